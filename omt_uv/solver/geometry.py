@@ -1,0 +1,91 @@
+"""Lengths, angles, areas and the cotangent Laplacian of triangle meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+
+def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """z component of the cross product of plane vectors (..., 2)."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Length of every halfedge, (3m,), of positions (n,2) or (n,3)."""
+    p = positions[triangles]
+    return np.linalg.norm(p[:, [1, 2, 0]] - p, axis=2).ravel()
+
+
+def face_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unsigned area of every triangle, (m,), of positions (n,3)."""
+    p = positions[triangles]
+    return 0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+
+
+def signed_areas(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Area of every triangle in the plane, (m,), positive when counter-clockwise, of uv (n,2)."""
+    p = uv[triangles]
+    return 0.5 * cross2(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+
+
+def vertex_areas(positions: np.ndarray, triangles: np.ndarray, density: np.ndarray | None = None) -> np.ndarray:
+    """A third of the adjacent face areas, times their density (m,) if given, per vertex, (n,)."""
+    area = face_areas(positions, triangles)
+    if density is not None:
+        area = area * density
+    return np.bincount(triangles.ravel(), np.repeat(area / 3, 3), len(positions))
+
+
+def angles_from_lengths(length: np.ndarray) -> np.ndarray:
+    """Angle opposite to halfedge k of every triangle, (m,3), of side lengths (m,3).
+
+    Half-angle formula; where the triangle inequality fails the angles are extended by pi opposite
+    to the too long side and 0 elsewhere (Springborn, Schroeder, Pinkall 2008, section 3.2), which keeps
+    the Yamabe energy convex and differentiable.
+    """
+    a, b, c = length.T
+    d = np.stack([b + c - a, c + a - b, a + b - c], axis=1)
+    total = (a + b + c)[:, None]
+    d = np.maximum(d, 0)
+    numerator = np.sqrt(d[:, [1, 2, 0]] * d[:, [2, 0, 1]])
+    return 2 * np.arctan2(numerator, np.sqrt(total * d))
+
+
+def cotangents_from_lengths(length: np.ndarray) -> np.ndarray:
+    """Cotangent of the angle opposite to halfedge k, (m,3); zero where the triangle is degenerate."""
+    a, b, c = length.T
+    squared = length**2
+    product = (a + b + c) * np.maximum(b + c - a, 0) * np.maximum(c + a - b, 0) * np.maximum(a + b - c, 0)
+    four_area = np.sqrt(product)
+    numerator = squared.sum(axis=1)[:, None] - 2 * squared
+    safe = four_area > 1e-14 * squared.max(axis=1)
+    return np.where(safe[:, None], numerator / np.where(safe, four_area, 1)[:, None], 0)
+
+
+def laplacian_from_weights(tail: np.ndarray, head: np.ndarray, weight: np.ndarray, n: int) -> csr_matrix:
+    """Positive semidefinite graph Laplacian (n,n) of edges with weights (each pair may repeat)."""
+    rows = np.concatenate([tail, head, tail, head])
+    columns = np.concatenate([head, tail, tail, head])
+    return csr_matrix((np.concatenate([-weight, -weight, weight, weight]), (rows, columns)), shape=(n, n))
+
+
+def cotangent_laplacian(positions: np.ndarray, triangles: np.ndarray) -> csr_matrix:
+    """Positive semidefinite cotangent Laplacian (n,n), entries -(cot + cot) / 2 (Pinkall, Polthier 1993)."""
+    length = halfedge_lengths(positions, triangles).reshape(-1, 3)
+    # The angle opposite to halfedge k is the one at vertex k + 2.
+    weight = 0.5 * cotangents_from_lengths(length)
+    return laplacian_from_weights(
+        triangles.ravel(), triangles[:, [1, 2, 0]].ravel(), weight.ravel(), len(positions)
+    )
+
+
+def angle_defects(triangles: np.ndarray, angles: np.ndarray, boundary: np.ndarray, n: int) -> np.ndarray:
+    """Curvature per vertex, (n,): 2 pi (on the boundary, pi) minus the angles around it.
+
+    `angles` (m,3) holds the angle *opposite* to halfedge k, which lies at vertex k + 2.
+    """
+    around = np.bincount(triangles[:, [2, 0, 1]].ravel(), angles.ravel(), n)
+    flat = np.full(n, 2 * np.pi)
+    flat[boundary] = np.pi
+    return flat - around

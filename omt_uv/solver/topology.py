@@ -1,0 +1,90 @@
+"""Halfedges, twins, boundary loops and components of triangle meshes, as flat arrays.
+
+Halfedge ``3 t + k`` of triangle ``t`` goes from ``T[t, k]`` to ``T[t, (k + 1) % 3]``; the boundary
+has twin -1 and is walked with the surface on its left.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+
+def halfedges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tail and head vertex of every halfedge, (3m,) each, of triangles (m,3)."""
+    return triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+
+
+def pair_keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """One int64 key per unordered pair of non-negative integers below 2^31."""
+    a, b = a.astype(np.int64), b.astype(np.int64)
+    return (np.minimum(a, b) << 32) | np.maximum(a, b)
+
+
+def pair_up(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of the two members of every key that occurs exactly twice, (p,) and (p,)."""
+    order = np.argsort(keys, kind="stable")
+    ordered = keys[order]
+    start = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
+    count = np.diff(np.r_[start, len(ordered)])
+    twice = start[count == 2]
+    return order[twice], order[twice + 1]
+
+
+def twins(triangles: np.ndarray) -> np.ndarray:
+    """Opposite halfedge of every halfedge, (3m,), -1 on the boundary, of an oriented manifold mesh (m,3)."""
+    tail, head = halfedges(triangles)
+    first, second = pair_up(pair_keys(tail, head))
+    twin = np.full(len(tail), -1, dtype=np.int64)
+    twin[first], twin[second] = second, first
+    return twin
+
+
+def next_halfedge(h: np.ndarray) -> np.ndarray:
+    """The following halfedge within the same triangle."""
+    return h + 1 - 3 * (h % 3 == 2)
+
+
+def previous_halfedge(h: np.ndarray) -> np.ndarray:
+    """The preceding halfedge within the same triangle."""
+    return h - 1 + 3 * (h % 3 == 0)
+
+
+def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
+    """Vertices of every boundary loop in order, surface on the left; longest loop first.
+
+    The mesh must be an oriented manifold with one fan per vertex (`charts.split` guarantees it).
+    """
+    tail, head = halfedges(triangles)
+    rim = np.flatnonzero(twins(triangles) < 0)
+    if len(rim) == 0:
+        return []
+    vertices = tail[rim]
+    successor = np.full(int(triangles.max()) + 1, -1, dtype=np.int64)
+    successor[vertices] = head[rim]
+    graph = coo_matrix((np.ones(len(rim)), (vertices, head[rim])), shape=(len(successor),) * 2)
+    label = connected_components(graph, directed=False)[1][vertices]
+    loops = [_walk(successor, vertices[label == c]) for c in np.unique(label)]
+    return sorted(loops, key=len, reverse=True)
+
+
+def _walk(successor: np.ndarray, members: np.ndarray) -> np.ndarray:
+    """Order one cycle by pointer doubling: position 2^k steps ahead is known after k rounds."""
+    start = int(members.min())
+    local = np.full(len(successor), -1, dtype=np.int64)
+    local[members] = np.arange(len(members))
+    jump = local[successor[members]]
+    order = np.array([local[start]])
+    while len(order) < len(members):
+        order = np.concatenate([order, jump[order]])
+        jump = jump[jump]
+    return members[order[: len(members)]]
+
+
+def triangle_components(triangles: np.ndarray) -> tuple[int, np.ndarray]:
+    """Number of edge-connected components and the component of every triangle, (m,)."""
+    twin = twins(triangles)
+    h = np.flatnonzero(twin >= 0)
+    graph = coo_matrix((np.ones(len(h)), (h // 3, twin[h] // 3)), shape=(len(triangles),) * 2)
+    return connected_components(graph, directed=False)
