@@ -1,0 +1,86 @@
+"""Where a UV map covers itself: the share of its area that lies under more than one face, by sampling."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .geometry import cross2
+
+SAMPLES = 200_000
+CHUNK = 20_000  # samples tested at once, for memory
+ENTRIES_PER_FACE = 40  # the grid is coarsened until its lists are no longer than this on average
+INSIDE = 1e-9  # a point this close to a face's border, relative to the squared extent, is not inside
+
+
+def overlap_share(uv, *, samples: int = SAMPLES, seed: int = 0) -> float:
+    """Share of the area of the triangles `uv` (m,3,2) that lies inside more than one of them.
+
+    Points are drawn uniformly by area, so the standard error is sqrt(share / samples); the same seed gives the same
+    points. 0 where no triangle has an area.
+    """
+    uv = np.asarray(uv, float)
+    area = np.abs(cross2(uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0])) / 2
+    tri, area = uv[area > 0], area[area > 0]
+    if not len(tri):
+        return 0.0
+    grid = _Grid(tri)
+    points = _draw(tri, area, samples, seed)
+    covered = np.concatenate([grid.cover(points[s : s + CHUNK]) for s in range(0, samples, CHUNK)])
+    return float((covered > 1).mean())
+
+
+def _draw(tri, area, samples, seed):
+    """Points (samples,2) distributed uniformly over the triangles."""
+    rng = np.random.default_rng(seed)
+    owner = rng.choice(len(tri), samples, p=area / area.sum())
+    cut = np.sort(rng.random((samples, 2)), axis=1)
+    bary = np.column_stack([cut[:, 0], cut[:, 1] - cut[:, 0], 1 - cut[:, 1]])
+    return np.einsum("ni,nid->nd", bary, tri[owner])
+
+
+class _Grid:
+    """Triangles listed by the cells of a square grid that their bounding boxes touch."""
+
+    def __init__(self, tri):
+        self.tri = tri
+        low, high = tri.min(1), tri.max(1)
+        self.origin = low.min(0)
+        self.extent = (high.max(0) - self.origin).max()
+        self.side = int(np.clip(np.sqrt(len(tri)), 8, 1024))
+        first, span = self._boxes(low, high)
+        while self.side > 1 and span.prod(1).sum() > ENTRIES_PER_FACE * len(tri):
+            self.side //= 2
+            first, span = self._boxes(low, high)
+        owner, k = _expand(span.prod(1))
+        column = first[owner, 0] + k % span[owner, 0]
+        row = first[owner, 1] + k // span[owner, 0]
+        cell = column * self.side + row
+        order = np.argsort(cell, kind="stable")
+        self.owner = owner[order]
+        self.start = np.searchsorted(cell[order], np.arange(self.side**2 + 1))
+
+    def _boxes(self, low, high):
+        first = self._cells(low)
+        return first, self._cells(high) - first + 1
+
+    def _cells(self, points):
+        return np.clip(((points - self.origin) / self.extent * self.side).astype(np.int64), 0, self.side - 1)
+
+    def cover(self, points):
+        """In how many triangles each point (k,2) lies."""
+        column, row = self._cells(points).T
+        cell = column * self.side + row
+        begin = self.start[cell]
+        query, k = _expand(self.start[cell + 1] - begin)
+        t = self.tri[self.owner[begin[query] + k]]
+        x = points[query]
+        sides = np.stack([cross2(t[:, (i + 1) % 3] - t[:, i], x - t[:, i]) for i in range(3)])
+        limit = INSIDE * self.extent**2
+        inside = (sides.min(0) > limit) | (sides.max(0) < -limit)
+        return np.bincount(query[inside], minlength=len(points))
+
+
+def _expand(counts):
+    """For rows of `counts` entries: the row of every entry, and its place within the row."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -1,0 +1,223 @@
+"""Distortion figures: exact values by hand, invariances, and agreement with an independent judge where it is at hand."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.distortion import RATIO_FLOOR, face_distortion, measure
+from omt_uv.solver.errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
+from omt_uv.solver.overlap import overlap_share
+
+JUDGE = Path(os.environ.get("OMT_UV_JUDGE") or meshes.ROOT.parent / "shared" / "tools" / "judge_uv.py")
+needs_judge = pytest.mark.skipif(not JUDGE.is_file(), reason=f"no judge at {JUDGE}: set OMT_UV_JUDGE to judge_uv.py")
+# what must not depend on the scale, rotation or mirror image of the map
+FIGURES = [
+    "area_l1",
+    "area_sd",
+    "area_p99",
+    "area_max",
+    "angle_mean",
+    "angle_p99",
+    "seed_area",
+    "seed_angle",
+    "overlap",
+]
+
+
+def flat(V, F):
+    """The map that drops z: (m,3,2)."""
+    return V[F][..., :2].copy()
+
+
+def rough_map(seed=0):
+    """A bumpy mesh under a smooth, uneven map with a handful of folded faces."""
+    V, F = meshes.bumpy()
+    X = V[:, :2] + 0.1 * np.sin(7 * V[:, [1, 0]]) + 0.03 * np.random.default_rng(seed).normal(size=(len(V), 2))
+    return V, F, X[F]
+
+
+def test_identity_is_exact():
+    V, F = meshes.grid(7, 5, 2.0, 3.0)
+    d = measure(V, F, flat(V, F))
+    assert (d.faces, d.charts, d.folds, d.skipped_zero_area_faces) == (70, 1, 0, 0)
+    assert d.area_l1 == pytest.approx(0, abs=1e-12) and d.area_sd == pytest.approx(0, abs=1e-12)
+    assert d.area_max == pytest.approx(0, abs=1e-12) and d.area_p99 == pytest.approx(0, abs=1e-12)
+    assert d.angle_mean == pytest.approx(1, abs=1e-7) and d.angle_p99 == pytest.approx(1, abs=1e-7)
+    assert d.seed_area == pytest.approx(2) and d.seed_angle == pytest.approx(2)
+    assert d.overlap == 0 and d.uv_min == (0, 0) and d.uv_max == (2, 3) and d.finite
+
+
+@pytest.mark.parametrize("stretch", [1.0, 1.5, 4.0, 300.0])
+def test_stretch_shears_and_keeps_area_shares(stretch):
+    V, F = meshes.grid()
+    d = measure(V, F, flat(V, F) * [stretch, 1.0])
+    assert d.angle_mean == pytest.approx(stretch) and d.angle_p99 == pytest.approx(stretch)
+    assert d.seed_angle == pytest.approx(stretch + 1 / stretch)
+    assert d.area_l1 == pytest.approx(0, abs=1e-12) and d.folds == 0
+
+
+def test_simple_shear_has_its_singular_values():
+    V, F = meshes.grid()
+    k = 0.7
+    _, shear = face_distortion(V, F, flat(V, F) @ np.array([[1.0, 0], [k, 1]]))
+    s1, s2 = np.linalg.svd([[1.0, k], [0, 1]], compute_uv=False)
+    assert shear == pytest.approx(np.full(len(F), s1 / s2))
+
+
+def test_area_figures_of_two_faces_by_hand():
+    V, F = meshes.quad_patch()
+    uv = flat(V, F)
+    uv[1] *= np.sqrt(3)  # two charts of areas 1/2 and 3/2: UV shares 1/4 and 3/4 of what should be halves
+    d = measure(V, F, uv)
+    assert d.charts == 2 and d.folds == 0
+    assert d.area_l1 == pytest.approx(0.5) and d.area_sd == pytest.approx(0.5)
+    assert d.area_max == pytest.approx(1.0) and d.seed_area == pytest.approx((0.5 + 2 + 1.5 + 2 / 3) / 2)
+    octaves, _ = face_distortion(V, F, uv)
+    assert octaves == pytest.approx([-1, np.log2(1.5)])
+
+
+def test_one_fold_is_counted_and_left_out_of_the_angles():
+    V, F = meshes.grid(2, 2)
+    uv = flat(V, F)
+    centre = F == 4
+    uv[centre] = [1.2, 0.5]  # pulled across the right side: the faces between the centre and that side turn over
+    d = measure(V, F, uv)
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    turned = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] <= 0
+    assert d.folds == turned.sum() > 0 and d.charts == 1
+    octaves, _ = face_distortion(V, F, uv)
+    assert np.array_equal(octaves == np.log2(RATIO_FLOOR), turned)
+
+
+def test_a_mirrored_chart_is_no_fold():
+    V, F = meshes.grid()
+    half = np.arange(len(F)) < len(F) // 2
+    uv = flat(V, F)
+    uv[half] = uv[half] * [-1, 1] - [5, 0]
+    assert measure(V, F, uv).folds == 0
+
+
+def test_known_overlap():
+    V, F = meshes.grid(1, 1)
+    V = np.concatenate([V, V + [3, 0, 0]])
+    F = np.concatenate([F, F + 4])
+    uv = flat(V, F)
+    uv[2:] -= [2.75, 0]  # the second unit square covers three quarters of the first
+    d = measure(V, F, uv)
+    assert d.charts == 2 and d.folds == 0
+    assert d.overlap == pytest.approx(0.75, abs=0.005)
+    assert measure(V, F, uv, overlap=False).overlap is None
+
+
+def test_overlap_counts_doubly_wound_strips_but_not_touching_faces():
+    V, F = meshes.spiral_strip(turns=2.0)
+    assert overlap_share(flat(V, F)) == 1.0
+    V, F = meshes.random_disk(2000)
+    assert overlap_share(flat(V, F)) == 0.0
+
+
+def test_overlap_of_one_giant_and_many_tiny_faces_stays_small_in_memory():
+    V, F = meshes.grid(60, 60)
+    tiny = flat(V, F) * 1e-3
+    giant = np.repeat(np.array([[[0.0, 0], [1, 0], [0, 1]]]), 50, axis=0)
+    assert overlap_share(np.concatenate([tiny, giant])) > 0.99
+
+
+@pytest.mark.parametrize("transform", ["scale", "rotation", "mirror", "mesh scale", "relabelling"])
+def test_figures_do_not_depend_on(transform):
+    V, F, uv = rough_map()
+    expected = measure(V, F, uv)
+    c, s = np.cos(1.1), np.sin(1.1)
+    if transform == "scale":
+        uv = uv * 1234.5
+    elif transform == "rotation":
+        uv = uv @ np.array([[c, s], [-s, c]]) + [3, -7]
+    elif transform == "mirror":
+        uv = uv * [-1, 1]
+    elif transform == "mesh scale":
+        V = V * 1e-4
+    else:
+        new = np.random.default_rng(1).permutation(len(V))
+        F, V = new[F], V[np.argsort(new)]
+    result = measure(V, F, uv)
+    assert result.folds == expected.folds > 0 and result.charts == expected.charts == 1
+    for name in FIGURES:
+        assert getattr(result, name) == pytest.approx(getattr(expected, name), rel=1e-8, abs=1e-3 * (name == "overlap"))
+
+
+def test_bad_input_is_a_named_error():
+    V, F = meshes.grid(2, 2)
+    uv = flat(V, F)
+    with pytest.raises(EmptyMeshError):
+        measure(V, F[:0], uv[:0])
+    broken = uv.copy()
+    broken[3, 1, 0] = np.nan
+    with pytest.raises(NonFiniteError) as caught:
+        measure(V, F, broken)
+    assert caught.value.kind == "face" and caught.value.elements.tolist() == [3]
+    with pytest.raises(NonFiniteError):
+        measure(np.where(np.arange(len(V))[:, None] == 4, np.inf, V), F, uv)
+    with pytest.raises(ZeroAreaFaceError):
+        measure(V * [1, 0, 0], F, uv)
+    with pytest.raises(ValueError, match="expected F"):
+        measure(V, F, uv[:, :2])
+
+
+def test_faces_without_area_are_skipped_and_vanished_maps_are_all_folds():
+    V, F = meshes.grid(3, 3)
+    F = np.concatenate([F, [[0, 1, 1]]])
+    d = measure(V, F, flat(V, F))
+    assert d.skipped_zero_area_faces == 1 and d.faces == 18 and d.area_l1 == pytest.approx(0, abs=1e-12)
+    octaves, shear = face_distortion(V, F, flat(V, F))
+    assert octaves[-1] == 0 and shear[-1] == 1
+    vanished = measure(V, F, 0 * flat(V, F))
+    assert vanished.folds == 18 and vanished.seed_area is None and vanished.overlap == 0
+
+
+def judge(V, F, uv):
+    spec = importlib.util.spec_from_file_location("judge_uv", JUDGE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.judge(V, F, uv)
+
+
+def assert_agrees(V, F, uv):
+    ours, theirs = asdict(measure(V, F, uv)), judge(V, F, uv)
+    assert set(theirs) <= set(ours)
+    for name, value in theirs.items():
+        assert ours[name] == pytest.approx(value, rel=1e-4, abs=1e-4), name
+
+
+@needs_judge
+@pytest.mark.parametrize("seed", range(5))
+def test_agrees_with_the_judge_on_rough_maps(seed):
+    assert_agrees(*rough_map(seed))
+
+
+@needs_judge
+def test_agrees_with_the_judge_on_several_overlapping_and_mirrored_charts():
+    V, F = meshes.icosphere(3)
+    V = V * [1.0, 1.3, 0.6]
+    below = V[F].mean(1)[:, 2] < 0
+    uv = V[F][..., :2] + 0.3 * V[F][..., 2:] ** 2
+    uv[below] = uv[below] * [0.4, 0.7] + [0.2, 0.1]
+    assert_agrees(V, F, uv)
+
+
+@needs_judge
+@meshes.models_missing
+@pytest.mark.parametrize("name", meshes.DISK_MODELS)
+def test_agrees_with_the_judge_on_models(name):
+    """Seen from the front every model overlaps, folds and shears as badly as a map can."""
+    V, F = meshes.load_model(name)
+    spread = V - V.mean(0)
+    axes = np.linalg.svd(spread.T @ spread)[0][:, :2]
+    X = spread @ axes
+    assert_agrees(V, F, np.float32(X / np.ptp(X))[F].astype(float))
