@@ -201,7 +201,7 @@ models_missing = pytest.mark.skipif(
 )
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def load_model(name):
     """A published model by its name, polygons cut into fans; the arrays are shared, so they are read-only."""
     path = model_path(name)
