@@ -163,3 +163,25 @@ def _edge_cosine(flat, log_length, u, h):
     i, j, k = u[flat[h]], u[flat[n]], u[flat[p]]
     side = np.stack([log_length[h] + i + j, log_length[n] + j + k, log_length[p] + k + i], axis=1)
     return opposite_cosines(side.ravel())[::3]
+
+
+def split_boundary_edge(tri: IntrinsicTriangulation, loop: np.ndarray, n: int):
+    """Put a vertex n in the middle of the longest boundary edge; returns the triangulation and the new loop."""
+    rim = np.flatnonzero(tri.twin < 0)
+    h = rim[np.argmax(tri.log_length[rim])]
+    after, before = next_halfedge(h), previous_halfedge(h)
+    i, j, k = tri.triangles.ravel()[[h, after, before]]
+    ij, jk, ki = np.exp(tri.log_length[[h, after, before]])
+    median = 0.5 * np.log(np.maximum(2 * jk**2 + 2 * ki**2 - ij**2, 0) / 4)
+    m = len(tri.triangles)
+    triangles = np.concatenate([tri.triangles, [[n, j, k]]])
+    triangles.reshape(-1)[after] = n
+    twin = np.concatenate([tri.twin, [-1, tri.twin[after], after]])
+    if tri.twin[after] >= 0:
+        twin[tri.twin[after]] = 3 * m + 1
+    twin[after] = 3 * m + 2
+    half = np.log(ij / 2)
+    log_length = np.concatenate([tri.log_length, [half, np.log(jk), median]])
+    log_length[h], log_length[after] = half, median
+    place = int(np.flatnonzero(loop == i)[0])
+    return IntrinsicTriangulation(triangles, twin, log_length), np.insert(loop, place + 1, n)
