@@ -34,7 +34,7 @@ class Domain(Protocol):
     """What the power diagram needs to know of a convex domain."""
 
     area: float
-    diameter: float
+    period: float  # of the boundary parameter
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         """Which points (k,2) lie inside, (k,) bool."""
@@ -64,7 +64,7 @@ class Disk:
     def __init__(self, radius: float = 1.0):
         self.radius = radius
         self.area = np.pi * radius**2
-        self.diameter = 2 * radius
+        self.period = 2 * np.pi
 
     def contains(self, points):
         return (points**2).sum(axis=1) <= self.radius**2
@@ -112,7 +112,7 @@ class ConvexPolygon:
         self.tangent = side / self.length[:, None]
         self.normal = np.stack([self.tangent[:, 1], -self.tangent[:, 0]], axis=1)
         self.start = np.concatenate([[0.0], np.cumsum(self.length)])
-        self.diameter = float(np.linalg.norm(self.corners[:, None] - self.corners, axis=2).max())
+        self.period = float(self.start[-1])
         pieces = segment_integrals(self.corners, np.roll(self.corners, -1, axis=0))
         self._cumulative = np.concatenate([np.zeros((4, 1)), np.cumsum(pieces, axis=1)], axis=1)
         self._reach = (self.normal * self.corners).sum(axis=1)
@@ -137,10 +137,10 @@ class ConvexPolygon:
         foot = self.corners + along[..., None] * self.tangent
         side = ((points[:, None] - foot) ** 2).sum(axis=2).argmin(axis=1)
         s = self.start[side] + np.take_along_axis(along, side[:, None], axis=1)[:, 0]
-        return np.where(s >= self.start[-1], 0.0, s)
+        return np.where(s >= self.period, 0.0, s)
 
     def boundary_point(self, s):
-        s = s % self.start[-1]
+        s = s % self.period
         side = np.clip(np.searchsorted(self.start, s, side="right") - 1, 0, len(self.corners) - 1)
         return self.corners[side] + (s - self.start[side])[:, None] * self.tangent[side]
 
@@ -153,7 +153,7 @@ class ConvexPolygon:
         return self._cumulative[:, -1]
 
     def map_boundary(self, share):
-        return self.boundary_point(share * self.start[-1])
+        return self.boundary_point(share * self.period)
 
 
 class Rectangle(ConvexPolygon):

@@ -63,6 +63,7 @@ def transport(
     floor = 0.5 * min(cells.area.min(), mass.min())
     error = np.linalg.norm(cells.area - mass)
     first = max(_residual(cells, mass), tolerance)
+    step = 1.0
     for iteration in range(MAX_STEPS):
         residual = _residual(cells, mass)
         done = 1 - np.log(max(residual, tolerance) / tolerance) / np.log(1 + first / tolerance)
@@ -70,7 +71,7 @@ def transport(
         if residual <= tolerance:
             return Transport(w, cells, residual, cells.cost(sites), iteration, diagrams)
         direction = _newton_direction(sites, cells, mass)
-        step = 1.0
+        step = min(1.0, 4 * step)
         for _ in range(MAX_HALVINGS):
             trial_w = w + step * direction
             trial = power_diagram(sites, trial_w, domain)
@@ -95,4 +96,4 @@ def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray) 
     i, j = cells.edges.T
     conductance = cells.length / (2 * np.linalg.norm(sites[i] - sites[j], axis=1))
     hessian = laplacian_from_weights(i, j, conductance, n)[1:, 1:]
-    return np.concatenate([[0.0], solve_spd(hessian.tocsc(), (mass - cells.area)[1:])])
+    return np.concatenate([[0.0], solve_spd(hessian.tocsc(), (mass - cells.area)[1:], order="mmd")])
