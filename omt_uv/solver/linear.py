@@ -15,6 +15,7 @@ from .errors import PrecisionError
 
 # Below this many unknowns minimum degree is the faster order of the two.
 SMALL = 20_000
+_ORDERS = {"mmd": "MMD_AT_PLUS_A", "colamd": "COLAMD", "natural": "NATURAL"}
 
 
 class Factor:
@@ -23,7 +24,7 @@ class Factor:
     Parameters
     ----------
     A : (n,n) sparse matrix
-    order : None (chosen by size), "mmd", "colamd", or (n,) permutation, `order[k]` the k-th unknown to eliminate
+    order : None (chosen by size), "mmd", "colamd", "natural" (as they come), or (n,) permutation, `order[k]` the k-th unknown to eliminate
     spd : True when A is symmetric positive definite, False for unsymmetric diagonally dominant systems
 
     Raises
@@ -36,7 +37,7 @@ class Factor:
         if order is None:
             order = "mmd" if spd and A.shape[0] < SMALL else "colamd"
         self._permutation = None
-        spec = {"mmd": "MMD_AT_PLUS_A", "colamd": "COLAMD"}.get(order, "") if isinstance(order, str) else "NATURAL"
+        spec = _ORDERS[order] if isinstance(order, str) else "NATURAL"
         if not isinstance(order, str):
             self._permutation = np.asarray(order)
             A = A[self._permutation][:, self._permutation].tocsc()
@@ -66,6 +67,18 @@ def solve_spd(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray | None = No
 def solve_general(A: sp.spmatrix, b: np.ndarray) -> np.ndarray:
     """Solve A x = b with A unsymmetric but diagonally dominant (Tutte systems); b (n,) or (n,k). Raises PrecisionError."""
     return Factor(A, "colamd", spd=False).solve(b)
+
+
+def minimum_degree(A: sp.spmatrix) -> np.ndarray:
+    """Elimination order of least fill, (n,), `order[k]` the k-th unknown to eliminate; only A's symmetric pattern counts.
+
+    Ordering takes longer than factoring: compute it once on the graph of the vertices, not on their coordinates.
+    """
+    A = sp.csc_matrix(A)
+    degree = np.diff(A.indptr)
+    dominant = sp.csc_matrix((np.full(A.nnz, -1.0), A.indices, A.indptr), shape=A.shape) + sp.diags(3.0 + degree)
+    lu = splu(sp.csc_matrix(dominant), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return np.argsort(lu.perm_c)
 
 
 def nested_dissection(A: sp.spmatrix, points: np.ndarray, leaf: int = 64) -> np.ndarray:

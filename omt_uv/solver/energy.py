@@ -1,0 +1,147 @@
+"""The energy of a piecewise linear map to the plane: shear plus weighted area error, infinite at a fold.
+
+    E = sum_f A_f [ (s1/s2 + s2/s1)/2 - 1 ] + balance * sum_f A_f [ (r + 1/r)/2 - 1 ],   r = s1 s2 / target ratio
+
+with s1 >= s2 the singular values of a face's Jacobian: MIPS (Hormann, Greiner 2000) plus its area
+counterpart (Degener, Meseth, Klein 2003). In complex notation the map is w and its derivatives
+a = dw/dz, b = dw/dconj(z); det J = |a|^2 - |b|^2 and the shear term is 2 |b|^2 / det J. The energy depends on
+|a| and |b| alone, so the Hessian's eigensystem is explicit (Smith, de Goes, Kim 2019): the two tangential
+directions i a, i b are eigenvectors and the radial ones form a 2x2 block. No singular value decomposition is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Faces of a surface, ready for the energy.
+
+    triangles (m,3); area (m,) of the surface, summing to 1 as weights of the energy; gradient (m,3) complex, the
+    gradients of the hat functions in each face's own plane; ratio (m,) target UV area over surface area.
+    """
+
+    triangles: np.ndarray
+    area: np.ndarray
+    gradient: np.ndarray
+    ratio: np.ndarray
+
+    def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """dw/dz and dw/dconj(z) per face, (m,) complex each, of a map w (n,) complex."""
+        corner = 0.5 * w[self.triangles]
+        g = self.gradient
+        a = np.einsum("mi,mi->m", corner, g.conj())
+        b = np.einsum("mi,mi->m", corner, g)
+        return a, b
+
+
+def elements(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> Elements:
+    """Elements of a surface (n,3), (m,3) whose faces shall have the UV areas target (m,).
+
+    Slivers too thin for double precision keep a finite gradient: their height is bounded below by 1e-9 of their longest side.
+    """
+    p = positions[triangles]
+    e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    side = np.linalg.norm(e1, axis=1)
+    x = np.einsum("md,md->m", e2, e1) / side
+    y = np.linalg.norm(np.cross(e1, e2), axis=1) / side
+    y = np.maximum(y, 1e-9 * np.maximum(side, np.abs(x)))
+    local = np.stack([np.zeros(len(x)), side, x + 1j * y], axis=1)
+    area = 0.5 * side * y
+    # The gradient of a hat function is the opposite side, turned by a quarter, over twice the area.
+    gradient = 1j * (local[:, [2, 0, 1]] - local[:, [1, 2, 0]]) / (2 * area)[:, None]
+    return Elements(triangles, area / area.sum(), gradient, target / area)
+
+
+def energy(faces: Elements, w: np.ndarray, balance: float) -> float:
+    """The energy of a map w (n,) complex; infinity where a face is folded."""
+    a, b = faces.derivatives(w)
+    outer, inner = squared(a), squared(b)
+    det = outer - inner
+    if not det.min() > 0:
+        return np.inf
+    r = det / faces.ratio
+    return float(faces.area @ (2 * inner / det + balance * ((r + 1 / r) / 2 - 1)))
+
+
+def gradient(faces: Elements, w: np.ndarray, balance: float) -> np.ndarray:
+    """Gradient (n,) complex: real part by u, imaginary part by v."""
+    return scatter(faces, local_derivatives(faces, w, balance).gradient, len(w))
+
+
+def scatter(faces: Elements, corner: np.ndarray, n: int) -> np.ndarray:
+    """Sum of corner values (m,3) complex per vertex, (n,)."""
+    flat = faces.triangles.ravel()
+    return np.bincount(flat, corner.real.ravel(), n) + 1j * np.bincount(flat, corner.imag.ravel(), n)
+
+
+@dataclass(frozen=True)
+class Local:
+    """Per face: gradient (m,3) complex by its corners; the Hessian is sum_k rows[:,k]^T rows[:,k], rows (m,4,3) complex.
+
+    A row stands for the linear form dw -> Re(row . dw).
+    """
+
+    gradient: np.ndarray
+    rows: np.ndarray
+
+
+def local_derivatives(faces: Elements, w: np.ndarray, balance: float) -> Local:
+    """Gradients and projected Hessians of all faces of a map w (n,) complex without folds."""
+    a, b = faces.derivatives(w)
+    e_outer, e_inner, block = _by_squares(faces, a, b, balance)
+    g = faces.gradient
+    corner = (e_outer * a)[:, None] * g + (e_inner * b)[:, None] * g.conj()
+    # Linear forms: change of |a|, of |b|, and of the two phases.
+    along_a = 0.5 * _unit(a).conj()[:, None] * g.conj()
+    along_b = 0.5 * _unit(b).conj()[:, None] * g
+    turn_a = -1j * np.sqrt(np.maximum(2 * e_outer, 0))[:, None] * along_a
+    turn_b = -1j * np.sqrt(np.maximum(2 * e_inner, 0))[:, None] * along_b
+    (c1, s1, v1), (c2, s2, v2) = _split(*block)
+    radial1 = np.sqrt(v1)[:, None] * (c1[:, None] * along_a + s1[:, None] * along_b)
+    radial2 = np.sqrt(v2)[:, None] * (c2[:, None] * along_a + s2[:, None] * along_b)
+    return Local(corner, np.stack([turn_a, turn_b, radial1, radial2], axis=1))
+
+
+def _by_squares(faces, a, b, balance):
+    """Derivatives by |a|^2 and |b|^2, and the Hessian entries by |a| and |b|."""
+    outer, inner = squared(a), squared(b)
+    det = outer - inner
+    weight = balance / 2
+    slope = weight * (1 / faces.ratio - faces.ratio / det**2)
+    bend = balance * faces.ratio / det**3 + 4 * inner / det**3
+    area = faces.area
+    e_outer = area * (slope - 2 * inner / det**2)
+    e_inner = area * (2 / det + 2 * inner / det**2 - slope)
+    aa = 2 * e_outer + area * 4 * outer * bend
+    ab = -4 * area * np.sqrt(outer * inner) * (bend + 2 / det**2)
+    bb = 2 * e_inner + area * 4 * inner * (bend + 4 / det**2)
+    return e_outer, e_inner, (aa, ab, bb)
+
+
+def _split(aa, ab, bb):
+    """Eigenvectors (cos, sin) and eigenvalues, negative ones set to 0, of symmetric 2x2 matrices."""
+    angle = 0.5 * np.arctan2(2 * ab, aa - bb)
+    c, s = np.cos(angle), np.sin(angle)
+    mean, half = (aa + bb) / 2, np.hypot((aa - bb) / 2, ab)
+    return (c, s, np.maximum(mean + half, 0)), (-s, c, np.maximum(mean - half, 0))
+
+
+def squared(z):
+    return z.real**2 + z.imag**2
+
+
+def _unit(z):
+    size = np.abs(z)
+    return np.where(size > 0, z, 1) / np.where(size > 0, size, 1)
+
+
+def area_error(faces: Elements, w: np.ndarray) -> float:
+    """Share of the UV area of w (n,) in the wrong place: sum of |share - target share| over the faces."""
+    a, b = faces.derivatives(w)
+    area = faces.area * (squared(a) - squared(b))
+    target = faces.area * faces.ratio
+    return float(np.abs(area / area.sum() - target / target.sum()).sum())

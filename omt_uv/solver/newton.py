@@ -1,0 +1,191 @@
+"""Projected Newton for energies of piecewise linear maps, with vertices that are free, slide on a curve or stay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from .energy import Elements, energy, local_derivatives, scatter, squared
+from .linear import Factor
+
+ARMIJO = 1e-4
+MAX_HALVINGS = 40
+# A step goes at most this share of the way to the first fold.
+FOLD_SHARE = 0.9
+# Added to the diagonal, relative to its mean: a free map has no place and no direction of its own.
+SHIFT = 1e-10
+
+
+class Motion(Protocol):
+    """How vertices may move: each has a frame of two axes, and either axis may be blocked."""
+
+    free: np.ndarray  # (n,2) bool
+
+    def frame(self, w: np.ndarray) -> np.ndarray:
+        """First axis (n,) as unit complex numbers; the second is i times the first."""
+
+    def bend(self, w: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        """Second derivative (n,) of the energy that the first axis gains from the curve's bending."""
+
+    def move(self, w: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """The map after a step (n,) complex in the frame's axes."""
+
+
+class Free:
+    """Every vertex may go anywhere, except the pinned ones (n,) bool."""
+
+    def __init__(self, pinned: np.ndarray):
+        self.free = np.repeat(~pinned[:, None], 2, axis=1)
+
+    def frame(self, w):
+        return np.ones(len(w), complex)
+
+    def bend(self, w, gradient):
+        return np.zeros(len(w))
+
+    def move(self, w, step):
+        return w + step
+
+
+class OnCircle:
+    """Vertices of `loop` slide on the circle of this radius about 0, the others are free."""
+
+    def __init__(self, loop: np.ndarray, radius: float, n: int):
+        self.loop, self.radius = loop, radius
+        self.free = np.ones((n, 2), bool)
+        self.free[loop, 1] = False
+
+    def frame(self, w):
+        axis = np.ones(len(w), complex)
+        axis[self.loop] = 1j * w[self.loop] / np.abs(w[self.loop])
+        return axis
+
+    def bend(self, w, gradient):
+        second = np.zeros(len(w))
+        at = w[self.loop]
+        second[self.loop] = -(gradient[self.loop].conj() * at).real / self.radius**2
+        return second
+
+    def move(self, w, step):
+        moved = w + self.frame(w) * step
+        turn = np.angle(w[self.loop]) + step[self.loop].real / self.radius
+        moved[self.loop] = self.radius * np.exp(1j * turn)
+        return moved
+
+
+class OnLines:
+    """Vertices (k,) slide along the directions (k,) complex; `fixed` (c,) stay; the others are free."""
+
+    def __init__(self, sliding: np.ndarray, direction: np.ndarray, fixed: np.ndarray, n: int):
+        self.axis = np.ones(n, complex)
+        self.axis[sliding] = direction
+        self.free = np.ones((n, 2), bool)
+        self.free[sliding, 1] = False
+        self.free[fixed] = False
+
+    def frame(self, w):
+        return self.axis
+
+    def bend(self, w, gradient):
+        return np.zeros(len(w))
+
+    def move(self, w, step):
+        return w + self.axis * step
+
+
+class Assembly:
+    """Scatters 6x6 matrices of faces into one sparse matrix whose pattern never changes.
+
+    Unknown 2 i and 2 i + 1 are the axes of vertex i.
+    """
+
+    def __init__(self, triangles: np.ndarray, n: int):
+        rows = np.repeat(triangles, 3, axis=1)
+        columns = np.tile(triangles, (1, 3))
+        key, block = np.unique(columns.astype(np.int64) * n + rows, return_inverse=True)
+        column, row = key // n, key % n
+        degree = np.bincount(column, minlength=n)
+        start = np.cumsum(degree) - degree
+        place = np.arange(len(key)) - start[column]
+        # Within column 2 j + q the rows 2 i + p follow each other.
+        axis = np.arange(2)
+        slot = 4 * start[column][:, None, None] + 2 * place[:, None, None] + axis[:, None]
+        slot = slot + (2 * degree[column])[:, None, None] * axis
+        local = slot[block.reshape(-1, 3, 3)].transpose(0, 1, 3, 2, 4)
+        self._slot = np.ascontiguousarray(local.reshape(-1), dtype=np.int64)
+        self._indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))])
+        self._indices = np.empty(4 * len(key), np.int32)
+        self._indices[slot.ravel()] = np.broadcast_to(2 * row[:, None, None] + axis[:, None], slot.shape).ravel()
+        self._diagonal = np.empty(2 * n, np.int64)
+        self._diagonal[:] = slot[row == column][:, axis, axis].ravel()
+        self._size = 2 * n
+
+    def matrix(self, blocks: np.ndarray, diagonal: np.ndarray) -> sp.csc_matrix:
+        """Sum of the faces' blocks (m,6,6), plus a diagonal (2n,)."""
+        data = np.bincount(self._slot, blocks.ravel(), len(self._indices))
+        data[self._diagonal] += diagonal
+        return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One accepted Newton step: the map, its energy, the predicted decrease (half the Newton decrement), the step's share."""
+
+    w: np.ndarray
+    energy: float
+    decrement: float
+    share: float
+
+
+def newton_direction(faces: Elements, assembly: Assembly, motion: Motion, w, balance):
+    """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
+    n = len(w)
+    local = local_derivatives(faces, w, balance)
+    slope = scatter(faces, local.gradient, n)
+    frame = motion.frame(w)
+    free = motion.free.astype(float)
+    rows = np.ascontiguousarray((local.rows * frame[faces.triangles][:, None, :]).conj()).view(float)
+    rows *= free[faces.triangles].reshape(-1, 1, 6)
+    blocks = np.matmul(rows.transpose(0, 2, 1), rows)
+    axes = (slope * frame.conj()).view(float).reshape(n, 2) * free
+    diagonal = 1 - free
+    diagonal[:, 0] += np.maximum(motion.bend(w, slope), 0) * free[:, 0]
+    scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
+    matrix = assembly.matrix(blocks, diagonal.ravel() + SHIFT * scale)
+    step = -Factor(matrix, "natural").solve(axes.ravel())
+    return step.view(complex), float(step @ axes.ravel())
+
+
+def newton_step(faces: Elements, assembly: Assembly, motion: Motion, w, value, balance) -> Step:
+    """One line-searched Newton step from a map w (n,) complex of energy `value`.
+
+    Raises
+    ------
+    PrecisionError : no decrease can be found along the Newton direction
+    """
+    step, slope = newton_direction(faces, assembly, motion, w, balance)
+    share = min(1.0, FOLD_SHARE * first_fold(faces, w, motion.frame(w) * step))
+    for _ in range(MAX_HALVINGS):
+        trial = motion.move(w, share * step)
+        trial_value = energy(faces, trial, balance)
+        if trial_value <= value + ARMIJO * share * slope:
+            return Step(trial, trial_value, -slope / 2, share)
+        share *= 0.5
+    return Step(w, value, -slope / 2, 0.0)
+
+
+def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:
+    """The smallest t > 0 at which a face of w + t step has no area; infinity if there is none."""
+    a, b = faces.derivatives(w)
+    da, db = faces.derivatives(step)
+    c = squared(a) - squared(b)
+    h = (a.conj() * da).real - (b.conj() * db).real
+    q = squared(da) - squared(db)
+    # q t^2 + 2 h t + c = 0 with c > 0: the smallest positive root in the form that does not cancel.
+    root = h * h - q * c
+    denominator = -h + np.sqrt(np.maximum(root, 0))
+    hit = (root >= 0) & (denominator > 0)
+    return float((c[hit] / denominator[hit]).min(initial=np.inf))

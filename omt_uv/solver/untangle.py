@@ -1,0 +1,49 @@
+"""Straighten a map that has folded faces, by one Tutte system (Tutte 1963, Floater 2003).
+
+Mean value weights taken from the folded map's own geometry reproduce it where its stars are valid; with all angles
+taken as positive the weights are positive everywhere, and with a convex boundary they make an embedding.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .embedding import arc_length_parameters, tutte
+from .geometry import signed_areas
+
+
+def count_folds(uv: np.ndarray, triangles: np.ndarray) -> int:
+    """Faces of a map (n,2) that are not counter-clockwise."""
+    return int((~(signed_areas(uv, triangles) > 0)).sum())
+
+
+def untangle(uv: np.ndarray, positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, rim: np.ndarray):
+    """An embedding near uv (n,2) with the boundary loop (b,) on the convex curve rim (b,2), and what had to be done.
+
+    Two systems are tried: weights of the map itself, then weights of the surface. The second return value is None
+    after the first and a warning after the second.
+    """
+    straight = tutte(uv, triangles, loop, rim)
+    if count_folds(straight, triangles) == 0:
+        return straight, None
+    fresh = tutte(positions, triangles, loop, rim)
+    if count_folds(fresh, triangles) < count_folds(straight, triangles):
+        return fresh, "The start could not be untangled; the refinement starts from a mean value map of the surface"
+    return straight, None
+
+
+def circle_rim(uv: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarray | None:
+    """Boundary of uv (n,2) pushed radially on to the circle about 0, (b,2); None unless that keeps its order."""
+    w = uv[loop, 0] + 1j * uv[loop, 1]
+    if not (np.abs(w) > 0).all():
+        return None
+    turn = np.angle(np.roll(w, -1) / w)
+    if not (turn > 0).all() or abs(turn.sum() - 2 * np.pi) > 1e-6:
+        return None
+    return uv[loop] * (radius / np.abs(w))[:, None]
+
+
+def arc_length_rim(positions: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarray:
+    """The boundary loop (b,) of a surface spread over the circle by its length, (b,2)."""
+    angle = 2 * np.pi * arc_length_parameters(positions, loop)
+    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
