@@ -65,7 +65,8 @@ def conformal_rectangle(
     """Conformal map of a disk mesh (n,3), (m,3) to the rectangle [0,1] x [0,aspect].
 
     corners (4,) boundary vertices, counter-clockwise from the lower left; the sharpest by default.
-    Raises PrecisionError where the map leaves double precision.
+    Triangles whose three vertices lie on one side have no area in the image. Raises PrecisionError where the
+    map leaves double precision.
     """
     loop = boundary_loops(triangles)[0]
     if corners is None:
@@ -108,6 +109,7 @@ def sharpest_corners(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarr
 
 def _rectangle(vertices, triangles, loop, corners) -> Steps[ConformalMap]:
     n = len(vertices)
+    loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
     scale = np.sqrt(vertex_areas(vertices, triangles).sum())
     tri = from_mesh((vertices - vertices.mean(axis=0)) / scale, triangles)
     if len(loop) == 3:
@@ -138,6 +140,8 @@ def _layout(flow: YamabeFlow, owner, loop, corners, n) -> tuple[np.ndarray, floa
     place = np.full(n, -1, dtype=np.int64)
     place[loop] = np.arange(len(loop))
     start = place[corners]
+    if (np.diff(start) <= 0).any():
+        raise ValueError("the corners must be four different boundary vertices in counter-clockwise order")
     # Side of the rectangle of each boundary segment: 0 bottom, 1 right, 2 top, 3 left.
     side = (np.searchsorted(start, np.arange(len(loop)), side="right") - 1) % 4
     segment = crossed_segment(flow.triangulation, loop, n)
