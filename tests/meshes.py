@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from omt_uv.solver.charts import Surface
+
 ROOT = Path(__file__).resolve().parent.parent
 DISK_MODELS = ["snail", "lilium", "camel_b", "face", "lion", "alligator", "woody", "hemisphere", "maze"]
 CLOSED_MODELS = ["max_planck", "bunny_small", "spot", "homer", "bunny", "david", "armadillo"]
@@ -130,6 +132,13 @@ def head(count=40, seed=0):
     return V * scale[:, None] * [1.0, 0.8, 1.2], F
 
 
+def quad_grid(columns=6, rows=6):
+    """A wavy square of quads: positions and polygons, a list of vertex lists."""
+    V, _ = bumpy(columns, rows, height=0.2, waves=1.0)
+    corner = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    return V, np.column_stack([corner, corner + 1, corner + columns + 2, corner + columns + 1]).tolist()
+
+
 # ---- charts that are no disks -------------------------------------------------------------------------------
 
 
@@ -180,6 +189,24 @@ def torus(major=24, minor=12, radius=0.4):
     c, d = (i + 1) % major * minor + (j + 1) % minor, i * minor + (j + 1) % minor
     a, b, c, d = (k.ravel() for k in (a, b, c, d))
     return V, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+
+
+# ---- polygons -----------------------------------------------------------------------------------------------
+
+
+def polygon_surface(V, polygons, seams=()):
+    """The `Surface` of a polygon mesh, polygons (lists of vertices) cut into fans of triangles."""
+    sizes = np.array([len(p) for p in polygons], dtype=np.int64)
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    fans = [(s, s + k, s + k + 1) for s, size in zip(start[:-1], sizes, strict=True) for k in range(1, size - 1)]
+    return Surface(
+        positions=np.asarray(V, float),
+        corner_vertex=np.array([v for p in polygons for v in p], np.int64),
+        face_start=start,
+        triangles=np.array(fans, np.int64).reshape(-1, 3),
+        triangle_face=np.repeat(np.arange(len(sizes)), np.maximum(sizes - 2, 0)),
+        seams=np.asarray(seams, np.int64).reshape(-1, 2),
+    )
 
 
 # ---- published models ---------------------------------------------------------------------------------------

@@ -1,0 +1,79 @@
+"""Make the pictures of the README: our unwrap beside Blender's own, on the same chart at the same texel density.
+
+Needs bpy, matplotlib and published models (OMT_UV_MODELS); a procedural head where there are none.
+usage: make_pictures.py [--models NAME ...] [--out FOLDER]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "benchmarks"))
+
+import meshes
+import pictures
+import rivals
+from cases import load_case, our_uv
+
+from omt_uv.solver.distortion import face_distortion, measure
+
+CELLS = {"lilium": 120}  # how many checker cells cover the model
+RIVALS = {"Blender Angle Based": "Angle Based", "Blender Minimum Stretch": "Minimum Stretch 50"}
+OURS = "OMT UV"
+
+
+def maps(case):
+    """Corner UVs (m,3,2) by title."""
+    found = {title: rivals.unwrap(case.V, case.F, case.seams, method).uv for title, method in RIVALS.items()}
+    found[OURS] = our_uv(case, "free", "standard")[0]
+    return found
+
+
+def gallery(name, out, scratch, pixels):
+    """Three sheets of one model: the checker, the distortions as colours, and the layouts."""
+    case = load_case(name)
+    V, F = case.V, case.F
+    view = pictures.VIEWS.get(name, pictures.View())
+    texture = pictures.checker(scratch / "checker.png")
+    checks, areas, shears, layouts, captions = [], [], [], [], []
+    uvs = maps(case)
+    for k, uv in enumerate(uvs.values()):
+        octaves, shear = face_distortion(V, F, uv)
+        area_rgb, shear_rgb = pictures.area_colours(octaves), pictures.shear_colours(shear)
+        figures = measure(V, F, uv)
+        captions.append(f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}")
+        for folder, suffix in ((checks, "checker"), (areas, "area"), (shears, "shear"), (layouts, "layout")):
+            folder.append(scratch / f"{name}_{k}_{suffix}.png")
+        scaled = pictures.equal_density(V, F, uv, CELLS.get(name, 300))
+        pictures.render_checker(V, F, scaled, view, checks[-1], texture, pixels)
+        pictures.render_colours(V, F, area_rgb, view, areas[-1], pixels)
+        pictures.render_colours(V, F, shear_rgb, view, shears[-1], pixels)
+        pictures.layout(uv, area_rgb, layouts[-1], pixels)
+    titles, blank = list(uvs), [""] * len(uvs)
+    pictures.sheet(out / f"{name}_checker.png", titles, [("", checks, captions, None)])
+    rows = [("area", areas, blank, pictures.AREA_SCALE), ("shear", shears, captions, pictures.SHEAR_SCALE)]
+    pictures.sheet(out / f"{name}_distortion.png", titles, rows)
+    pictures.sheet(out / f"{name}_layout.png", titles, [("", layouts, captions, pictures.AREA_SCALE)])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    present = [n for n in ("face", "lion", "lilium", "max_planck") if meshes.model_path(n)]
+    parser.add_argument("--models", nargs="+", default=present or ["head"])
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures")
+    parser.add_argument("--pixels", type=int, default=400, help="of one panel")
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        for name in args.models:
+            gallery(name, args.out, Path(scratch), args.pixels)
+    for path in sorted(args.out.glob("*.png")):
+        print(f"{path} {path.stat().st_size // 1000} kB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,224 @@
+"""Thousands of broken meshes: every outcome is a map or a named error, and the input stays as it was."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.charts import Surface
+from omt_uv.solver.errors import MeshError
+from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.progress import drain
+
+CASES = 2400
+CHUNKS = 24
+
+
+# ---- surgery: (rng, V, polygons) -> (V, polygons) -----------------------------------------------------------
+
+
+def delete(rng, V, P):
+    gone = set(rng.choice(len(P), rng.integers(1, max(2, len(P) // 4)), replace=False).tolist())
+    return V, [p for i, p in enumerate(P) if i not in gone]
+
+
+def duplicate(rng, V, P):
+    return V, [*P, list(P[rng.integers(len(P))])]
+
+
+def flip(rng, V, P):
+    i = rng.integers(len(P))
+    return V, [p[::-1] if k == i else p for k, p in enumerate(P)]
+
+
+def flip_half(rng, V, P):
+    return V, [p[::-1] if k < len(P) // 2 else p for k, p in enumerate(P)]
+
+
+def weld(rng, V, P):
+    """Two far vertices become one: bow-ties, pinches, non-manifold edges."""
+    a, b = rng.choice(len(V), 2, replace=False)
+    return V, [[a if v == b else v for v in p] for p in P]
+
+
+def collapse(rng, V, P):
+    """One vertex is put upon another of its polygon."""
+    p = P[rng.integers(len(P))]
+    V[p[0]] = V[p[1]]
+    return V, P
+
+
+def repeat_vertex(rng, V, P):
+    p = list(P[rng.integers(len(P))])
+    return V, [*P, [p[0], p[1], p[1]]]
+
+
+def needle(rng, V, P):
+    """A vertex is moved next to the line through two others of its polygon."""
+    p = P[rng.integers(len(P))]
+    V[p[0]] = V[p[1]] + rng.random() * (V[p[2]] - V[p[1]]) + 10.0 ** rng.uniform(-18, -3) * rng.normal(size=3)
+    return V, P
+
+
+def not_a_number(rng, V, P):
+    V[rng.integers(len(V)), rng.integers(3)] = rng.choice([np.nan, np.inf, -np.inf])
+    return V, P
+
+
+def far_away(rng, V, P):
+    V[rng.integers(len(V))] *= 10.0 ** rng.integers(2, 300)
+    return V, P
+
+
+def scale(rng, V, P):
+    return V * 10.0 ** rng.uniform(-320, 308), P
+
+
+def offset(rng, V, P):
+    return V + 10.0 ** rng.uniform(0, 18), P
+
+
+def flatten(rng, V, P):
+    V[:, rng.integers(3)] *= 10.0 ** rng.integers(-30, 1)
+    return V, P
+
+
+def jitter(rng, V, P):
+    return V + 10.0 ** rng.uniform(-3, 1) * rng.normal(size=V.shape), P
+
+
+def fin(rng, V, P):
+    """A third face at an edge."""
+    p = P[rng.integers(len(P))]
+    return np.concatenate([V, rng.normal(size=(1, 3))]), [*P, [p[1], p[0], len(V)]]
+
+
+def hole(rng, V, P):
+    """The faces around one or two vertices go: several boundaries."""
+    gone = set(rng.choice(len(V), rng.integers(1, 3), replace=False).tolist())
+    return V, [p for p in P if not gone & set(p)]
+
+
+def stray_vertices(rng, V, P):
+    return np.concatenate([V, np.full((3, 3), np.nan)]), P
+
+
+def second_part(rng, V, P):
+    W, Q = BASES[rng.integers(len(BASES))]()
+    return np.concatenate([V, W + 3]), [*P, *[[v + len(V) for v in q] for q in _lists(Q)]]
+
+
+def shuffle(rng, V, P):
+    """New names for everything: no damage by itself."""
+    name = rng.permutation(len(V))
+    return V[np.argsort(name)], [[int(name[v]) for v in P[i]] for i in rng.permutation(len(P))]
+
+
+SURGERY = [delete, duplicate, flip, flip_half, weld, collapse, repeat_vertex, needle, not_a_number, far_away, scale,
+           offset, flatten, jitter, fin, hole, stray_vertices, second_part, shuffle]  # fmt: skip
+
+BASES = [
+    meshes.single_triangle,
+    meshes.quad_patch,
+    meshes.cube,
+    meshes.annulus,
+    meshes.quad_grid,
+    lambda: meshes.bumpy(6, 6),
+    lambda: meshes.cone(3, 8),
+    lambda: meshes.cap(5, 10),
+    lambda: meshes.comb(3, 3),
+    lambda: meshes.spiral_strip(1.5, 20),
+    lambda: meshes.random_disk(40),
+    lambda: meshes.icosphere(1),
+    lambda: meshes.torus(8, 6),
+]
+
+
+def soup(rng):
+    """Random polygons on few vertices: everything wrong at once."""
+    count = rng.integers(3, 12)
+    polygons = [rng.choice(count, rng.integers(3, min(count, 5) + 1), replace=rng.random() < 0.1).tolist()
+                for _ in range(rng.integers(0, 10))]  # fmt: skip
+    return rng.normal(size=(count, 3)), polygons
+
+
+def _lists(polygons):
+    return [[int(v) for v in p] for p in polygons]
+
+
+def broken_mesh(seed):
+    """The surface, the chosen faces (or None) and options of case `seed`."""
+    rng = np.random.default_rng(seed)
+    if rng.random() < 0.15:
+        V, P = soup(rng)
+    else:
+        V, P = BASES[rng.integers(len(BASES))]()
+        P = _lists(P)
+        with np.errstate(over="ignore"):
+            for _ in range(rng.integers(1, 4)):
+                if P:
+                    V, P = SURGERY[rng.integers(len(SURGERY))](rng, V.copy(), P)
+    seams = rng.integers(len(V), size=(rng.integers(0, 4), 2))
+    if P and rng.random() < 0.5:
+        edges = np.array([[p[0], p[1]] for p in P])
+        seams = np.concatenate([seams, edges[rng.random(len(edges)) < rng.random()]])
+    surface = meshes.polygon_surface(V, P, seams)
+    faces = rng.random(len(P)) < 0.8 if rng.random() < 0.2 else None
+    return surface, faces, {"boundary": rng.choice(["disk", "square", "free"]), "quality": "draft"}
+
+
+def arrays(surface: Surface):
+    return [np.array(getattr(surface, name)) for name in Surface.__dataclass_fields__]
+
+
+def check_error(error: MeshError, surface: Surface):
+    assert error.cause and str(error).startswith(error.cause) and error.remedy
+    limit = {"vertex": len(surface.positions), "edge": len(surface.positions), "face": len(surface.face_start) - 1}
+    if len(error.elements):
+        assert error.kind in limit
+        assert error.elements.min() >= 0 and error.elements.max() < limit[error.kind]
+        assert error.elements.shape[1:] == ((2,) if error.kind == "edge" else ())
+
+
+def check_result(result, surface: Surface, faces):
+    chosen = np.ones(len(surface.face_start) - 1, bool) if faces is None else faces
+    corners, uv = result.corner_uv()
+    expected = np.flatnonzero(np.repeat(chosen, np.diff(surface.face_start)))
+    assert np.array_equal(np.sort(corners), expected)
+    assert uv.shape == (len(corners), 2) and np.isfinite(uv).all()
+    for chart, chart_map in zip(result.charts, result.maps, strict=True):
+        assert chart_map.uv.shape == (len(chart.vertices), 2)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("chunk", range(CHUNKS))
+def test_every_outcome_is_a_map_or_a_named_error(chunk):
+    for seed in range(chunk * CASES // CHUNKS, (chunk + 1) * CASES // CHUNKS):
+        surface, faces, options = broken_mesh(seed)
+        before = arrays(surface)
+        try:
+            result = drain(unwrap(surface, faces, **options))
+        except MeshError as error:
+            check_error(error, surface)
+        except Exception as error:
+            error.add_note(f"broken_mesh({seed}), {options}")
+            raise
+        else:
+            check_result(result, surface, faces)
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, arrays(surface), strict=True)), seed
+
+
+def test_the_fuzz_meets_maps_and_every_kind_of_error():
+    """A fuzz that always breaks at the first check would show nothing."""
+    outcomes = set()
+    for seed in range(600):
+        surface, faces, options = broken_mesh(seed)
+        try:
+            with np.errstate(all="ignore"):
+                drain(unwrap(surface, faces, **options))
+            outcomes.add("map")
+        except MeshError as error:
+            outcomes.add(type(error).__name__)
+    assert outcomes >= {"map", "EmptyMeshError", "NonFiniteError", "ZeroAreaFaceError", "DuplicateFaceError",
+                        "NonManifoldEdgeError", "OrientationError", "NotADiskError"}  # fmt: skip
