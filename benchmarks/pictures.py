@@ -37,8 +37,8 @@ VIEWS = {
     "face": View("Y", 8, 4),
     "lion": View("Y", 130, 5),
     "lilium": View("Z", 30, 50),
-    "max_planck": View("Y", 20, 5),
-    "spot": View("Y", 130, 15),
+    "max_planck": View("Y", 100, 5),
+    "spot": View("Y", 155, 15),
     "head": View("Z", 30, 5),
 }
 
@@ -140,7 +140,12 @@ def _palette(image, colour_functions):
     sample.paste(image)
     for k, bar in enumerate(bars):
         sample.paste(bar, (0, image.height + k * bar.height))
-    return image.quantize(palette=sample.quantize(256, kmeans=3), dither=Image.Dither.NONE)
+    result = image.quantize(palette=sample.quantize(256, kmeans=3), dither=Image.Dither.NONE)
+    palette = result.getpalette()
+    ground = 3 * result.getpixel((0, 0))
+    palette[ground : ground + 3] = [255, 255, 255]  # clustering has mixed the paper with the lightest of the rest
+    result.putpalette(palette)
+    return result
 
 
 def _bar(colour, length, thick):
