@@ -1,0 +1,237 @@
+"""Blender meshes to arrays and back; nothing else in the project reads or writes a mesh.
+
+Edit Mode is read from a copy of the flushed mesh, in bulk, and written through BMesh, which touches nothing
+but the corners it is told to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import bpy  # noqa: I001 - bmesh exists only once bpy is there
+import bmesh
+import numpy as np
+
+from .solver.charts import Surface
+from .solver.errors import MeshError, NonFiniteError
+
+UV_LAYER_NAME = "UVMap"
+UV_LAYER_NAME_BYTES = 63
+
+
+class TargetError(ValueError):
+    """The UVs cannot be written where the user wants them."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A surface, the polygons to work on (f,) bool, and the active UV layer (c,2) float32 if there is one."""
+
+    surface: Surface
+    faces: np.ndarray
+    uv: np.ndarray | None
+
+
+def read(obj: bpy.types.Object) -> Reading:
+    """Read a mesh object with its scale applied, whatever mode it is in.
+
+    Object Mode works on every polygon, Edit Mode on the selected ones that are not hidden. Loose vertices and
+    edges are in no polygon and play no part.
+
+    Raises
+    ------
+    NonFiniteError : the transformation of the object is not finite
+    """
+    if obj.mode != "EDIT":
+        return _read_mesh(obj.data, obj, edit_mode=False)
+    obj.update_from_editmode()
+    copy = obj.data.copy()
+    try:
+        return _read_mesh(copy, obj, edit_mode=True)
+    finally:
+        bpy.data.meshes.remove(copy)
+
+
+def _read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, edit_mode: bool) -> Reading:
+    mesh.calc_loop_triangles()
+    f = len(mesh.polygons)
+    starts = np.append(_get(mesh.polygons, "loop_start", f), len(mesh.loops))
+    seam = _get(mesh.edges, "use_seam", len(mesh.edges), bool)
+    surface = Surface(
+        positions=_stretched(_get(mesh.vertices, "co", 3 * len(mesh.vertices), np.float32).reshape(-1, 3), obj),
+        corner_vertex=_get(mesh.loops, "vertex_index", len(mesh.loops)),
+        face_start=starts,
+        triangles=_get(mesh.loop_triangles, "loops", 3 * len(mesh.loop_triangles)).reshape(-1, 3),
+        triangle_face=_get(mesh.loop_triangles, "polygon_index", len(mesh.loop_triangles)),
+        seams=_get(mesh.edges, "vertices", 2 * len(mesh.edges)).reshape(-1, 2)[seam],
+    )
+    faces = np.ones(f, dtype=bool)
+    if edit_mode:
+        faces = _get(mesh.polygons, "select", f, bool) & ~_get(mesh.polygons, "hide", f, bool)
+    layer = mesh.uv_layers.active
+    return Reading(surface, faces, read_uv(mesh, layer.name) if layer else None)
+
+
+def _get(collection, name: str, count: int, dtype=np.int32) -> np.ndarray:
+    values = np.zeros(count, dtype)
+    if count:
+        collection.foreach_get(name, values)
+    return values.astype(np.int64) if dtype is np.int32 else values
+
+
+def _stretched(positions: np.ndarray, obj: bpy.types.Object) -> np.ndarray:
+    """Positions (n,3) float64 under the scale and shear of the object, without its rotation.
+
+    The symmetric factor of the polar decomposition M = R S has the same lengths and angles as M.
+    """
+    matrix = np.array(obj.matrix_world, dtype=float)[:3, :3]
+    if not np.isfinite(matrix).all():
+        raise NonFiniteError("The transformation of the object is not finite", remedy="Clear or fix its scale")
+    _, stretch, axes = np.linalg.svd(matrix)
+    positions = positions.astype(float)
+    # A rotation is stored with single precision; without this it would blur the positions for nothing.
+    if np.allclose(stretch, stretch.mean(), rtol=1e-6, atol=0):
+        factor = stretch.mean()
+        return positions if abs(factor - 1) < 1e-6 else positions * factor
+    return positions @ (axes.T * stretch) @ axes
+
+
+def weld_split_vertices(reading: Reading) -> Reading:
+    """Join vertices that a file format had to split: equal position and, where there are UVs, equal UV.
+
+    The mesh stays as it is; the corners of the surface all refer to the first of the equal vertices.
+    """
+    surface = reading.surface
+    key = surface.positions
+    if reading.uv is not None:
+        uv = np.zeros((len(key), 2))
+        uv[surface.corner_vertex] = reading.uv
+        key = np.concatenate([key, uv], axis=1)
+    # Adding zero makes -0.0 and 0.0 the same bytes.
+    _, first, inverse = np.unique(key + 0.0, axis=0, return_index=True, return_inverse=True)
+    same = first[inverse.ravel()]
+    return replace(reading, surface=replace(surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams]))
+
+
+def read_uv(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
+    """UVs (c,2) float32 of every corner of a mesh that is not in Edit Mode."""
+    return _get(mesh.uv_layers[layer].uv, "vector", 2 * len(mesh.loops), np.float32).reshape(-1, 2)
+
+
+def check_target(mesh: bpy.types.Mesh, name: str) -> None:
+    """Raise TargetError if UVs cannot be written to the layer `name` (the active one if empty)."""
+    if mesh.library is not None:
+        raise TargetError(f"{mesh.name} is linked from a library. Make it local first.")
+    if len(name.encode()) > UV_LAYER_NAME_BYTES:
+        raise TargetError(f"The UV layer name {name!r} is too long. Use at most {UV_LAYER_NAME_BYTES} bytes.")
+    missing = name not in mesh.uv_layers if name else len(mesh.uv_layers) == 0
+    if missing and name in mesh.attributes:
+        raise TargetError(f"{mesh.name} has an attribute {name!r} that is no UV layer. Choose another name.")
+    if missing and len(mesh.uv_layers) >= 8:
+        raise TargetError(f"{mesh.name} has 8 UV layers, the most a mesh can hold. Remove one first.")
+
+
+def target_layer(mesh: bpy.types.Mesh, name: str) -> str:
+    """Name of the UV layer to write: the active one, or `name`, made and made active as needed.
+
+    A new layer starts as a copy of the active one, so that faces that are not unwrapped keep their UVs.
+    """
+    check_target(mesh, name)
+    if not name and mesh.uv_layers.active:
+        return mesh.uv_layers.active.name
+    name = name or UV_LAYER_NAME
+    layer = mesh.uv_layers.get(name) or mesh.uv_layers.new(name=name)
+    if layer is None:
+        raise TargetError(f"{mesh.name} does not take another UV layer.")
+    mesh.uv_layers.active = layer
+    return layer.name
+
+
+def write_uv(obj: bpy.types.Object, layer: str, corners: np.ndarray, uv: np.ndarray) -> None:
+    """Write uv (k,2) to the given corners (k,) of an existing layer; every other corner keeps its bits."""
+    if obj.mode == "EDIT":
+        _write_bmesh(obj.data, layer, corners, uv)
+        return
+    values = read_uv(obj.data, layer)
+    values[corners] = uv
+    obj.data.uv_layers[layer].uv.foreach_set("vector", values.ravel())
+    obj.data.update()
+
+
+def _write_bmesh(mesh: bpy.types.Mesh, layer: str, corners: np.ndarray, uv: np.ndarray) -> None:
+    edit = bmesh.from_edit_mesh(mesh)
+    uv_layer = edit.loops.layers.uv[layer]
+    value_of = dict(zip(corners.tolist(), uv.tolist(), strict=True))
+    # Faces and their loops come in the order in which update_from_editmode numbers them.
+    for corner, loop in enumerate(loop for face in edit.faces for loop in face.loops):
+        if corner in value_of:
+            loop[uv_layer].uv = value_of[corner]
+    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
+
+
+def select_elements(obj: bpy.types.Object, kind: str, elements: np.ndarray) -> None:
+    """Select exactly the vertices, edges (k,2) or faces an error speaks of, and the select mode that shows them."""
+    if not kind or not len(elements):
+        return
+    if obj.mode == "EDIT":
+        _select_bmesh(obj.data, kind, elements)
+    else:
+        _select_mesh(obj.data, kind, elements)
+
+
+def select_mode(kind: str) -> tuple[bool, bool, bool]:
+    """Value of `ToolSettings.mesh_select_mode` that shows elements of a kind."""
+    return (kind == "vertex", kind == "edge", kind == "face")
+
+
+def _select_bmesh(mesh: bpy.types.Mesh, kind: str, elements: np.ndarray) -> None:
+    edit = bmesh.from_edit_mesh(mesh)
+    for sequence in (edit.faces, edit.edges, edit.verts):
+        for element in sequence:
+            element.select = False
+    edit.select_mode = {{"vertex": "VERT", "edge": "EDGE", "face": "FACE"}[kind]}
+    edit.verts.ensure_lookup_table()
+    edit.faces.ensure_lookup_table()
+    if kind == "edge":
+        pairs = ((edit.verts[a], edit.verts[b]) for a, b in elements.tolist())
+        chosen = [edge for edge in map(edit.edges.get, pairs) if edge]
+    else:
+        sequence = edit.verts if kind == "vertex" else edit.faces
+        chosen = [sequence[i] for i in elements.tolist()]
+    for element in chosen:
+        element.select_set(True)
+    edit.select_flush_mode()
+    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
+
+
+def _select_mesh(mesh: bpy.types.Mesh, kind: str, elements: np.ndarray) -> None:
+    ends = _get(mesh.edges, "vertices", 2 * len(mesh.edges)).reshape(-1, 2)
+    vertices, edges = np.zeros(len(mesh.vertices), bool), np.zeros(len(mesh.edges), bool)
+    faces = np.zeros(len(mesh.polygons), bool)
+    if kind == "vertex":
+        vertices[elements] = True
+    elif kind == "edge":
+        n = len(mesh.vertices)
+        low, high = ends.min(axis=1, initial=n), ends.max(axis=1, initial=0)
+        edges = np.isin(low * n + high, elements.min(axis=1) * n + elements.max(axis=1))
+        vertices[ends[edges].ravel()] = True
+    else:
+        faces[elements] = True
+        corners = np.concatenate([np.arange(p.loop_start, p.loop_start + p.loop_total) for p in _items(mesh, elements)])
+        vertices[_get(mesh.loops, "vertex_index", len(mesh.loops))[corners]] = True
+        edges[_get(mesh.loops, "edge_index", len(mesh.loops))[corners]] = True
+    for collection, flags in ((mesh.vertices, vertices), (mesh.edges, edges), (mesh.polygons, faces)):
+        if len(flags):
+            collection.foreach_set("select", flags)
+    mesh.update()
+
+
+def _items(mesh: bpy.types.Mesh, elements: np.ndarray):
+    return (mesh.polygons[i] for i in elements.tolist())
+
+
+def select_culprits(context: bpy.types.Context, obj: bpy.types.Object, error: MeshError) -> None:
+    """Select what an error complains about on the object, without leaving the mode."""
+    if error.kind and len(error.elements):
+        context.tool_settings.mesh_select_mode = select_mode(error.kind)
+        select_elements(obj, error.kind, error.elements)

@@ -1,0 +1,1 @@
+"""Operators: read, solve, write, report."""

@@ -1,0 +1,98 @@
+"""uv.omt_unwrap: area-preserving UVs for whole objects or for selected faces."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+
+from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_MARGIN, DEFAULT_TEXTURE_SIZE, Settings
+from .common import Complaint, SolverOperator, read_objects
+
+
+class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
+    """Unwrap so that every part of the surface gets its share of the texture. Charts follow the seams"""
+
+    bl_idname = "uv.omt_unwrap"
+    bl_label = "Unwrap Area Preserving"
+    bl_options = {"REGISTER", "UNDO"}
+
+    boundary: EnumProperty(
+        name="Boundary", description="Outline of every island", items=BOUNDARIES, default=DEFAULT_BOUNDARY
+    )
+    pack: BoolProperty(
+        name="Pack Islands",
+        description="Arrange the islands in the unit square. Otherwise they are centred one upon the other, "
+        "the largest as wide as the square",
+        default=True,
+    )
+    margin: IntProperty(
+        name="Margin",
+        description="Least distance between islands, in pixels of the texture",
+        default=DEFAULT_MARGIN,
+        min=0,
+        max=1024,
+        soft_max=64,
+        subtype="PIXEL",
+    )
+    texture_size: IntProperty(
+        name="Texture Size",
+        description="Width of the texture that the margin is measured in",
+        default=DEFAULT_TEXTURE_SIZE,
+        min=16,
+        max=65536,
+        soft_max=8192,
+        subtype="PIXEL",
+    )
+    uv_layer: StringProperty(
+        name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_settings(self.layout, self)
+
+    def steps(self, context: bpy.types.Context):
+        from .. import blender_mesh, blender_pack, packing
+        from ..unwrapping import Refusal, lay_out
+
+        pairs = read_objects(context)
+        try:
+            for obj, _ in pairs:
+                blender_mesh.check_target(obj.data, self.uv_layer)
+        except blender_mesh.TargetError as error:
+            raise Complaint(str(error)) from error
+        settings = Settings(self.boundary.lower(), self.margin, self.texture_size, self.pack)
+        surfaces = [(reading.surface, reading.faces) for _, reading in pairs]
+        try:
+            layout = yield from lay_out(surfaces, settings, blender_pack.pack)
+        except Refusal as refusal:
+            obj = pairs[refusal.index][0]
+            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
+        except packing.PackingError as error:
+            raise Complaint(str(error)) from error
+        return [obj for obj, _ in pairs], layout
+
+    def finish(self, context: bpy.types.Context, result) -> None:
+        from .. import blender_mesh
+
+        objects, layout = result
+        for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):
+            layer = blender_mesh.target_layer(obj.data, self.uv_layer)
+            blender_mesh.write_uv(obj, layer, corners, uv)
+        for (index, text), count in Counter(layout.warnings).items():
+            name = f"{objects[index].name}: " if index >= 0 else ""
+            self.report({"WARNING"}, f"{name}{text}" + (f" ({count} islands)" if count > 1 else ""))
+
+
+def draw_settings(layout: bpy.types.UILayout, properties) -> None:
+    """The settings of the operator, for the redo panel and the sidebar."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(properties, "boundary")
+    layout.prop(properties, "pack")
+    column = layout.column()
+    column.active = properties.pack
+    column.prop(properties, "margin")
+    column.prop(properties, "texture_size")
+    layout.prop(properties, "uv_layer")

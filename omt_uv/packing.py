@@ -1,0 +1,156 @@
+"""Islands into the unit square with xatlas: one scale for all, a margin in pixels, no overlap.
+
+xatlas decides only where islands go. It stretches every chart to whole texels, and its own quarter turns
+mirror charts, so neither is taken over: islands are turned here and moved by a translation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+# xatlas drops faces of meshes with small units.
+EXTENT = 100.0
+# Rasterising finer than this costs more than the space it saves.
+MAX_RASTER = 2048
+# Wider gaps, in texels, are made by rasterising coarser.
+MAX_GAP = 31
+ATTEMPTS = 8
+REMEDY = "Lower the margin or raise the texture size"
+
+
+class PackingError(RuntimeError):
+    """The packer cannot be loaded or failed."""
+
+
+class MarginError(PackingError):
+    """The margins leave no room for the islands."""
+
+
+@dataclass(frozen=True)
+class Packing:
+    """Islands (n_i,2) in the unit square, `scale` from input to UV length, the packer's name, used area share."""
+
+    islands: list[np.ndarray]
+    scale: float
+    packer: str
+    coverage: float
+
+
+def pack(
+    islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray], margin: float = 4, texture_size: int = 1024
+) -> Packing:
+    """Place islands in the unit square without overlap, all scaled by the same factor and never mirrored.
+
+    Parameters
+    ----------
+    islands : (n_i,2) positions in one common unit of length
+    triangles : (m_i,3) vertex indices
+    margin : least distance between islands and to the border, in pixels
+    texture_size : pixels along a side of the unit square
+
+    Raises
+    ------
+    MarginError : the margins alone fill the texture
+    PackingError : xatlas cannot be imported or fails
+    """
+    if 2 * margin >= texture_size:
+        raise MarginError(f"A margin of {margin:g} pixels fills a texture of {texture_size} pixels. {REMEDY}.")
+    turned = [turn_upright(p) for p in islands]
+    inner = texture_size - 2 * margin
+    raster = float(min(texture_size, MAX_RASTER))
+    # xatlas grows every island by the padding, so two stay twice as far apart; shrinking them from whole
+    # texels back to scale can move each outline by half a texel, and never together.
+    padding = int(np.ceil(0.5 * min(margin * raster / inner, MAX_GAP) + 0.5))
+    # The margin is kept as long as the gap, in an atlas this wide, is at least `margin` pixels.
+    widest = (2 * padding - 1) * inner / margin if margin > 0 else np.inf
+    for _ in range(ATTEMPTS):
+        placed, scale = _place(turned, triangles, max(int(raster), 1), padding)
+        low = np.min([p.min(axis=0) for p in placed], axis=0)
+        size = float(np.max([(p - low).max() for p in placed]))
+        if size <= widest:
+            break
+        raster *= 0.95 * widest / size
+    else:
+        raise MarginError(f"No room for {len(islands)} islands with a margin of {margin:g} pixels. {REMEDY}.")
+    fit = inner / size
+    origin = margin / texture_size
+    result = [(p - low) * (fit / texture_size) + origin for p in placed]
+    return Packing(result, scale * fit / texture_size, "xatlas", covered_area(result, triangles))
+
+
+def stack(islands: Sequence[np.ndarray]) -> Packing:
+    """Islands centred one upon the other, all at the scale at which the largest fits the unit square."""
+    size = max(float(np.ptp(p, axis=0).max()) for p in islands)
+    centred = [(p - 0.5 * (p.min(axis=0) + p.max(axis=0))) / size + 0.5 for p in islands]
+    return Packing([np.clip(p, 0, 1) for p in centred], 1 / size, "none", float("nan"))
+
+
+def turn_upright(points: np.ndarray) -> np.ndarray:
+    """Points (n,2) turned so that their smallest enclosing rectangle is upright, its long side along v."""
+    try:
+        hull = points[ConvexHull(points).vertices]
+    except QhullError:
+        return points
+    edge = np.roll(hull, -1, axis=0) - hull
+    # One side of the smallest enclosing rectangle lies on an edge of the convex hull (Freeman & Shapira 1975).
+    direction = edge / np.linalg.norm(edge, axis=1)[:, None]
+    along = hull @ direction.T
+    across = hull @ np.stack([-direction[:, 1], direction[:, 0]])
+    best = np.argmin(np.ptp(along, axis=0) * np.ptp(across, axis=0))
+    c, s = direction[best]
+    if np.ptp(along[:, best]) > np.ptp(across[:, best]):
+        c, s = -s, c
+    return points @ np.array([[c, -s], [s, c]])
+
+
+def _place(islands, triangles, raster: int, padding: int) -> tuple[list[np.ndarray], float]:
+    """Islands in texels, and texels per unit of length."""
+    try:
+        import xatlas
+    except ImportError as error:
+        raise PackingError(f"xatlas cannot be imported: {error}") from error
+
+    extent = max(float(np.ptp(p, axis=0).max()) for p in islands)
+    meshes = [
+        (np.ascontiguousarray((p - p.min(axis=0)) * (EXTENT / extent), np.float32), np.ascontiguousarray(t, np.uint32))
+        for p, t in zip(islands, triangles, strict=True)
+    ]
+    atlas = xatlas.Atlas()
+    # xatlas keeps pointers to these arrays until generate(); `meshes` keeps them alive.
+    for uv, index in meshes:
+        atlas.add_uv_mesh(uv, index)
+    options = xatlas.PackOptions()
+    options.resolution, options.padding = raster, padding
+    options.rotate_charts = options.rotate_charts_to_axis = False
+    try:
+        atlas.generate(pack_options=options)
+    except RuntimeError as error:
+        raise PackingError(f"xatlas failed: {error}") from error
+    if atlas.atlas_count != 1:
+        raise PackingError(f"xatlas made {atlas.atlas_count} atlases instead of one")
+
+    low, size = np.empty((len(islands), 2)), np.empty((len(islands), 2))
+    for k in range(len(islands)):
+        texel = atlas.get_mesh(k)[2] * [atlas.width, atlas.height]
+        low[k], size[k] = texel.min(axis=0), np.ptp(texel, axis=0)
+    own = np.array([np.ptp(p, axis=0) for p in islands])
+    if not (np.isfinite(low).all() and (size > 0).all()):
+        raise PackingError("xatlas left an island unplaced")
+    scale = float((size / own).min())
+    centre = low + 0.5 * size
+    return [
+        (p - 0.5 * (p.min(axis=0) + p.max(axis=0))) * scale + c for p, c in zip(islands, centre, strict=True)
+    ], scale
+
+
+def covered_area(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> float:
+    """Share of the unit square that islands (n_i,2) without overlap cover."""
+    total = 0.0
+    for uv, index in zip(islands, triangles, strict=True):
+        a, b, c = (uv[index[:, k]] for k in range(3))
+        total += 0.5 * float(np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum())
+    return total

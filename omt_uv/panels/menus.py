@@ -1,0 +1,25 @@
+"""Entries in Blender's own menus; the search finds only what is in a menu."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..operators.measure import UV_OT_omt_measure
+from ..operators.unwrap import UV_OT_omt_unwrap
+
+
+def draw_unwrap(self, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator(UV_OT_omt_unwrap.bl_idname)
+    self.layout.operator(UV_OT_omt_measure.bl_idname)
+
+
+def menus() -> list[type]:
+    """Menus that get the entries, so that every UV menu of every Blender version shows them once.
+
+    Since 4.5 the UV menu of the 3D View contains the Unwrap menu of the UV editor; before, it repeats it.
+    """
+    types = [bpy.types.IMAGE_MT_uvs_unwrap, bpy.types.VIEW3D_MT_object]
+    if bpy.app.version < (4, 5, 0):
+        types.append(bpy.types.VIEW3D_MT_uv_map)
+    return types

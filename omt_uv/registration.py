@@ -1,0 +1,43 @@
+"""Everything the extension adds to Blender, in order, and its exact reverse."""
+
+from __future__ import annotations
+
+import bpy
+
+from .operators.measure import UV_OT_omt_measure
+from .operators.unwrap import UV_OT_omt_unwrap
+from .panels.menus import draw_unwrap, menus
+from .panels.sidebar import IMAGE_PT_omt_uv, VIEW3D_PT_omt_uv
+
+CLASSES = (UV_OT_omt_unwrap, UV_OT_omt_measure, VIEW3D_PT_omt_uv, IMAGE_PT_omt_uv)
+COMMAND = "omt_uv"
+
+_undo: list = []
+
+
+def register() -> None:
+    """Register all or nothing: what was registered before a failure is taken back and the failure raised."""
+    try:
+        for cls in CLASSES:
+            bpy.utils.register_class(cls)
+            _undo.append((bpy.utils.unregister_class, cls))
+        for menu in menus():
+            menu.append(draw_unwrap)
+            _undo.append((menu.remove, draw_unwrap))
+        handle = bpy.utils.register_cli_command(COMMAND, _command)
+        _undo.append((bpy.utils.unregister_cli_command, handle))
+    except Exception:
+        unregister()
+        raise
+
+
+def unregister() -> None:
+    while _undo:
+        function, argument = _undo.pop()
+        function(argument)
+
+
+def _command(arguments: list[str]) -> int:
+    from .cli import main
+
+    return main(arguments)

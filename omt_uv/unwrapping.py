@@ -1,0 +1,98 @@
+"""Several surfaces to one packed layout; the one path of the operator and of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import packing
+from .settings import Settings
+from .solver.charts import Surface
+from .solver.errors import MeshError
+from .solver.parameterize import SurfaceMap, unwrap
+from .solver.progress import Progress, Steps
+
+Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
+
+
+class Refusal(Exception):
+    """A surface that cannot be unwrapped: its index and the error."""
+
+    def __init__(self, index: int, error: MeshError):
+        super().__init__(str(error))
+        self.index, self.error = index, error
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Corners (k,) and their UVs (k,2) of each surface, the maps with their reports, the packing and warnings.
+
+    `warnings` are pairs of surface index and text; -1 stands for the layout as a whole.
+    """
+
+    corners: list[np.ndarray]
+    uv: list[np.ndarray]
+    maps: list[SurfaceMap]
+    packing: packing.Packing
+    warnings: list[tuple[int, str]]
+
+
+def lay_out(
+    surfaces: Sequence[tuple[Surface, np.ndarray | None]], settings: Settings, spare_packer: Packer | None = None
+) -> Steps[Layout]:
+    """Unwrap surfaces, each with the polygons (f,) bool to use, at one texel density into one unit square.
+
+    Solver results have the area of the surface, so packing with a single scale gives every island of every
+    surface the same texels per area. `spare_packer` takes over, with a warning, where xatlas cannot.
+
+    Raises
+    ------
+    Refusal : with the index of the surface and the MeshError that says why
+    packing.PackingError : neither packer can place the islands
+    """
+    maps: list[SurfaceMap] = []
+    warnings: list[tuple[int, str]] = []
+    for index, (surface, faces) in enumerate(surfaces):
+        try:
+            maps.append((yield from unwrap(surface, faces, **settings.solver_arguments())))
+        except MeshError as error:
+            raise Refusal(index, error) from error
+        warnings += [(index, text) for chart_map in maps[-1].maps for text in chart_map.warnings]
+    yield Progress("packing", 0.0)
+    islands = [m.uv for surface_map in maps for m in surface_map.maps]
+    triangles = [c.triangles for surface_map in maps for c in surface_map.charts]
+    packed, complaint = _pack(islands, triangles, settings, spare_packer)
+    if complaint:
+        warnings.append((-1, complaint))
+    corners, uv = _scatter(maps, packed)
+    yield Progress("packing", 1.0)
+    return Layout(corners, uv, maps, packed, warnings)
+
+
+def _pack(islands, triangles, settings: Settings, spare_packer: Packer | None) -> tuple[packing.Packing, str]:
+    if not settings.pack:
+        return packing.stack(islands), ""
+    try:
+        return packing.pack(islands, triangles, settings.margin, settings.texture_size), ""
+    except packing.MarginError:
+        raise
+    except packing.PackingError as error:
+        if spare_packer is None:
+            raise
+        result = spare_packer(islands, triangles, settings.margin, settings.texture_size)
+        return result, f"{error}; packed with {result.packer} instead"
+
+
+def _scatter(maps: Sequence[SurfaceMap], packed: packing.Packing) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """From island vertices to the corners of each surface."""
+    island = iter(packed.islands)
+    corners, uv = [], []
+    for surface_map in maps:
+        k = [chart.corners.ravel() for chart in surface_map.charts]
+        v = [next(island)[chart.triangles.ravel()] for chart in surface_map.charts]
+        unique, first = np.unique(np.concatenate(k), return_index=True)
+        corners.append(unique)
+        uv.append(np.concatenate(v)[first])
+    return corners, uv
