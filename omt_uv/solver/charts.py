@@ -21,7 +21,7 @@ from .errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
-from .topology import boundary_loops, pair_keys, pair_up
+from .topology import boundary_loops, halfedges, pair_keys, pair_up
 
 # A triangle whose area is below this share of its longest side squared is a line.
 DEGENERATE = 1e-10
@@ -96,11 +96,13 @@ def _check_positions(surface: Surface, triangles: np.ndarray) -> None:
 
 def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> None:
     p = surface.positions[surface.corner_vertex[triangles]]
-    size = np.abs(p - p[:, :1]).max(axis=(1, 2))
+    # Halves: the difference of two huge numbers may be infinite.
+    side = p / 2 - p[:, :1] / 2
+    size = np.abs(side).max(axis=(1, 2))
     # Scaling first keeps tiny and huge meshes clear of underflow and overflow.
-    p = (p - p[:, :1]) / np.where(size > 0, size, 1)[:, None, None]
-    area = 0.5 * np.linalg.norm(np.cross(p[:, 1], p[:, 2]), axis=1)
-    extent = np.ptp(surface.positions[surface.corner_vertex[triangles]].reshape(-1, 3), axis=0).max()
+    side = side / np.where(size > 0, size, 1)[:, None, None]
+    area = 0.5 * np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1)
+    extent = np.ptp(p.reshape(-1, 3) / 2, axis=0).max()
     wrong = (area <= DEGENERATE) | (size <= 1e-9 * extent)
     if wrong.any():
         raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(owner[wrong]))
@@ -122,7 +124,7 @@ def _check_duplicates(surface: Surface, faces: np.ndarray) -> None:
 
 def _joined_halfedges(surface: Surface, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of opposite halfedges (p,), (p,) across which the map is continuous."""
-    tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    tail, head = halfedges(triangles)
     a, b = surface.corner_vertex[tail], surface.corner_vertex[head]
     # A triangle side that is no side of its polygon is a diagonal; its twin lies in the same polygon.
     after = np.arange(len(surface.corner_vertex)) + 1
@@ -155,7 +157,7 @@ def _joined_halfedges(surface: Surface, triangles: np.ndarray) -> tuple[np.ndarr
 
 def _join(surface, triangles, owner, first, second) -> tuple[np.ndarray, np.ndarray]:
     """Class of every corner and chart of every triangle, joined across the halfedge pairs."""
-    tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    tail, head = halfedges(triangles)
     rows = np.concatenate([tail[first], head[first]])
     columns = np.concatenate([head[second], tail[second]])
     c = len(surface.corner_vertex)
@@ -178,8 +180,23 @@ def _make(surface: Surface, members: np.ndarray, triangles, owner, corner_class)
     vertex_ids = surface.corner_vertex[corners.ravel()[index]]
     local = inverse.reshape(-1, 3).astype(np.int64)
     chart = Chart(surface.positions[vertex_ids], local, corners, owner[members], vertex_ids)
+    _check_edges(chart)
     _check_disk(chart)
     return chart
+
+
+def _check_edges(chart: Chart) -> None:
+    """Straight lines in the plane cannot tell apart two edges, or diagonals, between the same two vertices."""
+    tail, head = halfedges(chart.triangles)
+    unique, index, count = np.unique(pair_keys(tail, head), return_index=True, return_counts=True)
+    wrong = index[count > 2]
+    if len(wrong):
+        raise NonManifoldEdgeError(
+            "Two faces share several edges in a row, so that their diagonals coincide",
+            remedy="Triangulate these faces, or dissolve the vertex that only they share",
+            kind="edge",
+            elements=chart.vertex_ids[np.stack([tail[wrong], head[wrong]], axis=1)],
+        )
 
 
 def _check_disk(chart: Chart) -> None:

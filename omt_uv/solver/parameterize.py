@@ -17,7 +17,7 @@ from .conformal import conformal_disk, conformal_rectangle, sharpest_corners
 from .distortion import measure
 from .domain import Disk, Domain, Rectangle
 from .embedding import arc_length_parameters, tutte
-from .errors import PrecisionError, TransportError
+from .errors import MeshError, PrecisionError, TransportError
 from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
 from .progress import Progress, Steps
 from .topology import boundary_loops
@@ -96,10 +96,19 @@ def unwrap(surface: Surface, faces: np.ndarray | None = None, *, boundary: str =
     for chart in charts:
         share = len(chart.triangles) / total
         steps = unwrap_chart(chart, boundary=boundary)
-        result = yield from _within(steps, done, share)
-        maps.append(result)
+        try:
+            maps.append((yield from _within(steps, done, share)))
+        except MeshError as error:
+            raise located(error, chart) from error
         done += share
     return SurfaceMap(charts, maps)
+
+
+def located(error: MeshError, chart: Chart) -> MeshError:
+    """The same error with the element indices of the surface instead of the chart's."""
+    place = {"vertex": chart.vertex_ids, "edge": chart.vertex_ids, "face": chart.faces}.get(error.kind)
+    elements = error.elements if place is None else place[error.elements]
+    return type(error)(error.cause, error.remedy, error.kind, elements)
 
 
 # Where the time of a chart goes, roughly: a bar that moves evenly needs no more.
@@ -131,17 +140,20 @@ def unwrap_chart(chart: Chart, *, boundary: str = "disk", density: np.ndarray | 
     domain: Domain = Disk() if boundary == "disk" else Rectangle()
     clock: dict[str, float] = {}
     warnings: list[str] = []
-    loop = boundary_loops(chart.triangles)[0]
-    mass = vertex_areas(chart.vertices, chart.triangles, density)
+    vertices, unit = _in_unit_box(chart.vertices)
+    triangles = chart.triangles
+    loop = boundary_loops(triangles)[0]
+    mass = vertex_areas(vertices, triangles, density)
+    solver = conformal_disk if boundary == "disk" else conformal_rectangle
     conformal, cells = None, None
     with _timed(clock, "conformal"):
         try:
-            conformal = yield from _conformal(chart, boundary)
+            conformal = yield from solver(vertices, triangles)
         except PrecisionError as error:
             warnings.append(f"{error.cause}; started from a mean value map instead")
     if conformal is not None:
         sites = _sites(conformal.uv, boundary, conformal.aspect)
-        nearest = halfedge_lengths(sites, chart.triangles).min()
+        nearest = halfedge_lengths(sites, triangles).min()
         if nearest < SITE_RESOLUTION:
             warnings.append(
                 f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport; "
@@ -155,16 +167,16 @@ def unwrap_chart(chart: Chart, *, boundary: str = "disk", density: np.ndarray | 
                     warnings.append(f"{error.cause} from the conformal map; started from a mean value map instead")
     if cells is None:
         with _timed(clock, "embedding"):
-            sites = _mean_value_sites(chart, loop, boundary, domain)
+            sites = _mean_value_sites(vertices, triangles, loop, boundary, domain)
         with _timed(clock, "transport"):
             cells = yield from transport(sites, mass, domain)
     with _timed(clock, "measure"):
         uv = centroid_map(cells, domain, loop, warnings)
-        covered = np.abs(signed_areas(uv, chart.triangles)).sum()
-        uv *= np.sqrt(face_areas(chart.vertices, chart.triangles).sum() / covered)
-        figures = measure(chart.vertices, chart.triangles, uv[chart.triangles], overlap=False)
+        covered = np.abs(signed_areas(uv, triangles)).sum()
+        uv *= np.sqrt(face_areas(vertices, triangles).sum() / covered)
+        figures = measure(vertices, triangles, uv[triangles], overlap=False)
     return ChartMap(
-        uv,
+        uv * unit,
         conformal.iterations if conformal else None,
         conformal.residual if conformal else None,
         cells.iterations,
@@ -203,9 +215,12 @@ def centroid_map(cells: Transport, domain: Domain, loop: np.ndarray, warnings: l
     return uv
 
 
-def _conformal(chart: Chart, boundary: str):
-    solver = conformal_disk if boundary == "disk" else conformal_rectangle
-    return (yield from solver(chart.vertices, chart.triangles))
+def _in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:
+    """Positions (n,3) moved to 0 and divided by their extent, so that no unit over- or underflows; the extent."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    # Halves first: the difference of two huge numbers may be infinite.
+    extent = 2 * float((high / 2 - low / 2).max())
+    return (positions - (low / 2 + high / 2)) / extent, extent
 
 
 def _sites(uv: np.ndarray, boundary: str, aspect: float) -> np.ndarray:
@@ -213,18 +228,18 @@ def _sites(uv: np.ndarray, boundary: str, aspect: float) -> np.ndarray:
     return uv if boundary == "disk" else uv / [1, aspect] - 0.5
 
 
-def _mean_value_sites(chart: Chart, loop: np.ndarray, boundary: str, domain: Domain) -> np.ndarray:
+def _mean_value_sites(vertices, triangles, loop, boundary: str, domain: Domain) -> np.ndarray:
     """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
     if boundary == "square" and len(loop) > 3:
         # Each side of the square takes the boundary between two corners.
-        corners = sharpest_corners(chart.vertices, chart.triangles, loop)
+        corners = sharpest_corners(vertices, triangles, loop)
         loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
         first = np.append(np.flatnonzero(np.isin(loop, corners)), len(loop))
-        start = arc_length_parameters(chart.vertices, loop)
+        start = arc_length_parameters(vertices, loop)
         share = np.interp(start, np.append(start, 1.0)[first], np.arange(5) / 4)
     else:
-        share = arc_length_parameters(chart.vertices, loop)
-    return tutte(chart.vertices, chart.triangles, loop, domain.map_boundary(share))
+        share = arc_length_parameters(vertices, loop)
+    return tutte(vertices, triangles, loop, domain.map_boundary(share))
 
 
 @contextmanager

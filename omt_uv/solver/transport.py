@@ -16,7 +16,7 @@ from .linear import solve_spd
 from .power_diagram import PowerDiagram, power_diagram
 from .progress import Progress, Steps
 
-TOLERANCE = 1e-7
+TOLERANCE = 5e-7
 MAX_STEPS = 100
 MAX_HALVINGS = 30
 
