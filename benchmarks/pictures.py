@@ -53,7 +53,7 @@ def checker(path, cell=128):
         for column in range(TILE):
             dark = (row + column) % 2
             hue = ((row * TILE + column * 3) % (TILE * TILE)) / (TILE * TILE)
-            ground = matplotlib.colors.hsv_to_rgb([hue, 0.45 if dark else 0.10, 0.62 if dark else 0.98])
+            ground = matplotlib.colors.hsv_to_rgb([hue, 0.50 if dark else 0.10, 0.58 if dark else 0.90])
             ink = matplotlib.colors.hsv_to_rgb([hue, 0.05 if dark else 0.55, 1.0 if dark else 0.45])
             ground, ink = (tuple(int(255 * c) for c in colour) for colour in (ground, ink))
             x, y, pad = column * cell, row * cell, cell // 10
