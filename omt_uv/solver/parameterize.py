@@ -1,4 +1,4 @@
-"""The pipeline: polygon mesh -> charts -> conformal map -> optimal transport -> texture coordinates.
+"""The pipeline: polygon mesh -> charts -> conformal map -> transport -> refinement -> texture coordinates.
 
 Each stage may be replaced by a milder one where its mathematics leaves double precision; the result says so.
 """
@@ -18,12 +18,12 @@ from .distortion import measure
 from .domain import Disk, Domain, Rectangle
 from .embedding import arc_length_parameters, tutte
 from .errors import MeshError, PrecisionError, TransportError
-from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
+from .geometry import face_areas, halfedge_lengths, vertex_areas
 from .progress import Progress, Steps
+from .refine import BOUNDARIES, refine
 from .topology import boundary_loops
 from .transport import Transport, transport
 
-BOUNDARIES = ("disk", "square")
 # Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
 # distance counts squared.
 SITE_RESOLUTION = 1e-7
@@ -36,14 +36,18 @@ class ChartMap:
     uv (n,2) in the units of the surface: the UV area is the area of the chart, its centroid is 0.
     newton_conformal, newton_transport : Newton steps; None where a stage was replaced
     residual_conformal : largest error of an angle sum, radians; residual_transport : |cell area - mass| / mass
+    newton_refinement, residual_refinement, status : see `refine.Refinement`
     warnings : what was replaced and why; seconds : wall-clock time per stage
     """
 
     uv: np.ndarray
     newton_conformal: int | None
     residual_conformal: float | None
-    newton_transport: int
-    residual_transport: float
+    newton_transport: int | None
+    residual_transport: float | None
+    newton_refinement: int
+    residual_refinement: float
+    status: str
     area_l1: float
     area_sd: float
     angle_mean: float
@@ -77,12 +81,21 @@ class SurfaceMap:
         return [m.report(c) for c, m in zip(self.charts, self.maps, strict=True)]
 
 
-def unwrap(surface: Surface, faces: np.ndarray | None = None, *, boundary: str = "disk") -> Steps[SurfaceMap]:
+def unwrap(
+    surface: Surface,
+    faces: np.ndarray | None = None,
+    *,
+    boundary: str = "free",
+    quality: str = "standard",
+    balance: float = 0.0,
+) -> Steps[SurfaceMap]:
     """Area-preserving texture coordinates of the polygons `faces` (f,) bool, all by default.
 
     Parameters
     ----------
-    boundary : "disk" or "square", the domain every chart is mapped to
+    boundary : "free" for the least shear; "disk" or "square", which every chart then fills
+    quality : "draft", "standard" or "exact", how small the area error of single faces becomes
+    balance : from 0, exact areas, to 1, least shear
 
     Raises
     ------
@@ -95,7 +108,7 @@ def unwrap(surface: Surface, faces: np.ndarray | None = None, *, boundary: str =
     done = 0
     for chart in charts:
         share = len(chart.triangles) / total
-        steps = unwrap_chart(chart, boundary=boundary)
+        steps = unwrap_chart(chart, boundary=boundary, quality=quality, balance=balance)
         try:
             maps.append((yield from _within(steps, done, share)))
         except MeshError as error:
@@ -112,7 +125,7 @@ def located(error: MeshError, chart: Chart) -> MeshError:
 
 
 # Where the time of a chart goes, roughly: a bar that moves evenly needs no more.
-_STAGES = {"Conformal map": (0.0, 0.4), "Optimal transport": (0.4, 0.6)}
+_STAGES = {"Conformal map": (0.0, 0.15), "Optimal transport": (0.15, 0.25), "Refinement": (0.4, 0.6)}
 
 
 def _within(steps: Steps[ChartMap], done: float, share: float) -> Steps[ChartMap]:
@@ -126,93 +139,139 @@ def _within(steps: Steps[ChartMap], done: float, share: float) -> Steps[ChartMap
         yield Progress(progress.stage, min(done + share * (start + width * progress.fraction), 1.0))
 
 
-def unwrap_chart(chart: Chart, *, boundary: str = "disk", density: np.ndarray | None = None) -> Steps[ChartMap]:
-    """Area-preserving map of one chart: conformal map, transport, centroids of the cells.
+def unwrap_chart(
+    chart: Chart,
+    *,
+    boundary: str = "free",
+    quality: str = "standard",
+    balance: float = 0.0,
+    density: np.ndarray | None = None,
+) -> Steps[ChartMap]:
+    """Area-preserving map of one chart: conformal map, transport, authalic refinement.
 
-    density (m,) > 0 multiplies the area that each triangle asks for; 1 by default.
+    Parameters
+    ----------
+    boundary, quality, balance : see `unwrap`
+    density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default
 
     Raises
     ------
-    PrecisionError, TransportError : where even the fallback embedding fails
+    PrecisionError, TransportError, FoldedUVError : where even the fallbacks fail
+    DensityError : a density that is not positive and finite
     """
     if boundary not in BOUNDARIES:
         raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
-    domain: Domain = Disk() if boundary == "disk" else Rectangle()
-    clock: dict[str, float] = {}
-    warnings: list[str] = []
+    log = _Log()
     vertices, unit = _in_unit_box(chart.vertices)
-    triangles = chart.triangles
-    loop = boundary_loops(triangles)[0]
-    mass = vertex_areas(vertices, triangles, density)
-    solver = conformal_disk if boundary == "disk" else conformal_rectangle
-    conformal, cells = None, None
-    with _timed(clock, "conformal"):
+    normalized = Chart(vertices, chart.triangles, chart.corners, chart.faces, chart.vertex_ids)
+    loop = boundary_loops(chart.triangles)[0]
+    if boundary == "square" and len(loop) < 4:
+        log.warnings.append("A chart with only three boundary vertices does not fill a square; its boundary is free")
+        boundary = "free"
+    domain: Domain = Rectangle() if boundary == "square" else Disk()
+    corners = sharpest_corners(vertices, chart.triangles, loop) if boundary == "square" else None
+    mass = vertex_areas(vertices, chart.triangles, density)
+    conformal, sites = yield from _embedding(normalized, loop, corners, domain, log)
+    cells, uv = None, sites
+    with log.timed("transport"):
         try:
-            conformal = yield from solver(vertices, triangles)
-        except PrecisionError as error:
-            warnings.append(f"{error.cause}; started from a mean value map instead")
-    if conformal is not None:
-        sites = _sites(conformal.uv, boundary, conformal.aspect)
-        nearest = halfedge_lengths(sites, triangles).min()
-        if nearest < SITE_RESOLUTION:
-            warnings.append(
-                f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport; "
-                "started from a mean value map instead"
-            )
-        else:
-            with _timed(clock, "transport"):
-                try:
-                    cells = yield from transport(sites, mass, domain)
-                except TransportError as error:
-                    warnings.append(f"{error.cause} from the conformal map; started from a mean value map instead")
-    if cells is None:
-        with _timed(clock, "embedding"):
-            sites = _mean_value_sites(vertices, triangles, loop, boundary, domain)
-        with _timed(clock, "transport"):
             cells = yield from transport(sites, mass, domain)
-    with _timed(clock, "measure"):
-        uv = centroid_map(cells, domain, loop, warnings)
-        covered = np.abs(signed_areas(uv, triangles)).sum()
-        uv *= np.sqrt(face_areas(vertices, triangles).sum() / covered)
-        figures = measure(vertices, triangles, uv[triangles], overlap=False)
+            uv = centroid_map(cells, domain, loop, corners, log.warnings)
+        except TransportError as error:
+            log.warnings.append(f"{error.cause}; refined the embedding without transport")
+    target = None if density is None else face_areas(vertices, chart.triangles) * density
+    with log.timed("refinement"):
+        refined = yield from refine(
+            vertices, chart.triangles, uv, boundary=boundary, target=target, balance=balance, quality=quality
+        )
+    with log.timed("measure"):
+        figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False)
     return ChartMap(
-        uv * unit,
+        refined.uv * unit,
         conformal.iterations if conformal else None,
         conformal.residual if conformal else None,
-        cells.iterations,
-        cells.residual,
+        cells.iterations if cells else None,
+        cells.residual if cells else None,
+        refined.iterations,
+        refined.residual,
+        refined.status,
         figures.area_l1,
         figures.area_sd,
         figures.angle_mean,
         figures.folds,
-        tuple(warnings),
-        clock,
+        tuple(log.warnings) + refined.warnings,
+        log.seconds,
     )
 
 
-def centroid_map(cells: Transport, domain: Domain, loop: np.ndarray, warnings: list[str]) -> np.ndarray:
+def _embedding(chart: Chart, loop, corners, domain: Domain, log: _Log):
+    """Conformal map (None where it leaves double precision) and sites (n,2) in the domain for the transport."""
+    conformal = None
+    with log.timed("conformal"):
+        try:
+            if corners is None:
+                conformal = yield from conformal_disk(chart.vertices, chart.triangles)
+                sites = conformal.uv
+            else:
+                conformal = yield from conformal_rectangle(chart.vertices, chart.triangles, corners)
+                sites = conformal.uv / [1, conformal.aspect] - 0.5
+            nearest = halfedge_lengths(sites, chart.triangles).min()
+            if nearest >= SITE_RESOLUTION:
+                return conformal, sites
+            cause = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
+        except PrecisionError as error:
+            cause = error.cause
+        log.warnings.append(f"{cause}; started from a mean value map instead")
+        return conformal, _mean_value_sites(chart, loop, corners, domain)
+
+
+def _mean_value_sites(chart: Chart, loop, corners, domain: Domain) -> np.ndarray:
+    """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
+    if corners is not None:
+        # Each side of the square takes the boundary between two corners.
+        loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
+    share = arc_length_parameters(chart.vertices, loop)
+    if corners is not None:
+        first = np.append(share[np.isin(loop, corners)], 1.0)
+        share = np.interp(share, first, np.arange(5) / 4)
+    return tutte(chart.vertices, chart.triangles, loop, domain.map_boundary(share))
+
+
+def centroid_map(cells: Transport, domain: Domain, loop, corners, warnings: list[str]) -> np.ndarray:
     """The inverse of the transport map, (n,2): every vertex at the centroid of its cell.
 
-    Boundary vertices (b,) move on to the boundary of the domain; where that would change their order, they
-    are pushed on so that they keep it.
+    Boundary vertices (b,) move on to the boundary of the domain, in their order, and `corners` (4,), if given,
+    into those of the rectangle.
     """
     uv = cells.cells.centroid.copy()
     s = domain.boundary_parameter(uv[loop])
     step = (np.roll(s, -1) - s + domain.period / 2) % domain.period - domain.period / 2
     if not np.isclose(step.sum(), domain.period):
-        warnings.append("The transport tangles the boundary; boundary vertices stay in their cells")
-        return uv
+        warnings.append("The transport tangles the boundary; it was spread evenly instead")
+        step = np.full(len(loop), domain.period / len(loop))
     # Start behind the largest gap: there nothing can be out of order.
     first = (int(step.argmax()) + 1) % len(loop)
     along = s[first] + np.concatenate([[0.0], np.cumsum(np.roll(step, -first)[:-1])])
-    backwards = np.diff(along) <= 0
-    if backwards.any():
-        warnings.append(f"The transport changed the order of {backwards.sum()} boundary vertices; it was restored")
+    backwards = int((np.diff(along) <= 0).sum())
+    if backwards:
+        warnings.append(f"The transport changed the order of {backwards} boundary vertices; it was restored")
         along = np.maximum.accumulate(along)
         spread = along[0] + domain.period * np.arange(len(loop)) / len(loop)
         along = 0.9 * along + 0.1 * spread
-    uv[np.roll(loop, -first)] = domain.boundary_point(along % domain.period)
+    loop = np.roll(loop, -first)
+    if corners is not None:
+        loop, along = _into_corners(domain, loop, along, corners)
+    uv[loop] = domain.boundary_point(along)
     return uv
+
+
+def _into_corners(domain: Domain, loop, along, corners) -> tuple[np.ndarray, np.ndarray]:
+    """Warp boundary parameters in order (b,) piecewise linearly so that the corners come to lie in corners."""
+    first = int(np.flatnonzero(loop == corners[0])[0])
+    loop, along = np.roll(loop, -first), np.concatenate([along[first:], along[:first] + domain.period])
+    place = np.flatnonzero(np.isin(loop, corners))
+    ends = np.append(along[place], along[0] + domain.period)
+    return loop, np.interp(along, ends, domain.period * np.arange(5) / 4)
 
 
 def _in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:
@@ -223,29 +282,17 @@ def _in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:
     return (positions - (low / 2 + high / 2)) / extent, extent
 
 
-def _sites(uv: np.ndarray, boundary: str, aspect: float) -> np.ndarray:
-    """Conformal image in the domain; a rectangle is squeezed to the square."""
-    return uv if boundary == "disk" else uv / [1, aspect] - 0.5
+class _Log:
+    """What happened to one chart: warnings, and seconds per stage."""
 
+    def __init__(self):
+        self.warnings: list[str] = []
+        self.seconds: dict[str, float] = {}
 
-def _mean_value_sites(vertices, triangles, loop, boundary: str, domain: Domain) -> np.ndarray:
-    """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
-    if boundary == "square" and len(loop) > 3:
-        # Each side of the square takes the boundary between two corners.
-        corners = sharpest_corners(vertices, triangles, loop)
-        loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
-        first = np.append(np.flatnonzero(np.isin(loop, corners)), len(loop))
-        start = arc_length_parameters(vertices, loop)
-        share = np.interp(start, np.append(start, 1.0)[first], np.arange(5) / 4)
-    else:
-        share = arc_length_parameters(vertices, loop)
-    return tutte(vertices, triangles, loop, domain.map_boundary(share))
-
-
-@contextmanager
-def _timed(clock: dict[str, float], stage: str) -> Iterator[None]:
-    begin = time.perf_counter()
-    try:
-        yield
-    finally:
-        clock[stage] = clock.get(stage, 0.0) + time.perf_counter() - begin
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        begin = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin
