@@ -1,0 +1,42 @@
+# Every target sets up what it needs. PYTHON=... picks the interpreter for a new .venv.
+VENV := .venv
+PY := $(VENV)/bin/python
+STAMP := $(VENV)/.installed
+export PYTHONPATH := $(CURDIR)
+export OMT_UV_MODELS ?= $(CURDIR)/../shared/models
+
+.PHONY: demo test check bench extension matrix venv clean
+
+test: $(STAMP)
+	$(PY) -m pytest
+
+demo: $(STAMP)
+	$(PY) benchmarks/demo.py
+
+check: $(STAMP)
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+
+bench: $(STAMP)
+	$(PY) benchmarks/run.py
+
+extension: $(STAMP)
+	$(PY) scripts/build_extension.py
+
+matrix: $(STAMP)
+	$(PY) scripts/matrix.py
+
+venv: $(STAMP)
+
+$(STAMP): requirements.txt requirements-dev.txt
+	@$(PY) -c "" 2>/dev/null || { \
+	    python="$(PYTHON)"; \
+	    [ -n "$$python" ] || python=$$(scripts/find_python.sh) || exit 1; \
+	    echo "Setting up $(VENV) with $$python"; \
+	    "$$python" -m venv --clear $(VENV); }
+	$(PY) -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
+	@touch $@
+
+clean:
+	rm -rf build dist .pytest_cache .ruff_cache .mypy_cache
