@@ -8,7 +8,7 @@ Jacobi's elliptic sine maps the rectangle to the disk, its boundary exactly to t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -21,6 +21,7 @@ from .intrinsic import euclidean_diagonal, from_mesh, make_delaunay, split_bound
 from .linear import solve_spd
 from .progress import Steps
 from .topology import boundary_loops, halfedges
+from .untangle import count_folds, untangle
 from .yamabe import YamabeFlow, yamabe_flow
 
 # Below this distance of two neighbours in the unit disk, rounding decides where they lie.
@@ -33,7 +34,9 @@ class ConformalMap:
 
     uv (n,2) in the unit disk or in the rectangle [0,1] x [0,aspect]; corners (4,) vertices with a right
     angle in the rectangle, -1 for a point between two vertices; residual: largest error of an angle sum in
-    radians; iterations: Newton steps; flips of edges; log_scale (n,) of the flat metric of the rectangle.
+    radians; iterations: Newton steps; flips of edges; log_scale (n,) of the flat metric of the rectangle;
+    straightened: faces that a flat metric puts on the wrong side of a straight line between their corners, and
+    that were moved back by `untangle`.
     """
 
     uv: np.ndarray
@@ -43,6 +46,7 @@ class ConformalMap:
     iterations: int
     flips: int
     log_scale: np.ndarray
+    straightened: int = 0
 
 
 def conformal_disk(vertices: np.ndarray, triangles: np.ndarray) -> Steps[ConformalMap]:
@@ -56,7 +60,11 @@ def conformal_disk(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Conform
     disk = centre_in_disk(disk, vertex_areas(vertices, triangles))
     disk[loop] /= np.linalg.norm(disk[loop], axis=1)[:, None]
     _check_resolution(disk, triangles)
-    return _replace(result, disk)
+    folds = count_folds(disk, triangles)
+    if folds:
+        # The flat metric is embedded, but the mesh's own edges are not always its straight lines.
+        disk, _ = untangle(disk, vertices, triangles, loop, disk[loop])
+    return replace(result, uv=disk, straightened=folds - count_folds(disk, triangles))
 
 
 def conformal_rectangle(
@@ -181,9 +189,3 @@ def _check_resolution(uv: np.ndarray, triangles: np.ndarray) -> None:
         raise PrecisionError(
             f"The conformal map leaves double precision: neighbouring vertices are only {shortest:.1e} apart"
         )
-
-
-def _replace(result: ConformalMap, uv: np.ndarray) -> ConformalMap:
-    return ConformalMap(
-        uv, result.aspect, result.corners, result.residual, result.iterations, result.flips, result.log_scale
-    )
