@@ -130,9 +130,36 @@ class Assembly:
         return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
 
 
+class Extra(Protocol):
+    """An energy beside that of the faces, for example a barrier."""
+
+    def energy(self, w: np.ndarray) -> float: ...
+
+    def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Gradient (n,) complex; vertices (k,q) and rows (k,q) of linear forms whose squares are the Hessian."""
+
+    def limit(self, w: np.ndarray, step: np.ndarray) -> float:
+        """Largest share of a step that is allowed."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What Newton minimises: faces, the weight of their area term, the motion of vertices, further energies."""
+
+    faces: Elements
+    assembly: Assembly
+    motion: Motion
+    weight: float
+    extras: tuple[Extra, ...] = ()
+
+    def energy(self, w: np.ndarray) -> float:
+        value = energy(self.faces, w, self.weight)
+        return value + sum(e.energy(w) for e in self.extras) if np.isfinite(value) else value
+
+
 @dataclass(frozen=True)
 class Step:
-    """One accepted Newton step: the map, its energy, the predicted decrease (half the Newton decrement), the step's share."""
+    """A step: map and energy after it, decrease promised by the full step, share of it taken (0: none helps)."""
 
     w: np.ndarray
     energy: float
@@ -140,37 +167,41 @@ class Step:
     share: float
 
 
-def newton_direction(faces: Elements, assembly: Assembly, motion: Motion, w, balance):
+def newton_direction(problem: Problem, w: np.ndarray) -> tuple[np.ndarray, float]:
     """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
-    n = len(w)
-    local = local_derivatives(faces, w, balance)
-    slope = scatter(faces, local.gradient, n)
+    n, faces, motion = len(w), problem.faces, problem.motion
+    local = local_derivatives(faces, w, problem.weight)
+    gradient = scatter(faces, local.gradient, n)
     frame = motion.frame(w)
     free = motion.free.astype(float)
     rows = np.ascontiguousarray((local.rows * frame[faces.triangles][:, None, :]).conj()).view(float)
     rows *= free[faces.triangles].reshape(-1, 1, 6)
     blocks = np.matmul(rows.transpose(0, 2, 1), rows)
-    axes = (slope * frame.conj()).view(float).reshape(n, 2) * free
-    diagonal = 1 - free
-    diagonal[:, 0] += np.maximum(motion.bend(w, slope), 0) * free[:, 0]
     scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
-    matrix = assembly.matrix(blocks, diagonal.ravel() + SHIFT * scale)
+    extra = sp.csr_matrix((2 * n, 2 * n))
+    for part in problem.extras:
+        slope, vertices, forms = part.derivatives(w)
+        gradient = gradient + slope
+        linear = linear_forms(vertices, forms * frame[vertices], n) @ sp.diags(free.ravel())
+        extra = extra + linear.T @ linear
+    axes = (gradient * frame.conj()).view(float).reshape(n, 2) * free
+    diagonal = 1 - free
+    diagonal[:, 0] += np.maximum(motion.bend(w, gradient), 0) * free[:, 0]
+    matrix = problem.assembly.matrix(blocks, diagonal.ravel() + SHIFT * scale)
+    if problem.extras:
+        matrix = matrix + extra
     step = -Factor(matrix, "natural").solve(axes.ravel())
     return step.view(complex), float(step @ axes.ravel())
 
 
-def newton_step(faces: Elements, assembly: Assembly, motion: Motion, w, value, balance) -> Step:
-    """One line-searched Newton step from a map w (n,) complex of energy `value`.
-
-    Raises
-    ------
-    PrecisionError : no decrease can be found along the Newton direction
-    """
-    step, slope = newton_direction(faces, assembly, motion, w, balance)
-    share = min(1.0, FOLD_SHARE * first_fold(faces, w, motion.frame(w) * step))
+def newton_step(problem: Problem, w: np.ndarray, value: float) -> Step:
+    """One line-searched Newton step from a map w (n,) complex of energy `value`."""
+    step, slope = newton_direction(problem, w)
+    moved = problem.motion.frame(w) * step
+    share = min(1.0, FOLD_SHARE * first_fold(problem.faces, w, moved), *(e.limit(w, moved) for e in problem.extras))
     for _ in range(MAX_HALVINGS):
-        trial = motion.move(w, share * step)
-        trial_value = energy(faces, trial, balance)
+        trial = problem.motion.move(w, share * step)
+        trial_value = problem.energy(trial)
         if trial_value <= value + ARMIJO * share * slope:
             return Step(trial, trial_value, -slope / 2, share)
         share *= 0.5
@@ -189,3 +220,11 @@ def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:
     denominator = -h + np.sqrt(np.maximum(root, 0))
     hit = (root >= 0) & (denominator > 0)
     return float((c[hit] / denominator[hit]).min(initial=np.inf))
+
+
+def linear_forms(vertices: np.ndarray, rows: np.ndarray, n: int) -> sp.csr_matrix:
+    """Sparse (k, 2n) of the forms dw -> Re(sum rows dw[vertices]), vertices and rows (k,q)."""
+    k, q = vertices.shape
+    columns = np.stack([2 * vertices, 2 * vertices + 1], axis=2).reshape(k, 2 * q)
+    data = np.stack([rows.real, -rows.imag], axis=2).reshape(k, 2 * q)
+    return sp.csr_matrix((data.ravel(), columns.ravel(), np.arange(k + 1) * 2 * q), shape=(k, 2 * n))

@@ -11,21 +11,23 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .energy import Elements, area_error, elements, energy
-from .errors import DensityError, FoldedUVError
+from .contact import contact, crossings
+from .energy import Elements, area_error, elements, squared
+from .errors import DensityError
 from .geometry import face_areas, signed_areas
 from .linear import minimum_degree
-from .newton import Assembly, Free, Motion, OnCircle, OnLines, newton_step
+from .newton import Assembly, Motion, Problem, newton_step
 from .progress import Progress, Steps
+from .starts import check_start, disk_start, free_start, square_start
 from .topology import boundary_loops
-from .untangle import arc_length_rim, circle_rim, count_folds, untangle
 
-BOUNDARIES = ("free", "disk", "square")
+STARTS = {"free": free_start, "disk": disk_start, "square": square_start}
+BOUNDARIES = tuple(STARTS)
 
 
 @dataclass(frozen=True)
 class Quality:
-    """Area error (share of the area in the wrong place) to reach, weights of the area term on the way, steps allowed."""
+    """Area error to reach (share of area in the wrong place), weights of the area term on the way, steps allowed."""
 
     area_error: float
     weights: tuple[float, ...]
@@ -40,6 +42,10 @@ QUALITIES = {
 }
 # A stage ends when Newton promises less than this share of the energy; the last stage is held to the second.
 LOOSE, TIGHT = 1e-2, 1e-3
+# The energy is a mean over the surface: below this it is rounding.
+NO_ENERGY = 1e-12
+# Of the barrier between boundary vertices and edges, in mean face areas.
+CONTACT_STRENGTH = 1.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,7 @@ class Refinement:
 
     area_error: share of the UV area in the wrong place; weight: that of the area term; energy at the end;
     status: "converged", "stalled" (no decrease could be found) or "steps" (allowance used up); warnings: what was
-    replaced and why.
+    replaced and why; overlap: the free boundary crosses itself.
     """
 
     uv: np.ndarray
@@ -58,6 +64,7 @@ class Refinement:
     weight: float
     energy: float
     status: str
+    overlap: bool
     warnings: tuple[str, ...]
 
 
@@ -94,25 +101,37 @@ def refine(
     """
     if boundary not in BOUNDARIES:
         raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
+    if not 0 <= balance <= 1:
+        raise ValueError(f"balance must lie in [0, 1], not {balance}")
     settings = QUALITIES[quality]
     yield Progress("Refinement", 0.0)
-    area = face_areas(vertices, triangles)
-    target = _targets(area, target)
-    loop = boundary_loops(triangles)[0]
-    warnings: list[str] = []
-    start, motion_of = _start(vertices, triangles, uv, loop, boundary, area.sum(), warnings)
+    target = _targets(face_areas(vertices, triangles), target)
+    uv = np.asarray(uv, float)
+    check_start(uv, triangles)
+    mirror = [np.sign(signed_areas(uv, triangles).sum()), 1]
+    uv = uv * mirror
+    # Neighbours in the elimination order are neighbours in memory: everything is renumbered once.
     order = minimum_degree(_graph(triangles, len(vertices)))
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
-    faces = elements(vertices[order], place[triangles], target)
-    motion = motion_of(place)
-    w = start[order, 0] + 1j * start[order, 1]
-    result = yield from _stages(faces, motion, w, balance, settings)
-    w, *figures = result
-    if boundary == "free":
-        w = _placed(w, start[order, 0] + 1j * start[order, 1], faces, area.sum())
-    refined = np.column_stack([w.real, w.imag])[place]
-    return Refinement(refined, *figures, tuple(warnings))
+    vertices, triangles, uv = vertices[order], place[triangles], uv[order]
+    loop = boundary_loops(triangles)[0]
+    start = STARTS[boundary](vertices, triangles, uv, loop)
+    faces = elements(vertices, triangles, target)
+    task = _Task(faces, Assembly(triangles, len(vertices)), start.motion, loop if start.may_cross else None)
+    found = yield from _stages(task, start.uv[:, 0] + 1j * start.uv[:, 1], balance, settings)
+    w = _placed(found.w, uv[:, 0] + 1j * uv[:, 1], faces) if boundary == "free" else found.w
+    return Refinement(
+        np.column_stack([w.real, w.imag])[place] * mirror,
+        found.steps,
+        found.residual,
+        area_error(faces, w),
+        found.weight,
+        found.energy,
+        found.status,
+        found.overlap,
+        (*start.warnings, *found.warnings),
+    )
 
 
 def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
@@ -130,91 +149,95 @@ def _graph(triangles: np.ndarray, n: int):
     return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
 
 
-def _start(vertices, triangles, uv, loop, boundary, area, warnings):
-    """A start without folds (n,2), and the motion of its vertices once these are renumbered."""
-    n = len(vertices)
-    signed = signed_areas(uv, triangles)
-    if not np.isfinite(uv).all() or not np.abs(signed).sum() > 1e-12 * np.ptp(uv, axis=0).max() ** 2 > 0:
-        raise FoldedUVError("The UVs to refine have no area")
-    uv = (uv - uv.mean(0)) if boundary == "free" else uv
-    if boundary == "square":
-        return _square_start(vertices, triangles, uv, loop, np.sqrt(area), warnings)
-    uv = uv * np.sqrt(area / np.abs(signed).sum())
-    radius = np.sqrt(area / np.pi)
-    if boundary == "free" and not (signed > 0).all() or boundary == "disk":
-        rim = circle_rim(uv, loop, radius)
-        if rim is None:
-            warnings.append("The boundary of the start is not in order; it was spread over the circle by its length")
-            rim = arc_length_rim(vertices, loop, radius)
-        pushed = uv.copy()
-        pushed[loop] = rim
-        if count_folds(pushed, triangles):
-            pushed, warning = untangle(uv, vertices, triangles, loop, rim)
-            warnings.extend([warning] if warning else [])
-        uv = pushed
-    left = np.flatnonzero(~(signed_areas(uv, triangles) > 0))
-    if len(left):
-        raise FoldedUVError("Faces stay folded in every start tried", kind="face", elements=left)
-    if boundary == "disk":
-        return uv, lambda place: OnCircle(place[loop], radius, n)
-    return uv, lambda place: Free(np.zeros(n, bool))
+@dataclass(frozen=True)
+class _Task:
+    """faces, assembly and motion for Newton; loop: a boundary (b,) that may not cross itself, or None."""
+
+    faces: Elements
+    assembly: Assembly
+    motion: Motion
+    loop: np.ndarray | None
+
+    def problem(self, w: np.ndarray, weight: float, guarded: bool) -> Problem:
+        extras = (contact(w, self.loop, CONTACT_STRENGTH / len(self.faces.area)),) if guarded else ()
+        return Problem(self.faces, self.assembly, self.motion, weight, extras)
+
+    def crosses(self, w: np.ndarray) -> bool:
+        return self.loop is not None and len(crossings(w, self.loop)) > 0
 
 
-def _square_start(vertices, triangles, uv, loop, side, warnings):
-    n = len(vertices)
-    low, high = uv[loop].min(0), uv[loop].max(0)
-    uv = ((uv - low) / (high - low) - 0.5) * side
-    rim = uv[loop]
-    corners = np.array([np.abs(rim - c * side / 2).sum(1).argmin() for c in np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])])
-    on_side = np.abs(np.abs(rim) - side / 2) < 1e-9 * side
-    if not on_side.any(1).all() or not on_side[corners].all():
-        raise FoldedUVError("The boundary of the start is not on a square")
-    pushed = uv.copy()
-    horizontal = on_side[:, 1]
-    pushed[loop] = np.where(on_side, np.sign(rim) * side / 2, rim)
-    if count_folds(pushed, triangles):
-        pushed, warning = untangle(uv, vertices, triangles, loop, pushed[loop])
-        warnings.extend([warning] if warning else [])
-    left = np.flatnonzero(~(signed_areas(pushed, triangles) > 0))
-    if len(left):
-        raise FoldedUVError("Faces stay folded in every start tried", kind="face", elements=left)
-    sliding = np.delete(np.arange(len(loop)), corners)
-    direction = np.where(horizontal, 1.0, 1j)[sliding]
-    return pushed, lambda place: OnLines(place[loop[sliding]], direction, place[loop[corners]], n)
+@dataclass(frozen=True)
+class _Found:
+    w: np.ndarray
+    steps: int
+    residual: float
+    weight: float
+    energy: float
+    status: str
+    overlap: bool
+    warnings: tuple[str, ...]
 
 
-def _stages(faces: Elements, motion: Motion, w, balance: float, settings: Quality):
-    assembly = Assembly(faces.triangles, len(w))
-    stages = list(settings.weights)
+def _stages(task: _Task, w: np.ndarray, balance: float, settings: Quality) -> Steps[_Found]:
+    """Newton in stages of growing weight, until the area error is small enough.
+
+    When a stage ends with a boundary that crosses itself it is done again with a barrier, from where it began.
+    """
+    weights = list(settings.weights)
     softening = (balance / (1 - balance)) ** 2 if balance < 1 else np.inf
-    steps, done, weight = 0, 0, 0.0
-    status = "steps"
-    while steps < settings.max_steps:
-        last = done >= len(stages) - 1
-        weight = 1 / (1 / stages[done] + softening)
-        value = energy(faces, w, weight)
-        while steps < settings.max_steps:
-            step = newton_step(faces, assembly, motion, w, value, weight)
-            w, value, steps = step.w, step.energy, steps + 1
-            yield Progress("Refinement", min(1.0, (done + 0.5) / (len(stages) + 1)))
-            if step.share == 0 or step.decrement < (TIGHT if last else LOOSE) * value + 1e-14:
-                break
-        status = "stalled" if step.share == 0 and step.decrement > TIGHT * value + 1e-14 else "converged"
-        error = area_error(faces, w)
-        done += 1
-        if done >= len(stages):
-            if balance > 0 or error <= settings.area_error or stages[-1] >= settings.greatest_weight or status == "stalled":
-                break
-            stages.append(stages[-1] * min(max(2.0, (error / settings.area_error) ** 2), 10.0))
-    error = area_error(faces, w)
-    return w, steps, step.decrement / max(value, 1e-300), error, weight, value, status
+    overlap, guarded, steps, k = task.crosses(w), False, 0, 0
+    warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
+    while True:
+        weight = 1 / (1 / weights[k] + softening)
+        problem = task.problem(w, weight, guarded)
+        last = k >= len(weights) - 1
+        tolerance, allowed = TIGHT if last else LOOSE, settings.max_steps - steps
+        stage = yield from _minimise(problem, w, tolerance, allowed, (k, len(weights)))
+        steps += stage.steps
+        if not (guarded or overlap) and task.crosses(stage.w):
+            guarded = True
+            continue
+        w, k = stage.w, k + 1
+        error = area_error(task.faces, w)
+        enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
+        if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
+            break
+        if k >= len(weights):
+            weights.append(weights[-1] * min(max(2.0, (error / settings.area_error) ** 2), 10.0))
+    return _Found(w, steps, stage.residual, weight, stage.energy, stage.status, task.crosses(w), warnings)
 
 
-def _placed(w, start, faces: Elements, area: float):
-    """The map with this UV area, turned and moved to lie as the start did."""
+@dataclass(frozen=True)
+class _Stage:
+    w: np.ndarray
+    steps: int
+    residual: float
+    energy: float
+    status: str
+
+
+def _minimise(problem: Problem, w: np.ndarray, tolerance: float, allowed: int, place: tuple[int, int]) -> Steps[_Stage]:
+    """Newton until it promises less than `tolerance` of the energy; place is the stage's number and their count."""
+    value = problem.energy(w)
+    steps, residual, status = 0, np.inf, "steps"
+    while steps < max(allowed, 1):
+        step = newton_step(problem, w, value)
+        w, value, steps = step.w, step.energy, steps + 1
+        residual = step.decrement / max(value, NO_ENERGY)
+        yield Progress("Refinement", min(1.0, (place[0] + 1 - 0.5**steps) / place[1]))
+        if residual < tolerance:
+            status = "converged"
+            break
+        if step.share == 0:
+            status = "stalled"
+            break
+    return _Stage(w, steps, residual, value, status)
+
+
+def _placed(w: np.ndarray, start: np.ndarray, faces: Elements) -> np.ndarray:
+    """The map with the UV area of its targets, turned and moved to lie as the start did."""
     a, b = faces.derivatives(w)
-    share = faces.area * (np.abs(a) ** 2 - np.abs(b) ** 2)
-    w = w * np.sqrt(1 / share.sum())
+    w = w * np.sqrt((faces.area @ faces.ratio) / (faces.area @ (squared(a) - squared(b))))
     mass = np.bincount(faces.triangles.ravel(), np.repeat(faces.area, 3) / 3, len(w))
     centred, aim = w - mass @ w, start - mass @ start
     turn = (mass * centred.conj()) @ aim

@@ -1,0 +1,162 @@
+"""Keep a boundary from crossing itself: find crossings, and a barrier between its vertices and edges.
+
+A map without folds whose boundary does not cross itself is one to one. The barrier follows Smith, Schaefer 2015:
+it acts where a boundary vertex is nearer to a boundary edge than a small reach, is infinite at contact, and a step is
+never taken past the first contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Reach of the barrier, relative to the shorter of the boundary edges involved.
+REACH = 0.25
+# A step goes at most this share of the way to the first contact.
+CONTACT_SHARE = 0.8
+
+
+def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Pairs (k,2) of edges of the closed polygon w[loop] that cross; edge i goes from loop[i] to the next.
+
+    Touching at a common vertex is no crossing, and neither are edges that only touch.
+    """
+    a, b = w[loop], w[np.roll(loop, -1)]
+    low, high = _box(np.stack([a, b]))
+    i, j = box_pairs(low, high, low, high)
+    apart = (j > i + 1) & ((i > 0) | (j < len(loop) - 1))
+    i, j = i[apart], j[apart]
+    first = _cross(b[i] - a[i], a[j] - a[i]) * _cross(b[i] - a[i], b[j] - a[i])
+    second = _cross(b[j] - a[j], a[i] - a[j]) * _cross(b[j] - a[j], b[i] - a[j])
+    hit = (first < 0) & (second < 0)
+    return np.column_stack([i[hit], j[hit]])
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Barrier of a boundary loop (b,), vertex numbers; reach (b,) of the vertex and of the edge that starts there."""
+
+    loop: np.ndarray
+    vertex_reach: np.ndarray
+    edge_reach: np.ndarray
+    strength: float
+
+    def energy(self, w: np.ndarray) -> float:
+        """Sum over near pairs of strength * (reach / distance - 1)^2."""
+        near = self._near(w)
+        return float(self.strength * ((near.reach / near.distance - 1) ** 2).sum()) if len(near.point) else 0.0
+
+    def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Gradient (n,) complex; vertices and rows (k,3) of linear forms whose squares are the Gauss-Newton Hessian."""
+        near = self._near(w)
+        d, reach = near.distance, near.reach
+        slope = -2 * self.strength * (reach / d - 1) * reach / d**2
+        bend = 2 * self.strength * (reach / d**2) ** 2 + 4 * self.strength * (reach / d - 1) * reach / d**3
+        vertices = np.column_stack([near.point, near.tail, near.head])
+        forms = near.normal[:, None] * np.column_stack([np.ones(len(d)), near.share - 1, -near.share])
+        flat, values = vertices.ravel(), (slope[:, None] * forms).ravel()
+        gradient = np.bincount(flat, values.real, len(w)) + 1j * np.bincount(flat, values.imag, len(w))
+        return gradient, vertices, np.sqrt(bend)[:, None] * forms.conj()
+
+    def limit(self, w: np.ndarray, step: np.ndarray) -> float:
+        """Share of a step (n,) that may be taken before a vertex touches an edge."""
+        loop, after = self.loop, np.roll(self.loop, -1)
+        p, a, b = w[loop], w[loop], w[after]
+        dp, da, db = step[loop], step[loop], step[after]
+        i, j = box_pairs(*_box(np.stack([p, p + dp])), *_box(np.stack([a, b, a + da, b + db])))
+        apart = (loop[i] != loop[j]) & (loop[i] != after[j])
+        i, j = i[apart], j[apart]
+        times = _contact_times(p[i] - a[j], dp[i] - da[j], b[j] - a[j], db[j] - da[j])
+        return CONTACT_SHARE * float(times.min(initial=np.inf))
+
+    def _near(self, w):
+        loop, after = self.loop, np.roll(self.loop, -1)
+        p, a, b = w[loop], w[loop], w[after]
+        low, high = _box(p[None])
+        grown = self.vertex_reach[:, None]
+        i, j = box_pairs(low - grown, high + grown, *_box(np.stack([a, b])))
+        apart = (loop[i] != loop[j]) & (loop[i] != after[j])
+        i, j = i[apart], j[apart]
+        along, to = b[j] - a[j], p[i] - a[j]
+        share = np.clip((to * along.conj()).real / np.maximum(np.abs(along) ** 2, 1e-300), 0, 1)
+        gap = to - share * along
+        distance = np.maximum(np.abs(gap), 1e-300)
+        reach = np.minimum(self.vertex_reach[i], self.edge_reach[j])
+        on = distance < reach
+        i, j = i[on], j[on]
+        return _Near(loop[i], loop[j], after[j], share[on], distance[on], reach[on], gap[on] / distance[on])
+
+
+@dataclass(frozen=True)
+class _Near:
+    point: np.ndarray
+    tail: np.ndarray
+    head: np.ndarray
+    share: np.ndarray
+    distance: np.ndarray
+    reach: np.ndarray
+    normal: np.ndarray
+
+
+def contact(w: np.ndarray, loop: np.ndarray, strength: float) -> Contact:
+    """A barrier for the boundary loop (b,) whose reach follows the edge lengths of the map w (n,)."""
+    edge = np.abs(w[np.roll(loop, -1)] - w[loop])
+    edge = np.minimum(edge, edge.mean())
+    return Contact(loop, REACH * np.minimum(edge, np.roll(edge, 1)), REACH * edge, strength)
+
+
+def _contact_times(p, dp, e, de):
+    """Smallest t in (0, 1] at which p + t dp lies on the segment from 0 to e + t de; infinity where it never does."""
+    q2, q1, q0 = _cross(de, dp), _cross(e, dp) + _cross(de, p), _cross(e, p)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        root = np.sqrt(q1 * q1 - 4 * q2 * q0)
+        half = -0.5 * (q1 + np.where(q1 >= 0, root, -root))
+        times = np.stack([half / q2, q0 / half])
+        at, edge = p + times * dp, e + times * de
+        share = (at * edge.conj()).real / np.abs(edge) ** 2
+    # A little more than the segment, lest rounding lets a vertex slip past an end.
+    hit = (times > 0) & (times <= 1 / CONTACT_SHARE) & (share > -1e-9) & (share < 1 + 1e-9)
+    return np.where(hit, times, np.inf).min(0, initial=np.inf) if len(p) else np.zeros(0)
+
+
+def box_pairs(low1, high1, low2, high2) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (i, j) of boxes (k,2) and (l,2), by corners, that meet: found by a uniform grid."""
+    low = np.minimum(low1.min(0), low2.min(0))
+    extent = np.maximum(high1.max(0), high2.max(0)) - low
+    cells = int(np.clip(np.sqrt(len(low1) + len(low2)), 1, 512))
+    size = max(extent.max(), 1e-300) / cells * (1 + 1e-9)
+    box1, cell1 = _rasterise(low1 - low, high1 - low, size, cells)
+    box2, cell2 = _rasterise(low2 - low, high2 - low, size, cells)
+    order = np.argsort(cell2, kind="stable")
+    box2, cell2 = box2[order], cell2[order]
+    begin, end = np.searchsorted(cell2, cell1), np.searchsorted(cell2, cell1, side="right")
+    which, place = expand(end - begin)
+    i, j = box1[which], box2[begin[which] + place]
+    meet = (low1[i] <= high2[j]).all(1) & (low2[j] <= high1[i]).all(1)
+    key = np.unique(i[meet] * len(low2) + j[meet])
+    return key // len(low2), key % len(low2)
+
+
+def _rasterise(low, high, size, cells):
+    first = np.clip((low / size).astype(np.int64), 0, cells - 1)
+    span = np.clip((high / size).astype(np.int64), 0, cells - 1) - first + 1
+    box, k = expand(span.prod(1))
+    return box, (first[box, 0] + k % span[box, 0]) * cells + first[box, 1] + k // span[box, 0]
+
+
+def expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For rows of `counts` (k,) entries: the row of every entry, and its place within the row."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _box(points):
+    return (
+        np.column_stack([points.real.min(0), points.imag.min(0)]),
+        np.column_stack([points.real.max(0), points.imag.max(0)]),
+    )
+
+
+def _cross(a, b):
+    return a.real * b.imag - a.imag * b.real

@@ -1,0 +1,216 @@
+"""Where the refinement starts: a map without folds whose boundary lies where it shall move.
+
+Every start is one of these, in this order: the given map; the given map untangled; a mean value map of the surface
+with the boundary spread by its length. Whatever replaces the given map is said in a warning.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .contact import crossings, expand
+from .energy import elements
+from .errors import FoldedUVError
+from .geometry import face_areas, signed_areas
+from .linear import solve_spd
+from .newton import Free, Motion, OnCircle, OnLines, linear_forms
+from .topology import halfedges, twins
+from .untangle import arc_length_rim, circle_rim, count_folds, untangle
+
+SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"
+# Curvature, summed without sign over the inner vertices, below which a chart may be unrolled at once, in radians.
+NEARLY_FLAT = 0.5
+# A map whose signed area is a smaller share of its unsigned area has no orientation to speak of.
+BEYOND_REPAIR = 0.05
+
+
+@dataclass(frozen=True)
+class Start:
+    """A map uv (n,2) without folds, the motion of its vertices, and what was replaced; may_cross: its boundary
+    might come to cross itself."""
+
+    uv: np.ndarray
+    motion: Motion
+    warnings: tuple[str, ...]
+    may_cross: bool = False
+
+
+def disk_start(vertices, triangles, uv, loop) -> Start:
+    """Boundary on the circle about 0 that has the area of the surface."""
+    radius = np.sqrt(face_areas(vertices, triangles).sum() / np.pi)
+    warnings = []
+    rim = circle_rim(uv, loop, radius)
+    if rim is None:
+        warnings.append(SPREAD)
+        rim = arc_length_rim(vertices, loop, radius)
+    straight = _straighten(uv, vertices, triangles, loop, rim, warnings)
+    return Start(straight, OnCircle(loop, radius, len(vertices)), tuple(warnings))
+
+
+def free_start(vertices, triangles, uv, loop) -> Start:
+    """Free boundary: the given map if it is one to one, else a disk; charts that are flat are unrolled."""
+    area = face_areas(vertices, triangles).sum()
+    motion = Free(np.zeros(len(vertices), bool))
+    flat = unroll(vertices, triangles, loop)
+    if flat is not None:
+        return Start(flat, motion, (), True)
+    uv = uv * np.sqrt(area / np.abs(signed_areas(uv, triangles)).sum())
+    if count_folds(uv, triangles) == 0 and not len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
+        return Start(uv, motion, (), True)
+    start = disk_start(vertices, triangles, uv - uv.mean(0), loop)
+    return Start(start.uv, motion, start.warnings, True)
+
+
+def square_start(vertices, triangles, uv, loop) -> Start:
+    """Boundary on the square about 0 that has the area of the surface; the vertices nearest to its corners take them.
+
+    Where a face would have all its corners on one side, one of its vertices is released from the side.
+    """
+    n, half = len(vertices), np.sqrt(face_areas(vertices, triangles).sum()) / 2
+    warnings = []
+    low, high = uv[loop].min(0), uv[loop].max(0)
+    if not (high > low).all():
+        raise FoldedUVError("The UVs to refine have no area")
+    uv = ((uv - low) / (high - low) * 2 - 1) * half
+    s = _perimeter(uv[loop] / half)
+    turn = (np.roll(s, -1) - s) % 4
+    if not (turn > 0).all() or abs(turn.sum() - 4) > 1e-9:
+        warnings.append(SPREAD)
+        s = 4 * np.arctan2(*arc_length_rim(vertices, loop, 1.0)[:, ::-1].T) / (2 * np.pi) % 4
+    s, corner = _snap_corners(s)
+    rim = _on_square(s) * half
+    side = np.floor(s).astype(int)
+    released = _released(triangles, loop, side, corner, n)
+    if released.any():
+        warnings.append(f"{released.sum()} boundary vertices leave the square, where a face would lie along a side")
+    straight = _straighten(uv, vertices, triangles, loop[~released], rim[~released], warnings)
+    slide = ~corner & ~released
+    motion = OnLines(loop[slide], np.where(side[slide] % 2 == 0, 1.0, 1j), loop[corner], n)
+    return Start(straight, motion, tuple(warnings), bool(released.any()))
+
+
+def unroll(vertices, triangles, loop) -> np.ndarray | None:
+    """The least squares conformal map (n,2) of a nearly flat surface, where it neither folds nor crosses itself.
+
+    Exact for developable charts (Levy et al. 2002). None for any other chart.
+    """
+    if _curvature(vertices, triangles, loop) > NEARLY_FLAT:
+        return None
+    n = len(vertices)
+    area = face_areas(vertices, triangles)
+    faces = elements(vertices, triangles, area)
+    rows = np.sqrt(area)[:, None] * faces.gradient
+    linear = linear_forms(np.vstack([triangles, triangles]), np.vstack([rows, -1j * rows]), n).tocsc()
+    first = loop[0]
+    second = loop[np.linalg.norm(vertices[loop] - vertices[first], axis=1).argmax()]
+    held = np.array([2 * first, 2 * first + 1, 2 * second, 2 * second + 1])
+    x = np.zeros(2 * n)
+    x[held[2]] = np.linalg.norm(vertices[second] - vertices[first])
+    others = np.setdiff1d(np.arange(2 * n), held)
+    x[others] = solve_spd(linear[:, others].T @ linear[:, others], -(linear[:, others].T @ (linear @ x)))
+    uv = x.reshape(n, 2)
+    signed = signed_areas(uv, triangles)
+    if not (signed > 0).all() or len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
+        return None
+    return uv * np.sqrt(area.sum() / signed.sum())
+
+
+def check_start(uv: np.ndarray, triangles: np.ndarray) -> None:
+    """Raise FoldedUVError unless uv (n,2) is finite, has an area, and lies on one side for the most part."""
+    wrong = np.flatnonzero(~np.isfinite(uv).all(1))
+    if len(wrong):
+        raise FoldedUVError("The UVs to refine are not finite", kind="vertex", elements=wrong)
+    signed = signed_areas(uv, triangles)
+    total = np.abs(signed).sum()
+    if not total > 1e-12 * np.ptp(uv, axis=0).max() ** 2:
+        raise FoldedUVError("The UVs to refine have no area")
+    if abs(signed.sum()) < BEYOND_REPAIR * total:
+        folded = np.flatnonzero(~(signed * np.sign(signed.sum()) > 0))
+        raise FoldedUVError("The UVs to refine are folded beyond repair", kind="face", elements=folded)
+
+
+def _straighten(uv, vertices, triangles, loop, rim, warnings):
+    """The map uv with its boundary loop on rim, untangled where that folds it."""
+    pushed = uv.copy()
+    pushed[loop] = rim
+    if count_folds(pushed, triangles):
+        pushed, warning = untangle(uv, vertices, triangles, loop, rim)
+        warnings.extend([warning] if warning else [])
+    left = np.flatnonzero(~(signed_areas(pushed, triangles) > 0))
+    if len(left):
+        raise FoldedUVError("Faces stay folded in every start tried", kind="face", elements=left)
+    return pushed
+
+
+def _perimeter(p):
+    """Nearest point of the square [-1,1]^2 to p (b,2), by its position in [0, 4) along the sides from lower left."""
+    x, y = p.T
+    along = np.clip((np.stack([x, y, -x, -y]) + 1) / 2, 0, 1 - 1e-12)
+    side = np.stack([-y, x, y, -x]).argmax(0)
+    return side + along[side, np.arange(len(p))]
+
+
+def _on_square(s):
+    """Points (b,2) of the square [-1,1]^2 at positions s (b,) in [0, 4]."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1.0]])
+    return np.column_stack([np.interp(s, np.arange(5), c) for c in corners.T])
+
+
+def _snap_corners(s):
+    """Positions (b,) with the nearest vertex moved to every corner, order kept, and which vertices these are, bool."""
+    b = len(s)
+    if b < 4:
+        raise FoldedUVError("A chart with fewer than four boundary vertices has no square map")
+    at = np.abs((s - np.arange(4)[:, None] + 2) % 4 - 2).argmin(1)
+    count = (np.roll(at, -1) - at) % b
+    if not (count > 0).all() or count.sum() != b:
+        at = (at[0] + np.arange(4) * b // 4) % b
+        count = (np.roll(at, -1) - at) % b
+    order = (at[0] + np.arange(b)) % b
+    side, place = expand(count)
+    # The boundary may pass a corner before or after the vertex that takes it: then the side is spread evenly.
+    along = np.clip((s[order] - side + 2) % 4 - 2, 0, 1)
+    along[place == 0] = 0
+    step = np.diff(np.append(along, 0)) + (place == count[side] - 1)
+    even = np.bincount(side, step <= 0)[side] > 0
+    snapped, corner = np.empty(b), np.zeros(b, bool)
+    snapped[order] = side + np.where(even, place / count[side], along)
+    corner[at] = True
+    return snapped, corner
+
+
+def _released(triangles, loop, side, corner, n):
+    """Boundary vertices (b,) bool to take off the square's sides, so that no inner edge runs along a side.
+
+    A cover of these edges: the vertices with most of them first.
+    """
+    position = np.full(n, -1)
+    position[loop] = np.arange(len(loop))
+    tail, head = halfedges(triangles)
+    inner = (twins(triangles) >= 0) & (tail < head) & (position[tail] >= 0) & (position[head] >= 0)
+    i, j = position[tail[inner]], position[head[inner]]
+    # A corner belongs to the side it starts and to the one before.
+    sides = np.stack([side, np.where(corner, (side - 1) % 4, side)])
+    same = (sides[:, None, i] == sides[None, :, j]).any((0, 1))
+    i, j = i[same], j[same]
+    released = np.zeros(len(loop), bool)
+    while len(i):
+        count = np.bincount(np.concatenate([i, j]), minlength=len(loop)) * ~corner
+        if not count.any():
+            raise FoldedUVError("Two corners of the square are joined by an edge within the chart")
+        released[count.argmax()] = True
+        left = ~(released[i] | released[j])
+        i, j = i[left], j[left]
+    return released
+
+
+def _curvature(vertices, triangles, loop):
+    """Sum of |angle defect| over the inner vertices, radians."""
+    p = vertices[triangles]
+    after, before = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
+    angle = np.arctan2(np.linalg.norm(np.cross(after, before), axis=2), (after * before).sum(2))
+    defect = 2 * np.pi - np.bincount(triangles.ravel(), angle.ravel(), len(vertices))
+    defect[loop] = 0
+    return np.abs(defect).sum()
