@@ -118,7 +118,7 @@ def refine(
     loop = boundary_loops(triangles)[0]
     start = STARTS[boundary](vertices, triangles, uv, loop)
     faces = elements(vertices, triangles, target)
-    task = _Task(faces, Assembly(triangles, len(vertices)), start.motion, loop if start.may_cross else None)
+    task = _Task(faces, Assembly(triangles, len(vertices)), start.motion, loop if start.may_cross else None, start.guarded)
     found = yield from _stages(task, start.uv[:, 0] + 1j * start.uv[:, 1], balance, settings)
     w = _placed(found.w, uv[:, 0] + 1j * uv[:, 1], faces) if boundary == "free" else found.w
     return Refinement(
@@ -151,12 +151,14 @@ def _graph(triangles: np.ndarray, n: int):
 
 @dataclass(frozen=True)
 class _Task:
-    """faces, assembly and motion for Newton; loop: a boundary (b,) that may not cross itself, or None."""
+    """faces, assembly and motion for Newton; loop: a boundary (b,) that may not cross itself, or None;
+    guarded: from the beginning."""
 
     faces: Elements
     assembly: Assembly
     motion: Motion
     loop: np.ndarray | None
+    guarded: bool
 
     def problem(self, w: np.ndarray, weight: float, guarded: bool) -> Problem:
         extras = (contact(w, self.loop, CONTACT_STRENGTH / len(self.faces.area)),) if guarded else ()
@@ -185,7 +187,7 @@ def _stages(task: _Task, w: np.ndarray, balance: float, settings: Quality) -> St
     """
     weights = list(settings.weights)
     softening = (balance / (1 - balance)) ** 2 if balance < 1 else np.inf
-    overlap, guarded, steps, k = task.crosses(w), False, 0, 0
+    overlap, guarded, steps, k = task.crosses(w), task.guarded, 0, 0
     warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
     while True:
         weight = 1 / (1 / weights[k] + softening)

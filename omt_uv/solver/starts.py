@@ -29,12 +29,13 @@ BEYOND_REPAIR = 0.05
 @dataclass(frozen=True)
 class Start:
     """A map uv (n,2) without folds, the motion of its vertices, and what was replaced; may_cross: its boundary
-    might come to cross itself."""
+    might come to cross itself; guarded: it would, in ways that `crossings` cannot see."""
 
     uv: np.ndarray
     motion: Motion
     warnings: tuple[str, ...]
     may_cross: bool = False
+    guarded: bool = False
 
 
 def disk_start(vertices, triangles, uv, loop) -> Start:
@@ -88,7 +89,9 @@ def square_start(vertices, triangles, uv, loop) -> Start:
     straight = _straighten(uv, vertices, triangles, loop[~released], rim[~released], warnings)
     slide = ~corner & ~released
     motion = OnLines(loop[slide], np.where(side[slide] % 2 == 0, 1.0, 1j), loop[corner], n)
-    return Start(straight, motion, tuple(warnings), bool(released.any()))
+    # Vertices of a side could pass each other where a released one between them leaves the side.
+    notched = bool(released.any())
+    return Start(straight, motion, tuple(warnings), notched, notched)
 
 
 def unroll(vertices, triangles, loop) -> np.ndarray | None:
