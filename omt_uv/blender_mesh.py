@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import bpy  # noqa: I001 - bmesh exists only once bpy is there
+import bpy
+
 import bmesh
 import numpy as np
 
@@ -110,7 +111,9 @@ def weld_split_vertices(reading: Reading) -> Reading:
     # Adding zero makes -0.0 and 0.0 the same bytes.
     _, first, inverse = np.unique(key + 0.0, axis=0, return_index=True, return_inverse=True)
     same = first[inverse.ravel()]
-    return replace(reading, surface=replace(surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams]))
+    return replace(
+        reading, surface=replace(surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams])
+    )
 
 
 def read_uv(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
@@ -220,10 +223,33 @@ def _select_mesh(mesh: bpy.types.Mesh, kind: str, elements: np.ndarray) -> None:
         corners = np.concatenate([np.arange(p.loop_start, p.loop_start + p.loop_total) for p in _items(mesh, elements)])
         vertices[_get(mesh.loops, "vertex_index", len(mesh.loops))[corners]] = True
         edges[_get(mesh.loops, "edge_index", len(mesh.loops))[corners]] = True
-    for collection, flags in ((mesh.vertices, vertices), (mesh.edges, edges), (mesh.polygons, faces)):
-        if len(flags):
-            collection.foreach_set("select", flags)
+    set_flags(mesh, ".select_vert", "POINT", vertices)
+    set_flags(mesh, ".select_edge", "EDGE", edges)
+    set_flags(mesh, ".select_poly", "FACE", faces)
     mesh.update()
+
+
+def set_flags(mesh: bpy.types.Mesh, name: str, domain: str, values: np.ndarray) -> None:
+    """Set a boolean attribute, such as the one behind `select`.
+
+    Mesh.from_pydata of Blender 5.0 leaves a `.select_edge` of another type behind, and then `edge.select = ...`
+    crashes; such an attribute is replaced.
+    """
+    attribute = mesh.attributes.get(name)
+    if attribute is not None and attribute.data_type != "BOOLEAN":
+        mesh.attributes.remove(attribute)
+        attribute = None
+    attribute = attribute or mesh.attributes.new(name, "BOOLEAN", domain)
+    attribute.data.foreach_set("value", values.tolist())
+
+
+def new_mesh(name: str, positions, faces, edges=()) -> bpy.types.Mesh:
+    """A mesh of vertices, faces and loose edges, sequences of tuples, in this order."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(positions, edges, faces)
+    set_flags(mesh, ".select_edge", "EDGE", np.ones(len(mesh.edges), bool))
+    mesh.update()
+    return mesh
 
 
 def _items(mesh: bpy.types.Mesh, elements: np.ndarray):

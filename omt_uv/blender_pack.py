@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import bpy
+
 import numpy as np
 
 from .packing import MarginError, Packing, PackingError, covered_area
@@ -27,7 +29,7 @@ def pack(
     index = np.concatenate([t + s for t, s in zip(triangles, sizes[:-1], strict=True)])
     packed = np.empty_like(points)
     packed[index.ravel()] = _pack_mesh(points, index, margin / texture_size)
-    result = [packed[a:b] for a, b in zip(sizes[:-1], sizes[1:], strict=True)]
+    result = [packed[a:b] for a, b in itertools.pairwise(sizes)]
     scales = [_diameter(q) / _diameter(p) for p, q in zip(islands, result, strict=True)]
     if packed.min() < -1e-6 or packed.max() > 1 + 1e-6 or min(scales) <= 0:
         raise MarginError(f"No room for {len(islands)} islands with a margin of {margin:g} pixels")
@@ -56,8 +58,10 @@ def _pack_mesh(points: np.ndarray, index: np.ndarray, margin: float) -> np.ndarr
         view_layer = scene.view_layers[0]
         view_layer.objects.active = obj
         context = {"scene": scene, "view_layer": view_layer, "object": obj, "active_object": obj}
-        with bpy.context.temp_override(**context, selected_objects=[obj], selected_editable_objects=[obj]):
+        lists = {"selected_objects": [obj], "selected_editable_objects": [obj]}
+        with bpy.context.temp_override(**context, **lists):
             bpy.ops.object.mode_set(mode="EDIT")
+        with bpy.context.temp_override(**context, **lists, edit_object=obj, mode="EDIT_MESH"):
             bpy.ops.mesh.select_all(action="SELECT")
             bpy.ops.uv.pack_islands(shape_method="CONVEX", margin_method="FRACTION", margin=margin)
             bpy.ops.object.mode_set(mode="OBJECT")

@@ -10,7 +10,16 @@ from dataclasses import asdict
 from pathlib import Path
 
 from . import __version__
-from .settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_MARGIN, DEFAULT_TEXTURE_SIZE, Settings
+from .settings import (
+    BOUNDARIES,
+    DEFAULT_BALANCE,
+    DEFAULT_BOUNDARY,
+    DEFAULT_MARGIN,
+    DEFAULT_QUALITY,
+    DEFAULT_TEXTURE_SIZE,
+    QUALITIES,
+    Settings,
+)
 
 PROGRAM = "omt_uv"
 FAILURE = 1
@@ -44,8 +53,15 @@ def parser() -> argparse.ArgumentParser:
     unwrap.set_defaults(run=run_unwrap)
     unwrap.add_argument("input", type=Path, metavar="IN", help=f"{formats} .off")
     unwrap.add_argument("-o", "--output", type=Path, metavar="OUT", required=True, help=formats)
-    names = [identifier.lower() for identifier, *_ in BOUNDARIES]
-    unwrap.add_argument("--boundary", choices=names, default=DEFAULT_BOUNDARY.lower(), help="outline of every island")
+    unwrap.add_argument(
+        "--boundary", choices=_names(BOUNDARIES), default=DEFAULT_BOUNDARY.lower(), help="outline of every island"
+    )
+    unwrap.add_argument(
+        "--balance", type=_share, default=DEFAULT_BALANCE, metavar="T", help="from 0, exact areas, to 1, least shear"
+    )
+    unwrap.add_argument(
+        "--quality", choices=_names(QUALITIES), default=DEFAULT_QUALITY.lower(), help="how exact the areas become"
+    )
     unwrap.add_argument(
         "--margin", type=_margin, default=DEFAULT_MARGIN, metavar="PX", help="least distance of islands, in pixels"
     )
@@ -61,6 +77,17 @@ def parser() -> argparse.ArgumentParser:
     measure.add_argument("input", type=Path, metavar="IN", help=f"{formats} .off")
     measure.add_argument("--json", action="store_true", help="print the figures as JSON")
     return top
+
+
+def _names(items) -> list[str]:
+    return [identifier.lower() for identifier, *_ in items]
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0 <= value <= 1:
+        raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
+    return value
 
 
 def _margin(text: str) -> float:
@@ -85,7 +112,14 @@ def run_unwrap(options: argparse.Namespace) -> None:
 
     if options.output.suffix.lower() not in files.WRITABLE:
         raise CommandError(f"{options.output}: unknown format. Use one of {' '.join(files.WRITABLE)}.")
-    settings = Settings(options.boundary, options.margin, options.texture_size, not options.no_pack)
+    settings = Settings(
+        boundary=options.boundary,
+        quality=options.quality,
+        balance=options.balance,
+        margin=options.margin,
+        texture_size=options.texture_size,
+        pack=not options.no_pack,
+    )
     pairs = _read(options.input, files, blender_mesh)
     objects = [obj for obj, _ in pairs]
     try:
@@ -178,6 +212,8 @@ def _write_report(options: argparse.Namespace, names: list[str], layout, warning
         "input": str(options.input),
         "output": str(options.output),
         "boundary": options.boundary,
+        "quality": options.quality,
+        "balance": options.balance,
         "packing": packing,
         "charts": charts,
         "warnings": warnings,

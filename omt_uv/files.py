@@ -8,11 +8,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import bpy  # noqa: I001 - bmesh exists only once bpy is there
+import bpy
+
 import bmesh
 import numpy as np
 
 from . import obj_text
+from .blender_mesh import new_mesh
 
 READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".off")
 WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb")
@@ -136,8 +138,7 @@ def _read_off(path: str) -> None:
     if faces and not 0 <= min(map(min, faces)) <= max(map(max, faces)) < n:
         raise FileError(f"{path}: a face has a vertex that does not exist")
     name = Path(path).stem
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(positions, [], faces)
+    mesh = new_mesh(name, positions, faces)
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 

@@ -39,7 +39,8 @@ def measure_readings(readings: Sequence[Reading]) -> Distortion:
 def summary(figures: Distortion) -> str:
     """One line for a status bar."""
     return (
-        f"Area error {100 * figures.area_l1:.2f} % (SD {figures.area_sd:.4f}, 99 % within {figures.area_p99:.3f} octaves), "
+        f"Area error {100 * figures.area_l1:.2f} % "
+        f"(SD {figures.area_sd:.4f}, 99 % within {figures.area_p99:.3f} octaves), "
         f"shear {figures.angle_mean:.3f} (99 % within {figures.angle_p99:.2f}), "
         f"{figures.folds} folded of {figures.faces} faces, overlap {100 * (figures.overlap or 0):.2f} %, "
         f"{figures.charts} islands; area and angle of Dominitz & Tannenbaum: {_number(figures.seed_area)}, "

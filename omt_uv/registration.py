@@ -12,7 +12,7 @@ from .panels.sidebar import IMAGE_PT_omt_uv, VIEW3D_PT_omt_uv
 CLASSES = (UV_OT_omt_unwrap, UV_OT_omt_measure, VIEW3D_PT_omt_uv, IMAGE_PT_omt_uv)
 COMMAND = "omt_uv"
 
-_undo: list = []
+_undo: list[tuple] = []
 
 
 def register() -> None:

@@ -6,23 +6,38 @@ from dataclasses import dataclass
 
 # identifier, label, description; the solver and the command line use the identifier in lower case.
 BOUNDARIES = (
-    ("DISK", "Disk", "The boundary of every chart becomes a circle"),
-    ("SQUARE", "Square", "The boundary of every chart becomes a square"),
+    ("FREE", "Free", "The outline follows from the surface: the least shear"),
+    ("DISK", "Disk", "Every island becomes a disk"),
+    ("SQUARE", "Square", "Every island becomes a square"),
 )
-DEFAULT_BOUNDARY = "DISK"
+QUALITIES = (
+    ("DRAFT", "Draft", "Fast; areas a few percent off where the surface is hard to flatten"),
+    ("STANDARD", "Standard", "Areas right to within about one percent of the texture"),
+    ("EXACT", "Exact", "Areas right to about a tenth of a percent of the texture; several times slower"),
+)
+DEFAULT_BOUNDARY = "FREE"
+DEFAULT_QUALITY = "STANDARD"
+DEFAULT_BALANCE = 0.0
 DEFAULT_MARGIN = 4
 DEFAULT_TEXTURE_SIZE = 1024
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to unwrap: `boundary` in lower case, `margin` in pixels of a texture `texture_size` pixels wide."""
+    """How to unwrap.
+
+    boundary, quality : an identifier of the lists above in lower case
+    balance : from 0, exact areas, to 1, least shear
+    margin : pixels of a texture `texture_size` pixels wide; pack : arrange the islands in the unit square
+    """
 
     boundary: str = DEFAULT_BOUNDARY.lower()
+    quality: str = DEFAULT_QUALITY.lower()
+    balance: float = DEFAULT_BALANCE
     margin: float = DEFAULT_MARGIN
     texture_size: int = DEFAULT_TEXTURE_SIZE
     pack: bool = True
 
     def solver_arguments(self) -> dict:
         """Keyword arguments of `solver.parameterize.unwrap`."""
-        return {"boundary": self.boundary}
+        return {"boundary": self.boundary, "quality": self.quality, "balance": self.balance}

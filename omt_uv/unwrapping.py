@@ -9,8 +9,9 @@ import numpy as np
 
 from . import packing
 from .settings import Settings
-from .solver.charts import Surface
+from .solver.charts import Chart, Surface
 from .solver.errors import MeshError
+from .solver.geometry import face_areas, signed_areas
 from .solver.parameterize import SurfaceMap, unwrap
 from .solver.progress import Progress, Steps
 
@@ -56,19 +57,39 @@ def lay_out(
     warnings: list[tuple[int, str]] = []
     for index, (surface, faces) in enumerate(surfaces):
         try:
-            maps.append((yield from unwrap(surface, faces, **settings.solver_arguments())))
+            steps = unwrap(surface, faces, **settings.solver_arguments())
+            maps.append((yield from _share_of(steps, index, len(surfaces))))
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for chart_map in maps[-1].maps for text in chart_map.warnings]
-    yield Progress("packing", 0.0)
-    islands = [m.uv for surface_map in maps for m in surface_map.maps]
-    triangles = [c.triangles for surface_map in maps for c in surface_map.charts]
+    yield Progress("Packing", 1.0)
+    charts = [(c, m.uv) for surface_map in maps for c, m in zip(surface_map.charts, surface_map.maps, strict=True)]
+    islands = [_at_true_area(chart, uv) for chart, uv in charts]
+    triangles = [chart.triangles for chart, _ in charts]
     packed, complaint = _pack(islands, triangles, settings, spare_packer)
     if complaint:
         warnings.append((-1, complaint))
     corners, uv = _scatter(maps, packed)
-    yield Progress("packing", 1.0)
     return Layout(corners, uv, maps, packed, warnings)
+
+
+def _share_of(steps: Steps[SurfaceMap], index: int, count: int) -> Steps[SurfaceMap]:
+    """Pass on progress of one surface as progress of all."""
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield Progress(progress.stage, (index + progress.fraction) / count)
+
+
+def _at_true_area(chart: Chart, uv: np.ndarray) -> np.ndarray:
+    """Coordinates (n,2) scaled so that the island has the area of its chart to the last digit.
+
+    The polygon inside a circle, for one, is smaller than the circle, the more so the fewer corners it has.
+    """
+    covered = np.abs(signed_areas(uv, chart.triangles)).sum()
+    return uv * np.sqrt(face_areas(chart.vertices, chart.triangles).sum() / covered)
 
 
 def _pack(islands, triangles, settings: Settings, spare_packer: Packer | None) -> tuple[packing.Packing, str]:

@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections import Counter
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_MARGIN, DEFAULT_TEXTURE_SIZE, Settings
+from ..settings import (
+    BOUNDARIES,
+    DEFAULT_BALANCE,
+    DEFAULT_BOUNDARY,
+    DEFAULT_MARGIN,
+    DEFAULT_QUALITY,
+    DEFAULT_TEXTURE_SIZE,
+    QUALITIES,
+    Settings,
+)
 from .common import Complaint, SolverOperator, read_objects
 
 
@@ -20,6 +29,17 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
 
     boundary: EnumProperty(
         name="Boundary", description="Outline of every island", items=BOUNDARIES, default=DEFAULT_BOUNDARY
+    )
+    balance: FloatProperty(
+        name="Balance",
+        description="From 0, exact areas, to 1, least shear",
+        default=DEFAULT_BALANCE,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    quality: EnumProperty(
+        name="Quality", description="How exact the areas become", items=QUALITIES, default=DEFAULT_QUALITY
     )
     pack: BoolProperty(
         name="Pack Islands",
@@ -52,6 +72,16 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
     def draw(self, _context: bpy.types.Context) -> None:
         draw_settings(self.layout, self)
 
+    def settings(self) -> Settings:
+        return Settings(
+            boundary=self.boundary.lower(),
+            quality=self.quality.lower(),
+            balance=self.balance,
+            margin=self.margin,
+            texture_size=self.texture_size,
+            pack=self.pack,
+        )
+
     def steps(self, context: bpy.types.Context):
         from .. import blender_mesh, blender_pack, packing
         from ..unwrapping import Refusal, lay_out
@@ -62,10 +92,9 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
                 blender_mesh.check_target(obj.data, self.uv_layer)
         except blender_mesh.TargetError as error:
             raise Complaint(str(error)) from error
-        settings = Settings(self.boundary.lower(), self.margin, self.texture_size, self.pack)
         surfaces = [(reading.surface, reading.faces) for _, reading in pairs]
         try:
-            layout = yield from lay_out(surfaces, settings, blender_pack.pack)
+            layout = yield from lay_out(surfaces, self.settings(), blender_pack.pack)
         except Refusal as refusal:
             obj = pairs[refusal.index][0]
             raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
@@ -90,6 +119,8 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "boundary")
+    layout.prop(properties, "balance")
+    layout.prop(properties, "quality")
     layout.prop(properties, "pack")
     column = layout.column()
     column.active = properties.pack

@@ -14,7 +14,7 @@ def draw_unwrap(self, _context: bpy.types.Context) -> None:
     self.layout.operator(UV_OT_omt_measure.bl_idname)
 
 
-def menus() -> list[type]:
+def menus() -> list:
     """Menus that get the entries, so that every UV menu of every Blender version shows them once.
 
     Since 4.5 the UV menu of the 3D View contains the Unwrap menu of the UV editor; before, it repeats it.

@@ -18,7 +18,7 @@ class SidebarPanel:
         return context.mode in {"OBJECT", "EDIT_MESH"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
+        layout: bpy.types.UILayout = self.layout  # type: ignore[attr-defined]
         # The operator starts from these, so nothing has to be kept in the scene.
         draw_settings(layout.column(), context.window_manager.operator_properties_last(UV_OT_omt_unwrap.bl_idname))
         layout.operator(UV_OT_omt_unwrap.bl_idname, icon="UV")
