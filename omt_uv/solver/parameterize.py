@@ -18,7 +18,7 @@ from .distortion import measure
 from .domain import Disk, Domain, Rectangle
 from .embedding import arc_length_parameters, tutte
 from .errors import MeshError, PrecisionError, TransportError
-from .geometry import face_areas, halfedge_lengths, vertex_areas
+from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
 from .progress import Progress, Steps
 from .refine import BOUNDARIES, refine
 from .topology import boundary_loops
@@ -185,9 +185,12 @@ def unwrap_chart(
             vertices, chart.triangles, uv, boundary=boundary, target=target, balance=balance, quality=quality
         )
     with log.timed("measure"):
-        figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False)
+        # A polygon inscribed in the disk is smaller than the disk: one texel density needs its own area.
+        covered = signed_areas(refined.uv, chart.triangles).sum()
+        uv = refined.uv * np.sqrt(face_areas(vertices, chart.triangles).sum() / covered)
+        figures = measure(vertices, chart.triangles, uv[chart.triangles], overlap=False)
     return ChartMap(
-        refined.uv * unit,
+        uv * unit,
         conformal.iterations if conformal else None,
         conformal.residual if conformal else None,
         cells.iterations if cells else None,

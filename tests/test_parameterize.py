@@ -1,0 +1,143 @@
+"""The pipeline from a surface to texture coordinates."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver import errors
+from omt_uv.solver.charts import split, triangle_surface
+from omt_uv.solver.distortion import measure
+from omt_uv.solver.geometry import face_areas, signed_areas
+from omt_uv.solver.parameterize import unwrap, unwrap_chart
+from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.topology import boundary_loops
+
+BOUNDARIES = ["free", "disk", "square"]
+
+
+def two_charts():
+    """A bumpy square and, far from it, one of twice the size."""
+    V, F = meshes.bumpy(10, 10)
+    return triangle_surface(np.vstack([V, 2 * V + 5]), np.vstack([F, F + len(V)]))
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize("shape", ["bumpy", "cone", "hemisphere", "head", "random_disk", "quad_patch"])
+def test_areas_are_kept_and_nothing_folds(shape, boundary):
+    V, F = getattr(meshes, shape)()
+    result = drain(unwrap(triangle_surface(V, F), boundary=boundary))
+    (chart,), (chart_map,) = result.charts, result.maps
+    area = signed_areas(chart_map.uv, chart.triangles)
+    assert (area > 0).all() and chart_map.folds == 0
+    assert area.sum() == pytest.approx(face_areas(V, F).sum(), rel=1e-9)
+    assert chart_map.area_l1 <= (0.01 if boundary == "free" else 0.02)
+    figures = measure(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])
+    assert figures.area_l1 == pytest.approx(chart_map.area_l1) and figures.overlap <= 1e-4
+
+
+def test_the_boundary_fills_the_domain():
+    surface = triangle_surface(*meshes.head(16))
+    (chart,) = split(surface)
+    (loop,) = boundary_loops(chart.triangles)
+    disk = drain(unwrap(surface, boundary="disk")).maps[0].uv[loop]
+    radius = np.linalg.norm(disk, axis=1)
+    np.testing.assert_allclose(radius, radius[0], rtol=1e-9)
+    square = drain(unwrap(surface, boundary="square")).maps[0].uv[loop]
+    side = np.abs(square).max()
+    np.testing.assert_allclose(np.abs(square).max(axis=1), side, rtol=1e-9)
+    assert (np.abs(np.abs(square) - side) < 1e-9 * side).all(axis=1).sum() == 4
+
+
+def test_charts_share_one_texel_density():
+    result = drain(unwrap(two_charts()))
+    assert len(result.maps) == 2
+    for chart, chart_map in zip(result.charts, result.maps, strict=True):
+        uv_area = signed_areas(chart_map.uv, chart.triangles).sum()
+        assert uv_area == pytest.approx(face_areas(chart.vertices, chart.triangles).sum(), rel=1e-9)
+
+
+def test_corner_uv_names_every_mapped_corner_once():
+    surface = two_charts()
+    faces = np.arange(len(surface.triangles)) < 200
+    corners, uv = drain(unwrap(surface, faces)).corner_uv()
+    np.testing.assert_array_equal(np.sort(corners), np.arange(600))
+    assert uv.shape == (600, 2) and np.isfinite(uv).all()
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+def test_pose_and_units_only_scale_the_result(boundary):
+    V, F = meshes.head(12)
+    rotation = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    rotation *= np.linalg.det(rotation)
+    reference = drain(unwrap(triangle_surface(V, F), boundary=boundary)).maps[0].uv
+    for moved, scale in ((1e-6 * V, 1e-6), (1e6 * V, 1e6), (V @ rotation.T + 7, 1)):
+        uv = drain(unwrap(triangle_surface(moved, F), boundary=boundary)).maps[0].uv / scale
+        a, b = (x[:, 0] + 1j * x[:, 1] for x in (uv - uv.mean(axis=0), reference - reference.mean(axis=0)))
+        turn = np.vdot(a, b)
+        np.testing.assert_allclose(a * turn / abs(turn), b, atol=1e-4 * np.abs(b).max())
+
+
+def test_progress_never_runs_backwards():
+    seen: list[Progress] = []
+    drain(unwrap(two_charts()), seen.append)
+    fractions = [p.fraction for p in seen]
+    assert {"Conformal map", "Optimal transport", "Refinement"} <= {p.stage for p in seen}
+    assert min(fractions) >= 0 and max(fractions) <= 1 and (np.diff(fractions) >= -1e-12).all()
+
+
+def test_a_density_magnifies_exactly():
+    V, F = meshes.hemisphere(16, 48)
+    (chart,) = split(triangle_surface(V, F))
+    density = np.where(chart.vertices[chart.triangles].mean(axis=1)[:, 2] > 0.8, 4.0, 1.0)
+    result = drain(unwrap_chart(chart, density=density))
+    target = face_areas(chart.vertices, chart.triangles) * density
+    area = signed_areas(result.uv, chart.triangles)
+    share = area / area.sum()
+    assert np.abs(share - target / target.sum()).sum() <= 0.01
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_densities_that_make_no_sense(value):
+    (chart,) = split(triangle_surface(*meshes.bumpy(4, 4)))
+    density = np.ones(len(chart.triangles))
+    density[5] = value
+    with pytest.raises(errors.DensityError) as caught:
+        drain(unwrap_chart(chart, density=density))
+    assert caught.value.elements.tolist() == [5]
+
+
+def test_an_elongated_chart_falls_back_and_says_so():
+    V, F = meshes.grid(200, 2, width=100.0)
+    (chart_map,) = drain(unwrap(triangle_surface(V, F), boundary="free")).maps
+    assert any("double precision" in w for w in chart_map.warnings)
+    assert chart_map.area_l1 < 1e-3 and chart_map.angle_mean < 1.01 and chart_map.folds == 0
+
+
+def test_errors_carry_the_indices_of_the_surface():
+    V, F = meshes.bumpy(6, 6)
+    A, T = meshes.annulus()
+    with pytest.raises(errors.NotADiskError) as caught:
+        drain(unwrap(triangle_surface(np.vstack([V, A + 5]), np.vstack([F, T + len(V)]))))
+    assert caught.value.elements.min() >= len(V)
+
+
+def test_the_report_is_plain_data():
+    import json
+
+    report = drain(unwrap(two_charts())).report()
+    assert len(report) == 2 and json.loads(json.dumps(report)) == report
+    expected = {"vertices", "faces", "newton_conformal", "newton_transport", "residual_transport", "area_l1", "folds"}
+    assert expected <= set(report[0]) and {"conformal", "transport", "refinement"} <= set(report[0]["seconds"])
+
+
+@meshes.models_missing
+@pytest.mark.parametrize("name", meshes.DISK_MODELS)
+def test_models(name):
+    result = drain(unwrap(triangle_surface(*meshes.load_model(name))))
+    (chart,), (chart_map,) = result.charts, result.maps
+    assert chart_map.folds == 0 and chart_map.area_l1 <= 0.01
+    figures = measure(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])
+    assert figures.overlap <= 1e-4
+    if chart_map.newton_conformal is not None:
+        assert chart_map.newton_conformal <= 12 and chart_map.residual_conformal <= 1e-8
+    assert chart_map.newton_transport <= 25 and chart_map.residual_transport <= 1e-6
