@@ -15,7 +15,6 @@ import argparse
 import os
 import platform
 import resource
-import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -93,7 +92,6 @@ def transport_part(args):
 
 def unwrap_part(args):
     from rivals import METHODS
-    from rivals import unwrap as rival
 
     figures = {"area_l1": 9, "area_sd": 9, "angle_mean": 10, "folds": 5, "overlap": 8, "time": 8, "ratio": 7}
     table = Table(
@@ -102,11 +100,9 @@ def unwrap_part(args):
     )
     for case in map(load_case, available(args.models)):
         runs = args.runs if len(case.F) < 20_000 else 1
-        reference = None
-        for method in sorted(METHODS, key=lambda m: m != REFERENCE):  # the reference time comes first
-            results = sorted((rival(case.V, case.F, case.seams, method) for _ in range(runs)), key=_processor)
-            found = results[(runs - 1) // 2]
-            reference = reference or found.processor_seconds
+        rivals = {m: _median_rival(case, m, runs) for m in METHODS}
+        reference = rivals[REFERENCE].processor_seconds
+        for method, found in rivals.items():
             _add(table, case, method, found.uv, found.processor_seconds, reference)
         for boundary in args.boundaries:
             for preset in args.presets:
@@ -120,8 +116,11 @@ def unwrap_part(args):
     return table
 
 
-def _processor(found):
-    return found.processor_seconds
+def _median_rival(case, method, runs):
+    from rivals import unwrap as rival
+
+    found = [rival(case.V, case.F, case.seams, method) for _ in range(runs)]
+    return sorted(found, key=lambda f: f.processor_seconds)[(runs - 1) // 2]
 
 
 def _head(case, method):
@@ -154,8 +153,6 @@ def _missed(case, d, ratio, boundary, preset):
 
 def lion_part(args):
     """The first two stages alone, on the model that has most to move."""
-    from rivals import unwrap as rival
-
     case = load_case(available(["lion"] if not args.models else args.models[:1])[0])
     chart = split(triangle_surface(case.V, case.F, case.seams))[0]
     mass = vertex_areas(chart.vertices, chart.triangles)
@@ -165,8 +162,7 @@ def lion_part(args):
         return conformal, drain(transport(conformal.uv, mass, Disk()))
 
     (conformal, moved), seconds = median_of(args.runs, ours)
-    times = [rival(case.V, case.F, case.seams, REFERENCE).processor_seconds for _ in range(args.runs)]
-    reference = statistics.median(times)
+    reference = _median_rival(case, REFERENCE, args.runs).processor_seconds
     table = Table(
         f"Conformal map and transport of {case.name} against {REFERENCE}",
         {"Newton conformal": 16, "Newton transport": 16, "residual": 9, "time": 8, REFERENCE: 18, "ratio": 7},
