@@ -83,6 +83,12 @@ class SolverOperator:
         cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")
         return False
 
+    def steps(self, context: bpy.types.Context):
+        raise NotImplementedError
+
+    def finish(self, context: bpy.types.Context, result) -> None:
+        raise NotImplementedError
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         from ..solver.progress import drain
 

@@ -1,0 +1,117 @@
+"""Packing: inside the square, apart by the margin, one scale, never mirrored."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from omt_uv import packing
+from omt_uv.packing import MarginError, pack, stack, turn_upright
+
+FAN = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])
+
+
+def corner(width, height, angle=0.0):
+    """An L of four triangles: not its own mirror image."""
+    points = np.array([[0, 0], [1, 0], [1, 0.3], [0.25, 0.3], [0.25, 1], [0, 1]]) * [width, height]
+    return points @ rotation(angle).T
+
+
+def rotation(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def corners(count, seed=0, unit=1.0):
+    rng = np.random.default_rng(seed)
+    return [unit * corner(*rng.uniform(1, 10, 2), rng.uniform(0, 7)) for _ in range(count)]
+
+
+def outline(points, samples=200):
+    t = np.linspace(0, 1, samples)[:, None, None]
+    return (points * (1 - t) + np.roll(points, -1, axis=0) * t).reshape(-1, 2)
+
+
+def least_distance(islands):
+    trees = [cKDTree(outline(p)) for p in islands]
+    return min(a.query(b.data)[0].min() for i, a in enumerate(trees) for b in trees[:i])
+
+
+@pytest.mark.parametrize("count", [1, 2, 25])
+@pytest.mark.parametrize("margin, texture_size", [(0, 1024), (4, 1024), (16, 1024), (3, 128), (2, 8192)])
+def test_inside_and_apart(count, margin, texture_size):
+    result = pack(corners(count), [FAN] * count, margin, texture_size)
+    points = np.concatenate(result.islands)
+    border = margin / texture_size
+    assert border - 1e-9 <= points.min()
+    assert points.max() <= 1 - border + 1e-9
+    assert np.ptp(points, axis=0).max() == pytest.approx(1 - 2 * border)
+    if count > 1:
+        distance = least_distance(result.islands)
+        assert distance > 0
+        assert distance >= border
+
+
+def test_one_scale_and_no_mirror_image():
+    islands = corners(30)
+    result = pack(islands, [FAN] * 30)
+    for before, after in zip(islands, result.islands, strict=True):
+        linear = np.linalg.lstsq(before - before.mean(axis=0), after - after.mean(axis=0), rcond=None)[0]
+        np.testing.assert_allclose(linear @ linear.T, result.scale**2 * np.eye(2), atol=1e-9)
+        assert np.linalg.det(linear) > 0
+    assert 0.25 < result.coverage < 1
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_units_do_not_matter(unit):
+    plain, scaled = (pack(corners(9, unit=u), [FAN] * 9) for u in (1.0, unit))
+    # Single precision may change a choice of the packer, but not how well it does.
+    assert scaled.scale * unit == pytest.approx(plain.scale, rel=0.1)
+
+
+def test_very_different_sizes():
+    islands = [corner(100, 100), *corners(40, unit=1e-3)]
+    result = pack(islands, [FAN] * 41, 2, 1024)
+    assert least_distance(result.islands) >= 2 / 1024
+    assert np.ptp(result.islands[0], axis=0).max() == pytest.approx(100 * result.scale)
+
+
+def test_a_folded_island_is_placed_all_the_same():
+    points = corner(2, 3)
+    points[3] = [5, 5]
+    result = pack([points, corner(1, 1)], [FAN, FAN], 4, 256)
+    assert np.concatenate(result.islands).min() >= 0
+
+
+@pytest.mark.parametrize("margin, texture_size, count", [(64, 128, 1), (100, 128, 1), (40, 128, 9)])
+def test_margins_that_leave_no_room(margin, texture_size, count):
+    with pytest.raises(MarginError, match="texture size"):
+        pack(corners(count), [FAN] * count, margin, texture_size)
+
+
+def test_smallest_rectangle():
+    points = corner(1, 10, 0.4)
+    upright = turn_upright(points)
+    size = np.ptp(upright, axis=0)
+    assert size[0] < size[1]
+    best = min(np.prod(np.ptp(points @ rotation(a).T, axis=0)) for a in np.linspace(0, np.pi, 2000))
+    assert np.prod(size) <= best * (1 + 1e-9)
+    assert turn_upright(np.zeros((3, 2))).shape == (3, 2)
+
+
+def test_stack_centres_at_one_scale():
+    islands = corners(5)
+    result = stack(islands)
+    sizes = [np.ptp(p, axis=0).max() for p in result.islands]
+    assert max(sizes) == pytest.approx(1)
+    for before, after in zip(islands, result.islands, strict=True):
+        np.testing.assert_allclose(0.5 * (after.min(axis=0) + after.max(axis=0)), 0.5)
+        np.testing.assert_allclose(np.ptp(after, axis=0), result.scale * np.ptp(before, axis=0))
+
+
+def test_without_xatlas(monkeypatch):
+    monkeypatch.setitem(sys.modules, "xatlas", None)
+    with pytest.raises(packing.PackingError, match="xatlas"):
+        pack(corners(2), [FAN] * 2)
