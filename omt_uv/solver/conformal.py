@@ -178,7 +178,7 @@ def _coordinate(flow, owner, crossed, on_side, n, low: int, high: int) -> tuple[
     free = np.ones(n, dtype=bool)
     free[on_side[low]] = free[on_side[high]] = False
     if free.any():
-        x[free] = solve_spd(matrix[free][:, free].tocsc(), (right - matrix @ x)[free])
+        x[free] = solve_spd(matrix[free][:, free].tocsc(), (right - matrix @ x)[free], order="mmd")
     energy = 0.5 * float(weight @ (x[a] - sign * x[b] - shift) ** 2)
     return x, energy
 

@@ -96,5 +96,5 @@ def _newton_direction(tri, owner, length, gradient):
     tail, head = halfedges(tri.triangles)
     weight = cotangents_from_lengths(length).ravel()
     hessian = laplacian_from_weights(owner[tail], owner[head], weight, n)[1:, 1:]
-    direction = np.concatenate([[0.0], solve_spd(hessian.tocsc(), -gradient[1:])])
+    direction = np.concatenate([[0.0], solve_spd(hessian.tocsc(), -gradient[1:], order="mmd")])
     return direction - direction.mean()
