@@ -6,11 +6,9 @@ that ends inside a chart, and a vertex where two fans meet, are cut open for the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from .errors import (
     DuplicateFaceError,
@@ -21,6 +19,7 @@ from .errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
+from .sheets import Sheets, components, corner_classes, diagonal_pairs, groups, polygon_sides
 from .topology import boundary_loops, halfedges, pair_keys, pair_up
 
 # A triangle whose area is below this share of its longest side squared is a line.
@@ -45,13 +44,22 @@ class Surface:
 
 @dataclass(frozen=True)
 class Chart:
-    """A disk: vertices (n,3), triangles (m,3), the surface's corners (m,3), faces (m,) and vertex_ids (n,)."""
+    """A disk: vertices (n,3), triangles (m,3), the surface's corners (m,3), faces (m,) and vertex_ids (n,).
+
+    patches (k,3) are triangles that fill holes of the chart. They exist for the map only: they have no corners,
+    and vertices that only they use have the id -1. `disk` (m+k,3), the triangles and the patches, is what is a disk.
+    """
 
     vertices: np.ndarray
     triangles: np.ndarray
     corners: np.ndarray
     faces: np.ndarray
     vertex_ids: np.ndarray
+    patches: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+
+    @property
+    def disk(self) -> np.ndarray:
+        return np.concatenate([self.triangles, self.patches]) if len(self.patches) else self.triangles
 
 
 def triangle_surface(positions: np.ndarray, triangles: np.ndarray, seams=()) -> Surface:
@@ -68,23 +76,43 @@ def triangle_surface(positions: np.ndarray, triangles: np.ndarray, seams=()) -> 
 def split(surface: Surface, faces: np.ndarray | None = None) -> list[Chart]:
     """Charts of the polygons `faces` (f,) bool (all by default), each a topological disk.
 
+    Nothing is repaired: see `preparation.prepare` for meshes that need it.
+
     Raises
     ------
     EmptyMeshError, NonFiniteError, ZeroAreaFaceError, DuplicateFaceError, NonManifoldEdgeError,
     OrientationError, NotADiskError : with the indices of the offending elements of the surface
     """
+    faces, triangles, owner = chosen_triangles(surface, faces)
+    _check_areas(surface, triangles, owner)
+    groups_of_duplicates = duplicate_faces(surface, faces)
+    if len(groups_of_duplicates):
+        raise DuplicateFaceError(
+            "Faces share all their vertices with another face", kind="face", elements=groups_of_duplicates[:, 0]
+        )
+    charts = assemble(surface, _joined(surface, triangles, owner))
+    for chart in charts:
+        check_edges(chart)
+        check_disk(chart)
+    return charts
+
+
+def chosen_triangles(surface: Surface, faces: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The polygons (f,) bool, their triangles (m,3) of corners, and the polygon (m,) of each.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError : nothing to unwrap, or not anywhere
+    """
     if faces is None:
         faces = np.ones(len(surface.face_start) - 1, dtype=bool)
-    chosen = np.asarray(faces, dtype=bool)[surface.triangle_face]
+    faces = np.asarray(faces, dtype=bool)
+    chosen = faces[surface.triangle_face]
     triangles, owner = surface.triangles[chosen], surface.triangle_face[chosen]
     if len(triangles) == 0:
         raise EmptyMeshError("There are no faces to unwrap")
     _check_positions(surface, triangles)
-    _check_areas(surface, triangles, owner)
-    _check_duplicates(surface, faces)
-    first, second = _joined_halfedges(surface, triangles)
-    corner_class, chart_of_triangle = _join(surface, triangles, owner, first, second)
-    return [_make(surface, c, triangles, owner, corner_class) for c in _groups(chart_of_triangle)]
+    return faces, triangles, owner
 
 
 def _check_positions(surface: Surface, triangles: np.ndarray) -> None:
@@ -94,8 +122,9 @@ def _check_positions(surface: Surface, triangles: np.ndarray) -> None:
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
 
 
-def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> None:
-    p = surface.positions[surface.corner_vertex[triangles]]
+def degenerate_triangles(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Triangles (m,3) of positions (n,3) that are a line or a point next to the extent of them all, (m,) bool."""
+    p = positions[triangles]
     # Halves: the difference of two huge numbers may be infinite.
     side = p / 2 - p[:, :1] / 2
     size = np.abs(side).max(axis=(1, 2))
@@ -103,89 +132,80 @@ def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> 
     side = side / np.where(size > 0, size, 1)[:, None, None]
     area = 0.5 * np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1)
     extent = np.ptp(p.reshape(-1, 3) / 2, axis=0).max()
-    wrong = (area <= DEGENERATE) | (size <= 1e-9 * extent)
+    return (area <= DEGENERATE) | (size <= 1e-9 * extent)
+
+
+def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> None:
+    wrong = degenerate_triangles(surface.positions, surface.corner_vertex[triangles])
     if wrong.any():
         raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(owner[wrong]))
 
 
-def _check_duplicates(surface: Surface, faces: np.ndarray) -> None:
-    """Faces on the same set of vertices, compared size by size."""
+def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
+    """Polygons on the same set of vertices as another: rows (k,2) of polygon and its number among its likes."""
     size = np.diff(surface.face_start)
-    wrong = []
+    rows = [np.zeros((0, 2), np.int64)]
     for s in np.unique(size[faces]):
         index = np.flatnonzero(faces & (size == s))
         vertices = np.sort(surface.corner_vertex[surface.face_start[index][:, None] + np.arange(s)], axis=1)
         _, inverse, count = np.unique(vertices, axis=0, return_inverse=True, return_counts=True)
-        wrong.append(index[count[inverse.ravel()] > 1])
-    duplicates = np.concatenate(wrong)
-    if len(duplicates):
-        raise DuplicateFaceError("Faces share all their vertices with another face", kind="face", elements=duplicates)
+        inverse = inverse.ravel()
+        order = np.argsort(inverse, kind="stable")
+        number = np.zeros(len(index), np.int64)
+        number[order] = np.arange(len(index)) - (np.cumsum(count) - count)[inverse[order]]
+        twice = count[inverse] > 1
+        rows.append(np.stack([index[twice], number[twice]], axis=1))
+    return np.concatenate(rows)
 
 
-def _joined_halfedges(surface: Surface, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of opposite halfedges (p,), (p,) across which the map is continuous."""
-    tail, head = halfedges(triangles)
-    a, b = surface.corner_vertex[tail], surface.corner_vertex[head]
-    # A triangle side that is no side of its polygon is a diagonal; its twin lies in the same polygon.
-    after = np.arange(len(surface.corner_vertex)) + 1
-    after[surface.face_start[1:] - 1] = surface.face_start[:-1]
-    side = after[tail] == head
-    diagonal = np.flatnonzero(~side)
-    first, second = pair_up(pair_keys(tail[diagonal], head[diagonal]))
-    inner = diagonal[first], diagonal[second]
-
+def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Sheets:
+    """Triangles joined across every edge that is no seam; what cannot be joined is an error."""
+    side = polygon_sides(len(surface.corner_vertex), surface.face_start, triangles)
+    sheets = Sheets(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
     sides = np.flatnonzero(side)
-    key = pair_keys(a[sides], b[sides])
-    if len(surface.seams):
-        keep = ~np.isin(key, pair_keys(surface.seams[:, 0], surface.seams[:, 1]))
-        sides, key = sides[keep], key[keep]
-    unique, index, count = np.unique(key, return_index=True, return_counts=True)
+    a, b = sheets.ends(sides)
+    key = pair_keys(a, b)
+    keep = ~is_seam(surface, key)
+    sides, key, a, b = sides[keep], key[keep], a[keep], b[keep]
+    _, index, count = np.unique(key, return_index=True, return_counts=True)
     if (count > 2).any():
-        h = sides[index[count > 2]]
+        h = index[count > 2]
         raise NonManifoldEdgeError(
             "More than two faces meet at an edge", kind="edge", elements=np.stack([a[h], b[h]], axis=1)
         )
     first, second = pair_up(key)
-    first, second = sides[first], sides[second]
     wrong = first[a[first] == a[second]]
     if len(wrong):
         raise OrientationError(
             "Neighbouring faces point to opposite sides", kind="edge", elements=np.stack([a[wrong], b[wrong]], axis=1)
         )
-    return np.concatenate([inner[0], first]), np.concatenate([inner[1], second])
+    return replace(
+        sheets,
+        first=np.concatenate([sheets.first, sides[first]]),
+        second=np.concatenate([sheets.second, sides[second]]),
+    )
 
 
-def _join(surface, triangles, owner, first, second) -> tuple[np.ndarray, np.ndarray]:
-    """Class of every corner and chart of every triangle, joined across the halfedge pairs."""
-    tail, head = halfedges(triangles)
-    rows = np.concatenate([tail[first], head[first]])
-    columns = np.concatenate([head[second], tail[second]])
-    c = len(surface.corner_vertex)
-    corner_class = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(c, c)), False)[1]
-    m = len(triangles)
-    # Triangles of one polygon always share its diagonals, so edge pairs alone connect a chart.
-    graph = coo_matrix((np.ones(len(first)), (first // 3, second // 3)), shape=(m, m))
-    return corner_class, connected_components(graph, directed=False)[1]
+def is_seam(surface: Surface, key: np.ndarray) -> np.ndarray:
+    """Whether edges, given by `topology.pair_keys` of their vertices, are seams; (k,) bool."""
+    return np.isin(key, pair_keys(surface.seams[:, 0], surface.seams[:, 1]))
 
 
-def _groups(label: np.ndarray) -> list[np.ndarray]:
-    """Indices of equal labels, one array per label in order."""
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+def assemble(surface: Surface, sheets: Sheets) -> list[Chart]:
+    """One chart per connected part of the sheets, in the order of their first triangles."""
+    corner_class = corner_classes(sheets)
+    return [_make(surface, c, sheets, corner_class) for c in groups(components(sheets))]
 
 
-def _make(surface: Surface, members: np.ndarray, triangles, owner, corner_class) -> Chart:
-    corners = triangles[members]
-    classes, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
+def _make(surface: Surface, members: np.ndarray, sheets: Sheets, corner_class: np.ndarray) -> Chart:
+    corners = sheets.triangles[members]
+    _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
     vertex_ids = surface.corner_vertex[corners.ravel()[index]]
     local = inverse.reshape(-1, 3).astype(np.int64)
-    chart = Chart(surface.positions[vertex_ids], local, corners, owner[members], vertex_ids)
-    _check_edges(chart)
-    _check_disk(chart)
-    return chart
+    return Chart(surface.positions[vertex_ids], local, corners, sheets.owner[members], vertex_ids)
 
 
-def _check_edges(chart: Chart) -> None:
+def check_edges(chart: Chart) -> None:
     """Straight lines in the plane cannot tell apart two edges, or diagonals, between the same two vertices."""
     tail, head = halfedges(chart.triangles)
     unique, index, count = np.unique(pair_keys(tail, head), return_index=True, return_counts=True)
@@ -199,9 +219,10 @@ def _check_edges(chart: Chart) -> None:
         )
 
 
-def _check_disk(chart: Chart) -> None:
-    loops = boundary_loops(chart.triangles)
-    n, m, b = len(chart.vertices), len(chart.triangles), sum(len(loop) for loop in loops)
+def check_disk(chart: Chart) -> None:
+    """Raise NotADiskError unless the chart, holes filled, is connected to one boundary without handles."""
+    loops = boundary_loops(chart.disk)
+    n, m, b = len(chart.vertices), len(chart.disk), sum(len(loop) for loop in loops)
     euler = n - (3 * m + b) // 2 + m
     handles = (2 - euler - len(loops)) // 2
     faces = np.unique(chart.faces)

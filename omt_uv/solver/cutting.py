@@ -1,0 +1,178 @@
+"""Cuts that turn every part of a surface into a disk, short and where they are least seen.
+
+Boundaries are joined by shortest paths, handles are opened along short loops, and a surface that has to be cut
+anyway is cut to the extremities that would be distorted most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from .charts import Surface, chosen_triangles
+from .cut_graph import greedy_arcs, path_to, shorten
+from .extremities import log_scale
+from .geometry import face_areas
+from .piece import NOISE, Kind, Piece, classify, edge_graph, make_piece
+from .repair import Repaired, join
+from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
+from .topology import pair_keys
+
+MOST_EXTREMITIES = 5
+# A flat map whose lengths are nowhere predicted to be off by more than this factor needs no further cut.
+BEARABLE = 2.0
+ROOT_TRIALS = 4
+
+
+@dataclass(frozen=True)
+class PieceCut:
+    """How one part was opened: triangles, boundaries, handles (crosscaps where one_sided), tips reached, cut length."""
+
+    triangles: int
+    boundaries: int
+    handles: int
+    one_sided: bool
+    extremities: int
+    length: float
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """Edges (k,2) of the surface to add to its seams, their length, and the parts that were opened.
+
+    torn (t,2): edges where more than two faces meet, which no map can join, among the edges.
+    """
+
+    edges: np.ndarray
+    length: float
+    pieces: tuple[PieceCut, ...]
+    torn: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def cut(
+    surface: Surface,
+    faces: np.ndarray | None = None,
+    *,
+    avoid: np.ndarray | None = None,
+    extremities: int = MOST_EXTREMITIES,
+) -> Cuts:
+    """Edges to mark as seams so that every part of the polygons `faces` (f,) bool is a disk; disks are left alone.
+
+    Parameters
+    ----------
+    avoid : (n,) in [0,1], vertices to keep free of seams
+    extremities : tips that a surface without boundary is opened through, at most
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError : see `charts.split`; everything else is repaired and said in the warnings
+    """
+    faces, triangles, owner = chosen_triangles(surface, faces)
+    repaired = join(surface, faces, triangles, owner)
+    return open_sheets(surface, repaired, avoid=avoid, extremities=extremities)[1]
+
+
+def open_sheets(
+    surface: Surface, repaired: Repaired, *, avoid: np.ndarray | None = None, extremities: int = MOST_EXTREMITIES
+) -> tuple[Sheets, Cuts]:
+    """The sheets, all looking to the same side and cut into disks, and the cuts; see `cut`."""
+    weight = np.zeros(len(surface.positions)) if avoid is None else np.clip(np.asarray(avoid, float), 0, 1)
+    positions, unit = in_unit_box(surface, repaired.sheets)
+    area = face_areas(positions, repaired.sheets.vertex[repaired.sheets.triangles])
+    sheets, one_sided = _looking_out(repaired.sheets, area)
+    part, corner_class = components(sheets), corner_classes(sheets)
+    kind = classify(sheets, corner_class, part, one_sided)
+    seam = np.isin(pair_keys(*sheets.ends(sheets.first)), pair_keys(*surface.seams.T))
+    gone = np.zeros(len(sheets.first), dtype=bool)
+    report = []
+    members = groups(part)
+    for k in np.flatnonzero(~kind.is_disk):
+        piece = make_piece(sheets, positions, corner_class, members[k], weight, seam)
+        chosen, tips = open_piece(piece, kind, k, extremities)
+        gone[piece.sheet_pair[chosen]] = True
+        length = float(piece.length[chosen].sum()) * unit
+        figures = int(kind.boundaries[k]), int(kind.handles[k]), bool(kind.one_sided[k])
+        report.append(PieceCut(len(piece.triangles), *figures, tips, length))
+    a, b = sheets.ends(sheets.first[gone])
+    edges = np.concatenate([np.stack([a, b], axis=1), repaired.torn]).astype(np.int64)
+    # Parts that could not be oriented can be, now that they are open.
+    sheets, _ = _looking_out(sheets.without(gone), area)
+    cuts = Cuts(edges, sum(p.length for p in report), tuple(report), repaired.torn, repaired.warnings)
+    return sheets, cuts
+
+
+def _looking_out(sheets: Sheets, area: np.ndarray) -> tuple[Sheets, np.ndarray]:
+    turned, one_sided = orientations(sheets, area)
+    return turn_over(sheets, turned), one_sided
+
+
+def in_unit_box(surface: Surface, sheets: Sheets) -> tuple[np.ndarray, float]:
+    """Positions (n,3) of the surface such that the triangles lie in a unit box, and its size; 0 where unused."""
+    used = np.unique(sheets.vertex[sheets.triangles])
+    p = surface.positions[used]
+    low, high = p.min(axis=0), p.max(axis=0)
+    # Halves first: the difference of two huge numbers may be infinite.
+    unit = 2 * float((high / 2 - low / 2).max()) or 1.0
+    positions = np.zeros(surface.positions.shape)
+    positions[used] = p / unit - low / unit
+    return positions, unit
+
+
+def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.ndarray, int]:
+    """Edges (e,) bool that open the piece, of `kind` number k, into a disk, and how many tips they reach."""
+    closed = kind.boundaries[k] == 0
+    if closed and kind.handles[k] == 0:
+        tips = _first_tips(piece)
+    else:
+        tips = np.zeros(0, dtype=np.int64)
+    if closed and len(tips) == 0:
+        chosen = _best_root(piece)
+    else:
+        chosen = greedy_arcs(piece, tips)
+    chosen = shorten(piece, chosen, tips)
+    while len(tips) < extremities:
+        scale = log_scale(piece, chosen)
+        scale *= 1 + NOISE * np.random.default_rng(0).random(len(scale))
+        tip = int(np.argmax(scale))
+        if scale[tip] <= np.log(BEARABLE):
+            break
+        tips = np.append(tips, tip)
+        chosen = shorten(piece, _reach(piece, chosen, tip), tips)
+    return chosen, len(tips)
+
+
+def _first_tips(piece: Piece) -> np.ndarray:
+    """The sharpest extremity of a sphere-like piece and the vertex farthest from it, (2,); (3,) if they are neighbours.
+
+    A slit of a single edge would not open anything.
+    """
+    nothing = np.zeros(len(piece.pair), dtype=bool)
+    scale = log_scale(piece, nothing) * (1 + NOISE * np.random.default_rng(0).random(piece.count))
+    tips = _farthest(piece, np.array([int(np.argmax(scale))]), 1)
+    neighbours = (np.sort(piece.ends, axis=1) == np.sort(tips)).all(axis=1).any()
+    return _farthest(piece, tips, 1) if neighbours else tips
+
+
+def _farthest(piece: Piece, points: np.ndarray, more: int) -> np.ndarray:
+    """The points (k,) and `more` others, each as far from those before it as the edges go."""
+    graph = edge_graph(piece, np.arange(len(piece.pair)), piece.ends, piece.count)
+    for _ in range(more):
+        points = np.append(points, int(np.argmax(dijkstra(graph, indices=points, min_only=True))))
+    return points
+
+
+def _best_root(piece: Piece) -> np.ndarray:
+    """Shortest of the greedy systems of loops from a few roots, spread evenly: edges (e,) bool."""
+    roots = _farthest(piece, np.array([0]), ROOT_TRIALS)[1:]
+    systems = [greedy_arcs(piece, np.array([root])) for root in roots]
+    return min(systems, key=lambda edges: piece.cost[edges].sum())
+
+
+def _reach(piece: Piece, chosen: np.ndarray, tip: int) -> np.ndarray:
+    """The cut (e,) bool and the shortest path from it, or from the boundary, to the tip."""
+    start = piece.on_rim()
+    start[piece.ends[chosen].ravel()] = True
+    return chosen | path_to(piece, np.flatnonzero(start), tip)

@@ -1,0 +1,187 @@
+"""Broken geometry made usable for the map alone: the mesh itself is never touched.
+
+Edges where several faces meet are cut open, coincident faces come apart in layers, faces that look to the wrong side
+are turned over, and triangles without area are given a little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .charts import Chart, Surface, degenerate_triangles, duplicate_faces, is_seam
+from .errors import ZeroAreaFaceError
+from .sheets import Sheets, corner_classes, diagonal_pairs, polygon_sides
+from .topology import halfedges, pair_keys, pair_up
+
+# Vertices of a triangle without area move by this share of the height of the flattest sound triangle around them:
+# it has area then, and its neighbours keep theirs to within a few thousandths.
+NUDGE = 1e-3
+NUDGE_ROUNDS = 12
+# Share of the extent of the mesh that stands for the size of a part which has none.
+SPECK = 1e-5
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """Sheets in which at most two faces meet at every edge, the edges (k,2) that were torn, and what was done."""
+
+    sheets: Sheets
+    torn: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def join(surface: Surface, faces: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> Repaired:
+    """Join triangles (m,3) of corners of the polygons `faces` (f,) bool across every edge where two of them meet.
+
+    Faces are joined whichever way they look: see `sheets.orientations`. Raises nothing: what cannot be joined is
+    cut open, and said.
+    """
+    side = polygon_sides(len(surface.corner_vertex), surface.face_start, triangles)
+    sheets = Sheets(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
+    layer, warnings = _layers(surface, faces)
+    joined, torn = _pair_sides(surface, sheets, layer)
+    while len(folded := _folded_faces(joined)):
+        layer[folded] = -1
+        joined, torn = _pair_sides(surface, sheets, layer)
+        warnings.append(
+            f"{_count(len(folded), 'face')} shared several edges in a row with another and became an island; "
+            "dissolve the vertex that only the two share"
+        )
+    if len(torn):
+        edges = "an edge" if len(torn) == 1 else f"{len(torn)} edges"
+        warnings.append(f"More than two faces meet at {edges}; cut open there for the map")
+    return Repaired(_healed(joined), torn, tuple(warnings))
+
+
+def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Layer (f,) of every polygon, -1 for those that cannot be joined to any, and warnings.
+
+    The first of several faces on the same vertices is in layer 0, the second in layer 1: a surface that lies double
+    falls into two, each with its own map.
+    """
+    f = len(surface.face_start) - 1
+    layer = np.zeros(f, dtype=np.int64)
+    warnings = []
+    rows = duplicate_faces(surface, faces)
+    layer[rows[:, 0]] = rows[:, 1]
+    copies = int((rows[:, 1] > 0).sum())
+    if copies:
+        warnings.append(
+            f"{_count(copies, 'face')} lie on others with the same vertices and were mapped apart from them; "
+            "delete them, or use Merge by Distance"
+        )
+    polygon = np.repeat(np.arange(f), np.diff(surface.face_start))
+    key = np.sort((polygon << 32) | surface.corner_vertex)
+    repeating = np.unique(key[1:][key[1:] == key[:-1]] >> 32)
+    layer[repeating] = -1
+    repeating = repeating[faces[repeating]]
+    if len(repeating):
+        warnings.append(
+            f"{_count(len(repeating), 'face')} use a vertex twice and became islands; "
+            "use Mesh > Clean Up > Degenerate Dissolve"
+        )
+    return layer, warnings
+
+
+def _pair_sides(surface: Surface, sheets: Sheets, layer: np.ndarray) -> tuple[Sheets, np.ndarray]:
+    """Join the sides of polygons of one layer, and the vertex pairs (k,2) where more than two of them meet."""
+    sides = np.flatnonzero(sheets.side)
+    a, b = sheets.ends(sides)
+    edge = pair_keys(a, b)
+    floor = layer[sheets.owner[sides // 3]]
+    keep = (floor >= 0) & ~is_seam(surface, edge)
+    sides, a, b, edge, floor = sides[keep], a[keep], b[keep], edge[keep], floor[keep]
+    number = np.unique(edge, return_inverse=True)[1].ravel()
+    key = number * (floor.max(initial=0) + 1) + floor
+    _, index, count = np.unique(key, return_index=True, return_counts=True)
+    h = index[count > 2]
+    torn = np.unique(np.stack([np.minimum(a[h], b[h]), np.maximum(a[h], b[h])], axis=1), axis=0)
+    first, second = pair_up(key)
+    first = np.concatenate([sheets.first, sides[first]])
+    second = np.concatenate([sheets.second, sides[second]])
+    return replace(sheets, first=first, second=second), torn
+
+
+def _folded_faces(sheets: Sheets) -> np.ndarray:
+    """One polygon for every diagonal that has the same two ends as another edge: no plane map keeps them apart."""
+    tail, head = halfedges(sheets.triangles)
+    corner_class = corner_classes(sheets)
+    key = pair_keys(corner_class[tail], corner_class[head])
+    _, number, count = np.unique(key, return_inverse=True, return_counts=True)
+    number = number.ravel()
+    h = np.flatnonzero((count[number] > 2) & ~sheets.side)
+    polygon = sheets.owner[h // 3]
+    last = np.zeros(len(count), dtype=np.int64)
+    np.maximum.at(last, number[h], polygon)
+    return np.unique(last[number[h]])
+
+
+def _healed(sheets: Sheets) -> Sheets:
+    """A slit of a single edge has no inside: its two sides are joined again."""
+    tail, head = halfedges(sheets.triangles)
+    corner_class = corner_classes(sheets)
+    open_ = np.ones(len(tail), dtype=bool)
+    open_[sheets.first] = open_[sheets.second] = False
+    h = np.flatnonzero(open_)
+    first, second = pair_up(pair_keys(corner_class[tail[h]], corner_class[head[h]]))
+    first, second = h[first], h[second]
+    slit = first // 3 != second // 3
+    return replace(
+        sheets,
+        first=np.concatenate([sheets.first, first[slit]]),
+        second=np.concatenate([sheets.second, second[slit]]),
+    )
+
+
+def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
+    """The chart with the vertices of triangles without area moved a little, and how many triangles these are.
+
+    The moves are random but always the same. `extent` is that of the whole mesh, for charts without any size.
+
+    Raises
+    ------
+    ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to its chart's)
+    """
+    bad = degenerate_triangles(chart.vertices, chart.disk)
+    if not bad.any():
+        return chart, 0
+    count = int(bad.sum())
+    low = chart.vertices.min(axis=0)
+    size = 2 * float((chart.vertices.max(axis=0) / 2 - low / 2).max())
+    scale = max(size, SPECK * extent) or 1.0
+    rng = np.random.default_rng(0)
+    # A chart without any area has no shape to keep.
+    vertices = SPECK * rng.random((len(chart.vertices), 3)) if bad.all() else chart.vertices / scale - low / scale
+    for k in range(NUDGE_ROUNDS):
+        bad = degenerate_triangles(vertices, chart.disk)
+        if not bad.any():
+            return replace(chart, vertices=vertices * scale), count
+        reach = _least_height(vertices, chart.disk, bad)
+        moved = np.unique(chart.disk[bad])
+        vertices[moved] += NUDGE * 2.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
+    raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.flatnonzero(bad[: len(chart.triangles)]))
+
+
+def _least_height(vertices: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> np.ndarray:
+    """Least height (n,) of the sound triangles around every vertex, or of those nearest along edges."""
+    p = vertices[triangles]
+    double_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    longest = np.linalg.norm(p - p[:, [1, 2, 0]], axis=2).max(axis=1)
+    height = np.where(bad, np.inf, double_area / np.where(longest > 0, longest, 1))
+    reach = np.full(len(vertices), np.inf)
+    np.minimum.at(reach, triangles.ravel(), np.repeat(height, 3))
+    known = reach[np.isfinite(reach)]
+    usual = np.median(known) if len(known) else 1 / np.sqrt(len(vertices))
+    return np.where(np.isfinite(reach), reach, usual)
+
+
+def duplicate_rim_vertices(surface: Surface, vertices: np.ndarray) -> int:
+    """How many of the surface's `vertices` (k,) lie exactly on another of them."""
+    points = surface.positions[np.unique(vertices)]
+    return len(points) - len(np.unique(points + 0.0, axis=0))
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

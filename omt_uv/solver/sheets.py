@@ -1,0 +1,119 @@
+"""Triangles of a polygon mesh and the halfedges across which they hang together.
+
+All topology that knows of corners is here: `charts.py` joins strictly, `repair.py` joins what can be joined, and
+`cutting.py` takes pairs away again. Orientation is a property of the pairs: two triangles agree when their common
+edge runs in opposite directions in them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .topology import halfedges, pair_keys, pair_up
+
+
+@dataclass(frozen=True)
+class Sheets:
+    """Triangles (m,3) of corners with the polygon (m,) of each, and pairs of joined halfedges first, second (p,).
+
+    vertex (c,) of every corner; side (3m,): the halfedge is a side of its polygon, not a diagonal.
+    """
+
+    triangles: np.ndarray
+    owner: np.ndarray
+    vertex: np.ndarray
+    side: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+
+    def ends(self, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Surface vertices at the tail and the head of halfedges (k,)."""
+        tail, head = halfedges(self.triangles)
+        return self.vertex[tail[h]], self.vertex[head[h]]
+
+    def parallel(self) -> np.ndarray:
+        """Pairs (p,) whose halfedges run in the same direction: the triangles look to opposite sides."""
+        return self.ends(self.first)[0] == self.ends(self.second)[0]
+
+    def without(self, gone: np.ndarray) -> Sheets:
+        """The same triangles with the pairs `gone` (p,) bool cut open."""
+        return replace(self, first=self.first[~gone], second=self.second[~gone])
+
+
+def polygon_sides(corner_count: int, face_start: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Whether each halfedge of the triangles of corners (m,3) is a side of its polygon, (3m,) bool."""
+    after = np.arange(corner_count) + 1
+    filled = face_start[1:] > face_start[:-1]
+    after[face_start[1:][filled] - 1] = face_start[:-1][filled]
+    tail, head = halfedges(triangles)
+    # A triangulation may name the corners of a polygon backwards.
+    return (after[tail] == head) | (after[head] == tail)
+
+
+def diagonal_pairs(triangles: np.ndarray, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of halfedges that are two sides of the same diagonal; both lie in one polygon."""
+    tail, head = halfedges(triangles)
+    diagonal = np.flatnonzero(~side)
+    first, second = pair_up(pair_keys(tail[diagonal], head[diagonal]))
+    return diagonal[first], diagonal[second]
+
+
+def corner_classes(sheets: Sheets) -> np.ndarray:
+    """Class (c,) of every corner: corners around one vertex that joined halfedges lead from one to the next."""
+    tail, head = halfedges(sheets.triangles)
+    same = sheets.parallel()
+    f, s = sheets.first, sheets.second
+    rows = np.concatenate([tail[f], head[f]])
+    columns = np.concatenate([np.where(same, tail[s], head[s]), np.where(same, head[s], tail[s])])
+    c = len(sheets.vertex)
+    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(c, c))
+    return connected_components(graph, directed=False)[1]
+
+
+def components(sheets: Sheets) -> np.ndarray:
+    """Connected part (m,) of every triangle."""
+    m = len(sheets.triangles)
+    graph = coo_matrix((np.ones(len(sheets.first)), (sheets.first // 3, sheets.second // 3)), shape=(m, m))
+    return connected_components(graph, directed=False)[1]
+
+
+def orientations(sheets: Sheets, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (m,) bool to turn over so that neighbours agree, and those (m,) of parts where no choice does.
+
+    Every triangle has two sides; joining those that look the same way leaves two components for a part that can be
+    oriented and one for a part that cannot. The winding of most of the `area` (m,) is kept.
+    """
+    m = len(sheets.triangles)
+    t, s = sheets.first // 3, sheets.second // 3
+    shift = m * sheets.parallel()
+    rows, columns = np.concatenate([t, t + m]), np.concatenate([s + shift, s + m - shift])
+    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * m, 2 * m))
+    label = connected_components(graph, directed=False)[1]
+    front, back = label[:m], label[m:]
+    weight = np.bincount(front, area, label.max() + 1) if m else np.zeros(0)
+    turned = (weight[front] < weight[back]) | ((weight[front] == weight[back]) & (front > back))
+    one_sided = front == back
+    return turned & ~one_sided, one_sided
+
+
+def turn_over(sheets: Sheets, turned: np.ndarray) -> Sheets:
+    """The same sheets with the corners of the triangles `turned` (m,) bool in reverse order."""
+    if not turned.any():
+        return sheets
+    triangles = np.where(turned[:, None], sheets.triangles[:, [0, 2, 1]], sheets.triangles)
+
+    def renamed(h: np.ndarray) -> np.ndarray:
+        return np.where(turned[h // 3], 3 * (h // 3) + 2 - h % 3, h)
+
+    side = sheets.side[renamed(np.arange(3 * len(triangles)))]
+    return replace(sheets, triangles=triangles, side=side, first=renamed(sheets.first), second=renamed(sheets.second))
+
+
+def groups(label: np.ndarray) -> list[np.ndarray]:
+    """Indices of equal labels, one array per label in order."""
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
