@@ -37,11 +37,16 @@ class Elements:
         b = np.einsum("mi,mi->m", corner, g)
         return a, b
 
+    def areas(self, w: np.ndarray) -> np.ndarray:
+        """Signed UV area of every face, (m,), over the area of the surface."""
+        a, b = self.derivatives(w)
+        return self.area * (squared(a) - squared(b))
+
 
 def elements(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> Elements:
     """Elements of a surface (n,3), (m,3) whose faces shall have the UV areas target (m,).
 
-    Slivers too thin for double precision keep a finite gradient: their height is bounded below by 1e-9 of their longest side.
+    Slivers too thin for double precision keep a finite gradient: their height is at least 1e-9 of their length.
     """
     p = positions[triangles]
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
@@ -80,7 +85,7 @@ def scatter(faces: Elements, corner: np.ndarray, n: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Local:
-    """Per face: gradient (m,3) complex by its corners; the Hessian is sum_k rows[:,k]^T rows[:,k], rows (m,4,3) complex.
+    """Per face: gradient (m,3) complex by its corners; the Hessian is the sum of squares of its rows (m,4,3) complex.
 
     A row stands for the linear form dw -> Re(row . dw).
     """
@@ -89,37 +94,42 @@ class Local:
     rows: np.ndarray
 
 
-def local_derivatives(faces: Elements, w: np.ndarray, balance: float) -> Local:
-    """Gradients and projected Hessians of all faces of a map w (n,) complex without folds."""
+def local_derivatives(faces: Elements, w: np.ndarray, balance: float, pressure: float = 1.0) -> Local:
+    """Gradients and projected Hessians of all faces of a map w (n,) complex without folds.
+
+    The area term bends the energy in two ways: by how fast its slope grows with the area, and by its slope times the
+    curvature of the area itself. The second part is indefinite, and nearly cancels between neighbours (a constant
+    pressure on all faces has no effect inside), but not once it is projected face by face: then it only holds the
+    faces back. `pressure` in [0, 1] is the share of it that the Hessian keeps; at 0 the term is Gauss-Newton's.
+    """
     a, b = faces.derivatives(w)
-    e_outer, e_inner, block = _by_squares(faces, a, b, balance)
+    (e_outer, e_inner), (h_outer, h_inner), block = _by_squares(faces, a, b, balance, pressure)
     g = faces.gradient
     corner = (e_outer * a)[:, None] * g + (e_inner * b)[:, None] * g.conj()
     # Linear forms: change of |a|, of |b|, and of the two phases.
     along_a = 0.5 * _unit(a).conj()[:, None] * g.conj()
     along_b = 0.5 * _unit(b).conj()[:, None] * g
-    turn_a = -1j * np.sqrt(np.maximum(2 * e_outer, 0))[:, None] * along_a
-    turn_b = -1j * np.sqrt(np.maximum(2 * e_inner, 0))[:, None] * along_b
+    turn_a = -1j * np.sqrt(np.maximum(2 * h_outer, 0))[:, None] * along_a
+    turn_b = -1j * np.sqrt(np.maximum(2 * h_inner, 0))[:, None] * along_b
     (c1, s1, v1), (c2, s2, v2) = _split(*block)
     radial1 = np.sqrt(v1)[:, None] * (c1[:, None] * along_a + s1[:, None] * along_b)
     radial2 = np.sqrt(v2)[:, None] * (c2[:, None] * along_a + s2[:, None] * along_b)
     return Local(corner, np.stack([turn_a, turn_b, radial1, radial2], axis=1))
 
 
-def _by_squares(faces, a, b, balance):
-    """Derivatives by |a|^2 and |b|^2, and the Hessian entries by |a| and |b|."""
+def _by_squares(faces, a, b, balance, pressure):
+    """Derivatives by |a|^2 and |b|^2, the same for the Hessian, and the Hessian's entries by |a| and |b|."""
     outer, inner = squared(a), squared(b)
     det = outer - inner
-    weight = balance / 2
-    slope = weight * (1 / faces.ratio - faces.ratio / det**2)
+    slope = balance / 2 * (1 / faces.ratio - faces.ratio / det**2)
     bend = balance * faces.ratio / det**3 + 4 * inner / det**3
-    area = faces.area
-    e_outer = area * (slope - 2 * inner / det**2)
-    e_inner = area * (2 / det + 2 * inner / det**2 - slope)
-    aa = 2 * e_outer + area * 4 * outer * bend
+    area, shear_outer, shear_inner = faces.area, -2 * inner / det**2, 2 / det + 2 * inner / det**2
+    first = area * (shear_outer + slope), area * (shear_inner - slope)
+    kept = area * (shear_outer + pressure * slope), area * (shear_inner - pressure * slope)
+    aa = 2 * kept[0] + area * 4 * outer * bend
     ab = -4 * area * np.sqrt(outer * inner) * (bend + 2 / det**2)
-    bb = 2 * e_inner + area * 4 * inner * (bend + 4 / det**2)
-    return e_outer, e_inner, (aa, ab, bb)
+    bb = 2 * kept[1] + area * 4 * inner * (bend + 4 / det**2)
+    return first, kept, (aa, ab, bb)
 
 
 def _split(aa, ab, bb):
@@ -141,7 +151,5 @@ def _unit(z):
 
 def area_error(faces: Elements, w: np.ndarray) -> float:
     """Share of the UV area of w (n,) in the wrong place: sum of |share - target share| over the faces."""
-    a, b = faces.derivatives(w)
-    area = faces.area * (squared(a) - squared(b))
-    target = faces.area * faces.ratio
+    area, target = faces.areas(w), faces.area * faces.ratio
     return float(np.abs(area / area.sum() - target / target.sum()).sum())

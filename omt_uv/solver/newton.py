@@ -167,10 +167,10 @@ class Step:
     share: float
 
 
-def newton_direction(problem: Problem, w: np.ndarray) -> tuple[np.ndarray, float]:
+def newton_direction(problem: Problem, w: np.ndarray, pressure: float = 1.0) -> tuple[np.ndarray, float]:
     """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
     n, faces, motion = len(w), problem.faces, problem.motion
-    local = local_derivatives(faces, w, problem.weight)
+    local = local_derivatives(faces, w, problem.weight, pressure)
     gradient = scatter(faces, local.gradient, n)
     frame = motion.frame(w)
     free = motion.free.astype(float)
@@ -194,9 +194,9 @@ def newton_direction(problem: Problem, w: np.ndarray) -> tuple[np.ndarray, float
     return step.view(complex), float(step @ axes.ravel())
 
 
-def newton_step(problem: Problem, w: np.ndarray, value: float) -> Step:
-    """One line-searched Newton step from a map w (n,) complex of energy `value`."""
-    step, slope = newton_direction(problem, w)
+def newton_step(problem: Problem, w: np.ndarray, value: float, pressure: float = 1.0) -> Step:
+    """One line-searched Newton step from a map w (n,) complex of energy `value`; pressure: see `local_derivatives`."""
+    step, slope = newton_direction(problem, w, pressure)
     moved = problem.motion.frame(w) * step
     share = min(1.0, FOLD_SHARE * first_fold(problem.faces, w, moved), *(e.limit(w, moved) for e in problem.extras))
     for _ in range(MAX_HALVINGS):

@@ -6,46 +6,26 @@ ends where the area error is small enough for the quality asked for.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .contact import contact, crossings
-from .energy import Elements, area_error, elements, squared
+from .energy import Elements, area_error, elements
 from .errors import DensityError
 from .geometry import face_areas, signed_areas
 from .linear import minimum_degree
-from .newton import Assembly, Motion, Problem, newton_step
+from .newton import Assembly
+from .pins import Pins, check_pins, drag
 from .progress import Progress, Steps
-from .starts import check_start, disk_start, free_start, square_start
+from .stages import QUALITIES, Task, stages
+from .starts import Start, check_start, disk_start, free_start, notched_disk, square_start
 from .topology import boundary_loops
 
 STARTS = {"free": free_start, "disk": disk_start, "square": square_start}
 BOUNDARIES = tuple(STARTS)
-
-
-@dataclass(frozen=True)
-class Quality:
-    """Area error to reach (share of area in the wrong place), weights of the area term on the way, steps allowed."""
-
-    area_error: float
-    weights: tuple[float, ...]
-    greatest_weight: float
-    max_steps: int
-
-
-QUALITIES = {
-    "draft": Quality(0.05, (10.0, 100.0), 1e3, 40),
-    "standard": Quality(0.005, (10.0, 100.0, 500.0), 1e6, 150),
-    "exact": Quality(0.0005, (10.0, 100.0, 1000.0, 1e4), 1e8, 300),
-}
-# A stage ends when Newton promises less than this share of the energy; the last stage is held to the second.
-LOOSE, TIGHT = 1e-2, 1e-3
-# The energy is a mean over the surface: below this it is rounding.
-NO_ENERGY = 1e-12
-# Of the barrier between boundary vertices and edges, in mean face areas.
-CONTACT_STRENGTH = 1.0
+# Area error of a disk above which vertices without room may leave the circle.
+NO_ROOM = 0.005
 
 
 @dataclass(frozen=True)
@@ -77,6 +57,7 @@ def refine(
     target: np.ndarray | None = None,
     balance: float = 0.0,
     quality: str = "standard",
+    pins: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Steps[Refinement]:
     """Refine a map uv (n,2) of a disk (n,3), (m,3) until every face has its area.
 
@@ -88,10 +69,14 @@ def refine(
         scaled to sum to the area of the surface.
     balance : 0 for exact areas to 1 for the least shear
     quality : "draft", "standard" or "exact"
+    pins : vertices (k,) and their places (k,2), in free mode. Two or more fix place, direction and scale, one fixes the
+        place; with one, scale and direction are those of `uv`. Without pins the map has the area of the surface, and
+        the place and the direction of `uv`.
 
     Raises
     ------
     DensityError : a target that is not positive and finite
+    PinError : pins that contradict each other or force a fold
     FoldedUVError : a start without area, or a fold that no embedding could remove
 
     References
@@ -103,29 +88,30 @@ def refine(
         raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
     if not 0 <= balance <= 1:
         raise ValueError(f"balance must lie in [0, 1], not {balance}")
-    settings = QUALITIES[quality]
+    if pins is not None and boundary != "free":
+        raise ValueError("pins need a free boundary")
     yield Progress("Refinement", 0.0)
     target = _targets(face_areas(vertices, triangles), target)
     uv = np.asarray(uv, float)
     check_start(uv, triangles)
-    mirror = [np.sign(signed_areas(uv, triangles).sum()), 1]
-    uv = uv * mirror
+    mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
     # Neighbours in the elimination order are neighbours in memory: everything is renumbered once.
     order = minimum_degree(_graph(triangles, len(vertices)))
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
-    vertices, triangles, uv = vertices[order], place[triangles], uv[order]
-    loop = boundary_loops(triangles)[0]
-    start = STARTS[boundary](vertices, triangles, uv, loop)
-    faces = elements(vertices, triangles, target)
-    task = _Task(faces, Assembly(triangles, len(vertices)), start.motion, loop if start.may_cross else None, start.guarded)
-    found = yield from _stages(task, start.uv[:, 0] + 1j * start.uv[:, 1], balance, settings)
-    w = _placed(found.w, uv[:, 0] + 1j * uv[:, 1], faces) if boundary == "free" else found.w
+    held = None
+    if pins is not None and len(pins[0]):
+        held = check_pins(place[np.asarray(pins[0])], np.asarray(pins[1], float).reshape(-1, 2) * mirror, len(order))
+    renumbered = vertices[order], place[triangles], uv[order] * mirror
+    found, start, area_left = yield from _refined(*renumbered, boundary, target, balance, QUALITIES[quality], held)
+    refined = np.column_stack([found.w.real, found.w.imag])[place] * mirror
+    if held is not None:
+        refined[pins[0]] = pins[1]
     return Refinement(
-        np.column_stack([w.real, w.imag])[place] * mirror,
+        refined,
         found.steps,
         found.residual,
-        area_error(faces, w),
+        area_left,
         found.weight,
         found.energy,
         found.status,
@@ -134,113 +120,44 @@ def refine(
     )
 
 
-def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
-    if target is None:
-        return area
-    target = np.asarray(target, float)
-    wrong = np.flatnonzero(~(np.isfinite(target) & (target > 0)))
-    if len(wrong):
-        raise DensityError("A face has no positive, finite target area", kind="face", elements=wrong)
-    return target * (area.sum() / target.sum())
+def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins: Pins | None):
+    """Stages on a renumbered chart: what was found, the start it was found from, and the area error that is left."""
+    loop = boundary_loops(triangles)[0]
+    start = STARTS[boundary](vertices, triangles, uv, loop)
+    faces = elements(vertices, triangles, target)
+    assembly = Assembly(triangles, len(vertices))
+    task = _task(faces, assembly, start, loop, boundary)
+    w = start.uv[:, 0] + 1j * start.uv[:, 1]
+    if pins is not None and len(pins.vertices) > 1:
+        task, w = yield from drag(task, w, pins)
+    found = yield from stages(task, w, balance, settings)
+    error = area_error(faces, found.w)
+    if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 4 * settings.area_error):
+        notched = notched_disk(start, triangles, loop)
+        if notched is not None:
+            again = yield from stages(_task(faces, assembly, notched, loop, boundary), w, balance, settings)
+            if area_error(faces, again.w) < error:
+                found, start, error = again, notched, area_error(faces, again.w)
+    if boundary == "free" and (pins is None or len(pins.vertices) == 1):
+        found = replace(found, w=_placed(found.w, uv[:, 0] + 1j * uv[:, 1], faces, pins))
+    return found, start, error
 
 
-def _graph(triangles: np.ndarray, n: int):
-    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
-    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
+def _task(faces: Elements, assembly: Assembly, start: Start, loop, boundary: str) -> Task:
+    # A polygon in a circle, or a notched square, has less area than the surface: the targets follow it.
+    follows = boundary != "free"
+    return Task(faces, assembly, start.motion, loop if start.may_cross else None, start.guarded, follows)
 
 
-@dataclass(frozen=True)
-class _Task:
-    """faces, assembly and motion for Newton; loop: a boundary (b,) that may not cross itself, or None;
-    guarded: from the beginning."""
+def _placed(w: np.ndarray, given: np.ndarray, faces: Elements, pins: Pins | None) -> np.ndarray:
+    """The map turned and moved to lie as the given one did, with the UV area of its targets.
 
-    faces: Elements
-    assembly: Assembly
-    motion: Motion
-    loop: np.ndarray | None
-    guarded: bool
-
-    def problem(self, w: np.ndarray, weight: float, guarded: bool) -> Problem:
-        extras = (contact(w, self.loop, CONTACT_STRENGTH / len(self.faces.area)),) if guarded else ()
-        return Problem(self.faces, self.assembly, self.motion, weight, extras)
-
-    def crosses(self, w: np.ndarray) -> bool:
-        return self.loop is not None and len(crossings(w, self.loop)) > 0
-
-
-@dataclass(frozen=True)
-class _Found:
-    w: np.ndarray
-    steps: int
-    residual: float
-    weight: float
-    energy: float
-    status: str
-    overlap: bool
-    warnings: tuple[str, ...]
-
-
-def _stages(task: _Task, w: np.ndarray, balance: float, settings: Quality) -> Steps[_Found]:
-    """Newton in stages of growing weight, until the area error is small enough.
-
-    When a stage ends with a boundary that crosses itself it is done again with a barrier, from where it began.
+    With a pin it keeps the scale of the given map, and the pin its place.
     """
-    weights = list(settings.weights)
-    softening = (balance / (1 - balance)) ** 2 if balance < 1 else np.inf
-    overlap, guarded, steps, k = task.crosses(w), task.guarded, 0, 0
-    warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
-    while True:
-        weight = 1 / (1 / weights[k] + softening)
-        problem = task.problem(w, weight, guarded)
-        last = k >= len(weights) - 1
-        tolerance, allowed = TIGHT if last else LOOSE, settings.max_steps - steps
-        stage = yield from _minimise(problem, w, tolerance, allowed, (k, len(weights)))
-        steps += stage.steps
-        if not (guarded or overlap) and task.crosses(stage.w):
-            guarded = True
-            continue
-        w, k = stage.w, k + 1
-        error = area_error(task.faces, w)
-        enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
-        if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
-            break
-        if k >= len(weights):
-            weights.append(weights[-1] * min(max(2.0, (error / settings.area_error) ** 2), 10.0))
-    return _Found(w, steps, stage.residual, weight, stage.energy, stage.status, task.crosses(w), warnings)
-
-
-@dataclass(frozen=True)
-class _Stage:
-    w: np.ndarray
-    steps: int
-    residual: float
-    energy: float
-    status: str
-
-
-def _minimise(problem: Problem, w: np.ndarray, tolerance: float, allowed: int, place: tuple[int, int]) -> Steps[_Stage]:
-    """Newton until it promises less than `tolerance` of the energy; place is the stage's number and their count."""
-    value = problem.energy(w)
-    steps, residual, status = 0, np.inf, "steps"
-    while steps < max(allowed, 1):
-        step = newton_step(problem, w, value)
-        w, value, steps = step.w, step.energy, steps + 1
-        residual = step.decrement / max(value, NO_ENERGY)
-        yield Progress("Refinement", min(1.0, (place[0] + 1 - 0.5**steps) / place[1]))
-        if residual < tolerance:
-            status = "converged"
-            break
-        if step.share == 0:
-            status = "stalled"
-            break
-    return _Stage(w, steps, residual, value, status)
-
-
-def _placed(w: np.ndarray, start: np.ndarray, faces: Elements) -> np.ndarray:
-    """The map with the UV area of its targets, turned and moved to lie as the start did."""
-    a, b = faces.derivatives(w)
-    w = w * np.sqrt((faces.area @ faces.ratio) / (faces.area @ (squared(a) - squared(b))))
+    area = faces.area @ faces.ratio if pins is None else abs(faces.areas(given).sum())
+    w = w * np.sqrt(area / faces.areas(w).sum())
     mass = np.bincount(faces.triangles.ravel(), np.repeat(faces.area, 3) / 3, len(w))
-    centred, aim = w - mass @ w, start - mass @ start
+    centred, aim = w - mass @ w, given - mass @ given
     turn = (mass * centred.conj()) @ aim
-    return centred * (turn / abs(turn) if abs(turn) > 0 else 1) + mass @ start
+    placed = centred * (turn / abs(turn) if abs(turn) > 0 else 1) + mass @ given
+    return placed if pins is None else placed + (pins.places[0] - placed[pins.vertices[0]])

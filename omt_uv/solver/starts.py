@@ -50,6 +50,20 @@ def disk_start(vertices, triangles, uv, loop) -> Start:
     return Start(straight, OnCircle(loop, radius, len(vertices)), tuple(warnings))
 
 
+def notched_disk(start: Start, triangles, loop) -> Start | None:
+    """A disk start with those vertices off the circle whose faces hardly have room there; None if there are none.
+
+    A part that one inner edge cuts off has all its boundary on an arc, and an arc encloses little.
+    """
+    everywhere = np.zeros(len(loop), np.int64)
+    released = _released(triangles, loop, everywhere, everywhere > 0, len(start.uv))
+    if not released.any():
+        return None
+    motion = OnCircle(loop[~released], start.motion.radius, len(start.uv))
+    warning = f"{released.sum()} boundary vertices leave the circle, where it has no room for their faces"
+    return Start(start.uv, motion, (*start.warnings, warning), True, True)
+
+
 def free_start(vertices, triangles, uv, loop) -> Start:
     """Free boundary: the given map if it is one to one, else a disk; charts that are flat are unrolled."""
     area = face_areas(vertices, triangles).sum()

@@ -1,0 +1,121 @@
+"""Pins: vertices that must come to lie exactly where they are told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .contact import contact
+from .energy import squared
+from .errors import PinError
+from .newton import Free, Problem
+from .progress import Progress, Steps
+from .stages import CONTACT_STRENGTH, Task, rescaled
+from .stages import minimise as minimise_energy
+
+# Weight of the area term while pins are dragged, and stiffness of the springs that drag them: from soft to hard.
+DRAG_WEIGHT = 10.0
+STIFFNESS = tuple(10.0**k for k in range(0, 11, 2))
+# A pin this near to its place, relative to the extent of the pins, is put there if that folds nothing.
+NEAR = 1e-3
+
+
+@dataclass(frozen=True)
+class Pins:
+    """Vertices (k,), each once, and their places (k,) complex."""
+
+    vertices: np.ndarray
+    places: np.ndarray
+
+
+def check_pins(vertices: np.ndarray, places: np.ndarray, n: int) -> Pins:
+    """Pins from vertices (k,) and places (k,2) of a chart with n vertices.
+
+    Raises
+    ------
+    PinError : places that are not finite, a vertex with two places, two vertices with one place
+    """
+    vertices, places = np.asarray(vertices, np.int64).ravel(), np.asarray(places, float).reshape(-1, 2)
+    if len(vertices) != len(places) or (len(vertices) and not 0 <= vertices.min() <= vertices.max() < n):
+        raise ValueError("pins need one place for each vertex, and vertices of this chart")
+    wrong = vertices[~np.isfinite(places).all(1)]
+    if len(wrong):
+        raise PinError("Pinned UVs are not finite", kind="vertex", elements=wrong)
+    both = np.unique(np.column_stack([vertices, places]), axis=0)
+    vertices, places = both[:, 0].astype(np.int64), both[:, 1:]
+    again = vertices[1:][vertices[1:] == vertices[:-1]]
+    if len(again):
+        raise PinError("A vertex is pinned to two places", kind="vertex", elements=again)
+    _, first, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+    same = vertices[count[first.ravel()] > 1]
+    if len(same):
+        raise PinError("Several vertices are pinned to one place", kind="vertex", elements=same)
+    return Pins(vertices, places[:, 0] + 1j * places[:, 1])
+
+
+@dataclass(frozen=True)
+class Springs:
+    """An energy that draws pins to their places: stiffness times the squared distance, in the given length unit."""
+
+    pins: Pins
+    stiffness: float
+    unit: float
+
+    def energy(self, w):
+        return float(self.stiffness * squared((w[self.pins.vertices] - self.pins.places) / self.unit).sum())
+
+    def derivatives(self, w):
+        factor = 2 * self.stiffness / self.unit**2
+        gradient = np.zeros(len(w), complex)
+        gradient[self.pins.vertices] = factor * (w[self.pins.vertices] - self.pins.places)
+        rows = np.sqrt(factor) * np.repeat([[1], [-1j]], len(self.pins.vertices), axis=0)
+        return gradient, np.tile(self.pins.vertices, 2)[:, None], rows
+
+    def limit(self, w, step):
+        return np.inf
+
+
+def aligned(w: np.ndarray, pins: Pins) -> np.ndarray:
+    """The map w (n,) moved, turned and scaled so that the pins (two or more) come nearest to their places."""
+    at, aim = w[pins.vertices], pins.places
+    centre, goal = at.mean(), aim.mean()
+    factor = ((at - centre).conj() @ (aim - goal)) / max(squared(at - centre).sum(), 1e-300)
+    if abs(factor) < 1e-6 * np.sqrt(squared(aim - goal).sum() / max(squared(at - centre).sum(), 1e-300)):
+        factor = np.sqrt(squared(aim - goal).sum() / squared(at - centre).sum())
+    return (w - centre) * factor + goal
+
+
+def drag(task: Task, w: np.ndarray, pins: Pins) -> Steps[tuple[Task, np.ndarray]]:
+    """The map w (n,), moved until all pins (two or more) are in place, and the task that keeps them there.
+
+    Springs of growing stiffness draw the pins; the barriers against folds and against a boundary that crosses itself
+    hold. Once near, a pin is put where it belongs.
+
+    Raises
+    ------
+    PinError : some pins cannot reach their places without a fold
+    """
+    loop = task.loop
+    w = aligned(w, pins)
+    extent = np.abs(pins.places - pins.places.mean()).max()
+    for k, stiffness in enumerate(STIFFNESS):
+        snapped = w.copy()
+        snapped[pins.vertices] = pins.places
+        near = np.abs(snapped - w).max() <= NEAR * extent or k == 0
+        if near and (task.faces.areas(snapped) > 0).all() and not task.crosses(snapped):
+            return replace(rescaled(task, snapped), motion=_held(len(w), pins), scale_free=True), snapped
+        task = rescaled(task, w)
+        guard = contact(w, loop, CONTACT_STRENGTH / len(task.faces.area))
+        springs = Springs(pins, stiffness, extent)
+        problem = Problem(task.faces, task.assembly, task.motion, DRAG_WEIGHT, (springs, guard))
+        yield Progress("Pins", k / len(STIFFNESS))
+        w = (yield from minimise_energy(problem, w, np.inf, 40, (k, len(STIFFNESS)))).w
+    far = pins.vertices[np.abs(w[pins.vertices] - pins.places) > NEAR * extent]
+    raise PinError("Pins cannot reach their places without a fold", kind="vertex", elements=far)
+
+
+def _held(n, pins):
+    pinned = np.zeros(n, bool)
+    pinned[pins.vertices] = True
+    return Free(pinned)

@@ -1,0 +1,156 @@
+"""Newton in stages of growing weight of the area term, until every face has its area."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .contact import contact, crossings
+from .energy import Elements, area_error
+from .newton import Assembly, Motion, Problem, Step, newton_step
+from .progress import Progress, Steps
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Area error to reach (share of area in the wrong place), weights of the area term on the way, steps allowed."""
+
+    area_error: float
+    weights: tuple[float, ...]
+    greatest_weight: float
+    max_steps: int
+
+
+QUALITIES = {
+    "draft": Quality(0.05, (10.0, 100.0), 1e3, 40),
+    "standard": Quality(0.005, (10.0, 100.0, 500.0), 1e6, 150),
+    "exact": Quality(0.0005, (10.0, 100.0, 1000.0, 1e4), 1e8, 300),
+}
+# A stage ends when Newton promises less than this share of the energy.
+LOOSE, TIGHT = 1e-2, 1e-3
+# A stage that takes longer gives way to the next, which may find a way around.
+STAGE_STEPS = 40
+# Share of the area term's indefinite Hessian kept: at the start of a stage, and the least before it is dropped.
+FIRST_PRESSURE, LEAST_PRESSURE = 0.3, 0.01
+# The energy is a mean over the surface: below this it is rounding.
+NO_ENERGY = 1e-12
+# Of the barrier between boundary vertices and edges, in mean face areas.
+CONTACT_STRENGTH = 1.0
+
+
+@dataclass(frozen=True)
+class Task:
+    """faces, assembly and motion for Newton; loop: a boundary (b,) that may not cross itself, or None;
+    guarded: from the beginning; scale_free: the scale of the targets follows the map."""
+
+    faces: Elements
+    assembly: Assembly
+    motion: Motion
+    loop: np.ndarray | None
+    guarded: bool
+    scale_free: bool = False
+
+    def problem(self, w: np.ndarray, weight: float, guarded: bool) -> Problem:
+        extras = (contact(w, self.loop, CONTACT_STRENGTH / len(self.faces.area)),) if guarded else ()
+        return Problem(self.faces, self.assembly, self.motion, weight, extras)
+
+    def crosses(self, w: np.ndarray) -> bool:
+        return self.loop is not None and len(crossings(w, self.loop)) > 0
+
+
+def rescaled(task: Task, w: np.ndarray) -> Task:
+    """The task with its targets scaled so that the map w (n,) has the least area error."""
+    r = task.faces.areas(w) / (task.faces.area * task.faces.ratio)
+    scale = np.sqrt((task.faces.area @ r) / (task.faces.area @ (1 / r)))
+    return replace(task, faces=replace(task.faces, ratio=task.faces.ratio * scale))
+
+
+@dataclass(frozen=True)
+class Found:
+    w: np.ndarray
+    steps: int
+    residual: float
+    weight: float
+    energy: float
+    status: str
+    overlap: bool
+    warnings: tuple[str, ...]
+
+
+def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Steps[Found]:
+    """Newton in stages of growing weight, until the area error is small enough.
+
+    When a stage ends with a boundary that crosses itself it is done again with a barrier, from where it began.
+    """
+    weights = list(settings.weights)
+    softening = (balance / (1 - balance)) ** 2 if balance < 1 else np.inf
+    overlap, guarded, steps, k = task.crosses(w), task.guarded, 0, 0
+    warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
+    while True:
+        weight = 1 / (1 / weights[k] + softening)
+        task = rescaled(task, w) if task.scale_free else task
+        problem = task.problem(w, weight, guarded)
+        goal = settings.area_error if k >= len(weights) - 1 else np.inf
+        allowed = min(settings.max_steps - steps, STAGE_STEPS)
+        stage = yield from minimise(problem, w, goal, allowed, (k, len(weights)))
+        steps += stage.steps
+        if not (guarded or overlap) and task.crosses(stage.w):
+            guarded = True
+            continue
+        w, k = stage.w, k + 1
+        error = area_error(task.faces, w)
+        enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
+        if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
+            break
+        if k >= len(weights):
+            weights.append(weights[-1] * min(max(2.0, (error / settings.area_error) ** 2), 10.0))
+    return Found(w, steps, stage.residual, weight, stage.energy, stage.status, task.crosses(w), warnings)
+
+
+@dataclass(frozen=True)
+class Stage:
+    w: np.ndarray
+    steps: int
+    residual: float
+    energy: float
+    status: str
+
+
+def minimise(problem: Problem, w: np.ndarray, goal: float, allowed: int, place: tuple[int, int]) -> Steps[Stage]:
+    """Newton until it promises little, at least LOOSE; where that leaves the area error above the goal, TIGHT.
+
+    place: the number of this stage, and how many there are.
+    """
+    value = problem.energy(w)
+    steps, residual, status, pressure = 0, np.inf, "steps", FIRST_PRESSURE
+    while steps < max(allowed, 1):
+        step, used = newton_step(problem, w, value, pressure), pressure
+        pressure = _next_pressure(pressure, step, value)
+        w, value, steps = step.w, step.energy, steps + 1
+        residual = step.decrement / max(value, NO_ENERGY)
+        yield Progress("Refinement", min(1.0, (place[0] + 1 - 0.5**steps) / place[1]))
+        if step.share == 0 and used == 1.0:
+            status = "stalled"
+            break
+        if residual < LOOSE and area_error(problem.faces, w) <= goal:
+            status = "converged"
+            break
+        if residual < TIGHT:
+            # A Hessian stiffer than the true one promises too little.
+            if used <= LEAST_PRESSURE:
+                status = "converged"
+                break
+            pressure = 0.0
+    return Stage(w, steps, residual, value, status)
+
+
+def _next_pressure(pressure: float, step: Step, value: float) -> float:
+    """Less of the indefinite part of the Hessian while full steps keep their promise, more when they do not."""
+    if step.share == 1 and value - step.energy > 0.7 * step.decrement:
+        return pressure / 3 if pressure > LEAST_PRESSURE else 0.0
+    if step.share == 0:
+        return 1.0
+    if step.share < 0.5 or value - step.energy < 0.3 * step.decrement:
+        return min(1.0, max(3 * pressure, 3 * LEAST_PRESSURE))
+    return pressure
