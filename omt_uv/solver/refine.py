@@ -120,6 +120,21 @@ def refine(
     )
 
 
+def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
+    if target is None:
+        return area
+    target = np.asarray(target, float)
+    wrong = np.flatnonzero(~(np.isfinite(target) & (target > 0)))
+    if len(wrong):
+        raise DensityError("A face has no positive, finite target area", kind="face", elements=wrong)
+    return target * (area.sum() / target.sum())
+
+
+def _graph(triangles: np.ndarray, n: int) -> coo_matrix:
+    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
+    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
+
+
 def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins: Pins | None):
     """Stages on a renumbered chart: what was found, the start it was found from, and the area error that is left."""
     loop = boundary_loops(triangles)[0]
