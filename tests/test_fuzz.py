@@ -155,7 +155,7 @@ def broken_mesh(seed):
     else:
         V, P = BASES[rng.integers(len(BASES))]()
         P = _lists(P)
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):
             for _ in range(rng.integers(1, 4)):
                 if P:
                     V, P = SURGERY[rng.integers(len(SURGERY))](rng, V.copy(), P)
@@ -189,6 +189,7 @@ def check_result(result, surface: Surface, faces):
     assert uv.shape == (len(corners), 2) and np.isfinite(uv).all()
     for chart, chart_map in zip(result.charts, result.maps, strict=True):
         assert chart_map.uv.shape == (len(chart.vertices), 2)
+        assert chart_map.warnings or not chart_map.folds, "a fold was returned without a word"
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
@@ -212,7 +213,7 @@ def test_every_outcome_is_a_map_or_a_named_error(chunk):
 def test_the_fuzz_meets_maps_and_every_kind_of_error():
     """A fuzz that always breaks at the first check would show nothing."""
     outcomes = set()
-    for seed in range(600):
+    for seed in range(300):
         surface, faces, options = broken_mesh(seed)
         try:
             with np.errstate(all="ignore"):
