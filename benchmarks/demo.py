@@ -10,6 +10,7 @@ import argparse
 from pathlib import Path
 
 import bpy
+
 import numpy as np
 from cases import ROOT, Table, load_case, meshes, our_uv, timed
 from pictures import VIEWS, View, area_colours, checker, checker_material, equal_density, render_checker, render_colours

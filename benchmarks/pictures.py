@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+
 import matplotlib
 import matplotlib.colors
 import numpy as np

@@ -9,6 +9,7 @@ import time
 from dataclasses import dataclass
 
 import bpy
+
 import numpy as np
 
 METHODS = {

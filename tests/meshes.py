@@ -123,8 +123,15 @@ def random_disk(count=300, seed=0, height=0.3):
 def head(count=40, seed=0):
     """A bust-like disk: a cap with a nose, ears and sockets; about 2 * count**2 faces, opened at the neck."""
     V, F = cap(rings=count, sectors=count, opening=0.85)
-    bumps = np.array([[1, 0, 0.0, 0.5, 0.2], [0, 1, 0.1, 0.4, 0.25], [0, -1, 0.1, 0.4, 0.25],
-                      [0.9, 0.35, 0.25, -0.15, 0.15], [0.9, -0.35, 0.25, -0.15, 0.15], [0, 0, -1, 0.3, 0.5]])  # fmt: skip
+    bumps = [
+        # direction, height, width: nose, ears, sockets, crown
+        (1, 0, 0, 0.5, 0.2),
+        (0, 1, 0.1, 0.4, 0.25),
+        (0, -1, 0.1, 0.4, 0.25),
+        (0.9, 0.35, 0.25, -0.15, 0.15),
+        (0.9, -0.35, 0.25, -0.15, 0.15),
+        (0, 0, 1, 0.3, 0.5),
+    ]
     scale = np.ones(len(V))
     for *centre, amount, width in bumps:
         direction = np.array(centre) / np.linalg.norm(centre)

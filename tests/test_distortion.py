@@ -1,4 +1,4 @@
-"""Distortion figures: exact values by hand, invariances, and agreement with an independent judge where it is at hand."""
+"""Distortion figures: exact values by hand, invariances, and agreement with an independent judge if at hand."""
 
 from __future__ import annotations
 
