@@ -42,6 +42,7 @@ def disk_start(vertices, triangles, uv, loop) -> Start:
     """Boundary on the circle about 0 that has the area of the surface."""
     radius = np.sqrt(face_areas(vertices, triangles).sum() / np.pi)
     warnings = []
+    uv = uv * (radius / np.linalg.norm(uv[loop], axis=1).mean())
     rim = circle_rim(uv, loop, radius)
     if rim is None:
         warnings.append(SPREAD)
