@@ -48,7 +48,7 @@ def _edge_above(piece: Piece, before: np.ndarray) -> np.ndarray:
     """Edge (n,) to the predecessor of every vertex, -1 where it has none."""
     child = np.flatnonzero(before >= 0)
     above = np.full(piece.count, -1, dtype=np.int64)
-    above[child] = _edges_between(piece.ends, piece.cost, child, before[child].astype(np.int64), piece.count)
+    above[child] = _edges_between(piece.ends, child, before[child].astype(np.int64), piece.count)
     return above
 
 
@@ -172,14 +172,17 @@ def _shortest_bridge(piece: Piece, cut: np.ndarray, tips: np.ndarray) -> np.ndar
         return None
     on_path = _ancestors(before, target[[np.argmin(distance[target])]])
     on_path = on_path[before[on_path] >= 0]
-    return inner[_edges_between(ends, piece.cost[inner], on_path, before[on_path].astype(np.int64), n)]
+    return inner[_edges_between(ends, on_path, before[on_path].astype(np.int64), n)]
 
 
-def _edges_between(ends: np.ndarray, cost: np.ndarray, a: np.ndarray, b: np.ndarray, n: int) -> np.ndarray:
-    """Number of the cheapest edge (k,) between vertices a and b (k,)."""
-    key = ends.min(axis=1) * n + ends.max(axis=1)
-    order = np.lexsort((cost, key))
-    return order[np.searchsorted(key[order], np.minimum(a, b) * n + np.maximum(a, b))]
+def _edges_between(ends: np.ndarray, a: np.ndarray, b: np.ndarray, n: int) -> np.ndarray:
+    """Number (k,) of the edges, of those with the given ends (e,2), between vertices a and b (k,)."""
+    touched = np.zeros(n, dtype=bool)
+    touched[a] = touched[b] = True
+    near = np.flatnonzero(touched[ends[:, 0]] & touched[ends[:, 1]])
+    key = ends[near].min(axis=1) * n + ends[near].max(axis=1)
+    order = np.argsort(key)
+    return near[order[np.searchsorted(key[order], np.minimum(a, b) * n + np.maximum(a, b))]]
 
 
 def path_to(piece: Piece, start: np.ndarray, end: int) -> np.ndarray:
@@ -190,5 +193,5 @@ def path_to(piece: Piece, start: np.ndarray, end: int) -> np.ndarray:
     on_path = _ancestors(before, np.array([end]))
     on_path = on_path[before[on_path] >= 0]
     path = np.zeros(len(piece.pair), dtype=bool)
-    path[_edges_between(piece.ends, piece.cost, on_path, before[on_path].astype(np.int64), n)] = True
+    path[_edges_between(piece.ends, on_path, before[on_path].astype(np.int64), n)] = True
     return path

@@ -13,16 +13,17 @@ from scipy.sparse.csgraph import dijkstra
 
 from .charts import Surface, chosen_triangles
 from .cut_graph import greedy_arcs, path_to, shorten
-from .extremities import log_scale
+from .extremities import log_scale, spread
 from .geometry import face_areas
 from .piece import NOISE, Kind, Piece, classify, edge_graph, make_piece
 from .repair import Repaired, join
 from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
 from .topology import pair_keys
 
-MOST_EXTREMITIES = 5
-# A flat map whose lengths are nowhere predicted to be off by more than this factor needs no further cut.
-BEARABLE = 2.0
+MOST_EXTREMITIES = 8
+# A further cut does not pay where the lengths of a flat map are predicted to be off by a factor of e^0.5 at most,
+# in the mean square over the surface.
+BEARABLE = 0.5**2
 ROOT_TRIALS = 4
 
 
@@ -135,12 +136,11 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
     chosen = shorten(piece, chosen, tips)
     while len(tips) < extremities:
         scale = log_scale(piece, chosen)
-        scale *= 1 + NOISE * np.random.default_rng(0).random(len(scale))
-        tip = int(np.argmax(scale))
-        if scale[tip] <= np.log(BEARABLE):
+        if spread(piece, scale) <= BEARABLE:
             break
-        tips = np.append(tips, tip)
-        chosen = shorten(piece, _reach(piece, chosen, tip), tips)
+        # A tip is worth its cut where much distortion is far from the boundary.
+        tips = np.append(tips, _peak(scale * _distance(piece, _cut_vertices(piece, chosen))))
+        chosen = shorten(piece, _reach(piece, chosen, tips[-1]), tips)
     return chosen, len(tips)
 
 
@@ -149,19 +149,34 @@ def _first_tips(piece: Piece) -> np.ndarray:
 
     A slit of a single edge would not open anything.
     """
-    nothing = np.zeros(len(piece.pair), dtype=bool)
-    scale = log_scale(piece, nothing) * (1 + NOISE * np.random.default_rng(0).random(piece.count))
-    tips = _farthest(piece, np.array([int(np.argmax(scale))]), 1)
+    scale = log_scale(piece, np.zeros(len(piece.pair), dtype=bool))
+    tips = _farthest(piece, np.array([_peak(scale)]), 1)
     neighbours = (np.sort(piece.ends, axis=1) == np.sort(tips)).all(axis=1).any()
     return _farthest(piece, tips, 1) if neighbours else tips
 
 
 def _farthest(piece: Piece, points: np.ndarray, more: int) -> np.ndarray:
     """The points (k,) and `more` others, each as far from those before it as the edges go."""
-    graph = edge_graph(piece, np.arange(len(piece.pair)), piece.ends, piece.count)
     for _ in range(more):
-        points = np.append(points, int(np.argmax(dijkstra(graph, indices=points, min_only=True))))
+        points = np.append(points, _peak(_distance(piece, points)))
     return points
+
+
+def _distance(piece: Piece, vertices: np.ndarray) -> np.ndarray:
+    """Cost (n,) of the cheapest path from the vertices (k,)."""
+    graph = edge_graph(piece, np.arange(len(piece.pair)), piece.ends, piece.count)
+    return dijkstra(graph, indices=vertices, min_only=True)
+
+
+def _peak(value: np.ndarray) -> int:
+    """Vertex of the largest value (n,) >= 0; on symmetric models rounding shall not choose between equals."""
+    return int(np.argmax(value * (1 + NOISE * np.random.default_rng(0).random(len(value)))))
+
+
+def _cut_vertices(piece: Piece, chosen: np.ndarray) -> np.ndarray:
+    start = piece.on_rim()
+    start[piece.ends[chosen].ravel()] = True
+    return np.flatnonzero(start)
 
 
 def _best_root(piece: Piece) -> np.ndarray:
@@ -173,6 +188,4 @@ def _best_root(piece: Piece) -> np.ndarray:
 
 def _reach(piece: Piece, chosen: np.ndarray, tip: int) -> np.ndarray:
     """The cut (e,) bool and the shortest path from it, or from the boundary, to the tip."""
-    start = piece.on_rim()
-    start[piece.ends[chosen].ravel()] = True
-    return chosen | path_to(piece, np.flatnonzero(start), tip)
+    return chosen | path_to(piece, _cut_vertices(piece, chosen), tip)

@@ -16,6 +16,7 @@ from .geometry import (
     cotangents_from_lengths,
     halfedge_lengths,
     laplacian_from_weights,
+    vertex_areas,
 )
 from .linear import solve_spd
 from .piece import Piece
@@ -45,3 +46,9 @@ def log_scale(piece: Piece, cut: np.ndarray) -> np.ndarray:
     at_vertex = np.zeros(piece.count)
     np.maximum.at(at_vertex, piece.triangles.ravel(), np.abs(u)[opened.ravel()])
     return at_vertex
+
+
+def spread(piece: Piece, scale: np.ndarray) -> float:
+    """Mean square over the surface of a log scale (n,)."""
+    area = vertex_areas(piece.positions, piece.triangles)
+    return float(area @ scale**2 / area.sum())

@@ -149,15 +149,10 @@ def _hiding(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> n
 
 
 def edge_graph(piece: Piece, edges: np.ndarray, ends: np.ndarray, n: int) -> csr_matrix:
-    """Symmetric graph (n,n) of the cost of edges (k,) between the vertices `ends` (k,2); diagonals are no edges."""
+    """Symmetric graph (n,n) of the cost of edges (k,) between the vertices `ends` (k,2); diagonals are no edges.
+
+    No two edges have the same ends (`repair.join` sees to it): a sparse matrix would add them up.
+    """
     keep = np.isfinite(piece.cost[edges])
     (a, b), cost = ends[keep].T, piece.cost[edges[keep]]
-    # Two edges between the same vertices: a sparse matrix would add them up.
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    order = np.lexsort((cost, high, low))
-    low, high, cost = low[order], high[order], cost[order]
-    first = np.ones(len(low), dtype=bool)
-    first[1:] = (low[1:] != low[:-1]) | (high[1:] != high[:-1])
-    first &= low != high
-    low, high, cost = low[first], high[first], cost[first]
-    return csr_matrix((np.tile(cost, 2), (np.r_[low, high], np.r_[high, low])), shape=(n, n))
+    return csr_matrix((np.concatenate([cost, cost]), (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(n, n))
