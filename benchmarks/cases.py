@@ -57,9 +57,10 @@ def timed(work):
     return result, time.process_time() - start
 
 
-def our_uv(case: Case, boundary, quality):
+def our_uv(case: Case, boundary, quality, balance=0.0):
     """Corner UVs (m,3,2) by our pipeline, and its result."""
-    result = drain(unwrap(triangle_surface(case.V, case.F, case.seams), boundary=boundary, quality=quality))
+    surface = triangle_surface(case.V, case.F, case.seams)
+    result = drain(unwrap(surface, boundary=boundary, quality=quality, balance=balance))
     corners, uv = result.corner_uv()
     full = np.zeros((3 * len(case.F), 2))
     full[corners] = uv

@@ -93,6 +93,14 @@ def shear_colours(shear):
     return SHEAR_COLOURS(0.02 + 0.9 * np.log(np.maximum(shear, 1)) / np.log(SHEAR_TOP))[:, :3]
 
 
+def lit(V, F, rgb):
+    """Colours (m,3) darkened by a lamp on the surface, so that its features can be found again in the layout."""
+    normal = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    lamp = np.array([0.5, 0.62, 0.6])
+    return rgb * (0.75 + 0.25 * normal @ lamp)[:, None]
+
+
 def layout(uv, rgb, path, pixels=480):
     """Draw the UV layout (m,3,2), one colour (m,3) per face, to `path`."""
     low, high = uv.reshape(-1, 2).min(0), uv.reshape(-1, 2).max(0)

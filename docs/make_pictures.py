@@ -14,16 +14,16 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
-import meshes
 import pictures
 import rivals
-from cases import load_case, our_uv
+from cases import load_case, meshes, our_uv
 
 from omt_uv.solver.distortion import face_distortion, measure
 
 CELLS = {"lilium": 120}  # how many checker cells cover the model
 RIVALS = {"Blender Angle Based": "Angle Based", "Blender Minimum Stretch": "Minimum Stretch 50"}
 OURS = "OMT UV"
+BALANCES = (0.0, 0.25, 0.5, 1.0)
 
 
 def maps(case):
@@ -37,27 +37,55 @@ def gallery(name, out, scratch, pixels):
     """Three sheets of one model: the checker, the distortions as colours, and the layouts."""
     case = load_case(name)
     V, F = case.V, case.F
-    view = pictures.VIEWS.get(name, pictures.View())
+    view = view_of(name)
     texture = pictures.checker(scratch / "checker.png")
     checks, areas, shears, layouts, captions = [], [], [], [], []
     uvs = maps(case)
     for k, uv in enumerate(uvs.values()):
         octaves, shear = face_distortion(V, F, uv)
         area_rgb, shear_rgb = pictures.area_colours(octaves), pictures.shear_colours(shear)
-        figures = measure(V, F, uv)
-        captions.append(f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}")
+        captions.append(caption(case, uv))
         for folder, suffix in ((checks, "checker"), (areas, "area"), (shears, "shear"), (layouts, "layout")):
             folder.append(scratch / f"{name}_{k}_{suffix}.png")
         scaled = pictures.equal_density(V, F, uv, CELLS.get(name, 300))
         pictures.render_checker(V, F, scaled, view, checks[-1], texture, pixels)
         pictures.render_colours(V, F, area_rgb, view, areas[-1], pixels)
         pictures.render_colours(V, F, shear_rgb, view, shears[-1], pixels)
-        pictures.layout(uv, area_rgb, layouts[-1], pixels)
+        pictures.layout(uv, pictures.lit(V, F, area_rgb), layouts[-1], pixels)
     titles, blank = list(uvs), [""] * len(uvs)
     pictures.sheet(out / f"{name}_checker.png", titles, [("", checks, captions, None)])
     rows = [("area", areas, blank, pictures.AREA_SCALE), ("shear", shears, captions, pictures.SHEAR_SCALE)]
     pictures.sheet(out / f"{name}_distortion.png", titles, rows)
     pictures.sheet(out / f"{name}_layout.png", titles, [("", layouts, captions, pictures.AREA_SCALE)])
+
+
+def balance_sheet(name, out, scratch, pixels):
+    """One sheet of the slider from exact area to conformal."""
+    case = load_case(name)
+    texture = pictures.checker(scratch / "checker.png")
+    renders, layouts, captions = [], [], []
+    for balance in BALANCES:
+        uv, _ = our_uv(case, "free", "standard", balance)
+        captions.append(caption(case, uv))
+        renders.append(scratch / f"balance_{balance}.png")
+        layouts.append(scratch / f"balance_{balance}_layout.png")
+        scaled = pictures.equal_density(case.V, case.F, uv, CELLS.get(name, 300))
+        pictures.render_checker(case.V, case.F, scaled, view_of(name), renders[-1], texture, pixels)
+        octaves, _ = face_distortion(case.V, case.F, uv)
+        rgb = pictures.lit(case.V, case.F, pictures.area_colours(octaves))
+        pictures.layout(uv, rgb, layouts[-1], pixels)
+    titles = [f"balance {b:g}" for b in BALANCES]
+    rows = [("", renders, captions, None), ("", layouts, [""] * len(BALANCES), pictures.AREA_SCALE)]
+    pictures.sheet(out / f"{name}_balance.png", titles, rows)
+
+
+def caption(case, uv):
+    figures = measure(case.V, case.F, uv)
+    return f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}"
+
+
+def view_of(name):
+    return pictures.VIEWS.get(name, pictures.View())
 
 
 def main():
@@ -71,6 +99,8 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         for name in args.models:
             gallery(name, args.out, Path(scratch), args.pixels)
+        favourite = "lion" if "lion" in args.models else args.models[0]
+        balance_sheet(favourite, args.out, Path(scratch), 3 * args.pixels // 4)
     for path in sorted(args.out.glob("*.png")):
         print(f"{path} {path.stat().st_size // 1000} kB")
 
