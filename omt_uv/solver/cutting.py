@@ -133,15 +133,16 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
         chosen = _best_root(piece)
     else:
         chosen = greedy_arcs(piece, tips)
-    chosen = shorten(piece, chosen, tips)
+    if kind.handles[k]:
+        chosen = shorten(piece, chosen, tips)
     while len(tips) < extremities:
         scale = log_scale(piece, chosen)
         if spread(piece, scale) <= BEARABLE:
             break
         # A tip is worth its cut where much distortion is far from the boundary.
         tips = np.append(tips, _peak(scale * _distance(piece, _cut_vertices(piece, chosen))))
-        chosen = shorten(piece, _reach(piece, chosen, tips[-1]), tips)
-    return chosen, len(tips)
+        chosen = _reach(piece, chosen, tips[-1])
+    return shorten(piece, chosen, tips), len(tips)
 
 
 def _first_tips(piece: Piece) -> np.ndarray:
