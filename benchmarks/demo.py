@@ -38,8 +38,8 @@ def all_maps(case):
         yield name, uv, seconds
 
 
-def add_objects(case, maps, material):
-    """One object per method, side by side, each with its map in the unit square."""
+def add_objects(case, maps, material, up):
+    """One object per method, side by side and upright, each with its map in the unit square."""
     step = 1.2 * np.ptp(case.V, axis=0)[0]
     for k, (name, uv) in enumerate(maps.items()):
         obj = make_object(case.V, case.F, case.seams, name)
@@ -48,6 +48,14 @@ def add_objects(case, maps, material):
         obj.data.materials.append(material)
         obj.data.shade_smooth()
         obj.location.x = k * step
+        obj.rotation_euler.x = np.pi / 2 if up == "Y" else 0
+
+
+def show_textures():
+    """Let every 3D view of the file show the checker as it opens."""
+    for area in (a for screen in bpy.data.screens for a in screen.areas if a.type == "VIEW_3D"):
+        area.spaces.active.shading.color_type = "TEXTURE"
+    bpy.ops.file.pack_all()
 
 
 def slug(name):
@@ -80,7 +88,8 @@ def main():
         render_checker(case.V, case.F, scaled, view, args.out / f"checker_{slug(name)}.png", texture)
         colours = area_colours(face_distortion(case.V, case.F, uv)[0])
         render_colours(case.V, case.F, colours, view, args.out / f"area_{slug(name)}.png")
-    add_objects(case, maps, checker_material(texture))
+    add_objects(case, maps, checker_material(texture), view.up)
+    show_textures()
     blend = args.out / f"{args.model}.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(blend), compress=True)
     print(f"written: {blend} (one object per method) and the pictures in {args.out}")
