@@ -143,11 +143,13 @@ def target_layer(mesh: bpy.types.Mesh, name: str) -> str:
     if not name and mesh.uv_layers.active:
         return mesh.uv_layers.active.name
     name = name or UV_LAYER_NAME
-    layer = mesh.uv_layers.get(name) or mesh.uv_layers.new(name=name)
-    if layer is None:
+    if name not in mesh.uv_layers:
+        # In Edit Mode, Blender 5.2 makes the layer and returns None.
+        mesh.uv_layers.new(name=name)
+    if name not in mesh.uv_layers:
         raise TargetError(f"{mesh.name} does not take another UV layer.")
-    mesh.uv_layers.active = layer
-    return layer.name
+    mesh.uv_layers.active = mesh.uv_layers[name]
+    return name
 
 
 def write_uv(obj: bpy.types.Object, layer: str, corners: np.ndarray, uv: np.ndarray) -> None:

@@ -161,8 +161,11 @@ def run_measure(options: argparse.Namespace) -> None:
 
 def _blender():
     """The modules that need Blender, which the help and a misspelt option do not."""
+    from .quiet import silence
+
     try:
-        from . import blender_mesh, blender_pack, files
+        with silence():
+            from . import blender_mesh, blender_pack, files
     except ModuleNotFoundError as error:
         raise CommandError(f"{error}. Install bpy, numpy, scipy and xatlas, or run inside Blender.") from error
     return files, blender_mesh, blender_pack

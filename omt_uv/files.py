@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
-import io
 import os
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import bpy
@@ -18,6 +14,7 @@ import numpy as np
 
 from . import obj_text
 from .blender_mesh import new_mesh
+from .quiet import silence
 
 READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".off")
 WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb")
@@ -40,7 +37,7 @@ def load(path: Path) -> list[bpy.types.Object]:
     if not path.is_file():
         raise FileError(f"{path}: there is no such file")
     try:
-        with _silence() as log:
+        with silence() as log:
             _READERS[path.suffix.lower()](str(path.resolve()))
     except (RuntimeError, ValueError, IndexError, OSError) as error:
         raise FileError(f"{path}: {_last_line(str(error)) or 'cannot be read'}") from error
@@ -66,12 +63,12 @@ def save(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
         raise FileError(f"{path}: there is no such folder")
     try:
         if path.suffix.lower() == ".blend":
-            with _silence():
+            with silence():
                 bpy.context.preferences.filepaths.save_version = 0
                 bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False)
             return []
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".omt_uv_") as folder:
-            with _silence():
+            with silence():
                 warnings = _WRITERS[path.suffix.lower()](Path(folder) / path.name, objects)
             for made in Path(folder).iterdir():
                 os.replace(made, path.parent / made.name)
@@ -88,35 +85,6 @@ def _check_suffix(path: Path, known: tuple[str, ...]) -> None:
 def _last_line(text: str) -> str:
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     return lines[-1].removeprefix("Error: ") if lines else ""
-
-
-@contextmanager
-def _silence() -> Iterator[Callable[[], str]]:
-    """Keep what Blender prints, from Python and from C, off the terminal; the value returns what was printed."""
-    python = io.StringIO()
-    with tempfile.TemporaryFile() as sink, redirect_stdout(python), redirect_stderr(python):
-        printed = ""
-        saved = [os.dup(1), os.dup(2)]
-        _flush()
-        try:
-            os.dup2(sink.fileno(), 1)
-            os.dup2(sink.fileno(), 2)
-            yield lambda: printed + python.getvalue()
-        finally:
-            _flush()
-            for number, copy in zip((1, 2), saved, strict=True):
-                os.dup2(copy, number)
-                os.close(copy)
-            sink.seek(0)
-            printed = sink.read().decode(errors="replace")
-
-
-def _flush() -> None:
-    """Empty the buffers of Python and of C, where Blender's own messages wait."""
-    for stream in (sys.__stdout__, sys.__stderr__):
-        if stream is not None:
-            stream.flush()
-    ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)
 
 
 def _read_blend(path: str) -> None:

@@ -95,7 +95,11 @@ def test_only_the_uv_layer_changes():
     rng = np.random.default_rng(2)
     other = mesh.uv_layers.new(name="Other")
     other.uv.foreach_set("vector", rng.random(2 * len(mesh.loops)).astype(np.float32))
-    for name, kind, domain in (("weight", "FLOAT", "POINT"), ("id", "INT", "FACE"), ("paint", "FLOAT_COLOR", "CORNER")):
+    for name, kind, domain in (
+        ("weight", "FLOAT", "POINT"),
+        ("tag", "INT", "FACE"),
+        ("paint", "FLOAT_COLOR", "CORNER"),
+    ):
         attribute = mesh.attributes.new(name, kind, domain)
         key, width = ("color", 4) if kind == "FLOAT_COLOR" else ("value", 1)
         attribute.data.foreach_set(key, rng.integers(0, 9, len(attribute.data) * width))
@@ -141,6 +145,21 @@ def test_new_layer_by_name_and_then_the_same_one():
     assert obj.data.uv_layers.active.name == "Second"
     assert (scenes.uv_of(obj, "First") == first).all()
     assert (scenes.uv_of(obj, "Second") != scenes.uv_of(obj, "Third")).any()
+
+
+def test_new_layer_starts_as_a_copy_for_faces_that_are_not_unwrapped():
+    obj = scenes.bump()
+    unwrap()
+    first = scenes.uv_of(obj)
+    scenes.edit(obj, faces=[0, 1])
+    unwrap(uv_layer="Second", boundary="SQUARE")
+    scenes.leave_edit()
+    loops = [i for face in (0, 1) for i in obj.data.polygons[face].loop_indices]
+    rest = np.setdiff1d(np.arange(len(first)), loops)
+    second = scenes.uv_of(obj, "Second")
+    assert (second[rest] == first[rest]).all()
+    assert (second[loops] != first[loops]).any()
+    assert (scenes.uv_of(obj, "UVMap") == first).all()
 
 
 def test_without_packing_islands_are_centred_at_one_scale():
