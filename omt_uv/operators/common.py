@@ -80,7 +80,7 @@ class SolverOperator:
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.mode in {"OBJECT", "EDIT_MESH"}:
             return True
-        cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")
+        cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")  # type: ignore[attr-defined]
         return False
 
     def steps(self, context: bpy.types.Context):
