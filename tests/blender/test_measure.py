@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import re
 from pathlib import Path
 
@@ -13,7 +14,8 @@ import numpy as np
 import pytest
 from blender import scenes
 
-JUDGE = Path(__file__).resolve().parents[3] / "shared" / "tools" / "judge_uv.py"
+SHARED = Path(__file__).resolve().parents[3] / "shared"
+JUDGE = Path(os.environ.get("OMT_UV_JUDGE", SHARED / "tools" / "judge_uv.py"))
 
 
 def measured(package, objects):
@@ -68,7 +70,7 @@ def test_scale_of_the_object_counts(package):
 @pytest.mark.parametrize("make", [scenes.bump, scenes.cube])
 def test_agrees_with_the_judge(package, make, tmp_path):
     if not JUDGE.is_file():
-        pytest.skip("judge_uv.py is not at hand")
+        pytest.skip(f"no judge at {JUDGE}: set OMT_UV_JUDGE to judge_uv.py")
     spec = importlib.util.spec_from_file_location("judge_uv", JUDGE)
     judge = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(judge)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import types
 
 import bpy
+
 import pytest
 
 
