@@ -83,18 +83,23 @@ def split(surface: Surface, faces: np.ndarray | None = None) -> list[Chart]:
     EmptyMeshError, NonFiniteError, ZeroAreaFaceError, DuplicateFaceError, NonManifoldEdgeError,
     OrientationError, NotADiskError : with the indices of the offending elements of the surface
     """
-    faces, triangles, owner = chosen_triangles(surface, faces)
-    _check_areas(surface, triangles, owner)
-    groups_of_duplicates = duplicate_faces(surface, faces)
-    if len(groups_of_duplicates):
-        raise DuplicateFaceError(
-            "Faces share all their vertices with another face", kind="face", elements=groups_of_duplicates[:, 0]
-        )
-    charts = assemble(surface, _joined(surface, triangles, owner))
+    charts = assemble(surface, strict_sheets(surface, faces))
     for chart in charts:
         check_edges(chart)
         check_disk(chart)
     return charts
+
+
+def strict_sheets(surface: Surface, faces: np.ndarray | None = None) -> Sheets:
+    """The triangles of sound polygons, joined across every edge that is no seam; raises what `split` raises."""
+    faces, triangles, owner = chosen_triangles(surface, faces)
+    _check_areas(surface, triangles, owner)
+    duplicates = duplicate_faces(surface, faces)
+    if len(duplicates):
+        raise DuplicateFaceError(
+            "Faces share all their vertices with another face", kind="face", elements=duplicates[:, 0]
+        )
+    return _joined(surface, triangles, owner)
 
 
 def chosen_triangles(surface: Surface, faces: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -198,16 +203,21 @@ def assemble(surface: Surface, sheets: Sheets) -> list[Chart]:
 
 
 def _make(surface: Surface, members: np.ndarray, sheets: Sheets, corner_class: np.ndarray) -> Chart:
-    corners = sheets.triangles[members]
+    corners, owner = sheets.triangles[members], sheets.owner[members]
     _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
-    vertex_ids = surface.corner_vertex[corners.ravel()[index]]
+    vertex_ids = sheets.vertex[corners.ravel()[index]]
     local = inverse.reshape(-1, 3).astype(np.int64)
-    return Chart(surface.positions[vertex_ids], local, corners, sheets.owner[members], vertex_ids)
+    # Triangles of no polygon fill holes, see `holes.py`; vertices that only they use are no vertices of the mesh.
+    real = owner >= 0
+    own = np.zeros(len(vertex_ids), dtype=bool)
+    own[local[real]] = True
+    positions, ids = surface.positions[vertex_ids], np.where(own, vertex_ids, -1)
+    return Chart(positions, local[real], corners[real], owner[real], ids, local[~real])
 
 
 def check_edges(chart: Chart) -> None:
     """Straight lines in the plane cannot tell apart two edges, or diagonals, between the same two vertices."""
-    tail, head = halfedges(chart.triangles)
+    tail, head = halfedges(chart.disk)
     unique, index, count = np.unique(pair_keys(tail, head), return_index=True, return_counts=True)
     wrong = index[count > 2]
     if len(wrong):

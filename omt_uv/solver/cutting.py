@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from .charts import Surface, chosen_triangles
+from .charts import Surface, chosen_triangles, is_seam
 from .cut_graph import greedy_arcs, path_to, shorten
 from .extremities import log_scale, spread
 from .geometry import face_areas
+from .holes import fill_holes
 from .piece import NOISE, Kind, Piece, classify, edge_graph, make_piece
 from .repair import Repaired, join
 from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
@@ -53,11 +54,25 @@ class Cuts:
     warnings: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Opened:
+    """The surface and its sheets, cut into disks and all looking to the same side, and the cuts.
+
+    Surface and sheets are those given, or with the triangles that fill holes; extent: size of a box around them.
+    """
+
+    surface: Surface
+    sheets: Sheets
+    cuts: Cuts
+    extent: float
+
+
 def cut(
     surface: Surface,
     faces: np.ndarray | None = None,
     *,
     avoid: np.ndarray | None = None,
+    fill: bool = False,
     extremities: int = MOST_EXTREMITIES,
 ) -> Cuts:
     """Edges to mark as seams so that every part of the polygons `faces` (f,) bool is a disk; disks are left alone.
@@ -65,7 +80,8 @@ def cut(
     Parameters
     ----------
     avoid : (n,) in [0,1], vertices to keep free of seams
-    extremities : tips that a surface without boundary is opened through, at most
+    fill : take holes for filled, all boundaries but the longest of every part
+    extremities : tips that a surface is opened through, at most
 
     Raises
     ------
@@ -73,23 +89,47 @@ def cut(
     """
     faces, triangles, owner = chosen_triangles(surface, faces)
     repaired = join(surface, faces, triangles, owner)
-    return open_sheets(surface, repaired, avoid=avoid, extremities=extremities)[1]
+    return open_sheets(surface, repaired, avoid=avoid, fill=fill, extremities=extremities).cuts
 
 
 def open_sheets(
-    surface: Surface, repaired: Repaired, *, avoid: np.ndarray | None = None, extremities: int = MOST_EXTREMITIES
-) -> tuple[Sheets, Cuts]:
-    """The sheets, all looking to the same side and cut into disks, and the cuts; see `cut`."""
-    weight = np.zeros(len(surface.positions)) if avoid is None else np.clip(np.asarray(avoid, float), 0, 1)
-    positions, unit = in_unit_box(surface, repaired.sheets)
-    area = face_areas(positions, repaired.sheets.vertex[repaired.sheets.triangles])
-    sheets, one_sided = _looking_out(repaired.sheets, area)
+    surface: Surface,
+    repaired: Repaired,
+    *,
+    avoid: np.ndarray | None = None,
+    fill: bool = False,
+    extremities: int = MOST_EXTREMITIES,
+) -> Opened:
+    """Repaired sheets cut into disks; see `cut`."""
+    vertex_count = len(surface.positions)
+    positions, unit = _in_unit_box(surface, repaired.sheets)
+    sheets, one_sided = _looking_out(repaired.sheets, positions)
+    if fill:
+        filled = fill_holes(surface, sheets, one_sided)
+        surface, sheets = filled.surface, filled.sheets
+        one_sided = np.append(one_sided, np.zeros(len(sheets.triangles) - len(one_sided), dtype=bool))
+        positions, unit = _in_unit_box(surface, sheets)
+    weight = np.zeros(len(positions))
+    if avoid is not None:
+        weight[:vertex_count] = np.clip(np.asarray(avoid, float), 0, 1)
+    gone, report = _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities)
+    edges = np.stack(sheets.ends(sheets.first[gone]), axis=1)
+    edges = edges[(edges < vertex_count).all(axis=1)]
+    # Parts that could not be oriented can be, now that they are open.
+    sheets, _ = _looking_out(sheets.without(gone), positions)
+    length = sum(p.length for p in report)
+    edges = np.concatenate([edges, repaired.torn]).astype(np.int64)
+    return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, repaired.warnings), unit)
+
+
+def _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities) -> tuple[np.ndarray, list[PieceCut]]:
+    """Pairs (p,) bool to cut so that every part is a disk, and what was done to those that were none."""
     part, corner_class = components(sheets), corner_classes(sheets)
     kind = classify(sheets, corner_class, part, one_sided)
-    seam = np.isin(pair_keys(*sheets.ends(sheets.first)), pair_keys(*surface.seams.T))
+    seam = is_seam(surface, pair_keys(*sheets.ends(sheets.first)))
     gone = np.zeros(len(sheets.first), dtype=bool)
-    report = []
     members = groups(part)
+    report = []
     for k in np.flatnonzero(~kind.is_disk):
         piece = make_piece(sheets, positions, corner_class, members[k], weight, seam)
         chosen, tips = open_piece(piece, kind, k, extremities)
@@ -97,20 +137,17 @@ def open_sheets(
         length = float(piece.length[chosen].sum()) * unit
         figures = int(kind.boundaries[k]), int(kind.handles[k]), bool(kind.one_sided[k])
         report.append(PieceCut(len(piece.triangles), *figures, tips, length))
-    a, b = sheets.ends(sheets.first[gone])
-    edges = np.concatenate([np.stack([a, b], axis=1), repaired.torn]).astype(np.int64)
-    # Parts that could not be oriented can be, now that they are open.
-    sheets, _ = _looking_out(sheets.without(gone), area)
-    cuts = Cuts(edges, sum(p.length for p in report), tuple(report), repaired.torn, repaired.warnings)
-    return sheets, cuts
+    return gone, report
 
 
-def _looking_out(sheets: Sheets, area: np.ndarray) -> tuple[Sheets, np.ndarray]:
+def _looking_out(sheets: Sheets, positions: np.ndarray) -> tuple[Sheets, np.ndarray]:
+    """Sheets in which neighbours look to the same side, and the triangles (m,) bool of parts where they cannot."""
+    area = face_areas(positions, sheets.vertex[sheets.triangles])
     turned, one_sided = orientations(sheets, area)
     return turn_over(sheets, turned), one_sided
 
 
-def in_unit_box(surface: Surface, sheets: Sheets) -> tuple[np.ndarray, float]:
+def _in_unit_box(surface: Surface, sheets: Sheets) -> tuple[np.ndarray, float]:
     """Positions (n,3) of the surface such that the triangles lie in a unit box, and its size; 0 where unused."""
     used = np.unique(sheets.vertex[sheets.triangles])
     p = surface.positions[used]

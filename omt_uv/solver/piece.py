@@ -16,6 +16,8 @@ from .topology import halfedges
 CREASE, HOLLOW, SEAM = 0.75, 0.6, 0.3
 # Edges between vertices that are to be kept free of seams count as so many times their length.
 AVOIDED = 10.0
+# Neither cut the triangles that fill a hole, nor along its edge, if there is another way.
+HOLE = 1000.0
 # Equal costs are told apart by this share of noise, the same for a mesh wherever it is and however large.
 NOISE = 1e-6
 
@@ -115,7 +117,8 @@ def make_piece(
     local[members] = np.arange(len(members))
     mine = np.flatnonzero(local[sheets.first // 3] >= 0)
     pair = np.stack([sheets.first[mine], sheets.second[mine]], axis=1)
-    diagonal = ~sheets.side[pair[:, 0]]
+    patch = (sheets.owner[pair // 3] < 0).any(axis=1)
+    diagonal = ~sheets.side[pair[:, 0]] & ~patch
     pair = 3 * local[pair // 3] + pair % 3
     tail, head = halfedges(triangles)
     ends = np.stack([tail[pair[:, 0]], head[pair[:, 0]]], axis=1)
@@ -126,6 +129,7 @@ def make_piece(
     noise = 1 + NOISE * np.random.default_rng(0).random(len(pair))
     cost = (length + floor) * _hiding(p, triangles, pair) * noise
     cost *= np.where(seam[mine], SEAM, 1.0) * (1 + (AVOIDED - 1) * weight[vertex_ids][ends].mean(axis=1))
+    cost[patch] *= HOLE
     cost[diagonal] = np.inf
     rim = _open_halfedges(3 * len(triangles), pair[:, 0], pair[:, 1])
     return Piece(p, triangles, pair, mine, ends, length, cost, rim, members, vertex_ids)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import Chart, Surface, assemble, check_disk, check_edges, chosen_triangles, split
-from .cutting import Cuts, in_unit_box, open_sheets
+from .charts import Chart, Surface, assemble, check_disk, check_edges, chosen_triangles, split, strict_sheets
+from .cutting import Cuts, open_sheets
+from .holes import fill_holes as fill_holes_of
 from .repair import join, with_area
 
 SEAMS = ("existing", "auto")
@@ -27,6 +28,7 @@ def prepare(
     faces: np.ndarray | None = None,
     *,
     seams: str = "auto",
+    fill_holes: bool = False,
     avoid: np.ndarray | None = None,
 ) -> Prepared:
     """Disk charts of the polygons `faces` (f,) bool, all by default.
@@ -35,6 +37,8 @@ def prepare(
     ----------
     seams : "existing" splits along the seams of the surface alone and refuses what is no disk, or broken;
         "auto" repairs and cuts, for the map only
+    fill_holes : fill all boundaries of a part but the longest, for the map only, instead of cutting to them; such
+        charts have `patches`
     avoid : (n,) in [0,1], vertices to keep free of seams
 
     Raises
@@ -45,20 +49,32 @@ def prepare(
     if seams not in SEAMS:
         raise ValueError(f"seams must be one of {', '.join(SEAMS)}, not {seams!r}")
     if seams == "existing":
-        return Prepared(split(surface, faces), None, ())
+        return Prepared(_existing(surface, faces, fill_holes), None, ())
     faces, triangles, owner = chosen_triangles(surface, faces)
     repaired = join(surface, faces, triangles, owner)
-    sheets, cuts = open_sheets(surface, repaired, avoid=avoid)
-    extent = in_unit_box(surface, sheets)[1]
+    opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes)
     charts, flat = [], 0
-    for chart in assemble(surface, sheets):
-        check_edges(chart)
-        check_disk(chart)
-        chart, count = with_area(chart, extent)
-        charts.append(chart)
+    for chart in _checked(assemble(opened.surface, opened.sheets)):
+        sound, count = with_area(chart, opened.extent)
+        charts.append(sound)
         flat += count
-    warnings = list(cuts.warnings)
+    warnings = list(opened.cuts.warnings)
     if flat:
         triangles = "A triangle has" if flat == 1 else f"{flat} triangles have"
         warnings.append(f"{triangles} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve")
-    return Prepared(charts, cuts, tuple(warnings))
+    return Prepared(charts, opened.cuts, tuple(warnings))
+
+
+def _existing(surface: Surface, faces: np.ndarray | None, holes_too: bool) -> list[Chart]:
+    if not holes_too:
+        return split(surface, faces)
+    sheets = strict_sheets(surface, faces)
+    filled = fill_holes_of(surface, sheets, np.zeros(len(sheets.triangles), dtype=bool))
+    return _checked(assemble(filled.surface, filled.sheets))
+
+
+def _checked(charts: list[Chart]) -> list[Chart]:
+    for chart in charts:
+        check_edges(chart)
+        check_disk(chart)
+    return charts

@@ -150,17 +150,18 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     count = int(bad.sum())
     low = chart.vertices.min(axis=0)
     size = 2 * float((chart.vertices.max(axis=0) / 2 - low / 2).max())
-    scale = max(size, SPECK * extent) or 1.0
     rng = np.random.default_rng(0)
-    # A chart without any area has no shape to keep.
-    vertices = SPECK * rng.random((len(chart.vertices), 3)) if bad.all() else chart.vertices / scale - low / scale
+    # A chart without any area, or without a size that counts, has no shape to keep.
+    shapeless = bad.all() or size < 1e-9 * extent
+    scale = (extent if size < 1e-9 * extent else size) or 1.0
+    vertices = SPECK * rng.random((len(chart.vertices), 3)) if shapeless else chart.vertices / scale - low / scale
     for k in range(NUDGE_ROUNDS):
         bad = degenerate_triangles(vertices, chart.disk)
         if not bad.any():
             return replace(chart, vertices=vertices * scale), count
         reach = _least_height(vertices, chart.disk, bad)
         moved = np.unique(chart.disk[bad])
-        vertices[moved] += NUDGE * 2.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
+        vertices[moved] += NUDGE * 4.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
     raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.flatnonzero(bad[: len(chart.triangles)]))
 
 

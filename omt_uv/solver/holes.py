@@ -1,0 +1,83 @@
+"""Holes filled for the map only, so that eyes and nostrils do not tear a face apart.
+
+Every hole gets a fan of triangles around a new vertex. In the sheets they are triangles of polygon -1, on corners and
+vertices after those of the surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .charts import Surface
+from .sheets import Sheets, components, corner_classes
+from .topology import halfedges
+
+NO_POLYGON = -1
+
+
+@dataclass(frozen=True)
+class Filled:
+    """The surface with a vertex in the middle of every hole, the sheets with the fans, and the number of holes."""
+
+    surface: Surface
+    sheets: Sheets
+    holes: int
+
+
+def fill_holes(surface: Surface, sheets: Sheets, one_sided: np.ndarray) -> Filled:
+    """Fill all boundaries but the longest of every part of oriented sheets; parts `one_sided` (m,) are left alone."""
+    tail, head = halfedges(corner_classes(sheets)[sheets.triangles])
+    open_ = np.ones(len(tail), dtype=bool)
+    open_[sheets.first] = open_[sheets.second] = False
+    rim = np.flatnonzero(open_)
+    rim = rim[~one_sided[rim // 3]]
+    if len(rim) == 0:
+        return Filled(surface, sheets, 0)
+    size = int(max(tail.max(), head.max())) + 1
+    loop = connected_components(coo_matrix((np.ones(len(rim)), (tail[rim], head[rim])), shape=(size, size)), False)[1]
+    loop = np.unique(loop[tail[rim]], return_inverse=True)[1].ravel()
+    hole = _holes(surface, sheets, rim, loop)
+    rim, loop = rim[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
+    if len(rim) == 0:
+        return Filled(surface, sheets, 0)
+    return _fans(surface, sheets, rim, loop, tail, head, size)
+
+
+def _holes(surface: Surface, sheets: Sheets, rim: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Loops (l,) bool that are not the longest of their part."""
+    a, b = sheets.ends(rim)
+    # Halves: the difference of two huge numbers may be infinite.
+    step = np.linalg.norm(surface.positions[a] / 2 - surface.positions[b] / 2, axis=1)
+    length = np.bincount(loop, step)
+    part = components(sheets)[rim[np.unique(loop, return_index=True)[1]] // 3]
+    order = np.lexsort((-length, part))
+    hole = np.ones(len(length), dtype=bool)
+    hole[order[np.unique(part[order], return_index=True)[1]]] = False
+    return hole
+
+
+def _fans(surface, sheets, rim, loop, tail, head, size) -> Filled:
+    """A triangle (head, tail, centre of the hole) on every rim halfedge (k,), joined to it and to its neighbours."""
+    a, b = sheets.ends(rim)
+    n, c, m, k = len(surface.positions), len(sheets.vertex), len(sheets.triangles), len(rim)
+    count = np.bincount(loop)
+    centre = np.stack([np.bincount(loop, x / count[loop]) for x in surface.positions[a].T], axis=1)
+    successor = np.full(size, -1, dtype=np.int64)
+    successor[tail[rim]] = np.arange(k)
+    following = successor[head[rim]]
+    mine = 3 * (m + np.arange(k))
+    extended = replace(
+        sheets,
+        triangles=np.concatenate([sheets.triangles, c + np.arange(3 * k).reshape(k, 3)]),
+        owner=np.concatenate([sheets.owner, np.full(k, NO_POLYGON)]),
+        vertex=np.concatenate([sheets.vertex, np.stack([b, a, n + loop], axis=1).ravel()]),
+        side=np.concatenate([sheets.side, np.tile([True, False, False], k)]),
+        first=np.concatenate([sheets.first, rim, mine + 2]),
+        second=np.concatenate([sheets.second, mine, mine[following] + 1]),
+    )
+    positions = np.concatenate([surface.positions, centre])
+    return Filled(replace(surface, positions=positions, corner_vertex=extended.vertex), extended, len(count))
