@@ -114,7 +114,10 @@ def test_orientation():
     assert np.sort(rejected(errors.OrientationError, V, [F[0], F[1][::-1]]).elements).tolist() == [[0, 2]]
 
 
-@pytest.mark.parametrize("shape, words", [("icosphere", "closed sphere"), ("torus", "genus 1"), ("annulus", "2 boundaries")])
+NO_DISKS = [("icosphere", "closed sphere"), ("torus", "genus 1"), ("annulus", "2 boundaries")]
+
+
+@pytest.mark.parametrize("shape, words", NO_DISKS)
 def test_what_is_no_disk(shape, words):
     V, F = getattr(meshes, shape)()
     error = rejected(errors.NotADiskError, V, F)

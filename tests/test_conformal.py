@@ -182,10 +182,14 @@ def test_double_is_closed_and_mirrored():
 @pytest.mark.parametrize("height", [0.2, 0.7, 1.0, 1.6, 4.0])
 def test_rectangle_to_disk_is_conformal_and_keeps_the_boundary_in_order(height):
     t = np.linspace(0, 1, 30)[:-1]
-    rim = np.concatenate([
-        np.column_stack([t, 0 * t]), np.column_stack([1 + 0 * t, t * height]),
-        np.column_stack([1 - t, height + 0 * t]), np.column_stack([0 * t, (1 - t) * height]),
-    ])
+    rim = np.concatenate(
+        [
+            np.column_stack([t, 0 * t]),
+            np.column_stack([1 + 0 * t, t * height]),
+            np.column_stack([1 - t, height + 0 * t]),
+            np.column_stack([0 * t, (1 - t) * height]),
+        ]
+    )
     image = rectangle_to_disk(rim, height)
     np.testing.assert_allclose(np.linalg.norm(image, axis=1), 1, atol=1e-12)
     turn = np.diff(np.unwrap(np.arctan2(image[:, 1], image[:, 0])))

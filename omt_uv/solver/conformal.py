@@ -134,7 +134,12 @@ def _rectangle(vertices, triangles, loop, corners) -> Steps[ConformalMap]:
     flow = yield from yamabe_flow(doubled, owner, cone_angle)
     uv, aspect = _layout(flow, owner, loop, corners, count)
     return ConformalMap(
-        uv[:n], aspect, np.where(corners < n, corners, -1), flow.residual, flow.iterations, flow.flips,
+        uv[:n],
+        aspect,
+        np.where(corners < n, corners, -1),
+        flow.residual,
+        flow.iterations,
+        flow.flips,
         flow.log_scale[:n],
     )
 

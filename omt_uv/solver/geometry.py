@@ -75,9 +75,7 @@ def cotangent_laplacian(positions: np.ndarray, triangles: np.ndarray) -> csr_mat
     length = halfedge_lengths(positions, triangles).reshape(-1, 3)
     # The angle opposite to halfedge k is the one at vertex k + 2.
     weight = 0.5 * cotangents_from_lengths(length)
-    return laplacian_from_weights(
-        triangles.ravel(), triangles[:, [1, 2, 0]].ravel(), weight.ravel(), len(positions)
-    )
+    return laplacian_from_weights(triangles.ravel(), triangles[:, [1, 2, 0]].ravel(), weight.ravel(), len(positions))
 
 
 def angle_defects(triangles: np.ndarray, angles: np.ndarray, boundary: np.ndarray, n: int) -> np.ndarray:

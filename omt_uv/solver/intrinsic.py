@@ -87,7 +87,7 @@ def flip_in_place(triangles, twin, log_length, h, diagonal: Diagonal) -> None:
     flat = triangles.reshape(-1)
     g = twin[h]
     jk, ki, il, lj = next_halfedge(h), previous_halfedge(h), next_halfedge(g), previous_halfedge(g)
-    i, j, k, l = flat[h], flat[g], flat[ki], flat[lj]
+    i, j, k, opposite = flat[h], flat[g], flat[ki], flat[lj]
     new_length = diagonal(log_length[jk], log_length[ki], log_length[il], log_length[lj], log_length[h])
     t, s = h // 3, g // 3
 
@@ -100,8 +100,8 @@ def flip_in_place(triangles, twin, log_length, h, diagonal: Diagonal) -> None:
     place = order[np.minimum(np.searchsorted(old[order], moved_twin), len(old) - 1)]
     moved_twin = np.where(old[place] == moved_twin, lookup[place], moved_twin)
 
-    triangles[t] = np.stack([i, l, k], axis=1)
-    triangles[s] = np.stack([j, k, l], axis=1)
+    triangles[t] = np.stack([i, opposite, k], axis=1)
+    triangles[s] = np.stack([j, k, opposite], axis=1)
     twin[new], log_length[new] = moved_twin, moved_length
     inner = moved_twin >= 0
     twin[moved_twin[inner]] = new[inner]

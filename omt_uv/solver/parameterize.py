@@ -58,8 +58,8 @@ class ChartMap:
     def report(self, chart: Chart) -> dict:
         """Everything but the coordinates, for a JSON file."""
         figures = {k: v for k, v in vars(self).items() if k != "uv"}
-        size = {"vertices": len(chart.vertices), "faces": len(np.unique(chart.faces)), "triangles": len(chart.triangles)}
-        return {**size, **figures, "warnings": list(self.warnings)}
+        size = {"vertices": len(chart.vertices), "faces": len(np.unique(chart.faces))}
+        return {**size, "triangles": len(chart.triangles), **figures, "warnings": list(self.warnings)}
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def unwrap(
     charts = split(surface, faces)
     maps = []
     total = sum(len(c.triangles) for c in charts)
-    done = 0
+    done = 0.0
     for chart in charts:
         share = len(chart.triangles) / total
         steps = unwrap_chart(chart, boundary=boundary, quality=quality, balance=balance)
