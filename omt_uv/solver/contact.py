@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 # Reach of the barrier, relative to the shorter of the boundary edges involved.
-REACH = 0.25
+REACH = 0.5
 # A step goes at most this share of the way to the first contact.
 CONTACT_SHARE = 0.8
 

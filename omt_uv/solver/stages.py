@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +37,7 @@ FIRST_PRESSURE, LEAST_PRESSURE = 0.3, 0.01
 # The energy is a mean over the surface: below this it is rounding.
 NO_ENERGY = 1e-12
 # Of the barrier between boundary vertices and edges, in mean face areas.
-CONTACT_STRENGTH = 1.0
+CONTACT_STRENGTH = 0.3
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ class Found:
 def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Steps[Found]:
     """Newton in stages of growing weight, until the area error is small enough.
 
-    When a stage ends with a boundary that crosses itself it is done again with a barrier, from where it began.
+    As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
     weights = list(settings.weights)
     softening = (balance / (1 - balance)) ** 2 if balance < 1 else np.inf
@@ -93,12 +94,13 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Step
         problem = task.problem(w, weight, guarded)
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
         allowed = min(settings.max_steps - steps, STAGE_STEPS)
-        stage = yield from minimise(problem, w, goal, allowed, (k, len(weights)))
-        steps += stage.steps
-        if not (guarded or overlap) and task.crosses(stage.w):
+        watch = None if guarded or overlap else task.crosses
+        stage = yield from minimise(problem, w, goal, allowed, (k, len(weights)), watch)
+        w, steps = stage.w, steps + stage.steps
+        if stage.status == "crossed":
             guarded = True
             continue
-        w, k = stage.w, k + 1
+        k += 1
         error = area_error(task.faces, w)
         enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
@@ -117,16 +119,26 @@ class Stage:
     status: str
 
 
-def minimise(problem: Problem, w: np.ndarray, goal: float, allowed: int, place: tuple[int, int]) -> Steps[Stage]:
+def minimise(
+    problem: Problem,
+    w: np.ndarray,
+    goal: float,
+    allowed: int,
+    place: tuple[int, int],
+    watch: Callable[[np.ndarray], bool] | None = None,
+) -> Steps[Stage]:
     """Newton until it promises little, at least LOOSE; where that leaves the area error above the goal, TIGHT.
 
-    place: the number of this stage, and how many there are.
+    place: the number of this stage, and how many there are; watch: a step to where this is true is not taken, and the
+    stage ends "crossed".
     """
     value = problem.energy(w)
     steps, residual, status, pressure = 0, np.inf, "steps", FIRST_PRESSURE
     while steps < max(allowed, 1):
         step, used = newton_step(problem, w, value, pressure), pressure
         pressure = _next_pressure(pressure, step, value)
+        if watch is not None and watch(step.w):
+            return Stage(w, steps + 1, residual, value, "crossed")
         w, value, steps = step.w, step.energy, steps + 1
         residual = step.decrement / max(value, NO_ENERGY)
         yield Progress("Refinement", min(1.0, (place[0] + 1 - 0.5**steps) / place[1]))

@@ -1,0 +1,45 @@
+"""Factors solve what they were made from, in every order, and say so when they cannot."""
+
+import meshes
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from omt_uv.solver.errors import PrecisionError
+from omt_uv.solver.geometry import cotangent_laplacian
+from omt_uv.solver.linear import Factor, minimum_degree, solve_general, solve_spd
+
+
+def system():
+    V, F = meshes.random_disk()
+    A = cotangent_laplacian(V, F) + 0.1 * sp.identity(len(V))
+    return A, np.random.default_rng(0).normal(size=(len(V), 2))
+
+
+@pytest.mark.parametrize("order", [None, "mmd", "colamd", "natural", "permutation"])
+def test_every_order_solves(order):
+    A, b = system()
+    factor = Factor(A, minimum_degree(A) if order == "permutation" else order)
+    assert np.allclose(A @ factor.solve(b), b)
+    assert np.allclose(A @ factor.solve(b[:, 0]), b[:, 0])
+
+
+def test_minimum_degree_is_a_permutation_with_less_fill_than_none():
+    A, _ = system()
+    order = minimum_degree(A)
+    assert np.array_equal(np.sort(order), np.arange(A.shape[0]))
+    assert Factor(A, order)._lu.nnz < Factor(A, "natural")._lu.nnz
+
+
+def test_unsymmetric_dominant_systems():
+    A, b = system()
+    B = A + sp.diags(np.full(A.shape[0] - 1, 0.05), 1)
+    assert np.allclose(B @ solve_general(B, b), b)
+    assert np.allclose(A @ solve_spd(A, b), b)
+
+
+def test_a_singular_matrix_is_named():
+    with pytest.raises(PrecisionError):
+        solve_spd(sp.csc_matrix((3, 3)), np.ones(3))
+    with pytest.raises(PrecisionError):
+        solve_spd(sp.diags([1.0, np.nan, 1.0]), np.ones(3))
