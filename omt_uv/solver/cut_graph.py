@@ -81,16 +81,17 @@ def _ancestors(before: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         found, jump = more, jump[jump]
 
 
-def shorten(piece: Piece, cut: np.ndarray, tips: np.ndarray) -> np.ndarray:
+def shorten(piece: Piece, cut: np.ndarray, tips: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
     """The cut (e,) bool with each stretch replaced by the shortest path that does the same; `tips` (k,) stay on it.
 
     Without one stretch the open piece is an annulus. The shortest path between its two boundaries may take off
-    anywhere along them, so stretches branch off one another where that is shorter.
+    anywhere along them, so stretches branch off one another where that is shorter. `around` (e,) bool confines this
+    to stretches that touch these edges, once.
     """
-    for _ in range(SWEEPS):
+    for _ in range(SWEEPS if around is None else 1):
         before = float(piece.cost[cut].sum())
         for stretch in stretches(piece, cut, tips):
-            if not _is_stretch(piece, cut, stretch):
+            if not _is_stretch(piece, cut, stretch) or not _touches(piece, stretch, around):
                 continue
             rest = cut.copy()
             rest[stretch] = False
@@ -101,6 +102,10 @@ def shorten(piece: Piece, cut: np.ndarray, tips: np.ndarray) -> np.ndarray:
         if piece.cost[cut].sum() >= before * (1 - 1e-3):
             break
     return cut
+
+
+def _touches(piece: Piece, stretch: np.ndarray, around: np.ndarray | None) -> bool:
+    return around is None or bool(np.isin(piece.ends[stretch], piece.ends[around]).any())
 
 
 def stretches(piece: Piece, cut: np.ndarray, tips: np.ndarray) -> list[np.ndarray]:

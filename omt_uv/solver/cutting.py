@@ -178,7 +178,8 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
             break
         # A tip is worth its cut where much distortion is far from the boundary.
         tips = np.append(tips, _peak(scale * _distance(piece, _cut_vertices(piece, chosen))))
-        chosen = _reach(piece, chosen, tips[-1])
+        path = path_to(piece, _cut_vertices(piece, chosen), tips[-1])
+        chosen = shorten(piece, chosen | path, tips, around=path)
     return shorten(piece, chosen, tips), len(tips)
 
 
@@ -222,8 +223,3 @@ def _best_root(piece: Piece) -> np.ndarray:
     roots = _farthest(piece, np.array([0]), ROOT_TRIALS)[1:]
     systems = [greedy_arcs(piece, np.array([root])) for root in roots]
     return min(systems, key=lambda edges: piece.cost[edges].sum())
-
-
-def _reach(piece: Piece, chosen: np.ndarray, tip: int) -> np.ndarray:
-    """The cut (e,) bool and the shortest path from it, or from the boundary, to the tip."""
-    return chosen | path_to(piece, _cut_vertices(piece, chosen), tip)
