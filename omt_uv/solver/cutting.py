@@ -30,14 +30,15 @@ ROOT_TRIALS = 4
 
 @dataclass(frozen=True)
 class PieceCut:
-    """How one part was opened: triangles, boundaries, handles (crosscaps where one_sided), tips reached, cut length."""
+    """How one part was opened: triangles, boundaries, handles (crosscaps where one_sided), cut length, and the
+    vertices of the surface (k,) that it was opened through."""
 
     triangles: int
     boundaries: int
     handles: int
     one_sided: bool
-    extremities: int
     length: float
+    extremities: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities)
         gone[piece.sheet_pair[chosen]] = True
         length = float(piece.length[chosen].sum()) * unit
         figures = int(kind.boundaries[k]), int(kind.handles[k]), bool(kind.one_sided[k])
-        report.append(PieceCut(len(piece.triangles), *figures, tips, length))
+        report.append(PieceCut(len(piece.triangles), *figures, length, piece.vertex_ids[tips]))
     return gone, report
 
 
@@ -159,8 +160,8 @@ def _in_unit_box(surface: Surface, sheets: Sheets) -> tuple[np.ndarray, float]:
     return positions, unit
 
 
-def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.ndarray, int]:
-    """Edges (e,) bool that open the piece, of `kind` number k, into a disk, and how many tips they reach."""
+def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.ndarray, np.ndarray]:
+    """Edges (e,) bool that open the piece, of `kind` number k, into a disk, and the tips (t,) that they reach."""
     closed = kind.boundaries[k] == 0
     if closed and kind.handles[k] == 0:
         tips = _first_tips(piece)
@@ -180,7 +181,7 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
         tips = np.append(tips, _peak(scale * _distance(piece, _cut_vertices(piece, chosen))))
         path = path_to(piece, _cut_vertices(piece, chosen), tips[-1])
         chosen = shorten(piece, chosen | path, tips, around=path)
-    return shorten(piece, chosen, tips), len(tips)
+    return shorten(piece, chosen, tips), tips
 
 
 def _first_tips(piece: Piece) -> np.ndarray:
