@@ -17,15 +17,21 @@ REACH = 0.5
 CONTACT_SHARE = 0.8
 
 
+def rim_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tails and heads (b,) of the edges of a boundary: a loop (b,) of vertices, or edges (b,2) of several loops."""
+    return (loop[:, 0], loop[:, 1]) if loop.ndim == 2 else (loop, np.roll(loop, -1))
+
+
 def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Pairs (k,2) of edges of the closed polygon w[loop] that cross; edge i goes from loop[i] to the next.
+    """Pairs (k,2) of edges of a boundary that cross: edge i goes from loop[i] to the next; see `rim_edges`.
 
     Touching at a common vertex is no crossing, and neither are edges that only touch.
     """
-    a, b = w[loop], w[np.roll(loop, -1)]
+    tail, head = rim_edges(loop)
+    a, b = w[tail], w[head]
     low, high = _box(np.stack([a, b]))
     i, j = box_pairs(low, high, low, high)
-    apart = (j > i + 1) & ((i > 0) | (j < len(loop) - 1))
+    apart = (j > i) & (tail[i] != head[j]) & (head[i] != tail[j])
     i, j = i[apart], j[apart]
     first = _cross(b[i] - a[i], a[j] - a[i]) * _cross(b[i] - a[i], b[j] - a[i])
     second = _cross(b[j] - a[j], a[i] - a[j]) * _cross(b[j] - a[j], b[i] - a[j])
@@ -35,9 +41,10 @@ def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Contact:
-    """Barrier of a boundary loop (b,), vertex numbers; reach (b,) of the vertex and of the edge that starts there."""
+    """Barrier of the boundary edges tail, head (b,); reach (b,) of the vertex tail and of the edge."""
 
-    loop: np.ndarray
+    tail: np.ndarray
+    head: np.ndarray
     vertex_reach: np.ndarray
     edge_reach: np.ndarray
     strength: float
@@ -61,22 +68,22 @@ class Contact:
 
     def limit(self, w: np.ndarray, step: np.ndarray) -> float:
         """Share of a step (n,) that may be taken before a vertex touches an edge."""
-        loop, after = self.loop, np.roll(self.loop, -1)
-        p, a, b = w[loop], w[loop], w[after]
-        dp, da, db = step[loop], step[loop], step[after]
+        tail, head = self.tail, self.head
+        p, a, b = w[tail], w[tail], w[head]
+        dp, da, db = step[tail], step[tail], step[head]
         i, j = box_pairs(*_box(np.stack([p, p + dp])), *_box(np.stack([a, b, a + da, b + db])))
-        apart = (loop[i] != loop[j]) & (loop[i] != after[j])
+        apart = (tail[i] != tail[j]) & (tail[i] != head[j])
         i, j = i[apart], j[apart]
         times = _contact_times(p[i] - a[j], dp[i] - da[j], b[j] - a[j], db[j] - da[j])
         return CONTACT_SHARE * float(times.min(initial=np.inf))
 
     def _near(self, w):
-        loop, after = self.loop, np.roll(self.loop, -1)
-        p, a, b = w[loop], w[loop], w[after]
+        tail, head = self.tail, self.head
+        p, a, b = w[tail], w[tail], w[head]
         low, high = _box(p[None])
         grown = self.vertex_reach[:, None]
         i, j = box_pairs(low - grown, high + grown, *_box(np.stack([a, b])))
-        apart = (loop[i] != loop[j]) & (loop[i] != after[j])
+        apart = (tail[i] != tail[j]) & (tail[i] != head[j])
         i, j = i[apart], j[apart]
         along, to = b[j] - a[j], p[i] - a[j]
         share = np.clip((to * along.conj()).real / np.maximum(np.abs(along) ** 2, 1e-300), 0, 1)
@@ -85,7 +92,7 @@ class Contact:
         reach = np.minimum(self.vertex_reach[i], self.edge_reach[j])
         on = distance < reach
         i, j = i[on], j[on]
-        return _Near(loop[i], loop[j], after[j], share[on], distance[on], reach[on], gap[on] / distance[on])
+        return _Near(tail[i], tail[j], head[j], share[on], distance[on], reach[on], gap[on] / distance[on])
 
 
 @dataclass(frozen=True)
@@ -100,10 +107,13 @@ class _Near:
 
 
 def contact(w: np.ndarray, loop: np.ndarray, strength: float) -> Contact:
-    """A barrier for the boundary loop (b,) whose reach follows the edge lengths of the map w (n,)."""
-    edge = np.abs(w[np.roll(loop, -1)] - w[loop])
+    """A barrier for a boundary, see `rim_edges`, whose reach follows the edge lengths of the map w (n,)."""
+    tail, head = rim_edges(loop)
+    edge = np.abs(w[head] - w[tail])
     edge = np.minimum(edge, edge.mean())
-    return Contact(loop, REACH * np.minimum(edge, np.roll(edge, 1)), REACH * edge, strength)
+    before = np.empty_like(edge)
+    before[np.argsort(tail)] = edge[np.argsort(head)]
+    return Contact(tail, head, REACH * np.minimum(edge, before), REACH * edge, strength)
 
 
 def _contact_times(p, dp, e, de):

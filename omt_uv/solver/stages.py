@@ -42,8 +42,8 @@ CONTACT_STRENGTH = 0.3
 
 @dataclass(frozen=True)
 class Task:
-    """faces, assembly and motion for Newton; loop: a boundary (b,) that may not cross itself, or None;
-    guarded: from the beginning; scale_free: the scale of the targets follows the map."""
+    """faces, assembly and motion for Newton; loop: a boundary, see `contact.rim_edges`, that may not cross itself, or
+    None; guarded: from the beginning; scale_free: the scale of the targets follows the map."""
 
     faces: Elements
     assembly: Assembly
