@@ -110,7 +110,7 @@ def drag(task: Task, w: np.ndarray, pins: Pins) -> Steps[tuple[Task, np.ndarray]
         springs = Springs(pins, stiffness, extent)
         problem = Problem(task.faces, task.assembly, task.motion, DRAG_WEIGHT, (springs, guard))
         yield Progress("Pins", k / len(STIFFNESS))
-        w = (yield from minimise_energy(problem, w, np.inf, 40, (k, len(STIFFNESS)))).w
+        w = (yield from minimise_energy(problem, w, np.inf, 40, k)).w
     far = pins.vertices[np.abs(w[pins.vertices] - pins.places) > NEAR * extent]
     raise PinError("Pins cannot reach their places without a fold", kind="vertex", elements=far)
 

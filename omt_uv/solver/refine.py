@@ -104,6 +104,7 @@ def refine(
         held = check_pins(place[np.asarray(pins[0])], np.asarray(pins[1], float).reshape(-1, 2) * mirror, len(order))
     renumbered = vertices[order], place[triangles], uv[order] * mirror
     found, start, area_left = yield from _refined(*renumbered, boundary, target, balance, QUALITIES[quality], held)
+    yield Progress("Refinement", 1.0)
     refined = np.column_stack([found.w.real, found.w.imag])[place] * mirror
     if held is not None:
         refined[pins[0]] = pins[1]

@@ -25,11 +25,11 @@ class Quality:
 
 QUALITIES = {
     "draft": Quality(0.05, (10.0, 100.0), 1e3, 40),
-    "standard": Quality(0.005, (10.0, 100.0, 500.0), 1e6, 150),
+    "standard": Quality(0.008, (30.0, 500.0), 1e6, 150),
     "exact": Quality(0.0005, (10.0, 100.0, 1000.0, 1e4), 1e8, 300),
 }
 # A stage ends when Newton promises less than this share of the energy.
-LOOSE, TIGHT = 1e-2, 1e-3
+LOOSE, TIGHT = 3e-2, 1e-3
 # A stage that takes longer gives way to the next, which may find a way around.
 STAGE_STEPS = 40
 # Share of the area term's indefinite Hessian kept: at the start of a stage, and the least before it is dropped.
@@ -95,7 +95,7 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Step
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
         allowed = min(settings.max_steps - steps, STAGE_STEPS)
         watch = None if guarded or overlap else task.crosses
-        stage = yield from minimise(problem, w, goal, allowed, (k, len(weights)), watch)
+        stage = yield from minimise(problem, w, goal, allowed, k, watch)
         w, steps = stage.w, steps + stage.steps
         if stage.status == "crossed":
             guarded = True
@@ -124,12 +124,12 @@ def minimise(
     w: np.ndarray,
     goal: float,
     allowed: int,
-    place: tuple[int, int],
+    place: int,
     watch: Callable[[np.ndarray], bool] | None = None,
 ) -> Steps[Stage]:
     """Newton until it promises little, at least LOOSE; where that leaves the area error above the goal, TIGHT.
 
-    place: the number of this stage, and how many there are; watch: a step to where this is true is not taken, and the
+    place: the number of this stage, for the progress; watch: a step to where this is true is not taken, and the
     stage ends "crossed".
     """
     value = problem.energy(w)
@@ -141,7 +141,8 @@ def minimise(
             return Stage(w, steps + 1, residual, value, "crossed")
         w, value, steps = step.w, step.energy, steps + 1
         residual = step.decrement / max(value, NO_ENERGY)
-        yield Progress("Refinement", min(1.0, (place[0] + 1 - 0.5**steps) / place[1]))
+        # How many stages and steps there will be is not known: every stage covers half of what is left.
+        yield Progress("Refinement", 1 - 0.5 ** (place + 1 - 0.5**steps))
         if step.share == 0 and used == 1.0:
             status = "stalled"
             break
