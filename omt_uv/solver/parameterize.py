@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .chart_pins import ChartPins, CornerPins, anchored, chart_pins, facing, refuse_outline
 from .charts import Chart, Surface, split
 from .conformal import conformal_disk, conformal_rectangle, sharpest_corners
 from .distortion import measure
@@ -33,7 +34,8 @@ SITE_RESOLUTION = 1e-7
 class ChartMap:
     """Texture coordinates of one chart.
 
-    uv (n,2) in the units of the surface: the UV area is the area of the chart, its centroid is 0.
+    uv (n,2) in the units of the surface: the UV area is the area of the chart, its centroid is 0. A chart with pins
+    (pinned) is where its pins are instead, at a scale that follows from them.
     newton_conformal, newton_transport : Newton steps; None where a stage was replaced
     residual_conformal : largest error of an angle sum, radians; residual_transport : |cell area - mass| / mass
     newton_refinement, residual_refinement, status : see `refine.Refinement`
@@ -54,6 +56,7 @@ class ChartMap:
     folds: int
     warnings: tuple[str, ...]
     seconds: dict[str, float]
+    pinned: bool = False
 
     def report(self, chart: Chart) -> dict:
         """Everything but the coordinates, for a JSON file."""
@@ -88,6 +91,7 @@ def unwrap(
     boundary: str = "free",
     quality: str = "standard",
     balance: float = 0.0,
+    pins: CornerPins | None = None,
 ) -> Steps[SurfaceMap]:
     """Area-preserving texture coordinates of the polygons `faces` (f,) bool, all by default.
 
@@ -96,6 +100,7 @@ def unwrap(
     boundary : "free" for the least shear; "disk" or "square", which every chart then fills
     quality : "draft", "standard" or "exact", how small the area error of single faces becomes
     balance : from 0, exact areas, to 1, least shear
+    pins : corners that keep their places, with a free boundary
 
     Raises
     ------
@@ -103,18 +108,26 @@ def unwrap(
     """
     yield Progress("Charts", 0.0)
     charts = split(surface, faces)
+    held = [_located_pins(pins, chart) for chart in charts]
     maps = []
     total = sum(len(c.triangles) for c in charts)
     done = 0.0
-    for chart in charts:
+    for chart, fixed in zip(charts, held, strict=True):
         share = len(chart.triangles) / total
-        steps = unwrap_chart(chart, boundary=boundary, quality=quality, balance=balance)
+        steps = unwrap_chart(chart, boundary=boundary, quality=quality, balance=balance, pins=fixed)
         try:
             maps.append((yield from _within(steps, done, share)))
         except MeshError as error:
             raise located(error, chart) from error
         done += share
     return SurfaceMap(charts, maps)
+
+
+def _located_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
+    try:
+        return chart_pins(pins, chart)
+    except MeshError as error:
+        raise located(error, chart) from error
 
 
 def located(error: MeshError, chart: Chart) -> MeshError:
@@ -146,6 +159,7 @@ def unwrap_chart(
     quality: str = "standard",
     balance: float = 0.0,
     density: np.ndarray | None = None,
+    pins: ChartPins | None = None,
 ) -> Steps[ChartMap]:
     """Area-preserving map of one chart: conformal map, transport, authalic refinement.
 
@@ -153,14 +167,18 @@ def unwrap_chart(
     ----------
     boundary, quality, balance : see `unwrap`
     density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default
+    pins : two or more fix place, direction and scale; one fixes the place, and the chart keeps the direction and the
+        size it has now
 
     Raises
     ------
+    PinError : pins that force a fold, or that a disk or a square cannot keep
     PrecisionError, TransportError, FoldedUVError : where even the fallbacks fail
     DensityError : a density that is not positive and finite
     """
     if boundary not in BOUNDARIES:
         raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
+    refuse_outline(pins, boundary)
     log = _Log()
     vertices, unit = _in_unit_box(chart.vertices)
     normalized = Chart(vertices, chart.triangles, chart.corners, chart.faces, chart.vertex_ids)
@@ -181,16 +199,14 @@ def unwrap_chart(
             log.warnings.append(f"{error.cause}; refined the embedding without transport")
     target = None if density is None else face_areas(vertices, chart.triangles) * density
     with log.timed("refinement"):
+        uv, held = facing(uv, pins)
         refined = yield from refine(
-            vertices, chart.triangles, uv, boundary=boundary, target=target, balance=balance, quality=quality
+            vertices, chart.triangles, uv, boundary=boundary, target=target, balance=balance, quality=quality, pins=held
         )
     with log.timed("measure"):
-        # A polygon inscribed in the disk is smaller than the disk: one texel density needs its own area.
-        covered = signed_areas(refined.uv, chart.triangles).sum()
-        uv = refined.uv * np.sqrt(face_areas(vertices, chart.triangles).sum() / covered)
-        figures = measure(vertices, chart.triangles, uv[chart.triangles], overlap=False)
+        figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False)
     return ChartMap(
-        uv * unit,
+        refined.uv if held else _in_place(refined.uv, normalized, unit, pins),
         conformal.iterations if conformal else None,
         conformal.residual if conformal else None,
         cells.iterations if cells else None,
@@ -204,6 +220,7 @@ def unwrap_chart(
         figures.folds,
         tuple(log.warnings) + refined.warnings,
         log.seconds,
+        pins is not None,
     )
 
 
@@ -275,6 +292,14 @@ def _into_corners(domain: Domain, loop, along, corners) -> tuple[np.ndarray, np.
     place = np.flatnonzero(np.isin(loop, corners))
     ends = np.append(along[place], along[0] + domain.period)
     return loop, np.interp(along, ends, domain.period * np.arange(5) / 4)
+
+
+def _in_place(uv: np.ndarray, chart: Chart, unit: float, pins: ChartPins | None) -> np.ndarray:
+    """A map uv (n,2) of a chart in a unit box, as large as the chart really is, or where its only pin is."""
+    # A polygon inscribed in the disk is smaller than the disk: one texel density needs its own area.
+    covered = signed_areas(uv, chart.triangles).sum()
+    uv = uv * np.sqrt(face_areas(chart.vertices, chart.triangles).sum() / covered)
+    return uv * unit if pins is None else anchored(uv, chart.triangles, pins)
 
 
 def _in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:
