@@ -243,10 +243,18 @@ def check_disk(chart: Chart) -> None:
         rest = np.concatenate([np.stack([x, np.roll(x, -1)], axis=1) for x in loops[1:]])
         raise NotADiskError(
             f"A chart has {len(loops)} boundaries instead of one",
-            remedy="Mark seams that join the boundaries, or fill the holes",
+            remedy=_boundary_remedy(chart, np.concatenate(loops)),
             kind="edge",
             elements=chart.vertex_ids[rest],
         )
     if handles:
         plural = "a handle" if handles == 1 else f"{handles} handles"
         raise NotADiskError(f"A chart has {plural}", kind="face", elements=faces)
+
+
+def _boundary_remedy(chart: Chart, rim: np.ndarray) -> str:
+    remedy = "Mark seams that join the boundaries, or fill the holes"
+    # Adding zero makes -0.0 and 0.0 the same.
+    if len(np.unique(chart.vertices[rim] + 0.0, axis=0)) < len(np.unique(chart.vertex_ids[rim])):
+        return f"Use Merge by Distance where they touch. {remedy}"
+    return remedy

@@ -16,9 +16,10 @@ from .cut_graph import greedy_arcs, path_to, shorten
 from .extremities import log_scale, spread
 from .geometry import face_areas
 from .holes import fill_holes
-from .piece import NOISE, Kind, Piece, classify, edge_graph, make_piece
-from .repair import Repaired, join
+from .piece import NOISE, Kind, Piece, classify, edge_graph, make_piece, rim_loops
+from .repair import Repaired, join, weldable
 from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
+from .steiner import meeting_points
 from .topology import pair_keys
 
 MOST_EXTREMITIES = 8
@@ -113,18 +114,24 @@ def open_sheets(
     weight = np.zeros(len(positions))
     if avoid is not None:
         weight[:vertex_count] = np.clip(np.asarray(avoid, float), 0, 1)
-    gone, report = _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities)
+    gone, report, touching = _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities)
     edges = np.stack(sheets.ends(sheets.first[gone]), axis=1)
     edges = edges[(edges < vertex_count).all(axis=1)]
     # Parts that could not be oriented can be, now that they are open.
     sheets, _ = _looking_out(sheets.without(gone), positions)
     length = sum(p.length for p in report)
     edges = np.concatenate([edges, repaired.torn]).astype(np.int64)
-    return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, repaired.warnings), unit)
+    warnings = list(repaired.warnings)
+    if touching:
+        warnings.append(f"{touching} boundary vertices lie on one another; Merge by Distance joins the parts there")
+    return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, tuple(warnings)), unit)
 
 
-def _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities) -> tuple[np.ndarray, list[PieceCut]]:
-    """Pairs (p,) bool to cut so that every part is a disk, and what was done to those that were none."""
+def _cut_parts(
+    surface, sheets, one_sided, positions, unit, weight, extremities
+) -> tuple[np.ndarray, list[PieceCut], int]:
+    """Pairs (p,) bool to cut so that every part is a disk, what was done to those that were none, and how many
+    vertices a weld would join."""
     part, corner_class = components(sheets), corner_classes(sheets)
     kind = classify(sheets, corner_class, part, one_sided)
     seam = is_seam(surface, pair_keys(*sheets.ends(sheets.first)))
@@ -138,7 +145,7 @@ def _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities)
         length = float(piece.length[chosen].sum()) * unit
         figures = int(kind.boundaries[k]), int(kind.handles[k]), bool(kind.one_sided[k])
         report.append(PieceCut(len(piece.triangles), *figures, length, piece.vertex_ids[tips]))
-    return gone, report
+    return gone, report, weldable(surface, sheets, part, kind.is_disk)
 
 
 def _looking_out(sheets: Sheets, positions: np.ndarray) -> tuple[Sheets, np.ndarray]:
@@ -181,7 +188,10 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
         tips = np.append(tips, _peak(scale * _distance(piece, _cut_vertices(piece, chosen))))
         path = path_to(piece, _cut_vertices(piece, chosen), tips[-1])
         chosen = shorten(piece, chosen | path, tips, around=path)
-    return shorten(piece, chosen, tips), tips
+    chosen = shorten(piece, chosen, tips)
+    if kind.handles[k] == 0 and len(tips) + kind.boundaries[k] > 2:
+        chosen = min(chosen, _branching_tree(piece, tips), key=lambda edges: piece.cost[edges].sum())
+    return chosen, tips
 
 
 def _first_tips(piece: Piece) -> np.ndarray:
@@ -217,6 +227,15 @@ def _cut_vertices(piece: Piece, chosen: np.ndarray) -> np.ndarray:
     start = piece.on_rim()
     start[piece.ends[chosen].ravel()] = True
     return np.flatnonzero(start)
+
+
+def _branching_tree(piece: Piece, tips: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool of a short tree that joins the tips (k,) and all boundaries of a piece without handles."""
+    ends = [np.array([tip]) for tip in tips] + rim_loops(piece)
+    distance = np.array([_distance(piece, end) for end in ends])
+    between = np.array([distance[:, end].min(axis=1) for end in ends])
+    points = meeting_points(distance, between)
+    return shorten(piece, greedy_arcs(piece, np.union1d(tips, points)), tips)
 
 
 def _best_root(piece: Piece) -> np.ndarray:

@@ -8,12 +8,14 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .sheets import Sheets
+from .sheets import Sheets, groups
 from .topology import halfedges
 
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
 # angle counts as this share of its length. Shares near 1 keep cuts short: their length is bounded by them.
-CREASE, HOLLOW, SEAM = 0.75, 0.6, 0.3
+CREASE, HOLLOW, SEAM = 0.85, 0.75, 0.3
+# Angles up to this one occur within a smooth surface and hide nothing.
+SMOOTH = np.pi / 6
 # Edges between vertices that are to be kept free of seams count as so many times their length.
 AVOIDED = 10.0
 # Neither cut the triangles that fill a hole, nor along its edge, if there is another way.
@@ -147,8 +149,7 @@ def _hiding(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> n
     far = positions[triangles[s, (pair[:, 1] + 2) % 3]] - positions[triangles[t, pair[:, 0] % 3]]
     rise = (normal[t] * far).sum(axis=1)
     depth = np.where((size[t] > 0) & (size[s] > 0), np.arccos(cosine), 0.0)
-    # Angles as they occur within a smooth surface hide nothing.
-    share = np.clip((depth - np.pi / 12) / (np.pi / 2 - np.pi / 12), 0, 1)
+    share = np.clip((depth - SMOOTH) / (np.pi / 2 - SMOOTH), 0, 1)
     return 1 - share * np.where(rise > 0, 1 - HOLLOW, 1 - CREASE)
 
 
@@ -160,3 +161,13 @@ def edge_graph(piece: Piece, edges: np.ndarray, ends: np.ndarray, n: int) -> csr
     keep = np.isfinite(piece.cost[edges])
     (a, b), cost = ends[keep].T, piece.cost[edges[keep]]
     return csr_matrix((np.concatenate([cost, cost]), (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(n, n))
+
+
+def rim_loops(piece: Piece) -> list[np.ndarray]:
+    """Vertices of every boundary, in no order."""
+    tail, head = halfedges(piece.triangles)
+    a, b = tail[piece.rim], head[piece.rim]
+    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(piece.count, piece.count))
+    rim = np.unique(a)
+    label = connected_components(graph, directed=False)[1][rim]
+    return [rim[group] for group in groups(label)] if len(rim) else []

@@ -46,7 +46,7 @@ def join(surface: Surface, faces: np.ndarray, triangles: np.ndarray, owner: np.n
         layer[folded] = -1
         joined, torn = _pair_sides(surface, sheets, layer)
         warnings.append(
-            f"{_count(len(folded), 'face')} shared several edges in a row with another and became an island; "
+            f"{_count(len(folded), 'face')} sharing several edges in a row with another, mapped apart; "
             "dissolve the vertex that only the two share"
         )
     if len(torn):
@@ -69,8 +69,8 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
     copies = int((rows[:, 1] > 0).sum())
     if copies:
         warnings.append(
-            f"{_count(copies, 'face')} lie on others with the same vertices and were mapped apart from them; "
-            "delete them, or use Merge by Distance"
+            f"{_count(copies, 'face')} with the same vertices as another, mapped apart; "
+            "delete what is double, or use Merge by Distance"
         )
     polygon = np.repeat(np.arange(f), np.diff(surface.face_start))
     key = np.sort((polygon << 32) | surface.corner_vertex)
@@ -79,7 +79,7 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
     repeating = repeating[faces[repeating]]
     if len(repeating):
         warnings.append(
-            f"{_count(len(repeating), 'face')} use a vertex twice and became islands; "
+            f"{_count(len(repeating), 'face')} with a vertex used twice, mapped apart; "
             "use Mesh > Clean Up > Degenerate Dissolve"
         )
     return layer, warnings
@@ -178,10 +178,26 @@ def _least_height(vertices: np.ndarray, triangles: np.ndarray, bad: np.ndarray) 
     return np.where(np.isfinite(reach), reach, usual)
 
 
-def duplicate_rim_vertices(surface: Surface, vertices: np.ndarray) -> int:
-    """How many of the surface's `vertices` (k,) lie exactly on another of them."""
-    points = surface.positions[np.unique(vertices)]
-    return len(points) - len(np.unique(points + 0.0, axis=0))
+def weldable(surface: Surface, sheets: Sheets, part: np.ndarray, is_disk: np.ndarray) -> int:
+    """Boundary vertices that lie exactly on one of another part, or of the same part (m,) where it is no disk (k,).
+
+    A disk that touches itself was meant to be open there.
+    """
+    open_ = np.ones(3 * len(sheets.triangles), dtype=bool)
+    open_[sheets.first] = open_[sheets.second] = False
+    rim = np.flatnonzero(open_)
+    rows = np.unique(np.stack([sheets.ends(rim)[0], part[rim // 3]], axis=1), axis=0)
+    vertex, piece = rows.T
+    # Adding zero makes -0.0 and 0.0 the same.
+    place = np.unique(surface.positions[vertex] + 0.0, axis=0, return_inverse=True)[1].ravel()
+    apart = _more_than_one(place, vertex)
+    return len(np.unique(vertex[apart & (_more_than_one(place, piece) | ~is_disk[piece])]))
+
+
+def _more_than_one(group: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Whether the group (k,) of each item has items of different values (k,), per item."""
+    pairs = np.unique(np.stack([group, value], axis=1), axis=0)
+    return np.bincount(pairs[:, 0], minlength=int(group.max(initial=0)) + 1)[group] > 1
 
 
 def _count(number: int, what: str) -> str:

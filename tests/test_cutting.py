@@ -1,0 +1,280 @@
+"""Cuts: every surface becomes a disk, along short paths, where the artist wants them, whatever the units."""
+
+import sys
+
+import meshes
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from omt_uv.solver.charts import split, triangle_surface
+from omt_uv.solver.cutting import cut
+from omt_uv.solver.preparation import prepare
+
+sys.path.insert(0, str(meshes.ROOT / "benchmarks"))
+
+from cuts import cotree_length, shortest_tree
+
+
+def holed_sphere(holes=3, subdivisions=3):
+    V, F = meshes.icosphere(subdivisions)
+    gone = [int(np.argmax(V @ d)) for d in np.concatenate([np.eye(3), -np.eye(3)])[:holes]]
+    return V, F[~np.isin(F, gone).any(1)]
+
+
+def holed_torus():
+    V, F = meshes.torus()
+    return V, F[~np.isin(F, [5, 160]).any(1)]
+
+
+def double_torus():
+    """Two tori with a missing face each, glued along it."""
+    V, F = meshes.torus()
+    a, b, c = F[0]
+    G = F[1:] + len(V)
+    # The second torus is a mirror image, so that its missing face fits the first one's.
+    mirrored = G[:, [0, 2, 1]]
+    name = np.arange(2 * len(V))
+    name[len(V) + F[0]] = (a, b, c)
+    return np.concatenate([V, V * [1, 1, -1] + [0, 0, 3]]), np.concatenate([F[1:], name[mirrored]])
+
+
+def moebius(segments=24, rows=2):
+    """A band with half a twist: it has one side and one boundary."""
+    s, r = np.meshgrid(np.arange(segments), np.arange(rows + 1), indexing="ij")
+    angle, w = 2 * np.pi * s / segments, (r / rows - 0.5) * 0.6
+    x = (1 + w * np.cos(angle / 2)) * np.cos(angle), (1 + w * np.cos(angle / 2)) * np.sin(angle), w * np.sin(angle / 2)
+
+    def name(i, j):
+        return np.where(i < segments, i * (rows + 1) + j, rows - j)
+
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(segments), np.arange(rows), indexing="ij"))
+    a, b, c, d = name(i, j), name(i + 1, j), name(i + 1, j + 1), name(i, j + 1)
+    quads = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    return np.stack(x, axis=2).reshape(-1, 3), quads
+
+
+def projective_plane():
+    """The six vertices of half an icosahedron, every two of them joined; it fits in no space without crossing."""
+    F = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5], [0, 5, 1],
+                  [1, 2, 4], [2, 3, 5], [3, 4, 1], [4, 5, 2], [5, 1, 3]])  # fmt: skip
+    return np.random.default_rng(0).normal(size=(6, 3)), F
+
+
+def tetrahedron():
+    V = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    return V, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+
+
+SURFACES = {
+    "tetrahedron": tetrahedron, "cube": meshes.cube, "sphere": meshes.icosphere, "annulus": meshes.annulus,
+    "holed sphere": holed_sphere, "torus": meshes.torus, "holed torus": holed_torus, "double torus": double_torus,
+    "moebius": moebius, "projective plane": projective_plane,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_every_surface_becomes_one_disk(name):
+    V, F = SURFACES[name]()
+    before = V.copy(), F.copy()
+    prepared = prepare(triangle_surface(V, F))  # refuses anything that is no disk
+    (chart,) = prepared.charts
+    assert len(chart.triangles) == len(F) and not prepared.warnings
+    np.testing.assert_array_equal(V, before[0])
+    np.testing.assert_array_equal(F, before[1])
+
+
+@pytest.mark.parametrize("name", ["sphere", "annulus", "holed torus", "double torus"])
+def test_cuts_are_seams_that_split_accepts(name):
+    V, F = SURFACES[name]()
+    cuts = cut(triangle_surface(V, F))
+    (chart,) = split(triangle_surface(V, F, cuts.edges))
+    assert len(chart.triangles) == len(F)
+    length = np.linalg.norm(V[cuts.edges[:, 0]] - V[cuts.edges[:, 1]], axis=1).sum()
+    assert np.isclose(cuts.length, length, rtol=1e-12)
+    # Cut again, there is nothing left to do.
+    assert len(cut(triangle_surface(V, F, cuts.edges)).edges) == 0
+
+
+def test_topology_is_told():
+    kinds = {name: cut(triangle_surface(*SURFACES[name]())).pieces[0] for name in SURFACES}
+    figures = {name: (p.boundaries, p.handles, p.one_sided) for name, p in kinds.items()}
+    assert figures == {
+        "tetrahedron": (0, 0, False), "cube": (0, 0, False), "sphere": (0, 0, False), "annulus": (2, 0, False),
+        "holed sphere": (3, 0, False), "torus": (0, 1, False), "holed torus": (2, 1, False),
+        "double torus": (0, 2, False), "moebius": (1, 1, True), "projective plane": (0, 1, True),
+    }  # fmt: skip
+
+
+def test_disks_are_left_alone():
+    for mesh in (meshes.bumpy(), meshes.hemisphere(), meshes.head(12)):
+        cuts = cut(triangle_surface(*mesh))
+        assert len(cuts.edges) == 0 and not cuts.pieces
+
+
+def test_an_annulus_is_cut_along_a_shortest_path():
+    V, F = meshes.annulus(sectors=24, rings=3)
+    cuts = cut(triangle_surface(V, F), extremities=0)
+    assert np.isclose(cuts.length, 1.0 - 1 / 4) or len(cuts.edges) == 3
+
+
+def test_a_moebius_strip_is_cut_across():
+    cuts = cut(triangle_surface(*moebius()), extremities=0)
+    assert len(cuts.edges) == 2
+
+
+def test_spheres_are_opened_along_short_trees():
+    sphere, F = meshes.icosphere(3)
+    for stretch in ([1.0, 1.0, 1.0], [1.0, 1.0, 4.0], [1.0, 3.0, 3.0], [1.0, 2.0, 3.0]):
+        V = sphere * stretch
+        cuts = cut(triangle_surface(V, F))
+        assert cuts.length <= 1.3 * shortest_tree(V, F, cuts.pieces[0].extremities)
+
+
+@pytest.mark.parametrize("name", ["torus", "holed torus", "double torus"])
+def test_handles_are_opened_along_short_loops(name):
+    V, F = SURFACES[name]()
+    # Two loops around a torus of radii 1 and 0.4, the inner one of them along the hole.
+    assert cut(triangle_surface(V, F), extremities=0).length <= 1.01 * cotree_length(V, F)
+
+
+def test_the_cut_of_a_long_body_ends_at_its_tips():
+    V, F = meshes.icosphere(3)
+    (piece,) = cut(triangle_surface(V * [1.0, 1.0, 4.0], F), extremities=2).pieces
+    heights = np.sort(V[piece.extremities, 2])
+    assert heights[0] < -0.95 and heights[-1] > 0.95
+
+
+def test_seams_of_the_artist_are_kept_and_used():
+    V, F = meshes.torus()
+    around = np.arange(12)
+    seam = np.column_stack([around, np.roll(around, -1)])
+    cuts = cut(triangle_surface(V, F, seam), extremities=0)
+    # The seam leaves a tube, which one path along it opens.
+    assert cuts.pieces[0].boundaries == 2 and cuts.pieces[0].handles == 0
+    (chart,) = split(triangle_surface(V, F, np.concatenate([seam, cuts.edges])))
+    assert len(chart.triangles) == len(F)
+
+
+def test_painted_vertices_are_kept_free():
+    V, F = meshes.annulus(sectors=24, rings=3)
+    free = cut(triangle_surface(V, F), extremities=0)
+    avoid = np.zeros(len(V))
+    side = V[free.edges.ravel()].mean(axis=0)
+    avoid[V @ side > 0] = 1
+    other = cut(triangle_surface(V, F), extremities=0, avoid=avoid)
+    assert avoid[free.edges].all() and not avoid[other.edges].any()
+
+
+def test_cuts_hide_in_creases():
+    """Of the two ways around a box the sharp edge wins over the middle of a side."""
+    V, F = meshes.grid(12, 8)
+    V[:, 2] = 1.0 * np.minimum(np.abs(V[:, 0] - 0.5), 0.25)
+    hole = np.isin(F, np.flatnonzero(np.linalg.norm(V[:, :2] - [0.5, 0.5], axis=1) < 0.1)).any(1)
+    cuts = cut(triangle_surface(V, F[~hole]), extremities=0)
+    assert np.allclose(V[cuts.edges][:, :, 0], 0.5)
+
+
+def test_polygons_are_cut_along_their_sides():
+    side = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    V, _ = meshes.cube()
+    mesh = meshes.polygon_surface(V, side.tolist())
+    cuts = cut(mesh)
+    assert np.allclose(np.linalg.norm(V[cuts.edges[:, 0]] - V[cuts.edges[:, 1]], axis=1), 1)
+    (chart,) = prepare(mesh).charts
+    assert len(np.unique(chart.faces)) == 6
+
+
+@pytest.mark.parametrize("scale, shift", [(1e-6, 0), (1e6, 0), (1, 1e5)])
+@pytest.mark.parametrize("name", ["sphere", "cube", "double torus", "holed sphere"])
+def test_units_do_not_matter(name, scale, shift):
+    V, F = SURFACES[name]()
+    np.testing.assert_array_equal(
+        cut(triangle_surface(V, F)).edges, cut(triangle_surface(V * scale + shift, F)).edges
+    )
+
+
+def test_names_of_vertices_hardly_matter():
+    V, F = meshes.head(20)
+    closed = np.concatenate([F, _fan(F)])
+    rng = np.random.default_rng(1)
+    name = rng.permutation(len(V))
+    shuffled = cut(triangle_surface(V[np.argsort(name)], name[closed]))
+    assert np.isclose(shuffled.length, cut(triangle_surface(V, closed)).length, rtol=0.05)
+
+
+def _fan(F):
+    from omt_uv.solver.topology import boundary_loops
+
+    loop = boundary_loops(F)[0][::-1]
+    return np.array([[loop[0], loop[k], loop[k + 1]] for k in range(1, len(loop) - 1)])
+
+
+def test_holes_are_filled_and_the_longest_boundary_stays():
+    V, F = meshes.annulus()
+    (chart,) = prepare(triangle_surface(V, F), fill_holes=True).charts
+    assert len(chart.patches) == 24 and len(chart.triangles) == len(F)
+    assert (chart.vertex_ids == -1).sum() == 1 and np.allclose(chart.vertices[chart.vertex_ids == -1], 0)
+    rim = np.linalg.norm(chart.vertices[_loop(chart.disk)], axis=1)
+    assert np.allclose(rim, rim.max())
+    (strict,) = prepare(triangle_surface(V, F), seams="existing", fill_holes=True).charts
+    np.testing.assert_array_equal(strict.disk, chart.disk)
+
+
+def _loop(triangles):
+    from omt_uv.solver.topology import boundary_loops
+
+    return boundary_loops(triangles)[0]
+
+
+def test_handles_are_cut_around_filled_holes():
+    V, F = holed_torus()
+    prepared = prepare(triangle_surface(V, F), fill_holes=True)
+    (chart,) = prepared.charts
+    assert len(chart.patches) > 0 and len(chart.triangles) == len(F)
+    assert prepared.cuts.pieces[0].boundaries == 1
+
+
+def test_a_path_is_really_shortest():
+    """The cut between two holes of a sphere is as long as Dijkstra says."""
+    V, F = holed_sphere(holes=2)
+    cuts = cut(triangle_surface(V, F), extremities=0)
+    sides = np.unique(np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1), axis=0)
+    length = np.linalg.norm(V[sides[:, 0]] - V[sides[:, 1]], axis=1)
+    graph = csr_matrix((length, sides.T), shape=(len(V), len(V)))
+    first, second = boundary(F)
+    distance = dijkstra(graph, directed=False, indices=first, min_only=True)[second].min()
+    assert np.isclose(cuts.length, distance, rtol=1e-6)
+
+
+def boundary(F):
+    from omt_uv.solver.topology import boundary_loops
+
+    return boundary_loops(F)
+
+
+@meshes.models_missing
+@pytest.mark.parametrize("name", ["spot", "bunny_small", "max_planck", "cow"])
+def test_models_are_cut_along_short_trees(name):
+    V, F = meshes.load_model(name)
+    cuts = cut(triangle_surface(V, F), extremities=5)
+    assert cuts.length <= 1.3 * shortest_tree(V, F, cuts.pieces[0].extremities)
+
+
+@meshes.models_missing
+@pytest.mark.parametrize("name, handles", [("three_holes", 3), ("fertility", 4)])
+def test_models_with_handles(name, handles):
+    V, F = meshes.load_model(name)
+    cuts = cut(triangle_surface(V, F), extremities=0)
+    assert cuts.pieces[0].handles == handles
+    assert cuts.length <= cotree_length(V, F)
+
+
+@meshes.models_missing
+@pytest.mark.parametrize("name, parts", [("suzanne", 5), ("teapot", 19), ("beetle", 1)])
+def test_models_of_many_parts(name, parts):
+    V, F = meshes.load_model(name)
+    prepared = prepare(triangle_surface(V, F))
+    assert len(prepared.charts) == parts
+    assert sum(len(c.triangles) for c in prepared.charts) == len(F)

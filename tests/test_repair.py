@@ -1,0 +1,228 @@
+"""Broken meshes: each fault is repaired for the map alone, and said; what cannot be repaired has a name."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver import errors, repair
+from omt_uv.solver.charts import degenerate_triangles, triangle_surface
+from omt_uv.solver.cutting import cut
+from omt_uv.solver.geometry import face_areas, signed_areas
+from omt_uv.solver.parameterize import unwrap_chart
+from omt_uv.solver.preparation import prepare
+from omt_uv.solver.progress import drain
+from omt_uv.solver.sheets import corner_classes
+
+
+def prepared(V, F, seams=(), **options):
+    """The preparation of a surface; the input must stay as it was."""
+    V, F = np.array(V, dtype=float), np.array(F)
+    before = V.copy(), F.copy()
+    result = prepare(triangle_surface(V, F, seams), **options)
+    np.testing.assert_array_equal(V, before[0])
+    np.testing.assert_array_equal(F, before[1])
+    corners = np.sort(np.concatenate([c.corners.ravel() for c in result.charts]))
+    np.testing.assert_array_equal(corners, np.arange(3 * len(F)))
+    return result
+
+
+def mapped(chart):
+    """The map of a chart, which must not fold."""
+    chart_map = drain(unwrap_chart(chart, quality="draft"))
+    assert np.isfinite(chart_map.uv).all()
+    uv = chart_map.uv / np.ptp(chart_map.uv, axis=0).max()
+    assert (signed_areas(uv, chart.triangles) > 0).all()
+    return chart_map
+
+
+def fin():
+    """Three faces at one edge."""
+    return np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -1, 0], [0.5, 0, 1.0]]), [[0, 1, 2], [1, 0, 3], [0, 1, 4]]
+
+
+def test_three_sheets_become_three_charts():
+    result = prepared(*fin())
+    assert [len(c.triangles) for c in result.charts] == [1, 1, 1]
+    assert result.cuts.edges.tolist() == [[0, 1]] and result.cuts.torn.tolist() == [[0, 1]]
+    assert any("More than two faces" in w for w in result.warnings)
+
+
+def test_a_fin_on_a_patch_leaves_the_patch_whole():
+    V, F = meshes.grid(6, 6)
+    inner = F[np.argmin(np.abs(V[F].mean(1)[:, :2] - 0.5).sum(1))]
+    V = np.vstack([V, V[inner].mean(0) + [0, 0, 1]])
+    result = prepared(V, np.vstack([F, [inner[0], inner[1], len(V) - 1]]))
+    # A slit of one edge has no inside: the patch stays a disk as it was.
+    assert sorted(len(c.triangles) for c in result.charts) == [1, len(F)]
+    assert len(max(result.charts, key=lambda c: len(c.triangles)).vertices) == len(V) - 1
+
+
+def test_two_spheres_that_share_a_face_come_apart():
+    V, F = meshes.icosphere(1)
+    mirror = V @ np.diag([1.0, 1, -1])
+    low = V[:, 2].min()
+    both = np.concatenate([V, mirror + [0, 0, 2 * low]])
+    G = F[:, [0, 2, 1]] + len(V)
+    name = np.arange(len(both))
+    shared = np.flatnonzero(np.isclose(V[:, 2], low))
+    name[len(V) + shared] = shared
+    result = prepared(both, np.concatenate([F, name[G]]))
+    assert len(result.charts) >= 2
+    for chart in result.charts:
+        mapped(chart)
+
+
+def test_faces_that_look_the_wrong_way_are_turned_for_the_map():
+    V, F = meshes.bumpy(6, 6)
+    turned = F.copy()
+    turned[[3, 17, 40]] = turned[[3, 17, 40]][:, ::-1]
+    (chart,) = prepared(V, turned).charts
+    (sound,) = prepared(V, F).charts
+    assert len(chart.triangles) == len(F)
+    # Every corner of the turned mesh belongs to the vertex it belongs to in the sound one.
+    np.testing.assert_allclose(mapped(chart).area_l1, mapped(sound).area_l1, rtol=0.1)
+    np.testing.assert_array_equal(turned.ravel()[chart.corners], chart.vertex_ids[chart.triangles])
+
+
+def test_the_winding_of_most_of_the_surface_is_kept():
+    V, F = meshes.bumpy(6, 6)
+    (chart,) = prepared(V, F[:, ::-1]).charts
+    np.testing.assert_array_equal(chart.vertex_ids[chart.triangles], F[:, ::-1][chart.corners[:, 0] // 3])
+
+
+def test_half_turned_sphere_is_cut_as_the_sound_one():
+    V, F = meshes.icosphere(2)
+    turned = F.copy()
+    turned[: len(F) // 3] = turned[: len(F) // 3, ::-1]
+    ours, sound = prepared(V, turned), prepared(V, F)
+    assert len(ours.charts) == 1
+    assert np.isclose(ours.cuts.length, sound.cuts.length, rtol=0.1)
+
+
+def test_coincident_faces_become_a_layer_of_their_own():
+    V, F = meshes.bumpy(4, 4)
+    result = prepared(V, np.concatenate([F, F[:, ::-1]]))
+    assert [len(c.triangles) for c in result.charts] == [len(F), len(F)]
+    assert any("Merge by Distance" in w for w in result.warnings)
+    single = prepared(V, np.vstack([F, F[3, [1, 2, 0]]]))
+    assert [len(c.triangles) for c in single.charts] == [len(F), 1]
+
+
+def test_a_face_that_uses_a_vertex_twice_becomes_an_island():
+    V, F = meshes.bumpy(4, 4)
+    result = prepared(V, np.vstack([F, [F[0, 0], F[0, 1], F[0, 1]]]))
+    assert [len(c.triangles) for c in result.charts] == [len(F), 1]
+    for chart in result.charts:
+        mapped(chart)
+
+
+def test_polygons_that_share_two_edges_in_a_row_come_apart():
+    """Two quads around a vertex that only they use: their diagonals are one line in every plane map."""
+    V = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, -1, 0.0]])
+    mesh = meshes.polygon_surface(V, [[0, 1, 2, 3], [2, 1, 0, 4]])
+    result = prepare(mesh)
+    assert [len(c.triangles) for c in result.charts] == [2, 2]
+    assert any("several edges in a row" in w for w in result.warnings)
+
+
+def needle(V, F, at):
+    """Split the edge between faces `at` and its neighbour by a vertex on it that only one side knows."""
+    a, b, c = F[at]
+    middle = len(V)
+    V = np.vstack([V, V[[a, b]].mean(0)])
+    rest = np.delete(F, at, axis=0)
+    # The neighbour keeps the whole edge, and a face without area closes the gap.
+    return V, np.concatenate([rest, [[a, middle, c], [middle, b, c], [a, b, middle]]])
+
+
+def test_a_face_without_area_does_not_spoil_its_neighbours():
+    V, F = meshes.bumpy(8, 8)
+    W, G = needle(V, F, 40)
+    result = prepared(W, G)
+    (chart,) = result.charts
+    assert any("no area" in w for w in result.warnings)
+    assert not degenerate_triangles(chart.vertices, chart.triangles).any()
+    sound = face_areas(W, G[chart.corners[:, 0] // 3]) > 1e-12
+    kept = face_areas(chart.vertices, chart.triangles)[sound]
+    np.testing.assert_allclose(kept, face_areas(W, G[chart.corners[:, 0] // 3])[sound], rtol=1e-2)
+    assert mapped(chart).area_l1 < 0.05
+
+
+def test_collapsed_vertices_are_told_apart():
+    V, F = meshes.bumpy(8, 8)
+    V = V.copy()
+    star = np.unique(F[(F == 40).any(1)])
+    V[star] = V[40]
+    (chart,) = prepared(V, F).charts
+    mapped(chart)
+
+
+@pytest.mark.parametrize("shape", ["point", "line"])
+def test_a_part_without_any_area_becomes_a_speck(shape):
+    V, F = meshes.bumpy(4, 4)
+    speck = np.tile(V[:1], (25, 1)) + (np.linspace(0, 1, 25)[:, None] * [1.0, 0, 0] if shape == "line" else 0)
+    result = prepared(np.concatenate([V, speck]), np.concatenate([F, F + len(V)]))
+    assert len(result.charts) == 2
+    for chart in result.charts:
+        mapped(chart)
+
+
+def test_vertices_that_nothing_uses_do_not_matter():
+    V, F = meshes.bumpy(4, 4)
+    (chart,) = prepared(np.vstack([V, [[np.nan] * 3]]), F).charts
+    assert len(chart.vertices) == len(V)
+
+
+def test_what_no_repair_helps():
+    V, F = meshes.bumpy(4, 4)
+    with pytest.raises(errors.EmptyMeshError):
+        prepare(triangle_surface(V, F[:0]))
+    V[7] = np.nan
+    with pytest.raises(errors.NonFiniteError) as caught:
+        prepare(triangle_surface(V, F))
+    assert caught.value.elements.tolist() == [7]
+
+
+@pytest.mark.parametrize("mesh", [fin, meshes.icosphere, meshes.annulus])
+def test_existing_seams_alone_refuse_what_they_did(mesh):
+    with pytest.raises(errors.MeshError):
+        prepare(triangle_surface(*mesh()), seams="existing")
+
+
+def test_touching_boundaries_are_offered_a_weld():
+    V, F = meshes.annulus()
+    loose = np.arange(6)  # faces whose vertices are their own
+    G = F.copy()
+    G[loose] = len(V) + np.unique(F[loose], return_inverse=True)[1].reshape(-1, 3)
+    W = np.concatenate([V, V[np.unique(F[loose])]])
+    assert any("Merge by Distance" in w for w in prepared(W, G).warnings)
+    # A disk that touches itself is open on purpose.
+    assert not prepared(*opened(V, F, cut(triangle_surface(V, F)).edges)).warnings
+
+
+def test_a_refused_chart_that_touches_itself_is_offered_a_weld():
+    V, F = meshes.torus()
+    around = np.arange(12)
+    W, G = opened(V, F, np.column_stack([around, np.roll(around, -1)]))
+    with pytest.raises(errors.NotADiskError, match="Merge by Distance"):
+        prepare(triangle_surface(W, G), seams="existing")
+
+
+def opened(V, F, seams):
+    """The mesh with its vertices doubled along the seams, as if it had been ripped there."""
+    sheets = repair.join(triangle_surface(V, F, seams), np.ones(len(F), bool), np.arange(F.size).reshape(-1, 3),
+                         np.arange(len(F))).sheets  # fmt: skip
+    _, first, G = np.unique(corner_classes(sheets), return_index=True, return_inverse=True)
+    return V[F.ravel()[first]], G.reshape(-1, 3)
+
+
+def test_only_the_chosen_faces_are_looked_at():
+    V, F = meshes.icosphere(1)
+    half = V[F].mean(1)[:, 2] > 0
+    result = prepare(triangle_surface(V, F), half)
+    assert sum(len(c.triangles) for c in result.charts) == half.sum()
+
+
+def test_seams_must_be_known():
+    with pytest.raises(ValueError, match="seams"):
+        prepare(triangle_surface(*meshes.cube()), seams="none")
