@@ -8,7 +8,6 @@ import numpy as np
 
 from .charts import Chart
 from .errors import PinError
-from .geometry import signed_areas
 from .pins import Pins, aligned, check_pins
 
 
@@ -56,36 +55,40 @@ def refuse_outline(pins: ChartPins | None, boundary: str) -> None:
 
 
 def facing(uv: np.ndarray, pins: ChartPins | None) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray] | None]:
-    """Start uv (n,2) and pins for `refine`, which takes two or more here; None for fewer.
+    """Start uv (n,2) and pins for `refine`, which takes three or more here; None for fewer, see `anchored`.
 
     The start is mirrored where that comes nearer to the pins once it is moved, turned and scaled.
     """
-    if pins is None or len(pins.vertices) < 2:
+    if pins is None or len(pins.vertices) < 3:
         return uv, None
     held = Pins(pins.vertices, pins.places @ [1, 1j])
     maps = uv @ [1, 1j], uv @ [1, -1j]
     miss, mirrored = (np.abs(aligned(w, held)[held.vertices] - held.places).sum() for w in maps)
-    # Two pins, or pins in a row, fit either way: then the map is not mirrored.
+    # Pins in a row fit either way: then the map is not mirrored.
     turn_over = miss - mirrored > 1e-4 * np.abs(held.places - held.places.mean()).sum()
     return uv * [1, -1 if turn_over else 1], (pins.vertices, pins.places)
 
 
 def anchored(uv: np.ndarray, triangles: np.ndarray, pins: ChartPins) -> np.ndarray:
-    """The map uv (n,2) with its only pin in place, as large as the UVs that the chart has now and turned like them.
+    """The map uv (n,2) moved, turned and scaled to its pins, one or two: its shape is what it would be without them.
 
-    Where those have no area the map becomes one unit wide.
+    With one pin it is as large as the UVs that the chart has now and turned like them, or one unit wide where those
+    have no area.
     """
-    w, given = uv[triangles] @ [1, 1j], pins.given @ [1, 1j]
-    sides = pins.given[:, 1:] - pins.given[:, :1]
-    area = 0.5 * np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]).sum()
-    turn = ((w - w.mean()).conj() * (given - given.mean())).sum()
-    direction = turn / abs(turn) if np.isfinite(turn) and abs(turn) > 0 else 1.0
-    if np.isfinite(area) and area > 0:
-        scale = np.sqrt(area / np.abs(signed_areas(uv, triangles)).sum())
+    w, places = uv @ [1, 1j], pins.places @ [1, 1j]
+    if len(pins.vertices) > 1:
+        w = aligned(w, Pins(pins.vertices, places))
     else:
-        scale = 1 / np.ptp(uv, axis=0).max()
-    turned = (uv @ [1, 1j]) * (scale * direction)
-    place = np.column_stack([turned.real, turned.imag])
-    place += pins.places[0] - place[pins.vertices[0]]
-    place[pins.vertices] = pins.places
-    return place
+        w = w * _likeness(w[triangles], pins.given @ [1, 1j])
+        w += places[0] - w[pins.vertices[0]]
+    w[pins.vertices] = places
+    return np.column_stack([w.real, w.imag])
+
+
+def _likeness(w: np.ndarray, given: np.ndarray) -> complex:
+    """Factor that turns and scales the corners w (m,3) of triangles to have direction and area of those given (m,3)."""
+    now, then = (np.abs(((x[:, 1] - x[:, 0]).conj() * (x[:, 2] - x[:, 0])).imag).sum() for x in (w, given))
+    if not (np.isfinite(then) and then > 0):
+        return 1 / max(np.ptp(w.real), np.ptp(w.imag))
+    turn = ((w - w.mean()).conj() * (given - given.mean())).sum()
+    return np.sqrt(then / now) * (turn / abs(turn) if abs(turn) > 0 else 1)

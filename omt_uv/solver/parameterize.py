@@ -295,7 +295,7 @@ def _into_corners(domain: Domain, loop, along, corners) -> tuple[np.ndarray, np.
 
 
 def _in_place(uv: np.ndarray, chart: Chart, unit: float, pins: ChartPins | None) -> np.ndarray:
-    """A map uv (n,2) of a chart in a unit box, as large as the chart really is, or where its only pin is."""
+    """A map uv (n,2) of a chart in a unit box, as large as the chart really is, or where its one or two pins are."""
     # A polygon inscribed in the disk is smaller than the disk: one texel density needs its own area.
     covered = signed_areas(uv, chart.triangles).sum()
     uv = uv * np.sqrt(face_areas(chart.vertices, chart.triangles).sum() / covered)
