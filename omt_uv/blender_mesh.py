@@ -13,6 +13,7 @@ import bpy
 import bmesh
 import numpy as np
 
+from .solver.chart_pins import CornerPins
 from .solver.charts import Surface
 from .solver.errors import MeshError, NonFiniteError
 
@@ -26,15 +27,27 @@ class TargetError(ValueError):
 
 @dataclass(frozen=True)
 class Reading:
-    """A surface, the polygons to work on (f,) bool, and the active UV layer (c,2) float32 if there is one."""
+    """A surface, the polygons to work on (f,) bool, and of a UV layer, if there is one, the UVs (c,2) float32 and
+    which of them are pinned (c,) bool."""
 
     surface: Surface
     faces: np.ndarray
     uv: np.ndarray | None
+    pinned: np.ndarray | None
+
+    @property
+    def pins(self) -> CornerPins | None:
+        """Pins of the polygons to work on, None if they have none."""
+        if self.uv is None or self.pinned is None:
+            return None
+        pinned = self.pinned & np.repeat(self.faces, np.diff(self.surface.face_start))
+        return CornerPins(pinned, self.uv) if pinned.any() else None
 
 
-def read(obj: bpy.types.Object) -> Reading:
+def read(obj: bpy.types.Object, layer: str = "") -> Reading:
     """Read a mesh object with its scale applied, whatever mode it is in.
+
+    UVs and pins are those of `layer`, of the active layer where there is none of this name.
 
     Object Mode works on every polygon, Edit Mode on the selected ones that are not hidden. Loose vertices and
     edges are in no polygon and play no part.
@@ -44,16 +57,16 @@ def read(obj: bpy.types.Object) -> Reading:
     NonFiniteError : the transformation of the object is not finite
     """
     if obj.mode != "EDIT":
-        return _read_mesh(obj.data, obj, edit_mode=False)
+        return _read_mesh(obj.data, obj, layer, edit_mode=False)
     obj.update_from_editmode()
     copy = obj.data.copy()
     try:
-        return _read_mesh(copy, obj, edit_mode=True)
+        return _read_mesh(copy, obj, layer, edit_mode=True)
     finally:
         bpy.data.meshes.remove(copy)
 
 
-def _read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, edit_mode: bool) -> Reading:
+def _read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, layer: str, edit_mode: bool) -> Reading:
     mesh.calc_loop_triangles()
     f = len(mesh.polygons)
     starts = np.append(_get(mesh.polygons, "loop_start", f), len(mesh.loops))
@@ -69,8 +82,10 @@ def _read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, edit_mode: bool) -> 
     faces = np.ones(f, dtype=bool)
     if edit_mode:
         faces = _get(mesh.polygons, "select", f, bool) & ~_get(mesh.polygons, "hide", f, bool)
-    layer = mesh.uv_layers.active
-    return Reading(surface, faces, read_uv(mesh, layer.name) if layer else None)
+    source = mesh.uv_layers.get(layer) or mesh.uv_layers.active
+    if source is None:
+        return Reading(surface, faces, None, None)
+    return Reading(surface, faces, read_uv(mesh, source.name), read_pinned(mesh, source.name))
 
 
 def _get(collection, name: str, count: int, dtype=np.int32) -> np.ndarray:
@@ -119,6 +134,17 @@ def weld_split_vertices(reading: Reading) -> Reading:
 def read_uv(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
     """UVs (c,2) float32 of every corner of a mesh that is not in Edit Mode."""
     return _get(mesh.uv_layers[layer].uv, "vector", 2 * len(mesh.loops), np.float32).reshape(-1, 2)
+
+
+def read_pinned(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
+    """Which corners (c,) bool of a mesh that is not in Edit Mode are pinned.
+
+    The attribute exists only once something was pinned; `MeshUVLoopLayer.pin` would make it in some versions.
+    """
+    attribute = mesh.attributes.get(f".pn.{layer}")
+    if attribute is None or attribute.domain != "CORNER" or attribute.data_type != "BOOLEAN":
+        return np.zeros(len(mesh.loops), bool)
+    return _get(attribute.data, "value", len(mesh.loops), bool)
 
 
 def check_target(mesh: bpy.types.Mesh, name: str) -> None:

@@ -120,13 +120,13 @@ def run_unwrap(options: argparse.Namespace) -> None:
         texture_size=options.texture_size,
         pack=not options.no_pack,
     )
-    pairs = _read(options.input, files, blender_mesh)
+    pairs = _read(options.input, files, blender_mesh, options.uv_layer)
     objects = [obj for obj, _ in pairs]
     try:
         for obj in objects:
             blender_mesh.check_target(obj.data, options.uv_layer)
         layout = drain(
-            lay_out([(r.surface, r.faces) for _, r in pairs], settings, blender_pack.pack),
+            lay_out([(r.surface, r.faces, r.pins) for _, r in pairs], settings, blender_pack.pack),
             _show_progress if sys.stderr.isatty() else None,
         )
         for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):
@@ -171,8 +171,8 @@ def _blender():
     return files, blender_mesh, blender_pack
 
 
-def _read(path: Path, files, blender_mesh) -> list:
-    """Pairs of object and Reading of all meshes with faces."""
+def _read(path: Path, files, blender_mesh, layer: str = "") -> list:
+    """Pairs of object and Reading of a UV layer (the active one by default) of all meshes with faces."""
     from .solver.errors import MeshError
 
     try:
@@ -183,7 +183,7 @@ def _read(path: Path, files, blender_mesh) -> list:
     pairs = []
     for obj in reversed(unique.values()):
         try:
-            reading = blender_mesh.read(obj)
+            reading = blender_mesh.read(obj, layer)
         except MeshError as error:
             raise CommandError(f"{obj.name}: {error}") from error
         if path.suffix.lower() == ".glb":

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import packing
 from .settings import Settings
+from .solver.chart_pins import CornerPins
 from .solver.charts import Chart, Surface
 from .solver.errors import MeshError
 from .solver.geometry import face_areas, signed_areas
@@ -41,12 +42,15 @@ class Layout:
 
 
 def lay_out(
-    surfaces: Sequence[tuple[Surface, np.ndarray | None]], settings: Settings, spare_packer: Packer | None = None
+    surfaces: Sequence[tuple[Surface, np.ndarray | None, CornerPins | None]],
+    settings: Settings,
+    spare_packer: Packer | None = None,
 ) -> Steps[Layout]:
-    """Unwrap surfaces, each with the polygons (f,) bool to use, at one texel density into one unit square.
+    """Unwrap surfaces, each with the polygons (f,) bool to use and its pins, at one texel density into one unit square.
 
     Solver results have the area of the surface, so packing with a single scale gives every island of every
-    surface the same texels per area. `spare_packer` takes over, with a warning, where xatlas cannot.
+    surface the same texels per area. `spare_packer` takes over, with a warning, where xatlas cannot. Islands with
+    pins are neither scaled nor packed, as in Blender, and the others are packed as if they were not there.
 
     Raises
     ------
@@ -55,25 +59,33 @@ def lay_out(
     """
     maps: list[SurfaceMap] = []
     warnings: list[tuple[int, str]] = []
-    for index, (surface, faces) in enumerate(surfaces):
+    for index, (surface, faces, pins) in enumerate(surfaces):
         try:
-            steps = unwrap(surface, faces, **settings.solver_arguments())
-            maps.append((yield from _share_of(steps, index, len(surfaces))))
+            steps = unwrap(surface, faces, pins=pins, **settings.solver_arguments())
+            maps.append((yield from share_of(steps, index, len(surfaces))))
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for chart_map in maps[-1].maps for text in chart_map.warnings]
     yield Progress("Packing", 1.0)
-    charts = [(c, m.uv) for surface_map in maps for c, m in zip(surface_map.charts, surface_map.maps, strict=True)]
-    islands = [_at_true_area(chart, uv) for chart, uv in charts]
-    triangles = [chart.triangles for chart, _ in charts]
-    packed, complaint = _pack(islands, triangles, settings, spare_packer)
+    charts = [pair for surface_map in maps for pair in zip(surface_map.charts, surface_map.maps, strict=True)]
+    free = [(c, m.uv) for c, m in charts if not m.pinned]
+    if len(free) < len(charts):
+        warnings.append((-1, _in_place(len(charts) - len(free), len(free))))
+    islands = [_at_true_area(chart, uv) for chart, uv in free]
+    packed, complaint = pack_islands(islands, [chart.triangles for chart, _ in free], settings, spare_packer)
     if complaint:
         warnings.append((-1, complaint))
-    corners, uv = _scatter(maps, packed)
+    placed = iter(packed.islands)
+    corners, uv = _scatter(maps, [m.uv if m.pinned else next(placed) for _, m in charts])
     return Layout(corners, uv, maps, packed, warnings)
 
 
-def _share_of(steps: Steps[SurfaceMap], index: int, count: int) -> Steps[SurfaceMap]:
+def _in_place(pinned: int, others: int) -> str:
+    text = "An island with pins stays" if pinned == 1 else f"{pinned} islands with pins stay"
+    return f"{text} in place" + ("; the others were packed as if there were none" if others else "")
+
+
+def share_of(steps: Steps[SurfaceMap], index: int, count: int) -> Steps[SurfaceMap]:
     """Pass on progress of one surface as progress of all."""
     while True:
         try:
@@ -92,7 +104,12 @@ def _at_true_area(chart: Chart, uv: np.ndarray) -> np.ndarray:
     return uv * np.sqrt(face_areas(chart.vertices, chart.triangles).sum() / covered)
 
 
-def _pack(islands, triangles, settings: Settings, spare_packer: Packer | None) -> tuple[packing.Packing, str]:
+def pack_islands(
+    islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray], settings: Settings, spare_packer: Packer | None
+) -> tuple[packing.Packing, str]:
+    """Islands (n_i,2) packed as the settings say, and a warning or an empty text; see `packing.pack`."""
+    if not islands:
+        return packing.Packing([], 0.0, "none", 0.0), ""
     if not settings.pack:
         return packing.stack(islands), ""
     try:
@@ -106,9 +123,9 @@ def _pack(islands, triangles, settings: Settings, spare_packer: Packer | None) -
         return result, f"{error}; packed with {result.packer} instead"
 
 
-def _scatter(maps: Sequence[SurfaceMap], packed: packing.Packing) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _scatter(maps: Sequence[SurfaceMap], placed: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """From island vertices to the corners of each surface."""
-    island = iter(packed.islands)
+    island = iter(placed)
     corners, uv = [], []
     for surface_map in maps:
         k = [chart.corners.ravel() for chart in surface_map.charts]

@@ -34,8 +34,8 @@ def mesh_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
     return unique
 
 
-def read_objects(context: bpy.types.Context) -> list:
-    """Pairs of object and Reading, of objects with at least one face to work on.
+def read_objects(context: bpy.types.Context, layer: str = "") -> list:
+    """Pairs of object and Reading of a UV layer (the active one by default), of objects with a face to work on.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def read_objects(context: bpy.types.Context) -> list:
     pairs = []
     for obj in mesh_objects(context):
         try:
-            pairs.append((obj, blender_mesh.read(obj)))
+            pairs.append((obj, blender_mesh.read(obj, layer)))
         except MeshError as error:
             raise Complaint(f"{obj.name}: {error}", obj, error) from error
     full = [(obj, reading) for obj, reading in pairs if reading.faces.any()]

@@ -21,7 +21,7 @@ from .common import Complaint, SolverOperator, read_objects
 
 
 class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
-    """Unwrap so that every part of the surface gets its share of the texture. Charts follow the seams"""
+    """Unwrap so that every part of the surface gets its share of the texture. Islands follow the seams, pins stay"""
 
     bl_idname = "uv.omt_unwrap"
     bl_label = "Unwrap Area Preserving"
@@ -86,13 +86,13 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
         from .. import blender_mesh, blender_pack, packing
         from ..unwrapping import Refusal, lay_out
 
-        pairs = read_objects(context)
+        pairs = read_objects(context, self.uv_layer)
         try:
             for obj, _ in pairs:
                 blender_mesh.check_target(obj.data, self.uv_layer)
         except blender_mesh.TargetError as error:
             raise Complaint(str(error)) from error
-        surfaces = [(reading.surface, reading.faces) for _, reading in pairs]
+        surfaces = [(reading.surface, reading.faces, reading.pins) for _, reading in pairs]
         try:
             layout = yield from lay_out(surfaces, self.settings(), blender_pack.pack)
         except Refusal as refusal:
