@@ -30,6 +30,10 @@ QUALITIES = {
 }
 # A stage ends when Newton promises less than this share of the energy.
 LOOSE, TIGHT = 3e-2, 1e-3
+# With a balance the weight alone decides, and neighbouring balances must not differ by chance.
+STRICT = 1e-4
+# Weight of the area term at balance 1: next to the map of least shear, which alone would leave the scale open.
+LEAST_WEIGHT = 1e-3
 # A stage that takes longer gives way to the next, which may find a way around.
 STAGE_STEPS = 40
 # Share of the area term's indefinite Hessian kept: at the start of a stage, and the least before it is dropped.
@@ -79,23 +83,32 @@ class Found:
     warnings: tuple[str, ...]
 
 
+def _weights(balance: float, settings: Quality) -> list[float]:
+    """The preset's weights; with a balance, those on the way to one between the preset's last and LEAST_WEIGHT."""
+    if balance == 0:
+        return list(settings.weights)
+    last = settings.weights[-1] ** (1 - balance) * LEAST_WEIGHT**balance
+    return [*(weight for weight in settings.weights if weight < last), last]
+
+
 def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Steps[Found]:
     """Newton in stages of growing weight, until the area error is small enough.
 
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
-    weights = list(settings.weights)
-    softening = (balance / (1 - balance)) ** 2 if balance < 1 else np.inf
+    weights = _weights(balance, settings)
     overlap, guarded, steps, k = task.crosses(w), task.guarded, 0, 0
     warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
     while True:
-        weight = 1 / (1 / weights[k] + softening)
+        weight = weights[k]
         task = rescaled(task, w) if task.scale_free else task
         problem = task.problem(w, weight, guarded)
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
-        allowed = min(settings.max_steps - steps, STAGE_STEPS)
+        left = settings.max_steps - steps
+        allowed = min(left, STAGE_STEPS) if balance == 0 else left
         watch = None if guarded or overlap else task.crosses
-        stage = yield from minimise(problem, w, goal, allowed, k, watch)
+        tight = TIGHT if balance == 0 else STRICT
+        stage = yield from minimise(problem, w, goal, allowed, k, watch, tight)
         w, steps = stage.w, steps + stage.steps
         if stage.status == "crossed":
             guarded = True
@@ -126,8 +139,9 @@ def minimise(
     allowed: int,
     place: int,
     watch: Callable[[np.ndarray], bool] | None = None,
+    tight: float = TIGHT,
 ) -> Steps[Stage]:
-    """Newton until it promises little, at least LOOSE; where that leaves the area error above the goal, TIGHT.
+    """Newton until it promises little, at least LOOSE; where that leaves the area error above the goal, `tight`.
 
     place: the number of this stage, for the progress; watch: a step to where this is true is not taken, and the
     stage ends "crossed".
@@ -149,7 +163,7 @@ def minimise(
         if residual < LOOSE and area_error(problem.faces, w) <= goal:
             status = "converged"
             break
-        if residual < TIGHT:
+        if residual < tight:
             # A Hessian stiffer than the true one promises too little.
             if used <= LEAST_PRESSURE:
                 status = "converged"
