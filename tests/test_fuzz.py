@@ -11,8 +11,8 @@ from omt_uv.solver.errors import MeshError
 from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.progress import drain
 
-CASES = 2400
-CHUNKS = 24
+CASES = 2100
+CHUNKS = 21
 
 
 # ---- surgery: (rng, V, polygons) -> (V, polygons) -----------------------------------------------------------
