@@ -90,7 +90,8 @@ def cotree_length(V, F):
     faces, triangles, owner = chosen_triangles(surface, None)
     sheets = join(surface, faces, triangles, owner).sheets
     nowhere = np.zeros(len(sheets.first), bool)
-    piece = make_piece(sheets, V, corner_classes(sheets), np.arange(len(F)), np.zeros(len(V)), nowhere)
+    everything = np.arange(len(F)), np.arange(len(nowhere))
+    piece = make_piece(sheets, V, corner_classes(sheets), *everything, np.zeros(len(V)), nowhere)
     piece.cost[:] = piece.length
     root = np.array([0] if len(piece.rim) == 0 else [], np.int64)
     return float(piece.length[greedy_arcs(piece, root)].sum())

@@ -16,7 +16,7 @@ from .cut_graph import greedy_arcs, path_to, shorten
 from .extremities import log_scale, spread
 from .geometry import face_areas
 from .holes import fill_holes
-from .piece import NOISE, Kind, Piece, classify, edge_graph, make_piece, rim_loops
+from .piece import NOISE, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .repair import Repaired, join, weldable
 from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
 from .steiner import meeting_points
@@ -137,15 +137,28 @@ def _cut_parts(
     seam = is_seam(surface, pair_keys(*sheets.ends(sheets.first)))
     gone = np.zeros(len(sheets.first), dtype=bool)
     members = groups(part)
+    order, start = _by_part(part[sheets.first // 3], len(members))
     report = []
+    # A mesh may hold the same part many times: rivets, teeth, leaves.
+    known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
     for k in np.flatnonzero(~kind.is_disk):
-        piece = make_piece(sheets, positions, corner_class, members[k], weight, seam)
-        chosen, tips = open_piece(piece, kind, k, extremities)
+        mine = order[start[k] : start[k + 1]]
+        piece = make_piece(sheets, positions, corner_class, members[k], mine, weight, seam)
+        name = fingerprint(piece)
+        if name not in known:
+            known[name] = open_piece(piece, kind, k, extremities)
+        chosen, tips = known[name]
         gone[piece.sheet_pair[chosen]] = True
         length = float(piece.length[chosen].sum()) * unit
         figures = int(kind.boundaries[k]), int(kind.handles[k]), bool(kind.one_sided[k])
         report.append(PieceCut(len(piece.triangles), *figures, length, piece.vertex_ids[tips]))
     return gone, report, weldable(surface, sheets, part, kind.is_disk)
+
+
+def _by_part(part: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Items in the order of their parts (p,), and where each of the `count` parts begins, (count+1,)."""
+    order = np.argsort(part, kind="stable")
+    return order, np.searchsorted(part[order], np.arange(count + 1))
 
 
 def _looking_out(sheets: Sheets, positions: np.ndarray) -> tuple[Sheets, np.ndarray]:

@@ -100,10 +100,10 @@ def _open_halfedges(count: int, first: np.ndarray, second: np.ndarray) -> np.nda
 
 
 def make_piece(
-    sheets: Sheets, positions: np.ndarray, corner_class: np.ndarray, members: np.ndarray, weight: np.ndarray,
-    seam: np.ndarray,
+    sheets: Sheets, positions: np.ndarray, corner_class: np.ndarray, members: np.ndarray, mine: np.ndarray,
+    weight: np.ndarray, seam: np.ndarray,
 ) -> Piece:
-    """The piece of the triangles `members` (m,).
+    """The piece of the triangles `members` (m,), in ascending order, and the pairs `mine` (e,) between them.
 
     Parameters
     ----------
@@ -115,13 +115,10 @@ def make_piece(
     _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1, 3).astype(np.int64)
     vertex_ids = sheets.vertex[corners.ravel()[index]]
-    local = np.full(len(sheets.triangles), -1, dtype=np.int64)
-    local[members] = np.arange(len(members))
-    mine = np.flatnonzero(local[sheets.first // 3] >= 0)
     pair = np.stack([sheets.first[mine], sheets.second[mine]], axis=1)
     patch = (sheets.owner[pair // 3] < 0).any(axis=1)
     diagonal = ~sheets.side[pair[:, 0]] & ~patch
-    pair = 3 * local[pair // 3] + pair % 3
+    pair = 3 * np.searchsorted(members, pair // 3) + pair % 3
     tail, head = halfedges(triangles)
     ends = np.stack([tail[pair[:, 0]], head[pair[:, 0]]], axis=1)
     p = positions[vertex_ids]
@@ -171,3 +168,11 @@ def rim_loops(piece: Piece) -> list[np.ndarray]:
     rim = np.unique(a)
     label = connected_components(graph, directed=False)[1][rim]
     return [rim[group] for group in groups(label)] if len(rim) else []
+
+
+def fingerprint(piece: Piece) -> tuple[bytes, ...]:
+    """Equal for copies of a piece, moved but not turned, and almost surely for no others."""
+    p = piece.positions - piece.positions.min(axis=0)
+    size = float(p.max()) or 1.0
+    rounded = [np.round(x / size * 1e6) for x in (p, np.where(np.isfinite(piece.cost), piece.cost, -1))]
+    return tuple(a.tobytes() for a in (piece.triangles, piece.pair, *rounded))
