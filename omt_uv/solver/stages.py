@@ -32,8 +32,9 @@ QUALITIES = {
 LOOSE, TIGHT = 3e-2, 1e-3
 # With a balance the weight alone decides, and neighbouring balances must not differ by chance.
 STRICT = 1e-4
-# Weight of the area term at balance 1: next to the map of least shear, which alone would leave the scale open.
-LEAST_WEIGHT = 1e-3
+# Weight of the area term at balance 1. Without it the map of least shear has no scale; and much below this the mean
+# shear, which is not quite the energy's, no longer falls.
+LEAST_WEIGHT = 1e-2
 # A stage that takes longer gives way to the next, which may find a way around.
 STAGE_STEPS = 40
 # Share of the area term's indefinite Hessian kept: at the start of a stage, and the least before it is dropped.

@@ -11,13 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .contact import crossings, expand
+from .embedding import arc_length_parameters
 from .energy import elements
 from .errors import FoldedUVError
 from .geometry import face_areas, signed_areas
 from .linear import solve_spd
 from .newton import Free, Motion, OnCircle, OnLines, linear_forms
 from .topology import halfedges, twins
-from .untangle import arc_length_rim, circle_rim, count_folds, untangle
+from .untangle import USABLE, arc_length_rim, circle_rim, count_folds, map_energy, untangle
 
 SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"
 # Curvature, summed without sign over the inner vertices, below which a chart may be unrolled at once, in radians.
@@ -82,28 +83,45 @@ def free_start(vertices, triangles, uv, loop) -> Start:
 def square_start(vertices, triangles, uv, loop) -> Start:
     """Boundary on the square about 0 that has the area of the surface; the vertices nearest to its corners take them.
 
-    Where a face would have all its corners on one side, one of its vertices is released from the side.
+    Where that squeezes faces beyond use, the corners are spread by the boundary's length instead.
     """
-    n, half = len(vertices), np.sqrt(face_areas(vertices, triangles).sum()) / 2
-    warnings = []
     low, high = uv[loop].min(0), uv[loop].max(0)
     if not (high > low).all():
         raise FoldedUVError("The UVs to refine have no area")
+    half = np.sqrt(face_areas(vertices, triangles).sum()) / 2
     uv = ((uv - low) / (high - low) * 2 - 1) * half
-    s = _perimeter(uv[loop] / half)
-    turn = (np.roll(s, -1) - s) % 4
-    if not (turn > 0).all() or abs(turn.sum() - 4) > 1e-9:
-        warnings.append(SPREAD)
-        s = 4 * np.arctan2(*arc_length_rim(vertices, loop, 1.0)[:, ::-1].T) / (2 * np.pi) % 4
+    given = _perimeter(uv[loop] / half)
+    turn = (np.roll(given, -1) - given) % 4
+    found, reasons = [], []
+    if (turn > 0).all() and abs(turn.sum() - 4) < 1e-9:
+        try:
+            found.append(_on_sides(vertices, triangles, uv, loop, given, half, []))
+        except FoldedUVError:
+            reasons.append("The corners of the start fold faces; they were spread by the length of the boundary")
+    else:
+        reasons.append(SPREAD)
+    if not found or map_energy(found[0].uv, vertices, triangles) > USABLE:
+        even = 4 * arc_length_parameters(vertices, loop)
+        reasons = reasons or ["The corners of the start squeeze faces; they were spread by the length of the boundary"]
+        found.append(_on_sides(vertices, triangles, uv, loop, even, half, reasons))
+    return min(found, key=lambda start: map_energy(start.uv, vertices, triangles))
+
+
+def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> Start:
+    """A start with the boundary loop (b,) at the positions s (b,) in [0, 4) along the square.
+
+    Where a face would have all its corners on one side, one of its vertices is released from the side.
+    """
+    warnings = list(reasons)
     s, corner = _snap_corners(s)
     rim = _on_square(s) * half
     side = np.floor(s).astype(int)
-    released = _released(triangles, loop, side, corner, n)
+    released = _released(triangles, loop, side, corner, len(vertices))
     if released.any():
         warnings.append(f"{released.sum()} boundary vertices leave the square, where a face would lie along a side")
     straight = _straighten(uv, vertices, triangles, loop[~released], rim[~released], warnings)
     slide = ~corner & ~released
-    motion = OnLines(loop[slide], np.where(side[slide] % 2 == 0, 1.0, 1j), loop[corner], n)
+    motion = OnLines(loop[slide], np.where(side[slide] % 2 == 0, 1.0, 1j), loop[corner], len(vertices))
     # Vertices of a side could pass each other where a released one between them leaves the side.
     notched = bool(released.any())
     return Start(straight, motion, tuple(warnings), notched, notched)

@@ -9,7 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from .embedding import arc_length_parameters, tutte
-from .geometry import signed_areas
+from .energy import elements, energy
+from .geometry import face_areas, signed_areas
+
+# Mean energy above which an untangled map is no better than a fresh one: Newton would spend itself on single faces.
+USABLE = 100.0
 
 
 def count_folds(uv: np.ndarray, triangles: np.ndarray) -> int:
@@ -20,16 +24,25 @@ def count_folds(uv: np.ndarray, triangles: np.ndarray) -> int:
 def untangle(uv: np.ndarray, positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, rim: np.ndarray):
     """An embedding near uv (n,2) with the boundary loop (b,) on the convex curve rim (b,2), and what had to be done.
 
-    Two systems are tried: weights of the map itself, then weights of the surface. The second return value is None
-    after the first and a warning after the second.
+    Two systems are tried: weights of the map itself, and where that folds or squeezes faces beyond use, weights of the
+    surface. The second return value is None after the first and a warning after the second.
     """
     straight = tutte(uv, triangles, loop, rim)
-    if count_folds(straight, triangles) == 0:
+    first = map_energy(straight, positions, triangles)
+    if first <= USABLE:
         return straight, None
     fresh = tutte(positions, triangles, loop, rim)
-    if count_folds(fresh, triangles) < count_folds(straight, triangles):
+    fewer = count_folds(fresh, triangles) < count_folds(straight, triangles)
+    if fewer or map_energy(fresh, positions, triangles) < first:
         return fresh, "The start could not be untangled; the refinement starts from a mean value map of the surface"
     return straight, None
+
+
+def map_energy(uv: np.ndarray, positions: np.ndarray, triangles: np.ndarray) -> float:
+    """Mean of shear and area error of a map (n,2), scaled to the area of the surface; infinite if it folds."""
+    area = face_areas(positions, triangles)
+    scale = np.sqrt(area.sum() / np.abs(signed_areas(uv, triangles)).sum())
+    return energy(elements(positions, triangles, area), scale * (uv[:, 0] + 1j * uv[:, 1]), 1.0)
 
 
 def circle_rim(uv: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarray | None:
