@@ -198,7 +198,8 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
         if spread(piece, scale) <= BEARABLE:
             break
         # A tip is worth its cut where much distortion is far from the boundary.
-        tips = np.append(tips, _peak(scale * _distance(piece, _cut_vertices(piece, chosen))))
+        far = _distance(piece, _cut_vertices(piece, chosen))
+        tips = np.append(tips, _peak(scale * far * (1 - piece.avoid)))
         path = path_to(piece, _cut_vertices(piece, chosen), tips[-1])
         chosen = shorten(piece, chosen | path, tips, around=path)
     chosen = shorten(piece, chosen, tips)
@@ -213,7 +214,7 @@ def _first_tips(piece: Piece) -> np.ndarray:
     A slit of a single edge would not open anything.
     """
     scale = log_scale(piece, np.zeros(len(piece.pair), dtype=bool))
-    tips = _farthest(piece, np.array([_peak(scale)]), 1)
+    tips = _farthest(piece, np.array([_peak(scale * (1 - piece.avoid))]), 1)
     neighbours = (np.sort(piece.ends, axis=1) == np.sort(tips)).all(axis=1).any()
     return _farthest(piece, tips, 1) if neighbours else tips
 

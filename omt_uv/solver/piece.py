@@ -30,7 +30,8 @@ class Piece:
 
     positions (n,3) in a unit box; triangles (m,3); pair (e,2) the two halfedges of every inner edge, `sheet_pair` (e,)
     their number among the pairs of the sheets; ends (e,2) vertices; length (e,); cost (e,), infinite for diagonals;
-    rim (r,) halfedges on the boundary; members (m,) triangles of the sheets; vertex_ids (n,) of the surface.
+    rim (r,) halfedges on the boundary; members (m,) triangles of the sheets; vertex_ids (n,) of the surface;
+    avoid (n,) in [0,1].
     """
 
     positions: np.ndarray
@@ -43,6 +44,7 @@ class Piece:
     rim: np.ndarray
     members: np.ndarray
     vertex_ids: np.ndarray
+    avoid: np.ndarray
 
     @property
     def count(self) -> int:
@@ -131,7 +133,7 @@ def make_piece(
     cost[patch] *= HOLE
     cost[diagonal] = np.inf
     rim = _open_halfedges(3 * len(triangles), pair[:, 0], pair[:, 1])
-    return Piece(p, triangles, pair, mine, ends, length, cost, rim, members, vertex_ids)
+    return Piece(p, triangles, pair, mine, ends, length, cost, rim, members, vertex_ids, weight[vertex_ids])
 
 
 def _hiding(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> np.ndarray:

@@ -1,0 +1,111 @@
+"""A cut budget: charts are cut further until their maps shear less than a bound, length of seam against shear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .charts import Chart, Surface
+from .distortion import face_distortion
+from .geometry import face_areas
+from .parameterize import ChartMap
+from .preparation import Prepared, prepare
+from .progress import Steps
+from .slits import slit
+
+MOST_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Budgeted:
+    """The preparation, the maps of its charts, the slits (k,2) that were added to its cuts, and what they brought.
+
+    history: length of all cuts and slits, and mean shear of the whole surface, before the first round and after each.
+    reached: the shear of every chart is within the bound; otherwise this is the round of the least shear.
+    """
+
+    prepared: Prepared
+    maps: list[ChartMap]
+    slits: np.ndarray
+    history: tuple[tuple[float, float], ...]
+    reached: bool
+
+
+def unwrap_within(
+    surface: Surface,
+    faces: np.ndarray | None,
+    map_chart: Callable[[Chart], Steps[ChartMap]],
+    bound: float,
+    *,
+    seams: str = "auto",
+    fill_holes: bool = False,
+    avoid: np.ndarray | None = None,
+    rounds: int = MOST_ROUNDS,
+) -> Steps[Budgeted]:
+    """Map all charts, and slit those whose mean shear s1/s2 is above `bound` > 1, until none is or `rounds` are over.
+
+    Parameters and errors are those of
+    `preparation.prepare`, and errors of `map_chart`, a solver for one chart.
+    """
+    if not bound > 1:
+        raise ValueError(f"no map shears less than 1; the bound must be greater, not {bound}")
+    options = {"fill_holes": fill_holes, "avoid": avoid}
+    first = prepared = prepare(surface, faces, seams=seams, **options)
+    cuts = np.zeros((0, 2), np.int64) if first.cuts is None else first.cuts.edges
+    slits = np.zeros((0, 2), dtype=np.int64)
+    maps: list[ChartMap] = []
+    charts: list[Chart] = []
+    history: list[tuple[float, float]] = []
+    best = None
+    while True:
+        maps = yield from _mapped(prepared.charts, charts, maps, map_chart)
+        charts = prepared.charts
+        shear = [_shear(c, m) for c, m in zip(charts, maps, strict=True)]
+        mean = np.array([_mean(c, s) for c, s in zip(charts, shear, strict=True)])
+        length = _length(surface, slits) + (first.cuts.length if first.cuts else 0.0)
+        history.append((length, _overall(charts, mean)))
+        worst = np.flatnonzero(mean > bound)
+        if best is None or len(worst) == 0 or history[-1][1] < min(h[1] for h in history[:-1]):
+            best = charts, maps, slits, len(worst) == 0
+        new = [slit(surface, charts[k], shear[k], avoid) for k in worst] if len(history) <= rounds else []
+        if not sum(map(len, new)):
+            break
+        slits = np.concatenate([slits, *new])
+        opened = replace(surface, seams=np.concatenate([surface.seams, cuts, slits]))
+        prepared = prepare(opened, faces, seams=seams, **options)
+    charts, maps, slits, reached = best
+    return Budgeted(Prepared(charts, first.cuts, first.warnings), maps, slits, tuple(history), reached)
+
+
+def _mapped(charts, old_charts, old_maps, map_chart) -> Steps[list[ChartMap]]:
+    """Maps of the charts; those that are as they were keep theirs. Slits never change the number of charts."""
+    maps = []
+    for k, chart in enumerate(charts):
+        same = k < len(old_charts) and _same(chart, old_charts[k])
+        maps.append(old_maps[k] if same else (yield from map_chart(chart)))
+    return maps
+
+
+def _same(chart: Chart, other: Chart) -> bool:
+    return np.array_equal(chart.corners, other.corners) and np.array_equal(chart.disk, other.disk)
+
+
+def _shear(chart: Chart, chart_map: ChartMap) -> np.ndarray:
+    return face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])[1]
+
+
+def _mean(chart: Chart, shear: np.ndarray) -> float:
+    area = face_areas(chart.vertices, chart.triangles)
+    return float(area @ shear / area.sum())
+
+
+def _overall(charts: list[Chart], mean: np.ndarray) -> float:
+    area = np.array([face_areas(c.vertices, c.triangles).sum() for c in charts])
+    return float(area @ mean / area.sum())
+
+
+def _length(surface: Surface, edges: np.ndarray) -> float:
+    p = surface.positions
+    return float(np.linalg.norm(p[edges[:, 0]] - p[edges[:, 1]], axis=1).sum())
