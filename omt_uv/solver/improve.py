@@ -1,0 +1,185 @@
+"""Improve a map that exists: any island, however many boundaries it has, with the refinement's energy.
+
+The refinement of charts knows only disks, because its fallbacks are disks. A map without folds needs no fallback; one
+that is folded or crosses itself is straightened first, its holes filled for that purpose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+
+from .contact import crossings
+from .energy import area_error, elements
+from .errors import FoldedUVError, MeshError
+from .geometry import face_areas, signed_areas
+from .linear import minimum_degree
+from .newton import Assembly, Free
+from .pins import Pins, aligned, check_pins, drag
+from .progress import Progress, Steps
+from .refine import Refinement
+from .stages import QUALITIES, Found, Task, stages
+from .starts import check_start, disk_start
+from .topology import boundary_loops, halfedges, twins
+from .untangle import count_folds
+
+STRAIGHTENED = "The UVs were folded or crossed themselves; the refinement started from a straightened map"
+
+
+def improve(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    uv: np.ndarray,
+    *,
+    balance: float = 0.0,
+    quality: str = "standard",
+    pins: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Steps[Refinement]:
+    """Refine a map uv (n,2) of a connected surface (n,3), (m,3) with one or more boundaries.
+
+    The result keeps the centroid, the direction, the mirroring and the UV area of the given map.
+
+    Parameters
+    ----------
+    balance, quality : see `refine.refine`
+    pins : vertices (k,) and their places (k,2); two or more fix place, direction and scale
+
+    Raises
+    ------
+    FoldedUVError : a map without area, or folds that no other start could remove
+    PinError : pins that contradict each other or force a fold
+
+    References
+    ----------
+    See `refine.refine`; the topology of a boundary that may not cross itself is that of Smith, Schaefer 2015.
+    """
+    if not 0 <= balance <= 1:
+        raise ValueError(f"balance must lie in [0, 1], not {balance}")
+    yield Progress("Refinement", 0.0)
+    uv = np.asarray(uv, float)
+    check_start(uv, triangles)
+    mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
+    order = minimum_degree(_graph(triangles, len(vertices)))
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    held = None
+    if pins is not None and len(pins[0]):
+        held = check_pins(place[np.asarray(pins[0])], np.asarray(pins[1], float).reshape(-1, 2) * mirror, len(order))
+    given = (uv[order] * mirror) @ [1, 1j]
+    try:
+        found, error, warnings = yield from _improved(
+            vertices[order], place[triangles], given, balance, QUALITIES[quality], held
+        )
+    except MeshError as problem:
+        raise _renumbered(problem, order) from problem
+    improved = np.column_stack([found.w.real, found.w.imag])[place] * mirror
+    if pins is not None:
+        improved[pins[0]] = pins[1]
+    return Refinement(
+        improved, found.steps, found.residual, error, found.weight, found.energy, found.status, found.overlap, warnings
+    )
+
+
+def _renumbered(error: MeshError, order: np.ndarray) -> MeshError:
+    elements = order[error.elements] if error.kind == "vertex" else error.elements
+    return type(error)(error.cause, error.remedy, error.kind, elements)
+
+
+def _graph(triangles: np.ndarray, n: int) -> coo_matrix:
+    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
+    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
+
+
+def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
+    """What was found from the map given (n,) complex, in its place; its area error; warnings."""
+    # The energy weighs lengths: surface and map are measured in the same unit, in which both have the area 1.
+    vertices = vertices / np.sqrt(face_areas(vertices, triangles).sum())
+    faces = elements(vertices, triangles, face_areas(vertices, triangles))
+    several = pins if pins is not None and len(pins.vertices) > 2 else None
+    fixed = several is not None
+    rim = boundary_edges(triangles)
+    start, warnings = _start(vertices, triangles, given, rim, fixed)
+    crossed = len(crossings(start, rim)) > 0
+    free = Free(np.zeros(len(given), bool))
+    # Pins may ask for a map that crosses itself, as the given one does.
+    task = Task(faces, Assembly(triangles, len(given)), free, None if crossed and fixed else rim, False)
+    w = start
+    if several is not None:
+        task, w = yield from drag(task, w, several)
+    found = yield from stages(task, w, balance, settings)
+    error = area_error(faces, found.w)
+    if several is None:
+        found = replace(found, w=_placed(found, given, faces, pins))
+    return found, error, (*warnings, *found.warnings)
+
+
+def boundary_edges(triangles: np.ndarray) -> np.ndarray:
+    """Edges (b,2) of all boundaries, surface on the left."""
+    tail, head = halfedges(triangles)
+    rim = twins(triangles) < 0
+    return np.column_stack([tail[rim], head[rim]])
+
+
+def _start(vertices, triangles, given, rim, fixed: bool) -> tuple[np.ndarray, tuple[str, ...]]:
+    """A map (n,) without folds, the given one if it will do, and a warning if it will not."""
+    uv = np.column_stack([given.real, given.imag])
+    folds = count_folds(uv, triangles)
+    scale = 1.0 if fixed else np.sqrt(1 / np.abs(signed_areas(uv, triangles)).sum())
+    if folds == 0 and (fixed or not len(crossings(given, rim))):
+        return given * scale, ()
+    straight = _straightened(vertices, triangles, uv)
+    if straight is not None:
+        return straight @ [1, 1j], (STRAIGHTENED,)
+    if folds == 0:
+        return given * scale, ()
+    folded = np.flatnonzero(~(signed_areas(uv, triangles) > 0))
+    raise FoldedUVError("The UVs to refine are folded beyond repair", kind="face", elements=folded)
+
+
+def _straightened(vertices, triangles, uv) -> np.ndarray | None:
+    """An embedding (n,2) in a disk, near uv where that is possible; None for a surface with handles."""
+    loops = boundary_loops(triangles)
+    n = len(vertices)
+    euler = n - (3 * len(triangles) + sum(map(len, loops))) // 2 + len(triangles)
+    if not loops or euler + len(loops) != 2:
+        return None
+    outer = int(np.argmax([signed_area_of(uv[loop]) for loop in loops]))
+    holes = [loop for k, loop in enumerate(loops) if k != outer]
+    points, fans = _fans(np.column_stack([vertices, uv]), holes)
+    try:
+        start = disk_start(points[:, :3], np.concatenate([triangles, fans]), points[:, 3:], loops[outer])
+    except FoldedUVError:
+        return None
+    straight = start.uv[:n]
+    return straight / np.sqrt(signed_areas(straight, triangles).sum())
+
+
+def signed_area_of(polygon: np.ndarray) -> float:
+    """Area of a closed polygon (b,2), positive if it is counter-clockwise."""
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    return 0.5 * float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+
+
+def _fans(points: np.ndarray, holes: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n+h,d) with the centre of every hole, and triangles (k,3) around the centres that close the holes."""
+    n = len(points)
+    if not holes:
+        return points, np.zeros((0, 3), np.int64)
+    centres = np.stack([points[loop].mean(axis=0) for loop in holes])
+    fans = [np.column_stack([np.roll(x, -1), x, np.full(len(x), n + k)]) for k, x in enumerate(holes)]
+    return np.concatenate([points, centres]), np.concatenate(fans)
+
+
+def _placed(found: Found, given: np.ndarray, faces, pins: Pins | None) -> np.ndarray:
+    """The map moved, turned and scaled to lie as the given one (n,) does, with its UV area; a pin keeps its place."""
+    w = found.w
+    if pins is not None and len(pins.vertices) == 2:
+        return aligned(w, pins)
+    w = w * np.sqrt(abs(faces.areas(given).sum()) / faces.areas(w).sum())
+    mass = np.bincount(faces.triangles.ravel(), np.repeat(faces.area, 3) / 3, len(w))
+    centred, aim = w - mass @ w, given - mass @ given
+    turn = (mass * centred.conj()) @ aim
+    placed = centred * (turn / abs(turn) if abs(turn) > 0 else 1) + mass @ given
+    return placed if pins is None else placed + (pins.places[0] - placed[pins.vertices[0]])

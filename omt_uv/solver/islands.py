@@ -1,0 +1,115 @@
+"""UV islands as charts: faces joined by edges that have equal UVs at both ends, whatever the seams say.
+
+An island may have several boundaries, unlike the charts that are unwrapped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .charts import Chart, Surface, assemble, chosen_triangles
+from .distortion import WELD
+from .errors import FoldedUVError, NonManifoldEdgeError, OrientationError
+from .geometry import face_areas
+from .repair import join, with_area
+from .sheets import orientations, turn_over
+from .topology import pair_keys
+
+
+@dataclass(frozen=True)
+class Island:
+    """A chart and where its vertices are in the UV map, uv (n,2)."""
+
+    chart: Chart
+    uv: np.ndarray
+
+
+@dataclass(frozen=True)
+class Islands:
+    """Islands, in the order of their first faces, and what had to be repaired for the map."""
+
+    islands: list[Island]
+    warnings: tuple[str, ...]
+
+
+def uv_islands(surface: Surface, uv: np.ndarray, faces: np.ndarray | None = None) -> Islands:
+    """Whole islands of UVs (c,2) that contain one of the polygons `faces` (f,) bool; all islands by default.
+
+    Two corners of a vertex are one UV vertex where they are nearer than `distortion.WELD` of the extent of the UVs.
+
+    Raises
+    ------
+    FoldedUVError : UVs that are not finite; three faces of an island at one of its edges
+    EmptyMeshError, NonFiniteError, ZeroAreaFaceError, OrientationError : broken geometry in these islands
+    """
+    uv = np.asarray(uv, float)
+    welded, origin = _welded(surface, uv)
+    if faces is not None:
+        label = _labels(welded)
+        faces = np.isin(label, label[faces])
+    faces, triangles, owner = chosen_triangles(welded, faces)
+    wrong = np.unique(owner[~np.isfinite(uv[triangles]).all((1, 2))])
+    if len(wrong):
+        raise FoldedUVError("The UVs to refine are not finite", kind="face", elements=wrong)
+    repaired = join(welded, faces, triangles, owner)
+    if len(repaired.torn):
+        raise NonManifoldEdgeError(
+            "More than two faces of an island meet at an edge",
+            remedy="Delete what is doubled, or unwrap these faces anew first",
+            kind="edge",
+            elements=origin[repaired.torn],
+        )
+    sheets = repaired.sheets
+    turned, one_sided = orientations(sheets, face_areas(surface.positions, surface.corner_vertex[triangles]))
+    if one_sided.any():
+        raise OrientationError(
+            "An island has only one side",
+            remedy="Unwrap these faces anew first",
+            kind="face",
+            elements=np.unique(owner[one_sided]),
+        )
+    extent = float(np.ptp(surface.positions, axis=0).max())
+    islands = []
+    for chart in assemble(welded, turn_over(sheets, turned)):
+        sound, _ = with_area(replace(chart, vertex_ids=origin[chart.vertex_ids]), extent)
+        place = np.empty((len(chart.vertices), 2))
+        place[chart.triangles] = uv[chart.corners]
+        islands.append(Island(sound, place))
+    return Islands(islands, repaired.warnings)
+
+
+def _welded(surface: Surface, uv: np.ndarray) -> tuple[Surface, np.ndarray]:
+    """The surface with a vertex for every UV vertex and without seams, and the old vertex of every new one."""
+    finite = np.isfinite(uv).all(axis=1)
+    extent = np.ptp(uv[finite], axis=0).max() if finite.any() else 0.0
+    cell = np.where(finite[:, None], uv, 0.0) / max(extent, np.finfo(float).tiny) / WELD
+    # Corners that are nowhere are alone.
+    alone = np.where(finite, 0, 1 + np.arange(len(uv)))
+    key = np.column_stack([surface.corner_vertex, np.round(cell), alone])
+    unique, index = np.unique(key, axis=0, return_inverse=True)
+    origin = unique[:, 0].astype(np.int64)
+    welded = replace(
+        surface,
+        positions=surface.positions[origin],
+        corner_vertex=index.ravel().astype(np.int64),
+        seams=np.zeros((0, 2), np.int64),
+    )
+    return welded, origin
+
+
+def _labels(surface: Surface) -> np.ndarray:
+    """Connected part (f,) of every polygon; polygons are joined by common sides."""
+    f = len(surface.face_start) - 1
+    size = np.diff(surface.face_start)
+    after = np.arange(len(surface.corner_vertex)) + 1
+    after[surface.face_start[1:][size > 0] - 1] = surface.face_start[:-1][size > 0]
+    key = pair_keys(surface.corner_vertex, surface.corner_vertex[after])
+    polygon = np.repeat(np.arange(f), size)
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order][1:] == key[order][:-1])
+    a, b = polygon[order][same], polygon[order][same + 1]
+    return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(f, f)), directed=False)[1]

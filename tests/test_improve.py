@@ -1,0 +1,340 @@
+"""Improving maps that exist: any number of boundaries, any fold that can be undone, nothing moved that is held."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.refining import refine_islands
+from omt_uv.settings import RefineSettings
+from omt_uv.solver.chart_pins import CornerPins
+from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.contact import contact, crossings
+from omt_uv.solver.distortion import measure
+from omt_uv.solver.embedding import tutte
+from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, PinError
+from omt_uv.solver.geometry import face_areas, signed_areas
+from omt_uv.solver.improve import STRAIGHTENED, boundary_edges, improve
+from omt_uv.solver.islands import uv_islands
+from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.progress import drain
+from omt_uv.solver.topology import boundary_loops
+from omt_uv.solver.untangle import arc_length_rim
+from omt_uv.unwrapping import Refusal
+
+
+def head(count=16):
+    """A bust and its mean value map, which has no folds and very wrong areas."""
+    V, F = meshes.head(count)
+    loop = boundary_loops(F)[0]
+    return V, F, tutte(V, F, loop, arc_length_rim(V, loop, 1.0))
+
+
+def ring(sectors=32, rings=6):
+    """A bumpy ring seen from above: two boundaries."""
+    V, F = meshes.annulus(sectors, rings)
+    V = np.column_stack([V[:, :2], 0.5 * np.sin(3 * V[:, 0]) * np.cos(2 * V[:, 1])])
+    return V, F, V[:, :2].copy()
+
+
+def bump():
+    V, F = meshes.bumpy(12, 12)
+    return V, F, V[:, :2].copy()
+
+
+def run(V, F, uv, **options):
+    return drain(improve(V, F, uv, **options))
+
+
+def figures(V, F, uv):
+    return measure(V, F, uv[F])
+
+
+def centroid(V, F, uv):
+    area = face_areas(V, F)
+    return area @ uv[F].mean(1) / area.sum()
+
+
+# ---- maps ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("make", [head, ring, bump])
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_areas_become_right_where_the_map_lies(make, mirror):
+    V, F, uv = make()
+    uv = uv * [0.1 * mirror, 0.1] + [3, -2]
+    result = run(V, F, uv)
+    after = figures(V, F, result.uv)
+    assert after.area_l1 < 0.01
+    assert after.area_l1 < 0.1 * figures(V, F, uv).area_l1
+    assert (after.folds, after.overlap) == (0, 0)
+    assert signed_areas(result.uv, F).sum() == pytest.approx(signed_areas(uv, F).sum())
+    assert centroid(V, F, result.uv) == pytest.approx(centroid(V, F, uv))
+    assert result.warnings == ()
+    # No turn brings it nearer to where it was.
+    a, b = ((x - centroid(V, F, x)) @ [1, 1j] for x in (result.uv, uv))
+    mass = np.bincount(F.ravel(), np.repeat(face_areas(V, F), 3), len(V))
+    assert np.angle((mass * a.conj()) @ b) == pytest.approx(0, abs=1e-6)
+
+
+def test_an_isometric_map_stays():
+    V, F = meshes.annulus()
+    uv = V[:, :2] * 0.2 + 0.5
+    assert run(V, F, uv).uv == pytest.approx(uv, abs=1e-9)
+
+
+def test_the_result_does_not_depend_on_place_and_size_of_the_map():
+    V, F, uv = ring()
+    first, second = run(V, F, uv).uv, run(1000 * V, F, uv * 1e-3 + 7).uv
+    assert second == pytest.approx(first * 1e-3 + 7, abs=1e-8)
+
+
+def test_balance_trades_area_for_shear():
+    V, F, uv = ring()
+    results = [figures(V, F, run(V, F, uv, balance=t).uv) for t in (0, 0.5, 1)]
+    assert np.all(np.diff([r.area_l1 for r in results]) > 0)
+    assert np.all(np.diff([r.angle_mean for r in results]) < 0)
+
+
+@pytest.mark.parametrize("make", [head, ring])
+@pytest.mark.parametrize("noise", [0.05, 0.2])
+def test_folds_are_undone_and_said(make, noise):
+    V, F, uv = make()
+    folded = uv + noise * np.random.default_rng(0).normal(size=uv.shape)
+    assert figures(V, F, folded).folds > 10
+    result = run(V, F, folded)
+    assert figures(V, F, result.uv).folds == 0
+    assert figures(V, F, result.uv).area_l1 < 0.01
+    assert STRAIGHTENED in result.warnings
+
+
+def test_a_hole_is_kept_apart_from_the_outline():
+    """A ring with a thin wall: pulled into a crossing, the barrier of one loop alone would let it through."""
+    V, F, uv = ring(24, 3)
+    rim = boundary_edges(F)
+    assert len(rim) == 48
+    w = uv @ [1, 1j]
+    assert not len(crossings(w, rim))
+    inner = np.abs(w) < 1.3
+    step = np.where(inner, 1.5, 0) + 0j
+    assert len(crossings(w + step, rim)) > 0
+    assert contact(w, rim, 1.0).limit(w, step) < 1
+
+
+def test_contact_of_edges_equals_contact_of_a_loop():
+    V, F, uv = bump()
+    loop, w = boundary_loops(F)[0], (uv + 0.02 * np.sin(40 * uv[:, ::-1])) @ [1, 1j]
+    a, b = contact(w, loop, 1.0), contact(w, boundary_edges(F), 1.0)
+    assert a.energy(w) == pytest.approx(b.energy(w))
+    assert a.derivatives(w)[0] == pytest.approx(b.derivatives(w)[0])
+
+
+# ---- what is held -------------------------------------------------------------------------------------------
+
+
+def test_pins_stay_to_the_bit():
+    V, F, uv = ring()
+    pins = np.array([0, 50, 99, 150])
+    result = run(V, F, uv, pins=(pins, uv[pins]))
+    assert (result.uv[pins] == uv[pins]).all()
+    assert figures(V, F, result.uv).area_l1 < 0.01
+    assert figures(V, F, result.uv).folds == 0
+
+
+@pytest.mark.parametrize("make", [head, ring])
+def test_the_outline_can_be_kept(make):
+    V, F, uv = make()
+    rim = np.unique(boundary_edges(F))
+    result = run(V, F, uv, pins=(rim, uv[rim]))
+    assert (result.uv[rim] == uv[rim]).all()
+    assert figures(V, F, result.uv).area_l1 < 0.3 * figures(V, F, uv).area_l1
+    assert figures(V, F, result.uv).folds == 0
+
+
+def test_one_pin_holds_the_place_and_two_the_scale():
+    V, F, uv = ring()
+    one = run(V, F, uv, pins=(np.array([7]), uv[[7]])).uv
+    assert (one[7] == uv[7]).all()
+    assert signed_areas(one, F).sum() == pytest.approx(signed_areas(uv, F).sum())
+    places = uv[[7, 90]] * 2 + 1
+    two = run(V, F, uv, pins=(np.array([7, 90]), places)).uv
+    assert (two[[7, 90]] == places).all()
+    assert figures(V, F, two).area_l1 == pytest.approx(figures(V, F, one).area_l1, abs=1e-9)
+
+
+def test_pins_that_force_a_fold_are_named():
+    V, F, uv = bump()
+    pins = np.append(F[100], [0, 12, 156, 168])
+    places = uv[pins][[1, 0, 2, 3, 4, 5, 6]]
+    with pytest.raises(PinError, match="fold") as info:
+        run(V, F, uv, pins=(pins, places))
+    assert set(info.value.elements) <= set(pins)
+
+
+# ---- beyond repair ------------------------------------------------------------------------------------------
+
+
+def test_maps_that_are_none_are_named():
+    V, F, uv = ring()
+    with pytest.raises(FoldedUVError, match="no area"):
+        run(V, F, 0 * uv)
+    with pytest.raises(FoldedUVError, match="not finite"):
+        run(V, F, np.nan * uv)
+    with pytest.raises(FoldedUVError, match="beyond repair"):
+        run(V, F, np.random.default_rng(0).random(uv.shape) * [1, 1e-3])
+    V, F = meshes.icosphere(1)
+    with pytest.raises(FoldedUVError, match="beyond repair"):
+        run(V, F, V[:, :2])
+    V, F = meshes.torus(12, 8)
+    with pytest.raises(FoldedUVError, match="beyond repair"):
+        run(V, F[1:], V[:, :2])
+
+
+# ---- islands ------------------------------------------------------------------------------------------------
+
+
+def corner_uv(F, uv):
+    """UVs (3m,2) of every corner of triangles, as `triangle_surface` numbers them."""
+    return uv[F].reshape(-1, 2).astype(np.float32)
+
+
+def torn():
+    """A bumpy square whose left and right halves lie apart in the UV map, without a seam on the mesh."""
+    V, F, uv = bump()
+    corners = corner_uv(F, uv)
+    right = V[F].mean(1)[:, 0] > 0.5
+    corners[np.repeat(right, 3)] += [2, 0]
+    return triangle_surface(V, F), corners, right
+
+
+def test_islands_follow_the_uvs_and_not_the_seams():
+    surface, uv, right = torn()
+    islands = uv_islands(surface, uv).islands
+    assert sorted(len(i.chart.faces) for i in islands) == [right.sum(), right.sum()]
+    for island in islands:
+        assert (surface.corner_vertex[island.chart.corners] == island.chart.vertex_ids[island.chart.triangles]).all()
+        assert (island.uv[island.chart.triangles] == uv[island.chart.corners]).all()
+    seamed = triangle_surface(surface.positions, surface.corner_vertex.reshape(-1, 3), [[0, 13], [13, 14], [14, 1]])
+    assert (
+        len(uv_islands(seamed, corner_uv(surface.corner_vertex.reshape(-1, 3), surface.positions[:, :2])).islands) == 1
+    )
+
+
+def test_one_face_selects_its_whole_island():
+    surface, uv, right = torn()
+    faces = np.zeros(len(right), bool)
+    faces[np.flatnonzero(right)[5]] = True
+    (island,) = uv_islands(surface, uv, faces).islands
+    assert (np.sort(island.chart.faces) == np.flatnonzero(right)).all()
+
+
+def test_three_faces_of_an_island_at_an_edge_are_named():
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 0.5, 1]])
+    F = np.array([[0, 1, 2], [2, 1, 3], [2, 1, 4]])
+    uv = corner_uv(F, np.array([[0, 0], [1, 0], [0, 1], [1, 1], [0.9, 0.9]]))
+    with pytest.raises(NonManifoldEdgeError) as info:
+        uv_islands(triangle_surface(V, F), uv)
+    assert sorted(info.value.elements.ravel()) == [1, 2]
+
+
+def refined(surface, uv, faces=None, pinned=None, **options):
+    pins = CornerPins(np.zeros(len(uv), bool) if pinned is None else pinned, uv)
+    return drain(refine_islands([(surface, faces, pins)], RefineSettings(**options)))
+
+
+def written(uv, result):
+    after = uv.astype(float)
+    after[result.corners[0]] = result.uv[0]
+    return after
+
+
+def test_islands_get_one_density_and_keep_their_total_area():
+    surface, uv, right = torn()
+    uv[np.repeat(right, 3)] *= 0.3
+    after = written(uv, refined(surface, uv))
+    T = np.arange(len(uv)).reshape(-1, 3)
+    area, before, space = signed_areas(after, T), signed_areas(uv, T), face_areas(surface.positions, T_of(surface))
+    assert area.sum() == pytest.approx(before.sum(), rel=1e-6)
+    left, other = (area[k].sum() / space[k].sum() for k in (~right, right))
+    assert left == pytest.approx(other, rel=1e-6)
+
+
+def T_of(surface):
+    return surface.corner_vertex.reshape(-1, 3)
+
+
+def test_pinned_islands_keep_their_own_density():
+    surface, uv, right = torn()
+    pinned = np.zeros(len(uv), bool)
+    pinned[3 * np.flatnonzero(right)[[0, 20, 40, 60]]] = True
+    result = refined(surface, uv, pinned=pinned)
+    assert not np.isin(np.flatnonzero(pinned), result.corners[0]).any()
+    after, T = written(uv, result), np.arange(len(uv)).reshape(-1, 3)
+    left = np.repeat(~right, 3)
+    alone = refined(surface, uv, faces=~right)
+    assert after[left] == pytest.approx(written(uv, alone)[left], abs=1e-9)
+    assert (signed_areas(after, T) > 0).all()
+
+
+def test_reports_say_what_changed():
+    surface, uv, _ = torn()
+    for report in refined(surface, uv).reports[0]:
+        assert report["area_l1"] < 0.01 < report["before"]["area_l1"]
+        assert report["folds"] == 0
+
+
+def test_an_outline_that_cannot_be_kept_is_named():
+    surface, uv, _ = torn()
+    V, F, _ = bump()
+    corner = np.flatnonzero(np.isclose(uv, [0, 0]).all(1))
+    uv[corner] = [0.4, 0.9]
+    with pytest.raises(Refusal, match="outline"):
+        refined(surface, uv, keep_boundary=True)
+
+
+# ---- unwrapping with pins -----------------------------------------------------------------------------------
+
+
+def unwrapped(V, F, vertices, given):
+    surface = triangle_surface(V, F)
+    uv = corner_uv(F, given)
+    result = drain(unwrap(surface, pins=CornerPins(np.isin(F.ravel(), vertices), uv)))
+    corners, values = result.corner_uv()
+    assert (corners == np.arange(F.size)).all()
+    return result.maps[0], values, uv
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+@pytest.mark.parametrize("vertices", [[84], [0, 168], [0, 12, 84, 156, 168]])
+def test_unwrapping_leaves_pins_in_place(mirror, vertices):
+    V, F, given = bump()
+    chart_map, values, uv = unwrapped(V, F, vertices, given * [0.2 * mirror, 0.2] + [1, 5])
+    pinned = np.isin(F.ravel(), vertices)
+    assert chart_map.pinned
+    assert (values[pinned] == uv[pinned]).all()
+    assert chart_map.folds == 0
+    assert chart_map.area_l1 < 0.01
+
+
+def test_one_pin_keeps_size_and_direction():
+    V, F, given = bump()
+    turn = np.array([[0.6, 0.8], [-0.8, 0.6]])
+    _, values, uv = unwrapped(V, F, [84], 0.1 * given @ turn)
+    T = np.arange(F.size).reshape(-1, 3)
+    assert signed_areas(values, T).sum() == pytest.approx(signed_areas(uv.astype(float), T).sum(), rel=1e-6)
+    plain = drain(unwrap(triangle_surface(V, F))).corner_uv()[1]
+    a, b = ((x - x.mean(0)) @ [1, 1j] for x in (values, uv))
+    assert abs(np.angle(a.conj() @ b)) < 0.05
+    assert np.ptp(plain, axis=0).max() > 5 * np.ptp(values, axis=0).max()
+
+
+def test_unwrapping_names_pins_that_contradict():
+    V, F, given = bump()
+    surface, uv = triangle_surface(V, F), corner_uv(F, given)
+    twice = np.flatnonzero(F.ravel() == 84)
+    uv[twice[0]] += 0.1
+    with pytest.raises(PinError, match="two places") as info:
+        drain(unwrap(surface, pins=CornerPins(F.ravel() == 84, uv)))
+    assert info.value.elements.tolist() == [84]
+    with pytest.raises(PinError, match="square") as info:
+        drain(unwrap(surface, boundary="square", pins=CornerPins(F.ravel() == 7, uv)))
+    assert info.value.elements.tolist() == [7]
