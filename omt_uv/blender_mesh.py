@@ -36,6 +36,11 @@ class Reading:
     pinned: np.ndarray | None
 
     @property
+    def all_pins(self) -> CornerPins | None:
+        """UVs and pins of the whole mesh, None if it has no UVs."""
+        return None if self.uv is None or self.pinned is None else CornerPins(self.pinned, self.uv)
+
+    @property
     def pins(self) -> CornerPins | None:
         """Pins of the polygons to work on, None if they have none."""
         if self.uv is None or self.pinned is None:
@@ -185,7 +190,8 @@ def write_uv(obj: bpy.types.Object, layer: str, corners: np.ndarray, uv: np.ndar
         return
     values = read_uv(obj.data, layer)
     values[corners] = uv
-    obj.data.uv_layers[layer].uv.foreach_set("vector", values.ravel())
+    # Writing to MeshUVLoopLayer.uv would, before Blender 5.2, change the array of the undo step as well.
+    obj.data.attributes[layer].data.foreach_set("vector", values.ravel())
     obj.data.update()
 
 

@@ -73,6 +73,26 @@ def leave_edit():
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
+def set_uv(obj, uv, layer="UVMap"):
+    """Write (c,2) to a layer, made as needed, of an object in Object Mode."""
+    target = obj.data.uv_layers.get(layer) or obj.data.uv_layers.new(name=layer)
+    obj.data.attributes[target.name].data.foreach_set("vector", np.ascontiguousarray(uv, np.float32).ravel())
+
+
+def seen_from_above(obj, scale=1.0, shift=(0.0, 0.0)):
+    """UVs (c,2) that are the x and y of every corner."""
+    vertex = np.array([loop.vertex_index for loop in obj.data.loops])
+    xy = np.array([v.co[:2] for v in obj.data.vertices])
+    return (xy[vertex] * scale + shift).astype(np.float32)
+
+
+def pin(obj, vertices, layer="UVMap"):
+    """Pin all corners of vertices of an object in Object Mode; returns the corners (c,) bool."""
+    pinned = np.array([loop.vertex_index in vertices for loop in obj.data.loops])
+    _flag(obj.data, f".pn.{layer}", "CORNER", pinned)
+    return pinned
+
+
 def uv_of(obj, layer=None):
     """(c,2) float32, also in Edit Mode."""
     if obj.mode == "EDIT":

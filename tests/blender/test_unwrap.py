@@ -116,14 +116,15 @@ def test_only_the_uv_layer_changes():
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
-def test_undo_restores_everything(mode):
+@pytest.mark.parametrize("layer", ["New", "UVMap"])
+def test_undo_restores_everything(mode, layer):
     obj = scenes.bump()
     obj.data.uv_layers.new(name="UVMap")
     name, before = obj.name, scenes.state(obj)
     if mode == "EDIT":
         scenes.edit(obj)
     bpy.ops.ed.undo_push(message="before")
-    assert bpy.ops.uv.omt_unwrap("EXEC_DEFAULT", True, uv_layer="New") == {"FINISHED"}
+    assert bpy.ops.uv.omt_unwrap("EXEC_DEFAULT", True, uv_layer=layer) == {"FINISHED"}
     assert scenes.state(bpy.data.objects[name]) != before
     bpy.ops.ed.undo()
     assert scenes.state(bpy.data.objects[name]) == before
