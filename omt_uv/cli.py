@@ -18,6 +18,7 @@ from .settings import (
     DEFAULT_QUALITY,
     DEFAULT_TEXTURE_SIZE,
     QUALITIES,
+    RefineSettings,
     Settings,
 )
 
@@ -72,6 +73,20 @@ def parser() -> argparse.ArgumentParser:
     unwrap.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
     unwrap.add_argument("--report", type=Path, metavar="R.json", help="write figures of every chart")
 
+    refine = commands.add_parser("refine", help="improve existing UVs of every mesh, whatever unwrapped them")
+    refine.set_defaults(run=run_refine)
+    refine.add_argument("input", type=Path, metavar="IN", help=f"{formats}, with UVs")
+    refine.add_argument("-o", "--output", type=Path, metavar="OUT", required=True, help=formats)
+    refine.add_argument(
+        "--balance", type=_share, default=DEFAULT_BALANCE, metavar="T", help="from 0, exact areas, to 1, least shear"
+    )
+    refine.add_argument(
+        "--quality", choices=_names(QUALITIES), default=DEFAULT_QUALITY.lower(), help="how exact the areas become"
+    )
+    refine.add_argument("--keep-boundary", action="store_true", help="leave the outline of every island as it is")
+    refine.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to refine; default: the active one")
+    refine.add_argument("--report", type=Path, metavar="R.json", help="write figures of every island")
+
     measure = commands.add_parser("measure", help="area error, shear, folds and overlap of the active UV maps")
     measure.set_defaults(run=run_measure)
     measure.add_argument("input", type=Path, metavar="IN", help=f"{formats} .off")
@@ -107,11 +122,9 @@ def _texture_size(text: str) -> int:
 def run_unwrap(options: argparse.Namespace) -> None:
     files, blender_mesh, blender_pack = _blender()
     from .packing import PackingError
-    from .solver.progress import drain
     from .unwrapping import Refusal, lay_out
 
-    if options.output.suffix.lower() not in files.WRITABLE:
-        raise CommandError(f"{options.output}: unknown format. Use one of {' '.join(files.WRITABLE)}.")
+    _check_output(options.output, files)
     settings = Settings(
         boundary=options.boundary,
         quality=options.quality,
@@ -125,10 +138,8 @@ def run_unwrap(options: argparse.Namespace) -> None:
     try:
         for obj in objects:
             blender_mesh.check_target(obj.data, options.uv_layer)
-        layout = drain(
-            lay_out([(r.surface, r.faces, r.pins) for _, r in pairs], settings, blender_pack.pack),
-            _show_progress if sys.stderr.isatty() else None,
-        )
+        surfaces = [(r.surface, r.faces, r.pins) for _, r in pairs]
+        layout = _drain(lay_out(surfaces, settings, blender_pack.pack))
         for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):
             blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
         warnings = files.save(options.output, objects)
@@ -136,15 +147,68 @@ def run_unwrap(options: argparse.Namespace) -> None:
         raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
     except (PackingError, blender_mesh.TargetError, files.FileError) as error:
         raise CommandError(str(error)) from error
-    finally:
-        if sys.stderr.isatty():
-            print("\r\033[K", end="", file=sys.stderr)
-    for index, text in dict.fromkeys(layout.warnings):
-        warnings.append(f"{objects[index].name}: {text}" if index >= 0 else text)
-    for text in warnings:
-        print(f"{PROGRAM}: warning: {text}", file=sys.stderr)
+    warnings = _warn(objects, layout.warnings, warnings)
     if options.report:
-        _write_report(options, [obj.name for obj in objects], layout, warnings)
+        charts = [surface_map.report() for surface_map in layout.maps]
+        packing = {"packer": layout.packing.packer, "scale": layout.packing.scale}
+        if not options.no_pack:
+            packing["coverage"] = layout.packing.coverage
+        _write_report(options, {"boundary": options.boundary, "packing": packing}, objects, charts, warnings)
+
+
+def run_refine(options: argparse.Namespace) -> None:
+    files, blender_mesh, _ = _blender()
+    from .refining import refine_islands
+    from .unwrapping import Refusal
+
+    _check_output(options.output, files)
+    pairs = _read(options.input, files, blender_mesh, options.uv_layer)
+    objects = [obj for obj, _ in pairs]
+    for obj in objects:
+        if options.uv_layer and options.uv_layer not in obj.data.uv_layers:
+            raise CommandError(f"{obj.name} has no UV map {options.uv_layer!r}. Name one that it has.")
+    settings = RefineSettings(quality=options.quality, balance=options.balance, keep_boundary=options.keep_boundary)
+    try:
+        for obj in objects:
+            blender_mesh.check_target(obj.data, options.uv_layer)
+        refined = _drain(refine_islands([(r.surface, r.faces, r.all_pins) for _, r in pairs], settings))
+        for obj, corners, uv in zip(objects, refined.corners, refined.uv, strict=True):
+            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
+        warnings = files.save(options.output, objects)
+    except Refusal as refusal:
+        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
+    except (blender_mesh.TargetError, files.FileError) as error:
+        raise CommandError(str(error)) from error
+    warnings = _warn(objects, refined.warnings, warnings)
+    if options.report:
+        _write_report(options, {"keep_boundary": options.keep_boundary}, objects, refined.reports, warnings)
+
+
+def _check_output(path: Path, files) -> None:
+    if path.suffix.lower() not in files.WRITABLE:
+        raise CommandError(f"{path}: unknown format. Use one of {' '.join(files.WRITABLE)}.")
+
+
+def _drain(steps):
+    """The result of a solver; a terminal shows its progress."""
+    from .solver.progress import drain
+
+    shown = sys.stderr.isatty()
+    try:
+        return drain(steps, _show_progress if shown else None)
+    finally:
+        if shown:
+            print("\r\033[K", end="", file=sys.stderr)
+
+
+def _warn(objects: list, solver_warnings: list[tuple[int, str]], warnings: list[str]) -> list[str]:
+    """Print and return the warnings of the writer and of the solver, each once."""
+    told = list(warnings)
+    for index, text in dict.fromkeys(solver_warnings):
+        told.append(f"{objects[index].name}: {text}" if index >= 0 else text)
+    for text in told:
+        print(f"{PROGRAM}: warning: {text}", file=sys.stderr)
+    return told
 
 
 def run_measure(options: argparse.Namespace) -> None:
@@ -201,24 +265,20 @@ def _show_progress(progress) -> None:
     print(f"\r\033[K{100 * progress.fraction:3.0f} % {progress.stage}", end="", file=sys.stderr, flush=True)
 
 
-def _write_report(options: argparse.Namespace, names: list[str], layout, warnings: list[str]) -> None:
-    charts = [
-        {"object": name, "chart": k, **figures}
-        for name, surface_map in zip(names, layout.maps, strict=True)
-        for k, figures in enumerate(surface_map.report())
-    ]
-    packing = {"packer": layout.packing.packer, "scale": layout.packing.scale}
-    if not options.no_pack:
-        packing["coverage"] = layout.packing.coverage
+def _write_report(options: argparse.Namespace, more: dict, objects: list, charts: list, warnings: list[str]) -> None:
+    """Settings, `more`, the figures of the charts of every object, and warnings as JSON."""
     report = {
         "version": __version__,
         "input": str(options.input),
         "output": str(options.output),
-        "boundary": options.boundary,
         "quality": options.quality,
         "balance": options.balance,
-        "packing": packing,
-        "charts": charts,
+        **more,
+        "charts": [
+            {"object": obj.name, "chart": k, **figures}
+            for obj, mine in zip(objects, charts, strict=True)
+            for k, figures in enumerate(mine)
+        ],
         "warnings": warnings,
     }
     try:

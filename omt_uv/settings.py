@@ -41,3 +41,14 @@ class Settings:
     def solver_arguments(self) -> dict:
         """Keyword arguments of `solver.parameterize.unwrap`."""
         return {"boundary": self.boundary, "quality": self.quality, "balance": self.balance}
+
+
+@dataclass(frozen=True)
+class RefineSettings(Settings):
+    """How to refine existing UVs; the boundary is free.
+
+    keep_boundary : the outline of every island stays exactly as it is; pack : arrange the islands anew
+    """
+
+    pack: bool = False
+    keep_boundary: bool = False

@@ -5,6 +5,8 @@ numpy and scipy load when an operator runs, so that Blender does not wait for th
 
 from __future__ import annotations
 
+from collections import Counter
+
 import bpy
 
 
@@ -67,6 +69,13 @@ def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Co
         select_culprits(context, complaint.obj, complaint.error)
     operator.report({"ERROR"}, str(complaint))
     return {"CANCELLED"}
+
+
+def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, str]]) -> None:
+    """Report warnings, pairs of an index into objects (-1: of none) and a text, each once."""
+    for (index, text), count in Counter(warnings).items():
+        name = f"{objects[index].name}: " if index >= 0 else ""
+        operator.report({"WARNING"}, f"{name}{text}" + (f" ({count} islands)" if count > 1 else ""))
 
 
 class SolverOperator:

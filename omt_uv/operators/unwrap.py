@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
@@ -17,7 +15,7 @@ from ..settings import (
     QUALITIES,
     Settings,
 )
-from .common import Complaint, SolverOperator, read_objects
+from .common import Complaint, SolverOperator, read_objects, warn
 
 
 class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
@@ -109,9 +107,7 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
         for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):
             layer = blender_mesh.target_layer(obj.data, self.uv_layer)
             blender_mesh.write_uv(obj, layer, corners, uv)
-        for (index, text), count in Counter(layout.warnings).items():
-            name = f"{objects[index].name}: " if index >= 0 else ""
-            self.report({"WARNING"}, f"{name}{text}" + (f" ({count} islands)" if count > 1 else ""))
+        warn(self, objects, layout.warnings)
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:

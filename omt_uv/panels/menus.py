@@ -5,12 +5,14 @@ from __future__ import annotations
 import bpy
 
 from ..operators.measure import UV_OT_omt_measure
+from ..operators.refine import UV_OT_omt_refine
 from ..operators.unwrap import UV_OT_omt_unwrap
 
 
 def draw_unwrap(self, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator(UV_OT_omt_unwrap.bl_idname)
+    self.layout.operator(UV_OT_omt_refine.bl_idname)
     self.layout.operator(UV_OT_omt_measure.bl_idname)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..operators.measure import UV_OT_omt_measure
+from ..operators.refine import UV_OT_omt_refine
 from ..operators.unwrap import UV_OT_omt_unwrap, draw_settings
 
 
@@ -22,6 +23,8 @@ class SidebarPanel:
         # The operator starts from these, so nothing has to be kept in the scene.
         draw_settings(layout.column(), context.window_manager.operator_properties_last(UV_OT_omt_unwrap.bl_idname))
         layout.operator(UV_OT_omt_unwrap.bl_idname, icon="UV")
+        # It starts from its own settings, which its redo panel shows: they are few, and mostly other ones.
+        layout.operator(UV_OT_omt_refine.bl_idname)
         layout.operator(UV_OT_omt_measure.bl_idname)
 
 

@@ -41,7 +41,7 @@ def test_sidebar_shows_every_setting(name):
     panel = getattr(bpy.types, name)
     assert panel.poll(bpy.context)
     panel.draw(types.SimpleNamespace(layout=Layout(record)), bpy.context)
-    assert record == [*SETTINGS, "uv.omt_unwrap", "uv.omt_measure"]
+    assert record == [*SETTINGS, "uv.omt_unwrap", "uv.omt_refine", "uv.omt_measure"]
 
 
 def test_redo_panel_shows_every_setting(package):
@@ -52,10 +52,20 @@ def test_redo_panel_shows_every_setting(package):
     assert set(SETTINGS) == {p.identifier for p in properties.bl_rna.properties if not p.is_readonly} - {"rna_type"}
 
 
+def test_refine_shows_every_setting():
+    record = []
+    properties = bpy.context.window_manager.operator_properties_last("uv.omt_refine")
+    settings = {p.identifier for p in properties.bl_rna.properties if not p.is_readonly} - {"rna_type"}
+    stand_in = types.SimpleNamespace(layout=Layout(record), bl_rna=properties.bl_rna, keep_boundary=False, pack=True)
+    bpy.types.UV_OT_omt_refine.draw(stand_in, bpy.context)
+    assert set(record) == settings
+    assert len(record) == len(settings)
+
+
 def test_menu_entry(package):
     record = []
     package("panels.menus").draw_unwrap(types.SimpleNamespace(layout=Layout(record)), bpy.context)
-    assert record == ["uv.omt_unwrap", "uv.omt_measure"]
+    assert record == ["uv.omt_unwrap", "uv.omt_refine", "uv.omt_measure"]
 
 
 def test_the_choices_are_those_of_the_solver_and_of_the_command(package):

@@ -1,0 +1,116 @@
+"""uv.omt_refine: better areas for UVs that exist, whatever unwrapped them."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from ..settings import (
+    DEFAULT_BALANCE,
+    DEFAULT_MARGIN,
+    DEFAULT_QUALITY,
+    DEFAULT_TEXTURE_SIZE,
+    QUALITIES,
+    RefineSettings,
+)
+from .common import Complaint, SolverOperator, read_objects, warn
+
+
+class UV_OT_omt_refine(SolverOperator, bpy.types.Operator):
+    """Give every part of existing UV islands its share of the texture. Islands stay whole and in place, pins too"""
+
+    bl_idname = "uv.omt_refine"
+    bl_label = "Refine Area"
+    bl_options = {"REGISTER", "UNDO"}
+
+    balance: FloatProperty(
+        name="Balance",
+        description="From 0, exact areas, to 1, least shear",
+        default=DEFAULT_BALANCE,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    quality: EnumProperty(
+        name="Quality", description="How exact the areas become", items=QUALITIES, default=DEFAULT_QUALITY
+    )
+    keep_boundary: BoolProperty(
+        name="Keep Outline", description="Leave the outline of every island exactly as it is", default=False
+    )
+    pack: BoolProperty(
+        name="Pack Islands",
+        description="Arrange the refined islands anew in the unit square. Otherwise they stay where they are",
+        default=False,
+    )
+    margin: IntProperty(
+        name="Margin",
+        description="Least distance between islands, in pixels of the texture",
+        default=DEFAULT_MARGIN,
+        min=0,
+        max=1024,
+        soft_max=64,
+        subtype="PIXEL",
+    )
+    texture_size: IntProperty(
+        name="Texture Size",
+        description="Width of the texture that the margin is measured in",
+        default=DEFAULT_TEXTURE_SIZE,
+        min=16,
+        max=65536,
+        soft_max=8192,
+        subtype="PIXEL",
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "balance")
+        layout.prop(self, "quality")
+        layout.prop(self, "keep_boundary")
+        row = layout.column()
+        row.active = not self.keep_boundary
+        row.prop(self, "pack")
+        column = layout.column()
+        column.active = self.pack and not self.keep_boundary
+        column.prop(self, "margin")
+        column.prop(self, "texture_size")
+
+    def settings(self) -> RefineSettings:
+        return RefineSettings(
+            quality=self.quality.lower(),
+            balance=self.balance,
+            margin=self.margin,
+            texture_size=self.texture_size,
+            pack=self.pack,
+            keep_boundary=self.keep_boundary,
+        )
+
+    def steps(self, context: bpy.types.Context):
+        from .. import blender_mesh, blender_pack, packing
+        from ..refining import refine_islands
+        from ..unwrapping import Refusal
+
+        pairs = read_objects(context)
+        try:
+            for obj, _ in pairs:
+                blender_mesh.check_target(obj.data, "")
+        except blender_mesh.TargetError as error:
+            raise Complaint(str(error)) from error
+        surfaces = [(reading.surface, reading.faces, reading.all_pins) for _, reading in pairs]
+        try:
+            refined = yield from refine_islands(surfaces, self.settings(), blender_pack.pack)
+        except Refusal as refusal:
+            obj = pairs[refusal.index][0]
+            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
+        except packing.PackingError as error:
+            raise Complaint(str(error)) from error
+        return [obj for obj, _ in pairs], refined
+
+    def finish(self, context: bpy.types.Context, result) -> None:
+        from .. import blender_mesh
+
+        objects, refined = result
+        for obj, corners, uv in zip(objects, refined.corners, refined.uv, strict=True):
+            blender_mesh.write_uv(obj, obj.data.uv_layers.active.name, corners, uv)
+        warn(self, objects, refined.warnings)
