@@ -1,0 +1,47 @@
+"""Many charts by xatlas, as seams between polygons."""
+
+from dataclasses import replace
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.segmentation import chart_seams
+from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.errors import EmptyMeshError
+from omt_uv.solver.preparation import prepare
+
+pytest.importorskip("xatlas")
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_a_cube_falls_into_its_sides(scale):
+    V, F = meshes.cube()
+    V, F = meshes.subdivide(V, F)
+    mesh = triangle_surface(V * scale, F)
+    prepared = prepare(replace(mesh, seams=chart_seams(mesh)))
+    assert len(prepared.charts) == 6 and not prepared.cuts.pieces
+    for chart in prepared.charts:
+        assert (np.ptp(chart.vertices, axis=0) == 0).sum() == 1
+
+
+def test_polygons_stay_whole():
+    V, polygons = meshes.quad_grid(8, 8)
+    V = V * [1, 1, 6]
+    mesh = meshes.polygon_surface(V, polygons)
+    seams = chart_seams(mesh)
+    sides = {frozenset((p[k], p[k - 1])) for p in polygons for k in range(4)}
+    assert all(frozenset(edge) in sides for edge in seams.tolist())
+
+
+def test_closed_surfaces_become_disks():
+    V, F = meshes.torus()
+    mesh = triangle_surface(V, F)
+    charts = prepare(replace(mesh, seams=chart_seams(mesh))).charts
+    assert len(charts) > 1 and sum(len(c.triangles) for c in charts) == len(F)
+
+
+def test_nothing_to_segment():
+    V, F = meshes.cube()
+    with pytest.raises(EmptyMeshError):
+        chart_seams(triangle_surface(V, F), np.zeros(len(F), bool))
