@@ -10,8 +10,9 @@ from omt_uv.solver import errors
 from omt_uv.solver.conformal import conformal_disk
 from omt_uv.solver.domain import ConvexPolygon, Disk, Rectangle, segment_integrals
 from omt_uv.solver.geometry import vertex_areas
-from omt_uv.solver.power_diagram import power_diagram, regular_triangulation
+from omt_uv.solver.power_diagram import power_diagram
 from omt_uv.solver.progress import drain
+from omt_uv.solver.regular import by_flips, by_hull
 from omt_uv.solver.transport import transport
 
 DOMAINS = {
@@ -89,7 +90,7 @@ def test_hidden_sites_have_no_area():
 
 def test_without_weights_it_is_the_delaunay_triangulation():
     sites = inside(Disk(), 200)
-    got = {tuple(sorted(t)) for t in regular_triangulation(sites, np.zeros(200))}
+    got = {tuple(sorted(t)) for t in by_hull(sites, np.zeros(200)).triangles}
     assert got == {tuple(sorted(t)) for t in Delaunay(sites).simplices}
 
 

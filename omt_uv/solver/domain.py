@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .geometry import cross2
+from .geometry import cross2, dot2
 
 
 def segment_integrals(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -67,10 +67,10 @@ class Disk:
         self.period = 2 * np.pi
 
     def contains(self, points):
-        return (points**2).sum(axis=1) <= self.radius**2
+        return dot2(points, points) <= self.radius**2
 
     def clip(self, origin, direction):
-        middle = -(origin * direction).sum(axis=1)
+        middle = -dot2(origin, direction)
         offset = cross2(origin, direction)
         half = np.sqrt(np.maximum(self.radius**2 - offset**2, 0))
         return middle - half, np.where(np.abs(offset) < self.radius, middle + half, middle - half - 1)

@@ -11,6 +11,11 @@ def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
+def dot2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar product of plane vectors (..., 2); several times faster than a sum along an axis of two."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
+
+
 def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Length of every halfedge, (3m,), of positions (n,2) or (n,3)."""
     p = positions[triangles]

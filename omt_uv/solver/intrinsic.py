@@ -1,15 +1,7 @@
 """Intrinsic triangulations as flat arrays, made Delaunay by vectorised edge flips.
 
-            k                            k
-          /   \\                        / | \\
-        /   t   \\                    /   |   \\
-       i --h---> j      flip h      i  t  |  s  j
-        \\   s   /     --------->     \\   |   /
-          \\   /                        \\ | /
-            l                            l
-
-A flip keeps the metric (`euclidean_diagonal`) or the discrete conformal class (`ptolemy_diagonal`).
-A triangulation may become a Delta-complex: several edges between the same two vertices are fine.
+A flip keeps the metric (`euclidean_diagonal`) or the discrete conformal class (`ptolemy_diagonal`); see the picture
+in `flips.py`. A triangulation may become a Delta-complex: several edges between the same two vertices are fine.
 """
 
 from __future__ import annotations
@@ -20,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import PrecisionError
+from .flips import flip_in_place, flip_until_none
 from .geometry import halfedge_lengths
 from .topology import next_halfedge, previous_halfedge, twins
 
@@ -78,35 +71,16 @@ def flip(tri: IntrinsicTriangulation, h: np.ndarray, diagonal: Diagonal) -> Intr
     the Euclidean one must be applied to the unscaled metric.
     """
     triangles, twin, log_length = tri.triangles.copy(), tri.twin.copy(), tri.log_length.copy()
-    flip_in_place(triangles, twin, log_length, h, diagonal)
+    _flip_in_place(triangles, twin, log_length, h, diagonal)
     return IntrinsicTriangulation(triangles, twin, log_length)
 
 
-def flip_in_place(triangles, twin, log_length, h, diagonal: Diagonal) -> None:
-    """As `flip`, overwriting the three arrays."""
-    flat = triangles.reshape(-1)
+def _flip_in_place(triangles, twin, log_length, h, diagonal: Diagonal) -> None:
     g = twin[h]
-    jk, ki, il, lj = next_halfedge(h), previous_halfedge(h), next_halfedge(g), previous_halfedge(g)
-    i, j, k, opposite = flat[h], flat[g], flat[ki], flat[lj]
-    new_length = diagonal(log_length[jk], log_length[ki], log_length[il], log_length[lj], log_length[h])
-    t, s = h // 3, g // 3
-
-    old = np.concatenate([il, ki, jk, lj])
-    new = np.concatenate([3 * t, 3 * t + 2, 3 * s, 3 * s + 2])
-    moved_twin, moved_length = twin[old], log_length[old]
-    # An outer twin may itself lie in a triangle that is rebuilt in this round.
-    lookup = np.concatenate([new, [-1]])
-    order = np.argsort(old)
-    place = order[np.minimum(np.searchsorted(old[order], moved_twin), len(old) - 1)]
-    moved_twin = np.where(old[place] == moved_twin, lookup[place], moved_twin)
-
-    triangles[t] = np.stack([i, opposite, k], axis=1)
-    triangles[s] = np.stack([j, k, opposite], axis=1)
-    twin[new], log_length[new] = moved_twin, moved_length
-    inner = moved_twin >= 0
-    twin[moved_twin[inner]] = new[inner]
-    twin[3 * t + 1], twin[3 * s + 1] = 3 * s + 1, 3 * t + 1
-    log_length[3 * t + 1] = log_length[3 * s + 1] = new_length
+    around = (next_halfedge(h), previous_halfedge(h), next_halfedge(g), previous_halfedge(g), h)
+    new_length = diagonal(*(log_length[e] for e in around))
+    flip_in_place(triangles, twin, h, log_length)
+    log_length[3 * (h // 3) + 1] = log_length[3 * (g // 3) + 1] = new_length
 
 
 def make_delaunay(
@@ -118,43 +92,23 @@ def make_delaunay(
 ) -> tuple[IntrinsicTriangulation, int]:
     """Flip until cos + cos >= 0 holds at every interior edge of the metric scaled by u (n,).
 
-    A round flips an independent set: an edge is taken when it is the worst in both of its triangles;
-    the next round looks only at edges of touched triangles. Returns the triangulation and the number
-    of flips. Raises PrecisionError if the rounds do not end.
+    Returns the triangulation and the number of flips. Raises PrecisionError if the rounds do not end.
     """
     triangles, twin, log_length = tri.triangles.copy(), tri.twin.copy(), tri.log_length.copy()
     if u is None:
         u = np.zeros(int(triangles.max()) + 1)
-    edges = np.flatnonzero(twin > np.arange(len(twin)))
-    flips = 0
-    for _ in range(max_rounds):
-        chosen, waiting = _worst_independent(triangles, twin, log_length, u, edges, tolerance)
-        if len(chosen) == 0:
-            return IntrinsicTriangulation(triangles, twin, log_length), flips
-        touched = np.concatenate([chosen // 3, twin[chosen] // 3])
-        flip_in_place(triangles, twin, log_length, chosen, diagonal)
-        flips += len(chosen)
-        # Halfedges of touched triangles have new meanings; those that lost their turn elsewhere keep theirs.
-        again = np.concatenate([(3 * touched[:, None] + np.arange(3)).ravel(), waiting])
-        again = again[twin[again] >= 0]
-        edges = np.unique(np.minimum(again, twin[again]))
-    raise PrecisionError("The intrinsic Delaunay triangulation does not settle")
-
-
-def _worst_independent(triangles, twin, log_length, u, edges, tolerance):
-    """Edges that violate the Delaunay condition and are the worst in both their triangles, and the other bad ones."""
     flat = triangles.reshape(-1)
-    t, s = edges // 3, twin[edges] // 3
-    cosine = _edge_cosine(flat, log_length, u, edges) + _edge_cosine(flat, log_length, u, twin[edges])
-    bad = (cosine < -tolerance) & (t != s)
-    edges, t, s = edges[bad], t[bad], s[bad]
-    rank = np.empty(len(edges), dtype=np.int64)
-    rank[np.argsort(cosine[bad], kind="stable")] = np.arange(len(edges))
-    worst = np.full(len(triangles), len(edges), dtype=np.int64)
-    np.minimum.at(worst, t, rank)
-    np.minimum.at(worst, s, rank)
-    first = (worst[t] == rank) & (worst[s] == rank)
-    return edges[first], edges[~first]
+
+    def violation(edges):
+        return _edge_cosine(flat, log_length, u, edges) + _edge_cosine(flat, log_length, u, twin[edges]) + tolerance
+
+    def flip_edges(edges):
+        _flip_in_place(triangles, twin, log_length, edges, diagonal)
+
+    flips, settled = flip_until_none(twin, violation, flip_edges, max_rounds)
+    if not settled:
+        raise PrecisionError("The intrinsic Delaunay triangulation does not settle")
+    return IntrinsicTriangulation(triangles, twin, log_length), flips
 
 
 def _edge_cosine(flat, log_length, u, h):

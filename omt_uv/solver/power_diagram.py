@@ -1,7 +1,7 @@
 """Power diagrams clipped to a convex domain: areas, moments and dual edges, all cells at once.
 
-The cell of site i is where |x - y_i|^2 - w_i is least (Aurenhammer 1987). Its dual, the regular triangulation,
-is the lower convex hull of the lifted points (y, |y|^2 - w).
+The cell of site i is where |x - y_i|^2 - w_i is least (Aurenhammer 1987). The dual is the regular triangulation of
+`regular.py`.
 """
 
 from __future__ import annotations
@@ -9,14 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from .domain import Domain, segment_integrals
-from .errors import TransportError
-from .topology import pair_keys, pair_up
-
-# A facet this steep stands on the rim of the hull; its power centre is far out of any domain.
-STEEP = 1e-9
+from .geometry import cross2, dot2
+from .regular import Regular, by_hull
+from .topology import halfedges
 
 
 @dataclass(frozen=True)
@@ -24,7 +21,8 @@ class PowerDiagram:
     """Cells of n sites in a domain.
 
     area (n,), moment (n,2) the integral of x over the cell, second (n,) the integral of |x|^2;
-    edges (k,2) pairs of sites whose cells share a side, length (k,) of these sides inside the domain.
+    edges (k,2) pairs of sites whose cells share a side, length (k,) of these sides inside the domain;
+    dual: the regular triangulation.
     """
 
     area: np.ndarray
@@ -32,6 +30,7 @@ class PowerDiagram:
     second: np.ndarray
     edges: np.ndarray
     length: np.ndarray
+    dual: Regular
 
     @property
     def centroid(self) -> np.ndarray:
@@ -40,11 +39,13 @@ class PowerDiagram:
 
     def cost(self, sites: np.ndarray) -> float:
         """The transport cost, the integral of |x - y_i|^2 over all cells i of sites (n,2)."""
-        return float((self.second - 2 * (sites * self.moment).sum(axis=1) + (sites**2).sum(axis=1) * self.area).sum())
+        return float((self.second - 2 * dot2(sites, self.moment) + dot2(sites, sites) * self.area).sum())
 
 
-def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain) -> PowerDiagram:
+def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: Regular | None = None) -> PowerDiagram:
     """Power diagram of sites (n,2) with power weights (n,) inside the domain; hidden sites have area 0.
+
+    `dual` is the regular triangulation of these sites and weights, if it is known already.
 
     The areas sum to the domain's area exactly, whatever the rounding of single vertices: every side is
     counted once for each of its two cells, and the arcs of the boundary telescope.
@@ -54,8 +55,9 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain) -> Pow
     TransportError : the sites cannot be triangulated
     """
     n = len(sites)
-    triangles = regular_triangulation(sites, weights)
-    edge = _dual_edges(sites, weights, triangles)
+    if dual is None:
+        dual = by_hull(sites, weights)
+    edge = _dual_edges(sites, weights, dual)
     centre_inside = np.append(domain.contains(edge.centre), False)
     right_inside, left_inside = centre_inside[edge.right], centre_inside[edge.left]
     enter, leave = domain.clip(edge.origin, edge.direction)
@@ -87,29 +89,7 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain) -> Pow
         around = int((((sites - corner) ** 2).sum(axis=1) - weights).argmin())
     arcs[:, around] += domain.total_integrals()
     integrals += arcs
-    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], pairs, np.maximum(end - start, 0))
-
-
-def regular_triangulation(sites: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Triangles (k,3), counter-clockwise, of the regular triangulation of sites (n,2) with weights (n,).
-
-    Raises TransportError for fewer than three sites, sites on one line, and sites that coincide.
-    """
-    # The hull of three lifted points is flat; a fourth far above closes it from the upper side.
-    lifted = np.column_stack([sites, (sites**2).sum(axis=1) - weights])
-    spread = max(np.ptp(lifted[:, 2]), np.ptp(sites, axis=0).max(), 1e-300)
-    above = np.append(sites.mean(axis=0), lifted[:, 2].max() + spread)
-    try:
-        hull = ConvexHull(np.vstack([lifted, above]), qhull_options="Qt Q12")
-    except (QhullError, ValueError) as error:
-        raise TransportError("The sites of the transport lie on one line or coincide") from error
-    n = len(sites)
-    triangles = hull.simplices.astype(np.int64)
-    triangles = triangles[(hull.equations[:, 2] < -STEEP) & (triangles.max(axis=1) < n)]
-    a, b, c = (sites[triangles[:, k]] for k in range(3))
-    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
-    triangles[turned] = triangles[turned][:, [0, 2, 1]]
-    return triangles
+    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], pairs, np.maximum(end - start, 0), dual)
 
 
 @dataclass(frozen=True)
@@ -126,25 +106,23 @@ class _DualEdges:
     centre: np.ndarray
 
 
-def _dual_edges(sites, weights, triangles) -> _DualEdges:
-    centre = _power_centres(sites, weights, triangles)
-    tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
-    first, second = pair_up(pair_keys(tail, head))
-    single = np.ones(len(tail), dtype=bool)
-    single[first] = single[second] = False
-    rim = np.flatnonzero(single)
-    h = np.concatenate([first, rim])
+def _dual_edges(sites, weights, dual: Regular) -> _DualEdges:
+    centre = _power_centres(sites, weights, dual.triangles)
+    tail, head = halfedges(dual.triangles)
+    inner = np.flatnonzero(dual.twin > np.arange(len(dual.twin)))
+    rim = np.flatnonzero(dual.twin < 0)
+    h = np.concatenate([inner, rim])
     left = h // 3
-    right = np.concatenate([second // 3, np.full(len(rim), -1)])
+    right = np.concatenate([dual.twin[inner] // 3, np.full(len(rim), -1)])
     i, j = tail[h], head[h]
     apart = sites[j] - sites[i]
-    squared = (apart**2).sum(axis=1)
+    squared = dot2(apart, apart)
     share = 0.5 + (weights[i] - weights[j]) / (2 * squared)
     origin = sites[i] + share[:, None] * apart
     direction = np.stack([-apart[:, 1], apart[:, 0]], axis=1) / np.sqrt(squared)[:, None]
-    t_left = ((centre[left] - origin) * direction).sum(axis=1)
-    t_right = ((centre[right] - origin) * direction).sum(axis=1)
-    t_right[len(first) :] = -np.inf
+    t_left = dot2(centre[left] - origin, direction)
+    t_right = dot2(centre[right] - origin, direction)
+    t_right[len(inner) :] = -np.inf
     return _DualEdges(np.stack([i, j], axis=1), origin, direction, left, right, t_left, t_right, centre)
 
 
@@ -152,9 +130,9 @@ def _power_centres(sites, weights, triangles) -> np.ndarray:
     """Point of equal power of each triangle, (k,2), relative to its first corner so that clusters keep precision."""
     a = sites[triangles[:, 0]]
     b, c = sites[triangles[:, 1]] - a, sites[triangles[:, 2]] - a
-    rb = (b**2).sum(axis=1) - weights[triangles[:, 1]] + weights[triangles[:, 0]]
-    rc = (c**2).sum(axis=1) - weights[triangles[:, 2]] + weights[triangles[:, 0]]
-    twice = 2 * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
+    rb = dot2(b, b) - weights[triangles[:, 1]] + weights[triangles[:, 0]]
+    rc = dot2(c, c) - weights[triangles[:, 2]] + weights[triangles[:, 0]]
+    twice = 2 * cross2(b, c)
     twice = np.where(np.abs(twice) > 1e-300, twice, 1e-300)
     return a + np.stack([rb * c[:, 1] - rc * b[:, 1], rc * b[:, 0] - rb * c[:, 0]], axis=1) / twice[:, None]
 

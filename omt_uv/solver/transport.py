@@ -15,6 +15,7 @@ from .geometry import laplacian_from_weights
 from .linear import solve_spd
 from .power_diagram import PowerDiagram, power_diagram
 from .progress import Progress, Steps
+from .regular import by_flips
 
 TOLERANCE = 5e-7
 MAX_STEPS = 100
@@ -23,7 +24,7 @@ MAX_HALVINGS = 30
 
 @dataclass(frozen=True)
 class Transport:
-    """Weights (n,) and cells; residual: largest |area - mass| / mass; cost; Newton steps and diagrams built."""
+    """Weights (n,) and cells; residual: largest |area - mass| / mass; cost; Newton steps, diagrams and hulls built."""
 
     weights: np.ndarray
     cells: PowerDiagram
@@ -31,6 +32,7 @@ class Transport:
     cost: float
     iterations: int
     diagrams: int
+    hulls: int
 
 
 def transport(
@@ -55,13 +57,12 @@ def transport(
         raise TransportError("Transport needs positive, finite masses", "Give every vertex area", "vertex", wrong)
     mass = mass * (domain.area / mass.sum())
     w = np.zeros(len(sites)) if weights is None else weights - weights.mean()
-    cells = power_diagram(sites, w, domain)
-    diagrams = 1
+    diagrams = _Diagrams(sites, domain)
+    cells = diagrams.anew(w)
     hidden = np.flatnonzero(cells.area <= 0)
     if len(hidden):
         raise TransportError("Sites coincide or lie outside the domain", kind="vertex", elements=hidden)
     floor = 0.5 * min(cells.area.min(), mass.min())
-    error = np.linalg.norm(cells.area - mass)
     first = max(_residual(cells, mass), tolerance)
     step = 1.0
     for iteration in range(MAX_STEPS):
@@ -69,21 +70,49 @@ def transport(
         done = 1 - np.log(max(residual, tolerance) / tolerance) / np.log(1 + first / tolerance)
         yield Progress("Optimal transport", float(np.clip(done, 0, 1)))
         if residual <= tolerance:
-            return Transport(w, cells, residual, cells.cost(sites), iteration, diagrams)
+            if diagrams.flipped:
+                # The result stands on a hull of its own, whatever the flips have led to.
+                cells = diagrams.anew(w)
+                residual = _residual(cells, mass)
+            if residual <= tolerance:
+                return Transport(w, cells, residual, cells.cost(sites), iteration, diagrams.count, diagrams.hulls)
         direction = _newton_direction(sites, cells, mass)
+        error = np.linalg.norm(cells.area - mass)
         step = min(1.0, 4 * step)
         for _ in range(MAX_HALVINGS):
             trial_w = w + step * direction
-            trial = power_diagram(sites, trial_w, domain)
-            diagrams += 1
-            trial_error = np.linalg.norm(trial.area - mass)
-            if trial.area.min() >= floor and trial_error <= (1 - step / 2) * error:
-                break
+            trial = diagrams.next(trial_w, cells)
+            if trial is not None and trial.area.min() >= floor:
+                if np.linalg.norm(trial.area - mass) <= (1 - step / 2) * error:
+                    break
             step /= 2
         else:
             raise TransportError(f"The transport is stuck at a residual of {residual:.1e}")
-        w, cells, error = trial_w, trial, trial_error
+        w, cells = trial_w, trial
     raise TransportError(f"The transport did not converge in {MAX_STEPS} steps")
+
+
+class _Diagrams:
+    """Diagrams of the same sites under changing weights: repaired by flips where that works, else by a hull."""
+
+    def __init__(self, sites: np.ndarray, domain: Domain):
+        self.sites, self.domain = sites, domain
+        self.count = self.hulls = 0
+        self.flipped = False
+
+    def anew(self, weights: np.ndarray) -> PowerDiagram:
+        self.count, self.hulls, self.flipped = self.count + 1, self.hulls + 1, False
+        return power_diagram(self.sites, weights, self.domain)
+
+    def next(self, weights: np.ndarray, near: PowerDiagram) -> PowerDiagram | None:
+        """The diagram near another one; None if a cell has certainly vanished."""
+        dual, hidden = by_flips(near.dual, self.sites, weights)
+        if hidden:
+            return None
+        if dual is None:
+            return self.anew(weights)
+        self.count, self.flipped = self.count + 1, True
+        return power_diagram(self.sites, weights, self.domain, dual)
 
 
 def _residual(cells: PowerDiagram, mass: np.ndarray) -> float:

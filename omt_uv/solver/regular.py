@@ -1,0 +1,91 @@
+"""Regular triangulations of weighted sites: by one convex hull, or repaired by flips when only the weights changed.
+
+The regular triangulation is the lower convex hull of the lifted points (y, |y|^2 - w) (Aurenhammer 1987).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from .errors import TransportError
+from .flips import flip_in_place, flip_until_none
+from .geometry import cross2, dot2
+from .topology import next_halfedge, previous_halfedge, twins
+
+# A facet this steep stands on the rim of the hull; its power centre is far out of any domain.
+STEEP = 1e-9
+# Edges flip only where the lifted point is below the plane by more than rounding can explain.
+ROUNDING = 1e-14
+MAX_ROUNDS = 200
+
+
+@dataclass(frozen=True)
+class Regular:
+    """Triangles (k,3) of sites, counter-clockwise, and their twin halfedges (3k,), -1 on the hull."""
+
+    triangles: np.ndarray
+    twin: np.ndarray
+
+
+def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
+    """Regular triangulation of sites (n,2) with weights (n,); sites above the hull are in no triangle.
+
+    Raises TransportError for fewer than three sites, sites on one line, and sites that coincide.
+    """
+    # The hull of three lifted points is flat; a fourth far above closes it from the upper side.
+    lifted = np.column_stack([sites, dot2(sites, sites) - weights])
+    spread = max(np.ptp(lifted[:, 2]), np.ptp(sites, axis=0).max(), 1e-300)
+    above = np.append(sites.mean(axis=0), lifted[:, 2].max() + spread)
+    try:
+        hull = ConvexHull(np.vstack([lifted, above]), qhull_options="Qt Q12")
+    except (QhullError, ValueError) as error:
+        raise TransportError("The sites of the transport lie on one line or coincide") from error
+    triangles = hull.simplices.astype(np.int64)
+    triangles = triangles[(hull.equations[:, 2] < -STEEP) & (triangles.max(axis=1) < len(sites))]
+    a, b, c = (sites[triangles[:, k]] for k in range(3))
+    turned = cross2(b - a, c - a) < 0
+    triangles[turned] = triangles[turned][:, [0, 2, 1]]
+    return Regular(triangles, twins(triangles))
+
+
+def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Regular | None, bool]:
+    """Repair a triangulation of all sites after their weights changed.
+
+    Returns the regular triangulation, or None where flips alone do not reach it, and whether a site is certainly
+    hidden: it has three neighbours and lies above their plane.
+    """
+    triangles, twin = start.triangles.copy(), start.twin.copy()
+    flat = triangles.reshape(-1)
+
+    def violation(edges):
+        below, convex = _below(sites, weights, flat, edges, twin[edges])
+        return np.where(convex, below, 0.0)
+
+    _, settled = flip_until_none(twin, violation, lambda edges: flip_in_place(triangles, twin, edges), MAX_ROUNDS)
+    edges = np.flatnonzero(twin > np.arange(len(twin)))
+    below, _ = _below(sites, weights, flat, edges, twin[edges])
+    stuck = edges[below < 0]
+    if settled and len(stuck) == 0:
+        return Regular(triangles, twin), False
+    degree = np.bincount(flat, minlength=len(sites))
+    on_hull = np.zeros(len(sites), dtype=bool)
+    on_hull[flat[twin < 0]] = True
+    ends = np.concatenate([flat[stuck], flat[twin[stuck]]])
+    return None, bool(((degree[ends] == 3) & ~on_hull[ends]).any())
+
+
+def _below(sites, weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
+    """How far the far corner of g lies below the lifted triangle of h, negative when it does, else 0; flip possible?"""
+    i, j, k, far = flat[h], flat[g], flat[previous_halfedge(h)], flat[next_halfedge(next_halfedge(g))]
+    a, b, c = sites[i] - sites[far], sites[j] - sites[far], sites[k] - sites[far]
+    base = weights[far]
+    za, zb, zc = (dot2(x, x) - weights[v] + base for x, v in ((a, i), (b, j), (c, k)))
+    bc, ca, ab = cross2(b, c), cross2(c, a), cross2(a, b)
+    terms = np.stack([za * bc, zb * ca, zc * ab])
+    determinant = terms.sum(axis=0)
+    size = np.abs(terms).sum(axis=0)
+    convex = (bc > 0) & (ca > 0)
+    return np.where(determinant > ROUNDING * size, -determinant / np.maximum(size, 1e-300), 0.0), convex
