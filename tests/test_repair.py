@@ -226,3 +226,11 @@ def test_only_the_chosen_faces_are_looked_at():
 def test_seams_must_be_known():
     with pytest.raises(ValueError, match="seams"):
         prepare(triangle_surface(*meshes.cube()), seams="none")
+
+
+def test_a_diagonal_between_two_corners_on_one_vertex():
+    """A pentagon that passes through two vertices twice: its diagonals have equal ends."""
+    V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+    (chart,) = prepare(meshes.polygon_surface(V, [[0, 1, 0, 1, 2]])).charts
+    assert len(chart.vertices) == 5
+    mapped(chart)

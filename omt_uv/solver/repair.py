@@ -42,7 +42,7 @@ def join(surface: Surface, faces: np.ndarray, triangles: np.ndarray, owner: np.n
     sheets = Sheets(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
     layer, warnings = _layers(surface, faces)
     joined, torn = _pair_sides(surface, sheets, layer)
-    while len(folded := _folded_faces(joined)):
+    while len(folded := _folded_faces(joined, layer)):
         layer[folded] = -1
         joined, torn = _pair_sides(surface, sheets, layer)
         warnings.append(
@@ -104,8 +104,11 @@ def _pair_sides(surface: Surface, sheets: Sheets, layer: np.ndarray) -> tuple[Sh
     return replace(sheets, first=first, second=second), torn
 
 
-def _folded_faces(sheets: Sheets) -> np.ndarray:
-    """One polygon for every diagonal that has the same two ends as another edge: no plane map keeps them apart."""
+def _folded_faces(sheets: Sheets, layer: np.ndarray) -> np.ndarray:
+    """One polygon for every diagonal that has the same two ends as another edge: no plane map keeps them apart.
+
+    Polygons of layer (f,) -1 are apart already.
+    """
     tail, head = halfedges(sheets.triangles)
     corner_class = corner_classes(sheets)
     key = pair_keys(corner_class[tail], corner_class[head])
@@ -115,7 +118,8 @@ def _folded_faces(sheets: Sheets) -> np.ndarray:
     polygon = sheets.owner[h // 3]
     last = np.zeros(len(count), dtype=np.int64)
     np.maximum.at(last, number[h], polygon)
-    return np.unique(last[number[h]])
+    folded = np.unique(last[number[h]])
+    return folded[layer[folded] >= 0]
 
 
 def _healed(sheets: Sheets) -> Sheets:

@@ -37,7 +37,10 @@ class Sheets:
 
     def parallel(self) -> np.ndarray:
         """Pairs (p,) whose halfedges run in the same direction: the triangles look to opposite sides."""
-        return self.ends(self.first)[0] == self.ends(self.second)[0]
+        tail, head = halfedges(self.triangles)
+        # A diagonal between two corners on one vertex has equal ends, whichever way it runs.
+        opposite = (tail[self.first] == head[self.second]) & (head[self.first] == tail[self.second])
+        return (self.vertex[tail[self.first]] == self.vertex[tail[self.second]]) & ~opposite
 
     def without(self, gone: np.ndarray) -> Sheets:
         """The same triangles with the pairs `gone` (p,) bool cut open."""
