@@ -82,9 +82,8 @@ def transport(
         for _ in range(MAX_HALVINGS):
             trial_w = w + step * direction
             trial = diagrams.next(trial_w, cells)
-            if trial is not None and trial.area.min() >= floor:
-                if np.linalg.norm(trial.area - mass) <= (1 - step / 2) * error:
-                    break
+            if trial is not None and _acceptable(trial, mass, floor, (1 - step / 2) * error):
+                break
             step /= 2
         else:
             raise TransportError(f"The transport is stuck at a residual of {residual:.1e}")
@@ -113,6 +112,10 @@ class _Diagrams:
             return self.anew(weights)
         self.count, self.flipped = self.count + 1, True
         return power_diagram(self.sites, weights, self.domain, dual)
+
+
+def _acceptable(cells: PowerDiagram, mass: np.ndarray, floor: float, most: float) -> bool:
+    return bool(cells.area.min() >= floor and np.linalg.norm(cells.area - mass) <= most)
 
 
 def _residual(cells: PowerDiagram, mass: np.ndarray) -> float:
