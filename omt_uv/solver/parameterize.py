@@ -18,10 +18,10 @@ from .conformal import conformal_disk, conformal_rectangle, sharpest_corners
 from .distortion import measure
 from .domain import Disk, Domain, Rectangle
 from .embedding import arc_length_parameters, tutte
-from .errors import MeshError, PrecisionError, TransportError
+from .errors import FoldedUVError, MeshError, PrecisionError, TransportError
 from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
 from .progress import Progress, Steps
-from .refine import BOUNDARIES, refine
+from .refine import BOUNDARIES, Refinement, refine
 from .topology import boundary_loops
 from .transport import Transport, transport
 
@@ -200,11 +200,12 @@ def unwrap_chart(
     target = None if density is None else face_areas(vertices, chart.triangles) * density
     with log.timed("refinement"):
         uv, held = facing(uv, pins)
-        refined = yield from refine(
-            vertices, chart.triangles, uv, boundary=boundary, target=target, balance=balance, quality=quality, pins=held
-        )
+        options = {"target": target, "balance": balance, "quality": quality, "pins": held}
+        refined = yield from _refined(normalized, uv, boundary, log, options)
     with log.timed("measure"):
         figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False)
+    if figures.folds:
+        log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
     return ChartMap(
         refined.uv if held else _in_place(refined.uv, normalized, unit, pins),
         conformal.iterations if conformal else None,
@@ -245,6 +246,19 @@ def _embedding(chart: Chart, loop, corners, domain: Domain, log: _Log):
         return conformal, _mean_value_sites(chart, loop, corners, domain)
 
 
+def _refined(chart: Chart, uv: np.ndarray, boundary: str, log: _Log, options: dict) -> Steps[Refinement]:
+    """The refined map, with a free boundary where the domain asked for leaves faces folded."""
+    try:
+        return (yield from refine(chart.vertices, chart.triangles, uv, boundary=boundary, **options))
+    except FoldedUVError as error:
+        if boundary == "free":
+            raise
+        log.warnings.append(f"The {boundary} has no room for this chart ({error.cause}); its boundary is free instead")
+    loop = boundary_loops(chart.triangles)[0]
+    uv = _mean_value_sites(chart, loop, None, Disk())
+    return (yield from refine(chart.vertices, chart.triangles, uv, boundary="free", **options))
+
+
 def _mean_value_sites(chart: Chart, loop, corners, domain: Domain) -> np.ndarray:
     """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
     if corners is not None:
@@ -272,9 +286,7 @@ def centroid_map(cells: Transport, domain: Domain, loop, corners, warnings: list
     # Start behind the largest gap: there nothing can be out of order.
     first = (int(step.argmax()) + 1) % len(loop)
     along = s[first] + np.concatenate([[0.0], np.cumsum(np.roll(step, -first)[:-1])])
-    backwards = int((np.diff(along) <= 0).sum())
-    if backwards:
-        warnings.append(f"The transport changed the order of {backwards} boundary vertices; it was restored")
+    if (np.diff(along) <= 0).any():
         along = np.maximum.accumulate(along)
         spread = along[0] + domain.period * np.arange(len(loop)) / len(loop)
         along = 0.9 * along + 0.1 * spread
