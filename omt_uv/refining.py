@@ -15,11 +15,14 @@ from .solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
 from .solver.geometry import face_areas, signed_areas
 from .solver.improve import boundary_edges, improve
 from .solver.islands import Island, uv_islands
+from .solver.overlap import overlap_share
 from .solver.parameterize import located
 from .solver.progress import Progress, Steps
 from .solver.refine import Refinement
 from .unwrapping import Packer, Refusal, pack_islands
 
+# More overlap than this, as a share of the UV area, is said.
+OVERLAP = 1e-4
 FIGURES = ("area_l1", "area_sd", "angle_mean", "folds")
 
 
@@ -82,18 +85,37 @@ def refine_islands(
             raise Refusal(owner, located(_shown(error, island.chart), island.chart)) from error
         held, refinement = piece
         pieces.append(_Piece(owner, island, pins, held, refinement))
-        warnings += [(owner, text) for text in refinement.warnings]
+        warnings += [(owner, text) for text in (*refinement.warnings, *_unfinished(refinement))]
         done += share
     placed = _at_one_density(pieces)
     if settings.pack:
         yield Progress("Packing", 1.0)
         placed, complaints = _packed(pieces, placed, settings, spare_packer)
         warnings += [(-1, text) for text in complaints]
+    elif grown := _grown_together(pieces, placed):
+        warnings.append((-1, grown))
     corners, uv = _scatter(surfaces, pieces, placed)
     reports: list[list[dict]] = [[] for _ in surfaces]
     for piece, place in zip(pieces, placed, strict=True):
         reports[piece.owner].append(_report(piece, place))
     return Refined(corners, uv, reports, warnings)
+
+
+def _unfinished(refinement: Refinement) -> tuple[str, ...]:
+    """A warning where the refinement used up its steps."""
+    return ("The refinement of an island stopped before it was done",) if refinement.status == "steps" else ()
+
+
+def _grown_together(pieces: Sequence[_Piece], placed: Sequence[np.ndarray]) -> str:
+    """A warning if islands that lay apart cover each other now."""
+    if len(pieces) == 1:
+        return ""
+    before, after = (
+        overlap_share(np.concatenate([x[p.island.chart.triangles] for p, x in zip(pieces, maps, strict=True)]))
+        for maps in ([p.island.uv for p in pieces], placed)
+    )
+    more = after - before
+    return "" if more < OVERLAP else f"Islands grew into each other, by {100 * more:.1f} % of the UV area; pack them"
 
 
 def _found(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]], list[tuple[int, str]]]:

@@ -128,6 +128,31 @@ def test_contact_of_edges_equals_contact_of_a_loop():
     assert a.derivatives(w)[0] == pytest.approx(b.derivatives(w)[0])
 
 
+def test_fans_that_touch_at_a_corner_are_parted():
+    """Two fans of one vertex, joined only around a hole, at one place of the UV map: a barrier would be infinite."""
+    V, F = meshes.grid(6, 6)
+    V = np.column_stack([V[:, :2], 0.3 * np.sin(3 * V[:, 0]) * V[:, 1]])
+    keep = ~np.isin(np.arange(len(F)), hits := np.flatnonzero(pinched(V, F)))
+    assert len(hits) > 0
+    surface = triangle_surface(V, F[keep])
+    (island,) = uv_islands(surface, corner_uv(F[keep], V[:, :2])).islands
+    ids = island.chart.vertex_ids
+    assert len(ids) > len(np.unique(ids)), "the pinched vertex has two places"
+    T = island.chart.triangles
+    result = run(island.chart.vertices, T, island.uv)
+    after = figures(island.chart.vertices, T, result.uv)
+    assert (after.folds, after.overlap) == (0, 0)
+    assert after.area_l1 < 0.01
+    assert result.warnings == ()
+
+
+def pinched(V, F):
+    """Faces of two squares that meet at the middle vertex, (m,) bool."""
+    middle = V[F].mean(1)[:, :2] * 6
+    low_left, up_right = (middle > 2).all(1) & (middle < 3).all(1), (middle > 3).all(1) & (middle < 4).all(1)
+    return low_left | up_right
+
+
 # ---- what is held -------------------------------------------------------------------------------------------
 
 
@@ -273,6 +298,14 @@ def test_pinned_islands_keep_their_own_density():
     alone = refined(surface, uv, faces=~right)
     assert after[left] == pytest.approx(written(uv, alone)[left], abs=1e-9)
     assert (signed_areas(after, T) > 0).all()
+
+
+def test_islands_that_grow_into_each_other_are_told():
+    surface, uv, right = torn()
+    uv[np.repeat(right, 3)] += [-1.95, 0]
+    result = refined(surface, uv)
+    assert any("grew into" in text for _, text in result.warnings)
+    assert not refined(surface, uv, pack=True).warnings
 
 
 def test_reports_say_what_changed():

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .contact import crossings
+from .contact import contact, crossings
 from .energy import area_error, elements
 from .errors import FoldedUVError, MeshError
 from .geometry import face_areas, signed_areas
@@ -25,7 +25,12 @@ from .starts import check_start, disk_start
 from .topology import boundary_loops, halfedges, twins
 from .untangle import count_folds
 
-STRAIGHTENED = "The UVs were folded or crossed themselves; the refinement started from a straightened map"
+STRAIGHTENED = "The UVs were folded, or met themselves; the refinement started from a straightened map"
+UNGUARDED = "The outline of an island meets itself; it is not kept apart"
+# A boundary this near to itself, relative to the reach of its barrier, is too stiff to be kept apart.
+TOUCHING = 1e-3
+# How far the boundary of such a map is drawn in, as a share of the way to the mean of each vertex' neighbours.
+PARTING = (0.0, 0.01, 0.03, 0.1)
 
 
 def improve(
@@ -101,10 +106,11 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
     fixed = several is not None
     rim = boundary_edges(triangles)
     start, warnings = _start(vertices, triangles, given, rim, fixed)
-    crossed = len(crossings(start, rim)) > 0
-    free = Free(np.zeros(len(given), bool))
-    # Pins may ask for a map that crosses itself, as the given one does.
-    task = Task(faces, Assembly(triangles, len(given)), free, None if crossed and fixed else rim, False)
+    # Pins may ask for a map that meets itself, as the given one does, and so may handles.
+    guard = None if meets_itself(start, rim) else rim
+    if guard is None and not (pins is not None and np.isin(rim, pins.vertices).all()):
+        warnings = (*warnings, UNGUARDED)
+    task = Task(faces, Assembly(triangles, len(given)), Free(np.zeros(len(given), bool)), guard, False)
     w = start
     if several is not None:
         task, w = yield from drag(task, w, several)
@@ -122,13 +128,22 @@ def boundary_edges(triangles: np.ndarray) -> np.ndarray:
     return np.column_stack([tail[rim], head[rim]])
 
 
+def meets_itself(w: np.ndarray, rim: np.ndarray) -> bool:
+    """Whether boundary edges (b,2) of a map (n,) cross, or come so near to others that they all but touch."""
+    with np.errstate(over="ignore"):
+        nearest = contact(w, rim, 1.0).energy(w)
+    return not nearest < (1 / TOUCHING) ** 2 or len(crossings(w, rim)) > 0
+
+
 def _start(vertices, triangles, given, rim, fixed: bool) -> tuple[np.ndarray, tuple[str, ...]]:
     """A map (n,) without folds, the given one if it will do, and a warning if it will not."""
     uv = np.column_stack([given.real, given.imag])
     folds = count_folds(uv, triangles)
     scale = 1.0 if fixed else np.sqrt(1 / np.abs(signed_areas(uv, triangles)).sum())
-    if folds == 0 and (fixed or not len(crossings(given, rim))):
-        return given * scale, ()
+    if folds == 0:
+        apart = given if fixed else _parted(given, triangles, rim)
+        if apart is not None:
+            return apart * scale, ()
     straight = _straightened(vertices, triangles, uv)
     if straight is not None:
         return straight @ [1, 1j], (STRAIGHTENED,)
@@ -136,6 +151,24 @@ def _start(vertices, triangles, given, rim, fixed: bool) -> tuple[np.ndarray, tu
         return given * scale, ()
     folded = np.flatnonzero(~(signed_areas(uv, triangles) > 0))
     raise FoldedUVError("The UVs to refine are folded beyond repair", kind="face", elements=folded)
+
+
+def _parted(w: np.ndarray, triangles: np.ndarray, rim: np.ndarray) -> np.ndarray | None:
+    """The map w (n,), its boundary drawn in a little if it touches itself; None where that does not part it.
+
+    Fans that share a place in the UV map, and sides of a slit, touch without crossing.
+    """
+    tail, head = halfedges(triangles)
+    ends, others = np.concatenate([tail, head]), np.concatenate([head, tail])
+    total = np.bincount(ends, w[others].real, len(w)) + 1j * np.bincount(ends, w[others].imag, len(w))
+    inward = total / np.bincount(ends, minlength=len(w)) - w
+    for share in PARTING:
+        drawn = w.copy()
+        drawn[rim[:, 0]] += share * inward[rim[:, 0]]
+        uv = np.column_stack([drawn.real, drawn.imag])
+        if not meets_itself(drawn, rim) and count_folds(uv, triangles) == 0:
+            return drawn
+    return None
 
 
 def _straightened(vertices, triangles, uv) -> np.ndarray | None:
