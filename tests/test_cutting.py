@@ -167,6 +167,15 @@ def test_painted_vertices_are_kept_free():
     assert avoid[free.edges].all() and not avoid[other.edges].any()
 
 
+def test_a_sphere_is_opened_beside_its_painted_half():
+    V, F = meshes.icosphere(2)
+    front = V[:, 0] > 0
+    edges = cut(triangle_surface(V, F), avoid=front.astype(float)).edges
+    assert not front[edges].all(axis=1).any()
+    # Where everything is painted there is still a way.
+    prepare(triangle_surface(V, F), avoid=np.ones(len(V)))
+
+
 def test_cuts_hide_in_creases():
     """Of the two ways around a box the sharp edge wins over the middle of a side."""
     V, F = meshes.grid(12, 8)

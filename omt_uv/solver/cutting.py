@@ -199,7 +199,7 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
             break
         # A tip is worth its cut where much distortion is far from the boundary.
         far = _distance(piece, _cut_vertices(piece, chosen))
-        tips = np.append(tips, _peak(scale * far * (1 - piece.avoid)))
+        tips = np.append(tips, _peak(scale * far * piece.welcome()))
         path = path_to(piece, _cut_vertices(piece, chosen), tips[-1])
         chosen = shorten(piece, chosen | path, tips, around=path)
     chosen = shorten(piece, chosen, tips)
@@ -214,7 +214,7 @@ def _first_tips(piece: Piece) -> np.ndarray:
     A slit of a single edge would not open anything.
     """
     scale = log_scale(piece, np.zeros(len(piece.pair), dtype=bool))
-    tips = _farthest(piece, np.array([_peak(scale * (1 - piece.avoid))]), 1)
+    tips = _farthest(piece, np.array([_peak(scale * piece.welcome())]), 1)
     neighbours = (np.sort(piece.ends, axis=1) == np.sort(tips)).all(axis=1).any()
     return _farthest(piece, tips, 1) if neighbours else tips
 
@@ -222,7 +222,7 @@ def _first_tips(piece: Piece) -> np.ndarray:
 def _farthest(piece: Piece, points: np.ndarray, more: int) -> np.ndarray:
     """The points (k,) and `more` others, each as far from those before it as the edges go."""
     for _ in range(more):
-        points = np.append(points, _peak(_distance(piece, points)))
+        points = np.append(points, _peak(_distance(piece, points) * piece.welcome()))
     return points
 
 

@@ -50,6 +50,10 @@ class Piece:
     def count(self) -> int:
         return len(self.positions)
 
+    def welcome(self) -> np.ndarray:
+        """Factor (n,) > 0 by which a cut would rather end at a vertex: small where cuts are to be avoided."""
+        return 1 - 0.999 * self.avoid
+
     def on_rim(self) -> np.ndarray:
         """Boundary vertices (n,) bool."""
         tail, head = halfedges(self.triangles)

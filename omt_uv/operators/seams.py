@@ -1,0 +1,73 @@
+"""uv.omt_seams: mark the seams that unwrapping needs, and stop, so that they can be seen and edited."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, IntProperty, StringProperty
+
+from .common import Complaint, SolverOperator, read_objects, warn
+
+
+class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
+    """Mark short seams that open every part into one island, along creases and hollows. Seams that exist are kept"""
+
+    bl_idname = "uv.omt_seams"
+    bl_label = "Seams for Area Preserving"
+    bl_options = {"REGISTER", "UNDO"}
+
+    extremities: IntProperty(
+        name="Extremities",
+        description="Tips such as ears and limbs that a part may be cut to, at most. "
+        "More seams let the map shear less; no more are added than pay",
+        default=8,
+        min=0,
+        max=32,
+    )
+    fill_holes: BoolProperty(
+        name="Fill Holes",
+        description="Take holes for filled, so that no seam runs to them; the longest boundary of a part stays open",
+        default=False,
+    )
+    keep_free: StringProperty(
+        name="Keep Free", description="Vertex group that seams avoid, the more the larger the weight. Empty: none"
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        self.layout.prop(self, "extremities")
+        self.layout.prop(self, "fill_holes")
+        self.layout.prop(self, "keep_free")
+
+    def steps(self, context: bpy.types.Context):
+        from ..blender_seams import group_weights
+        from ..solver.cutting import cut
+        from ..solver.errors import MeshError
+        from ..solver.progress import Progress
+
+        pairs = read_objects(context)
+        results = []
+        for k, (obj, reading) in enumerate(pairs):
+            yield Progress("Seams", k / len(pairs))
+            avoid = group_weights(obj, self.keep_free) if self.keep_free else None
+            if self.keep_free and avoid is None and len(pairs) == 1:
+                raise Complaint(f"{obj.name} has no vertex group {self.keep_free!r}. Choose one, or leave it empty.")
+            try:
+                cuts = cut(
+                    reading.surface, reading.faces, avoid=avoid, fill=self.fill_holes, extremities=self.extremities
+                )
+            except MeshError as error:
+                raise Complaint(f"{obj.name}: {error}", obj, error) from error
+            results.append((obj, cuts))
+        return results
+
+    def finish(self, context: bpy.types.Context, result) -> None:
+        from ..blender_seams import mark_seams
+
+        new = [mark_seams(obj, cuts.edges) for obj, cuts in result]
+        warn(self, [obj for obj, _ in result], [(k, text) for k, (_, c) in enumerate(result) for text in c.warnings])
+        opened = sum(len(cuts.pieces) for _, cuts in result)
+        if sum(new):
+            self.report({"INFO"}, f"Opened {opened} part{'' if opened == 1 else 's'} along {sum(new)} edges")
+        else:
+            self.report({"INFO"}, "Every part is an island already; no seam is needed")

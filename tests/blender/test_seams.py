@@ -1,0 +1,101 @@
+"""uv.omt_seams as users call it: seams appear, nothing else changes, and unwrapping accepts them."""
+
+from __future__ import annotations
+
+import bpy
+
+import meshes
+import numpy as np
+import pytest
+from blender import scenes
+
+
+@pytest.fixture(autouse=True)
+def registered(package):
+    """The operator, also where the extension does not list it yet."""
+    cls = package("operators.seams").UV_OT_omt_seams
+    missing = not hasattr(bpy.types, "UV_OT_omt_seams")
+    if missing:
+        bpy.utils.register_class(cls)
+    yield
+    if missing:
+        bpy.utils.unregister_class(cls)
+
+
+def seams_of(obj):
+    values = np.zeros(len(obj.data.edges), bool)
+    obj.data.edges.foreach_get("use_seam", values)
+    return values
+
+
+def positions(obj):
+    values = np.zeros(3 * len(obj.data.vertices), np.float32)
+    obj.data.vertices.foreach_get("co", values)
+    return values
+
+
+def sphere(name="Sphere"):
+    return scenes.add(*meshes.icosphere(2), name=name)
+
+
+def mark(**arguments):
+    assert bpy.ops.uv.omt_seams(**arguments) == {"FINISHED"}
+
+
+def test_seams_open_a_sphere_and_nothing_else_changes():
+    obj = sphere()
+    before = positions(obj)
+    mark()
+    assert seams_of(obj).any() and (positions(obj) == before).all() and len(obj.data.uv_layers) == 0
+    assert bpy.ops.uv.omt_unwrap(quality="DRAFT") == {"FINISHED"}
+    marked = seams_of(obj)
+    mark()
+    assert (seams_of(obj) == marked).all()
+
+
+def test_edit_mode_marks_the_same_seams():
+    first = sphere()
+    mark()
+    second = sphere("Second")
+    scenes.edit(second)
+    mark()
+    scenes.leave_edit()
+    assert (seams_of(first) == seams_of(second)).all()
+
+
+def test_seams_that_exist_stay():
+    obj = scenes.cube()
+    before = seams_of(obj)
+    mark()
+    assert (seams_of(obj) == before).all()
+
+
+def test_several_objects_at_once():
+    one, other = sphere("One"), sphere("Other")
+    scenes.select([one, other])
+    mark()
+    assert seams_of(one).any() and (seams_of(one) == seams_of(other)).all()
+
+
+def test_a_vertex_group_is_kept_free():
+    obj = sphere()
+    group = obj.vertex_groups.new(name="Face")
+    front = np.flatnonzero(positions(obj).reshape(-1, 3)[:, 0] > 0)
+    group.add(front.tolist(), 1.0, "REPLACE")
+    mark(keep_free="Face")
+    ends = np.array([edge.vertices[:] for edge in obj.data.edges])[seams_of(obj)]
+    assert not np.isin(ends, front).all(axis=1).any()
+
+
+def test_a_group_that_is_not_there_is_said():
+    sphere()
+    with pytest.raises(RuntimeError, match="no vertex group 'Face'"):
+        mark(keep_free="Face")
+
+
+def test_holes_may_be_filled():
+    obj = scenes.add(*meshes.annulus())
+    mark(fill_holes=True)
+    assert not seams_of(obj).any()
+    mark()
+    assert seams_of(obj).any()
