@@ -167,8 +167,7 @@ def unwrap_chart(
     ----------
     boundary, quality, balance : see `unwrap`
     density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default
-    pins : two or more fix place, direction and scale; one fixes the place, and the chart keeps the direction and the
-        size it has now
+    pins : two or more fix place, direction and scale; one fixes the place, and the chart stays as large as it is
 
     Raises
     ------
