@@ -148,7 +148,7 @@ def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins:
         task, w = yield from drag(task, w, pins)
     found = yield from stages(task, w, balance, settings)
     error = area_error(faces, found.w)
-    if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 4 * settings.area_error):
+    if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * settings.area_error):
         notched = notched_disk(start, triangles, loop)
         if notched is not None:
             again = yield from stages(_task(faces, assembly, notched, loop, boundary), w, balance, settings)

@@ -15,21 +15,26 @@ from .progress import Progress, Steps
 
 @dataclass(frozen=True)
 class Quality:
-    """Area error to reach (share of area in the wrong place), weights of the area term on the way, steps allowed."""
+    """Area error to reach (share of area in the wrong place), weights of the area term on the way, steps allowed.
+
+    tolerance: where the error is not reached, a weight is left for a greater one when Newton promises less than this
+    share of the energy. A small one costs steps and saves shear.
+    """
 
     area_error: float
     weights: tuple[float, ...]
     greatest_weight: float
     max_steps: int
+    tolerance: float
 
 
 QUALITIES = {
-    "draft": Quality(0.05, (10.0, 100.0), 1e3, 40),
-    "standard": Quality(0.008, (30.0, 500.0), 1e6, 150),
-    "exact": Quality(0.0005, (10.0, 100.0, 1000.0, 1e4), 1e8, 300),
+    "draft": Quality(0.05, (10.0, 100.0), 1e3, 40, 1e-2),
+    "standard": Quality(0.008, (30.0, 500.0), 1e6, 150, 1e-2),
+    "exact": Quality(0.0005, (10.0, 100.0, 1000.0, 1e4), 1e8, 300, 1e-3),
 }
-# A stage ends when Newton promises less than this share of the energy.
-LOOSE, TIGHT = 3e-2, 1e-3
+# A stage on the way, or one that reaches the goal, ends when Newton promises less than this share of the energy.
+LOOSE = 3e-2
 # With a balance the weight alone decides, and neighbouring balances must not differ by chance.
 STRICT = 1e-4
 # Weight of the area term at balance 1. Without it the map of least shear has no scale; and much below this the mean
@@ -108,8 +113,8 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Step
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
         watch = None if guarded or overlap else task.crosses
-        tight = TIGHT if balance == 0 else STRICT
-        stage = yield from minimise(problem, w, goal, allowed, k, watch, tight)
+        tolerance = settings.tolerance if balance == 0 else STRICT
+        stage = yield from minimise(problem, w, goal, allowed, k, watch, tolerance)
         w, steps = stage.w, steps + stage.steps
         if stage.status == "crossed":
             guarded = True
@@ -140,9 +145,9 @@ def minimise(
     allowed: int,
     place: int,
     watch: Callable[[np.ndarray], bool] | None = None,
-    tight: float = TIGHT,
+    tolerance: float = LOOSE,
 ) -> Steps[Stage]:
-    """Newton until it promises little, at least LOOSE; where that leaves the area error above the goal, `tight`.
+    """Newton until it promises little, at least LOOSE; where that leaves the area error above the goal, `tolerance`.
 
     place: the number of this stage, for the progress; watch: a step to where this is true is not taken, and the
     stage ends "crossed".
@@ -164,7 +169,7 @@ def minimise(
         if residual < LOOSE and area_error(problem.faces, w) <= goal:
             status = "converged"
             break
-        if residual < tight:
+        if residual < tolerance:
             # A Hessian stiffer than the true one promises too little.
             if used <= LEAST_PRESSURE:
                 status = "converged"
