@@ -13,13 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .chart_pins import ChartPins, CornerPins, anchored, chart_pins, facing, refuse_outline
-from .charts import Chart, Surface, split
+from .charts import Chart, Surface
 from .conformal import conformal_disk, conformal_rectangle, sharpest_corners
 from .distortion import measure
 from .domain import Disk, Domain, Rectangle
 from .embedding import arc_length_parameters, tutte
 from .errors import FoldedUVError, MeshError, PrecisionError, TransportError
 from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
+from .preparation import prepare
 from .progress import Progress, Steps
 from .refine import BOUNDARIES, Refinement, refine
 from .topology import boundary_loops
@@ -67,10 +68,15 @@ class ChartMap:
 
 @dataclass(frozen=True)
 class SurfaceMap:
-    """All charts of a surface and their maps, in one texel density."""
+    """All charts of a surface and their maps, in one texel density.
+
+    seams (k,2): edges that were cut for the map; warnings: what was repaired for the map.
+    """
 
     charts: list[Chart]
     maps: list[ChartMap]
+    seams: np.ndarray
+    warnings: tuple[str, ...] = ()
 
     def corner_uv(self) -> tuple[np.ndarray, np.ndarray]:
         """Corners of the surface (k,) that were mapped, each once, and their coordinates (k,2), charts unpacked."""
@@ -92,6 +98,9 @@ def unwrap(
     quality: str = "standard",
     balance: float = 0.0,
     pins: CornerPins | None = None,
+    seams: str = "auto",
+    fill_holes: bool = False,
+    avoid: np.ndarray | None = None,
 ) -> Steps[SurfaceMap]:
     """Area-preserving texture coordinates of the polygons `faces` (f,) bool, all by default.
 
@@ -101,13 +110,15 @@ def unwrap(
     quality : "draft", "standard" or "exact", how small the area error of single faces becomes
     balance : from 0, exact areas, to 1, least shear
     pins : corners that keep their places, with a free boundary
+    seams, fill_holes, avoid : see `preparation.prepare`
 
     Raises
     ------
-    MeshError : see `charts.split` and `unwrap_chart`; element indices are those of the surface
+    MeshError : see `preparation.prepare` and `unwrap_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
-    charts = split(surface, faces)
+    prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
+    charts = prepared.charts
     held = [_located_pins(pins, chart) for chart in charts]
     maps = []
     total = sum(len(c.triangles) for c in charts)
@@ -120,7 +131,8 @@ def unwrap(
         except MeshError as error:
             raise located(error, chart) from error
         done += share
-    return SurfaceMap(charts, maps)
+    cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
+    return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
 
 def _located_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
@@ -180,15 +192,18 @@ def unwrap_chart(
     refuse_outline(pins, boundary)
     log = _Log()
     vertices, unit = _in_unit_box(chart.vertices)
-    normalized = Chart(vertices, chart.triangles, chart.corners, chart.faces, chart.vertex_ids)
-    loop = boundary_loops(chart.triangles)[0]
+    # Patches over holes are mapped with the rest, and forgotten afterwards.
+    triangles = chart.disk
+    if density is not None:
+        density = np.concatenate([density, np.ones(len(chart.patches))])
+    loop = boundary_loops(triangles)[0]
     if boundary == "square" and len(loop) < 4:
         log.warnings.append("A chart with only three boundary vertices does not fill a square; its boundary is free")
         boundary = "free"
     domain: Domain = Rectangle() if boundary == "square" else Disk()
-    corners = sharpest_corners(vertices, chart.triangles, loop) if boundary == "square" else None
-    mass = vertex_areas(vertices, chart.triangles, density)
-    conformal, sites = yield from _embedding(normalized, loop, corners, domain, log)
+    corners = sharpest_corners(vertices, triangles, loop) if boundary == "square" else None
+    mass = vertex_areas(vertices, triangles, density)
+    conformal, sites = yield from _embedding(vertices, triangles, loop, corners, domain, log)
     cells, uv = None, sites
     with log.timed("transport"):
         try:
@@ -196,17 +211,17 @@ def unwrap_chart(
             uv = centroid_map(cells, domain, loop, corners, log.warnings)
         except TransportError as error:
             log.warnings.append(f"{error.cause}; refined the embedding without transport")
-    target = None if density is None else face_areas(vertices, chart.triangles) * density
+    target = None if density is None else face_areas(vertices, triangles) * density
     with log.timed("refinement"):
         uv, held = facing(uv, pins)
         options = {"target": target, "balance": balance, "quality": quality, "pins": held}
-        refined = yield from _refined(normalized, uv, boundary, log, options)
+        refined = yield from _refined(vertices, triangles, uv, boundary, log, options)
     with log.timed("measure"):
         figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False)
     if figures.folds:
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
     return ChartMap(
-        refined.uv if held else _in_place(refined.uv, normalized, unit, pins),
+        refined.uv if held else _in_place(refined.uv, vertices, chart.triangles, unit, pins),
         conformal.iterations if conformal else None,
         conformal.residual if conformal else None,
         cells.iterations if cells else None,
@@ -224,50 +239,50 @@ def unwrap_chart(
     )
 
 
-def _embedding(chart: Chart, loop, corners, domain: Domain, log: _Log):
+def _embedding(vertices, triangles, loop, corners, domain: Domain, log: _Log):
     """Conformal map (None where it leaves double precision) and sites (n,2) in the domain for the transport."""
     conformal = None
     with log.timed("conformal"):
         try:
             if corners is None:
-                conformal = yield from conformal_disk(chart.vertices, chart.triangles)
+                conformal = yield from conformal_disk(vertices, triangles)
                 sites = conformal.uv
             else:
-                conformal = yield from conformal_rectangle(chart.vertices, chart.triangles, corners)
+                conformal = yield from conformal_rectangle(vertices, triangles, corners)
                 sites = conformal.uv / [1, conformal.aspect] - 0.5
-            nearest = halfedge_lengths(sites, chart.triangles).min()
+            nearest = halfedge_lengths(sites, triangles).min()
             if nearest >= SITE_RESOLUTION:
                 return conformal, sites
             cause = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
         except PrecisionError as error:
             cause = error.cause
         log.warnings.append(f"{cause}; started from a mean value map instead")
-        return conformal, _mean_value_sites(chart, loop, corners, domain)
+        return conformal, _mean_value_sites(vertices, triangles, loop, corners, domain)
 
 
-def _refined(chart: Chart, uv: np.ndarray, boundary: str, log: _Log, options: dict) -> Steps[Refinement]:
+def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: _Log, options: dict) -> Steps[Refinement]:
     """The refined map, with a free boundary where the domain asked for leaves faces folded."""
     try:
-        return (yield from refine(chart.vertices, chart.triangles, uv, boundary=boundary, **options))
+        return (yield from refine(vertices, triangles, uv, boundary=boundary, **options))
     except FoldedUVError as error:
         if boundary == "free":
             raise
         log.warnings.append(f"The {boundary} has no room for this chart ({error.cause}); its boundary is free instead")
-    loop = boundary_loops(chart.triangles)[0]
-    uv = _mean_value_sites(chart, loop, None, Disk())
-    return (yield from refine(chart.vertices, chart.triangles, uv, boundary="free", **options))
+    loop = boundary_loops(triangles)[0]
+    uv = _mean_value_sites(vertices, triangles, loop, None, Disk())
+    return (yield from refine(vertices, triangles, uv, boundary="free", **options))
 
 
-def _mean_value_sites(chart: Chart, loop, corners, domain: Domain) -> np.ndarray:
+def _mean_value_sites(vertices, triangles, loop, corners, domain: Domain) -> np.ndarray:
     """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
     if corners is not None:
         # Each side of the square takes the boundary between two corners.
         loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
-    share = arc_length_parameters(chart.vertices, loop)
+    share = arc_length_parameters(vertices, loop)
     if corners is not None:
         first = np.append(share[np.isin(loop, corners)], 1.0)
         share = np.interp(share, first, np.arange(5) / 4)
-    return tutte(chart.vertices, chart.triangles, loop, domain.map_boundary(share))
+    return tutte(vertices, triangles, loop, domain.map_boundary(share))
 
 
 def centroid_map(cells: Transport, domain: Domain, loop, corners, warnings: list[str]) -> np.ndarray:
@@ -305,12 +320,12 @@ def _into_corners(domain: Domain, loop, along, corners) -> tuple[np.ndarray, np.
     return loop, np.interp(along, ends, domain.period * np.arange(5) / 4)
 
 
-def _in_place(uv: np.ndarray, chart: Chart, unit: float, pins: ChartPins | None) -> np.ndarray:
+def _in_place(uv: np.ndarray, vertices, triangles, unit: float, pins: ChartPins | None) -> np.ndarray:
     """A map uv (n,2) of a chart in a unit box, as large as the chart really is, or where its one or two pins are."""
     # A polygon inscribed in the disk is smaller than the disk: one texel density needs its own area.
-    covered = signed_areas(uv, chart.triangles).sum()
-    uv = uv * np.sqrt(face_areas(chart.vertices, chart.triangles).sum() / covered)
-    return uv * unit if pins is None else anchored(uv, chart.triangles, pins)
+    covered = signed_areas(uv, triangles).sum()
+    uv = uv * np.sqrt(face_areas(vertices, triangles).sum() / covered)
+    return uv * unit if pins is None else anchored(uv, triangles, pins)
 
 
 def _in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:
