@@ -3,6 +3,7 @@
 import meshes
 import numpy as np
 import pytest
+import test_fuzz
 
 from omt_uv.solver import errors, repair
 from omt_uv.solver.charts import degenerate_triangles, triangle_surface
@@ -234,3 +235,29 @@ def test_a_diagonal_between_two_corners_on_one_vertex():
     (chart,) = prepare(meshes.polygon_surface(V, [[0, 1, 0, 1, 2]])).charts
     assert len(chart.vertices) == 5
     mapped(chart)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("chunk", range(8))
+def test_every_mesh_becomes_disks_or_has_a_named_fault(chunk):
+    """`prepare` checks every chart itself; only coordinates that are no numbers, or no faces, may stop it."""
+    for seed in range(100 * chunk, 100 * (chunk + 1)):
+        surface, faces, _ = test_fuzz.broken_mesh(seed)
+        try:
+            result = prepare(surface, faces, fill_holes=seed % 3 == 0)
+        except (errors.EmptyMeshError, errors.NonFiniteError):
+            continue
+        except Exception as error:
+            error.add_note(f"broken_mesh({seed})")
+            raise
+        chosen = np.ones(len(surface.face_start) - 1, bool) if faces is None else faces
+        corners = np.unique(np.concatenate([c.corners.ravel() for c in result.charts]))
+        assert np.array_equal(corners, np.flatnonzero(np.repeat(chosen, np.diff(surface.face_start)))), seed
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_triangle_soups_become_disks(seed):
+    rng = np.random.default_rng(seed)
+    n = rng.integers(3, 40)
+    V, F = rng.normal(size=(n, 3)), rng.integers(0, n, size=(rng.integers(1, 100), 3))
+    assert sum(len(c.triangles) for c in prepared(V, F, fill_holes=seed % 2 == 0).charts) == len(F)

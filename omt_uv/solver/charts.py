@@ -127,8 +127,11 @@ def _check_positions(surface: Surface, triangles: np.ndarray) -> None:
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
 
 
-def degenerate_triangles(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Triangles (m,3) of positions (n,3) that are a line or a point next to the extent of them all, (m,) bool."""
+def degenerate_triangles(positions: np.ndarray, triangles: np.ndarray, flat: float = DEGENERATE) -> np.ndarray:
+    """Triangles (m,3) of positions (n,3) that are a line or a point next to the extent of them all, (m,) bool.
+
+    flat : share of the square of its longest side that the area of a line does not exceed
+    """
     p = positions[triangles]
     # Halves: the difference of two huge numbers may be infinite.
     side = p / 2 - p[:, :1] / 2
@@ -137,7 +140,7 @@ def degenerate_triangles(positions: np.ndarray, triangles: np.ndarray) -> np.nda
     side = side / np.where(size > 0, size, 1)[:, None, None]
     area = 0.5 * np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1)
     extent = np.ptp(p.reshape(-1, 3) / 2, axis=0).max()
-    return (area <= DEGENERATE) | (size <= 1e-9 * extent)
+    return (area <= flat) | (size <= 1e-9 * extent)
 
 
 def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> None:

@@ -15,6 +15,8 @@ from .piece import Piece, edge_graph
 from .topology import halfedges
 
 SWEEPS = 3
+# Where there are many holes only so many of the most expensive stretches are tried again.
+MOST_STRETCHES = 64
 
 
 def greedy_arcs(piece: Piece, roots: np.ndarray) -> np.ndarray:
@@ -90,7 +92,7 @@ def shorten(piece: Piece, cut: np.ndarray, tips: np.ndarray, around: np.ndarray 
     """
     for _ in range(SWEEPS if around is None else 1):
         before = float(piece.cost[cut].sum())
-        for stretch in stretches(piece, cut, tips):
+        for stretch in stretches(piece, cut, tips)[:MOST_STRETCHES]:
             if not _is_stretch(piece, cut, stretch) or not _touches(piece, stretch, around):
                 continue
             rest = cut.copy()

@@ -19,7 +19,7 @@ from .holes import fill_holes
 from .piece import NOISE, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .repair import Repaired, join, weldable
 from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
-from .steiner import meeting_points
+from .steiner import MOST_ENDS, meeting_points
 from .topology import pair_keys
 
 MOST_EXTREMITIES = 8
@@ -203,7 +203,7 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
         path = path_to(piece, _cut_vertices(piece, chosen), tips[-1])
         chosen = shorten(piece, chosen | path, tips, around=path)
     chosen = shorten(piece, chosen, tips)
-    if kind.handles[k] == 0 and len(tips) + kind.boundaries[k] > 2:
+    if kind.handles[k] == 0 and 2 < len(tips) + kind.boundaries[k] <= MOST_ENDS:
         chosen = min(chosen, _branching_tree(piece, tips), key=lambda edges: piece.cost[edges].sum())
     return chosen, tips
 

@@ -19,6 +19,9 @@ from .topology import halfedges, pair_keys, pair_up
 # it has area then, and its neighbours keep theirs to within a few thousandths.
 NUDGE = 1e-3
 NUDGE_ROUNDS = 12
+# Triangles with less than this share of the square of their longest side have no area that a texture could show, but
+# their angles would cost the solvers half of their digits.
+NEEDLE = 1e-7
 # Share of the extent of the mesh that stands for the size of a part which has none.
 SPECK = 1e-5
 
@@ -148,7 +151,7 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     ------
     ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to its chart's)
     """
-    bad = degenerate_triangles(chart.vertices, chart.disk)
+    bad = degenerate_triangles(chart.vertices, chart.disk, NEEDLE)
     if not bad.any():
         return chart, 0
     count = int(bad.sum())
@@ -160,7 +163,7 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     scale = (extent if size < 1e-9 * extent else size) or 1.0
     vertices = SPECK * rng.random((len(chart.vertices), 3)) if shapeless else chart.vertices / scale - low / scale
     for k in range(NUDGE_ROUNDS):
-        bad = degenerate_triangles(vertices, chart.disk)
+        bad = degenerate_triangles(vertices, chart.disk, NEEDLE)
         if not bad.any():
             return replace(chart, vertices=vertices * scale), count
         reach = _least_height(vertices, chart.disk, bad)

@@ -22,11 +22,9 @@ def meeting_points(distance: np.ndarray, between: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    distance : (k,n) of every vertex from every end; between : (k,k) of the ends from each other
+    distance : (k,n) of every vertex from every end, 3 <= k <= MOST_ENDS; between : (k,k) of the ends from each other
     """
     k = len(distance)
-    if not 3 <= k <= MOST_ENDS:
-        return np.zeros(0, dtype=np.int64)
     threes = list(combinations(range(k), 3))
     sums = [distance[list(t)].sum(axis=0) for t in threes]
     vertex = np.array([int(np.argmin(s)) for s in sums])
