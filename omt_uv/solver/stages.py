@@ -40,6 +40,8 @@ STRICT = 1e-4
 # Weight of the area term at balance 1. Without it the map of least shear has no scale; and much below this the mean
 # shear, which is not quite the energy's, no longer falls.
 LEAST_WEIGHT = 1e-2
+# Mean energy above which a start is so squeezed that its shear must relax before its areas.
+SQUEEZED = 50.0
 # A stage that takes longer gives way to the next, which may find a way around.
 STAGE_STEPS = 40
 # Share of the area term's indefinite Hessian kept: at the start of a stage, and the least before it is dropped.
@@ -103,6 +105,8 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Step
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
     weights = _weights(balance, settings)
+    if task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
+        weights = [1.0, *weights]
     overlap, guarded, steps, k = task.crosses(w), task.guarded, 0, 0
     warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
     while True:

@@ -103,7 +103,8 @@ def square_start(vertices, triangles, uv, loop) -> Start:
     if not found or map_energy(found[0].uv, vertices, triangles) > USABLE:
         even = 4 * arc_length_parameters(vertices, loop)
         reasons = reasons or ["The corners of the start squeeze faces; they were spread by the length of the boundary"]
-        found.append(_on_sides(vertices, triangles, uv, loop, even, half, reasons))
+        for phase in np.arange(8) / 8:
+            found.append(_on_sides(vertices, triangles, uv, loop, (even + phase) % 4, half, reasons))
     return min(found, key=lambda start: map_energy(start.uv, vertices, triangles))
 
 
