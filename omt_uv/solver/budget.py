@@ -51,8 +51,7 @@ def unwrap_within(
     """
     if not bound > 1:
         raise ValueError(f"no map shears less than 1; the bound must be greater, not {bound}")
-    options = {"fill_holes": fill_holes, "avoid": avoid}
-    first = prepared = prepare(surface, faces, seams=seams, **options)
+    first = prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
     cuts = np.zeros((0, 2), np.int64) if first.cuts is None else first.cuts.edges
     slits = np.zeros((0, 2), dtype=np.int64)
     maps: list[ChartMap] = []
@@ -74,7 +73,7 @@ def unwrap_within(
             break
         slits = np.concatenate([slits, *new])
         opened = replace(surface, seams=np.concatenate([surface.seams, cuts, slits]))
-        prepared = prepare(opened, faces, seams=seams, **options)
+        prepared = prepare(opened, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
     charts, maps, slits, reached = best
     return Budgeted(Prepared(charts, first.cuts, first.warnings), maps, slits, tuple(history), reached)
 

@@ -60,8 +60,8 @@ def prepare(
         flat += count
     warnings = list(opened.cuts.warnings)
     if flat:
-        triangles = "A triangle has" if flat == 1 else f"{flat} triangles have"
-        warnings.append(f"{triangles} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve")
+        who = "A triangle has" if flat == 1 else f"{flat} triangles have"
+        warnings.append(f"{who} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve")
     return Prepared(charts, opened.cuts, tuple(warnings))
 
 
