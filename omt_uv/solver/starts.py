@@ -21,6 +21,7 @@ from .topology import halfedges, twins
 from .untangle import USABLE, arc_length_rim, circle_rim, count_folds, map_energy, untangle
 
 SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"
+SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by the length of the boundary"
 # Curvature, summed without sign over the inner vertices, below which a chart may be unrolled at once, in radians.
 NEARLY_FLAT = 0.5
 # A map whose signed area is a smaller share of its unsigned area has no orientation to speak of.
@@ -92,20 +93,25 @@ def square_start(vertices, triangles, uv, loop) -> Start:
     uv = ((uv - low) / (high - low) * 2 - 1) * half
     given = _perimeter(uv[loop] / half)
     turn = (np.roll(given, -1) - given) % 4
-    found, reasons = [], []
-    if (turn > 0).all() and abs(turn.sum() - 4) < 1e-9:
-        try:
-            found.append(_on_sides(vertices, triangles, uv, loop, given, half, []))
-        except FoldedUVError:
-            reasons.append("The corners of the start fold faces; they were spread by the length of the boundary")
-    else:
-        reasons.append(SPREAD)
-    if not found or map_energy(found[0].uv, vertices, triangles) > USABLE:
+    ordered = (turn > 0).all() and abs(turn.sum() - 4) < 1e-9
+    tries = [_attempt(vertices, triangles, uv, loop, given, half, [])] if ordered else []
+    if not tries or tries[0][1] > USABLE:
         even = 4 * arc_length_parameters(vertices, loop)
-        reasons = reasons or ["The corners of the start squeeze faces; they were spread by the length of the boundary"]
-        for phase in np.arange(8) / 8:
-            found.append(_on_sides(vertices, triangles, uv, loop, (even + phase) % 4, half, reasons))
-    return min(found, key=lambda start: map_energy(start.uv, vertices, triangles))
+        reasons = [SQUEEZED if ordered else SPREAD]
+        tries += [_attempt(vertices, triangles, uv, loop, (even + k / 8) % 4, half, reasons) for k in range(8)]
+    best, _ = min(tries, key=lambda found: found[1])
+    if isinstance(best, FoldedUVError):
+        raise best
+    return best
+
+
+def _attempt(vertices, triangles, uv, loop, s, half, reasons) -> tuple[Start | FoldedUVError, float]:
+    """A start with these positions along the square, or why there is none, and its energy."""
+    try:
+        start = _on_sides(vertices, triangles, uv, loop, s, half, reasons)
+    except FoldedUVError as error:
+        return error, np.inf
+    return start, map_energy(start.uv, vertices, triangles)
 
 
 def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> Start:
