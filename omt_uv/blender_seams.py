@@ -37,6 +37,24 @@ def _mark_bmesh(mesh: bpy.types.Mesh, edges: np.ndarray) -> int:
     return len(new)
 
 
+class GroupError(ValueError):
+    """No object has a vertex group of this name."""
+
+
+def avoided(objects: list, name: str) -> list:
+    """Weights (n,) of the vertex group for each object, None where it has none; without a name for none.
+
+    Raises
+    ------
+    GroupError : no object has this group
+    """
+    weights = [group_weights(obj, name) if name else None for obj in objects]
+    if name and all(w is None for w in weights):
+        names = ", ".join(obj.name for obj in objects)
+        raise GroupError(f"{names}: There is no vertex group {name!r}. Choose one, or leave it empty.")
+    return weights
+
+
 def group_weights(obj: bpy.types.Object, name: str) -> np.ndarray | None:
     """Weights (n,) in [0,1] of a vertex group, 0 outside of it; None if the object has none of this name."""
     group = obj.vertex_groups.get(name)

@@ -16,8 +16,10 @@ from .settings import (
     DEFAULT_BOUNDARY,
     DEFAULT_MARGIN,
     DEFAULT_QUALITY,
+    DEFAULT_SEAMS,
     DEFAULT_TEXTURE_SIZE,
     QUALITIES,
+    SEAMS,
     RefineSettings,
     Settings,
 )
@@ -63,6 +65,11 @@ def parser() -> argparse.ArgumentParser:
     unwrap.add_argument(
         "--quality", choices=_names(QUALITIES), default=DEFAULT_QUALITY.lower(), help="how exact the areas become"
     )
+    unwrap.add_argument("--seams", choices=_names(SEAMS), default=DEFAULT_SEAMS.lower(), help="where islands are cut")
+    _add_cut_options(unwrap)
+    unwrap.add_argument(
+        "--max-shear", type=_shear, default=0.0, metavar="S", help="cut further until the mean shear is below S > 1"
+    )
     unwrap.add_argument(
         "--margin", type=_margin, default=DEFAULT_MARGIN, metavar="PX", help="least distance of islands, in pixels"
     )
@@ -87,11 +94,29 @@ def parser() -> argparse.ArgumentParser:
     refine.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to refine; default: the active one")
     refine.add_argument("--report", type=Path, metavar="R.json", help="write figures of every island")
 
+    seams = commands.add_parser("seams", help="mark the seams that unwrapping needs, and stop")
+    seams.set_defaults(run=run_seams)
+    seams.add_argument("input", type=Path, metavar="IN", help=f"{formats} .off")
+    seams.add_argument("-o", "--output", type=Path, metavar="OUT", required=True, help=".blend, which keeps seams")
+    _add_cut_options(seams)
+
     measure = commands.add_parser("measure", help="area error, shear, folds and overlap of the active UV maps")
     measure.set_defaults(run=run_measure)
     measure.add_argument("input", type=Path, metavar="IN", help=f"{formats} .off")
     measure.add_argument("--json", action="store_true", help="print the figures as JSON")
     return top
+
+
+def _add_cut_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--fill-holes", action="store_true", help="take all holes but the longest boundary for filled")
+    command.add_argument("--keep-free", default="", metavar="GROUP", help="vertex group that new cuts avoid")
+
+
+def _shear(text: str) -> float:
+    value = float(text)
+    if not 1 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not greater than 1, which is no shear")
+    return value
 
 
 def _names(items) -> list[str]:
@@ -121,8 +146,9 @@ def _texture_size(text: str) -> int:
 
 def run_unwrap(options: argparse.Namespace) -> None:
     files, blender_mesh, blender_pack = _blender()
+    from .blender_seams import GroupError, avoided
     from .packing import PackingError
-    from .unwrapping import Refusal, lay_out
+    from .unwrapping import Job, Refusal, lay_out
 
     _check_output(options.output, files)
     settings = Settings(
@@ -132,20 +158,24 @@ def run_unwrap(options: argparse.Namespace) -> None:
         margin=options.margin,
         texture_size=options.texture_size,
         pack=not options.no_pack,
+        seams=options.seams,
+        fill_holes=options.fill_holes,
+        max_shear=options.max_shear,
     )
     pairs = _read(options.input, files, blender_mesh, options.uv_layer)
     objects = [obj for obj, _ in pairs]
     try:
         for obj in objects:
             blender_mesh.check_target(obj.data, options.uv_layer)
-        surfaces = [(r.surface, r.faces, r.pins) for _, r in pairs]
-        layout = _drain(lay_out(surfaces, settings, blender_pack.pack))
+        free = avoided(objects, options.keep_free)
+        jobs = [Job(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
+        layout = _drain(lay_out(jobs, settings, blender_pack.pack))
         for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):
             blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
         warnings = files.save(options.output, objects)
     except Refusal as refusal:
         raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
-    except (PackingError, blender_mesh.TargetError, files.FileError) as error:
+    except (PackingError, GroupError, blender_mesh.TargetError, files.FileError) as error:
         raise CommandError(str(error)) from error
     warnings = _warn(objects, layout.warnings, warnings)
     if options.report:
@@ -154,6 +184,32 @@ def run_unwrap(options: argparse.Namespace) -> None:
         if not options.no_pack:
             packing["coverage"] = layout.packing.coverage
         _write_report(options, {"boundary": options.boundary, "packing": packing}, objects, charts, warnings)
+
+
+def run_seams(options: argparse.Namespace) -> None:
+    files, blender_mesh, _ = _blender()
+    from .blender_seams import GroupError, avoided, mark_seams
+    from .solver.cutting import cut
+    from .solver.errors import MeshError
+
+    if options.output.suffix.lower() != ".blend":
+        raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")
+    pairs = _read(options.input, files, blender_mesh)
+    objects = [obj for obj, _ in pairs]
+    told = []
+    try:
+        free = avoided(objects, options.keep_free)
+        for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
+            cuts = cut(reading.surface, reading.faces, avoid=avoid, fill=options.fill_holes)
+            told += [(k, text) for text in cuts.warnings]
+            mark_seams(obj, cuts.edges)
+            print(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")
+        warnings = files.save(options.output, objects)
+    except MeshError as error:
+        raise CommandError(f"{obj.name}: {error}") from error
+    except (GroupError, files.FileError) as error:
+        raise CommandError(str(error)) from error
+    _warn(objects, told, warnings)
 
 
 def run_refine(options: argparse.Namespace) -> None:

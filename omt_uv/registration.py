@@ -6,11 +6,19 @@ import bpy
 
 from .operators.measure import UV_OT_omt_measure
 from .operators.refine import UV_OT_omt_refine
+from .operators.seams import UV_OT_omt_seams
 from .operators.unwrap import UV_OT_omt_unwrap
 from .panels.menus import draw_unwrap, menus
 from .panels.sidebar import IMAGE_PT_omt_uv, VIEW3D_PT_omt_uv
 
-CLASSES = (UV_OT_omt_unwrap, UV_OT_omt_refine, UV_OT_omt_measure, VIEW3D_PT_omt_uv, IMAGE_PT_omt_uv)
+CLASSES = (
+    UV_OT_omt_unwrap,
+    UV_OT_omt_refine,
+    UV_OT_omt_seams,
+    UV_OT_omt_measure,
+    VIEW3D_PT_omt_uv,
+    IMAGE_PT_omt_uv,
+)
 COMMAND = "omt_uv"
 
 _undo: list[tuple] = []

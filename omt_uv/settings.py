@@ -15,7 +15,17 @@ QUALITIES = (
     ("STANDARD", "Standard", "Areas right to within about one percent of the texture"),
     ("EXACT", "Exact", "Areas right to about a tenth of a percent of the texture; several times slower"),
 )
+SEAMS = (
+    (
+        "AUTO",
+        "Auto",
+        "Islands follow the seams; what they leave closed, ringed or knotted is cut open along short paths",
+    ),
+    ("EXISTING", "Existing", "Islands follow the seams alone; what they do not open into a disk is refused"),
+    ("CHARTS", "Charts", "Many islands of little distortion, inside those that the seams make"),
+)
 DEFAULT_BOUNDARY = "FREE"
+DEFAULT_SEAMS = "AUTO"
 DEFAULT_QUALITY = "STANDARD"
 DEFAULT_BALANCE = 0.0
 DEFAULT_MARGIN = 4
@@ -29,6 +39,8 @@ class Settings:
     boundary, quality : an identifier of the lists above in lower case
     balance : from 0, exact areas, to 1, least shear
     margin : pixels of a texture `texture_size` pixels wide; pack : arrange the islands in the unit square
+    seams : an identifier of the list above in lower case; fill_holes : take all boundaries of a part but the longest
+        for filled; max_shear : cut islands further until their mean shear is below, 0 for no such cuts
     """
 
     boundary: str = DEFAULT_BOUNDARY.lower()
@@ -37,10 +49,17 @@ class Settings:
     margin: float = DEFAULT_MARGIN
     texture_size: int = DEFAULT_TEXTURE_SIZE
     pack: bool = True
+    seams: str = DEFAULT_SEAMS.lower()
+    fill_holes: bool = False
+    max_shear: float = 0.0
 
     def solver_arguments(self) -> dict:
-        """Keyword arguments of `solver.parameterize.unwrap`."""
+        """How to map a chart: keyword arguments of `solver.parameterize.unwrap_chart`."""
         return {"boundary": self.boundary, "quality": self.quality, "balance": self.balance}
+
+    def preparation_arguments(self) -> dict:
+        """How to make charts: keyword arguments of `solver.preparation.prepare`."""
+        return {"seams": "existing" if self.seams == "existing" else "auto", "fill_holes": self.fill_holes}
 
 
 @dataclass(frozen=True)

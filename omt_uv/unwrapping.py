@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from . import packing
+from .segmentation import SegmentationError, chart_seams
 from .settings import Settings
-from .solver.chart_pins import CornerPins
+from .solver.budget import unwrap_within
+from .solver.chart_pins import CornerPins, chart_pins
 from .solver.charts import Chart, Surface
 from .solver.errors import MeshError
 from .solver.geometry import face_areas, signed_areas
-from .solver.parameterize import SurfaceMap, unwrap
+from .solver.parameterize import ChartMap, SurfaceMap, located, unwrap, unwrap_chart
 from .solver.progress import Progress, Steps
 
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
@@ -41,12 +43,22 @@ class Layout:
     warnings: list[tuple[int, str]]
 
 
+@dataclass(frozen=True)
+class Job:
+    """A surface, the polygons (f,) bool to unwrap, its pins, and vertices (n,) in [0,1] to keep free of cuts."""
+
+    surface: Surface
+    faces: np.ndarray | None = None
+    pins: CornerPins | None = None
+    avoid: np.ndarray | None = None
+
+
 def lay_out(
-    surfaces: Sequence[tuple[Surface, np.ndarray | None, CornerPins | None]],
+    jobs: Sequence[Job],
     settings: Settings,
     spare_packer: Packer | None = None,
 ) -> Steps[Layout]:
-    """Unwrap surfaces, each with the polygons (f,) bool to use and its pins, at one texel density into one unit square.
+    """Unwrap surfaces at one texel density into one unit square.
 
     Solver results have the area of the surface, so packing with a single scale gives every island of every
     surface the same texels per area. `spare_packer` takes over, with a warning, where xatlas cannot. Islands with
@@ -59,12 +71,13 @@ def lay_out(
     """
     maps: list[SurfaceMap] = []
     warnings: list[tuple[int, str]] = []
-    for index, (surface, faces, pins) in enumerate(surfaces):
+    for index, job in enumerate(jobs):
         try:
-            steps = unwrap(surface, faces, pins=pins, **settings.solver_arguments())
-            maps.append((yield from share_of(steps, index, len(surfaces))))
+            job, complaint = _with_charts(job) if settings.seams == "charts" else (job, "")
+            maps.append((yield from share_of(_mapped(job, settings), index, len(jobs))))
         except MeshError as error:
             raise Refusal(index, error) from error
+        warnings += [(index, text) for text in (complaint, *maps[-1].warnings) if text]
         warnings += [(index, text) for chart_map in maps[-1].maps for text in chart_map.warnings]
     yield Progress("Packing", 1.0)
     charts = [pair for surface_map in maps for pair in zip(surface_map.charts, surface_map.maps, strict=True)]
@@ -78,6 +91,40 @@ def lay_out(
     placed = iter(packed.islands)
     corners, uv = _scatter(maps, [m.uv if m.pinned else next(placed) for _, m in charts])
     return Layout(corners, uv, maps, packed, warnings)
+
+
+def _with_charts(job: Job) -> tuple[Job, str]:
+    """The job with the seams of charts of low distortion added, or as it is and a warning."""
+    try:
+        more = chart_seams(job.surface, job.faces)
+    except SegmentationError as error:
+        return job, f"{error}; cut only where it has to be"
+    seams = np.concatenate([job.surface.seams, more])
+    return replace(job, surface=replace(job.surface, seams=seams)), ""
+
+
+def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
+    options = settings.preparation_arguments()
+    if not settings.max_shear:
+        arguments = {**settings.solver_arguments(), **options}
+        return (yield from unwrap(job.surface, job.faces, pins=job.pins, avoid=job.avoid, **arguments))
+
+    def map_chart(chart: Chart) -> Steps[ChartMap]:
+        try:
+            return (yield from unwrap_chart(chart, pins=chart_pins(job.pins, chart), **settings.solver_arguments()))
+        except MeshError as error:
+            raise located(error, chart) from error
+
+    found = yield from unwrap_within(job.surface, job.faces, map_chart, settings.max_shear, avoid=job.avoid, **options)
+    cuts = found.slits if found.prepared.cuts is None else np.concatenate([found.prepared.cuts.edges, found.slits])
+    (length, shear), first = found.history[-1], found.history[0]
+    warnings = list(found.prepared.warnings)
+    if not found.reached:
+        warnings.append(
+            f"The mean shear went from {first[1]:.3g} to {shear:.3g} with {length - first[0]:.3g} more of seam, "
+            f"not below {settings.max_shear:.3g}; the least that was found is kept"
+        )
+    return SurfaceMap(found.prepared.charts, found.maps, cuts, tuple(warnings))
 
 
 def _in_place(pinned: int, others: int) -> str:

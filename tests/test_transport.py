@@ -12,7 +12,7 @@ from omt_uv.solver.domain import ConvexPolygon, Disk, Rectangle, segment_integra
 from omt_uv.solver.geometry import vertex_areas
 from omt_uv.solver.power_diagram import power_diagram
 from omt_uv.solver.progress import drain
-from omt_uv.solver.regular import by_flips, by_hull
+from omt_uv.solver.regular import by_hull
 from omt_uv.solver.transport import transport
 
 DOMAINS = {

@@ -40,18 +40,19 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
         self.layout.prop(self, "keep_free")
 
     def steps(self, context: bpy.types.Context):
-        from ..blender_seams import group_weights
+        from ..blender_seams import GroupError, avoided
         from ..solver.cutting import cut
         from ..solver.errors import MeshError
         from ..solver.progress import Progress
 
         pairs = read_objects(context)
+        try:
+            free = avoided([obj for obj, _ in pairs], self.keep_free)
+        except GroupError as error:
+            raise Complaint(str(error)) from error
         results = []
-        for k, (obj, reading) in enumerate(pairs):
+        for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
             yield Progress("Seams", k / len(pairs))
-            avoid = group_weights(obj, self.keep_free) if self.keep_free else None
-            if self.keep_free and avoid is None and len(pairs) == 1:
-                raise Complaint(f"{obj.name} has no vertex group {self.keep_free!r}. Choose one, or leave it empty.")
             try:
                 cuts = cut(
                     reading.surface, reading.faces, avoid=avoid, fill=self.fill_holes, extremities=self.extremities

@@ -11,8 +11,10 @@ from ..settings import (
     DEFAULT_BOUNDARY,
     DEFAULT_MARGIN,
     DEFAULT_QUALITY,
+    DEFAULT_SEAMS,
     DEFAULT_TEXTURE_SIZE,
     QUALITIES,
+    SEAMS,
     Settings,
 )
 from .common import Complaint, SolverOperator, read_objects, warn
@@ -38,6 +40,24 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
     )
     quality: EnumProperty(
         name="Quality", description="How exact the areas become", items=QUALITIES, default=DEFAULT_QUALITY
+    )
+    seams: EnumProperty(name="Seams", description="Where islands are cut", items=SEAMS, default=DEFAULT_SEAMS)
+    fill_holes: BoolProperty(
+        name="Fill Holes",
+        description="Take holes such as eyes and nostrils for filled instead of cutting to them; "
+        "the longest boundary of a part stays open",
+        default=False,
+    )
+    keep_free: StringProperty(
+        name="Keep Free", description="Vertex group that new cuts avoid, the more the larger the weight. Empty: none"
+    )
+    max_shear: FloatProperty(
+        name="Max Shear",
+        description="Cut islands further until their mean shear is below this. 0: no such cuts. 1.3 is hardly visible; "
+        "every cut takes another run",
+        default=0.0,
+        min=0.0,
+        soft_max=3.0,
     )
     pack: BoolProperty(
         name="Pack Islands",
@@ -78,21 +98,26 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
             margin=self.margin,
             texture_size=self.texture_size,
             pack=self.pack,
+            seams=self.seams.lower(),
+            fill_holes=self.fill_holes,
+            max_shear=self.max_shear if self.max_shear > 1 else 0.0,
         )
 
     def steps(self, context: bpy.types.Context):
         from .. import blender_mesh, blender_pack, packing
-        from ..unwrapping import Refusal, lay_out
+        from ..blender_seams import GroupError, avoided
+        from ..unwrapping import Job, Refusal, lay_out
 
         pairs = read_objects(context, self.uv_layer)
         try:
             for obj, _ in pairs:
                 blender_mesh.check_target(obj.data, self.uv_layer)
-        except blender_mesh.TargetError as error:
+            free = avoided([obj for obj, _ in pairs], self.keep_free)
+        except (blender_mesh.TargetError, GroupError) as error:
             raise Complaint(str(error)) from error
-        surfaces = [(reading.surface, reading.faces, reading.pins) for _, reading in pairs]
+        jobs = [Job(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
         try:
-            layout = yield from lay_out(surfaces, self.settings(), blender_pack.pack)
+            layout = yield from lay_out(jobs, self.settings(), blender_pack.pack)
         except Refusal as refusal:
             obj = pairs[refusal.index][0]
             raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
@@ -117,6 +142,12 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "boundary")
     layout.prop(properties, "balance")
     layout.prop(properties, "quality")
+    layout.prop(properties, "seams")
+    column = layout.column()
+    column.active = properties.seams != "EXISTING"
+    column.prop(properties, "keep_free")
+    layout.prop(properties, "fill_holes")
+    layout.prop(properties, "max_shear")
     layout.prop(properties, "pack")
     column = layout.column()
     column.active = properties.pack

@@ -6,6 +6,7 @@ import bpy
 
 from ..operators.measure import UV_OT_omt_measure
 from ..operators.refine import UV_OT_omt_refine
+from ..operators.seams import UV_OT_omt_seams
 from ..operators.unwrap import UV_OT_omt_unwrap
 
 
@@ -13,6 +14,7 @@ def draw_unwrap(self, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator(UV_OT_omt_unwrap.bl_idname)
     self.layout.operator(UV_OT_omt_refine.bl_idname)
+    self.layout.operator(UV_OT_omt_seams.bl_idname)
     self.layout.operator(UV_OT_omt_measure.bl_idname)
 
 

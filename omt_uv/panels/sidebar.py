@@ -6,6 +6,7 @@ import bpy
 
 from ..operators.measure import UV_OT_omt_measure
 from ..operators.refine import UV_OT_omt_refine
+from ..operators.seams import UV_OT_omt_seams
 from ..operators.unwrap import UV_OT_omt_unwrap, draw_settings
 
 
@@ -25,6 +26,7 @@ class SidebarPanel:
         layout.operator(UV_OT_omt_unwrap.bl_idname, icon="UV")
         # It starts from its own settings, which its redo panel shows: they are few, and mostly other ones.
         layout.operator(UV_OT_omt_refine.bl_idname)
+        layout.operator(UV_OT_omt_seams.bl_idname)
         layout.operator(UV_OT_omt_measure.bl_idname)
 
 

@@ -6,8 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import Chart, Surface, assemble, check_disk, check_edges, chosen_triangles, split, strict_sheets
+from .charts import (
+    Chart,
+    Surface,
+    assemble,
+    check_disk,
+    check_edges,
+    chosen_triangles,
+    degenerate_triangles,
+    split,
+    strict_sheets,
+)
 from .cutting import Cuts, open_sheets
+from .errors import ZeroAreaFaceError
 from .holes import fill_holes as fill_holes_of
 from .repair import join, with_area
 
@@ -51,6 +62,8 @@ def prepare(
     if seams == "existing":
         return Prepared(_existing(surface, faces, fill_holes), None, ())
     faces, triangles, owner = chosen_triangles(surface, faces)
+    if degenerate_triangles(surface.positions, surface.corner_vertex[triangles]).all():
+        raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     repaired = join(surface, faces, triangles, owner)
     opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes)
     charts, flat = [], 0

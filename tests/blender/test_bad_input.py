@@ -114,7 +114,7 @@ def test_refused_with_the_culprits_selected(make, mode):
     else:
         scenes.select([bystander, obj])
     before = scenes.state(obj), scenes.state(bystander)
-    message = scenes.error_of(bpy.ops.uv.omt_unwrap, uv_layer="New")
+    message = scenes.error_of(bpy.ops.uv.omt_unwrap, uv_layer="New", seams="EXISTING")
     assert obj.name in message
     assert len(message.strip().splitlines()) == 1
     assert message.count(". ") >= 1, "cause and remedy"
@@ -138,7 +138,7 @@ def test_refused_with_the_culprits_selected(make, mode):
 
 def test_the_right_elements_are_selected():
     obj, _ = non_manifold_edge()
-    scenes.error_of(bpy.ops.uv.omt_unwrap)
+    scenes.error_of(bpy.ops.uv.omt_unwrap, seams="EXISTING")
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.object.mode_set(mode="OBJECT")
     assert [tuple(sorted(e.vertices)) for e in obj.data.edges if e.select] == [(6, 7)]
@@ -149,7 +149,35 @@ def test_only_selected_faces_count():
     """What is wrong elsewhere in the mesh does not keep selected faces from being unwrapped."""
     obj, _ = non_manifold_edge()
     scenes.edit(obj, faces=[12, 13, 14, 15])
-    assert bpy.ops.uv.omt_unwrap() == {"FINISHED"}
+    assert bpy.ops.uv.omt_unwrap(seams="EXISTING") == {"FINISHED"}
+
+
+REPAIRED = [
+    non_manifold_edge, zero_area_face, coincident_vertices, duplicate_face, wrong_orientation, closed,
+    several_boundaries, handle,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("make", REPAIRED)
+def test_repaired_and_cut_for_the_map_only(make):
+    obj, _ = make()
+    obj.data.uv_layers.new(name="UVMap")
+    points, faces = [tuple(v.co) for v in obj.data.vertices], [tuple(p.vertices) for p in obj.data.polygons]
+    seams = [e.use_seam for e in obj.data.edges]
+    assert bpy.ops.uv.omt_unwrap(quality="DRAFT") == {"FINISHED"}
+    assert [tuple(v.co) for v in obj.data.vertices] == points
+    assert [tuple(p.vertices) for p in obj.data.polygons] == faces
+    assert [e.use_seam for e in obj.data.edges] == seams
+    space, uv = scenes.areas(obj)
+    assert np.isfinite(uv).all() and (np.abs(uv[space > 1e-9]) > 0).all()
+
+
+@pytest.mark.parametrize("make", [not_a_number, infinite, zero_scale, flat_scale])
+def test_what_no_repair_helps_is_refused(make):
+    obj, _ = make()
+    before = scenes.state(obj)
+    assert obj.name in scenes.error_of(bpy.ops.uv.omt_unwrap, uv_layer="New")
+    assert scenes.state(obj) == before
 
 
 def test_two_fans_at_a_vertex_are_split_for_the_map():

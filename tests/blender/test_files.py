@@ -202,8 +202,12 @@ def test_measure_prints_what_the_unwrap_reports(run, tmp_path):
     assert len(out.splitlines()) == 1
 
 
-def bad_closed(path):
+def closed(path):
     path.write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n")
+
+
+def bad_number(path):
+    path.write_text("OFF\n3 1 0\n0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n")
 
 
 def bad_empty(path):
@@ -220,7 +224,7 @@ def bad_missing(path):
 
 @pytest.mark.parametrize(
     "make, suffix",
-    [(bad_closed, ".off"), (bad_empty, ".off"), (bad_missing, ".obj"), (bad_missing, ".blend"), (bad_missing, ".xyz")]
+    [(bad_number, ".off"), (bad_empty, ".off"), (bad_missing, ".obj"), (bad_missing, ".blend"), (bad_missing, ".xyz")]
     + [(bad_garbage, suffix) for suffix in (*FORMATS, ".off")],
 )
 def test_bad_files_end_with_one_line_and_no_output(run, tmp_path, make, suffix):
@@ -261,8 +265,10 @@ def test_as_a_program(tmp_path):
     command = [sys.executable, "-m", "omt_uv", "unwrap", str(tmp_path / "in.obj"), "-o", str(tmp_path / "out.ply")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    bad_closed(tmp_path / "in.off")
+    closed(tmp_path / "in.off")
     command[4] = str(tmp_path / "in.off")
+    assert subprocess.run(command, cwd=ROOT, capture_output=True).returncode == 0
+    command += ["--seams", "existing"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1

@@ -32,7 +32,10 @@ class Layout:
         return types.SimpleNamespace()
 
 
-SETTINGS = ["boundary", "balance", "quality", "pack", "margin", "texture_size", "uv_layer"]
+SETTINGS = [
+    *("boundary", "balance", "quality", "seams", "keep_free", "fill_holes", "max_shear"),
+    *("pack", "margin", "texture_size", "uv_layer"),
+]
 
 
 @pytest.mark.parametrize("name", ["VIEW3D_PT_omt_uv", "IMAGE_PT_omt_uv"])
@@ -41,7 +44,7 @@ def test_sidebar_shows_every_setting(name):
     panel = getattr(bpy.types, name)
     assert panel.poll(bpy.context)
     panel.draw(types.SimpleNamespace(layout=Layout(record)), bpy.context)
-    assert record == [*SETTINGS, "uv.omt_unwrap", "uv.omt_refine", "uv.omt_measure"]
+    assert record == [*SETTINGS, "uv.omt_unwrap", "uv.omt_refine", "uv.omt_seams", "uv.omt_measure"]
 
 
 def test_redo_panel_shows_every_setting(package):
@@ -65,7 +68,7 @@ def test_refine_shows_every_setting():
 def test_menu_entry(package):
     record = []
     package("panels.menus").draw_unwrap(types.SimpleNamespace(layout=Layout(record)), bpy.context)
-    assert record == ["uv.omt_unwrap", "uv.omt_refine", "uv.omt_measure"]
+    assert record == ["uv.omt_unwrap", "uv.omt_refine", "uv.omt_seams", "uv.omt_measure"]
 
 
 def test_the_choices_are_those_of_the_solver_and_of_the_command(package):
