@@ -199,9 +199,7 @@ def test_polygons_are_cut_along_their_sides():
 @pytest.mark.parametrize("name", ["sphere", "cube", "double torus", "holed sphere"])
 def test_units_do_not_matter(name, scale, shift):
     V, F = SURFACES[name]()
-    np.testing.assert_array_equal(
-        cut(triangle_surface(V, F)).edges, cut(triangle_surface(V * scale + shift, F)).edges
-    )
+    np.testing.assert_array_equal(cut(triangle_surface(V, F)).edges, cut(triangle_surface(V * scale + shift, F)).edges)
 
 
 def test_names_of_vertices_hardly_matter():

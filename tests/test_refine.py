@@ -415,11 +415,17 @@ def overlapping_helix():
         rows.append(np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0.25 * angle * 0.2]))
     V = np.concatenate(rows)
     quad = np.arange(k - 1)
-    F = np.concatenate([
-        np.concatenate([np.column_stack([r * k + quad, (r + 1) * k + quad, r * k + quad + 1]),
-                        np.column_stack([r * k + quad + 1, (r + 1) * k + quad, (r + 1) * k + quad + 1])])
-        for r in range(2)
-    ])
+    F = np.concatenate(
+        [
+            np.concatenate(
+                [
+                    np.column_stack([r * k + quad, (r + 1) * k + quad, r * k + quad + 1]),
+                    np.column_stack([r * k + quad + 1, (r + 1) * k + quad, (r + 1) * k + quad + 1]),
+                ]
+            )
+            for r in range(2)
+        ]
+    )
     return V, F[:, [0, 1, 2]]
 
 

@@ -106,8 +106,13 @@ def _open_halfedges(count: int, first: np.ndarray, second: np.ndarray) -> np.nda
 
 
 def make_piece(
-    sheets: Sheets, positions: np.ndarray, corner_class: np.ndarray, members: np.ndarray, mine: np.ndarray,
-    weight: np.ndarray, seam: np.ndarray,
+    sheets: Sheets,
+    positions: np.ndarray,
+    corner_class: np.ndarray,
+    members: np.ndarray,
+    mine: np.ndarray,
+    weight: np.ndarray,
+    seam: np.ndarray,
 ) -> Piece:
     """The piece of the triangles `members` (m,), in ascending order, and the pairs `mine` (e,) between them.
 

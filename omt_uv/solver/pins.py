@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .contact import contact
 from .energy import squared
 from .errors import PinError
 from .newton import Free, Problem
 from .progress import Progress, Steps
-from .stages import CONTACT_STRENGTH, Task, rescaled
+from .stages import Task, rescaled
 from .stages import minimise as minimise_energy
 
 # Weight of the area term while pins are dragged, and stiffness of the springs that drag them: from soft to hard.
@@ -96,7 +95,6 @@ def drag(task: Task, w: np.ndarray, pins: Pins) -> Steps[tuple[Task, np.ndarray]
     ------
     PinError : some pins cannot reach their places without a fold
     """
-    loop = task.loop
     w = aligned(w, pins)
     extent = np.abs(pins.places - pins.places.mean()).max()
     for k, stiffness in enumerate(STIFFNESS):
@@ -106,7 +104,7 @@ def drag(task: Task, w: np.ndarray, pins: Pins) -> Steps[tuple[Task, np.ndarray]
         if near and (task.faces.areas(snapped) > 0).all() and not task.crosses(snapped):
             return replace(rescaled(task, snapped), motion=_held(len(w), pins), scale_free=True), snapped
         task = rescaled(task, w)
-        guard = contact(w, loop, CONTACT_STRENGTH / len(task.faces.area))
+        guard = task.guard(w)
         springs = Springs(pins, stiffness, extent)
         problem = Problem(task.faces, task.assembly, task.motion, DRAG_WEIGHT, (springs, guard))
         yield Progress("Pins", k / len(STIFFNESS))

@@ -106,7 +106,7 @@ def refine(
     found, start, area_left = yield from _refined(*renumbered, boundary, target, balance, QUALITIES[quality], held)
     yield Progress("Refinement", 1.0)
     refined = np.column_stack([found.w.real, found.w.imag])[place] * mirror
-    if held is not None:
+    if pins is not None and held is not None:
         refined[pins[0]] = pins[1]
     return Refinement(
         refined,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .contact import contact, crossings
+from .contact import Contact, contact, crossings
 from .energy import Elements, area_error
 from .newton import Assembly, Motion, Problem, Step, newton_step
 from .progress import Progress, Steps
@@ -65,8 +65,14 @@ class Task:
     scale_free: bool = False
 
     def problem(self, w: np.ndarray, weight: float, guarded: bool) -> Problem:
-        extras = (contact(w, self.loop, CONTACT_STRENGTH / len(self.faces.area)),) if guarded else ()
+        extras = (self.guard(w),) if guarded else ()
         return Problem(self.faces, self.assembly, self.motion, weight, extras)
+
+    def guard(self, w: np.ndarray) -> Contact:
+        """The barrier that keeps the boundary of the map w (n,) from crossing itself."""
+        if self.loop is None:
+            raise ValueError("a boundary that may not move has nothing to be kept from")
+        return contact(w, self.loop, CONTACT_STRENGTH / len(self.faces.area))
 
     def crosses(self, w: np.ndarray) -> bool:
         return self.loop is not None and len(crossings(w, self.loop)) > 0

@@ -62,7 +62,8 @@ def notched_disk(start: Start, triangles, loop) -> Start | None:
     released = _released(triangles, loop, everywhere, everywhere > 0, len(start.uv))
     if not released.any():
         return None
-    motion = OnCircle(loop[~released], start.motion.radius, len(start.uv))
+    radius = float(np.linalg.norm(start.uv[loop], axis=1).mean())
+    motion = OnCircle(loop[~released], radius, len(start.uv))
     warning = f"{released.sum()} boundary vertices leave the circle, where it has no room for their faces"
     return Start(start.uv, motion, (*start.warnings, warning), True, True)
 

@@ -77,7 +77,7 @@ def transport(
             if residual <= tolerance:
                 return Transport(w, cells, residual, cells.cost(sites), iteration, diagrams.count, diagrams.hulls)
         direction = _newton_direction(sites, cells, mass)
-        error = np.linalg.norm(cells.area - mass)
+        error = float(np.linalg.norm(cells.area - mass))
         step = min(1.0, 4 * step)
         for _ in range(MAX_HALVINGS):
             trial_w = w + step * direction
