@@ -12,7 +12,7 @@ from omt_uv.solver.domain import ConvexPolygon, Disk, Rectangle, segment_integra
 from omt_uv.solver.geometry import vertex_areas
 from omt_uv.solver.power_diagram import power_diagram
 from omt_uv.solver.progress import drain
-from omt_uv.solver.regular import by_hull
+from omt_uv.solver.regular import by_flips, by_hull
 from omt_uv.solver.transport import transport
 
 DOMAINS = {
@@ -208,3 +208,30 @@ def test_models(name):
     np.testing.assert_allclose(result.cells.area, mass / mass.sum() * np.pi, rtol=1e-6)
     assert abs(result.cells.area.sum() - np.pi) < 1e-12
     assert result.iterations <= 25
+
+
+def test_flips_repair_the_triangulation_a_hull_would_give():
+    sites = inside(Disk(), 300)
+    rng = np.random.default_rng(7)
+    start = by_hull(sites, np.zeros(300))
+    assert start.whole
+    reached = 0
+    for size in (1e-4, 1e-3, 3e-3):
+        weights = size * rng.normal(size=300)
+        repaired, hidden = by_flips(start, sites, weights)
+        expected = by_hull(sites, weights)
+        if repaired is None:
+            # Flips alone cannot take a site out; the certificate must then be right.
+            assert not hidden or len(np.unique(expected.triangles)) < 300
+            continue
+        reached += 1
+        rows = [{tuple(sorted(t)) for t in r.triangles} for r in (repaired, expected)]
+        assert rows[0] == rows[1]
+        assert (repaired.twin[repaired.twin[repaired.twin >= 0]] >= 0).all()
+    assert reached >= 2
+
+
+def test_few_hulls_are_built():
+    """One hull for the start; flips carry the triangulation through the Newton steps."""
+    result = drain(transport(inside(Disk(), 2000), np.ones(2000), Disk()))
+    assert result.hulls <= 2 and result.diagrams <= 20

@@ -24,10 +24,15 @@ MAX_ROUNDS = 200
 
 @dataclass(frozen=True)
 class Regular:
-    """Triangles (k,3) of sites, counter-clockwise, and their twin halfedges (3k,), -1 on the hull."""
+    """Triangles (k,3) of sites, counter-clockwise, and their twin halfedges (3k,), -1 on the hull.
+
+    whole: the triangles fill the convex hull of all sites, so that edges which are regular one by one prove that the
+    triangulation is. Not so where sites lie on a straight rim, or are hidden.
+    """
 
     triangles: np.ndarray
     twin: np.ndarray
+    whole: bool
 
 
 def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
@@ -43,12 +48,15 @@ def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
         hull = ConvexHull(np.vstack([lifted, above]), qhull_options="Qt Q12")
     except (QhullError, ValueError) as error:
         raise TransportError("The sites of the transport lie on one line or coincide") from error
-    triangles = hull.simplices.astype(np.int64)
-    triangles = triangles[(hull.equations[:, 2] < -STEEP) & (triangles.max(axis=1) < len(sites))]
+    triangles, slope = hull.simplices.astype(np.int64), hull.equations[:, 2]
+    of_sites = triangles.max(axis=1) < len(sites)
+    whole = not (np.abs(slope[of_sites]) <= STEEP).any()
+    triangles = triangles[(slope < -STEEP) & of_sites]
     a, b, c = (sites[triangles[:, k]] for k in range(3))
     turned = cross2(b - a, c - a) < 0
     triangles[turned] = triangles[turned][:, [0, 2, 1]]
-    return Regular(triangles, twins(triangles))
+    whole = whole and len(np.unique(triangles)) == len(sites)
+    return Regular(triangles, twins(triangles), whole)
 
 
 def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Regular | None, bool]:
@@ -69,7 +77,7 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
     below, _ = _below(sites, weights, flat, edges, twin[edges])
     stuck = edges[below < 0]
     if settled and len(stuck) == 0:
-        return Regular(triangles, twin), False
+        return Regular(triangles, twin, start.whole), False
     degree = np.bincount(flat, minlength=len(sites))
     on_hull = np.zeros(len(sites), dtype=bool)
     on_hull[flat[twin < 0]] = True

@@ -70,8 +70,8 @@ def transport(
         done = 1 - np.log(max(residual, tolerance) / tolerance) / np.log(1 + first / tolerance)
         yield Progress("Optimal transport", float(np.clip(done, 0, 1)))
         if residual <= tolerance:
-            if diagrams.flipped:
-                # The result stands on a hull of its own, whatever the flips have led to.
+            if diagrams.flipped and not cells.dual.whole:
+                # Flips prove nothing on a straight rim: let the result stand on a hull of its own.
                 cells = diagrams.anew(w)
                 residual = _residual(cells, mass)
             if residual <= tolerance:
