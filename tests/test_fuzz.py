@@ -165,7 +165,8 @@ def broken_mesh(seed):
         seams = np.concatenate([seams, edges[rng.random(len(edges)) < rng.random()]])
     surface = meshes.polygon_surface(V, P, seams)
     faces = rng.random(len(P)) < 0.8 if rng.random() < 0.2 else None
-    return surface, faces, {"boundary": rng.choice(["disk", "square", "free"]), "quality": "draft"}
+    options = {"boundary": str(rng.choice(["disk", "square", "free"])), "quality": "draft"}
+    return surface, faces, {**options, "seams": "existing" if rng.random() < 0.4 else "auto"}
 
 
 def arrays(surface: Surface):

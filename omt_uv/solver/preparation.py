@@ -13,7 +13,6 @@ from .charts import (
     check_disk,
     check_edges,
     chosen_triangles,
-    degenerate_triangles,
     split,
     strict_sheets,
 )
@@ -62,7 +61,7 @@ def prepare(
     if seams == "existing":
         return Prepared(_existing(surface, faces, fill_holes), None, ())
     faces, triangles, owner = chosen_triangles(surface, faces)
-    if degenerate_triangles(surface.positions, surface.corner_vertex[triangles]).all():
+    if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     repaired = join(surface, faces, triangles, owner)
     opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes)
@@ -76,6 +75,14 @@ def prepare(
         who = "A triangle has" if flat == 1 else f"{flat} triangles have"
         warnings.append(f"{who} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve")
     return Prepared(charts, opened.cuts, tuple(warnings))
+
+
+def _all_lines(points: np.ndarray) -> bool:
+    """No triangle (m,3,3) spans an area, for example under an object scale of 0 along two axes."""
+    side = points / 2 - points[:, :1] / 2
+    size = np.abs(side).max(axis=(1, 2), initial=0.0)
+    side = side / np.where(size > 0, size, 1)[:, None, None]
+    return not (np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1) > 0).any()
 
 
 def _existing(surface: Surface, faces: np.ndarray | None, holes_too: bool) -> list[Chart]:
