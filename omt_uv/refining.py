@@ -17,7 +17,7 @@ from .solver.improve import boundary_edges, improve
 from .solver.islands import Island, uv_islands
 from .solver.overlap import overlap_share
 from .solver.parameterize import located
-from .solver.progress import Progress, Steps
+from .solver.progress import Progress, Steps, part_of
 from .solver.refine import Refinement
 from .unwrapping import Packer, Refusal, pack_islands
 
@@ -80,10 +80,9 @@ def refine_islands(
         share = len(island.chart.triangles)
         steps = _improve(island, pins, settings)
         try:
-            piece = yield from _within(steps, done / total, share / total)
+            held, refinement = yield from part_of(steps, done / total, share / total)
         except MeshError as error:
             raise Refusal(owner, located(_shown(error, island.chart), island.chart)) from error
-        held, refinement = piece
         pieces.append(_Piece(owner, island, pins, held, refinement))
         warnings += [(owner, text) for text in (*refinement.warnings, *_unfinished(refinement))]
         done += share
@@ -139,16 +138,6 @@ def _pins_of(pins: CornerPins, chart: Chart) -> ChartPins | None:
         return chart_pins(pins, chart)
     except MeshError as error:
         raise located(error, chart) from error
-
-
-def _within(steps: Steps, done: float, share: float) -> Steps:
-    """Pass on progress of one island as progress of all."""
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield Progress(progress.stage, min(done + share * progress.fraction, 1.0))
 
 
 def _improve(island: Island, pins: ChartPins | None, settings: RefineSettings) -> Steps[tuple[bool, Refinement]]:

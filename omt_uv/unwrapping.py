@@ -16,7 +16,7 @@ from .solver.charts import Chart, Surface
 from .solver.errors import MeshError
 from .solver.geometry import face_areas, signed_areas
 from .solver.parameterize import ChartMap, SurfaceMap, located, unwrap, unwrap_chart
-from .solver.progress import Progress, Steps
+from .solver.progress import Progress, Steps, part_of
 
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
 
@@ -74,7 +74,7 @@ def lay_out(
     for index, job in enumerate(jobs):
         try:
             job, complaint = _with_charts(job) if settings.seams == "charts" else (job, "")
-            maps.append((yield from share_of(_mapped(job, settings), index, len(jobs))))
+            maps.append((yield from part_of(_mapped(job, settings), index / len(jobs), 1 / len(jobs))))
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for text in (complaint, *maps[-1].warnings) if text]
@@ -130,16 +130,6 @@ def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
 def _in_place(pinned: int, others: int) -> str:
     text = "An island with pins stays" if pinned == 1 else f"{pinned} islands with pins stay"
     return f"{text} in place" + ("; the others were packed as if there were none" if others else "")
-
-
-def share_of(steps: Steps[SurfaceMap], index: int, count: int) -> Steps[SurfaceMap]:
-    """Pass on progress of one surface as progress of all."""
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield Progress(progress.stage, (index + progress.fraction) / count)
 
 
 def _at_true_area(chart: Chart, uv: np.ndarray) -> np.ndarray:

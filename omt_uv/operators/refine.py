@@ -3,37 +3,22 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty
 
 from ..settings import (
-    DEFAULT_BALANCE,
-    DEFAULT_MARGIN,
-    DEFAULT_QUALITY,
-    DEFAULT_TEXTURE_SIZE,
-    QUALITIES,
     RefineSettings,
 )
 from .common import Complaint, SolverOperator, read_objects, warn
+from .properties import AreaSettings, MarginSettings
 
 
-class UV_OT_omt_refine(SolverOperator, bpy.types.Operator):
+class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.Operator):
     """Give every part of existing UV islands its share of the texture. Islands stay whole and in place, pins too"""
 
     bl_idname = "uv.omt_refine"
     bl_label = "Refine Area"
     bl_options = {"REGISTER", "UNDO"}
 
-    balance: FloatProperty(
-        name="Balance",
-        description="From 0, exact areas, to 1, least shear",
-        default=DEFAULT_BALANCE,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-    )
-    quality: EnumProperty(
-        name="Quality", description="How exact the areas become", items=QUALITIES, default=DEFAULT_QUALITY
-    )
     keep_boundary: BoolProperty(
         name="Keep Outline", description="Leave the outline of every island exactly as it is", default=False
     )
@@ -41,24 +26,6 @@ class UV_OT_omt_refine(SolverOperator, bpy.types.Operator):
         name="Pack Islands",
         description="Arrange the refined islands anew in the unit square. Otherwise they stay where they are",
         default=False,
-    )
-    margin: IntProperty(
-        name="Margin",
-        description="Least distance between islands, in pixels of the texture",
-        default=DEFAULT_MARGIN,
-        min=0,
-        max=1024,
-        soft_max=64,
-        subtype="PIXEL",
-    )
-    texture_size: IntProperty(
-        name="Texture Size",
-        description="Width of the texture that the margin is measured in",
-        default=DEFAULT_TEXTURE_SIZE,
-        min=16,
-        max=65536,
-        soft_max=8192,
-        subtype="PIXEL",
     )
 
     def draw(self, _context: bpy.types.Context) -> None:

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..settings import (
     BOUNDARIES,
-    DEFAULT_BALANCE,
     DEFAULT_BOUNDARY,
-    DEFAULT_MARGIN,
-    DEFAULT_QUALITY,
     DEFAULT_SEAMS,
-    DEFAULT_TEXTURE_SIZE,
-    QUALITIES,
     SEAMS,
     Settings,
 )
 from .common import Complaint, SolverOperator, read_objects, warn
+from .properties import AreaSettings, MarginSettings
 
 
-class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
+class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.Operator):
     """Unwrap so that every part of the surface gets its share of the texture. Islands follow the seams, pins stay"""
 
     bl_idname = "uv.omt_unwrap"
@@ -29,17 +25,6 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
 
     boundary: EnumProperty(
         name="Boundary", description="Outline of every island", items=BOUNDARIES, default=DEFAULT_BOUNDARY
-    )
-    balance: FloatProperty(
-        name="Balance",
-        description="From 0, exact areas, to 1, least shear",
-        default=DEFAULT_BALANCE,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-    )
-    quality: EnumProperty(
-        name="Quality", description="How exact the areas become", items=QUALITIES, default=DEFAULT_QUALITY
     )
     seams: EnumProperty(name="Seams", description="Where islands are cut", items=SEAMS, default=DEFAULT_SEAMS)
     fill_holes: BoolProperty(
@@ -64,24 +49,6 @@ class UV_OT_omt_unwrap(SolverOperator, bpy.types.Operator):
         description="Arrange the islands in the unit square. Otherwise they are centred one upon the other, "
         "the largest as wide as the square",
         default=True,
-    )
-    margin: IntProperty(
-        name="Margin",
-        description="Least distance between islands, in pixels of the texture",
-        default=DEFAULT_MARGIN,
-        min=0,
-        max=1024,
-        soft_max=64,
-        subtype="PIXEL",
-    )
-    texture_size: IntProperty(
-        name="Texture Size",
-        description="Width of the texture that the margin is measured in",
-        default=DEFAULT_TEXTURE_SIZE,
-        min=16,
-        max=65536,
-        soft_max=8192,
-        subtype="PIXEL",
     )
     uv_layer: StringProperty(
         name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"

@@ -21,11 +21,13 @@ from .embedding import arc_length_parameters, tutte
 from .errors import FoldedUVError, MeshError, PrecisionError, TransportError
 from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
 from .preparation import prepare
-from .progress import Progress, Steps
+from .progress import Progress, Steps, part_of
 from .refine import BOUNDARIES, Refinement, refine
 from .topology import boundary_loops
 from .transport import Transport, transport
 
+# Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
+CONFORMAL, TRANSPORT, REFINEMENT = (0.0, 0.15), (0.15, 0.25), (0.4, 0.6)
 # Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
 # distance counts squared.
 SITE_RESOLUTION = 1e-7
@@ -127,7 +129,7 @@ def unwrap(
         share = len(chart.triangles) / total
         steps = unwrap_chart(chart, boundary=boundary, quality=quality, balance=balance, pins=fixed)
         try:
-            maps.append((yield from _within(steps, done, share)))
+            maps.append((yield from part_of(steps, done, share)))
         except MeshError as error:
             raise located(error, chart) from error
         done += share
@@ -147,21 +149,6 @@ def located(error: MeshError, chart: Chart) -> MeshError:
     place = {"vertex": chart.vertex_ids, "edge": chart.vertex_ids, "face": chart.faces}.get(error.kind)
     elements = error.elements if place is None else place[error.elements]
     return type(error)(error.cause, error.remedy, error.kind, elements)
-
-
-# Where the time of a chart goes, roughly: a bar that moves evenly needs no more.
-_STAGES = {"Conformal map": (0.0, 0.15), "Optimal transport": (0.15, 0.25), "Refinement": (0.4, 0.6)}
-
-
-def _within(steps: Steps[ChartMap], done: float, share: float) -> Steps[ChartMap]:
-    """Pass on progress of one chart as progress of all charts."""
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        start, width = _STAGES.get(progress.stage, (0.0, 1.0))
-        yield Progress(progress.stage, min(done + share * (start + width * progress.fraction), 1.0))
 
 
 def unwrap_chart(
@@ -204,18 +191,13 @@ def unwrap_chart(
     corners = sharpest_corners(vertices, triangles, loop) if boundary == "square" else None
     mass = vertex_areas(vertices, triangles, density)
     conformal, sites = yield from _embedding(vertices, triangles, loop, corners, domain, log)
-    cells, uv = None, sites
-    with log.timed("transport"):
-        try:
-            cells = yield from transport(sites, mass, domain)
-            uv = centroid_map(cells, domain, loop, corners, log.warnings)
-        except TransportError as error:
-            log.warnings.append(f"{error.cause}; refined the embedding without transport")
+    cells, uv = yield from _transported(sites, mass, loop, corners, domain, log)
     target = None if density is None else face_areas(vertices, triangles) * density
     with log.timed("refinement"):
         uv, held = facing(uv, pins)
         options = {"target": target, "balance": balance, "quality": quality, "pins": held}
-        refined = yield from _refined(vertices, triangles, uv, boundary, log, options)
+        steps = _refined(vertices, triangles, uv, boundary, log, options)
+        refined = yield from part_of(steps, *REFINEMENT)
     with log.timed("measure"):
         figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False)
     if figures.folds:
@@ -245,10 +227,10 @@ def _embedding(vertices, triangles, loop, corners, domain: Domain, log: _Log):
     with log.timed("conformal"):
         try:
             if corners is None:
-                conformal = yield from conformal_disk(vertices, triangles)
+                conformal = yield from part_of(conformal_disk(vertices, triangles), *CONFORMAL)
                 sites = conformal.uv
             else:
-                conformal = yield from conformal_rectangle(vertices, triangles, corners)
+                conformal = yield from part_of(conformal_rectangle(vertices, triangles, corners), *CONFORMAL)
                 sites = conformal.uv / [1, conformal.aspect] - 0.5
             nearest = halfedge_lengths(sites, triangles).min()
             if nearest >= SITE_RESOLUTION:
@@ -258,6 +240,17 @@ def _embedding(vertices, triangles, loop, corners, domain: Domain, log: _Log):
             cause = error.cause
         log.warnings.append(f"{cause}; started from a mean value map instead")
         return conformal, _mean_value_sites(vertices, triangles, loop, corners, domain)
+
+
+def _transported(sites, mass, loop, corners, domain: Domain, log: _Log):
+    """Transport and centroid map (n,2); None and the sites themselves where the transport fails."""
+    with log.timed("transport"):
+        try:
+            cells = yield from part_of(transport(sites, mass, domain), *TRANSPORT)
+        except TransportError as error:
+            log.warnings.append(f"{error.cause}; refined the embedding without transport")
+            return None, sites
+        return cells, centroid_map(cells, domain, loop, corners, log.warnings)
 
 
 def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: _Log, options: dict) -> Steps[Refinement]:

@@ -33,3 +33,13 @@ def drain(steps: Steps[T], callback: Callable[[Progress], None] | None = None) -
             return stop.value
         if callback is not None:
             callback(progress)
+
+
+def part_of(steps: Steps[T], start: float, width: float) -> Steps[T]:
+    """Run a solver as that part of a longer job which goes from fraction `start` to `start + width` of it."""
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield Progress(progress.stage, min(start + width * progress.fraction, 1.0))
