@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .settings import RefineSettings
-from .solver.chart_pins import ChartPins, CornerPins, chart_pins
+from .solver.chart_pins import ChartPins, CornerPins
 from .solver.charts import Chart, Surface
 from .solver.distortion import measure
 from .solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
@@ -16,7 +16,7 @@ from .solver.geometry import face_areas, signed_areas
 from .solver.improve import boundary_edges, improve
 from .solver.islands import Island, uv_islands
 from .solver.overlap import overlap_share
-from .solver.parameterize import located
+from .solver.parameterize import located, located_pins
 from .solver.progress import Progress, Steps, part_of
 from .solver.refine import Refinement
 from .unwrapping import Packer, Refusal, pack_islands
@@ -127,17 +127,10 @@ def _found(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]], list[t
             islands = uv_islands(surface, pins.uv, faces)
             warnings += [(index, text) for text in islands.warnings]
             for island in islands.islands:
-                found.append((index, island, _pins_of(pins, island.chart)))
+                found.append((index, island, located_pins(pins, island.chart)))
         except MeshError as error:
             raise Refusal(index, error) from error
     return found, warnings
-
-
-def _pins_of(pins: CornerPins, chart: Chart) -> ChartPins | None:
-    try:
-        return chart_pins(pins, chart)
-    except MeshError as error:
-        raise located(error, chart) from error
 
 
 def _improve(island: Island, pins: ChartPins | None, settings: RefineSettings) -> Steps[tuple[bool, Refinement]]:

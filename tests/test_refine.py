@@ -567,3 +567,11 @@ def test_lilium_has_little_shear():
     result = run(V, F)
     assert area_l1(V, F, result.uv) <= 0.003
     assert shear(V, F, result.uv) <= 1.15
+
+
+def test_pin_errors_name_the_vertices_of_the_caller():
+    """The refinement renumbers its mesh; whoever reads the error must not notice."""
+    V, F = meshes.grid(8, 8)
+    with pytest.raises(PinError) as caught:
+        drain(refine(V, F, V[:, :2], pins=(np.array([5, 40, 70]), np.array([[0.0, 0], [0, 0], [1, 1]]))))
+    assert sorted(caught.value.elements.tolist()) == [5, 40]

@@ -9,19 +9,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
 from .contact import contact, crossings
 from .energy import area_error, elements
 from .errors import FoldedUVError, MeshError
 from .geometry import face_areas, signed_areas
-from .linear import minimum_degree
 from .newton import Assembly, Free
-from .pins import Pins, aligned, check_pins, drag
+from .pins import Pins, aligned, drag
 from .progress import Progress, Steps
 from .refine import Refinement
+from .renumbering import renumbered
 from .stages import QUALITIES, Found, Task, stages
-from .starts import check_start, disk_start
+from .starts import disk_start
 from .topology import boundary_loops, halfedges, twins
 from .untangle import count_folds
 
@@ -63,38 +62,20 @@ def improve(
     if not 0 <= balance <= 1:
         raise ValueError(f"balance must lie in [0, 1], not {balance}")
     yield Progress("Refinement", 0.0)
-    uv = np.asarray(uv, float)
-    check_start(uv, triangles)
-    mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
-    order = minimum_degree(_graph(triangles, len(vertices)))
-    place = np.empty(len(order), np.int64)
-    place[order] = np.arange(len(order))
-    held = None
-    if pins is not None and len(pins[0]):
-        held = check_pins(place[np.asarray(pins[0])], np.asarray(pins[1], float).reshape(-1, 2) * mirror, len(order))
-    given = (uv[order] * mirror) @ [1, 1j]
+    mesh = renumbered(vertices, triangles, uv, pins)
+    given = mesh.uv @ [1, 1j]
     try:
         found, error, warnings = yield from _improved(
-            vertices[order], place[triangles], given, balance, QUALITIES[quality], held
+            mesh.vertices, mesh.triangles, given, balance, QUALITIES[quality], mesh.pins
         )
     except MeshError as problem:
-        raise _renumbered(problem, order) from problem
-    improved = np.column_stack([found.w.real, found.w.imag])[place] * mirror
+        raise mesh.blame(problem) from problem
+    improved = mesh.original(found.w)
     if pins is not None:
         improved[pins[0]] = pins[1]
     return Refinement(
         improved, found.steps, found.residual, error, found.weight, found.energy, found.status, found.overlap, warnings
     )
-
-
-def _renumbered(error: MeshError, order: np.ndarray) -> MeshError:
-    elements = order[error.elements] if error.kind == "vertex" else error.elements
-    return type(error)(error.cause, error.remedy, error.kind, elements)
-
-
-def _graph(triangles: np.ndarray, n: int) -> coo_matrix:
-    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
-    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
 
 
 def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):

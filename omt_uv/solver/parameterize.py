@@ -121,7 +121,7 @@ def unwrap(
     yield Progress("Charts", 0.0)
     prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
     charts = prepared.charts
-    held = [_located_pins(pins, chart) for chart in charts]
+    held = [located_pins(pins, chart) for chart in charts]
     maps = []
     total = sum(len(c.triangles) for c in charts)
     done = 0.0
@@ -137,7 +137,8 @@ def unwrap(
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
 
-def _located_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
+def located_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
+    """The pins of a chart; errors have the element indices of the surface."""
     try:
         return chart_pins(pins, chart)
     except MeshError as error:
@@ -145,9 +146,13 @@ def _located_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
 
 
 def located(error: MeshError, chart: Chart) -> MeshError:
-    """The same error with the element indices of the surface instead of the chart's."""
-    place = {"vertex": chart.vertex_ids, "edge": chart.vertex_ids, "face": chart.faces}.get(error.kind)
-    elements = error.elements if place is None else place[error.elements]
+    """The same error with the element indices of the surface instead of the chart's; patches are nobody's fault."""
+    patched = np.concatenate([chart.faces, np.full(len(chart.patches), -1)])
+    place = {"vertex": chart.vertex_ids, "edge": chart.vertex_ids, "face": patched}.get(error.kind)
+    elements = error.elements
+    if place is not None:
+        elements = place[elements]
+        elements = elements[(elements >= 0).reshape(len(elements), -1).all(axis=1)]
     return type(error)(error.cause, error.remedy, error.kind, elements)
 
 

@@ -9,17 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
 from .energy import Elements, area_error, elements
-from .errors import DensityError
-from .geometry import face_areas, signed_areas
-from .linear import minimum_degree
+from .errors import DensityError, MeshError
+from .geometry import face_areas
 from .newton import Assembly
-from .pins import Pins, check_pins, drag
+from .pins import Pins, drag
 from .progress import Progress, Steps
+from .renumbering import renumbered
 from .stages import QUALITIES, Task, stages
-from .starts import Start, check_start, disk_start, free_start, notched_disk, square_start
+from .starts import Start, disk_start, free_start, notched_disk, square_start
 from .topology import boundary_loops
 
 STARTS = {"free": free_start, "disk": disk_start, "square": square_start}
@@ -92,21 +91,16 @@ def refine(
         raise ValueError("pins need a free boundary")
     yield Progress("Refinement", 0.0)
     target = _targets(face_areas(vertices, triangles), target)
-    uv = np.asarray(uv, float)
-    check_start(uv, triangles)
-    mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
-    # Neighbours in the elimination order are neighbours in memory: everything is renumbered once.
-    order = minimum_degree(_graph(triangles, len(vertices)))
-    place = np.empty(len(order), np.int64)
-    place[order] = np.arange(len(order))
-    held = None
-    if pins is not None and len(pins[0]):
-        held = check_pins(place[np.asarray(pins[0])], np.asarray(pins[1], float).reshape(-1, 2) * mirror, len(order))
-    renumbered = vertices[order], place[triangles], uv[order] * mirror
-    found, start, area_left = yield from _refined(*renumbered, boundary, target, balance, QUALITIES[quality], held)
+    mesh = renumbered(vertices, triangles, uv, pins)
+    try:
+        found, start, area_left = yield from _refined(
+            mesh.vertices, mesh.triangles, mesh.uv, boundary, target, balance, QUALITIES[quality], mesh.pins
+        )
+    except MeshError as error:
+        raise mesh.blame(error) from error
     yield Progress("Refinement", 1.0)
-    refined = np.column_stack([found.w.real, found.w.imag])[place] * mirror
-    if pins is not None and held is not None:
+    refined = mesh.original(found.w)
+    if pins is not None and mesh.pins is not None:
         refined[pins[0]] = pins[1]
     return Refinement(
         refined,
@@ -129,11 +123,6 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     if len(wrong):
         raise DensityError("A face has no positive, finite target area", kind="face", elements=wrong)
     return target * (area.sum() / target.sum())
-
-
-def _graph(triangles: np.ndarray, n: int) -> coo_matrix:
-    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
-    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
 
 
 def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins: Pins | None):

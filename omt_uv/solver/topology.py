@@ -80,11 +80,3 @@ def _walk(successor: np.ndarray, members: np.ndarray) -> np.ndarray:
         order = np.concatenate([order, jump[order]])
         jump = jump[jump]
     return members[order[: len(members)]]
-
-
-def triangle_components(triangles: np.ndarray) -> tuple[int, np.ndarray]:
-    """Number of edge-connected components and the component of every triangle, (m,)."""
-    twin = twins(triangles)
-    h = np.flatnonzero(twin >= 0)
-    graph = coo_matrix((np.ones(len(h)), (h // 3, twin[h] // 3)), shape=(len(triangles),) * 2)
-    return connected_components(graph, directed=False)

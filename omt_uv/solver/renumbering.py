@@ -1,0 +1,65 @@
+"""A mesh in the order in which its unknowns are eliminated: neighbours in the order are neighbours in memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+
+from .errors import MeshError
+from .geometry import signed_areas
+from .linear import minimum_degree
+from .pins import Pins, check_pins
+from .starts import check_start
+
+
+@dataclass(frozen=True)
+class Renumbered:
+    """A mesh and its map, vertex order[k] as vertex k, and mirrored if need be so that most of it is not.
+
+    vertices (n,3), triangles (m,3), uv (n,2) and pins, all renumbered; order (n,); mirror (2,) signs of u and v.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    uv: np.ndarray
+    pins: Pins | None
+    order: np.ndarray
+    mirror: np.ndarray
+
+    def original(self, w: np.ndarray) -> np.ndarray:
+        """A map w (n,) complex as UVs (n,2) of the mesh as it was."""
+        uv = np.empty((len(w), 2))
+        uv[self.order] = np.column_stack([w.real, w.imag]) * self.mirror
+        return uv
+
+    def blame(self, error: MeshError) -> MeshError:
+        """An error with the vertices of the mesh as it was."""
+        elements = self.order[error.elements] if error.kind in ("vertex", "edge") else error.elements
+        return type(error)(error.cause, error.remedy, error.kind, elements)
+
+
+def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | None) -> Renumbered:
+    """Renumber a mesh (n,3), (m,3), its map (n,2), and pins: vertices (k,) and their places (k,2).
+
+    Raises
+    ------
+    FoldedUVError, PinError : see `starts.check_start` and `pins.check_pins`
+    """
+    uv = np.asarray(uv, float)
+    check_start(uv, triangles)
+    mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
+    order = minimum_degree(_graph(triangles, len(vertices)))
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    held = None
+    if pins is not None and len(pins[0]):
+        checked = check_pins(np.asarray(pins[0]), np.asarray(pins[1], float).reshape(-1, 2) * mirror, len(order))
+        held = Pins(place[checked.vertices], checked.places)
+    return Renumbered(vertices[order], place[triangles], uv[order] * mirror, held, order, mirror)
+
+
+def _graph(triangles: np.ndarray, n: int) -> coo_matrix:
+    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
+    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
