@@ -1,0 +1,30 @@
+"""measure: area error, shear, folds and overlap of the active UV maps."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from .common import CommandError, blender, read
+from .options import FORMATS
+
+
+def add(commands) -> None:
+    command = commands.add_parser("measure", help="area error, shear, folds and overlap of the active UV maps")
+    command.set_defaults(run=run)
+    command.add_argument("input", type=Path, metavar="IN", help=f"{FORMATS} .off")
+    command.add_argument("--json", action="store_true", help="print the figures as JSON")
+
+
+def run(options: argparse.Namespace) -> None:
+    files, blender_mesh, _ = blender()
+    from ..measuring import measure_readings, summary
+    from ..solver.errors import MeshError
+
+    try:
+        figures = measure_readings([reading for _, reading in read(options.input, files, blender_mesh)])
+    except MeshError as error:
+        raise CommandError(f"{options.input}: {error}") from error
+    print(json.dumps(asdict(figures), indent=1) if options.json else summary(figures))

@@ -1,0 +1,65 @@
+"""Options that several commands share, and the types of their values."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..settings import DEFAULT_BALANCE, DEFAULT_QUALITY, QUALITIES
+
+FORMATS = ".blend .obj .ply .stl .glb"
+
+
+def add_files(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off", writes: str = FORMATS) -> None:
+    command.add_argument("input", type=Path, metavar="IN", help=accepts)
+    command.add_argument("-o", "--output", type=Path, metavar="OUT", required=True, help=writes)
+
+
+def add_area_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--balance", type=share, default=DEFAULT_BALANCE, metavar="T", help="from 0, exact areas, to 1, least shear"
+    )
+    command.add_argument(
+        "--quality", choices=names(QUALITIES), default=DEFAULT_QUALITY.lower(), help="how exact the areas become"
+    )
+
+
+def add_report(command: argparse.ArgumentParser, of: str) -> None:
+    command.add_argument("--report", type=Path, metavar="R.json", help=f"write figures of every {of}")
+
+
+def add_cut_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--fill-holes", action="store_true", help="take all holes but the longest boundary for filled")
+    command.add_argument("--keep-free", default="", metavar="GROUP", help="vertex group that new cuts avoid")
+
+
+def names(items) -> list[str]:
+    return [identifier.lower() for identifier, *_ in items]
+
+
+def share(text: str) -> float:
+    value = float(text)
+    if not 0 <= value <= 1:
+        raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
+    return value
+
+
+def shear(text: str) -> float:
+    value = float(text)
+    if not 1 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not greater than 1, which is no shear")
+    return value
+
+
+def margin(text: str) -> float:
+    value = float(text)
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a number of pixels")
+    return value
+
+
+def texture_size(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of pixels")
+    return value

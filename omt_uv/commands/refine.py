@@ -1,0 +1,47 @@
+"""refine: existing UVs of every mesh of a file, whatever unwrapped them."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..settings import RefineSettings
+from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
+from .options import FORMATS, add_area_options, add_files, add_report
+
+
+def add(commands) -> None:
+    command = commands.add_parser("refine", help="improve existing UVs of every mesh, whatever unwrapped them")
+    command.set_defaults(run=run)
+    add_files(command, accepts=f"{FORMATS}, with UVs")
+    add_area_options(command)
+    command.add_argument("--keep-boundary", action="store_true", help="leave the outline of every island as it is")
+    command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to refine; default: the active one")
+    add_report(command, "island")
+
+
+def run(options: argparse.Namespace) -> None:
+    files, blender_mesh, _ = blender()
+    from ..refining import refine_islands
+    from ..unwrapping import Refusal
+
+    check_output(options.output, files)
+    pairs = read(options.input, files, blender_mesh, options.uv_layer)
+    objects = [obj for obj, _ in pairs]
+    for obj in objects:
+        if options.uv_layer and options.uv_layer not in obj.data.uv_layers:
+            raise CommandError(f"{obj.name} has no UV map {options.uv_layer!r}. Name one that it has.")
+    settings = RefineSettings(quality=options.quality, balance=options.balance, keep_boundary=options.keep_boundary)
+    try:
+        for obj in objects:
+            blender_mesh.check_target(obj.data, options.uv_layer)
+        refined = drain_shown(refine_islands([(r.surface, r.faces, r.all_pins) for _, r in pairs], settings))
+        for obj, corners, uv in zip(objects, refined.corners, refined.uv, strict=True):
+            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
+        warnings = files.save(options.output, objects)
+    except Refusal as refusal:
+        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
+    except (blender_mesh.TargetError, files.FileError) as error:
+        raise CommandError(str(error)) from error
+    warnings = warn(objects, refined.warnings, warnings)
+    if options.report:
+        write_report(options, {"keep_boundary": options.keep_boundary}, objects, refined.reports, warnings)

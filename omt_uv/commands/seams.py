@@ -1,0 +1,41 @@
+"""seams: mark the seams that unwrapping needs, and stop."""
+
+from __future__ import annotations
+
+import argparse
+
+from .common import CommandError, blender, read, warn
+from .options import add_cut_options, add_files
+
+
+def add(commands) -> None:
+    command = commands.add_parser("seams", help="mark the seams that unwrapping needs, and stop")
+    command.set_defaults(run=run)
+    add_files(command, writes=".blend, which keeps seams")
+    add_cut_options(command)
+
+
+def run(options: argparse.Namespace) -> None:
+    files, blender_mesh, _ = blender()
+    from ..blender_seams import GroupError, avoided, mark_seams
+    from ..solver.cutting import cut
+    from ..solver.errors import MeshError
+
+    if options.output.suffix.lower() != ".blend":
+        raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")
+    pairs = read(options.input, files, blender_mesh)
+    objects = [obj for obj, _ in pairs]
+    told = []
+    try:
+        free = avoided(objects, options.keep_free)
+        for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
+            cuts = cut(reading.surface, reading.faces, avoid=avoid, fill=options.fill_holes)
+            told += [(k, text) for text in cuts.warnings]
+            mark_seams(obj, cuts.edges)
+            print(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")
+        warnings = files.save(options.output, objects)
+    except MeshError as error:
+        raise CommandError(f"{obj.name}: {error}") from error
+    except (GroupError, files.FileError) as error:
+        raise CommandError(str(error)) from error
+    warn(objects, told, warnings)

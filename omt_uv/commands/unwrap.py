@@ -1,0 +1,83 @@
+"""unwrap: every mesh of a file, all at one texel density."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..settings import (
+    BOUNDARIES,
+    DEFAULT_BOUNDARY,
+    DEFAULT_MARGIN,
+    DEFAULT_SEAMS,
+    DEFAULT_TEXTURE_SIZE,
+    SEAMS,
+    Settings,
+)
+from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
+from .options import add_area_options, add_cut_options, add_files, add_report, margin, names, shear, texture_size
+
+
+def add(commands) -> None:
+    command = commands.add_parser("unwrap", help="unwrap every mesh of a file, all at one texel density")
+    command.set_defaults(run=run)
+    add_files(command)
+    command.add_argument(
+        "--boundary", choices=names(BOUNDARIES), default=DEFAULT_BOUNDARY.lower(), help="outline of every island"
+    )
+    add_area_options(command)
+    command.add_argument("--seams", choices=names(SEAMS), default=DEFAULT_SEAMS.lower(), help="where islands are cut")
+    add_cut_options(command)
+    command.add_argument(
+        "--max-shear", type=shear, default=0.0, metavar="S", help="cut further until the mean shear is below S > 1"
+    )
+    command.add_argument(
+        "--margin", type=margin, default=DEFAULT_MARGIN, metavar="PX", help="least distance of islands, in pixels"
+    )
+    command.add_argument(
+        "--texture-size", type=texture_size, default=DEFAULT_TEXTURE_SIZE, metavar="PX", help="width of the texture"
+    )
+    command.add_argument("--no-pack", action="store_true", help="centre the islands one upon the other")
+    command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
+    add_report(command, "chart")
+
+
+def run(options: argparse.Namespace) -> None:
+    files, blender_mesh, blender_pack = blender()
+    from ..blender_seams import GroupError, avoided
+    from ..packing import PackingError
+    from ..unwrapping import Job, Refusal, lay_out
+
+    check_output(options.output, files)
+    settings = Settings(
+        boundary=options.boundary,
+        quality=options.quality,
+        balance=options.balance,
+        margin=options.margin,
+        texture_size=options.texture_size,
+        pack=not options.no_pack,
+        seams=options.seams,
+        fill_holes=options.fill_holes,
+        max_shear=options.max_shear,
+    )
+    pairs = read(options.input, files, blender_mesh, options.uv_layer)
+    objects = [obj for obj, _ in pairs]
+    try:
+        for obj in objects:
+            blender_mesh.check_target(obj.data, options.uv_layer)
+        free = avoided(objects, options.keep_free)
+        jobs = [Job(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
+        layout = drain_shown(lay_out(jobs, settings, blender_pack.pack))
+        for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):
+            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
+        warnings = files.save(options.output, objects)
+    except Refusal as refusal:
+        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
+    except (PackingError, GroupError, blender_mesh.TargetError, files.FileError) as error:
+        raise CommandError(str(error)) from error
+    warnings = warn(objects, layout.warnings, warnings)
+    if options.report:
+        charts = [surface_map.report() for surface_map in layout.maps]
+        packing = {"packer": layout.packing.packer, "scale": layout.packing.scale}
+        if not options.no_pack:
+            packing["coverage"] = layout.packing.coverage
+        write_report(options, {"boundary": options.boundary, "packing": packing}, objects, charts, warnings)
