@@ -9,6 +9,8 @@ from collections import Counter
 
 import bpy
 
+from .. import running
+
 
 class Complaint(Exception):
     """What the user is told instead of a result, and the object and MeshError it is about, if any."""
@@ -78,19 +80,39 @@ def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, 
         operator.report({"WARNING"}, f"{name}{text}" + (f" ({count} islands)" if count > 1 else ""))
 
 
+# Events that move the view, which goes on while a solver runs.
+NAVIGATION = {
+    *(
+        "MIDDLEMOUSE",
+        "WHEELUPMOUSE",
+        "WHEELDOWNMOUSE",
+        "WHEELINMOUSE",
+        "WHEELOUTMOUSE",
+        "MOUSEMOVE",
+        "INBETWEEN_MOUSEMOVE",
+    ),
+    *("TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM", "NDOF_MOTION", "WINDOW_DEACTIVATE"),
+    *(f"NUMPAD_{k}" for k in range(10)),
+    *("NUMPAD_PERIOD", "NUMPAD_PLUS", "NUMPAD_MINUS"),
+}
+
+
 class SolverOperator:
     """A long solver behind an operator: subclasses give `steps`, a generator, and `finish`, which writes.
 
     `steps(context)` yields Progress and returns a result without changing anything in the file, so it can be
     thrown away at any moment. `finish(context, result)` writes it. Both raise Complaint.
+
+    Scripts and the redo panel run `execute`, which does all at once. A click runs `invoke`: the same generator,
+    stepped from a timer, so that Blender stays usable and Esc cancels; one undo step either way.
     """
+
+    bl_label: str
+    _timer: bpy.types.Timer | None = None
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode in {"OBJECT", "EDIT_MESH"}:
-            return True
-        cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")  # type: ignore[attr-defined]
-        return False
+        return ready(cls, context)
 
     def steps(self, context: bpy.types.Context):
         raise NotImplementedError
@@ -111,3 +133,89 @@ class SolverOperator:
         finally:
             manager.progress_end()
         return {"FINISHED"}
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        return self.start(context)
+
+    def start(self, context: bpy.types.Context) -> set[str]:
+        """Run the first slice, which is all for small meshes, and go on from a timer."""
+        if running.current is not None:
+            return tell(
+                self, context, Complaint(f"{running.current.label} is still running. Wait, or cancel it by Esc.")
+            )
+        try:
+            objects = mesh_objects(context)
+        except Complaint as complaint:
+            return tell(self, context, complaint)
+        running.current = running.Run(self.bl_label, context, objects, self.steps(context))
+        self._timer = None
+        state = self._advance(context)
+        if "RUNNING_MODAL" in state and not bpy.app.background:
+            self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
+            context.window_manager.modal_handler_add(self)
+        return state
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
+            seconds = running.current.seconds if running.current else 0.0
+            self.cancel(context)
+            self.report({"INFO"}, f"Cancelled after {seconds:.1f} s; nothing was changed")  # type: ignore[attr-defined]
+            return {"CANCELLED"}
+        if event.type == "TIMER":
+            return self._advance(context)
+        return {"PASS_THROUGH"} if event.type in NAVIGATION else {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Throw the solver away; Blender calls this when it loads another file."""
+        if running.current is not None:
+            running.current.close()
+            running.current = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        show_progress(context, None)
+
+    def _advance(self, context: bpy.types.Context) -> set[str]:
+        run, ended = running.current, True
+        if run is None:
+            return {"CANCELLED"}
+        try:
+            ended = run.advance()
+            if not ended:
+                show_progress(context, run.text())
+                return {"RUNNING_MODAL"}
+            self.finish(context, run.result)
+        except Complaint as complaint:
+            return tell(self, context, complaint)
+        except running.Disturbed as reason:
+            return tell(self, context, Complaint(f"{run.label} was cancelled: {reason}. Run it again."))
+        finally:
+            if ended:
+                self.cancel(context)
+        return {"FINISHED"}
+
+
+def ready(cls, context: bpy.types.Context) -> bool:
+    """Whether an operator on meshes can run; the tooltip of the greyed button says why not."""
+    if running.current is not None:
+        cls.poll_message_set(f"{running.current.label} is still running. Esc cancels it")
+        return False
+    if context.mode in {"OBJECT", "EDIT_MESH"}:
+        return True
+    cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")
+    return False
+
+
+def show_progress(context: bpy.types.Context, text: str | None) -> None:
+    """Say in the status bar and in our panels how far a run is; None: there is none."""
+    if context.workspace is None:
+        return
+    context.workspace.status_text_set(f"{text}      Esc: Cancel" if text else None)
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"VIEW_3D", "IMAGE_EDITOR"}:
+                for region in area.regions:
+                    if region.type == "UI":
+                        region.tag_redraw()

@@ -1,0 +1,67 @@
+"""Whether a mesh is still what it was; see `blender_mesh.py`."""
+
+from __future__ import annotations
+
+import hashlib
+
+import bpy
+
+import numpy as np
+
+# Blender's own caches, made and dropped as it likes.
+_DERIVED = (".select_", ".uv_select_", ".hide_")
+_FIELD = {
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "INT8": ("value", 1, np.int32),
+    "BOOLEAN": ("value", 1, bool),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+    "INT32_2D": ("value", 2, np.int32),
+    "INT16_2D": ("value", 2, np.int32),
+    "QUATERNION": ("value", 4, np.float32),
+    "FLOAT4X4": ("value", 16, np.float32),
+}
+
+
+def fingerprint(obj: bpy.types.Object) -> bytes:
+    """A hash of what operators read: mode, transformation, faces, selection, seams, and all attributes of a mesh.
+
+    Equal as long as nothing changed. False attributes count as absent: Blender drops and makes these as it likes.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    digest.update(repr((obj.mode, obj.data.name, [tuple(row) for row in obj.matrix_world])).encode())
+    if obj.mode != "EDIT":
+        _digest(obj.data, digest)
+        return digest.digest()
+    obj.update_from_editmode()
+    copy = obj.data.copy()
+    try:
+        _digest(copy, digest)
+    finally:
+        bpy.data.meshes.remove(copy)
+    return digest.digest()
+
+
+def _digest(mesh: bpy.types.Mesh, digest) -> None:
+    for collection, name, count, dtype in (
+        (mesh.vertices, "co", 3 * len(mesh.vertices), np.float32),
+        (mesh.polygons, "loop_start", len(mesh.polygons), np.int32),
+        (mesh.loops, "vertex_index", len(mesh.loops), np.int32),
+        (mesh.edges, "use_seam", len(mesh.edges), bool),
+        (mesh.polygons, "select", len(mesh.polygons), bool),
+        (mesh.polygons, "hide", len(mesh.polygons), bool),
+    ):
+        values: np.ndarray = np.zeros(count, dtype)
+        collection.foreach_get(name, values)
+        digest.update(values.tobytes())
+    for attribute in sorted(mesh.attributes, key=lambda a: a.name):
+        if attribute.data_type not in _FIELD or attribute.name.startswith(_DERIVED):
+            continue
+        field, width, kind = _FIELD[attribute.data_type]
+        values = np.zeros(len(attribute.data) * width, kind)
+        attribute.data.foreach_get(field, values)
+        if kind is not bool or values.any():
+            digest.update(attribute.name.encode() + attribute.domain.encode() + values.tobytes())

@@ -1,0 +1,114 @@
+"""One solver at a time in Blender's window: stepped in slices, watched, and thrown away without a trace.
+
+The operators' base class drives it; the panels look at `current`.
+"""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+
+# Seconds of work between two looks at the keyboard.
+SLICE = 0.05
+
+
+class Disturbed(Exception):
+    """What a run works on is no longer what it was."""
+
+
+class Run:
+    """A generator of Progress, how long it has taken, and what it works on."""
+
+    def __init__(self, label: str, context: bpy.types.Context, objects: list, steps):
+        self.label, self.steps = label, steps
+        self.began = time.monotonic()
+        self.stage, self.fraction = "Reading", 0.0
+        self.longest = 0.0
+        self.result = None
+        self._watch = Watch(context, objects)
+
+    @property
+    def seconds(self) -> float:
+        return time.monotonic() - self.began
+
+    def advance(self, seconds: float = SLICE) -> bool:
+        """Work for about so long; whether the result is there.
+
+        Raises
+        ------
+        Disturbed : the mesh or the mode has changed, so the result would be of no use
+        """
+        begin = time.monotonic()
+        self._watch.check()
+        more = True
+        while more:
+            try:
+                progress = next(self.steps)
+            except StopIteration as stop:
+                self.result = stop.value
+                self._watch.check(thoroughly=True)
+                return True
+            self.stage, self.fraction = progress.stage, progress.fraction
+            more = time.monotonic() - begin < seconds
+        self.longest = max(self.longest, time.monotonic() - begin)
+        return False
+
+    def text(self) -> str:
+        """One line for the status bar."""
+        return f"{self.label}: {self.stage}   {100 * self.fraction:.0f} %   {self.seconds:.1f} s"
+
+    def close(self) -> None:
+        self._watch.close()
+        self.steps.close()
+
+
+class Watch:
+    """Notices when objects that a run works on change, vanish, or are exchanged by undo."""
+
+    def __init__(self, context: bpy.types.Context, objects: list):
+        self._mode = context.mode
+        self._objects = [(obj, obj.name) for obj in objects]
+        self._marks = self._fingerprints()
+        self._suspect = self._lost = False
+        handlers = bpy.app.handlers
+        self._handlers = [
+            (handlers.depsgraph_update_post, self._on_update),
+            *((kind, self._on_exchange) for kind in (handlers.undo_post, handlers.redo_post, handlers.load_pre)),
+        ]
+        for kind, function in self._handlers:
+            kind.append(function)
+
+    def close(self) -> None:
+        for kind, function in self._handlers:
+            if function in kind:
+                kind.remove(function)
+
+    def check(self, thoroughly: bool = False) -> None:
+        """Raise Disturbed if anything has changed; looks closely when told to, or when Blender said so."""
+        if self._lost:
+            raise Disturbed("Something was undone meanwhile")
+        try:
+            if any(bpy.data.objects.get(name) != obj for obj, name in self._objects):
+                raise Disturbed("An object was renamed or deleted meanwhile")
+            if bpy.context.mode != self._mode:
+                raise Disturbed("The mode was changed meanwhile")
+            if (thoroughly or self._suspect) and self._fingerprints() != self._marks:
+                raise Disturbed("The mesh was changed meanwhile")
+        except ReferenceError as error:
+            raise Disturbed("An object was deleted meanwhile") from error
+        self._suspect = False
+
+    def _fingerprints(self) -> list[bytes]:
+        from .blender_state import fingerprint
+
+        return [fingerprint(obj) for obj, _ in self._objects]
+
+    def _on_update(self, _scene, depsgraph=None) -> None:
+        self._suspect = True
+
+    def _on_exchange(self, *_) -> None:
+        self._lost = True
+
+
+current: Run | None = None

@@ -1,0 +1,197 @@
+"""What every operator promises while it runs, when it is cancelled, undone and redone, in both modes."""
+
+from __future__ import annotations
+
+import types
+
+import bpy
+
+import numpy as np
+import pytest
+from blender import scenes
+
+# Every operator that changes a mesh, and the settings that make it change this one. New ones are added here.
+OPERATORS = {
+    "uv.omt_unwrap": {},
+    "uv.omt_refine": {},
+    "uv.omt_seams": {},
+}
+MODES = ["OBJECT", "EDIT"]
+
+
+def scene(name, mode):
+    """A mesh on which the operator has something to do."""
+    if name == "uv.omt_seams":
+        bpy.ops.mesh.primitive_cube_add()
+        obj = bpy.context.object
+    else:
+        obj = scenes.bump(20, 16)
+        scenes.set_uv(obj, scenes.seen_from_above(obj))
+    if mode == "EDIT":
+        scenes.edit(obj)
+    return obj
+
+
+def class_of(name):
+    group, verb = name.split(".")
+    return getattr(bpy.types, f"{group.upper()}_OT_{verb}")
+
+
+def stand_in(name, **settings):
+    """An operator as Blender would make it, with the class' own methods: there is no window to click in."""
+    cls = class_of(name)
+    body = {"reports": []}
+    for base in reversed(cls.__mro__):
+        if not base.__module__.startswith("bpy") and base is not object:
+            body |= {k: v for k, v in vars(base).items() if not k.startswith("__") and k != "bl_rna"}
+    for prop in bpy.context.window_manager.operator_properties_last(name).bl_rna.properties:
+        if not prop.is_readonly and prop.identifier != "rna_type":
+            body[prop.identifier] = prop.default
+    body |= settings
+    body["report"] = lambda self, kind, text: self.reports.append((set(kind), text))
+    return type("StandIn", (), body)()
+
+
+def event(kind, value="NOTHING"):
+    return types.SimpleNamespace(type=kind, value=value)
+
+
+def step(operator, count=None):
+    """Start the operator and give it timer events until it ends, or `count` of them."""
+    state = operator.start(bpy.context)
+    while "RUNNING_MODAL" in state and (count is None or count > 0):
+        state = operator.modal(bpy.context, event("TIMER"))
+        count = None if count is None else count - 1
+    return state
+
+
+@pytest.fixture(autouse=True)
+def short_slices(package, monkeypatch):
+    """One step of the solver a slice, so that small meshes take many."""
+    monkeypatch.setattr(package("running").Run.advance, "__defaults__", (0.0,))
+    yield
+    assert package("running").current is None
+
+
+def test_every_operator_on_meshes_is_listed(package):
+    base = package("operators.common").SolverOperator
+    registered = {c.bl_idname for c in package("registration").CLASSES if issubclass(c, base)}
+    names = {
+        f"{name.split('_OT_')[0].lower()}.{name.split('_OT_')[1]}" if "_OT_" in name else name for name in registered
+    }
+    assert names == set(OPERATORS)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", OPERATORS)
+def test_slices_and_one_go_give_the_same_and_undo_and_redo_are_exact(name, mode):
+    group, verb = name.split(".")
+    operator = getattr(getattr(bpy.ops, group), verb)
+    obj = scene(name, mode)
+    title = obj.name
+    before = scenes.state(obj)
+    bpy.ops.ed.undo_push(message="before")
+    assert operator("EXEC_DEFAULT", True, **OPERATORS[name]) == {"FINISHED"}
+    after = scenes.state(bpy.data.objects[title])
+    assert after != before
+    bpy.ops.ed.undo()
+    assert scenes.state(bpy.data.objects[title]) == before
+    bpy.ops.ed.redo()
+    assert scenes.state(bpy.data.objects[title]) == after
+    bpy.ops.ed.undo()
+    assert step(stand_in(name, **OPERATORS[name])) == {"FINISHED"}
+    assert scenes.state(bpy.data.objects[title]) == after
+
+
+@pytest.mark.parametrize("key", ["ESC", "RIGHTMOUSE"])
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", OPERATORS)
+def test_cancel_in_every_phase_leaves_no_trace(name, mode, key, package):
+    obj = scene(name, mode)
+    before = scenes.state(obj)
+    handlers = [len(kind) for kind in (bpy.app.handlers.undo_post, bpy.app.handlers.depsgraph_update_post)]
+    phases = 0
+    while True:
+        operator = stand_in(name, **OPERATORS[name])
+        if step(operator, phases) != {"RUNNING_MODAL"}:
+            break
+        assert not class_of(name).poll(bpy.context)  # nothing else may start meanwhile
+        assert operator.modal(bpy.context, event(key, "PRESS")) == {"CANCELLED"}
+        assert operator.reports
+        assert scenes.state(obj) == before
+        assert [len(k) for k in (bpy.app.handlers.undo_post, bpy.app.handlers.depsgraph_update_post)] == handlers
+        phases += 1 + phases // 3
+    assert phases > 0
+
+
+def test_a_second_run_is_refused(package):
+    scene("uv.omt_unwrap", "OBJECT")
+    first, second = stand_in("uv.omt_unwrap"), stand_in("uv.omt_refine")
+    assert step(first, 1) == {"RUNNING_MODAL"}
+    assert second.start(bpy.context) == {"CANCELLED"}
+    assert "still running" in second.reports[0][1]
+    first.cancel(bpy.context)
+
+
+def move_a_vertex(obj):
+    obj.data.vertices[0].co.z += 1
+
+
+def change_uvs(obj):
+    obj.data.attributes["UVMap"].data[3].vector = (9, 9)
+
+
+DISTURBANCES = {
+    "vertex": move_a_vertex,
+    "uv": change_uvs,
+    "mode": lambda obj: bpy.ops.object.mode_set(mode="EDIT"),
+    "renamed": lambda obj: setattr(obj, "name", "Other"),
+    "deleted": lambda obj: bpy.data.objects.remove(obj),
+    "scale": lambda obj: setattr(obj, "scale", (1, 2, 3)) or bpy.context.view_layer.update(),
+    "undo": lambda obj: bpy.ops.ed.undo(),
+}
+
+
+@pytest.mark.parametrize("kind", DISTURBANCES)
+def test_a_mesh_that_changes_meanwhile_ends_the_run(kind):
+    obj = scene("uv.omt_unwrap", "OBJECT")
+    bpy.ops.ed.undo_push(message="before")
+    obj = bpy.data.objects[obj.name]
+    obj.data.name = "Patch"
+    bpy.ops.ed.undo_push(message="one more")
+    operator = stand_in("uv.omt_unwrap")
+    assert step(operator, 2) == {"RUNNING_MODAL"}
+    DISTURBANCES[kind](bpy.data.objects[obj.name] if kind != "undo" else None)
+    mesh = bpy.data.meshes["Patch"] if "Patch" in bpy.data.meshes else bpy.data.meshes[0]
+    uv = uv_bytes(mesh) if kind not in {"mode", "deleted"} else None
+    state = {"RUNNING_MODAL"}
+    while "RUNNING_MODAL" in state:
+        state = operator.modal(bpy.context, event("TIMER"))
+    assert state == {"CANCELLED"}
+    assert operator.reports[0][0] == {"ERROR"}
+    assert "meanwhile" in operator.reports[0][1]
+    if uv is not None:
+        assert uv_bytes(mesh) == uv
+
+
+def uv_bytes(mesh):
+    values = np.zeros(2 * len(mesh.loops), np.float32)
+    mesh.uv_layers.active.uv.foreach_get("vector", values)
+    return values.tobytes()
+
+
+def test_the_view_can_be_moved_and_nothing_else_gets_through():
+    scene("uv.omt_unwrap", "OBJECT")
+    operator = stand_in("uv.omt_unwrap")
+    assert step(operator, 1) == {"RUNNING_MODAL"}
+    assert operator.modal(bpy.context, event("WHEELUPMOUSE", "PRESS")) == {"PASS_THROUGH"}
+    for kind in ("LEFTMOUSE", "TAB", "X", "Z"):
+        assert operator.modal(bpy.context, event(kind, "PRESS")) == {"RUNNING_MODAL"}
+    operator.cancel(bpy.context)
+
+
+def test_bad_input_is_refused_in_the_first_slice():
+    bpy.ops.mesh.primitive_cube_add()
+    operator = stand_in("uv.omt_unwrap", seams="EXISTING")
+    assert step(operator) == {"CANCELLED"}
+    assert operator.reports[0][0] == {"ERROR"}
