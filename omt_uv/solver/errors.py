@@ -77,6 +77,12 @@ class NotADiskError(MeshError):
     remedy = "Mark seams that cut it open into a disk"
 
 
+class NotASphereError(MeshError):
+    """A surface is open, has handles or several parts: it has no map to a sphere."""
+
+    remedy = "Only one closed part without handles maps to a sphere"
+
+
 class PrecisionError(MeshError):
     """A map leaves double precision."""
 

@@ -71,11 +71,12 @@ def flip(tri: IntrinsicTriangulation, h: np.ndarray, diagonal: Diagonal) -> Intr
     the Euclidean one must be applied to the unscaled metric.
     """
     triangles, twin, log_length = tri.triangles.copy(), tri.twin.copy(), tri.log_length.copy()
-    _flip_in_place(triangles, twin, log_length, h, diagonal)
+    flip_metric_in_place(triangles, twin, log_length, h, diagonal)
     return IntrinsicTriangulation(triangles, twin, log_length)
 
 
-def _flip_in_place(triangles, twin, log_length, h, diagonal: Diagonal) -> None:
+def flip_metric_in_place(triangles, twin, log_length, h, diagonal: Diagonal) -> None:
+    """As `flip`, overwriting the arrays; the new edges are the halfedges 3t + 1 of the triangles t on both sides."""
     g = twin[h]
     around = (next_halfedge(h), previous_halfedge(h), next_halfedge(g), previous_halfedge(g), h)
     new_length = diagonal(*(log_length[e] for e in around))
@@ -100,10 +101,10 @@ def make_delaunay(
     flat = triangles.reshape(-1)
 
     def violation(edges):
-        return _edge_cosine(flat, log_length, u, edges) + _edge_cosine(flat, log_length, u, twin[edges]) + tolerance
+        return edge_cosines(flat, log_length, u, edges) + edge_cosines(flat, log_length, u, twin[edges]) + tolerance
 
     def flip_edges(edges):
-        _flip_in_place(triangles, twin, log_length, edges, diagonal)
+        flip_metric_in_place(triangles, twin, log_length, edges, diagonal)
 
     flips, settled = flip_until_none(twin, violation, flip_edges, max_rounds)
     if not settled:
@@ -111,7 +112,7 @@ def make_delaunay(
     return IntrinsicTriangulation(triangles, twin, log_length), flips
 
 
-def _edge_cosine(flat, log_length, u, h):
+def edge_cosines(flat, log_length, u, h):
     """Cosine opposite to the halfedges h in the scaled metric."""
     n, p = next_halfedge(h), previous_halfedge(h)
     i, j, k = u[flat[h]], u[flat[n]], u[flat[p]]

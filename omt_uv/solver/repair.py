@@ -145,31 +145,46 @@ def _healed(sheets: Sheets) -> Sheets:
 def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     """The chart with the vertices of triangles without area moved a little, and how many triangles these are.
 
-    The moves are random but always the same. `extent` is that of the whole mesh, for charts without any size.
+    See `nudged`. `extent` is that of the whole mesh, for charts without any size.
 
     Raises
     ------
     ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to its chart's)
     """
-    bad = degenerate_triangles(chart.vertices, chart.disk, NEEDLE)
+    vertices, count = nudged(chart.vertices, chart.disk, extent, len(chart.triangles))
+    return (replace(chart, vertices=vertices) if count else chart), count
+
+
+def nudged(
+    vertices: np.ndarray, triangles: np.ndarray, extent: float, own: int | None = None
+) -> tuple[np.ndarray, int]:
+    """Positions (n,3) with the vertices of triangles (m,3) without area moved a little, and how many these are.
+
+    The moves are random but always the same. An error blames only the first `own` triangles, all by default.
+
+    Raises
+    ------
+    ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to the whole)
+    """
+    bad = degenerate_triangles(vertices, triangles, NEEDLE)
     if not bad.any():
-        return chart, 0
+        return vertices, 0
     count = int(bad.sum())
-    low = chart.vertices.min(axis=0)
-    size = 2 * float((chart.vertices.max(axis=0) / 2 - low / 2).max())
+    low = vertices.min(axis=0)
+    size = 2 * float((vertices.max(axis=0) / 2 - low / 2).max())
     rng = np.random.default_rng(0)
     # A chart without any area, or without a size that counts, has no shape to keep.
     shapeless = bad.all() or size < 1e-9 * extent
     scale = (extent if size < 1e-9 * extent else size) or 1.0
-    vertices = SPECK * rng.random((len(chart.vertices), 3)) if shapeless else chart.vertices / scale - low / scale
+    moving = SPECK * rng.random((len(vertices), 3)) if shapeless else vertices / scale - low / scale
     for k in range(NUDGE_ROUNDS):
-        bad = degenerate_triangles(vertices, chart.disk, NEEDLE)
+        bad = degenerate_triangles(moving, triangles, NEEDLE)
         if not bad.any():
-            return replace(chart, vertices=vertices * scale), count
-        reach = _least_height(vertices, chart.disk, bad)
-        moved = np.unique(chart.disk[bad])
-        vertices[moved] += NUDGE * 4.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
-    raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.flatnonzero(bad[: len(chart.triangles)]))
+            return moving * scale, count
+        reach = _least_height(moving, triangles, bad)
+        moved = np.unique(triangles[bad])
+        moving[moved] += NUDGE * 4.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
+    raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.flatnonzero(bad[:own]))
 
 
 def _least_height(vertices: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> np.ndarray:

@@ -1,0 +1,136 @@
+"""Closed surfaces of genus 0: checked, moved into a unit box, and given area where they have none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .errors import (
+    DuplicateFaceError,
+    EmptyMeshError,
+    NonFiniteError,
+    NonManifoldEdgeError,
+    NotASphereError,
+    OrientationError,
+)
+from .repair import nudged
+from .topology import halfedges, pair_keys
+
+
+@dataclass(frozen=True)
+class ClosedSurface:
+    """Positions (n,3) in a unit box about 0, triangles (m,3), extent of the original, and what was repaired."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    extent: float
+    warnings: tuple[str, ...]
+
+
+def closed_surface(vertices: np.ndarray, triangles: np.ndarray) -> ClosedSurface:
+    """Check that a mesh (n,3), (m,3) is one topological sphere, and repair triangles without area.
+
+    Raises
+    ------
+    MeshError : EmptyMeshError, NonFiniteError, DuplicateFaceError, NonManifoldEdgeError, OrientationError;
+        NotASphereError for boundaries, handles, several parts, fans that meet at a vertex, and loose vertices;
+        ZeroAreaFaceError where no repair helps. Elements are indices of the input's vertices, edges and triangles.
+    """
+    vertices, triangles = np.asarray(vertices, float), np.asarray(triangles, np.int64)
+    if not len(triangles):
+        raise EmptyMeshError("There are no faces to map to the sphere")
+    wrong = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(wrong):
+        raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
+    _check_faces(triangles)
+    _check_edges(triangles)
+    _check_parts(triangles, len(vertices))
+    _check_genus(triangles)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    # Halves first: the difference of two huge numbers may be infinite.
+    extent = 2 * float((high / 2 - low / 2).max()) or 1.0
+    sound, count = nudged((vertices - (low / 2 + high / 2)) / extent, triangles, 1.0)
+    warnings: tuple[str, ...] = ()
+    if count:
+        who = "A triangle has" if count == 1 else f"{count} triangles have"
+        warnings = (f"{who} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve",)
+    return ClosedSurface(sound, triangles, extent, warnings)
+
+
+def _check_faces(triangles: np.ndarray) -> None:
+    a, b, c = np.sort(triangles, axis=1).T
+    repeating = np.flatnonzero((a == b) | (b == c))
+    if len(repeating):
+        raise NotASphereError("A face uses a vertex twice", "Use Degenerate Dissolve", "face", repeating)
+    _, inverse, count = np.unique(np.stack([a, b, c], axis=1), axis=0, return_inverse=True, return_counts=True)
+    double = np.flatnonzero(count[inverse.ravel()] > 1)
+    if len(double):
+        raise DuplicateFaceError("Several faces have the same vertices", kind="face", elements=double)
+
+
+def _check_edges(triangles: np.ndarray) -> None:
+    tail, head = halfedges(triangles)
+    edges, inverse, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
+    ends = np.stack([edges >> 32, edges & 0xFFFFFFFF], axis=1)
+    if (count > 2).any():
+        raise NonManifoldEdgeError("More than two faces meet at an edge", kind="edge", elements=ends[count > 2])
+    if (count < 2).any():
+        raise NotASphereError(
+            "The surface is not closed: it has boundary edges",
+            "Fill the holes (Select > Non Manifold, then Fill), or unwrap it as a chart",
+            "edge",
+            ends[count < 2],
+        )
+    forward = np.bincount(inverse.ravel(), tail < head, len(edges))
+    if (forward != 1).any():
+        raise OrientationError("Neighbouring faces have opposite orientation", kind="edge", elements=ends[forward != 1])
+
+
+def _check_parts(triangles: np.ndarray, n: int) -> None:
+    used = np.zeros(n, dtype=bool)
+    used[triangles] = True
+    if not used.all():
+        raise NotASphereError(
+            "A vertex belongs to no face", "Use Mesh > Clean Up > Delete Loose", "vertex", np.flatnonzero(~used)
+        )
+    tail, head = halfedges(triangles)
+    count, part = connected_components(coo_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n)), directed=False)
+    if count > 1:
+        of_face = part[triangles[:, 0]]
+        largest = np.bincount(of_face).argmax()
+        raise NotASphereError(
+            f"The surface has {count} parts",
+            "Map them one by one (Separate by Loose Parts)",
+            "face",
+            np.flatnonzero(of_face != largest),
+        )
+    # Corners of one fan follow each other across edges.
+    m = len(triangles)
+    order = np.lexsort((tail < head, pair_keys(tail, head)))
+    first, second = order[0::2], order[1::2]
+    following = np.arange(3 * m) + 1 - 3 * (np.arange(3 * m) % 3 == 2)
+    joined = np.concatenate([first, following[first]]), np.concatenate([following[second], second])
+    fans, fan = connected_components(coo_matrix((np.ones(3 * m), joined), shape=(3 * m, 3 * m)), directed=False)
+    if fans > n:
+        pairs = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)
+        torn = np.flatnonzero(np.bincount(pairs[:, 0], minlength=n) > 1)
+        raise NotASphereError(
+            "Several fans of faces meet in one vertex",
+            "Split the vertex (Mesh > Split > Faces by Edges)",
+            "vertex",
+            torn,
+        )
+
+
+def _check_genus(triangles: np.ndarray) -> None:
+    n, m = int(triangles.max()) + 1, len(triangles)
+    # Every edge has two faces: V - E + F = n - m / 2 = 2 - 2 genus.
+    genus = (2 - (n - m // 2)) // 2
+    if genus > 0:
+        plural = "a handle" if genus == 1 else f"{genus} handles"
+        raise NotASphereError(
+            f"The surface has {plural}", "Only closed surfaces without handles map to a sphere; unwrap it with cuts"
+        )
