@@ -111,3 +111,9 @@ class FoldedUVError(MeshError):
     """UVs that should be improved are folded beyond repair."""
 
     remedy = "Unwrap these faces anew first"
+
+
+class CountError(MeshError):
+    """A remesh was asked for fewer vertices or faces than its topology and features take."""
+
+    remedy = "Ask for more vertices, or keep fewer features"

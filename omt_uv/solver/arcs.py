@@ -1,0 +1,168 @@
+"""The lines along which disk charts meet, and samples on them that neighbouring charts share.
+
+An arc is a chain of edges between two nodes: a cut, a boundary, or a feature. Every chart's boundary is a cycle of
+arcs, and every arc occurs in it forwards once and, unless it is a boundary of the surface, backwards once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .charts import Chart
+from .topology import boundary_loops, pair_keys
+
+# A boundary or a feature that turns by more than this, radians, has a corner there.
+CORNER = np.radians(50.0)
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Part vertices (k,) in order, both ends included; keys of its edges; held: no mere cut but a line to keep."""
+
+    vertices: np.ndarray
+    held: bool
+
+
+@dataclass(frozen=True)
+class Side:
+    """An arc as a chart sees it: number of the arc, whether it runs backwards, and its first place in the loop."""
+
+    arc: int
+    backwards: bool
+    start: int
+
+
+@dataclass(frozen=True)
+class Network:
+    """All arcs, and per chart its boundary loop of chart vertices, starting at a node, and its sides in order."""
+
+    arcs: list[Arc]
+    loops: list[np.ndarray]
+    sides: list[list[Side]]
+
+
+def network(positions: np.ndarray, charts: list[Chart], held: np.ndarray, corners: bool = True) -> Network:
+    """Arcs of the boundaries of charts of one part, positions (n,3); held: sorted keys of the edges to keep."""
+    loops = [boundary_loops(chart.disk)[0] for chart in charts]
+    ids = [chart.vertex_ids[loop] for chart, loop in zip(charts, loops, strict=True)]
+    keys = [pair_keys(i, np.roll(i, -1)) for i in ids]
+    node = _nodes(positions, np.unique(np.concatenate(keys)), held, corners)
+    for i in ids:
+        if not node[i].any():
+            node[i.min()] = True
+    arcs: list[Arc] = []
+    number: dict[int, int] = {}
+    sides: list[list[Side]] = []
+    for c, (i, key) in enumerate(zip(ids, keys, strict=True)):
+        first = int(np.flatnonzero(node[i])[0])
+        loops[c], i, key = np.roll(loops[c], -first), np.roll(i, -first), np.roll(key, -first)
+        starts = np.flatnonzero(node[i])
+        labels = np.minimum.reduceat(key, starts)
+        ends = np.append(starts[1:], len(i))
+        closed = np.append(i, i[0])
+        mine = []
+        for start, end, label in zip(starts, ends, labels, strict=True):
+            again = int(label) in number
+            if not again:
+                number[int(label)] = len(arcs)
+                arcs.append(Arc(closed[start : end + 1], bool(_among(key[start : start + 1], held)[0])))
+            mine.append(Side(number[int(label)], again, int(start)))
+        sides.append(mine)
+    return Network(arcs, loops, sides)
+
+
+def _nodes(positions: np.ndarray, keys: np.ndarray, held: np.ndarray, corners: bool) -> np.ndarray:
+    """Vertices (n,) bool where arcs end: branches, ends, changes of kind, and corners of lines that are kept."""
+    n = len(positions)
+    a, b = keys >> 32, keys & 0xFFFFFFFF
+    ends, other = np.concatenate([a, b]), np.concatenate([b, a])
+    degree = np.bincount(ends, minlength=n)
+    kept = np.bincount(ends, np.tile(_among(keys, held), 2), n)
+    node = (degree > 0) & ((degree != 2) | (kept == 1))
+    if corners:
+        order = np.argsort(ends, kind="stable")
+        ends, other = ends[order], other[order]
+        first = np.flatnonzero((degree[ends] == 2) & (kept[ends] == 2))[::2]
+        v = ends[first]
+        p, q = positions[other[first]] - positions[v], positions[other[first + 1]] - positions[v]
+        size = np.linalg.norm(p, axis=1) * np.linalg.norm(q, axis=1)
+        node[v[-np.einsum("ij,ij->i", p, q) < np.cos(CORNER) * size]] = True
+    return node
+
+
+def _among(keys: np.ndarray, ordered: np.ndarray) -> np.ndarray:
+    return np.isin(keys, ordered)
+
+
+@dataclass(frozen=True)
+class ArcSamples:
+    """Samples on arcs: positions (s,3), fixed (s,) bool; per arc the samples (p+1,) along it, both ends included, and
+    where they are: the edge of the arc and the share along it, (p+1,) each."""
+
+    points: np.ndarray
+    fixed: np.ndarray
+    along: list[np.ndarray]
+    edge: list[np.ndarray]
+    share: list[np.ndarray]
+
+
+def sample_arcs(positions: np.ndarray, arcs: list[Arc], size: np.ndarray, longer: int = -1) -> ArcSamples:
+    """Samples about `size` (n,), an edge length at every vertex, apart: a whole number of equal pieces on every arc.
+
+    Arcs that begin and end at one node get two samples more, and several arcs between the same two one. The arc number
+    `longer` gets one piece more.
+    """
+    pieces, places = [], []
+    for arc in arcs:
+        p = positions[arc.vertices]
+        local = (size[arc.vertices][1:] + size[arc.vertices][:-1]) / 2
+        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1) / local)])
+        places.append(length)
+        pieces.append(max(1, round(float(length[-1]))))
+    ends = np.sort([[a.vertices[0], a.vertices[-1]] for a in arcs], axis=1)
+    _, pair, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    least = np.where(ends[:, 0] == ends[:, 1], 3, np.where(count[pair.ravel()] > 1, 2, 1))
+    nodes = np.unique(ends)
+    points, fixed = [positions[nodes]], [np.zeros(len(nodes), dtype=bool)]
+    along: list[np.ndarray] = []
+    edges, shares = [], []
+    total = len(nodes)
+    for arc, length, p, q in zip(arcs, places, pieces, least, strict=True):
+        p = max(p, int(q)) + (len(along) == longer)
+        s = np.arange(p + 1) / p * length[-1]
+        edge = np.clip(np.searchsorted(length, s, side="right") - 1, 0, len(length) - 2)
+        share = np.clip((s - length[edge]) / np.maximum(length[edge + 1] - length[edge], 1e-300), 0, 1)
+        a, b = positions[arc.vertices[edge]], positions[arc.vertices[edge + 1]]
+        first, last = np.searchsorted(nodes, arc.vertices[[0, -1]])
+        along.append(np.concatenate([[first], total + np.arange(p - 1), [last]]))
+        edges.append(edge)
+        shares.append(share)
+        points.append((a + share[:, None] * (b - a))[1:-1])
+        fixed.append(np.full(p - 1, arc.held))
+        if arc.held:
+            fixed[0][[first, last]] = True
+        total += p - 1
+    return ArcSamples(np.concatenate(points), np.concatenate(fixed), along, edges, shares)
+
+
+@dataclass(frozen=True)
+class Border:
+    """Samples around a chart in order: their numbers (b,), and the place of each in the boundary loop, (b,) real."""
+
+    samples: np.ndarray
+    place: np.ndarray
+
+
+def border(sides: list[Side], samples: ArcSamples, arcs: list[Arc]) -> Border:
+    """The samples of a chart's sides, each node once."""
+    numbers, places = [], []
+    for side in sides:
+        place = samples.edge[side.arc] + samples.share[side.arc]
+        along = samples.along[side.arc]
+        if side.backwards:
+            place, along = len(arcs[side.arc].vertices) - 1 - place[::-1], along[::-1]
+        numbers.append(along[:-1])
+        places.append(side.start + place[:-1])
+    return Border(np.concatenate(numbers), np.concatenate(places))

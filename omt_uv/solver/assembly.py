@@ -1,0 +1,51 @@
+"""Triangulated charts glued along their common samples to one mesh that has the topology of the surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arcs import Border
+from .mesh_edits import independent_splits, split_edges
+from .sampling import Patch
+from .topology import halfedges, pair_keys, twins
+
+MOST_ROUNDS = 50
+
+
+def glue(shared: np.ndarray, borders: list[Border], patches: list[Patch]) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n,3), the samples on arcs `shared` (s,3) first, and triangles (m,3).
+
+    Edges inside of charts that join the same two samples on arcs as another edge does, or one with itself, get a
+    vertex in the middle, so that two vertices have at most one edge.
+    """
+    number, points, triangles = [], [], []
+    total, local = len(shared), 0
+    for border, patch in zip(borders, patches, strict=True):
+        number.append(np.concatenate([border.samples, total + np.arange(len(patch.points))]))
+        points.append(np.concatenate([shared[border.samples], patch.points]))
+        triangles.append(patch.triangles + local)
+        total, local = total + len(patch.points), local + len(number[-1])
+    p, t, n = np.concatenate(points), np.concatenate(triangles), np.concatenate(number)
+    for _ in range(MOST_ROUNDS):
+        repeated = _repeated(t, n)
+        if len(repeated) == 0:
+            break
+        edit = split_edges(p, t, independent_splits(t, repeated))
+        n = np.concatenate([n, total + np.arange(len(edit.points) - len(p))])
+        p, t, total = edit.points, edit.triangles, total + len(edit.points) - len(p)
+    glued = np.empty((total, 3))
+    glued[n] = p
+    glued[: len(shared)] = shared
+    return glued, n[t]
+
+
+def _repeated(triangles: np.ndarray, number: np.ndarray) -> np.ndarray:
+    """Halfedges (k,) of edges inside of charts between samples (n,) that are joined elsewhere, or are the same."""
+    twin = twins(triangles)
+    tail, head = halfedges(triangles)
+    a, b = number[tail], number[head]
+    inner, rim = np.flatnonzero(twin > np.arange(len(twin))), np.flatnonzero(twin < 0)
+    keys = np.concatenate([pair_keys(a[inner], b[inner]), np.unique(pair_keys(a[rim], b[rim]))])
+    _, place, count = np.unique(keys, return_inverse=True, return_counts=True)
+    again = count[place.ravel()[: len(inner)]] > 1
+    return inner[again | (a[inner] == b[inner])]

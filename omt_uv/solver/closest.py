@@ -1,0 +1,240 @@
+"""Closest points on a triangle mesh, many queries at once, on the sheet of the surface that looks the right way.
+
+Candidates come from a k-d tree of points spread over the faces, each with its normal, so that a query on one side of
+a thin part is not answered from the other side; the exact distance to the candidates decides, and the answer walks
+on across edges while that brings it nearer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .geometry import face_areas
+from .topology import twins
+
+CANDIDATES = 6
+MOST_SAMPLES = 600_000
+WALK_ROUNDS = 20
+SAMPLES_PER_POINT = 8
+
+
+@dataclass(frozen=True)
+class Located:
+    """Points (k,3) on the surface, the triangle (k,) of each and its barycentric coordinates (k,3)."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    barycentric: np.ndarray
+
+
+def closest_on_triangles(q: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (..., 3) of the points of triangles a, b, c (..., 3) that are closest to q (..., 3).
+
+    By regions of the triangle's plane (Ericson 2005, section 5.1.5).
+    """
+    ab, ac, ap = b - a, c - a, q - a
+    d1, d2 = _dot(ab, ap), _dot(ac, ap)
+    e, f, g = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac)
+    d3, d4 = d1 - e, d2 - f
+    d5, d6 = d1 - f, d2 - g
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        total = va + vb + vc
+        v, w = vb / total, vc / total
+        on_bc = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        on_ac, on_ab = d2 / g, d1 / e
+    # Later rules overrule earlier ones: edges the inside, corners the edges.
+    edge = (va <= 0) & (d4 >= d3) & (d5 >= d6)
+    v, w = np.where(edge, 1 - on_bc, v), np.where(edge, on_bc, w)
+    edge = (vb <= 0) & (d2 >= 0) & (d6 <= 0)
+    v, w = np.where(edge, 0, v), np.where(edge, on_ac, w)
+    edge = (vc <= 0) & (d1 >= 0) & (d3 <= 0)
+    v, w = np.where(edge, on_ab, v), np.where(edge, 0, w)
+    corner = (d6 >= 0) & (d5 <= d6)
+    v, w = np.where(corner, 0, v), np.where(corner, 1, w)
+    corner = (d3 >= 0) & (d4 <= d3)
+    v, w = np.where(corner, 1, v), np.where(corner, 0, w)
+    corner = (d1 <= 0) & (d2 <= 0)
+    v, w = np.where(corner, 0, v), np.where(corner, 0, w)
+    v, w = np.clip(np.nan_to_num(v), 0, 1), np.clip(np.nan_to_num(w), 0, 1)
+    return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("...i,...i->...", a, b)
+
+
+def unit(v: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) of length one; 0 stays 0."""
+    length = np.sqrt(_dot(v, v))[..., None]
+    return v / np.where(length > 0, length, 1)
+
+
+def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (m,3)."""
+    a, b, c = positions[triangles[:, 0]], positions[triangles[:, 1]], positions[triangles[:, 2]]
+    return unit(np.cross(b - a, c - a))
+
+
+def vertex_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (n,3), weighted by the areas of the adjacent faces."""
+    a, b, c = positions[triangles[:, 0]], positions[triangles[:, 1]], positions[triangles[:, 2]]
+    normal = np.cross(b - a, c - a)
+    flat = triangles.ravel()
+    total = [np.bincount(flat, np.repeat(normal[:, k], 3), len(positions)) for k in range(3)]
+    return unit(np.stack(total, axis=1))
+
+
+class ClosestPoint:
+    """Closest points on a mesh (n,3), (m,3); queries are expected about `spacing` apart."""
+
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, spacing: float):
+        self.vertices, self.triangles = vertices, triangles
+        self.normals = face_normals(vertices, triangles)
+        self.corners = tuple(np.ascontiguousarray(vertices[triangles[:, k]]) for k in range(3))
+        self.neighbour = np.where((t := twins(triangles)) >= 0, t // 3, -1).reshape(-1, 3)
+        # A normal to the opposite side counts as far as one spacing.
+        self.weight = 0.5 * spacing
+        self.owner, points = spread_points(vertices, triangles, spacing / 2)
+        self.tree = cKDTree(np.column_stack([points, self.weight * self.normals[self.owner]]))
+
+    def __call__(self, points: np.ndarray, normals: np.ndarray) -> Located:
+        """Closest points to points (k,3) where the surface looks about the way of normals (k,3)."""
+        k = min(CANDIDATES, len(self.owner))
+        _, index = self.tree.query(np.column_stack([points, self.weight * normals]), k=k)
+        faces = self.owner[index.reshape(len(points), -1)]
+        barycentric, distance = self._distance(points[:, None], faces)
+        # The right side first, then the distance.
+        back = np.einsum("kcj,kj->kc", self.normals[faces], normals) < 0
+        distance = distance + np.where(back, 4 * distance.max(initial=1e-300), 0)
+        best = distance.argmin(axis=1)[:, None]
+        face = np.take_along_axis(faces, best, 1)[:, 0]
+        bary = np.take_along_axis(barycentric, best[..., None], 1)[:, 0]
+        return self.walk(points, face, bary)
+
+    def walk(self, points: np.ndarray, faces: np.ndarray, barycentric: np.ndarray | None = None) -> Located:
+        """From starting faces (k,) across edges for as long as that brings nearer to the points (k,3)."""
+        faces = faces.copy()
+        if barycentric is None:
+            barycentric = self._distance(points, faces)[0]
+        barycentric = barycentric.copy()
+        active = np.arange(len(points))
+        for _ in range(WALK_ROUNDS):
+            # The edge from corner k to k + 1 is where the coordinate k + 2 is zero.
+            out = barycentric[active][:, [2, 0, 1]] <= 1e-12
+            out &= self.neighbour[faces[active]] >= 0
+            active = active[out.any(axis=1)]
+            if len(active) == 0:
+                break
+            around = np.column_stack([faces[active], self.neighbour[faces[active]]])
+            around = np.where(around >= 0, around, around[:, :1])
+            b, d = self._distance(points[active][:, None], around)
+            best = d.argmin(axis=1)
+            better = d[np.arange(len(active)), best] < d[:, 0] * (1 - 1e-12)
+            active, best, b, around = active[better], best[better], b[better], around[better]
+            rows = np.arange(len(active))
+            faces[active], barycentric[active] = around[rows, best], b[rows, best]
+        return Located(self.at(faces, barycentric), faces, barycentric)
+
+    def at(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Positions (k,3) of points given by face and barycentric coordinates."""
+        return np.einsum("kc,kcj->kj", barycentric, self.vertices[self.triangles[faces]])
+
+    def _distance(self, points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        a, b, c = (corner[faces] for corner in self.corners)
+        barycentric = closest_on_triangles(points, a, b, c)
+        u, v, w = (barycentric[..., k, None] for k in range(3))
+        off = u * a + v * b + w * c - points
+        return barycentric, _dot(off, off)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Of the samples nearest to every point: their area (k,), their mass, which is area times squared density, (k,),
+    and their first moment about it (k,3)."""
+
+    area: np.ndarray
+    mass: np.ndarray
+    moment: np.ndarray
+
+
+def surface_samples(index: ClosestPoint, density: np.ndarray, count: int) -> tuple[np.ndarray, ...]:
+    """Points (s,3) of the surface, a few times `count` at most, normals (s,3), area (s,), area by density^2 (s,)."""
+    V, T = index.vertices, index.triangles
+    area = face_areas(V, T)
+    owner, points = spread_points(V, T, np.sqrt(2 * area.sum() / count))
+    share = area[owner] / np.bincount(owner, minlength=len(T))[owner]
+    if len(owner) > 2 * count:
+        # Where faces are smaller than the samples' spacing a few of them stand for all, as often as they are large.
+        places = (np.arange(count) + 0.5) / count * share.sum()
+        pick = np.searchsorted(np.cumsum(share), places)
+        owner, points, share = owner[pick], points[pick], np.full(count, share.sum() / count)
+    return points, index.normals[owner], share, share * density[owner] ** 2
+
+
+class Carrier:
+    """Points that move on a surface with a density (m,): a short walk from where they were mostly, and
+    now and then a search, since a walk may end in a nearest point that is not the nearest of all."""
+
+    SEARCH_EVERY = 8
+
+    def __init__(self, index: ClosestPoint, density: np.ndarray):
+        self.index, self.density = index, density
+        self.faces: np.ndarray | None = None
+        self.calls = 0
+        self.samples: tuple[np.ndarray, ...] | None = None
+
+    def onto(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Closest points (k,3) to points (k,3), the surface's normals and density there."""
+        known = self.faces if self.calls % self.SEARCH_EVERY else None
+        self.calls += 1
+        if known is None or len(known) != len(points):
+            found = self.index(points, normals)
+        else:
+            found = self.index.walk(points, known)
+        self.faces = found.faces
+        return found.points, self.index.normals[found.faces], self.density[found.faces]
+
+    def seen_by(self, points: np.ndarray, normals: np.ndarray) -> Seen:
+        """Samples of the surface, each with the nearest of points (k,3) with normals (k,3)."""
+        if self.samples is None:
+            self.samples = surface_samples(self.index, self.density, SAMPLES_PER_POINT * len(points))
+        place, normal, area, weight = self.samples
+        w = self.index.weight
+        near = cKDTree(np.column_stack([points, w * normals])).query(np.column_stack([place, w * normal]))[1]
+        k, off = len(points), weight[:, None] * (place - points[near])
+        moment = np.stack([np.bincount(near, off[:, j], k) for j in range(3)], axis=1)
+        return Seen(np.bincount(near, area, k), np.bincount(near, weight, k), moment)
+
+
+def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (s,3) over the faces, no farther apart than about `spacing`, and the face (s,) of each.
+
+    A face is cut into k^2 similar ones, and their centroids are the points.
+    """
+    p = vertices[triangles]
+    longest = np.linalg.norm(p - p[:, [1, 2, 0]], axis=2).max(axis=1)
+    level = np.maximum(np.ceil(longest / max(spacing, 1e-300)), 1)
+    excess = np.sqrt((level**2).sum() / MOST_SAMPLES)
+    if excess > 1:
+        level = np.maximum(np.floor(level / excess), 1)
+    level = np.minimum(level, 1000).astype(np.int64)
+    owners, points = [], []
+    for k in np.unique(level):
+        faces = np.flatnonzero(level == k)
+        pattern = subdivision_centroids(int(k))
+        owners.append(np.repeat(faces, len(pattern)))
+        points.append(np.einsum("sc,fcj->fsj", pattern, p[faces]).reshape(-1, 3))
+    return np.concatenate(owners), np.concatenate(points)
+
+
+def subdivision_centroids(k: int) -> np.ndarray:
+    """Barycentric coordinates (k^2,3) of the centroids of a triangle cut into k^2 similar ones."""
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(k), np.arange(k), indexing="ij"))
+    up, down = i + j < k, i + j < k - 1
+    u = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3]) / k
+    v = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3]) / k
+    return np.stack([1 - u - v, u, v], axis=1)

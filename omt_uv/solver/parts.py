@@ -1,0 +1,102 @@
+"""The connected, oriented, manifold parts of a triangle mesh: what can be remeshed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .charts import Chart, assemble, chosen_triangles, triangle_surface
+from .errors import OrientationError, ZeroAreaFaceError
+from .geometry import face_areas
+from .repair import join
+from .sheets import orientations, turn_over
+from .topology import halfedges, pair_keys, twins
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part in a unit box: vertices (n,3), triangles (m,3), the input's triangles (m,) and vertices (n,).
+
+    features (e,2): pairs of its vertices that are edges to keep.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    faces: np.ndarray
+    vertex_ids: np.ndarray
+    features: np.ndarray
+
+    @property
+    def area(self) -> np.ndarray:
+        return face_areas(self.vertices, self.triangles)
+
+    @property
+    def rim(self) -> np.ndarray:
+        """Keys of the boundary edges, sorted."""
+        tail, head = halfedges(self.triangles)
+        open_ = twins(self.triangles) < 0
+        return np.sort(pair_keys(tail[open_], head[open_]))
+
+    @property
+    def euler(self) -> int:
+        edges = (3 * len(self.triangles) + len(self.rim)) // 2
+        return len(self.vertices) - edges + len(self.triangles)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The parts, their common unit box (position = centre + size * part position), and what was repaired."""
+
+    parts: list[Part]
+    centre: np.ndarray
+    size: float
+    warnings: tuple[str, ...]
+
+
+def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarray) -> Parts:
+    """Parts of a mesh (n,3), (m,3) with edges (e,2) to keep.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError, ZeroAreaFaceError : nothing that could be remeshed
+    OrientationError : a part has only one side
+    """
+    surface = triangle_surface(vertices, triangles)
+    faces, corners, owner = chosen_triangles(surface, None)
+    used = surface.positions[np.unique(surface.corner_vertex)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    # Halves first: the difference of two huge numbers may be infinite.
+    size = 2 * float((high / 2 - low / 2).max()) or 1.0
+    centre = low / 2 + high / 2
+    boxed = surface.positions / size - centre / size
+    area = face_areas(boxed, surface.corner_vertex[corners])
+    if not area.sum() > 1e-20:
+        raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
+    repaired = join(surface, faces, corners, owner)
+    turned, one_sided = orientations(repaired.sheets, area)
+    if one_sided.any():
+        raise OrientationError(
+            "A part of the mesh has only one side, like a Moebius strip",
+            remedy="Cut it open, or delete the faces where it closes",
+            kind="face",
+            elements=np.unique(owner[one_sided]),
+        )
+    warnings = [w.replace(", mapped apart", ", remeshed apart").replace(" for the map", "") for w in repaired.warnings]
+    if turned.any():
+        warnings.append(f"{int(turned.sum())} triangles looked to the wrong side and were turned over")
+    charts = assemble(surface, turn_over(repaired.sheets, turned))
+    kept = np.sort(pair_keys(features[:, 0], features[:, 1]))
+    parts = [_part(chart, boxed, kept) for chart in charts]
+    sound = [p for p in parts if p.area.sum() > 1e-12 * area.sum()]
+    if len(sound) < len(parts):
+        warnings.append(f"{len(parts) - len(sound)} parts without area were left out")
+    return Parts(sound, centre, size, tuple(warnings))
+
+
+def _part(chart: Chart, boxed: np.ndarray, features: np.ndarray) -> Part:
+    tail, head = halfedges(chart.triangles)
+    key = pair_keys(chart.vertex_ids[tail], chart.vertex_ids[head])
+    kept = np.isin(key, features)
+    rows = np.unique(np.sort(np.stack([tail[kept], head[kept]], axis=1), axis=1), axis=0)
+    return Part(boxed[chart.vertex_ids], chart.triangles, chart.faces, chart.vertex_ids, rows.reshape(-1, 2))

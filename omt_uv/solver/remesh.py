@@ -1,0 +1,191 @@
+"""Remeshing: sample on the measure-preserving map, triangulate on the conformal map, relax on the surface.
+
+Samples are uniform in the measure-preserving image of the surface and triangles Delaunay in the conformal one (B. Gu
+2018). Closed surfaces go through charts; afterwards everything happens on the surface itself, so that the cuts
+between the charts leave no trace.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .closest import Carrier, ClosestPoint, vertex_normals
+from .counts import adjust_count, distribute, least_vertices
+from .errors import DensityError
+from .fit import fit_to_surface
+from .parts import Part, split_parts
+from .progress import Progress, Steps, part_of
+from .relaxation import relax
+from .sampling import STRATEGIES
+from .tessellation import Options, tessellate
+
+# More vertices than this many times the input's tell nothing new about the surface.
+FAR_MORE = 50
+ROUNDS = 100
+# Mean step of a relaxation that has settled, in edge lengths.
+CONVERGED = 0.01
+
+
+@dataclass(frozen=True)
+class Remesh:
+    """A new mesh of a surface.
+
+    vertices (k,3) in the units of the input; triangles (t,3), counter-clockwise as the input's; faces (k,) the input
+    triangle on which the closest point of each vertex lies, and barycentric (k,3) where; iterations: rounds of
+    relaxation; residual: mean step of the last one, in edge lengths; status: "converged" or "rounds".
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    faces: np.ndarray
+    barycentric: np.ndarray
+    iterations: int
+    residual: float
+    status: str
+    warnings: tuple[str, ...]
+
+
+def remesh(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    count: int,
+    *,
+    count_of: str = "vertices",
+    density: np.ndarray | None = None,
+    features: np.ndarray | None = None,
+    preserve_boundary: bool = True,
+    strategy: str = "app-cfp",
+    fit: bool = True,
+    rounds: int = ROUNDS,
+    seed: int = 0,
+) -> Steps[Remesh]:
+    """A new mesh of the surface (n,3), (m,3) with `count` vertices, its triangles equilateral as far as can be.
+
+    Parameters
+    ----------
+    count_of : "vertices" or "faces"
+    density : (m,) > 0, how many vertices per area every input triangle gets, in proportion; 1 by default
+    features : (e,2) pairs of input vertices, edges to keep as lines of the new mesh
+    preserve_boundary : keep vertices on the corners of boundaries
+    strategy : map to sample on and map to triangulate on, each the measure-preserving ("app") or the conformal ("cfp")
+    fit : move vertices off the surface to halve the distance of the triangles to it
+    rounds : of relaxation on the surface; 0 leaves the strategy's mesh as it is
+    seed : of the walks that locate points
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError, ZeroAreaFaceError, OrientationError : see `parts.split_parts`
+    CountError : fewer than the topology, boundaries and features take
+    DensityError : a density that is not positive and finite
+    """
+    if strategy not in STRATEGIES:
+        raise ValueError(f"strategy must be one of {', '.join(STRATEGIES)}, not {strategy!r}")
+    if count_of not in ("vertices", "faces"):
+        raise ValueError(f"count_of must be 'vertices' or 'faces', not {count_of!r}")
+    yield Progress("Parts", 0.0)
+    vertices = np.asarray(vertices, dtype=float)
+    triangles = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
+    lines = np.zeros((0, 2), np.int64) if features is None else np.asarray(features, np.int64).reshape(-1, 2)
+    wanted = _checked_density(density, len(triangles))
+    found = split_parts(vertices, triangles, lines)
+    warnings = list(found.warnings)
+    if count > FAR_MORE * (len(vertices) if count_of == "vertices" else len(triangles)):
+        warnings.append(f"{count} {count_of} are more than {FAR_MORE} times the input's; they add no detail")
+    measure = np.array([float(p.area @ wanted[p.faces]) for p in found.parts])
+    counts = _counts(found.parts, measure, count, count_of)
+    done, results = 0.0, []
+    options = Options(count_of, strategy, fit, rounds, preserve_boundary, seed)
+    for part, share, number in zip(found.parts, measure / measure.sum(), counts, strict=True):
+        steps = _remesh_part(part, int(number), wanted[part.faces], options)
+        results.append((yield from part_of(steps, done, float(share))))
+        done += float(share)
+        warnings += [w for w in results[-1].warnings if w not in warnings]
+    return _joined(results, found.centre, found.size, warnings, rounds)
+
+
+@dataclass(frozen=True)
+class _Result:
+    points: np.ndarray
+    triangles: np.ndarray
+    faces: np.ndarray
+    barycentric: np.ndarray
+    moved: float
+    warnings: tuple[str, ...]
+
+
+def _checked_density(density: np.ndarray | None, m: int) -> np.ndarray:
+    if density is None:
+        return np.ones(m)
+    density = np.asarray(density, dtype=float)
+    if density.shape != (m,):
+        raise ValueError(f"density must have one value for each of {m} triangles, not the shape {density.shape}")
+    wrong = np.flatnonzero(~(np.isfinite(density) & (density > 0)))
+    if len(wrong):
+        raise DensityError("Remeshing needs a positive, finite density", kind="face", elements=wrong)
+    return density
+
+
+def _counts(parts: list[Part], measure: np.ndarray, count: int, count_of: str) -> np.ndarray:
+    """Vertices, or faces, of every part."""
+    least = np.array([least_vertices(p) for p in parts])
+    if count_of == "vertices":
+        return distribute(count, measure, least)
+    closed = np.array([len(p.rim) == 0 for p in parts])
+    euler = np.array([p.euler for p in parts])
+    return distribute(count, measure, np.where(closed, 2 * (least - euler), 1))
+
+
+def _remesh_part(part: Part, count: int, density: np.ndarray, options: Options) -> Steps[_Result]:
+    """One part in its unit box."""
+    level = density / (part.area @ density / part.area.sum())
+    at_vertices = _at_vertices(part, level)
+    start = yield from part_of(tessellate(part, count, level, at_vertices, options), 0.0, 0.4)
+    size = start.size
+    index = ClosestPoint(part.vertices, part.triangles, size)
+    carrier = Carrier(index, level)
+
+    def target(points: np.ndarray) -> np.ndarray:
+        near = index.tree.query(np.column_stack([points, np.zeros((len(points), 3))]))[1]
+        return size / np.sqrt(level[index.owner[near]])
+
+    points, triangles, fixed = start.points, start.triangles, start.fixed
+    warnings, moved = list(start.warnings), 0.0
+    if options.rounds:
+        first = min(options.rounds, 10)
+        points, triangles, _ = yield from part_of(
+            relax(points, triangles, fixed, start.locked, first, carrier), 0.4, 0.05
+        )
+    points, triangles, fixed = adjust_count(points, triangles, fixed, start.locked, start.count, target)
+    if options.rounds:
+        steps = relax(points, triangles, fixed, start.locked, options.rounds, carrier)
+        points, triangles, moved = yield from part_of(steps, 0.45, 0.45)
+    if options.fit:
+        points = fit_to_surface(points, triangles, fixed, index)
+    on = index(points, vertex_normals(points, triangles))
+    yield Progress("Remesh", 1.0)
+    return _Result(points, triangles, part.faces[on.faces], on.barycentric, moved, tuple(warnings))
+
+
+def _at_vertices(part: Part, density: np.ndarray) -> np.ndarray:
+    """Density (n,) at the vertices, the mean of that of their triangles (m,) by area."""
+    corner, n = part.triangles.ravel(), len(part.vertices)
+    area = np.maximum(part.area, 1e-300)
+    total = np.bincount(corner, np.repeat(area * density, 3), n)
+    return total / np.maximum(np.bincount(corner, np.repeat(area, 3), n), 1e-300)
+
+
+def _joined(results: list[_Result], centre, size, warnings: list[str], rounds: int) -> Remesh:
+    first = np.cumsum([0] + [len(r.points) for r in results])
+    moved = max((r.moved for r in results), default=0.0)
+    return Remesh(
+        np.concatenate([r.points for r in results]) * size + centre,
+        np.concatenate([r.triangles + k for r, k in zip(results, first[:-1], strict=True)]),
+        np.concatenate([r.faces for r in results]),
+        np.concatenate([r.barycentric for r in results]),
+        rounds,
+        moved,
+        "converged" if moved < CONVERGED else "rounds",
+        tuple(warnings),
+    )

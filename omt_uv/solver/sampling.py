@@ -1,0 +1,147 @@
+"""Samples of a chart, evenly by measure, and their triangulation: see B. Gu 2018.
+
+Points that are uniform in the measure-preserving image are uniform on the surface; triangles that are Delaunay in the
+conformal image are so on the surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arcs import Border
+from .chart_maps import ChartMaps
+from .domain import Disk
+from .embedding import tutte
+from .errors import TransportError
+from .point_location import locate
+from .power_diagram import power_diagram
+from .regular import by_hull
+from .topology import twins
+
+ROUNDS = 8
+# Strategies name the map to sample on and the map to triangulate on.
+STRATEGIES = ("app-cfp", "app-app", "cfp-cfp", "cfp-app")
+# Where all of them leave double precision: an embedding with the boundary samples at equal angles.
+EVEN = "even-even"
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A chart triangulated anew: positions (k,3) of its inner samples and triangles (t,3), boundary samples first."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+
+
+def triangulate_chart(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    loop: np.ndarray,
+    maps: ChartMaps,
+    border: Border,
+    count: int,
+    strategy: str,
+) -> Patch | None:
+    """A chart (n,3), (m,3) with its boundary samples and about `count` inner ones; None where precision fails.
+
+    strategy : one of STRATEGIES, or EVEN
+    """
+    images = {"app": maps.preserving, "cfp": maps.conformal}
+    if strategy == EVEN:
+        images = {"even": _even_map(vertices, triangles, loop, border)}
+    from_map, to_map = (images[name] for name in strategy.split("-"))
+    spread = spread_samples(_on_circle(from_map, loop, border), count)
+    face, bary = locate(from_map, triangles, spread)
+    corners = triangles[face]
+    points = np.einsum("kc,kcj->kj", bary, vertices[corners])
+    inner = np.einsum("kc,kcj->kj", bary, to_map[corners])
+    found = triangulate_disk(_on_circle(to_map, loop, border), inner)
+    if found is None:
+        return None
+    used = np.unique(found[found >= len(border.samples)])
+    number = np.arange(len(border.samples) + len(points))
+    number[used] = len(border.samples) + np.arange(len(used))
+    return Patch(points[used - len(border.samples)], number[found])
+
+
+def _on_circle(uv: np.ndarray, loop: np.ndarray, border: Border) -> np.ndarray:
+    """Images (b,2) of boundary samples, between their neighbours by angle, all different."""
+    angle = np.unwrap(np.arctan2(uv[loop, 1], uv[loop, 0]))
+    angle = np.append(angle, angle[0] + 2 * np.pi)
+    place = np.interp(border.place, np.arange(len(angle)), angle)
+    return np.column_stack([np.cos(place), np.sin(place)])
+
+
+def _even_map(vertices, triangles, loop, border: Border) -> np.ndarray:
+    """Mean value embedding (n,2) in the disk, boundary samples about equally far apart."""
+    b = len(border.samples)
+    place = np.append(border.place, len(loop))
+    angle = np.interp(np.arange(len(loop)), place, 2 * np.pi * np.arange(b + 1) / b)
+    return tutte(vertices, triangles, loop, np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+def spread_samples(rim: np.ndarray, count: int, rounds: int = ROUNDS) -> np.ndarray:
+    """Points (count,2) inside the unit disk that spread evenly between themselves and the boundary's (b,2)."""
+    points = _lattice(count)
+    disk, b = Disk(), len(rim)
+    if count == 0 or b + count < 4:
+        return points
+    try:
+        for _ in range(rounds):
+            cells = power_diagram(np.concatenate([rim, points]), np.zeros(b + count), disk)
+            filled = cells.area[b:] > 0
+            points = np.where(filled[:, None], cells.centroid[b:], points)
+    except TransportError:
+        # Boundary samples that coincide in double precision: the lattice alone has to do.
+        return _lattice(count)
+    return points
+
+
+def _lattice(count: int) -> np.ndarray:
+    """The `count` (count,2) points of a triangular lattice nearest to a point of it, filling the disk but a margin."""
+    half = int(np.ceil(np.sqrt(count))) + 2
+    i, j = np.meshgrid(np.arange(-half, half + 1), np.arange(-half, half + 1))
+    # Off the lattice's symmetries, so that no two points are equally far.
+    points = np.column_stack([(i + j / 2).ravel() + 0.31, (j * np.sqrt(3) / 2).ravel() + 0.17])
+    points = points[np.argsort((points**2).sum(axis=1), kind="stable")[:count]]
+    pitch = np.sqrt(np.pi / (max(count, 1) * np.sqrt(3) / 2))
+    return points * pitch * (1 - 0.5 / np.sqrt(max(count, 1)))
+
+
+def triangulate_disk(rim: np.ndarray, inner: np.ndarray) -> np.ndarray | None:
+    """Delaunay triangles (t,3) of boundary samples (b,2) in order on the circle and inner ones; None if these fail.
+
+    Inner samples beyond a chord of the boundary are pulled to its inside.
+    """
+    b = len(rim)
+    if b + len(inner) < 4:
+        return np.arange(3)[None] if b == 3 and len(inner) == 0 else None
+    points = np.concatenate([rim, _inside(rim, inner)])
+    try:
+        triangles = by_hull(points, np.zeros(len(points))).triangles
+    except TransportError:
+        return None
+    flat, twin = triangles.ravel(), twins(triangles)
+    head = triangles[:, [1, 2, 0]].ravel()
+    open_ = twin < 0
+    successor = np.full(len(points), -1)
+    successor[flat[open_]] = head[open_]
+    whole = open_.sum() == b and (successor[:b] == (np.arange(b) + 1) % b).all()
+    if not whole or len(triangles) != 2 * len(np.unique(triangles)) - b - 2:
+        return None
+    return triangles
+
+
+def _inside(rim: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    angle = np.unwrap(np.arctan2(rim[:, 1], rim[:, 0]))
+    edges = np.append(angle, angle[0] + 2 * np.pi)
+    mine = (np.arctan2(inner[:, 1], inner[:, 0]) - edges[0]) % (2 * np.pi) + edges[0]
+    k = np.clip(np.searchsorted(edges, mine, side="right") - 1, 0, len(rim) - 1)
+    # Distance of the chord from the centre, and along the ray.
+    half = (edges[k + 1] - edges[k]) / 2
+    along = np.cos(half) / np.maximum(np.cos(mine - edges[k] - half), 1e-12)
+    radius = np.linalg.norm(inner, axis=1)
+    limit = np.where(half < np.pi / 2, along - 0.02 * np.sin(half) * half - 1e-9, radius)
+    return inner * np.minimum(1, limit / np.maximum(radius, 1e-300))[:, None]

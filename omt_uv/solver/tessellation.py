@@ -1,0 +1,132 @@
+"""The first mesh of a part: charts, their two maps, samples, triangles, and the charts glued again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arcs import ArcSamples, Border, Network, border, network, sample_arcs
+from .assembly import glue
+from .chart_maps import chart_maps
+from .charts import Chart, triangle_surface
+from .counts import edge_size
+from .errors import PrecisionError
+from .geometry import face_areas
+from .parts import Part
+from .preparation import prepare
+from .progress import Progress, Steps, part_of
+from .sampling import EVEN, Patch, triangulate_chart
+from .topology import pair_keys
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to remesh a part; see `remesh.remesh`."""
+
+    count_of: str
+    strategy: str
+    fit: bool
+    rounds: int
+    corners: bool
+    seed: int
+
+
+@dataclass(frozen=True)
+class Tessellation:
+    """A mesh (n,3), (m,3) of a part with about the vertices asked for.
+
+    fixed (n,) bool: samples on boundaries and features; locked: sorted keys of the features' edges; count: the exact
+    number of vertices to reach; size: edge length at density 1.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    fixed: np.ndarray
+    locked: np.ndarray
+    count: int
+    size: float
+    warnings: tuple[str, ...]
+
+
+def tessellate(
+    part: Part, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options
+) -> Steps[Tessellation]:
+    """Samples of a part with density (m,), and at_vertices (n,), of mean 1, triangulated by the strategy.
+
+    Raises
+    ------
+    PrecisionError : a chart cannot be triangulated
+    """
+    yield Progress("Charts", 0.0)
+    held = np.union1d(part.rim, pair_keys(part.features[:, 0], part.features[:, 1]))
+    charts = prepare(triangle_surface(part.vertices, part.triangles, part.features)).charts
+    lines = network(part.vertices, charts, held, options.corners)
+    measure, rim = float(part.area @ density), _weighted_length(part.vertices, part.rim, at_vertices)
+    vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
+    size = edge_size(measure, rim, vertices)
+    samples = sample_arcs(part.vertices, lines.arcs, size / np.sqrt(at_vertices))
+    if options.count_of == "faces":
+        samples, vertices = _for_faces(part, lines, samples, count, size / np.sqrt(at_vertices))
+    borders = [border(sides, samples, lines.arcs) for sides in lines.sides]
+    inner = _inner_counts(charts, borders, density, vertices - len(samples.points))
+    patches: list[Patch] = []
+    warnings: list[str] = []
+    done = 0.0
+    for chart, loop, edge, number in zip(charts, lines.loops, borders, inner, strict=True):
+        share = len(chart.triangles) / len(part.triangles)
+        steps = _patch(chart, loop, edge, int(number), density, options.strategy)
+        patch, said = yield from part_of(steps, done, share)
+        patches.append(patch)
+        warnings += said
+        done += share
+    points, triangles = glue(samples.points, borders, patches)
+    fixed = np.zeros(len(points), dtype=bool)
+    fixed[: len(samples.fixed)] = samples.fixed
+    return Tessellation(points, triangles, fixed, _kept(lines, samples), vertices, size, tuple(warnings))
+
+
+def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarray) -> float:
+    a, b = keys >> 32, keys & 0xFFFFFFFF
+    length = np.linalg.norm(positions[a] - positions[b], axis=1)
+    return float(length @ np.sqrt((density[a] + density[b]) / 2))
+
+
+def _for_faces(part: Part, lines: Network, samples: ArcSamples, count: int, size) -> tuple[ArcSamples, int]:
+    """Samples whose boundary fits a number of faces, F = 2 V - 2 euler - b, and the number of vertices."""
+    rim = [k for k, arc in enumerate(lines.arcs) if np.isin(pair_keys(*arc.vertices[:2, None]), part.rim)[0]]
+    b = sum(len(samples.along[k]) - 1 for k in rim)
+    if (count + b) % 2 and rim:
+        longest = max(rim, key=lambda k: len(samples.along[k]))
+        samples = sample_arcs(part.vertices, lines.arcs, size, longer=longest)
+        b += 1
+    return samples, (count + b) // 2 + part.euler
+
+
+def _inner_counts(charts: list[Chart], borders: list[Border], density: np.ndarray, count: int) -> np.ndarray:
+    """Inner samples of every chart, (c,): its measure, but for half of the cell of every sample on its border."""
+    measure = np.array([face_areas(c.vertices, c.triangles) @ density[c.faces] for c in charts])
+    half = np.array([len(b.samples) for b in borders]) / 2
+    total = count + half.sum()
+    ideal = np.maximum(total * measure / measure.sum() - half, 0)
+    ideal *= max(count, 0) / max(ideal.sum(), 1e-300)
+    return np.diff(np.concatenate([[0], np.round(np.cumsum(ideal))])).astype(np.int64)
+
+
+def _patch(
+    chart: Chart, loop: np.ndarray, edge: Border, number: int, density: np.ndarray, strategy: str
+) -> Steps[tuple[Patch, tuple[str, ...]]]:
+    if len(edge.samples) == 3 and number == 0:
+        return Patch(np.zeros((0, 3)), np.arange(3)[None]), ()
+    maps = yield from chart_maps(chart.vertices, chart.disk, density[chart.faces])
+    for name in (strategy, EVEN):
+        patch = triangulate_chart(chart.vertices, chart.disk, loop, maps, edge, number, name)
+        if patch is not None:
+            return patch, maps.warnings
+    raise PrecisionError("A chart cannot be triangulated", kind="face", elements=chart.faces)
+
+
+def _kept(lines: Network, samples: ArcSamples) -> np.ndarray:
+    """Sorted keys of the edges between samples on boundaries and features."""
+    keys = [pair_keys(along[:-1], along[1:]) for arc, along in zip(lines.arcs, samples.along, strict=True) if arc.held]
+    return np.sort(np.concatenate(keys)) if keys else np.zeros(0, np.int64)

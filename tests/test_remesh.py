@@ -1,0 +1,157 @@
+"""Remeshing: as many vertices as asked for, the topology of the input, and good triangles on its surface."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.errors import CountError, DensityError, EmptyMeshError, NonFiniteError, OrientationError
+from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths
+from omt_uv.solver.progress import drain
+from omt_uv.solver.remesh import STRATEGIES, remesh
+from omt_uv.solver.topology import boundary_loops, halfedges, pair_keys
+
+CASES = {
+    "disk": lambda: meshes.bumpy(24, 24),
+    "sphere": lambda: meshes.icosphere(3),
+    "torus": lambda: meshes.torus(),
+    "annulus": lambda: meshes.annulus(),
+    "cube": lambda: meshes.cube(),
+}
+
+
+def run(V, F, count, **options):
+    return drain(remesh(V, F, count, **options))
+
+
+def topology(F):
+    """Euler number, boundary loops; the mesh must be an oriented manifold."""
+    tail, head = halfedges(F)
+    _, count = np.unique(pair_keys(tail, head), return_counts=True)
+    assert count.max() <= 2
+    directed = tail.astype(np.int64) << 32 | head
+    assert len(np.unique(directed)) == len(directed)
+    return len(np.unique(F)) - len(count) + len(F), len(boundary_loops(F))
+
+
+def angles(V, F):
+    return np.degrees(angles_from_lengths(halfedge_lengths(V, F).reshape(-1, 3)))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_topology_and_count_are_exact(name):
+    V, F = CASES[name]()
+    result = run(V, F, 300, rounds=20)
+    assert len(result.vertices) == 300
+    assert topology(result.triangles) == topology(F)
+    assert result.triangles.max() == 299
+
+
+@pytest.mark.parametrize("name", ["disk", "sphere", "torus"])
+def test_triangles_are_nearly_equilateral(name):
+    V, F = CASES[name]()
+    result = run(V, F, 400)
+    assert np.percentile(angles(result.vertices, result.triangles).min(axis=1), 1) > 36
+
+
+def test_points_of_the_input_under_the_new_vertices():
+    V, F = meshes.bumpy(24, 24)
+    result = run(V, F, 300, rounds=20, fit=False)
+    foot = np.einsum("kc,kcj->kj", result.barycentric, V[F[result.faces]])
+    assert np.abs(foot - result.vertices).max() < 1e-9
+    assert (result.barycentric >= 0).all()
+
+
+@pytest.mark.parametrize("count", [399, 400])
+def test_faces_are_counted_exactly(count):
+    V, F = meshes.bumpy(24, 24)
+    result = run(V, F, count, count_of="faces", rounds=10)
+    assert len(result.triangles) == count
+
+
+def test_the_same_twice():
+    V, F = meshes.icosphere(3)
+    a, b = (run(V, F, 200, rounds=10) for _ in range(2))
+    assert (a.vertices == b.vertices).all() and (a.triangles == b.triangles).all()
+
+
+def test_scale_and_place_do_not_matter():
+    V, F = meshes.bumpy(24, 24)
+    a, b = run(V, F, 200, rounds=10), run(1000 * V + [5e4, 0, 0], F, 200, rounds=10)
+    assert np.abs(angles(a.vertices, a.triangles).mean(axis=0) - angles(b.vertices, b.triangles).mean(axis=0)).max() < 1
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_strategies_make_meshes(strategy):
+    V, F = meshes.bumpy(24, 24)
+    result = run(V, F, 300, strategy=strategy, rounds=0)
+    assert len(result.vertices) == 300 and topology(result.triangles) == (1, 1)
+
+
+def test_density_is_honoured():
+    V, F = meshes.grid(30, 30)
+    dense = V[F].mean(axis=1)[:, 0] < 0.5
+    result = run(V, F, 1500, density=np.where(dense, 4.0, 1.0))
+    area = face_areas(V, F)
+    inside = dense[result.faces]
+    # The cell of a boundary vertex is half on the surface.
+    weight = np.where(np.isin(np.arange(1500), np.concatenate(boundary_loops(result.triangles))), 0.5, 1.0)
+    ratio = (weight[inside].sum() / area[dense].sum()) / (weight[~inside].sum() / area[~dense].sum())
+    assert abs(ratio / 4 - 1) < 0.05
+
+
+def test_boundary_corners_stay():
+    V, F = meshes.grid(10, 10)
+    result = run(V, F, 200, rounds=20)
+    for corner in ([0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]):
+        assert np.linalg.norm(result.vertices - corner, axis=1).min() < 1e-12
+
+
+def test_features_are_lines_of_the_new_mesh():
+    V, F = meshes.cube()
+    E = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    E = E[np.linalg.norm(V[E[:, 0]] - V[E[:, 1]], axis=1) < 1.1]
+    result = run(V, F, 300, features=E, rounds=20)
+    assert abs(face_areas(result.vertices, result.triangles).sum() - 6) < 1e-9
+
+
+def test_parts_share_the_count():
+    V, F = meshes.icosphere(2)
+    result = run(np.concatenate([V, 0.5 * V + 3]), np.concatenate([F, F + len(V)]), 250, rounds=10)
+    assert len(result.vertices) == 250
+    assert topology(result.triangles)[0] == 4
+
+
+@pytest.mark.parametrize("name, count", [("sphere", 3), ("torus", 6), ("cube", 2)])
+def test_too_few_vertices_are_refused(name, count):
+    with pytest.raises(CountError):
+        run(*CASES[name](), count)
+
+
+def test_bad_input_is_named():
+    V, F = meshes.bumpy(6, 6)
+    with pytest.raises(EmptyMeshError):
+        run(V, F[:0], 100)
+    with pytest.raises(NonFiniteError):
+        run(np.where(np.arange(len(V))[:, None] == 3, np.nan, V), F, 100)
+    with pytest.raises(DensityError):
+        run(V, F, 100, density=np.zeros(len(F)))
+
+
+def test_one_sided_surfaces_are_refused():
+    k = np.arange(40)
+    turn, half = 2 * np.pi * k / 40, np.pi * k / 40
+    rim = [(1 + s * np.cos(half)) * np.exp(1j * turn) for s in (-0.3, 0.3)]
+    sides = zip(rim, (-0.3, 0.3), strict=True)
+    V = np.concatenate([np.column_stack([r.real, r.imag, s * np.sin(half)]) for r, s in sides])
+    a, b = k, k + 40
+    c, d = np.append(k[1:], 40), np.append(k[1:] + 40, 0)
+    F = np.concatenate([np.column_stack([a, c, b]), np.column_stack([c, d, b])])
+    with pytest.raises(OrientationError):
+        run(V, F, 100)
+
+
+def test_many_more_vertices_than_the_input_has_are_warned_of():
+    V, F = meshes.quad_patch()
+    assert any("times" in w for w in run(V, F, 300, rounds=5).warnings)
