@@ -7,6 +7,7 @@ unwrap      area, shear, folds, overlap and time: Blender's unwraps and ours on 
 lion        conformal map and transport alone against Minimum Stretch with 50 iterations
 profile     where our time goes, stage by stage
 memory      peak memory of the unwrap of 100,000 faces
+latency     how long Blender waits for a slice of a run and for Esc, wall clock
 """
 
 from __future__ import annotations
@@ -233,12 +234,19 @@ def print_peak(preset):
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
 
 
+def latency(args):
+    from latency import latency_part
+
+    return latency_part(args)
+
+
 PARTS = {
     "transport": transport_part,
     "lion": lion_part,
     "unwrap": unwrap_part,
     "profile": profile_part,
     "memory": memory_part,
+    "latency": latency,
 }
 
 
@@ -258,6 +266,7 @@ def main():
     parser.add_argument("--presets", nargs="+", choices=PRESETS, default=PRESETS)
     parser.add_argument("--boundaries", nargs="+", choices=BOUNDARIES, default=BOUNDARIES)
     parser.add_argument("--runs", type=int, default=3, help="per figure; meshes of 20,000 faces and more run once")
+    parser.add_argument("--sizes", nargs="+", type=int, metavar="N", help="for latency: heads of N * N vertices")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "benchmarks", help="folder for the TSV files")
     parser.add_argument("--peak", choices=PRESETS, help=argparse.SUPPRESS)
     args = parser.parse_args()

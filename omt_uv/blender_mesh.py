@@ -13,6 +13,7 @@ import bpy
 import bmesh
 import numpy as np
 
+from .blender_versions import uv_values
 from .solver.chart_pins import CornerPins
 from .solver.charts import Surface
 from .solver.errors import MeshError, NonFiniteError
@@ -138,7 +139,8 @@ def weld_split_vertices(reading: Reading) -> Reading:
 
 def read_uv(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
     """UVs (c,2) float32 of every corner of a mesh that is not in Edit Mode."""
-    return _get(mesh.uv_layers[layer].uv, "vector", 2 * len(mesh.loops), np.float32).reshape(-1, 2)
+    collection, name = uv_values(mesh, layer)
+    return _get(collection, name, 2 * len(mesh.loops), np.float32).reshape(-1, 2)
 
 
 def read_pinned(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
@@ -190,8 +192,8 @@ def write_uv(obj: bpy.types.Object, layer: str, corners: np.ndarray, uv: np.ndar
         return
     values = read_uv(obj.data, layer)
     values[corners] = uv
-    # Writing to MeshUVLoopLayer.uv would, before Blender 5.2, change the array of the undo step as well.
-    obj.data.attributes[layer].data.foreach_set("vector", values.ravel())
+    collection, name = uv_values(obj.data, layer)
+    collection.foreach_set(name, values.ravel())
     obj.data.update()
 
 

@@ -61,6 +61,8 @@ def pack(
         raise MarginError(f"A margin of {margin:g} pixels fills a texture of {texture_size} pixels. {REMEDY}.")
     turned = [turn_upright(p) for p in islands]
     inner = texture_size - 2 * margin
+    if len(islands) == 1:
+        return _alone(turned[0], triangles[0], inner / texture_size)
     raster = float(min(texture_size, MAX_RASTER))
     # xatlas grows every island by the padding, so two stay twice as far apart; shrinking them from whole
     # texels back to scale can move each outline by half a texel, and never together.
@@ -80,6 +82,17 @@ def pack(
     origin = margin / texture_size
     result = [(p - low) * (fit / texture_size) + origin for p in placed]
     return Packing(result, scale * fit / texture_size, "xatlas", covered_area(result, triangles))
+
+
+def _alone(points: np.ndarray, triangles: np.ndarray, width: float) -> Packing:
+    """One island (n,2) as large as a square of this width in the middle of the unit square allows, at its lower left.
+
+    There is nothing to arrange, and xatlas keeps Blender waiting.
+    """
+    low = points.min(axis=0)
+    scale = width / float((points - low).max())
+    placed = [(points - low) * scale + (1 - width) / 2]
+    return Packing(placed, scale, "none", covered_area(placed, [triangles]))
 
 
 def stack(islands: Sequence[np.ndarray]) -> Packing:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .blender_versions import register_command, unregister_command
 from .operators.measure import UV_OT_omt_measure
 from .operators.refine import UV_OT_omt_refine
 from .operators.seams import UV_OT_omt_seams
@@ -33,8 +34,7 @@ def register() -> None:
         for menu in menus():
             menu.append(draw_unwrap)
             _undo.append((menu.remove, draw_unwrap))
-        handle = bpy.utils.register_cli_command(COMMAND, _command)
-        _undo.append((bpy.utils.unregister_cli_command, handle))
+        _undo.append((unregister_command, register_command(COMMAND, _command)))
     except Exception:
         unregister()
         raise

@@ -1,11 +1,15 @@
 """One solver at a time in Blender's window: stepped in slices, watched, and thrown away without a trace.
 
-The operators' base class drives it; the panels look at `current`.
+The operators' base class drives it; the panels look at `current`. What knows nothing of Blender may run on a thread of
+its own (`aside`); whatever touches Blender stays in front.
 """
 
 from __future__ import annotations
 
+import queue
+import threading
 import time
+from collections.abc import Callable
 
 import bpy
 
@@ -24,7 +28,6 @@ class Run:
         self.label, self.steps = label, steps
         self.began = time.monotonic()
         self.stage, self.fraction = "Reading", 0.0
-        self.longest = 0.0
         self.result = None
         self._watch = Watch(context, objects)
 
@@ -39,8 +42,11 @@ class Run:
         ------
         Disturbed : the mesh or the mode has changed, so the result would be of no use
         """
+        from .solver.progress import Elsewhere
+
         begin = time.monotonic()
         self._watch.check()
+        serve()
         more = True
         while more:
             try:
@@ -50,8 +56,7 @@ class Run:
                 self._watch.check(thoroughly=True)
                 return True
             self.stage, self.fraction = progress.stage, progress.fraction
-            more = time.monotonic() - begin < seconds
-        self.longest = max(self.longest, time.monotonic() - begin)
+            more = time.monotonic() - begin < seconds and not isinstance(progress, Elsewhere)
         return False
 
     def text(self) -> str:
@@ -112,3 +117,39 @@ class Watch:
 
 
 current: Run | None = None
+_calls: queue.SimpleQueue = queue.SimpleQueue()
+
+
+def aside(steps):
+    """A solver that knows nothing of Blender, on a thread of its own while a run is on; as it is in a script."""
+    from .solver import progress
+
+    return steps if current is None else progress.aside(steps)
+
+
+def in_front(function: Callable) -> Callable:
+    """A function that touches Blender, for solvers that may run aside: they wait until the next slice calls it."""
+
+    def call(*arguments):
+        if threading.current_thread() is threading.main_thread():
+            return function(*arguments)
+        answer: queue.SimpleQueue = queue.SimpleQueue()
+        _calls.put((current, function, arguments, answer))
+        value, error = answer.get()
+        if error is not None:
+            raise error
+        return value
+
+    return call
+
+
+def serve() -> None:
+    """Make the calls that the solver of the present run has asked for, and refuse those of runs that are over."""
+    while not _calls.empty():
+        run, function, arguments, answer = _calls.get()
+        try:
+            if run is None or run is not current:
+                raise Disturbed("The run was cancelled")
+            answer.put((function(*arguments), None))
+        except Exception as error:  # noqa: BLE001, it belongs to the one who asked
+            answer.put((None, error))

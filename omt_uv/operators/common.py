@@ -172,6 +172,7 @@ class SolverOperator:
         if running.current is not None:
             running.current.close()
             running.current = None
+            running.serve()
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None

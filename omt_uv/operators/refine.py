@@ -54,7 +54,7 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from .. import blender_mesh, blender_pack, packing
+        from .. import blender_mesh, blender_pack, packing, running
         from ..refining import refine_islands
         from ..unwrapping import Refusal
 
@@ -66,7 +66,8 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             raise Complaint(str(error)) from error
         surfaces = [(reading.surface, reading.faces, reading.all_pins) for _, reading in pairs]
         try:
-            refined = yield from refine_islands(surfaces, self.settings(), blender_pack.pack)
+            steps = refine_islands(surfaces, self.settings(), running.in_front(blender_pack.pack))
+            refined = yield from running.aside(steps)
         except Refusal as refusal:
             obj = pairs[refusal.index][0]
             raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal

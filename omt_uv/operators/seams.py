@@ -40,27 +40,23 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
         self.layout.prop(self, "keep_free")
 
     def steps(self, context: bpy.types.Context):
+        from .. import running
         from ..blender_seams import GroupError, avoided
-        from ..solver.cutting import cut
-        from ..solver.errors import MeshError
-        from ..solver.progress import Progress
+        from ..unwrapping import Refusal
 
         pairs = read_objects(context)
         try:
             free = avoided([obj for obj, _ in pairs], self.keep_free)
         except GroupError as error:
             raise Complaint(str(error)) from error
-        results = []
-        for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
-            yield Progress("Seams", k / len(pairs))
-            try:
-                cuts = cut(
-                    reading.surface, reading.faces, avoid=avoid, fill=self.fill_holes, extremities=self.extremities
-                )
-            except MeshError as error:
-                raise Complaint(f"{obj.name}: {error}", obj, error) from error
-            results.append((obj, cuts))
-        return results
+        readings = [reading for _, reading in pairs]
+        options = {"fill": self.fill_holes, "extremities": self.extremities}
+        try:
+            cuts = yield from running.aside(_cut_all(readings, free, options))
+        except Refusal as refusal:
+            obj = pairs[refusal.index][0]
+            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
+        return [(obj, found) for (obj, _), found in zip(pairs, cuts, strict=True)]
 
     def finish(self, context: bpy.types.Context, result) -> None:
         from ..blender_seams import mark_seams
@@ -72,3 +68,20 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
             self.report({"INFO"}, f"Opened {opened} part{'' if opened == 1 else 's'} along {sum(new)} edges")
         else:
             self.report({"INFO"}, "Every part is an island already; no seam is needed")
+
+
+def _cut_all(readings: list, free: list, options: dict):
+    """The cuts of every surface; Refusal says which one has none."""
+    from ..solver.cutting import cut
+    from ..solver.errors import MeshError
+    from ..solver.progress import Progress
+    from ..unwrapping import Refusal
+
+    found = []
+    for k, (reading, avoid) in enumerate(zip(readings, free, strict=True)):
+        yield Progress("Seams", k / len(readings))
+        try:
+            found.append(cut(reading.surface, reading.faces, avoid=avoid, **options))
+        except MeshError as error:
+            raise Refusal(k, error) from error
+    return found

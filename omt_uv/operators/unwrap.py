@@ -71,7 +71,7 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from .. import blender_mesh, blender_pack, packing
+        from .. import blender_mesh, blender_pack, packing, running
         from ..blender_seams import GroupError, avoided
         from ..unwrapping import Job, Refusal, lay_out
 
@@ -84,7 +84,8 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             raise Complaint(str(error)) from error
         jobs = [Job(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
         try:
-            layout = yield from lay_out(jobs, self.settings(), blender_pack.pack)
+            steps = lay_out(jobs, self.settings(), running.in_front(blender_pack.pack))
+            layout = yield from running.aside(steps)
         except Refusal as refusal:
             obj = pairs[refusal.index][0]
             raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal

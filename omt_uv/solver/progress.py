@@ -6,6 +6,7 @@ operator, which steps the generator from a timer and closes it to cancel.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TypeAlias, TypeVar
@@ -19,6 +20,10 @@ class Progress:
 
     stage: str
     fraction: float
+
+
+class Elsewhere(Progress):
+    """Progress of a solver that works on a thread of its own: there is nothing to gain by asking again at once."""
 
 
 Steps: TypeAlias = Generator[Progress, None, T]
@@ -43,3 +48,37 @@ def part_of(steps: Steps[T], start: float, width: float) -> Steps[T]:
         except StopIteration as stop:
             return stop.value
         yield Progress(progress.stage, min(start + width * progress.fraction, 1.0))
+
+
+def aside(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
+    """Run a solver on a thread of its own; what it yields, returns and raises comes out here.
+
+    Factorisations and convex hulls take a second on large meshes, and give up the interpreter's lock meanwhile: whoever
+    steps this waits for `patience` seconds at most. Closing it returns at once; the solver ends at its next Progress.
+    """
+    latest: list[Progress] = [Progress("", 0.0)]
+    results: list[T] = []
+    errors: list[BaseException] = []
+    closed, done = threading.Event(), threading.Event()
+
+    def work() -> None:
+        try:
+            while not closed.is_set():
+                latest[0] = next(steps)
+            steps.close()
+        except StopIteration as stop:
+            results.append(stop.value)
+        except BaseException as error:  # noqa: BLE001, it is raised again below
+            errors.append(error)
+        finally:
+            done.set()
+
+    threading.Thread(target=work, name="omt_uv solver", daemon=True).start()
+    try:
+        while not done.wait(patience):
+            yield Elsewhere(latest[0].stage, latest[0].fraction)
+    finally:
+        closed.set()
+    if errors:
+        raise errors[0]
+    return results[0]

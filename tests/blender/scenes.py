@@ -180,3 +180,23 @@ def error_of(operator, **arguments):
     except RuntimeError as error:
         return str(error)
     raise AssertionError("the operator did not complain")
+
+
+def class_of(name):
+    group, verb = name.split(".")
+    return getattr(bpy.types, f"{group.upper()}_OT_{verb}")
+
+
+def stand_in(name, **settings):
+    """An operator as Blender would make it, with the class' own methods: there is no window to click in."""
+    cls = class_of(name)
+    body = {"reports": []}
+    for base in reversed(cls.__mro__):
+        if not base.__module__.startswith("bpy") and base is not object:
+            body |= {k: v for k, v in vars(base).items() if not k.startswith("__") and k != "bl_rna"}
+    for prop in bpy.context.window_manager.operator_properties_last(name).bl_rna.properties:
+        if not prop.is_readonly and prop.identifier != "rna_type":
+            body[prop.identifier] = prop.default
+    body |= settings
+    body["report"] = lambda self, kind, text: self.reports.append((set(kind), text))
+    return type("StandIn", (), body)()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import types
 
 import bpy
@@ -32,26 +33,6 @@ def scene(name, mode):
     return obj
 
 
-def class_of(name):
-    group, verb = name.split(".")
-    return getattr(bpy.types, f"{group.upper()}_OT_{verb}")
-
-
-def stand_in(name, **settings):
-    """An operator as Blender would make it, with the class' own methods: there is no window to click in."""
-    cls = class_of(name)
-    body = {"reports": []}
-    for base in reversed(cls.__mro__):
-        if not base.__module__.startswith("bpy") and base is not object:
-            body |= {k: v for k, v in vars(base).items() if not k.startswith("__") and k != "bl_rna"}
-    for prop in bpy.context.window_manager.operator_properties_last(name).bl_rna.properties:
-        if not prop.is_readonly and prop.identifier != "rna_type":
-            body[prop.identifier] = prop.default
-    body |= settings
-    body["report"] = lambda self, kind, text: self.reports.append((set(kind), text))
-    return type("StandIn", (), body)()
-
-
 def event(kind, value="NOTHING"):
     return types.SimpleNamespace(type=kind, value=value)
 
@@ -67,7 +48,8 @@ def step(operator, count=None):
 
 @pytest.fixture(autouse=True)
 def short_slices(package, monkeypatch):
-    """One step of the solver a slice, so that small meshes take many."""
+    """One step of the solver a slice, and none aside, so that small meshes take many and phases are told apart."""
+    monkeypatch.setattr(package("running"), "aside", lambda steps: steps)
     monkeypatch.setattr(package("running").Run.advance, "__defaults__", (0.0,))
     yield
     assert package("running").current is None
@@ -99,7 +81,7 @@ def test_slices_and_one_go_give_the_same_and_undo_and_redo_are_exact(name, mode)
     bpy.ops.ed.redo()
     assert scenes.state(bpy.data.objects[title]) == after
     bpy.ops.ed.undo()
-    assert step(stand_in(name, **OPERATORS[name])) == {"FINISHED"}
+    assert step(scenes.stand_in(name, **OPERATORS[name])) == {"FINISHED"}
     assert scenes.state(bpy.data.objects[title]) == after
 
 
@@ -112,10 +94,10 @@ def test_cancel_in_every_phase_leaves_no_trace(name, mode, key, package):
     handlers = [len(kind) for kind in (bpy.app.handlers.undo_post, bpy.app.handlers.depsgraph_update_post)]
     phases = 0
     while True:
-        operator = stand_in(name, **OPERATORS[name])
+        operator = scenes.stand_in(name, **OPERATORS[name])
         if step(operator, phases) != {"RUNNING_MODAL"}:
             break
-        assert not class_of(name).poll(bpy.context)  # nothing else may start meanwhile
+        assert not scenes.class_of(name).poll(bpy.context)  # nothing else may start meanwhile
         assert operator.modal(bpy.context, event(key, "PRESS")) == {"CANCELLED"}
         assert operator.reports
         assert scenes.state(obj) == before
@@ -126,7 +108,7 @@ def test_cancel_in_every_phase_leaves_no_trace(name, mode, key, package):
 
 def test_a_second_run_is_refused(package):
     scene("uv.omt_unwrap", "OBJECT")
-    first, second = stand_in("uv.omt_unwrap"), stand_in("uv.omt_refine")
+    first, second = scenes.stand_in("uv.omt_unwrap"), scenes.stand_in("uv.omt_refine")
     assert step(first, 1) == {"RUNNING_MODAL"}
     assert second.start(bpy.context) == {"CANCELLED"}
     assert "still running" in second.reports[0][1]
@@ -159,7 +141,7 @@ def test_a_mesh_that_changes_meanwhile_ends_the_run(kind):
     obj = bpy.data.objects[obj.name]
     obj.data.name = "Patch"
     bpy.ops.ed.undo_push(message="one more")
-    operator = stand_in("uv.omt_unwrap")
+    operator = scenes.stand_in("uv.omt_unwrap")
     assert step(operator, 2) == {"RUNNING_MODAL"}
     DISTURBANCES[kind](bpy.data.objects[obj.name] if kind != "undo" else None)
     mesh = bpy.data.meshes["Patch"] if "Patch" in bpy.data.meshes else bpy.data.meshes[0]
@@ -182,7 +164,7 @@ def uv_bytes(mesh):
 
 def test_the_view_can_be_moved_and_nothing_else_gets_through():
     scene("uv.omt_unwrap", "OBJECT")
-    operator = stand_in("uv.omt_unwrap")
+    operator = scenes.stand_in("uv.omt_unwrap")
     assert step(operator, 1) == {"RUNNING_MODAL"}
     assert operator.modal(bpy.context, event("WHEELUPMOUSE", "PRESS")) == {"PASS_THROUGH"}
     for kind in ("LEFTMOUSE", "TAB", "X", "Z"):
@@ -190,8 +172,66 @@ def test_the_view_can_be_moved_and_nothing_else_gets_through():
     operator.cancel(bpy.context)
 
 
+@pytest.fixture
+def threads(package, monkeypatch):
+    progress, running = package("solver.progress"), package("running")
+    monkeypatch.setattr(running, "aside", lambda steps: steps if running.current is None else progress.aside(steps))
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_a_solver_aside_finds_the_same(name, threads):
+    obj = scene(name, "OBJECT")
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    bpy.context.collection.objects.link(copy)
+    scenes.select([copy])
+    group, verb = name.split(".")
+    assert getattr(getattr(bpy.ops, group), verb)(**OPERATORS[name]) == {"FINISHED"}
+    scenes.select([obj])
+    assert step(scenes.stand_in(name, **OPERATORS[name])) == {"FINISHED"}
+    assert scenes.state(obj) == scenes.state(copy)
+
+
+def test_a_solver_aside_is_thrown_away_at_once(threads, package):
+    obj = scene("uv.omt_unwrap", "OBJECT")
+    before = scenes.state(obj)
+    for slices in (0, 1, 3):
+        operator = scenes.stand_in("uv.omt_unwrap")
+        if step(operator, slices) == {"RUNNING_MODAL"}:
+            assert operator.modal(bpy.context, event("ESC", "PRESS")) == {"CANCELLED"}
+            assert scenes.state(obj) == before
+
+
+def test_a_solver_aside_complains_as_any_other(threads):
+    bpy.ops.mesh.primitive_cube_add()
+    operator = scenes.stand_in("uv.omt_unwrap", seams="EXISTING")
+    assert step(operator) == {"CANCELLED"}
+    assert operator.reports[0][0] == {"ERROR"}
+
+
+def test_the_spare_packer_is_called_in_front(threads, package, monkeypatch):
+    """Blender's own packer must not run on another thread."""
+    packing, spare = package("packing"), package("blender_pack")
+    seen, own = [], spare.pack
+
+    def broken(*_, **__):
+        raise packing.PackingError("xatlas failed")
+
+    def watched(*arguments):
+        seen.append(threading.current_thread() is threading.main_thread())
+        return own(*arguments)
+
+    monkeypatch.setattr(packing, "pack", broken)
+    monkeypatch.setattr(spare, "pack", watched)
+    scene("uv.omt_unwrap", "OBJECT")
+    operator = scenes.stand_in("uv.omt_unwrap")
+    assert step(operator) == {"FINISHED"}
+    assert seen == [True]
+    assert "packed with" in operator.reports[0][1]
+
+
 def test_bad_input_is_refused_in_the_first_slice():
     bpy.ops.mesh.primitive_cube_add()
-    operator = stand_in("uv.omt_unwrap", seams="EXISTING")
+    operator = scenes.stand_in("uv.omt_unwrap", seams="EXISTING")
     assert step(operator) == {"CANCELLED"}
     assert operator.reports[0][0] == {"ERROR"}

@@ -1,0 +1,108 @@
+"""How long Blender waits for a run: the longest slice between two looks at the keyboard, and what cancelling takes.
+
+Wall-clock milliseconds, which other jobs on the machine lengthen, and those that the main thread itself worked. The
+last slice writes, which cannot be cancelled; it stands apart.
+"""
+
+from __future__ import annotations
+
+import time
+import types
+
+import bpy
+
+import numpy as np
+from cases import Table, meshes
+
+SIZES = (100, 224, 316)
+SLICE_GOAL, CANCEL_GOAL = 200.0, 300.0
+OPERATORS = ("uv.omt_unwrap", "uv.omt_refine", "uv.omt_seams")
+TIMER = types.SimpleNamespace(type="TIMER", value="NOTHING")
+ESCAPE = types.SimpleNamespace(type="ESC", value="PRESS")
+
+
+def latency_part(args):
+    from omt_uv import registration
+
+    table = Table(
+        "Milliseconds that Blender waits during a run, and until Esc is obeyed",
+        {"vertices": 8, "operator": 15, "mode": 6, "seconds": 8, "slices": 7, "slice": 7, "working": 8, "writing": 8}
+        | {"cancel": 7, "longest slice in": 22, "missed goals": 20},
+    )
+    registration.register()
+    try:
+        for size in args.sizes or SIZES:
+            for mode in ("OBJECT", "EDIT"):
+                for name in OPERATORS:
+                    _add(table, size, mode, name)
+    finally:
+        registration.unregister()
+    return table
+
+
+def _add(table, size, mode, name):
+    from blender import scenes
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    V, F = meshes.head(size)
+    obj = scenes.add(V, F)
+    if name == "uv.omt_refine":
+        # Planar from the side of the nose; the folds are straightened first.
+        angle, height = np.arctan2(V[:, 1], V[:, 0]), V[:, 2]
+        r = 1.5 + height.max() - height
+        scenes.set_uv(obj, np.column_stack([r * np.cos(angle), r * np.sin(angle)])[F.ravel()])
+    if mode == "EDIT":
+        scenes.edit(obj)
+    begin = time.perf_counter()
+    slices = _slices(scenes.stand_in(name))
+    seconds = time.perf_counter() - begin
+    *during, (writing, _, _) = slices
+    longest = max(during, default=(0.0, 0.0, ""))
+    worked = max((own for _, own, _ in during), default=0.0)
+    cancel = longest[0] + _cancelling(scenes.stand_in(name), seconds)
+    missed = ["slice"] * (longest[1] > SLICE_GOAL and size <= 224) + ["cancel"] * (cancel > CANCEL_GOAL)
+    table.add(
+        vertices=len(V),
+        operator=name,
+        mode=mode,
+        seconds=seconds,
+        slices=len(slices),
+        slice=longest[0],
+        working=worked,
+        writing=writing,
+        cancel=cancel,
+        **{"longest slice in": longest[2], "missed goals": ", ".join(missed)},
+    )
+    if mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def _slices(operator):
+    """Wall-clock milliseconds, those of the main thread, and the stage, of every slice."""
+    from omt_uv import running
+
+    found, state = [], {"RUNNING_MODAL"}
+    while "RUNNING_MODAL" in state:
+        wall, own = time.perf_counter(), time.thread_time()
+        stage = running.current.stage if running.current else "Reading"
+        state = operator.modal(bpy.context, TIMER) if found else operator.start(bpy.context)
+        found.append((1e3 * (time.perf_counter() - wall), 1e3 * (time.thread_time() - own), stage))
+    if state != {"FINISHED"}:
+        raise SystemExit(f"{operator.bl_label}: {operator.reports}")
+    return found
+
+
+def _cancelling(operator, seconds, tries=8):
+    """The most milliseconds that the answer to Esc takes, at moments spread over a run of so many seconds."""
+    most = 0.0
+    for k in range(tries):
+        begin = time.perf_counter()
+        state = operator.start(bpy.context)
+        while "RUNNING_MODAL" in state and time.perf_counter() - begin < seconds * k / tries:
+            state = operator.modal(bpy.context, TIMER)
+        if "RUNNING_MODAL" in state:
+            begin = time.perf_counter()
+            operator.modal(bpy.context, ESCAPE)
+            most = max(most, 1e3 * (time.perf_counter() - begin))
+            time.sleep(0.5)  # the solver that was thrown away ends in the background
+    return most

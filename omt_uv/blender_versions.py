@@ -1,0 +1,38 @@
+"""What differs between versions of Blender, said once; see `blender_mesh.py`.
+
+Extensions need 4.2. Version 3.4 is kept alive for one thing: it is the Blender that Linux distributions package, so its
+window can be driven in tests.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+
+def uv_values(mesh: bpy.types.Mesh, layer: str) -> tuple:
+    """The collection of the UVs of a layer, of a mesh that is not in Edit Mode, and the name of a UV in it.
+
+    Writing to MeshUVLoopLayer.uv would, before Blender 5.2, change the array of the undo step as well.
+    """
+    if bpy.app.version < (3, 5, 0):
+        return mesh.uv_layers[layer].data, "uv"
+    return mesh.attributes[layer].data, "vector"
+
+
+def register_command(name: str, function):
+    """A handle of the command `blender --command name`, None where Blender knows no commands."""
+    register = getattr(bpy.utils, "register_cli_command", None)
+    return register and register(name, function)
+
+
+def unregister_command(handle) -> None:
+    if handle is not None:
+        bpy.utils.unregister_cli_command(handle)
+
+
+def progress_bar(layout: bpy.types.UILayout, fraction: float, text: str) -> None:
+    """A bar in a panel, plain text before Blender 4.0."""
+    if hasattr(layout, "progress"):
+        layout.progress(factor=fraction, text=text)
+    else:
+        layout.label(text=f"{text}  {100 * fraction:.0f} %", icon="TIME")
