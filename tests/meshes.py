@@ -105,6 +105,16 @@ def comb(teeth=6, length=6, pitch=2):
     return V, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
+def hinge(columns=10, rows=10, height=0.4):
+    """A bumpy square slit along its middle but for the first edge: its halves hang together by one edge."""
+    V, F = bumpy(2 * columns, rows, height)
+    slit = np.arange(2, rows + 1) * (2 * columns + 1) + columns
+    copy = np.arange(len(V))
+    copy[slit] = len(V) + np.arange(len(slit))
+    right = V[F].mean(axis=1)[:, 0] > 0.5
+    return np.concatenate([V, V[slit]]), np.where(right[:, None], copy[F], F)
+
+
 def random_disk(count=300, seed=0, height=0.3):
     """The Delaunay triangulation of random points of the unit disk, lifted to a smooth random height field."""
     rng = np.random.default_rng(seed)

@@ -1,5 +1,8 @@
 """The pipeline from a surface to texture coordinates."""
 
+import functools
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -75,6 +78,41 @@ def test_pose_and_units_only_scale_the_result(boundary):
         a, b = (x[:, 0] + 1j * x[:, 1] for x in (uv - uv.mean(axis=0), reference - reference.mean(axis=0)))
         turn = np.vdot(a, b)
         np.testing.assert_allclose(a * turn / abs(turn), b, atol=1e-4 * np.abs(b).max())
+
+
+def _move(surface, scale, shift):
+    return replace(surface, positions=surface.positions * scale + shift)
+
+
+@pytest.mark.parametrize("scale, shift", [(1e-6, 0), (1e6, 0), (1, 1e5)])
+@pytest.mark.parametrize(
+    "shape", ["hinge", "annulus", "torus", pytest.param("teapot", marks=meshes.models_missing), "elongated"]
+)
+def test_neither_the_unit_nor_the_place_of_a_mesh_changes_its_uvs(shape, scale, shift):
+    surface = _surface(shape)
+    reference, moved = _unwrapped(shape), drain(unwrap(_move(surface, scale, shift)))
+    np.testing.assert_array_equal(moved.seams, reference.seams)
+    for a, b in zip(moved.maps, reference.maps, strict=True):
+        assert (a.status, b.status) == ("converged", "converged")
+        np.testing.assert_allclose(a.uv / scale, b.uv, atol=1e-5 * np.ptp(b.uv, axis=0).max())
+
+
+def _surface(shape):
+    if shape == "teapot":
+        return triangle_surface(*meshes.load_model(shape))
+    return triangle_surface(*(meshes.grid(200, 2, width=100.0) if shape == "elongated" else getattr(meshes, shape)()))
+
+
+@functools.cache
+def _unwrapped(shape):
+    return drain(unwrap(_surface(shape)))
+
+
+def test_halves_that_hang_by_an_edge_start_from_where_no_face_is_squeezed():
+    """The conformal map of the one half is so small beside the other's that rounding decides where its points lie."""
+    (chart_map,) = _unwrapped("hinge").maps
+    assert chart_map.status == "converged" and chart_map.newton_refinement <= 40
+    assert chart_map.area_l1 <= 0.01 and chart_map.folds == 0
 
 
 def test_progress_never_runs_backwards():

@@ -26,6 +26,9 @@ from .yamabe import YamabeFlow, yamabe_flow
 
 # Below this distance of two neighbours in the unit disk, rounding decides where they lie.
 RESOLUTION = 1e-12
+# A vertex this share of the boundary before a quarter of it is as good as there: on a symmetric boundary, rounding
+# shall not decide between two.
+QUARTER_SLACK = 1e-3
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def quarter_points(vertices: np.ndarray, loop: np.ndarray) -> np.ndarray:
     """Four distinct vertices (4,) that cut the boundary into parts of about equal length."""
     step = np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1)
     start = np.cumsum(step) - step
-    place = np.searchsorted(start, np.arange(4) / 4 * step.sum() - 1e-12 * step.sum())
+    place = np.searchsorted(start, np.arange(4) / 4 * step.sum() - QUARTER_SLACK * step.sum())
     # Long edges may hold several quarters: push the later ones on, and none beyond the end of the loop.
     place = np.maximum.accumulate(place - np.arange(4)) + np.arange(4)
     return loop[np.minimum(place, len(loop) - 4 + np.arange(4))] if len(loop) > 3 else loop

@@ -15,6 +15,9 @@ import numpy as np
 REACH = 0.5
 # A step goes at most this share of the way to the first contact.
 CONTACT_SHARE = 0.8
+# Edges that reach past each other by less than this share of the map only touch: the two sides of a cut through a flat
+# surface lie on one another, and rounding shall not decide whether they cross.
+TOUCH = 1e-9
 
 
 def rim_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -33,10 +36,16 @@ def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
     i, j = box_pairs(low, high, low, high)
     apart = (j > i) & (tail[i] != head[j]) & (head[i] != tail[j])
     i, j = i[apart], j[apart]
-    first = _cross(b[i] - a[i], a[j] - a[i]) * _cross(b[i] - a[i], b[j] - a[i])
-    second = _cross(b[j] - a[j], a[i] - a[j]) * _cross(b[j] - a[j], b[i] - a[j])
-    hit = (first < 0) & (second < 0)
+    depth = TOUCH * float((high.max(0) - low.min(0)).max())
+    hit = _passes(a[i], b[i], a[j], b[j], depth) & _passes(a[j], b[j], a[i], b[i], depth)
     return np.column_stack([i[hit], j[hit]])
+
+
+def _passes(a, b, p, q, depth: float) -> np.ndarray:
+    """Whether p and q (k,) lie on different sides of the lines from a to b (k,), both farther than `depth` from them."""
+    along = b - a
+    left, right = _cross(along, p - a), _cross(along, q - a)
+    return (left * right < 0) & (np.minimum(np.abs(left), np.abs(right)) > depth * np.abs(along))
 
 
 @dataclass(frozen=True)

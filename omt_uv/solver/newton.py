@@ -198,7 +198,10 @@ def newton_step(problem: Problem, w: np.ndarray, value: float, pressure: float =
     """One line-searched Newton step from a map w (n,) complex of energy `value`; pressure: see `local_derivatives`."""
     step, slope = newton_direction(problem, w, pressure)
     moved = problem.motion.frame(w) * step
-    share = min(1.0, FOLD_SHARE * first_fold(problem.faces, w, moved), *(e.limit(w, moved) for e in problem.extras))
+    share = min(1.0, FOLD_SHARE * first_fold(problem.faces, w, moved))
+    for extra in problem.extras:
+        # Of what is left of the step: how far a whole one would reach is a large search, and of no use.
+        share *= min(1.0, extra.limit(w, share * moved))
     for _ in range(MAX_HALVINGS):
         trial = problem.motion.move(w, share * step)
         trial_value = problem.energy(trial)

@@ -25,6 +25,7 @@ from .progress import Progress, Steps, part_of
 from .refine import BOUNDARIES, Refinement, refine
 from .topology import boundary_loops
 from .transport import Transport, transport
+from .untangle import map_energy
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 CONFORMAL, TRANSPORT, REFINEMENT = (0.0, 0.15), (0.15, 0.25), (0.4, 0.6)
@@ -195,8 +196,7 @@ def unwrap_chart(
     domain: Domain = Rectangle() if boundary == "square" else Disk()
     corners = sharpest_corners(vertices, triangles, loop) if boundary == "square" else None
     mass = vertex_areas(vertices, triangles, density)
-    conformal, sites = yield from _embedding(vertices, triangles, loop, corners, domain, log)
-    cells, uv = yield from _transported(sites, mass, loop, corners, domain, log)
+    conformal, cells, uv = yield from _start(vertices, triangles, mass, loop, corners, domain, boundary, log)
     target = None if density is None else face_areas(vertices, triangles) * density
     with log.timed("refinement"):
         uv, held = facing(uv, pins)
@@ -226,9 +226,32 @@ def unwrap_chart(
     )
 
 
-def _embedding(vertices, triangles, loop, corners, domain: Domain, log: _Log):
-    """Conformal map (None where it leaves double precision) and sites (n,2) in the domain for the transport."""
-    conformal = None
+def _start(vertices, triangles, mass, loop, corners, domain: Domain, boundary: str, log: _Log):
+    """Where the refinement starts: the conformal map or None, the transport or None, and coordinates (n,2).
+
+    The conformal map moved by the transport; where rounding decides where its points lie, a mean value map, or what
+    the transport makes of it. Where areas differ that much the transport may squeeze more faces than it helps, and
+    Newton's way from a squeezed start is long and takes its turns by chance.
+    """
+    conformal, sites, trouble = yield from _conformal_sites(vertices, triangles, corners, log)
+    if not trouble:
+        cells, trouble = yield from _transport(sites, mass, domain, log)
+        if cells is not None:
+            return conformal, cells, centroid_map(cells, domain, loop, corners, log.warnings)
+    log.warnings.append(f"{trouble}; started from a mean value map instead")
+    sites = _mean_value_sites(vertices, triangles, loop, corners, domain)
+    cells, trouble = yield from _transport(sites, mass, domain, log)
+    if cells is None:
+        log.warnings.append(f"{trouble}; refined the embedding without transport")
+        return conformal, None, sites
+    uv = centroid_map(cells, domain, loop, corners, log.warnings)
+    if boundary == "free" and map_energy(sites, vertices, triangles) < map_energy(uv, vertices, triangles):
+        return conformal, cells, sites
+    return conformal, cells, uv
+
+
+def _conformal_sites(vertices, triangles, corners, log: _Log):
+    """Conformal map, its coordinates (n,2) in the domain, and why they cannot be used or an empty text."""
     with log.timed("conformal"):
         try:
             if corners is None:
@@ -237,25 +260,22 @@ def _embedding(vertices, triangles, loop, corners, domain: Domain, log: _Log):
             else:
                 conformal = yield from part_of(conformal_rectangle(vertices, triangles, corners), *CONFORMAL)
                 sites = conformal.uv / [1, conformal.aspect] - 0.5
-            nearest = halfedge_lengths(sites, triangles).min()
-            if nearest >= SITE_RESOLUTION:
-                return conformal, sites
-            cause = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
         except PrecisionError as error:
-            cause = error.cause
-        log.warnings.append(f"{cause}; started from a mean value map instead")
-        return conformal, _mean_value_sites(vertices, triangles, loop, corners, domain)
+            return None, None, error.cause
+        nearest = halfedge_lengths(sites, triangles).min()
+        if nearest < SITE_RESOLUTION:
+            trouble = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
+            return conformal, None, trouble
+        return conformal, sites, ""
 
 
-def _transported(sites, mass, loop, corners, domain: Domain, log: _Log):
-    """Transport and centroid map (n,2); None and the sites themselves where the transport fails."""
+def _transport(sites, mass, domain: Domain, log: _Log):
+    """The transport, or None and why there is none."""
     with log.timed("transport"):
         try:
-            cells = yield from part_of(transport(sites, mass, domain), *TRANSPORT)
+            return (yield from part_of(transport(sites, mass, domain), *TRANSPORT)), ""
         except TransportError as error:
-            log.warnings.append(f"{error.cause}; refined the embedding without transport")
-            return None, sites
-        return cells, centroid_map(cells, domain, loop, corners, log.warnings)
+            return None, error.cause
 
 
 def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: _Log, options: dict) -> Steps[Refinement]:
