@@ -42,7 +42,7 @@ def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
 
 
 def _passes(a, b, p, q, depth: float) -> np.ndarray:
-    """Whether p and q (k,) lie on different sides of the lines from a to b (k,), both farther than `depth` from them."""
+    """Whether p and q (k,) lie on either side of the lines from a to b (k,), both farther than `depth` from them."""
     along = b - a
     left, right = _cross(along, p - a), _cross(along, q - a)
     return (left * right < 0) & (np.minimum(np.abs(left), np.abs(right)) > depth * np.abs(along))
