@@ -63,16 +63,17 @@ def read(obj: bpy.types.Object, layer: str = "") -> Reading:
     NonFiniteError : the transformation of the object is not finite
     """
     if obj.mode != "EDIT":
-        return _read_mesh(obj.data, obj, layer, edit_mode=False)
+        return read_mesh(obj.data, obj, layer)
     obj.update_from_editmode()
     copy = obj.data.copy()
     try:
-        return _read_mesh(copy, obj, layer, edit_mode=True)
+        return read_mesh(copy, obj, layer, edit_mode=True)
     finally:
         bpy.data.meshes.remove(copy)
 
 
-def _read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, layer: str, edit_mode: bool) -> Reading:
+def read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, layer: str = "", edit_mode: bool = False) -> Reading:
+    """Read a mesh that is in no Edit Mode with the scale of an object applied; see `read`."""
     mesh.calc_loop_triangles()
     f = len(mesh.polygons)
     starts = np.append(_get(mesh.polygons, "loop_start", f), len(mesh.loops))
@@ -102,20 +103,27 @@ def _get(collection, name: str, count: int, dtype=np.int32) -> np.ndarray:
 
 
 def _stretched(positions: np.ndarray, obj: bpy.types.Object) -> np.ndarray:
-    """Positions (n,3) float64 under the scale and shear of the object, without its rotation.
+    return positions.astype(float) @ stretch(obj)
+
+
+def stretch(obj: bpy.types.Object) -> np.ndarray:
+    """The symmetric matrix (3,3) that stands for the scale and shear of the object, without its rotation.
 
     The symmetric factor of the polar decomposition M = R S has the same lengths and angles as M.
+
+    Raises
+    ------
+    NonFiniteError : the transformation of the object is not finite
     """
     matrix = np.array(obj.matrix_world, dtype=float)[:3, :3]
     if not np.isfinite(matrix).all():
         raise NonFiniteError("The transformation of the object is not finite", remedy="Clear or fix its scale")
     _, stretch, axes = np.linalg.svd(matrix)
-    positions = positions.astype(float)
     # A rotation is stored with single precision; without this it would blur the positions for nothing.
     if np.allclose(stretch, stretch.mean(), rtol=1e-6, atol=0):
         factor = stretch.mean()
-        return positions if abs(factor - 1) < 1e-6 else positions * factor
-    return positions @ (axes.T * stretch) @ axes
+        return np.eye(3) * (1.0 if abs(factor - 1) < 1e-6 else factor)
+    return (axes.T * stretch) @ axes
 
 
 def weld_split_vertices(reading: Reading) -> Reading:

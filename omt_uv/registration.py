@@ -7,9 +7,10 @@ import bpy
 from .blender_versions import register_command, unregister_command
 from .operators.measure import UV_OT_omt_measure
 from .operators.refine import UV_OT_omt_refine
+from .operators.remesh import OBJECT_OT_omt_remesh
 from .operators.seams import UV_OT_omt_seams
 from .operators.unwrap import UV_OT_omt_unwrap
-from .panels.menus import draw_unwrap, menus
+from .panels.menus import draw_remesh, draw_unwrap, menus, remesh_menus
 from .panels.sidebar import IMAGE_PT_omt_uv, VIEW3D_PT_omt_uv
 
 CLASSES = (
@@ -17,6 +18,7 @@ CLASSES = (
     UV_OT_omt_refine,
     UV_OT_omt_seams,
     UV_OT_omt_measure,
+    OBJECT_OT_omt_remesh,
     VIEW3D_PT_omt_uv,
     IMAGE_PT_omt_uv,
 )
@@ -31,9 +33,10 @@ def register() -> None:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append((bpy.utils.unregister_class, cls))
-        for menu in menus():
-            menu.append(draw_unwrap)
-            _undo.append((menu.remove, draw_unwrap))
+        for draw, places in ((draw_unwrap, menus()), (draw_remesh, remesh_menus())):
+            for menu in places:
+                menu.append(draw)
+                _undo.append((menu.remove, draw))
         _undo.append((unregister_command, register_command(COMMAND, _command)))
     except Exception:
         unregister()

@@ -30,6 +30,18 @@ DEFAULT_QUALITY = "STANDARD"
 DEFAULT_BALANCE = 0.0
 DEFAULT_MARGIN = 4
 DEFAULT_TEXTURE_SIZE = 1024
+COUNTS = (
+    ("VERTICES", "Vertices", "As many vertices as asked"),
+    ("FACES", "Faces", "As many triangles as asked"),
+    ("EDGE", "Edge Length", "As many triangles as make edges of this length on average, in the units of the scene"),
+)
+STRATEGIES = (
+    ("APP-CFP", "APP, CFP", "Sample on the area-preserving map, triangulate on the conformal map"),
+    ("APP-APP", "APP, APP", "Sample and triangulate on the area-preserving map"),
+    ("CFP-CFP", "CFP, CFP", "Sample and triangulate on the conformal map"),
+    ("CFP-APP", "CFP, APP", "Sample on the conformal map, triangulate on the area-preserving map"),
+)
+DEFAULT_STRATEGY = "APP-CFP"
 
 
 @dataclass(frozen=True)
@@ -71,3 +83,28 @@ class RefineSettings(Settings):
 
     pack: bool = False
     keep_boundary: bool = False
+
+
+@dataclass(frozen=True)
+class RemeshSettings:
+    """How to make a new mesh.
+
+    count_of : an identifier of COUNTS in lower case; count : vertices, faces, or the length of an edge
+    preserve_* : features that edges of the new mesh follow; sharp_angle : edges with more than this many radians
+        between their faces are sharp
+    levels : how many meshes, each with `ratio` times the count of the one before
+    strategy : an identifier of STRATEGIES in lower case
+    """
+
+    count_of: str = "vertices"
+    count: float = 5000
+    preserve_boundary: bool = True
+    preserve_sharp: bool = False
+    sharp_angle: float = 0.7
+    preserve_seams: bool = True
+    preserve_materials: bool = True
+    preserve_attributes: bool = True
+    levels: int = 1
+    ratio: float = 0.5
+    strategy: str = DEFAULT_STRATEGY.lower()
+    seed: int = 0

@@ -6,6 +6,7 @@ import bpy
 
 from ..operators.measure import UV_OT_omt_measure
 from ..operators.refine import UV_OT_omt_refine
+from ..operators.remesh import OBJECT_OT_omt_remesh
 from ..operators.seams import UV_OT_omt_seams
 from ..operators.unwrap import UV_OT_omt_unwrap
 
@@ -27,3 +28,13 @@ def menus() -> list:
     if bpy.app.version < (4, 5, 0):
         types.append(bpy.types.VIEW3D_MT_uv_map)
     return types
+
+
+def draw_remesh(self, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator(OBJECT_OT_omt_remesh.bl_idname, icon="MOD_REMESH")
+
+
+def remesh_menus() -> list:
+    """The Object menu of the 3D View, and the panel that has Blender's own remeshers."""
+    return [bpy.types.VIEW3D_MT_object, bpy.types.DATA_PT_remesh]

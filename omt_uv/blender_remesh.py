@@ -1,0 +1,153 @@
+"""A mesh object to a job for remeshing, and new objects beside it; see `blender_mesh.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import bpy
+
+import numpy as np
+
+from . import blender_mesh, blender_transfer
+from .blender_transfer import Attributes
+from .remeshing import Job, Level, Series
+from .settings import RemeshSettings
+from .solver.charts import Surface
+from .solver.errors import MeshError
+from .solver.features import all_edges, sharp_edges
+
+# Modifiers that keep data for the very vertices of a mesh and are of no use on another.
+BOUND = {
+    "MULTIRES",
+    "HOOK",
+    "SURFACE_DEFORM",
+    "MESH_DEFORM",
+    "LAPLACIANDEFORM",
+    "PARTICLE_SYSTEM",
+    "CLOTH",
+    "SOFT_BODY",
+}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to remesh, what it carries, and the stretch (3,3) of its positions, see `blender_mesh.stretch`."""
+
+    job: Job
+    attributes: Attributes
+    stretch: np.ndarray
+    evaluated: bool
+
+
+def read_request(
+    obj: bpy.types.Object, settings: RemeshSettings, depsgraph: bpy.types.Depsgraph | None = None, weld: bool = False
+) -> Request:
+    """Read an object in Object Mode, with its modifiers if a depsgraph is given; changes nothing.
+
+    weld : join vertices that a file format had to split
+
+    Raises
+    ------
+    MeshError : no faces, a transformation that is not finite or flattens the object
+    """
+    with _mesh_of(obj, depsgraph) as mesh:
+        reading = blender_mesh.read_mesh(mesh, obj)
+        if weld:
+            reading = blender_mesh.weld_split_vertices(replace(reading, uv=None))
+        surface = reading.surface
+        names = tuple(group.name for group in obj.vertex_groups)
+        attributes = blender_transfer.read_attributes(mesh, names, settings.preserve_attributes)
+    stretch = blender_mesh.stretch(obj)
+    if abs(np.linalg.det(stretch)) <= 1e-12 * np.abs(stretch).max() ** 3:
+        raise MeshError("The scale of the object is zero along an axis", "Clear or fix its scale")
+    jumps = all_edges(
+        blender_transfer.uv_seams(attributes, surface), blender_transfer.material_borders(attributes, surface)
+    )
+    job = Job(surface, _features(attributes, surface, settings), jumps)
+    return Request(job, attributes, stretch, depsgraph is not None)
+
+
+@contextmanager
+def _mesh_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None) -> Iterator[bpy.types.Mesh]:
+    if depsgraph is None:
+        yield obj.data
+        return
+    evaluated = obj.evaluated_get(depsgraph)
+    try:
+        yield evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _features(attributes: Attributes, surface: Surface, settings: RemeshSettings) -> np.ndarray:
+    """Edges (e,2) that the new mesh shall follow."""
+    triangles = surface.corner_vertex[surface.triangles]
+    kept = []
+    if settings.preserve_sharp:
+        kept += [
+            blender_transfer.marked_sharp(attributes),
+            sharp_edges(surface.positions, triangles, settings.sharp_angle),
+        ]
+    if settings.preserve_seams:
+        kept += [surface.seams, blender_transfer.uv_seams(attributes, surface)]
+    if settings.preserve_materials:
+        kept.append(blender_transfer.material_borders(attributes, surface))
+    return all_edges(*kept)
+
+
+def new_objects(obj: bpy.types.Object, request: Request, series: Series, carried: list[Attributes]) -> list[str]:
+    """Make the objects of a series beside the object; returns their names."""
+    single = len(series.levels) == 1
+    names = []
+    for k, (level, attributes) in enumerate(zip(series.levels, carried, strict=True)):
+        name = f"{obj.name}_remesh" if single else f"{obj.name}_LOD{k}"
+        names.append(_new_object(obj, name, request, level, attributes).name)
+    return names
+
+
+def carried_attributes(request: Request, series: Series) -> list[Attributes]:
+    """What the meshes of a series carry."""
+    surface = request.job.surface
+    return [blender_transfer.carry(request.attributes, surface, level.footprint) for level in series.levels]
+
+
+def _new_object(
+    obj: bpy.types.Object, name: str, request: Request, level: Level, attributes: Attributes
+) -> bpy.types.Object:
+    positions = np.linalg.solve(request.stretch, level.positions.T).T
+    mesh = blender_mesh.new_mesh(name, positions.tolist(), level.triangles.tolist())
+    for material in obj.data.materials:
+        mesh.materials.append(material)
+    new = obj.copy()
+    new.name = name
+    new.data = mesh
+    for slot, old in zip(new.material_slots, obj.material_slots, strict=False):
+        slot.link, slot.material = old.link, old.material
+    _drop_modifiers(new, request.evaluated)
+    collections = [c for c in obj.users_collection if c.library is None] or [bpy.context.scene.collection]
+    for collection in collections:
+        collection.objects.link(new)
+    blender_transfer.write_attributes(new, attributes)
+    return new
+
+
+def _drop_modifiers(new: bpy.types.Object, applied: bool) -> None:
+    for modifier in list(new.modifiers):
+        if applied or modifier.type in BOUND:
+            new.modifiers.remove(modifier)
+
+
+def lost(obj: bpy.types.Object, request: Request, carried: list[Attributes]) -> list[str]:
+    """Warnings about what the new objects do not have, or not as it was."""
+    texts = []
+    folded = sum(attributes.folded for attributes in carried)
+    if folded:
+        texts.append(f"{folded} faces of the new mesh are folded in a UV map")
+    if request.attributes.left:
+        texts.append(f"Attributes on edges or of text are not carried: {', '.join(request.attributes.left)}")
+    bound = [m.name for m in obj.modifiers if m.type in BOUND]
+    if bound and not request.evaluated:
+        texts.append(f"Modifiers bound to the vertices of the old mesh are left out: {', '.join(bound)}")
+    return texts

@@ -1,0 +1,107 @@
+"""remesh: a new mesh of a chosen size for every mesh of a file, or a series of them."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
+from .common import CommandError, blender, check_output, drain_shown, read, warn
+from .options import add_files, names
+
+
+def add(commands) -> None:
+    command = commands.add_parser("remesh", help="new meshes of a chosen size, with triangles of even shape")
+    command.set_defaults(run=run)
+    add_files(command)
+    count = command.add_mutually_exclusive_group(required=True)
+    count.add_argument("--vertices", type=int, metavar="N", help="vertices of each new mesh")
+    count.add_argument("--faces", type=int, metavar="N", help="triangles of each new mesh")
+    count.add_argument("--edge", type=float, metavar="L", help="mean length of the edges")
+    command.add_argument("--levels", type=int, default=1, metavar="K", help="make K meshes, OUT_LOD0 and so on")
+    command.add_argument(
+        "--ratio", type=_ratio, default=0.5, metavar="R", help="size of a level next to the one before"
+    )
+    command.add_argument("--strategy", choices=names(STRATEGIES), default=DEFAULT_STRATEGY.lower(), help="two maps")
+    _add_features(command)
+    command.add_argument("--no-attributes", action="store_true", help="carry no UVs, groups, colours, shape keys")
+    command.add_argument("--seed", type=int, default=0, metavar="N", help="another number, another mesh of the kind")
+
+
+def _add_features(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--sharp", type=float, nargs="?", const=40.0, metavar="DEGREES", help="keep sharp edges, by default above 40"
+    )
+    command.add_argument("--no-boundary", action="store_true", help="do not keep the boundary")
+    command.add_argument("--no-seams", action="store_true", help="do not keep seams and outlines of UV islands")
+    command.add_argument("--no-materials", action="store_true", help="do not keep borders of materials")
+
+
+def _ratio(text: str) -> float:
+    value = float(text)
+    if not 0 < value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
+    return value
+
+
+def run(options: argparse.Namespace) -> None:
+    files, blender_mesh, _ = blender()
+    from ..blender_remesh import carried_attributes, lost, new_objects, read_request
+    from ..remeshing import remesh_series
+    from ..solver.errors import MeshError
+
+    check_output(options.output, files)
+    settings = _settings(options)
+    objects = [obj for obj, _ in read(options.input, files, blender_mesh)]
+    weld = options.input.suffix.lower() == ".glb"
+    results = []
+    for obj in objects:
+        try:
+            request = read_request(obj, settings, weld=weld)
+            series = drain_shown(remesh_series(request.job, settings))
+        except MeshError as error:
+            raise CommandError(f"{obj.name}: {error}") from error
+        results.append((obj, request, series, carried_attributes(request, series)))
+    told, made = [], []
+    for k, (obj, request, series, carried) in enumerate(results):
+        told += [(k, text) for text in (*lost(obj, request, carried), *series.warnings)]
+        made.append(new_objects(obj, request, series, carried))
+    try:
+        warnings = _save(options.output, made, files)
+    except files.FileError as error:
+        raise CommandError(str(error)) from error
+    warn(objects, told, warnings)
+
+
+def _settings(options: argparse.Namespace) -> RemeshSettings:
+    counts = {"vertices": options.vertices, "faces": options.faces, "edge": options.edge}
+    count_of = next(name for name, count in counts.items() if count is not None)
+    return RemeshSettings(
+        count_of=count_of,
+        count=counts[count_of],
+        preserve_boundary=not options.no_boundary,
+        preserve_sharp=options.sharp is not None,
+        sharp_angle=math.radians(options.sharp or 0.0),
+        preserve_seams=not options.no_seams,
+        preserve_materials=not options.no_materials,
+        preserve_attributes=not options.no_attributes,
+        levels=options.levels,
+        ratio=options.ratio,
+        strategy=options.strategy,
+        seed=options.seed,
+    )
+
+
+def _save(path: Path, made: list[list[str]], files) -> list[str]:
+    """A .blend with everything in it; other files hold the new objects alone, every level a file of its own."""
+    import bpy
+
+    if path.suffix.lower() == ".blend":
+        return files.save(path, [])
+    warnings: list[str] = []
+    levels = len(made[0])
+    for k in range(levels):
+        target = path if levels == 1 else path.with_name(f"{path.stem}_LOD{k}{path.suffix}")
+        warnings += files.save(target, [bpy.data.objects[names[k]] for names in made])
+    return warnings

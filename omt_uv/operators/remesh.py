@@ -1,0 +1,193 @@
+"""object.omt_remesh: a new mesh of a chosen size beside the old one, with everything that it carries."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from ..settings import COUNTS, DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
+from .common import Complaint, SolverOperator, mesh_objects, ready, warn
+
+
+class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
+    """Make a new object with triangles of even shape and a chosen number. The object itself stays as it is"""
+
+    bl_idname = "object.omt_remesh"
+    bl_label = "Remesh Area Preserving"
+    bl_options = {"REGISTER", "UNDO"}
+
+    count_of: EnumProperty(name="Count", description="What sets the size of the new mesh", items=COUNTS)
+    target_vertices: IntProperty(
+        name="Vertices", description="Vertices of the new mesh", default=5000, min=4, soft_max=100_000
+    )
+    target_faces: IntProperty(
+        name="Faces", description="Triangles of the new mesh", default=10_000, min=4, soft_max=200_000
+    )
+    edge_length: FloatProperty(
+        name="Edge Length",
+        description="Mean length of the edges, with the scale of the object",
+        default=0.1,
+        min=1e-6,
+        soft_max=10,
+        precision=4,
+        subtype="DISTANCE",
+    )
+    use_preserve_boundary: BoolProperty(
+        name="Preserve Boundary", description="Keep the outline of open meshes, and its corners", default=True
+    )
+    use_preserve_sharp: BoolProperty(
+        name="Preserve Sharp",
+        description="Keep edges that are marked sharp, creased, or sharper than the angle",
+        default=False,
+    )
+    sharp_angle: FloatProperty(
+        name="Sharp Angle",
+        description="Edges with more than this angle between their faces are sharp",
+        default=0.7,
+        min=0.0,
+        max=3.1416,
+        subtype="ANGLE",
+    )
+    use_preserve_seams: BoolProperty(
+        name="Preserve Seams",
+        description="Keep seams and the outlines of UV islands, so that UV maps are carried without a stretch",
+        default=True,
+    )
+    use_preserve_materials: BoolProperty(
+        name="Preserve Material Borders", description="Keep the edges between materials", default=True
+    )
+    preserve_attributes: BoolProperty(
+        name="Preserve Attributes",
+        description="Carry UV maps, vertex groups, colours, shape keys and other attributes to the new mesh",
+        default=True,
+    )
+    use_modifiers: BoolProperty(
+        name="Apply Modifiers", description="Remesh what the modifiers make of the mesh", default=False
+    )
+    levels: IntProperty(
+        name="Levels", description="How many objects to make, LOD0 the finest", default=1, min=1, max=16, soft_max=6
+    )
+    ratio: FloatProperty(
+        name="Ratio",
+        description="Size of each level next to the one before",
+        default=0.5,
+        min=0.01,
+        max=0.99,
+        subtype="FACTOR",
+    )
+    strategy: EnumProperty(
+        name="Strategy",
+        description="On which map vertices are placed, and on which they are joined",
+        items=STRATEGIES,
+        default=DEFAULT_STRATEGY,
+    )
+    seed: IntProperty(name="Seed", description="Another number, another mesh of the same kind", default=0, min=0)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode == "EDIT_MESH":
+            cls.poll_message_set("Makes new objects, so it works in Object Mode only")  # type: ignore[attr-defined]
+            return False
+        return ready(cls, context)
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_remesh_settings(self.layout, self)
+
+    def settings(self) -> RemeshSettings:
+        counts = {"VERTICES": self.target_vertices, "FACES": self.target_faces, "EDGE": self.edge_length}
+        return RemeshSettings(
+            count_of=self.count_of.lower(),
+            count=counts[self.count_of],
+            preserve_boundary=self.use_preserve_boundary,
+            preserve_sharp=self.use_preserve_sharp,
+            sharp_angle=self.sharp_angle,
+            preserve_seams=self.use_preserve_seams,
+            preserve_materials=self.use_preserve_materials,
+            preserve_attributes=self.preserve_attributes,
+            levels=self.levels,
+            ratio=self.ratio,
+            strategy=self.strategy.lower(),
+            seed=self.seed,
+        )
+
+    def steps(self, context: bpy.types.Context):
+        from .. import running
+        from ..blender_remesh import read_request
+        from ..solver.errors import MeshError
+        from ..unwrapping import Refusal
+
+        objects = mesh_objects(context)
+        depsgraph = context.evaluated_depsgraph_get() if self.use_modifiers else None
+        requests = []
+        try:
+            for obj in objects:
+                requests.append(read_request(obj, self.settings(), depsgraph))
+            results = yield from running.aside(_remesh_all(requests, self.settings()))
+        except MeshError as error:
+            raise self._complaint(obj, error) from error
+        except Refusal as refusal:
+            raise self._complaint(objects[refusal.index], refusal.error) from refusal
+        return [(obj, request, *result) for obj, request, result in zip(objects, requests, results, strict=True)]
+
+    def _complaint(self, obj: bpy.types.Object, error) -> Complaint:
+        # Elements of a mesh with modifiers are none of the object's.
+        return Complaint(f"{obj.name}: {error}", obj, None if self.use_modifiers else error)
+
+    def finish(self, context: bpy.types.Context, result) -> None:
+        from ..blender_remesh import lost, new_objects
+
+        names, warnings = [], []
+        for k, (obj, request, series, carried) in enumerate(result):
+            warnings += [(k, text) for text in (*lost(obj, request, carried), *series.warnings)]
+            names += new_objects(obj, request, series, carried)
+        for obj in context.selected_objects:
+            obj.select_set(False)
+        # Those in a collection that the view layer leaves out cannot be selected.
+        made = [new for new in map(context.view_layer.objects.get, names) if new is not None]
+        for new in made:
+            new.select_set(True)
+        if made:
+            context.view_layer.objects.active = made[0]
+        warn(self, [obj for obj, *_ in result], warnings)
+        self.report({"INFO"}, f"Made {', '.join(names)}")
+
+
+def _remesh_all(requests: list, settings: RemeshSettings):
+    """The series of every request and what its meshes carry; Refusal says which one has none."""
+    from ..blender_remesh import carried_attributes
+    from ..remeshing import remesh_series
+    from ..solver.errors import MeshError
+    from ..solver.progress import part_of
+    from ..unwrapping import Refusal
+
+    results = []
+    for k, request in enumerate(requests):
+        steps = remesh_series(request.job, settings)
+        try:
+            series = yield from part_of(steps, k / len(requests), 1 / len(requests))
+        except MeshError as error:
+            raise Refusal(k, error) from error
+        results.append((series, carried_attributes(request, series)))
+    return results
+
+
+def draw_remesh_settings(layout: bpy.types.UILayout, properties) -> None:
+    """The settings of the operator, for the redo panel and the sidebar."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(properties, "count_of")
+    of = {"VERTICES": "target_vertices", "FACES": "target_faces", "EDGE": "edge_length"}
+    layout.prop(properties, of[properties.count_of])
+    for name in ("use_preserve_boundary", "use_preserve_seams", "use_preserve_materials", "use_preserve_sharp"):
+        layout.prop(properties, name)
+    column = layout.column()
+    column.active = properties.use_preserve_sharp
+    column.prop(properties, "sharp_angle")
+    layout.prop(properties, "preserve_attributes")
+    layout.prop(properties, "use_modifiers")
+    layout.prop(properties, "levels")
+    column = layout.column()
+    column.active = properties.levels > 1
+    column.prop(properties, "ratio")
+    layout.prop(properties, "strategy")
+    layout.prop(properties, "seed")

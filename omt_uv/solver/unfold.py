@@ -1,0 +1,159 @@
+"""Folded faces of a carried map straightened where they are, and nothing else moved.
+
+A map sampled at the vertices of another mesh may turn a face over where the map shears much within one face, or where
+its outline is crooked. Vertices around such faces are placed anew as averages of their neighbours with everything
+around them fixed; the patch grows by a ring where that is not enough. Faces that only have vertices on outlines
+are pushed open.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix, identity
+
+from .embedding import mean_value_weights
+from .errors import PrecisionError
+from .geometry import halfedge_lengths, signed_areas
+from .linear import solve_general
+from .topology import halfedges, pair_keys, pair_up
+
+MOST_RINGS = 6
+# A face with less than this share of the median area is as good as folded.
+LEAST_AREA = 1e-6
+# What is pushed open gets this share of the median area, in as many rounds at most.
+PUSHED_AREA = 0.05
+PUSH_ROUNDS = 30
+
+
+def straightened(triangles: np.ndarray, uv: np.ndarray, side: np.ndarray) -> tuple[np.ndarray, int]:
+    """UVs (3t,2) of the corners of faces (t,3) without folds that the map they come from does not have.
+
+    side (t,): -1, 0 or 1, which way the map they come from lies under each face. Where single faces of that map lie
+    another way than those around them, nothing is asked of the new ones. Returns the UVs, and how many faces are left
+    folded.
+    """
+    extent = np.ptp(uv, axis=0).max(initial=0.0)
+    if not (extent > 0 and np.isfinite(uv).all()):
+        return uv, 0
+    points, faces, outline = uv_vertices(triangles, uv, 1e-7 * extent)
+    side = _agreed(faces, np.sign(side).astype(np.int64))
+    moved = _pushed(_averaged(points, faces, side, outline), faces, side)
+    left = int(_folded(moved, faces, side).sum())
+    return np.where((moved != points).any(axis=1)[faces.ravel(), None], moved[faces.ravel()], uv), left
+
+
+def uv_vertices(triangles: np.ndarray, uv: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners (3t,2) of a mesh (t,3) joined where they are one vertex and about `tolerance` apart at most.
+
+    Returns the map (u,2), its faces (t,3), and which of its vertices (u,) are on an outline.
+    """
+    key = np.column_stack([triangles.ravel(), np.round(uv / tolerance).astype(np.int64)])
+    _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    faces = inverse.reshape(-1, 3).astype(np.int64)
+    tail, head = halfedges(faces)
+    _, index, count = np.unique(pair_keys(tail, head), return_index=True, return_counts=True)
+    rim = index[count == 1]
+    outline = np.zeros(len(first), dtype=bool)
+    outline[tail[rim]] = outline[head[rim]] = True
+    return uv[first], faces, outline
+
+
+def _agreed(faces: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """The sides (t,) where those of the faces across the edges agree with them on the whole, 0 elsewhere."""
+    first, second = pair_up(pair_keys(*halfedges(faces)))
+    a, b = first // 3, second // 3
+    around = np.bincount(np.concatenate([a, b]), side[np.concatenate([b, a])], len(side))
+    return np.where(around * side >= 0, side, 0)
+
+
+def _folded(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
+    area = side * signed_areas(uv, faces)
+    return (area <= LEAST_AREA * np.median(np.abs(area))) & (side != 0)
+
+
+def _averaged(uv: np.ndarray, faces: np.ndarray, side: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """The map (u,2) with vertices around folded faces at averages of their neighbours, those `fixed` (u,) excepted.
+
+    The weights are mean value weights of the map itself (Floater 2003), all angles taken as positive: they reproduce
+    what is valid and pull straight what is not, see `untangle.untangle`.
+    """
+    best, folded = uv, _folded(uv, faces, side)
+    if not folded.any():
+        return uv
+    fewest, chosen = int(folded.sum()), np.zeros(len(uv), dtype=bool)
+    weights = _weights(uv, faces)
+    for rings in range(MOST_RINGS):
+        chosen |= _around(folded, faces, len(uv), rings)
+        candidate = _solved(uv, weights, np.flatnonzero(chosen & ~fixed))
+        folded = _folded(candidate, faces, side)
+        if folded.sum() < fewest:
+            best, fewest = candidate, int(folded.sum())
+        if fewest == 0:
+            break
+    return best
+
+
+def _weights(uv: np.ndarray, faces: np.ndarray) -> csr_matrix:
+    """Mean value weights (u,u), every row with the sum 1."""
+    at_tail, at_head = mean_value_weights(halfedge_lengths(uv, faces).reshape(-1, 3))
+    tail, head = halfedges(faces)
+    rows, columns = np.concatenate([tail, head]), np.concatenate([head, tail])
+    data = np.concatenate([at_tail.ravel(), at_head.ravel()])
+    total = np.bincount(rows, data, len(uv))
+    return csr_matrix((data / total[rows], (rows, columns)), shape=(len(uv),) * 2)
+
+
+def _around(chosen: np.ndarray, faces: np.ndarray, count: int, rings: int) -> np.ndarray:
+    """Vertices (u,) bool at most `rings` edges away from the faces `chosen` (t,) bool."""
+    near = np.zeros(count, dtype=bool)
+    near[faces[chosen]] = True
+    for _ in range(rings):
+        near[faces[near[faces].any(axis=1)]] = True
+    return near
+
+
+def _solved(uv: np.ndarray, weights: csr_matrix, free: np.ndarray) -> np.ndarray:
+    """The map with the vertices `free` (k,) at the weighted averages of their neighbours; as it is if none are."""
+    if len(free) == 0:
+        return uv
+    rows, solved = weights[free], uv.copy()
+    solved[free] = 0
+    system = identity(len(free), format="csr") - rows[:, free]
+    try:
+        solved[free] = solve_general(system, rows @ solved)
+    except PrecisionError:
+        # Nothing around them is fixed: an island whose every face is folded has no shape to go by.
+        return uv
+    return solved
+
+
+def _pushed(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """The map with the vertices of folded faces, on outlines too, moved until each of these has a little area.
+
+    Every round takes, for each such face by itself, the least step that gives it the area.
+    """
+    best = current = uv
+    goal = PUSHED_AREA * np.median(np.abs(signed_areas(uv, faces)))
+    folded = _folded(uv, faces, side)
+    pushed, fewest = folded, int(folded.sum())
+    for _ in range(PUSH_ROUNDS):
+        if fewest == 0:
+            break
+        area = side * signed_areas(current, faces)
+        low = np.flatnonzero(pushed & (area < goal / 2))
+        current = current.copy()
+        np.add.at(
+            current, faces[low].ravel(), _opening(current[faces[low]], side[low], goal - area[low]).reshape(-1, 2)
+        )
+        folded = _folded(current, faces, side)
+        pushed = pushed | folded
+        if folded.sum() < fewest:
+            best, fewest = current, int(folded.sum())
+    return best
+
+
+def _opening(corners: np.ndarray, side: np.ndarray, lack: np.ndarray) -> np.ndarray:
+    """Least steps (k,3,2) of the corners (k,3,2) of faces that add `lack` (k,) to their areas, to first order."""
+    across = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    gradient = 0.5 * side[:, None, None] * np.stack([-across[..., 1], across[..., 0]], axis=-1)
+    return gradient * (lack / np.maximum((gradient**2).sum(axis=(1, 2)), 1e-300))[:, None, None]
