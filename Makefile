@@ -5,7 +5,7 @@ STAMP := $(VENV)/.installed
 export PYTHONPATH := $(CURDIR)
 export OMT_UV_MODELS ?= $(CURDIR)/../shared/models
 
-.PHONY: demo test check bench extension matrix venv clean
+.PHONY: demo test check bench extension matrix gui venv clean
 
 test: $(STAMP)
 	$(PY) -m pytest
@@ -26,6 +26,9 @@ extension: $(STAMP)
 
 matrix: $(STAMP)
 	$(PY) scripts/matrix.py
+
+gui: $(STAMP)
+	$(PY) scripts/gui/run.py
 
 venv: $(STAMP)
 

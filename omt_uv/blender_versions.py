@@ -36,3 +36,6 @@ def progress_bar(layout: bpy.types.UILayout, fraction: float, text: str) -> None
         layout.progress(factor=fraction, text=text)
     else:
         layout.label(text=f"{text}  {100 * fraction:.0f} %", icon="TIME")
+
+
+SMOOTH_COLOUR_SHADER = "SMOOTH_COLOR" if bpy.app.version >= (4, 0, 0) else "2D_SMOOTH_COLOR"

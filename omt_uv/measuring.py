@@ -11,13 +11,12 @@ from .solver.distortion import Distortion, measure
 from .solver.errors import EmptyMeshError
 
 
-def measure_readings(readings: Sequence[Reading]) -> Distortion:
-    """Distortion of the active UVs over the chosen polygons of all readings.
+def triangles_of(readings: Sequence[Reading]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions (n,3), triangles (m,3) and their UVs (m,3,2) of the chosen polygons of all readings in turn.
 
     Raises
     ------
     EmptyMeshError : no polygon is chosen, or a mesh with chosen polygons has no UVs
-    NonFiniteError, ZeroAreaFaceError : see `solver.distortion.measure`
     """
     positions, triangles, uv, offset = [], [], [], 0
     for reading in readings:
@@ -33,7 +32,18 @@ def measure_readings(readings: Sequence[Reading]) -> Distortion:
         offset += len(surface.positions)
     if not triangles:
         raise EmptyMeshError("There are no faces to measure")
-    return measure(np.concatenate(positions), np.concatenate(triangles), np.concatenate(uv))
+    return np.concatenate(positions), np.concatenate(triangles), np.concatenate(uv)
+
+
+def measure_readings(readings: Sequence[Reading], overlap: bool = True) -> Distortion:
+    """Distortion of the active UVs over the chosen polygons of all readings; `overlap` costs most of the time.
+
+    Raises
+    ------
+    EmptyMeshError : no polygon is chosen, or a mesh with chosen polygons has no UVs
+    NonFiniteError, ZeroAreaFaceError : see `solver.distortion.measure`
+    """
+    return measure(*triangles_of(readings), overlap=overlap)
 
 
 def summary(figures: Distortion) -> str:

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import bpy
 
+from . import overlay
 from .blender_versions import register_command, unregister_command
+from .operators.density import UV_OT_omt_density_get, UV_OT_omt_density_set
 from .operators.measure import UV_OT_omt_measure
+from .operators.overlay import UV_OT_omt_histogram, UV_OT_omt_overlay
+from .operators.preset import UV_OT_omt_preset
 from .operators.refine import UV_OT_omt_refine
 from .operators.remesh import OBJECT_OT_omt_remesh
+from .operators.report import WM_OT_omt_copy_report
 from .operators.seams import UV_OT_omt_seams
 from .operators.unwrap import UV_OT_omt_unwrap
 from .panels.menus import draw_remesh, draw_unwrap, menus, remesh_menus
-from .panels.sidebar import IMAGE_PT_omt_uv, VIEW3D_PT_omt_uv
+from .panels.sidebar import PANELS
+from .preferences import OMTUVPreferences, apply_soon
+from .preset_files import register_folder, unregister_folder
 
 CLASSES = (
     UV_OT_omt_unwrap,
@@ -19,8 +26,14 @@ CLASSES = (
     UV_OT_omt_seams,
     UV_OT_omt_measure,
     OBJECT_OT_omt_remesh,
-    VIEW3D_PT_omt_uv,
-    IMAGE_PT_omt_uv,
+    UV_OT_omt_overlay,
+    UV_OT_omt_histogram,
+    UV_OT_omt_density_get,
+    UV_OT_omt_density_set,
+    UV_OT_omt_preset,
+    WM_OT_omt_copy_report,
+    OMTUVPreferences,
+    *PANELS,
 )
 COMMAND = "omt_uv"
 
@@ -38,6 +51,9 @@ def register() -> None:
                 menu.append(draw)
                 _undo.append((menu.remove, draw))
         _undo.append((unregister_command, register_command(COMMAND, _command)))
+        register_folder()
+        _undo.append((_clear, None))
+        apply_soon()
     except Exception:
         unregister()
         raise
@@ -47,6 +63,12 @@ def unregister() -> None:
     while _undo:
         function, argument = _undo.pop()
         function(argument)
+
+
+def _clear(_) -> None:
+    """What lives outside of classes and menus."""
+    overlay.forget()
+    unregister_folder()
 
 
 def _command(arguments: list[str]) -> int:

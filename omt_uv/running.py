@@ -117,6 +117,8 @@ class Watch:
 
 
 current: Run | None = None
+# Whether solvers may work on a thread of their own; a preference.
+threads = True
 _calls: queue.SimpleQueue = queue.SimpleQueue()
 
 
@@ -124,7 +126,7 @@ def aside(steps):
     """A solver that knows nothing of Blender, on a thread of its own while a run is on; as it is in a script."""
     from .solver import progress
 
-    return steps if current is None else progress.aside(steps)
+    return steps if current is None or not threads else progress.aside(steps)
 
 
 def in_front(function: Callable) -> Callable:

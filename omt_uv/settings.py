@@ -30,6 +30,7 @@ DEFAULT_QUALITY = "STANDARD"
 DEFAULT_BALANCE = 0.0
 DEFAULT_MARGIN = 4
 DEFAULT_TEXTURE_SIZE = 1024
+FIRST_TILE = 1001
 COUNTS = (
     ("VERTICES", "Vertices", "As many vertices as asked"),
     ("FACES", "Faces", "As many triangles as asked"),
@@ -50,7 +51,8 @@ class Settings:
 
     boundary, quality : an identifier of the lists above in lower case
     balance : from 0, exact areas, to 1, least shear
-    margin : pixels of a texture `texture_size` pixels wide; pack : arrange the islands in the unit square
+    margin : pixels of a texture `texture_size` pixels wide; pack : arrange the islands in the unit square; tile : UDIM
+        number of the square, 1001 for the unit square
     seams : an identifier of the list above in lower case; fill_holes : take all boundaries of a part but the longest
         for filled; max_shear : cut islands further until their mean shear is below, 0 for no such cuts
     """
@@ -61,9 +63,16 @@ class Settings:
     margin: float = DEFAULT_MARGIN
     texture_size: int = DEFAULT_TEXTURE_SIZE
     pack: bool = True
+    tile: int = FIRST_TILE
     seams: str = DEFAULT_SEAMS.lower()
     fill_holes: bool = False
     max_shear: float = 0.0
+
+    @property
+    def tile_origin(self) -> tuple[int, int]:
+        """Lower left corner of the UDIM tile: ten in a row."""
+        row, column = divmod(self.tile - FIRST_TILE, 10)
+        return column, row
 
     def solver_arguments(self) -> dict:
         """How to map a chart: keyword arguments of `solver.parameterize.unwrap_chart`."""

@@ -147,6 +147,12 @@ def pack_islands(
     """Islands (n_i,2) packed as the settings say, and a warning or an empty text; see `packing.pack`."""
     if not islands:
         return packing.Packing([], 0.0, "none", 0.0), ""
+    packed, complaint = _packed(islands, triangles, settings, spare_packer)
+    return replace(packed, islands=[uv + settings.tile_origin for uv in packed.islands]), complaint
+
+
+def _packed(islands, triangles, settings: Settings, spare_packer: Packer | None) -> tuple[packing.Packing, str]:
+    """Islands in the unit square, and a warning or an empty text."""
     if not settings.pack:
         return packing.stack(islands), ""
     try:

@@ -15,6 +15,9 @@ def add(commands) -> None:
     command = commands.add_parser("measure", help="area error, shear, folds and overlap of the active UV maps")
     command.set_defaults(run=run)
     command.add_argument("input", type=Path, metavar="IN", help=f"{FORMATS} .off")
+    command.add_argument(
+        "--histogram", type=Path, metavar="H.png", help="draw how area error and shear are spread over the surface"
+    )
     command.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
@@ -24,7 +27,24 @@ def run(options: argparse.Namespace) -> None:
     from ..solver.errors import MeshError
 
     try:
-        figures = measure_readings([reading for _, reading in read(options.input, files, blender_mesh)])
+        readings = [reading for _, reading in read(options.input, files, blender_mesh)]
+        figures = measure_readings(readings)
+        if options.histogram:
+            _draw(options.histogram, readings)
     except MeshError as error:
         raise CommandError(f"{options.input}: {error}") from error
     print(json.dumps(asdict(figures), indent=1) if options.json else summary(figures))
+
+
+def _draw(path: Path, readings: list) -> None:
+    from ..blender_images import save
+    from ..histogram import histogram
+    from ..quiet import silence
+
+    if path.suffix.lower() != ".png":
+        raise CommandError(f"{path}: a histogram is a picture. Name a .png file.")
+    try:
+        with silence():
+            save(path, histogram(readings))
+    except (OSError, RuntimeError) as error:
+        raise CommandError(f"{path}: {error}") from error

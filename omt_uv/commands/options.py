@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..settings import DEFAULT_BALANCE, DEFAULT_QUALITY, QUALITIES
+from ..settings import DEFAULT_BALANCE, DEFAULT_QUALITY, FIRST_TILE, QUALITIES
 
 FORMATS = ".blend .obj .ply .stl .glb"
 
@@ -55,6 +55,13 @@ def margin(text: str) -> float:
     value = float(text)
     if not 0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not a number of pixels")
+    return value
+
+
+def tile(text: str) -> int:
+    value = int(text)
+    if not FIRST_TILE <= value <= 1999:
+        raise argparse.ArgumentTypeError(f"{text} is no UDIM tile: they go from {FIRST_TILE} to 1999")
     return value
 
 

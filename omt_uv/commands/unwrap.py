@@ -10,11 +10,12 @@ from ..settings import (
     DEFAULT_MARGIN,
     DEFAULT_SEAMS,
     DEFAULT_TEXTURE_SIZE,
+    FIRST_TILE,
     SEAMS,
     Settings,
 )
 from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
-from .options import add_area_options, add_cut_options, add_files, add_report, margin, names, shear, texture_size
+from .options import add_area_options, add_cut_options, add_files, add_report, margin, names, shear, texture_size, tile
 
 
 def add(commands) -> None:
@@ -29,6 +30,9 @@ def add(commands) -> None:
     add_cut_options(command)
     command.add_argument(
         "--max-shear", type=shear, default=0.0, metavar="S", help="cut further until the mean shear is below S > 1"
+    )
+    command.add_argument(
+        "--udim", type=tile, default=FIRST_TILE, metavar="TILE", help="tile to pack into; 1001 is the unit square"
     )
     command.add_argument(
         "--margin", type=margin, default=DEFAULT_MARGIN, metavar="PX", help="least distance of islands, in pixels"
@@ -54,6 +58,7 @@ def run(options: argparse.Namespace) -> None:
         balance=options.balance,
         margin=options.margin,
         texture_size=options.texture_size,
+        tile=options.udim,
         pack=not options.no_pack,
         seams=options.seams,
         fill_holes=options.fill_holes,

@@ -5,11 +5,13 @@ numpy and scipy load when an operator runs, so that Blender does not wait for th
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 
 import bpy
 
-from .. import running
+from .. import last_run, overlay, running
+from ..settings import DEFAULT_TEXTURE_SIZE
 
 
 class Complaint(Exception):
@@ -69,6 +71,7 @@ def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Co
         from ..blender_mesh import select_culprits
 
         select_culprits(context, complaint.obj, complaint.error)
+    last_run.state.error = str(complaint)
     operator.report({"ERROR"}, str(complaint))
     return {"CANCELLED"}
 
@@ -77,7 +80,9 @@ def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, 
     """Report warnings, pairs of an index into objects (-1: of none) and a text, each once."""
     for (index, text), count in Counter(warnings).items():
         name = f"{objects[index].name}: " if index >= 0 else ""
-        operator.report({"WARNING"}, f"{name}{text}" + (f" ({count} islands)" if count > 1 else ""))
+        several = f" ({count} islands)" if count > 1 else ""
+        last_run.state.warnings.append(text + several)
+        operator.report({"WARNING"}, f"{name}{text}{several}")
 
 
 # Events that move the view, which goes on while a solver runs.
@@ -108,6 +113,8 @@ class SolverOperator:
     """
 
     bl_label: str
+    # Whether it changes the active UVs, so that their figures are worth a look.
+    makes_uvs = False
     _timer: bpy.types.Timer | None = None
 
     @classmethod
@@ -123,11 +130,11 @@ class SolverOperator:
     def execute(self, context: bpy.types.Context) -> set[str]:
         from ..solver.progress import drain
 
-        manager = context.window_manager
+        manager, begin = context.window_manager, time.monotonic()
         manager.progress_begin(0, 100)
         try:
             result = drain(self.steps(context), lambda p: manager.progress_update(int(100 * p.fraction)))
-            self.finish(context, result)
+            self._finish(context, result, time.monotonic() - begin)
         except Complaint as complaint:
             return tell(self, context, complaint)
         finally:
@@ -178,6 +185,20 @@ class SolverOperator:
             self._timer = None
         show_progress(context, None)
 
+    def _finish(self, context: bpy.types.Context, result, seconds: float) -> None:
+        """Write the result, and keep what the panel says about it."""
+        last_run.state.warnings.clear()
+        self.finish(context, result)
+        rows: tuple = ()
+        if self.makes_uvs:
+            pairs = read_objects(context)
+            scale = context.scene.unit_settings.scale_length
+            rows = last_run.figures([r for _, r in pairs], getattr(self, "texture_size", DEFAULT_TEXTURE_SIZE), scale)
+            overlay.refresh(context, pairs)
+        rows = (*rows, ("Time", last_run.seconds(seconds)))
+        last_run.state.summary = last_run.Summary(self.bl_label, rows, tuple(last_run.state.warnings))
+        last_run.state.error = ""
+
     def _advance(self, context: bpy.types.Context) -> set[str]:
         run, ended = running.current, True
         if run is None:
@@ -187,7 +208,7 @@ class SolverOperator:
             if not ended:
                 show_progress(context, run.text())
                 return {"RUNNING_MODAL"}
-            self.finish(context, run.result)
+            self._finish(context, run.result, run.seconds)
         except Complaint as complaint:
             return tell(self, context, complaint)
         except running.Disturbed as reason:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from .common import Complaint, SolverOperator, read_objects, tell
+from .. import last_run
+from ..settings import DEFAULT_TEXTURE_SIZE
+from .common import Complaint, read_objects, ready, tell
 
 
 class UV_OT_omt_measure(bpy.types.Operator):
@@ -14,15 +16,19 @@ class UV_OT_omt_measure(bpy.types.Operator):
     bl_label = "Measure UV Distortion"
     bl_options = {"REGISTER"}
 
-    poll = SolverOperator.poll
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return ready(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from ..measuring import measure_readings, summary
         from ..solver.errors import MeshError
 
         try:
-            pairs = read_objects(context)
-            self.report({"INFO"}, summary(measure_readings([reading for _, reading in pairs])))
+            readings = [reading for _, reading in read_objects(context)]
+            self.report({"INFO"}, summary(measure_readings(readings)))
+            rows = last_run.figures(readings, DEFAULT_TEXTURE_SIZE, context.scene.unit_settings.scale_length)
+            last_run.state.summary = last_run.Summary(self.bl_label, rows)
         except Complaint as complaint:
             return tell(self, context, complaint)
         except MeshError as error:

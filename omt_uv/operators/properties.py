@@ -1,10 +1,11 @@
-"""Settings that several operators share, said once."""
+"""Settings that several operators share, said once, and how they are drawn."""
 
 from __future__ import annotations
 
+import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
-from ..settings import DEFAULT_BALANCE, DEFAULT_MARGIN, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, QUALITIES
+from ..settings import DEFAULT_BALANCE, DEFAULT_MARGIN, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, FIRST_TILE, QUALITIES
 
 
 class AreaSettings:
@@ -35,6 +36,14 @@ class MarginSettings:
         soft_max=64,
         subtype="PIXEL",
     )
+    tile: IntProperty(
+        name="UDIM Tile",
+        description="Tile that the islands are packed into. 1001 is the unit square, 1002 the one to its right",
+        default=FIRST_TILE,
+        min=FIRST_TILE,
+        max=1999,
+        soft_max=1100,
+    )
     texture_size: IntProperty(
         name="Texture Size",
         description="Width of the texture that the margin is measured in",
@@ -44,3 +53,28 @@ class MarginSettings:
         soft_max=8192,
         subtype="PIXEL",
     )
+
+
+def draw_margin(layout: bpy.types.UILayout, properties) -> None:
+    for name in ("margin", "texture_size", "tile"):
+        layout.prop(properties, name)
+
+
+def choose_group(layout: bpy.types.UILayout, properties, name: str) -> None:
+    """A field for the name of a vertex group, with those of the active object to choose from."""
+    _choose(layout, properties, name, "vertex_groups", "GROUP_VERTEX")
+
+
+def choose_layer(layout: bpy.types.UILayout, properties, name: str) -> None:
+    """A field for the name of a UV map, with those of the active mesh to choose from."""
+    _choose(layout, properties, name, "uv_layers", "GROUP_UVS")
+
+
+def _choose(layout: bpy.types.UILayout, properties, name: str, collection: str, icon: str) -> None:
+    obj = bpy.context.object
+    if obj is None or obj.type != "MESH":
+        layout.prop(properties, name)
+        return
+    owner = obj if hasattr(obj, collection) else obj.data
+    # A name that does not exist yet may be typed in as well: the field shows it in red, and it is used.
+    layout.prop_search(properties, name, owner, collection, icon=icon)

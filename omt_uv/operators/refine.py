@@ -9,7 +9,7 @@ from ..settings import (
     RefineSettings,
 )
 from .common import Complaint, SolverOperator, read_objects, warn
-from .properties import AreaSettings, MarginSettings
+from .properties import AreaSettings, MarginSettings, draw_margin
 
 
 class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.Operator):
@@ -17,7 +17,8 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
 
     bl_idname = "uv.omt_refine"
     bl_label = "Refine Area"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+    makes_uvs = True
 
     keep_boundary: BoolProperty(
         name="Keep Outline", description="Leave the outline of every island exactly as it is", default=False
@@ -29,19 +30,7 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
     )
 
     def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        layout.prop(self, "balance")
-        layout.prop(self, "quality")
-        layout.prop(self, "keep_boundary")
-        row = layout.column()
-        row.active = not self.keep_boundary
-        row.prop(self, "pack")
-        column = layout.column()
-        column.active = self.pack and not self.keep_boundary
-        column.prop(self, "margin")
-        column.prop(self, "texture_size")
+        draw_settings(self.layout, self)
 
     def settings(self) -> RefineSettings:
         return RefineSettings(
@@ -50,6 +39,7 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             margin=self.margin,
             texture_size=self.texture_size,
             pack=self.pack,
+            tile=self.tile,
             keep_boundary=self.keep_boundary,
         )
 
@@ -82,3 +72,18 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         for obj, corners, uv in zip(objects, refined.corners, refined.uv, strict=True):
             blender_mesh.write_uv(obj, obj.data.uv_layers.active.name, corners, uv)
         warn(self, objects, refined.warnings)
+
+
+def draw_settings(layout: bpy.types.UILayout, properties) -> None:
+    """The settings of the operator, for the redo panel and the sidebar."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(properties, "balance", slider=True)
+    layout.prop(properties, "quality")
+    layout.prop(properties, "keep_boundary")
+    column = layout.column()
+    column.active = not properties.keep_boundary
+    column.prop(properties, "pack")
+    column = layout.column()
+    column.active = properties.pack and not properties.keep_boundary
+    draw_margin(column, properties)

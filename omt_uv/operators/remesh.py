@@ -91,7 +91,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         return ready(cls, context)
 
     def draw(self, _context: bpy.types.Context) -> None:
-        draw_remesh_settings(self.layout, self)
+        draw_settings(self.layout, self)
 
     def settings(self) -> RemeshSettings:
         counts = {"VERTICES": self.target_vertices, "FACES": self.target_faces, "EDGE": self.edge_length}
@@ -171,7 +171,7 @@ def _remesh_all(requests: list, settings: RemeshSettings):
     return results
 
 
-def draw_remesh_settings(layout: bpy.types.UILayout, properties) -> None:
+def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     """The settings of the operator, for the redo panel and the sidebar."""
     layout.use_property_split = True
     layout.use_property_decorate = False

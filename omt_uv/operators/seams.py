@@ -6,6 +6,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from .common import Complaint, SolverOperator, read_objects, warn
+from .properties import choose_group
 
 
 class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
@@ -13,7 +14,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
 
     bl_idname = "uv.omt_seams"
     bl_label = "Seams for Area Preserving"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     extremities: IntProperty(
         name="Extremities",
@@ -33,11 +34,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
     )
 
     def draw(self, _context: bpy.types.Context) -> None:
-        self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
-        self.layout.prop(self, "extremities")
-        self.layout.prop(self, "fill_holes")
-        self.layout.prop(self, "keep_free")
+        draw_settings(self.layout, self)
 
     def steps(self, context: bpy.types.Context):
         from .. import running
@@ -85,3 +82,12 @@ def _cut_all(readings: list, free: list, options: dict):
         except MeshError as error:
             raise Refusal(k, error) from error
     return found
+
+
+def draw_settings(layout: bpy.types.UILayout, properties) -> None:
+    """The settings of the operator, for the redo panel and the sidebar."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(properties, "extremities")
+    layout.prop(properties, "fill_holes")
+    choose_group(layout, properties, "keep_free")

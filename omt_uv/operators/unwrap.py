@@ -13,7 +13,7 @@ from ..settings import (
     Settings,
 )
 from .common import Complaint, SolverOperator, read_objects, warn
-from .properties import AreaSettings, MarginSettings
+from .properties import AreaSettings, MarginSettings, choose_group, choose_layer, draw_margin
 
 
 class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.Operator):
@@ -21,7 +21,8 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
 
     bl_idname = "uv.omt_unwrap"
     bl_label = "Unwrap Area Preserving"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+    makes_uvs = True
 
     boundary: EnumProperty(
         name="Boundary", description="Outline of every island", items=BOUNDARIES, default=DEFAULT_BOUNDARY
@@ -65,6 +66,7 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             margin=self.margin,
             texture_size=self.texture_size,
             pack=self.pack,
+            tile=self.tile,
             seams=self.seams.lower(),
             fill_holes=self.fill_holes,
             max_shear=self.max_shear if self.max_shear > 1 else 0.0,
@@ -104,21 +106,34 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
-    """The settings of the operator, for the redo panel and the sidebar."""
+    """The settings of the operator, for the redo panel."""
+    draw_main(layout, properties)
+    layout.separator()
+    draw_more(layout, properties)
+
+
+def draw_main(layout: bpy.types.UILayout, properties) -> None:
+    """What everybody looks at."""
     layout.use_property_split = True
     layout.use_property_decorate = False
+    layout.prop(properties, "balance", slider=True)
     layout.prop(properties, "boundary")
-    layout.prop(properties, "balance")
     layout.prop(properties, "quality")
+
+
+def draw_more(layout: bpy.types.UILayout, properties) -> None:
+    """Where islands are cut, and where they go."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
     layout.prop(properties, "seams")
     column = layout.column()
     column.active = properties.seams != "EXISTING"
-    column.prop(properties, "keep_free")
+    choose_group(column, properties, "keep_free")
     layout.prop(properties, "fill_holes")
     layout.prop(properties, "max_shear")
+    layout.separator()
     layout.prop(properties, "pack")
     column = layout.column()
     column.active = properties.pack
-    column.prop(properties, "margin")
-    column.prop(properties, "texture_size")
-    layout.prop(properties, "uv_layer")
+    draw_margin(column, properties)
+    choose_layer(layout, properties, "uv_layer")

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.measure import UV_OT_omt_measure
-from ..operators.refine import UV_OT_omt_refine
-from ..operators.remesh import OBJECT_OT_omt_remesh
-from ..operators.seams import UV_OT_omt_seams
-from ..operators.unwrap import UV_OT_omt_unwrap
+# In the order of the menu; those that do not exist are left out.
+ENTRIES = (
+    *("uv.omt_unwrap", "uv.omt_refine", "uv.omt_magnify", "uv.omt_sphere", "uv.omt_seams", "uv.omt_measure"),
+    *("uv.omt_overlay", "uv.omt_histogram", "uv.omt_density_get", "uv.omt_density_set"),
+)
+
+
+def exists(operator: str) -> bool:
+    group, verb = operator.split(".")
+    return hasattr(bpy.types, f"{group.upper()}_OT_{verb}")
 
 
 def draw_unwrap(self, _context: bpy.types.Context) -> None:
     self.layout.separator()
-    self.layout.operator(UV_OT_omt_unwrap.bl_idname)
-    self.layout.operator(UV_OT_omt_refine.bl_idname)
-    self.layout.operator(UV_OT_omt_seams.bl_idname)
-    self.layout.operator(UV_OT_omt_measure.bl_idname)
+    for name in filter(exists, ENTRIES):
+        self.layout.operator(name)
 
 
 def menus() -> list:
@@ -32,7 +35,7 @@ def menus() -> list:
 
 def draw_remesh(self, _context: bpy.types.Context) -> None:
     self.layout.separator()
-    self.layout.operator(OBJECT_OT_omt_remesh.bl_idname, icon="MOD_REMESH")
+    self.layout.operator("object.omt_remesh", icon="MOD_REMESH")
 
 
 def remesh_menus() -> list:

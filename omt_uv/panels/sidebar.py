@@ -1,40 +1,203 @@
-"""The sidebar tab: settings before the first run, and the operators."""
+"""The sidebar's tab OMT, in the 3D View and in the UV editor: settings before the first run, and what the last one did.
+
+Panels only draw. A click runs an operator with the settings shown here, which are the operator's own last ones.
+"""
 
 from __future__ import annotations
 
+import sys
+from dataclasses import dataclass
+
 import bpy
 
-from ..operators.measure import UV_OT_omt_measure
-from ..operators.refine import UV_OT_omt_refine
-from ..operators.seams import UV_OT_omt_seams
-from ..operators.unwrap import UV_OT_omt_unwrap, draw_settings
+from .. import last_run, overlay, running
+from ..blender_versions import progress_bar
+from ..operators.overlay import HISTOGRAM, KINDS
+from ..operators.unwrap import draw_main, draw_more
+
+TAB = "OMT"
+EDITORS = {"VIEW3D": "VIEW_3D", "IMAGE": "IMAGE_EDITOR"}
 
 
-class SidebarPanel:
-    bl_label = "OMT UV"
-    bl_category = "OMT UV"
+@dataclass(frozen=True)
+class Section:
+    """A panel of an operator below the main one; absent where there is no such operator."""
+
+    name: str
+    title: str
+    operator: str
+    icon: str
+
+
+SECTIONS = (
+    Section("refine", "Refine Area", "uv.omt_refine", "MOD_SMOOTH"),
+    Section("magnify", "Magnify", "uv.omt_magnify", "VIEWZOOM"),
+    Section("weights", "Weights", "object.omt_weights", "MOD_VERTEX_WEIGHT"),
+    Section("sphere", "Sphere", "uv.omt_sphere", "WORLD"),
+    Section("remesh", "Remesh", "object.omt_remesh", "MOD_REMESH"),
+    Section("seams", "Seams", "uv.omt_seams", "EDGESEL"),
+)
+
+
+def class_of(operator: str):
+    """The class of an operator by its name, None where it is not registered."""
+    group, verb = operator.split(".")
+    return getattr(bpy.types, f"{group.upper()}_OT_{verb}", None)
+
+
+def settings_of(context: bpy.types.Context, operator: str):
+    """What the operator would start from."""
+    return context.window_manager.operator_properties_last(operator)
+
+
+def draw_settings(layout: bpy.types.UILayout, operator: str, properties) -> None:
+    """As the operator's own module draws them; one below the other where it does not."""
+    draw = getattr(sys.modules[class_of(operator).__module__], "draw_settings", None)
+    if draw is not None:
+        draw(layout, properties)
+        return
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    for prop in properties.bl_rna.properties:
+        if prop.identifier != "rna_type" and not prop.is_hidden:
+            layout.prop(properties, prop.identifier)
+
+
+class TabPanel:
+    bl_category = TAB
     bl_region_type = "UI"
+    layout: bpy.types.UILayout
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.mode in {"OBJECT", "EDIT_MESH"}
+
+class MainPanel(TabPanel):
+    bl_label = "OMT UV"
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        self.layout.emboss = "NONE"
+        self.layout.menu("UV_MT_omt_presets", text="", icon="PRESET")
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout: bpy.types.UILayout = self.layout  # type: ignore[attr-defined]
-        # The operator starts from these, so nothing has to be kept in the scene.
-        draw_settings(layout.column(), context.window_manager.operator_properties_last(UV_OT_omt_unwrap.bl_idname))
-        layout.operator(UV_OT_omt_unwrap.bl_idname, icon="UV")
-        # It starts from its own settings, which its redo panel shows: they are few, and mostly other ones.
-        layout.operator(UV_OT_omt_refine.bl_idname)
-        layout.operator(UV_OT_omt_seams.bl_idname)
-        layout.operator(UV_OT_omt_measure.bl_idname)
+        layout = self.layout
+        if running.current is not None:
+            draw_run(layout, running.current)
+        else:
+            row = layout.row()
+            row.scale_y = 1.5
+            row.operator("uv.omt_unwrap", text="Unwrap", icon="UV")
+        draw_main(layout.column(), settings_of(context, "uv.omt_unwrap"))
+        if last_run.state.summary is not None:
+            draw_summary(layout, last_run.state.summary)
 
 
-class VIEW3D_PT_omt_uv(SidebarPanel, bpy.types.Panel):
-    bl_idname = "VIEW3D_PT_omt_uv"
-    bl_space_type = "VIEW_3D"
+class MorePanel(TabPanel):
+    bl_label = "Unwrap Options"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_more(self.layout.column(), settings_of(context, "uv.omt_unwrap"))
 
 
-class IMAGE_PT_omt_uv(SidebarPanel, bpy.types.Panel):
-    bl_idname = "IMAGE_PT_omt_uv"
-    bl_space_type = "IMAGE_EDITOR"
+class SectionPanel(TabPanel):
+    bl_options = {"DEFAULT_CLOSED"}
+    section: Section
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return class_of(cls.section.operator) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        section = self.section
+        draw_settings(self.layout.column(), section.operator, settings_of(context, section.operator))
+        row = self.layout.row()
+        row.scale_y = 1.2
+        row.operator(section.operator, icon=section.icon)
+
+
+class DistortionPanel(TabPanel):
+    bl_label = "Distortion"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        row = layout.row(align=True)
+        for name, title, _, _, _ in KINDS:
+            row.operator("uv.omt_overlay", text=title, depress=overlay.kind() == name).show = name
+        if overlay.kind() == "AREA":
+            layout.label(text="Blue: too little texture. Red: too much", icon="INFO")
+        elif overlay.kind() == "SHEAR":
+            layout.label(text="Dark: angles kept. Yellow: 4 times", icon="INFO")
+        row = layout.row(align=True)
+        row.operator("uv.omt_measure", text="Measure", icon="DRIVER_DISTANCE")
+        row.operator("uv.omt_histogram", text="Histogram", icon="RNDCURVE")
+        image = bpy.data.images.get(HISTOGRAM)
+        if image is not None and image.preview is not None:
+            layout.template_icon(icon_value=image.preview.icon_id, scale=8.0)
+
+
+class DensityPanel(TabPanel):
+    bl_label = "Texel Density"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        properties = settings_of(context, "uv.omt_density_set")
+        layout.prop(properties, "density")
+        layout.prop(properties, "texture_size")
+        layout.prop(properties, "scope")
+        row = layout.row(align=True)
+        row.operator("uv.omt_density_get", text="Get", icon="EYEDROPPER").texture_size = properties.texture_size
+        row.operator("uv.omt_density_set", text="Set", icon="CHECKMARK")
+
+
+def draw_run(layout: bpy.types.UILayout, run: running.Run) -> None:
+    box = layout.box().column(align=True)
+    progress_bar(box, run.fraction, f"{run.stage}, {run.seconds:.1f} s")
+    box.label(text="Esc or right click: cancel", icon="CANCEL")
+
+
+def draw_summary(layout: bpy.types.UILayout, summary: last_run.Summary) -> None:
+    box = layout.box().column(align=True)
+    box.label(text=summary.title, icon="ERROR" if summary.warnings else "CHECKMARK")
+    for name, value in summary.rows:
+        split = box.split(factor=0.55)
+        split.label(text=name)
+        split.label(text=value, translate=False)
+    if summary.warnings:
+        count = len(summary.warnings)
+        box.label(text=f"{count} warning{'' if count == 1 else 's'}: see the info editor")
+
+
+class UV_MT_omt_presets(bpy.types.Menu):
+    bl_idname = "UV_MT_omt_presets"
+    bl_label = "Unwrap Presets"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        from ..preset_files import files
+
+        for path in files("uv.omt_unwrap"):
+            entry = self.layout.operator("uv.omt_preset", text=path.stem.replace("_", " "), translate=False)
+            entry.operator, entry.filepath = "uv.omt_unwrap", str(path)
+
+
+def _panels() -> list[type]:
+    """Every panel once for each editor; the main one first, as the others are its children."""
+    made = []
+    for prefix, space in EDITORS.items():
+        parent = f"{prefix}_PT_omt_uv"
+        kinds: list[tuple[str, type, dict]] = [
+            ("", MainPanel, {}),
+            ("_more", MorePanel, {}),
+            ("_distortion", DistortionPanel, {}),
+        ]
+        kinds += [(f"_{s.name}", SectionPanel, {"section": s, "bl_label": s.title}) for s in SECTIONS]
+        kinds.append(("_density", DensityPanel, {}))
+        for suffix, base, more in kinds:
+            body = {"bl_idname": parent + suffix, "bl_space_type": space, **more}
+            if suffix:
+                body["bl_parent_id"] = parent
+            made.append(type(parent + suffix, (base, bpy.types.Panel), body))
+    return made
+
+
+PANELS = (UV_MT_omt_presets, *_panels())

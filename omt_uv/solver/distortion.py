@@ -157,7 +157,7 @@ def _surface_area(V, F):
 
 
 def _measure_faces(V, F, uv, area):
-    charts, chart = _charts(F, uv)
+    charts, chart = uv_charts(F, uv)
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     uv_area = 0.5 * cross2(a, b)
     mirrored = np.bincount(chart, uv_area, charts) < 0
@@ -183,7 +183,7 @@ def _shear(V, F, a, b):
     return np.minimum(np.where(det > 0, shear, SHEAR_CAP), SHEAR_CAP)
 
 
-def _charts(F, uv):
+def uv_charts(F, uv):
     """Number of charts and chart (m,) of every face: faces are joined by edges with equal UVs at both ends."""
     corner = uv.reshape(-1, 2)
     extent = np.ptp(corner, axis=0).max() + np.finfo(float).tiny

@@ -187,6 +187,15 @@ def class_of(name):
     return getattr(bpy.types, f"{group.upper()}_OT_{verb}")
 
 
+def name_of(cls):
+    """Name such as "uv.omt_unwrap" of a registered class, whose bl_idname Blender has changed."""
+    return (
+        ".".join((cls.bl_rna.identifier.split("_OT_")[0].lower(), cls.bl_rna.identifier.split("_OT_")[1]))
+        if "_OT_" in cls.bl_rna.identifier
+        else cls.bl_idname
+    )
+
+
 def stand_in(name, **settings):
     """An operator as Blender would make it, with the class' own methods: there is no window to click in."""
     cls = class_of(name)

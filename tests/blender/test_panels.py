@@ -7,6 +7,7 @@ import types
 import bpy
 
 import pytest
+from blender import scenes
 
 
 class Layout:
@@ -18,11 +19,31 @@ class Layout:
     def column(self, **_):
         return Layout(self.record)
 
+    row = split = box = column
+
     def separator(self, **_):
         pass
 
+    def label(self, text="", **_):
+        self.record.append(f"label {text}")
+
+    def progress(self, factor, text):
+        assert 0 <= factor <= 1
+        self.record.append(f"progress {text}")
+
+    def template_icon(self, icon_value, scale):
+        self.record.append("icon")
+
     def prop(self, data, name, **_):
         assert name in data.bl_rna.properties, name
+        self.record.append(name)
+
+    def prop_search(self, data, name, owner, collection, **_):
+        assert hasattr(owner, collection)
+        self.prop(data, name)
+
+    def menu(self, name, **_):
+        assert hasattr(bpy.types, name), name
         self.record.append(name)
 
     def operator(self, name, **_):
@@ -32,43 +53,159 @@ class Layout:
         return types.SimpleNamespace()
 
 
-SETTINGS = [
-    *("boundary", "balance", "quality", "seams", "keep_free", "fill_holes", "max_shear"),
-    *("pack", "margin", "texture_size", "uv_layer"),
-]
+def settings_of(name):
+    properties = bpy.context.window_manager.operator_properties_last(name).bl_rna.properties
+    return {p.identifier for p in properties if not p.is_readonly} - {"rna_type"}
 
 
-@pytest.mark.parametrize("name", ["VIEW3D_PT_omt_uv", "IMAGE_PT_omt_uv"])
-def test_sidebar_shows_every_setting(name):
+def our_classes(package, base):
+    return [cls for cls in package("registration").CLASSES if issubclass(cls, base)]
+
+
+def draw(panel):
+    """What a panel draws, None where it is not shown."""
     record = []
-    panel = getattr(bpy.types, name)
-    assert panel.poll(bpy.context)
-    panel.draw(types.SimpleNamespace(layout=Layout(record)), bpy.context)
-    assert record == [*SETTINGS, "uv.omt_unwrap", "uv.omt_refine", "uv.omt_seams", "uv.omt_measure"]
+    if hasattr(panel, "poll") and not panel.poll(bpy.context):
+        return None
+    stand_in = types.SimpleNamespace(layout=Layout(record), section=getattr(panel, "section", None))
+    for method in ("draw_header_preset", "draw"):
+        if method in dir(panel):
+            getattr(panel, method)(stand_in, bpy.context)
+    return record
 
 
-def test_redo_panel_shows_every_setting(package):
+@pytest.fixture(params=["EMPTY", "OBJECT", "EDIT", "SCULPT"])
+def mode(request):
+    """Panels are drawn in every mode, and without an object."""
+    if request.param != "EMPTY":
+        scenes.bump()
+        bpy.ops.object.mode_set(mode=request.param)
+
+
+@pytest.mark.parametrize("prefix", ["VIEW3D", "IMAGE"])
+def test_the_tab_shows_every_setting_of_every_operator(package, prefix, mode):
+    drawn = {}
+    for panel in our_classes(package, bpy.types.Panel):
+        if panel.bl_idname.startswith(prefix):
+            assert panel.bl_category == "OMT"
+            drawn[panel.bl_idname.removeprefix(f"{prefix}_PT_omt_uv")] = draw(panel)
+    assert set(drawn[""]) | set(drawn["_more"]) >= settings_of("uv.omt_unwrap") | {"uv.omt_unwrap"}
+    for section in package("panels.sidebar").SECTIONS:
+        panel = drawn[f"_{section.name}"]
+        if panel is None:
+            assert not hasattr(bpy.types, section.operator.replace(".", "_OT_").upper())
+        else:
+            assert section.operator in panel
+            assert len(panel) > 1
+    assert {"uv.omt_overlay", "uv.omt_measure", "uv.omt_histogram"} <= set(drawn["_distortion"])
+    assert {"uv.omt_density_get", "uv.omt_density_set", "density", "scope"} <= set(drawn["_density"])
+
+
+@pytest.mark.parametrize("name", ["unwrap", "refine", "seams"])
+def test_redo_panels_show_every_setting_once(package, name):
     record = []
-    properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
-    package("operators.unwrap").draw_settings(Layout(record), properties)
-    assert record == SETTINGS
-    assert set(SETTINGS) == {p.identifier for p in properties.bl_rna.properties if not p.is_readonly} - {"rna_type"}
+    properties = bpy.context.window_manager.operator_properties_last(f"uv.omt_{name}")
+    package(f"operators.{name}").draw_settings(Layout(record), properties)
+    assert sorted(record) == sorted(settings_of(f"uv.omt_{name}"))
 
 
-def test_refine_shows_every_setting():
-    record = []
-    properties = bpy.context.window_manager.operator_properties_last("uv.omt_refine")
-    settings = {p.identifier for p in properties.bl_rna.properties if not p.is_readonly} - {"rna_type"}
-    stand_in = types.SimpleNamespace(layout=Layout(record), bl_rna=properties.bl_rna, keep_boundary=False, pack=True)
-    bpy.types.UV_OT_omt_refine.draw(stand_in, bpy.context)
-    assert set(record) == settings
-    assert len(record) == len(settings)
+def test_the_result_of_the_last_run_is_shown(package):
+    scenes.bump()
+    bpy.ops.uv.omt_unwrap()
+    (main,) = (p for p in our_classes(package, bpy.types.Panel) if p.bl_idname == "VIEW3D_PT_omt_uv")
+    labels = [entry.removeprefix("label ") for entry in draw(main) if entry.startswith("label ")]
+    assert "Unwrap Area Preserving" in labels
+    for name in ("Area error", "Shear", "Folded faces", "Texel density", "Time"):
+        assert labels[labels.index(name) + 1][0].isdigit()
 
 
-def test_menu_entry(package):
+def test_a_run_shows_its_progress(package):
+    scenes.bump(20, 20)
+    operator = scenes.stand_in("uv.omt_unwrap")
+    running = package("running")
+    (main,) = (p for p in our_classes(package, bpy.types.Panel) if p.bl_idname == "VIEW3D_PT_omt_uv")
+    assert operator.start(bpy.context) == {"RUNNING_MODAL"} or running.current is None
+    if running.current is not None:
+        record = draw(main)
+        assert any(entry.startswith(("progress ", "label Charts")) for entry in record)
+        assert "uv.omt_unwrap" not in record
+        operator.cancel(bpy.context)
+
+
+def test_every_operator_is_in_a_menu(package):
     record = []
     package("panels.menus").draw_unwrap(types.SimpleNamespace(layout=Layout(record)), bpy.context)
-    assert record == ["uv.omt_unwrap", "uv.omt_refine", "uv.omt_seams", "uv.omt_measure"]
+    hidden = {"uv.omt_preset", "wm.omt_copy_report"}
+    names = {scenes.name_of(cls) for cls in our_classes(package, bpy.types.Operator)}
+    package("panels.menus").draw_remesh(types.SimpleNamespace(layout=Layout(record)), bpy.context)
+    assert names - hidden == set(record)
+
+
+def test_everything_has_a_tooltip(package):
+    """Every operator, property and choice says what it does, in one sentence or more without a final full stop."""
+    for cls in our_classes(package, (bpy.types.Operator, bpy.types.AddonPreferences)):
+        rna = cls.bl_rna
+        assert issubclass(cls, bpy.types.AddonPreferences) or len(cls.__doc__ or "") > 10, cls
+        inherited = {p.identifier for p in rna.base.properties} | {"rna_type"}
+        if issubclass(cls, bpy.types.Operator):
+            rna = bpy.context.window_manager.operator_properties_last(scenes.name_of(cls)).bl_rna
+        for prop in rna.properties:
+            if prop.is_readonly or prop.identifier in inherited:
+                continue
+            texts = [prop.description]
+            if prop.type == "ENUM":
+                texts += [item.description for item in prop.enum_items]
+            for text in texts:
+                assert len(text) > 5, f"{cls.__name__}.{prop.identifier}: {text!r}"
+                assert not text.endswith("."), f"{cls.__name__}.{prop.identifier}: Blender adds the full stop"
+            assert prop.name, prop.identifier
+
+
+@pytest.mark.parametrize("mode", ["SCULPT", "WEIGHT_PAINT", "VERTEX_PAINT"])
+def test_wrong_modes_grey_the_buttons(package, mode):
+    scenes.bump()
+    bpy.ops.object.mode_set(mode=mode)
+    for name in ("uv.omt_unwrap", "uv.omt_refine", "uv.omt_seams", "uv.omt_measure", "uv.omt_overlay"):
+        assert not scenes.class_of(name).poll(bpy.context)
+
+
+def test_presets_name_what_the_operator_has(package):
+    presets = package("preset_files")
+    files = presets.files("uv.omt_unwrap")
+    assert {"Character", "Scan", "Lightmap"} <= {path.stem for path in files}
+    properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    for path in files:
+        values = presets.values(path)
+        assert values.keys() <= settings_of("uv.omt_unwrap")
+        assert bpy.ops.uv.omt_preset(operator="uv.omt_unwrap", filepath=str(path)) == {"FINISHED"}
+        for name, value in values.items():
+            assert getattr(properties, name) == pytest.approx(value)
+    for prop in properties.bl_rna.properties:
+        properties.property_unset(prop.identifier)
+
+
+def test_a_broken_preset_is_refused(tmp_path):
+    (tmp_path / "Bad.py").write_text("op.margin = open('/')\n")
+    message = scenes.error_of(bpy.ops.uv.omt_preset, filepath=str(tmp_path / "Bad.py"))
+    assert "Bad.py cannot be used" in message
+
+
+def test_the_report_has_what_a_bug_needs(package):
+    scenes.cube()
+    scenes.error_of(bpy.ops.uv.omt_density_set)
+    text = package("operators.report").report_text(bpy.context)
+    for word in (
+        "OMT UV",
+        "Blender",
+        "numpy",
+        "scipy",
+        "xatlas",
+        "8 vertices",
+        "6 faces",
+        "last error: There are no UVs",
+    ):
+        assert word in text
+    assert "Cube" not in text  # no names of files or objects
 
 
 def test_the_choices_are_those_of_the_solver_and_of_the_command(package):

@@ -1,0 +1,48 @@
+"""What the last run did, for the panel and for reports of bugs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Summary:
+    """title: the operator; rows: pairs of a name and a value, as the panel shows them."""
+
+    title: str
+    rows: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass
+class State:
+    summary: Summary | None = None
+    error: str = ""
+    warnings: list[str] = field(default_factory=list)
+
+
+state = State()
+
+
+def figures(readings, texture_size: float, metres: float) -> tuple[tuple[str, str], ...]:
+    """Rows about the active UVs of readings; none where there is nothing to measure."""
+    from .measuring import measure_readings
+    from .solver.errors import MeshError
+    from .texel_density import Texels, density
+
+    try:
+        found = measure_readings(readings, overlap=False)
+        pixels = density(readings, Texels(texture_size, metres))
+    except MeshError:
+        return ()
+    return (
+        ("Area error", f"{100 * found.area_l1:.2f} %"),
+        ("Shear", f"{found.angle_mean:.3f}"),
+        ("Folded faces", f"{found.folds}"),
+        ("Islands", f"{found.charts}"),
+        ("Texel density", f"{pixels:.4g} px/m"),
+    )
+
+
+def seconds(value: float) -> str:
+    return f"{value:.2f} s" if value < 10 else f"{value:.0f} s"

@@ -1,0 +1,31 @@
+"""uv.omt_preset: settings of an operator from a preset file, before it runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+
+class UV_OT_omt_preset(bpy.types.Operator):
+    """Take over the settings of this preset"""
+
+    bl_idname = "uv.omt_preset"
+    bl_label = "Choose Preset"
+    bl_options = {"INTERNAL"}
+
+    operator: StringProperty(name="Operator", description="Operator that gets the settings", default="uv.omt_unwrap")
+    filepath: StringProperty(name="File", description="File of the preset", subtype="FILE_PATH")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from .. import preset_files
+
+        path = Path(self.filepath)
+        try:
+            preset_files.choose(path, context.window_manager.operator_properties_last(self.operator))
+        except (OSError, SyntaxError, ValueError, TypeError) as error:
+            self.report({"ERROR"}, f"{path.name} cannot be used: {error}")
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{path.stem}: the settings are chosen, nothing has been unwrapped yet")
+        return {"FINISHED"}

@@ -1,0 +1,54 @@
+"""wm.omt_copy_report: what a bug report needs, in the clipboard."""
+
+from __future__ import annotations
+
+import platform
+from importlib import metadata, util
+
+import bpy
+
+from .. import __version__, last_run
+
+
+class WM_OT_omt_copy_report(bpy.types.Operator):
+    """Copy versions, mesh sizes, the last figures and the last error as text, for a bug report"""
+
+    bl_idname = "wm.omt_copy_report"
+    bl_label = "Copy OMT UV Report"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.window_manager.clipboard = report_text(context)
+        self.report({"INFO"}, "The report is in the clipboard; paste it into the bug report")
+        return {"FINISHED"}
+
+
+def report_text(context: bpy.types.Context) -> str:
+    """Lines of text; names of objects and files are left out."""
+    lines = [f"OMT UV {__version__}", f"Blender {bpy.app.version_string}", platform.platform()]
+    lines += [
+        f"Python {platform.python_version()}",
+        *(f"{name} {_version(name)}" for name in ("numpy", "scipy", "xatlas")),
+    ]
+    lines.append(f"mode {context.mode}")
+    for k, obj in enumerate(o for o in context.selected_objects if o.type == "MESH"):
+        mesh = obj.data
+        sizes = f"{len(mesh.vertices)} vertices, {len(mesh.edges)} edges, {len(mesh.polygons)} faces"
+        scale = ", ".join(f"{x:.4g}" for x in obj.matrix_world.to_scale())
+        lines.append(f"mesh {k + 1}: {sizes}, {len(mesh.uv_layers)} UV maps, scale {scale}")
+    state = last_run.state
+    if state.summary is not None:
+        lines.append(f"last run: {state.summary.title}")
+        lines += [f"  {name}: {value}" for name, value in state.summary.rows]
+        lines += [f"  warning: {text}" for text in state.summary.warnings]
+    lines.append(f"last error: {state.error or 'none'}")
+    return "\n".join(lines) + "\n"
+
+
+def _version(name: str) -> str:
+    if util.find_spec(name) is None:
+        return "missing"
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "of unknown version"

@@ -1,0 +1,125 @@
+"""Distortion as colours: an attribute in the 3D View, filled faces in the UV editor. Taken back, nothing is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+
+
+@dataclass
+class _Shown:
+    """kind: NONE, AREA or SHEAR; what is drawn in the UV editor; how the 3D Views were shaded, by pointer."""
+
+    kind: str = "NONE"
+    places: list = field(default_factory=list)
+    colours: list = field(default_factory=list)
+    batch: object = None
+    shading: dict = field(default_factory=dict)
+    handle: object = None
+
+
+_shown = _Shown()
+
+
+def kind() -> str:
+    """What is shown: NONE, AREA or SHEAR."""
+    return _shown.kind
+
+
+def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
+    """Colour objects, pairs of object and Reading, by AREA or SHEAR.
+
+    Raises
+    ------
+    MeshError : see `solver.distortion.measure`
+    """
+    import numpy as np
+
+    from . import blender_colours
+    from .colours import area_colours, shear_colours
+    from .measuring import triangles_of
+    from .solver.distortion import face_distortion
+
+    V, F, uv = triangles_of([reading for _, reading in pairs])
+    octaves, shear = face_distortion(V, F, uv)
+    rgb = area_colours(octaves) if wanted == "AREA" else shear_colours(shear)
+    _paint_views(context)
+    start = 0
+    for obj, reading in pairs:
+        corners = reading.surface.triangles[reading.faces[reading.surface.triangle_face]]
+        mine = np.repeat(rgb[start : start + len(corners)], 3, axis=0)
+        blender_colours.write_colours(obj, corners.ravel(), mine)
+        start += len(corners)
+    rgba = np.concatenate([np.repeat(rgb, 3, axis=0), np.ones((3 * len(rgb), 1))], axis=1)
+    _shown.kind, _shown.places, _shown.colours = wanted, uv.reshape(-1, 2).tolist(), rgba.tolist()
+    _shown.batch = None
+    if _shown.handle is None and not bpy.app.background:
+        _shown.handle = bpy.types.SpaceImageEditor.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
+    _redraw(context)
+
+
+def hide(context: bpy.types.Context) -> None:
+    """Take everything back: attributes, shading, drawing."""
+    from . import blender_colours
+
+    for obj in bpy.data.objects:
+        if obj.type == "MESH" and obj.data.library is None and blender_colours.has_colours(obj.data):
+            blender_colours.remove_colours(obj)
+    for space in _view_spaces(context):
+        kept = _shown.shading.get(space.as_pointer())
+        if kept is not None and space.shading.type == "SOLID" and space.shading.color_type == "VERTEX":
+            space.shading.type, space.shading.color_type = kept
+    forget()
+    _redraw(context)
+
+
+def forget() -> None:
+    """Stop drawing; also when the add-on goes."""
+    if _shown.handle is not None:
+        bpy.types.SpaceImageEditor.draw_handler_remove(_shown.handle, "WINDOW")
+    _shown.__init__()  # type: ignore[misc]
+
+
+def refresh(context: bpy.types.Context, pairs: list) -> None:
+    """Colour anew what is shown, after the UVs changed."""
+    if _shown.kind != "NONE":
+        show(context, pairs, _shown.kind)
+
+
+def _paint_views(context: bpy.types.Context) -> None:
+    for space in _view_spaces(context):
+        key = space.as_pointer()
+        if key not in _shown.shading:
+            _shown.shading[key] = (space.shading.type, space.shading.color_type)
+        space.shading.type, space.shading.color_type = "SOLID", "VERTEX"
+
+
+def _view_spaces(context: bpy.types.Context) -> list:
+    areas = [area for window in context.window_manager.windows for area in window.screen.areas]
+    return [area.spaces.active for area in areas if area.type == "VIEW_3D"]
+
+
+def _redraw(context: bpy.types.Context) -> None:
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"VIEW_3D", "IMAGE_EDITOR"}:
+                area.tag_redraw()
+
+
+def _draw() -> None:
+    """Fill the faces in the UV editor; Blender draws their outlines over them."""
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    from .blender_versions import SMOOTH_COLOUR_SHADER
+
+    space = bpy.context.space_data
+    if space is None or not getattr(space, "show_uvedit", True):
+        return
+    shader = gpu.shader.from_builtin(SMOOTH_COLOUR_SHADER)
+    if _shown.batch is None:
+        _shown.batch = batch_for_shader(shader, "TRIS", {"pos": _shown.places, "color": _shown.colours})
+    gpu.state.blend_set("ALPHA")
+    _shown.batch.draw(shader)  # type: ignore[attr-defined]
+    gpu.state.blend_set("NONE")

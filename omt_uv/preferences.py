@@ -1,0 +1,96 @@
+"""What is chosen once for all files: Edit > Preferences > Add-ons > OMT UV."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+
+from . import running
+from .settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, QUALITIES
+
+# The package that Blender knows as the add-on contains this one.
+ADDON = __package__.rpartition(".")[0] or __package__
+DEFAULTS = ("boundary", "quality", "keep_free", "texture_size")
+OPERATORS = ("UV_OT_omt_unwrap", "UV_OT_omt_refine", "UV_OT_omt_magnify", "UV_OT_omt_seams", "UV_OT_omt_density_set")
+
+
+def _changed(self, context: bpy.types.Context) -> None:
+    apply(self, context)
+
+
+class OMTUVPreferences(bpy.types.AddonPreferences):
+    bl_idname = ADDON
+
+    boundary: EnumProperty(
+        name="Boundary",
+        description="Outline of every island that operators start with",
+        items=BOUNDARIES,
+        default=DEFAULT_BOUNDARY,
+        update=_changed,
+    )
+    quality: EnumProperty(
+        name="Quality",
+        description="How exact the areas become that operators start with",
+        items=QUALITIES,
+        default=DEFAULT_QUALITY,
+        update=_changed,
+    )
+    keep_free: StringProperty(
+        name="Keep Free", description="Vertex group that new cuts avoid, where a mesh has it", update=_changed
+    )
+    texture_size: IntProperty(
+        name="Texture Size",
+        description="Width of your textures, in pixels: margins and texel densities refer to it",
+        default=DEFAULT_TEXTURE_SIZE,
+        min=16,
+        max=65536,
+        subtype="PIXEL",
+        update=_changed,
+    )
+    own_thread: BoolProperty(
+        name="Solve on a Second Core",
+        description="Keep the window fluid during a run. Without it Blender pauses for every large linear system",
+        default=True,
+        update=_changed,
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.label(text="New sessions start with")
+        for name in DEFAULTS:
+            layout.prop(self, name)
+        layout.separator()
+        layout.prop(self, "own_thread")
+        layout.operator("wm.omt_copy_report", icon="COPYDOWN")
+
+
+def get(context: bpy.types.Context) -> OMTUVPreferences | None:
+    """The preferences; None where the package is used without the add-on."""
+    addon = context.preferences.addons.get(ADDON)
+    return addon.preferences if addon else None
+
+
+def apply(preferences, context: bpy.types.Context) -> None:
+    """Let operators start from the preferences, as if they had been chosen in the panel."""
+    running.threads = preferences.own_thread
+    for name in OPERATORS:
+        if not hasattr(bpy.types, name):
+            continue
+        group, _, verb = name.partition("_OT_")
+        chosen = context.window_manager.operator_properties_last(f"{group.lower()}.{verb}")
+        for setting in DEFAULTS:
+            if setting in chosen.bl_rna.properties:
+                setattr(chosen, setting, getattr(preferences, setting))
+
+
+def apply_soon() -> None:
+    """Once Blender is up: an add-on that is being registered has no window manager yet."""
+    if not bpy.app.background:
+        bpy.app.timers.register(_apply, first_interval=0.0)
+
+
+def _apply() -> None:
+    preferences = get(bpy.context)
+    if preferences is not None:
+        apply(preferences, bpy.context)

@@ -1,0 +1,103 @@
+"""Texel density of UV islands: how many pixels of the texture a metre of the surface gets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .blender_mesh import Reading
+from .solver.distortion import uv_charts
+from .solver.errors import EmptyMeshError, ZeroAreaFaceError
+from .solver.geometry import face_areas, signed_areas
+
+
+@dataclass(frozen=True)
+class Texels:
+    """How UV and space are measured: pixels along a side of the texture, and metres in a unit of length."""
+
+    texture_size: float
+    metres: float = 1.0
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """UVs (c,2), triangles (m,3) of corners, the island (m,) of each, their areas (m,) in space and in UV."""
+
+    uv: np.ndarray
+    corners: np.ndarray
+    island: np.ndarray
+    space: np.ndarray
+    uv_area: np.ndarray
+
+
+def density(readings: Sequence[Reading], texels: Texels) -> float:
+    """Pixels per metre of the chosen polygons of all readings together.
+
+    Raises
+    ------
+    EmptyMeshError : no UVs, or no polygon is chosen; ZeroAreaFaceError : nothing has an area
+    """
+    faces = [_faces(reading) for reading in readings]
+    return _density(sum(f.space.sum() for f in faces), sum(f.uv_area.sum() for f in faces), texels)
+
+
+def with_density(
+    readings: Sequence[Reading], wanted: float, texels: Texels, each_island: bool
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Corners (k,) and UVs (k,2) of the chosen polygons of every reading, scaled to `wanted` pixels per metre.
+
+    each_island: every island about the middle of its bounding box, so that afterwards all have this density; otherwise
+    the whole layout by one factor about its middle, which keeps the differences between islands.
+
+    Raises
+    ------
+    EmptyMeshError, ZeroAreaFaceError : as for `density`
+    """
+    faces = [_faces(reading) for reading in readings]
+    common = wanted / _density(sum(f.space.sum() for f in faces), sum(f.uv_area.sum() for f in faces), texels)
+    used = np.concatenate([f.uv[np.unique(f.corners)] for f in faces])
+    middle = (used.min(axis=0) + used.max(axis=0)) / 2
+    result = []
+    for face in faces:
+        corners, first = np.unique(face.corners, return_index=True)
+        uv = face.uv[corners]
+        island = np.repeat(face.island, 3)[first]
+        if each_island:
+            factor, centre = _of_islands(face, island, uv, wanted, texels)
+        else:
+            factor, centre = np.full(len(uv), common), middle
+        result.append((corners, centre + (uv - centre) * factor[:, None]))
+    return result
+
+
+def _of_islands(face: _Faces, island, uv, wanted: float, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
+    """Factor (k,) and centre (k,2) for every corner, of its island; islands without area stay as they are."""
+    count = int(face.island.max()) + 1
+    space, covered = np.bincount(face.island, face.space, count), np.bincount(face.island, face.uv_area, count)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = wanted * texels.metres / texels.texture_size * np.sqrt(space / covered)
+    factor = np.where(np.isfinite(factor) & (factor > 0), factor, 1.0)
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, island, uv)
+    np.maximum.at(high, island, uv)
+    return factor[island], ((low + high) / 2)[island]
+
+
+def _faces(reading: Reading) -> _Faces:
+    if reading.uv is None:
+        raise EmptyMeshError("There are no UVs", remedy="Unwrap the mesh first")
+    surface = reading.surface
+    corners = surface.triangles[reading.faces[surface.triangle_face]]
+    if not len(corners):
+        raise EmptyMeshError("There are no faces to measure")
+    uv, triangles = reading.uv.astype(float), surface.corner_vertex[corners]
+    _, island = uv_charts(triangles, uv[corners])
+    return _Faces(uv, corners, island, face_areas(surface.positions, triangles), np.abs(signed_areas(uv, corners)))
+
+
+def _density(space: float, covered: float, texels: Texels) -> float:
+    if not (space > 0 and covered > 0):
+        raise ZeroAreaFaceError("The faces have no area in space, or none in the UV map")
+    return float(texels.texture_size / texels.metres * np.sqrt(covered / space))
