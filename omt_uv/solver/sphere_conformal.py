@@ -35,12 +35,14 @@ class ConformalSphere:
     """positions (n,3) on the unit sphere, faces counter-clockwise seen from outside, area-weighted mean at 0.
 
     folds: faces too small for double precision that do not come out so; infinite: the vertex that was sent to infinity;
-    residual: largest error of an angle sum in radians; Newton steps, and flips.
+    triangles (m,3): the Delaunay triangulation that the edges flipped to, also counter-clockwise; residual: largest
+    error of an angle sum in radians; Newton steps, and flips.
     """
 
     positions: np.ndarray
     folds: int
     infinite: int
+    triangles: np.ndarray
     residual: float
     iterations: int
     flips: int
@@ -66,7 +68,8 @@ def conformal_sphere(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Confo
     mass = vertex_areas(vertices, triangles)
     positions = centred(_on_sphere(z, infinite, mass), mass)
     folds = int((~(signed_volumes(positions, triangles) > 0)).sum())
-    return ConformalSphere(positions, folds, infinite, flat.residual, flat.iterations, flat.flips)
+    delaunay = flat.triangulation.triangles
+    return ConformalSphere(positions, folds, infinite, delaunay, flat.residual, flat.iterations, flat.flips)
 
 
 def rounded(tri: IntrinsicTriangulation, n: int) -> Steps[IntrinsicTriangulation]:

@@ -5,19 +5,33 @@ from __future__ import annotations
 import numpy as np
 
 
-def signed_volumes(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Determinant (m,) of the three corners of every triangle, positive when counter-clockwise seen from outside.
+def normalized(vectors: np.ndarray) -> np.ndarray:
+    """Unit vectors (n,3) in the direction of vectors (n,3); zero stays zero."""
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(size > 0, size, 1)
+
+
+def triple_products(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Determinant (m,) of points (m,3) each, positive when counter-clockwise seen from outside.
 
     Differences first: of close points they are exact, so that the sign of a tiny triangle is right.
     """
+    return np.einsum("md,md->m", a, np.cross(b - a, c - a))
+
+
+def triangle_areas(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Signed area (m,) of the spherical triangles of unit vectors (m,3) each (van Oosterom, Strackee 1983)."""
+    below = 1 + np.einsum("md,md->m", a, b) + np.einsum("md,md->m", b, c) + np.einsum("md,md->m", c, a)
+    return 2 * np.arctan2(triple_products(a, b, c), below)
+
+
+def signed_volumes(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Triple product (m,) of the corners of every triangle of unit vectors (n,3); negative where it is folded."""
     p = positions[triangles]
-    a, b, c = p[:, 0], p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    return np.einsum("md,md->m", a, np.cross(b, c))
+    return triple_products(p[:, 0], p[:, 1], p[:, 2])
 
 
 def spherical_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Signed area (m,) of every spherical triangle (van Oosterom, Strackee 1983); positive ones tile 4 pi."""
+    """Signed area (m,) of every spherical triangle of unit vectors (n,3); positive ones tile 4 pi."""
     p = positions[triangles]
-    a, b, c = p[:, 0], p[:, 1], p[:, 2]
-    below = 1 + (a * b).sum(axis=1) + (b * c).sum(axis=1) + (c * a).sum(axis=1)
-    return 2 * np.arctan2(signed_volumes(positions, triangles), below)
+    return triangle_areas(p[:, 0], p[:, 1], p[:, 2])
