@@ -63,7 +63,11 @@ def elements(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray) -
 
 def energy(faces: Elements, w: np.ndarray, balance: float) -> float:
     """The energy of a map w (n,) complex; infinity where a face is folded."""
-    a, b = faces.derivatives(w)
+    return energy_of(faces, *faces.derivatives(w), balance)
+
+
+def energy_of(faces: Elements, a: np.ndarray, b: np.ndarray, balance: float) -> float:
+    """The energy of the derivatives a, b (m,) complex; infinity where a face is folded."""
     outer, inner = squared(a), squared(b)
     det = outer - inner
     if not det.min() > 0:
@@ -102,8 +106,21 @@ def local_derivatives(faces: Elements, w: np.ndarray, balance: float, pressure: 
     pressure on all faces has no effect inside), but not once it is projected face by face: then it only holds the
     faces back. `pressure` in [0, 1] is the share of it that the Hessian keeps; at 0 the term is Gauss-Newton's.
     """
-    a, b = faces.derivatives(w)
-    (e_outer, e_inner), (h_outer, h_inner), block = _by_squares(faces, a, b, balance, pressure)
+    return derivatives_of(faces, *faces.derivatives(w), balance, pressure)
+
+
+def derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, balance: float, pressure: float) -> Local:
+    """As `local_derivatives`, from the derivatives a, b (m,) complex of the map."""
+    return local_of(faces, a, b, *_by_squares(faces, a, b, balance, pressure))
+
+
+def local_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, kept, block) -> Local:
+    """Gradients and projected Hessians of an energy of |a|^2 and |b|^2.
+
+    first: its derivatives by both, (m,) each; kept: those that the Hessian along the phases sees; block: the Hessian's
+    entries aa, ab, bb by |a| and |b|.
+    """
+    (e_outer, e_inner), (h_outer, h_inner) = first, kept
     g = faces.gradient
     corner = (e_outer * a)[:, None] * g + (e_inner * b)[:, None] * g.conj()
     # Linear forms: change of |a|, of |b|, and of the two phases.

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from .energy import Elements, energy, local_derivatives, scatter, squared
+from .energy import Elements, area_error, energy, local_derivatives, scatter, squared
 from .linear import Factor
 
 ARMIJO = 1e-4
@@ -156,6 +156,12 @@ class Problem:
         value = energy(self.faces, w, self.weight)
         return value + sum(e.energy(w) for e in self.extras) if np.isfinite(value) else value
 
+    def area_error(self, w: np.ndarray) -> float:
+        return area_error(self.faces, w)
+
+    def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
+        return newton_step(self, w, value, pressure)
+
 
 @dataclass(frozen=True)
 class Step:
@@ -213,8 +219,11 @@ def newton_step(problem: Problem, w: np.ndarray, value: float, pressure: float =
 
 def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:
     """The smallest t > 0 at which a face of w + t step has no area; infinity if there is none."""
-    a, b = faces.derivatives(w)
-    da, db = faces.derivatives(step)
+    return fold_share(*faces.derivatives(w), *faces.derivatives(step))
+
+
+def fold_share(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> float:
+    """The smallest t > 0 at which a face with the derivatives a + t da, b + t db (m,) complex has no area."""
     c = squared(a) - squared(b)
     h = (a.conj() * da).real - (b.conj() * db).real
     q = squared(da) - squared(db)

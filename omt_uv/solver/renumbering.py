@@ -50,7 +50,7 @@ def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | No
     uv = np.asarray(uv, float)
     check_start(uv, triangles)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
-    order = minimum_degree(_graph(triangles, len(vertices)))
+    order = minimum_degree(vertex_graph(triangles, len(vertices)))
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     held = None
@@ -60,6 +60,7 @@ def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | No
     return Renumbered(vertices[order], place[triangles], uv[order] * mirror, held, order, mirror)
 
 
-def _graph(triangles: np.ndarray, n: int) -> coo_matrix:
+def vertex_graph(triangles: np.ndarray, n: int) -> coo_matrix:
+    """Which of n vertices share a triangle (m,3), themselves included: (n,n), entries positive."""
     pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
     return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))

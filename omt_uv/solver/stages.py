@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from .contact import Contact, contact, crossings
 from .energy import Elements, area_error
-from .newton import Assembly, Motion, Problem, Step, newton_step
+from .newton import Assembly, Motion, Problem, Step
 from .progress import Progress, Steps
 
 
@@ -97,7 +98,7 @@ class Found:
     warnings: tuple[str, ...]
 
 
-def _weights(balance: float, settings: Quality) -> list[float]:
+def weights_of(balance: float, settings: Quality) -> list[float]:
     """The preset's weights; with a balance, those on the way to one between the preset's last and LEAST_WEIGHT."""
     if balance == 0:
         return list(settings.weights)
@@ -110,7 +111,7 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Step
 
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
-    weights = _weights(balance, settings)
+    weights = weights_of(balance, settings)
     if task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
     overlap, guarded, steps, k = task.crosses(w), task.guarded, 0, 0
@@ -148,8 +149,18 @@ class Stage:
     status: str
 
 
+class Minimised(Protocol):
+    """An energy of maps w, arrays of any shape, with a Newton step that never folds a face."""
+
+    def energy(self, w: np.ndarray) -> float: ...
+
+    def area_error(self, w: np.ndarray) -> float: ...
+
+    def step(self, w: np.ndarray, value: float, pressure: float) -> Step: ...
+
+
 def minimise(
-    problem: Problem,
+    problem: Minimised,
     w: np.ndarray,
     goal: float,
     allowed: int,
@@ -165,7 +176,7 @@ def minimise(
     value = problem.energy(w)
     steps, residual, status, pressure = 0, np.inf, "steps", FIRST_PRESSURE
     while steps < max(allowed, 1):
-        step, used = newton_step(problem, w, value, pressure), pressure
+        step, used = problem.step(w, value, pressure), pressure
         pressure = _next_pressure(pressure, step, value)
         if watch is not None and watch(step.w):
             return Stage(w, steps + 1, residual, value, "crossed")
@@ -176,7 +187,7 @@ def minimise(
         if step.share == 0 and used == 1.0:
             status = "stalled"
             break
-        if residual < LOOSE and area_error(problem.faces, w) <= goal:
+        if residual < LOOSE and problem.area_error(w) <= goal:
             status = "converged"
             break
         if residual < tolerance:

@@ -1,0 +1,131 @@
+"""The energy of `energy.py` for maps to the unit sphere, and its projected Newton step.
+
+A face is measured as its corners are seen from above their middle c = (p_0 + p_1 + p_2) / |p_0 + p_1 + p_2|: in a frame
+of two axes across c, where it has no area just when it has none on the sphere. With the corners the frame turns: their
+coordinates change by dz_k = axes (dp_k - (c . p_k) / |p_0 + p_1 + p_2| (dp_0 + dp_1 + dp_2)). What is seen is smaller
+than the spherical triangle, so the areas asked for are shrunk alike, anew in every stage.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .energy import Elements, Local, derivatives_of, energy_of
+from .newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, Step, fold_share
+from .linear import Factor
+from .spherical import normalized, signed_volumes, spherical_areas
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Faces from above: axes (m,2,3) of their frames, corners (m,3) complex, mixing (m,3,3) of what corners change."""
+
+    axes: np.ndarray
+    corner: np.ndarray
+    mixing: np.ndarray
+
+    def change(self, vectors: np.ndarray) -> np.ndarray:
+        """How the corners (m,3) complex change when those on the sphere move by vectors (m,3,3)."""
+        part = np.einsum("mad,mkd->mka", self.axes, vectors)
+        return np.einsum("mkl,ml->mk", self.mixing, part[..., 0] + 1j * part[..., 1])
+
+
+def seen(positions: np.ndarray, triangles: np.ndarray) -> Seen:
+    """The faces (m,3) of unit vectors (n,3) from above."""
+    p = positions[triangles]
+    total = p.sum(axis=1)
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    up = total / np.maximum(size, 1e-300)
+    side = p[:, 1] - p[:, 0]
+    first = normalized(side - np.einsum("md,md->m", side, up)[:, None] * up)
+    axes = np.stack([first, np.cross(up, first)], axis=1)
+    part = np.einsum("mad,mkd->mka", axes, p - p[:, :1])
+    height = np.einsum("md,mkd->mk", up, p) / np.maximum(size, 1e-300)
+    return Seen(axes, part[..., 0] + 1j * part[..., 1], np.eye(3) - height[:, :, None])
+
+
+def derivatives(faces: Elements, corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """dw/dz and dw/dconj(z) per face, (m,) complex each, of corners (m,3) complex."""
+    a = 0.5 * np.einsum("mk,mk->m", corner, faces.gradient.conj())
+    b = 0.5 * np.einsum("mk,mk->m", corner, faces.gradient)
+    return a, b
+
+
+def tangents(positions: np.ndarray) -> np.ndarray:
+    """Two orthonormal tangents (n,2,3) at unit vectors (n,3)."""
+    least = np.eye(3)[np.abs(positions).argmin(axis=1)]
+    first = normalized(np.cross(positions, least))
+    return np.stack([first, np.cross(positions, first)], axis=1)
+
+
+def moved(positions: np.ndarray, axes: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Unit vectors (n,3) after steps (n,2) along their tangents (n,2,3)."""
+    return normalized(positions + np.einsum("na,nad->nd", step, axes))
+
+
+@dataclass(frozen=True)
+class SphereProblem:
+    """What Newton minimises: faces whose ratio is as seen from above, the weight of their area term.
+
+    target (m,): spherical areas, summing to 4 pi; ratio (m,): theirs over those of the surface.
+    """
+
+    faces: Elements
+    target: np.ndarray
+    ratio: np.ndarray
+    assembly: Assembly
+    weight: float
+
+    def energy(self, positions: np.ndarray) -> float:
+        """The energy of unit vectors (n,3); infinity where a face is folded."""
+        if not signed_volumes(positions, self.faces.triangles).min() > 0:
+            return np.inf
+        return energy_of(self.faces, *derivatives(self.faces, seen(positions, self.faces.triangles).corner), self.weight)
+
+    def area_error(self, positions: np.ndarray) -> float:
+        """The larger of the share of the area in the wrong place and the deviation of the areas' ratios."""
+        share = self.target / self.target.sum()
+        ratio = spherical_areas(positions, self.faces.triangles) / self.target
+        return float(max(share @ np.abs(ratio - 1), np.sqrt(share @ (ratio - 1) ** 2)))
+
+    def step(self, positions: np.ndarray, value: float, pressure: float) -> Step:
+        """One line-searched Newton step from unit vectors (n,3) of energy `value`."""
+        face = seen(positions, self.faces.triangles)
+        a, b = derivatives(self.faces, face.corner)
+        local = derivatives_of(self.faces, a, b, self.weight, pressure)
+        axes = tangents(positions)
+        direction, slope = newton_direction(self.faces, self.assembly, positions, axes, face, local)
+        change = np.einsum("na,nad->nd", direction, axes)[self.faces.triangles]
+        share = min(1.0, FOLD_SHARE * fold_share(a, b, *derivatives(self.faces, face.change(change))))
+        for _ in range(MAX_HALVINGS):
+            trial = moved(positions, axes, share * direction)
+            trial_value = self.energy(trial)
+            if trial_value <= value + ARMIJO * share * slope:
+                return Step(trial, trial_value, -slope / 2, share)
+            share *= 0.5
+        return Step(positions, value, -slope / 2, 0.0)
+
+
+def newton_direction(
+    faces: Elements, assembly: Assembly, positions: np.ndarray, axes: np.ndarray, face: Seen, local: Local
+) -> tuple[np.ndarray, float]:
+    """Step (n,2) along the tangents (n,2,3), and the slope of the energy along it (negative)."""
+    n, triangles = len(positions), faces.triangles
+    # How the tangents of the corners lie in the frames of the faces: (m, corner, frame axis, tangent).
+    turn = np.einsum("mfd,mkad->mkfa", face.axes, axes[triangles])
+    forms = np.matmul(local.rows, face.mixing)
+    rows = forms.real[..., None] * turn[:, None, :, 0] - forms.imag[..., None] * turn[:, None, :, 1]
+    rows = np.ascontiguousarray(rows.reshape(len(triangles), 4, 6))
+    corner = np.einsum("mk,mkl->ml", local.gradient, face.mixing)
+    corner = np.stack([corner.real, corner.imag], axis=2)
+    pull = np.einsum("mkf,mfd->mkd", corner, face.axes).reshape(-1, 3)
+    gradient = np.column_stack([np.bincount(triangles.ravel(), pull[:, d], n) for d in range(3)])
+    # Moving along a great circle bends inwards: the pull along the radius adds to the Hessian.
+    bend = np.maximum(-np.einsum("nd,nd->n", gradient, positions), 0)
+    scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
+    matrix = assembly.matrix(np.matmul(rows.transpose(0, 2, 1), rows), np.repeat(bend, 2) + SHIFT * scale)
+    slope = np.einsum("nd,nad->na", gradient, axes).ravel()
+    step = -Factor(matrix, "natural").solve(slope)
+    return step.reshape(n, 2), float(step @ slope)

@@ -1,0 +1,132 @@
+"""Authalic refinement on the sphere: every face gets its area, none folds, and the shear is the least that allows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .energy import elements, squared
+from .errors import FoldedUVError
+from .linear import minimum_degree
+from .newton import Assembly
+from .progress import Progress, Steps
+from .renumbering import vertex_graph
+from .spherical import signed_volumes, spherical_areas
+from .sphere_newton import SphereProblem, derivatives, seen
+from .sphere_untangle import untangle_on_sphere
+from .stages import LOOSE, QUALITIES, SQUEEZED, STAGE_STEPS, STRICT, Quality, minimise, weights_of
+
+# Steps on the way from coarse to fine: the finer levels do the rest.
+RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
+
+
+@dataclass(frozen=True)
+class SphereRefinement:
+    """positions (n,3) on the sphere, no face folded; Newton steps, after those for untangling; last predicted decrease over energy.
+
+    area_error: the larger of the share of the area in the wrong place and the deviation of the areas' ratios; weight:
+    that of the area term; energy at the end; status: "converged", "stalled" or "steps".
+    """
+
+    positions: np.ndarray
+    iterations: int
+    untangling: int
+    residual: float
+    area_error: float
+    weight: float
+    energy: float
+    status: str
+
+
+def sphere_refine(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    positions: np.ndarray,
+    target: np.ndarray,
+    *,
+    balance: float = 0.0,
+    quality: str = "standard",
+) -> Steps[SphereRefinement]:
+    """Refine a map (n,3) of a closed surface (n,3), (m,3) until every face has its area.
+
+    Parameters
+    ----------
+    target : (m,) area that every spherical triangle shall have relative to the others
+    balance : 0 for exact areas to 1 for the least shear
+    quality : "draft", "standard" or "exact"
+
+    Raises
+    ------
+    FoldedUVError : faces of the start are folded, and could not be straightened
+
+    References
+    ----------
+    As for `refine.refine`.
+    """
+    if not 0 <= balance <= 1:
+        raise ValueError(f"balance must lie in [0, 1], not {balance}")
+    yield Progress("Refinement", 0.0)
+    problem, order = _renumbered(vertices, triangles, target)
+    start, steps = yield from untangle_on_sphere(problem.faces, problem.assembly, positions[order])
+    folded = np.flatnonzero(~(signed_volumes(start, problem.faces.triangles) > 0))
+    if len(folded):
+        raise FoldedUVError("The start of the refinement is folded on the sphere", kind="face", elements=folded)
+    found = yield from _stages(problem, start, balance, QUALITIES[quality])
+    yield Progress("Refinement", 1.0)
+    return replace(found, positions=_in_order(found.positions, order), untangling=steps)
+
+
+def relax(
+    vertices: np.ndarray, triangles: np.ndarray, positions: np.ndarray, target: np.ndarray
+) -> Steps[tuple[np.ndarray, int]]:
+    """A few steps from a map without folds (n,3), and their number: areas roughly right, shear low."""
+    problem, order = _renumbered(vertices, triangles, target)
+    found = yield from _stages(problem, positions[order], 0.0, RELAXING)
+    return _in_order(found.positions, order), found.iterations
+
+
+def _renumbered(vertices, triangles, target) -> tuple[SphereProblem, np.ndarray]:
+    """The problem with vertices in the order (n,) in which they are eliminated."""
+    order = minimum_degree(vertex_graph(triangles, len(vertices)))
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    triangles, target = place[triangles], target * (4 * np.pi / target.sum())
+    faces = elements(vertices[order], triangles, target)
+    return SphereProblem(faces, target, faces.ratio, Assembly(triangles, len(vertices)), 1.0), order
+
+
+def _in_order(positions: np.ndarray, order: np.ndarray) -> np.ndarray:
+    result = np.empty_like(positions)
+    result[order] = positions
+    return result
+
+
+def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Quality) -> Steps[SphereRefinement]:
+    """Newton in stages of growing weight, as `stages.stages`."""
+    weights = weights_of(balance, settings)
+    if seen_from_above(problem, p, weights[0]).energy(p) > SQUEEZED and weights[0] > 1:
+        weights = [1.0, *weights]
+    steps, k = 0, 0
+    while True:
+        current = seen_from_above(problem, p, weights[k])
+        goal = settings.area_error if k >= len(weights) - 1 else np.inf
+        left = settings.max_steps - steps
+        allowed = min(left, STAGE_STEPS) if balance == 0 else left
+        tolerance = settings.tolerance if balance == 0 else STRICT
+        stage = yield from minimise(current, p, goal, allowed, k, None, tolerance)
+        p, steps, weight, k = stage.w, steps + stage.steps, weights[k], k + 1
+        error = problem.area_error(p)
+        enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
+        if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
+            return SphereRefinement(p, steps, 0, stage.residual, error, weight, stage.energy, stage.status)
+        if k >= len(weights):
+            weights.append(weights[-1] * min(max(2.0, (error / settings.area_error) ** 2), 10.0))
+
+
+def seen_from_above(problem: SphereProblem, p: np.ndarray, weight: float) -> SphereProblem:
+    """The problem with its targets as much below the spherical ones as the faces of the map p (n,3) are."""
+    triangles = problem.faces.triangles
+    a, b = derivatives(problem.faces, seen(p, triangles).corner)
+    shrink = (squared(a) - squared(b)) * problem.target / problem.ratio / spherical_areas(p, triangles)
+    return replace(problem, faces=replace(problem.faces, ratio=problem.ratio * shrink), weight=weight)

@@ -1,0 +1,92 @@
+"""Straighten a map to the sphere that has folded faces, by an energy that is finite at a fold.
+
+In the energy of `energy.py` the area ratio r of a face is replaced by chi(r) = (r + sqrt(eps^2 + r^2)) / 2, positive for
+folded faces too, and eps shrinks with the worst fold (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov 2021).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .energy import Elements, Local, local_of, squared
+from .newton import ARMIJO, Assembly
+from .progress import Progress, Steps
+from .spherical import signed_volumes
+from .sphere_newton import derivatives, moved, newton_direction, seen, tangents
+
+MAX_STEPS = 60
+MAX_HALVINGS = 12
+# eps is this share of the worst fold, and at least the second.
+SHARE, LEAST = 0.2, 1e-3
+AREA_WEIGHT = 1.0
+
+
+def untangle_on_sphere(faces: Elements, assembly: Assembly, positions: np.ndarray) -> Steps[tuple[np.ndarray, int]]:
+    """Unit vectors (n,3) near the given ones with no face folded, if that is found, and the steps taken.
+
+    The caller checks: the method has no guarantee, and gives up where it makes no more progress.
+    """
+    # In units of the areas asked for; faces of little area must not fold either.
+    even = np.full(len(faces.area), 1 / len(faces.area))
+    faces = replace(faces, gradient=faces.gradient / np.sqrt(faces.ratio)[:, None], area=(faces.area + even) / 2)
+    for k in range(MAX_STEPS):
+        if signed_volumes(positions, faces.triangles).min() > 0:
+            return positions, k
+        yield Progress("Untangling", k / MAX_STEPS)
+        following = _step(faces, assembly, positions)
+        if following is None:
+            break
+        positions = following
+    return positions, MAX_STEPS
+
+
+def _step(faces: Elements, assembly: Assembly, positions: np.ndarray) -> np.ndarray | None:
+    face = seen(positions, faces.triangles)
+    a, b = derivatives(faces, face.corner)
+    worst = min(float((squared(a) - squared(b)).min()), 0.0)
+    eps = np.hypot(LEAST, SHARE * worst)
+    value, local = _energy(faces, a, b, eps), _local(faces, a, b, eps)
+    axes = tangents(positions)
+    direction, slope = newton_direction(faces, assembly, positions, axes, face, local)
+    share = 1.0
+    for _ in range(MAX_HALVINGS):
+        trial = moved(positions, axes, share * direction)
+        there = derivatives(faces, seen(trial, faces.triangles).corner)
+        if _energy(faces, *there, eps) <= value + ARMIJO * share * slope:
+            return trial
+        share /= 2
+    return None
+
+
+def _chi(det: np.ndarray, eps: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """chi and its first two derivatives."""
+    root = np.hypot(eps, det)
+    # For folds the sum cancels: chi = eps^2 / (2 (root - det)).
+    chi = np.where(det > 0, 0.5 * (det + root), 0.5 * eps**2 / (root + np.abs(det)))
+    return chi, chi / root, 0.5 * eps**2 / root**3
+
+
+def _energy(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> float:
+    outer, inner = squared(a), squared(b)
+    chi, _, _ = _chi(outer - inner, eps)
+    return float(faces.area @ ((outer + inner) / chi + AREA_WEIGHT * (chi + 1 / chi) / 2))
+
+
+def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> Local:
+    """As `energy.derivatives_of`, for the energy with chi instead of the area ratio."""
+    outer, inner = squared(a), squared(b)
+    chi, first, second = _chi(outer - inner, eps)
+    total = outer + inner
+    # The area term is a function of chi, the shear term a quotient by it.
+    slope = AREA_WEIGHT / 2 * (1 - 1 / chi**2) * first
+    bend = AREA_WEIGHT * (first**2 / chi**3 + (1 - 1 / chi**2) * second / 2)
+    quotient = total * (2 * first**2 / chi**3 - second / chi**2) + bend
+    area = faces.area
+    by_outer = area * (1 / chi - total * first / chi**2 + slope)
+    by_inner = area * (1 / chi + total * first / chi**2 - slope)
+    oo = area * (quotient - 2 * first / chi**2)
+    ii = area * (quotient + 2 * first / chi**2)
+    block = 2 * by_outer + 4 * outer * oo, -4 * area * np.sqrt(outer * inner) * quotient, 2 * by_inner + 4 * inner * ii
+    return local_of(faces, a, b, (by_outer, by_inner), (by_outer, by_inner), block)
