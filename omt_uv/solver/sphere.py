@@ -1,4 +1,8 @@
-"""Area-preserving maps of closed surfaces of genus 0 to the unit sphere."""
+"""Area-preserving maps of closed surfaces of genus 0 to the unit sphere.
+
+Conformal map, transport, refinement, as on the plane; and where one of the first two leaves double precision, a start
+from coarse to fine instead, which always exists.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .progress import Steps
-from .sphere_conformal import conformal_sphere
+from .closed import ClosedSurface, closed_surface
+from .errors import DensityError, FoldedUVError, PrecisionError, TransportError
+from .geometry import face_areas, vertex_areas
+from .progress import Steps, part_of
+from .sphere_conformal import ConformalSphere, conformal_sphere
+from .sphere_multilevel import multilevel_start
+from .sphere_refine import SphereRefinement, sphere_refine
+from .sphere_transport import sphere_transport
+from .spherical_power import Hull
+from .stages import QUALITIES
+from .topology import twins
 
 METHODS = ("newton",)
+# Where the time goes, roughly, as start and width.
+CONFORMAL, TRANSPORT, REFINEMENT, ANEW = (0.0, 0.15), (0.15, 0.25), (0.4, 0.6), (0.4, 0.3)
 
 
 @dataclass(frozen=True)
@@ -17,7 +32,9 @@ class SphereMap:
     """A map of a closed surface to the unit sphere.
 
     positions (n,3) unit vectors, faces counter-clockwise seen from outside; conformal (n,3): the Moebius-centred
-    conformal map it started from; status; iterations: Newton steps; residual; warnings: what was replaced and why.
+    conformal map it started from, or the map of least shear where that leaves double precision; status: see
+    `sphere_refine.SphereRefinement`; iterations: Newton steps of the refinement; residual: last predicted decrease
+    over energy; warnings: what was repaired or replaced, and why.
     """
 
     positions: np.ndarray
@@ -36,14 +53,85 @@ def sphere_map(
     quality: str = "standard",
     method: str = "newton",
 ) -> Steps[SphereMap]:
-    """Map a closed surface (n,3), (m,3) of genus 0 to the unit sphere.
+    """Map a closed surface (n,3), (m,3) of genus 0 to the unit sphere, every face with its share of 4 pi.
+
+    Parameters
+    ----------
+    density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default
+    balance : from 0, exact areas, to 1, least shear
+    quality : "draft", "standard" or "exact", how small the area error of single faces becomes
+    method : "newton"
 
     Raises
     ------
     MeshError : see `closed.closed_surface`
-    PrecisionError : the map leaves double precision
+    DensityError : a density that is not positive and finite
+    PrecisionError : the surface has no map without folds in double precision
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
-    found = yield from conformal_sphere(vertices, triangles)
-    return SphereMap(found.positions, found.positions, "conformal", found.iterations, found.residual, ())
+    surface = closed_surface(vertices, triangles)
+    target = _target(surface, density)
+    warnings = list(surface.warnings)
+    options = {"balance": balance, "quality": quality}
+    found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
+    refined = None
+    if found is not None:
+        mass = vertex_areas(surface.vertices, surface.triangles, density)
+        refined = yield from _transported(surface, found, mass, target, warnings, options)
+    if refined is None:
+        start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *ANEW)
+        refined = yield from _refined(surface, start, target, options)
+    if balance == 0 and refined.area_error > QUALITIES[quality].area_error:
+        warnings.append(f"Areas of faces are off by {100 * refined.area_error:.1f} % on average")
+    conformal = found.positions if found else (yield from _least_shear(surface, refined))
+    return SphereMap(
+        refined.positions, conformal, refined.status, refined.iterations, refined.residual, tuple(warnings)
+    )
+
+
+def _target(surface: ClosedSurface, density: np.ndarray | None) -> np.ndarray:
+    """Area (m,) that every face asks for."""
+    area = face_areas(surface.vertices, surface.triangles)
+    if density is None:
+        return area
+    density = np.asarray(density, float)
+    wrong = np.flatnonzero(~(np.isfinite(density) & (density > 0)))
+    if len(wrong):
+        raise DensityError("A face has no positive, finite density", kind="face", elements=wrong)
+    return area * density
+
+
+def _conformal(surface: ClosedSurface, warnings: list[str]) -> Steps[ConformalSphere | None]:
+    """The conformal map; None, and a warning, where it leaves double precision."""
+    try:
+        found = yield from conformal_sphere(surface.vertices, surface.triangles)
+    except PrecisionError as error:
+        warnings.append(f"{error.cause}; started from coarse to fine instead")
+        return None
+    return found
+
+
+def _transported(
+    surface: ClosedSurface, found: ConformalSphere, mass, target, warnings: list[str], options: dict
+) -> Steps[SphereRefinement | None]:
+    """The refined transport map; None, and a warning, where the transport or the straightening of its folds fails."""
+    try:
+        hull = Hull(found.triangles, twins(found.triangles))
+        cells = yield from part_of(sphere_transport(found.sites, mass, hull=hull), *TRANSPORT)
+        return (yield from _refined(surface, cells.cells.centroids(), target, options))
+    except (TransportError, FoldedUVError) as error:
+        warnings.append(f"{error.cause}; started from coarse to fine instead")
+    return None
+
+
+def _refined(surface: ClosedSurface, start: np.ndarray, target: np.ndarray, options: dict) -> Steps[SphereRefinement]:
+    steps = sphere_refine(surface.vertices, surface.triangles, start, target, **options)
+    return (yield from part_of(steps, *REFINEMENT))
+
+
+def _least_shear(surface: ClosedSurface, refined: SphereRefinement) -> Steps[np.ndarray]:
+    """What comes nearest to a conformal map where that leaves double precision, (n,3)."""
+    area = face_areas(surface.vertices, surface.triangles)
+    steps = sphere_refine(surface.vertices, surface.triangles, refined.positions, area, balance=1.0)
+    return (yield from part_of(steps, *REFINEMENT)).positions

@@ -21,6 +21,7 @@ from .intrinsic import IntrinsicTriangulation, euclidean_diagonal, from_mesh, ma
 from .linear import solve_spd
 from .moebius import centred, to_sphere
 from .progress import Steps
+from .sphere_untangle import locally_untangled
 from .spherical import signed_volumes
 from .topology import halfedges
 from .yamabe import yamabe_flow
@@ -34,13 +35,14 @@ ATTEMPTS = 4
 class ConformalSphere:
     """positions (n,3) on the unit sphere, faces counter-clockwise seen from outside, area-weighted mean at 0.
 
-    folds: faces too small for double precision that do not come out so; infinite: the vertex that was sent to infinity;
-    triangles (m,3): the Delaunay triangulation that the edges flipped to, also counter-clockwise; residual: largest
-    error of an angle sum in radians; Newton steps, and flips.
+    sites (n,3): the same before faces were straightened which come out folded, as edges that flipped may, and their
+    number; infinite: the vertex that was sent to infinity; triangles (m,3): the Delaunay triangulation of the sites,
+    to which the edges flipped; residual: largest error of an angle sum in radians; Newton steps, and flips.
     """
 
     positions: np.ndarray
-    folds: int
+    sites: np.ndarray
+    straightened: int
     infinite: int
     triangles: np.ndarray
     residual: float
@@ -66,20 +68,15 @@ def conformal_sphere(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Confo
     infinite, flat = yield from _flattened(tri, magnified_vertices(vertices, triangles))
     z = lay_out(flat, len(vertices))
     mass = vertex_areas(vertices, triangles)
-    positions = centred(_on_sphere(z, infinite, mass), mass)
-    folds = int((~(signed_volumes(positions, triangles) > 0)).sum())
+    sites = centred(_on_sphere(z, infinite, mass), mass)
+    folds = int((~(signed_volumes(sites, triangles) > 0)).sum())
+    positions = sites
+    if folds:
+        positions = yield from locally_untangled(vertices, triangles, sites)
+    if not signed_volumes(positions, triangles).min() > 0:
+        raise PrecisionError("Faces of the conformal map are too small for double precision on the sphere")
     delaunay = flat.triangulation.triangles
-    return ConformalSphere(positions, folds, infinite, delaunay, flat.residual, flat.iterations, flat.flips)
-
-
-def rounded(tri: IntrinsicTriangulation, n: int) -> Steps[IntrinsicTriangulation]:
-    """A conformally equivalent triangulation, Delaunay, whose curvature is spread evenly over its n vertices.
-
-    Such a metric always exists (Gu, Luo, Sun, Wu 2018), and from there the way to infinity is about as short as from a
-    round sphere. Raises PrecisionError: see `yamabe.yamabe_flow`.
-    """
-    even = yield from yamabe_flow(tri, np.arange(n), np.full(n, 2 * np.pi * (1 - 2 / n)))
-    return IntrinsicTriangulation(even.triangulation.triangles, even.triangulation.twin, np.log(even.length).ravel())
+    return ConformalSphere(positions, sites, folds, infinite, delaunay, flat.residual, flat.iterations, flat.flips)
 
 
 def _flattened(tri: IntrinsicTriangulation, candidates: np.ndarray) -> Steps[tuple[int, FlatPolygon]]:
@@ -94,6 +91,16 @@ def _flattened(tri: IntrinsicTriangulation, candidates: np.ndarray) -> Steps[tup
             except PrecisionError as error:
                 failure = error
     raise failure
+
+
+def rounded(tri: IntrinsicTriangulation, n: int) -> Steps[IntrinsicTriangulation]:
+    """A conformally equivalent triangulation, Delaunay, whose curvature is spread evenly over its n vertices.
+
+    Such a metric always exists (Gu, Luo, Sun, Wu 2018), and from there the way to infinity is about as short as from a
+    round sphere. Raises PrecisionError: see `yamabe.yamabe_flow`.
+    """
+    even = yield from yamabe_flow(tri, np.arange(n), np.full(n, 2 * np.pi * (1 - 2 / n)))
+    return IntrinsicTriangulation(even.triangulation.triangles, even.triangulation.twin, np.log(even.length).ravel())
 
 
 def magnified_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

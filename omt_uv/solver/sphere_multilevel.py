@@ -13,16 +13,14 @@ import numpy as np
 from .coarsening import Level, Round, coarsened
 from .errors import PrecisionError
 from .progress import Progress, Steps
-from .spherical import normalized, signed_volumes, triple_products
 from .sphere_refine import relax
+from .spherical import normalized, signed_volumes, triple_products
 
 # Distances from the neighbour, in widths of the hole, at which a vertex that comes back tries to settle.
 TRIES = 2.0 ** -np.concatenate([np.arange(0, 5, 0.5), np.arange(5, 24, 2)])
 
 
-def multilevel_start(
-    vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray
-) -> Steps[tuple[np.ndarray, int]]:
+def multilevel_start(vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> Steps[tuple[np.ndarray, int]]:
     """Unit vectors (n,3) of a closed surface (n,3), (m,3), all faces positive, areas roughly the target (m,).
 
     Also the Newton steps taken. Raises PrecisionError where a vertex finds no place in double precision.

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .energy import Elements, Local, derivatives_of, energy_of
-from .newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, Step, fold_share
+from .energy import Elements, Local, derivatives_of, energy_of, squared
 from .linear import Factor
+from .newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, Step, fold_share
 from .spherical import normalized, signed_volumes, spherical_areas
 
 
@@ -82,13 +82,21 @@ class SphereProblem:
         """The energy of unit vectors (n,3); infinity where a face is folded."""
         if not signed_volumes(positions, self.faces.triangles).min() > 0:
             return np.inf
-        return energy_of(self.faces, *derivatives(self.faces, seen(positions, self.faces.triangles).corner), self.weight)
+        return energy_of(
+            self.faces, *derivatives(self.faces, seen(positions, self.faces.triangles).corner), self.weight
+        )
 
     def area_error(self, positions: np.ndarray) -> float:
         """The larger of the share of the area in the wrong place and the deviation of the areas' ratios."""
         share = self.target / self.target.sum()
         ratio = spherical_areas(positions, self.faces.triangles) / self.target
         return float(max(share @ np.abs(ratio - 1), np.sqrt(share @ (ratio - 1) ** 2)))
+
+    def error_seen(self, positions: np.ndarray) -> float:
+        """Share of the area in the wrong place, of faces seen from above against what is asked of them."""
+        a, b = derivatives(self.faces, seen(positions, self.faces.triangles).corner)
+        error = np.abs((squared(a) - squared(b)) / self.faces.ratio - 1)
+        return float(self.target @ error / self.target.sum())
 
     def step(self, positions: np.ndarray, value: float, pressure: float) -> Step:
         """One line-searched Newton step from unit vectors (n,3) of energy `value`."""
@@ -109,9 +117,15 @@ class SphereProblem:
 
 
 def newton_direction(
-    faces: Elements, assembly: Assembly, positions: np.ndarray, axes: np.ndarray, face: Seen, local: Local
+    faces: Elements,
+    assembly: Assembly,
+    positions: np.ndarray,
+    axes: np.ndarray,
+    face: Seen,
+    local: Local,
+    held: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
-    """Step (n,2) along the tangents (n,2,3), and the slope of the energy along it (negative)."""
+    """Step (n,2) along the tangents (n,2,3), 0 for vertices held (n,) bool, and the energy's slope along it."""
     n, triangles = len(positions), faces.triangles
     # How the tangents of the corners lie in the frames of the faces: (m, corner, frame axis, tangent).
     turn = np.einsum("mfd,mkad->mkfa", face.axes, axes[triangles])
@@ -125,6 +139,9 @@ def newton_direction(
     # Moving along a great circle bends inwards: the pull along the radius adds to the Hessian.
     bend = np.maximum(-np.einsum("nd,nd->n", gradient, positions), 0)
     scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
+    if held is not None:
+        rows *= ~np.repeat(held[triangles], 2, axis=1)[:, None, :]
+        gradient[held], bend[held] = 0, 1
     matrix = assembly.matrix(np.matmul(rows.transpose(0, 2, 1), rows), np.repeat(bend, 2) + SHIFT * scale)
     slope = np.einsum("nd,nad->na", gradient, axes).ravel()
     step = -Factor(matrix, "natural").solve(slope)

@@ -1,4 +1,4 @@
-"""Authalic refinement on the sphere: every face gets its area, none folds, and the shear is the least that allows it."""
+"""Authalic refinement on the sphere: every face gets its area, none folds, and the shear is as low as can be."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .linear import minimum_degree
 from .newton import Assembly
 from .progress import Progress, Steps
 from .renumbering import vertex_graph
-from .spherical import signed_volumes, spherical_areas
 from .sphere_newton import SphereProblem, derivatives, seen
 from .sphere_untangle import untangle_on_sphere
+from .spherical import signed_volumes, spherical_areas
 from .stages import LOOSE, QUALITIES, SQUEEZED, STAGE_STEPS, STRICT, Quality, minimise, weights_of
 
 # Steps on the way from coarse to fine: the finer levels do the rest.
@@ -23,10 +23,11 @@ RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
 
 @dataclass(frozen=True)
 class SphereRefinement:
-    """positions (n,3) on the sphere, no face folded; Newton steps, after those for untangling; last predicted decrease over energy.
+    """positions (n,3) on the sphere, no face folded; Newton steps, after those for untangling.
 
-    area_error: the larger of the share of the area in the wrong place and the deviation of the areas' ratios; weight:
-    that of the area term; energy at the end; status: "converged", "stalled" or "steps".
+    residual: last predicted decrease over energy; area_error: the larger of the share of the area in the wrong place
+    and the deviation of the areas' ratios; weight: that of the area term; energy at the end; status: "converged",
+    "stalled" or "steps".
     """
 
     positions: np.ndarray
@@ -107,7 +108,7 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
     weights = weights_of(balance, settings)
     if seen_from_above(problem, p, weights[0]).energy(p) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
-    steps, k = 0, 0
+    steps, k, error = 0, 0, np.inf
     while True:
         current = seen_from_above(problem, p, weights[k])
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
@@ -116,12 +117,15 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
         tolerance = settings.tolerance if balance == 0 else STRICT
         stage = yield from minimise(current, p, goal, allowed, k, None, tolerance)
         p, steps, weight, k = stage.w, steps + stage.steps, weights[k], k + 1
-        error = problem.area_error(p)
+        before, error = error, problem.area_error(p)
         enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
             return SphereRefinement(p, steps, 0, stage.residual, error, weight, stage.energy, stage.status)
         if k >= len(weights):
-            weights.append(weights[-1] * min(max(2.0, (error / settings.area_error) ** 2), 10.0))
+            # What is left may be due to large faces, which look smaller from above: then looking anew is enough.
+            seen_right = current.error_seen(p) <= 0.5 * settings.area_error and error < 0.9 * before
+            growth = 1.0 if seen_right else min(max(2.0, (error / settings.area_error) ** 2), 10.0)
+            weights.append(weights[-1] * growth)
 
 
 def seen_from_above(problem: SphereProblem, p: np.ndarray, weight: float) -> SphereProblem:

@@ -18,7 +18,7 @@ from .spherical_power import Hull, SphericalCells, by_flips, by_hull, spherical_
 TOLERANCE = 5e-7
 MAX_STEPS = 100
 MAX_HALVINGS = 30
-# Where cells start tiny the steps do, too: from one to the next they may grow by this, and below SMALL they shrink by 4.
+# Where cells start tiny, so do steps: from one to the next they may grow by this, and below SMALL they shrink by 4.
 GROWTH = 16.0
 SMALL = 0.05
 
@@ -40,7 +40,8 @@ def sphere_transport(
     """Transport the uniform measure of the sphere to unit vectors (n,3) with mass (n,) > 0, scaled to sum to 4 pi.
 
     `hull`, a triangulation of the sites, is where the search for their convex hull starts; sites closer together than
-    about 1e-7 need one. A solution exists where no half of the mass is gathered too narrowly, as after centring (Oliker 2007).
+    about 1e-7 need one. A solution exists where no half of the mass is gathered too narrowly, as after centring
+    (Oliker 2007).
 
     Raises
     ------
@@ -70,9 +71,8 @@ def sphere_transport(
         for _ in range(MAX_HALVINGS):
             trial = _near(cells, sites, h + step * direction)
             diagrams += 1
-            if trial is not None and trial.area.min() >= floor:
-                if float(np.linalg.norm(trial.area - mass)) <= (1 - step / 2) * error:
-                    break
+            if trial is not None and _acceptable(trial, mass, floor, (1 - step / 2) * error):
+                break
             step /= 2 if step > SMALL else 4
         else:
             raise TransportError(f"The transport is stuck at a residual of {residual:.1e}")
@@ -98,6 +98,10 @@ def _near(cells: SphericalCells, sites: np.ndarray, weights: np.ndarray) -> Sphe
         except TransportError:
             return None
     return spherical_cells(sites, weights, hull)
+
+
+def _acceptable(cells: SphericalCells, mass: np.ndarray, floor: float, most: float) -> bool:
+    return bool(cells.area.min() >= floor and np.linalg.norm(cells.area - mass) <= most)
 
 
 def _residual(cells: SphericalCells, mass: np.ndarray) -> float:

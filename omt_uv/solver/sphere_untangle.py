@@ -1,7 +1,7 @@
 """Straighten a map to the sphere that has folded faces, by an energy that is finite at a fold.
 
-In the energy of `energy.py` the area ratio r of a face is replaced by chi(r) = (r + sqrt(eps^2 + r^2)) / 2, positive for
-folded faces too, and eps shrinks with the worst fold (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov 2021).
+In the energy of `energy.py` the area ratio r of a face is replaced by chi(r) = (r + sqrt(eps^2 + r^2)) / 2, positive
+for folded faces too, and eps shrinks with the worst fold (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov 2021).
 """
 
 from __future__ import annotations
@@ -10,47 +10,62 @@ from dataclasses import replace
 
 import numpy as np
 
-from .energy import Elements, Local, local_of, squared
+from .energy import Elements, Local, elements, local_of, squared
 from .newton import ARMIJO, Assembly
 from .progress import Progress, Steps
-from .spherical import signed_volumes
 from .sphere_newton import derivatives, moved, newton_direction, seen, tangents
+from .spherical import signed_volumes, spherical_areas
 
-MAX_STEPS = 60
+MAX_STEPS = 40
 MAX_HALVINGS = 12
-# eps is this share of the worst fold, and at least the second.
-SHARE, LEAST = 0.2, 1e-3
+# eps is one of these shares of the worst fold, the next where no step helps, and at least LEAST.
+SHARES = (0.2, 1.0, 5.0)
+LEAST = 1e-6
+# No vertex moves farther in a step.
+FARTHEST = 0.05
+# Folds may become this many times as many on the way.
+SPREADING = 3
 AREA_WEIGHT = 1.0
+# Around folds that are straightened alone.
+RINGS = 4
 
 
-def untangle_on_sphere(faces: Elements, assembly: Assembly, positions: np.ndarray) -> Steps[tuple[np.ndarray, int]]:
+def untangle_on_sphere(
+    faces: Elements, assembly: Assembly, positions: np.ndarray, held: np.ndarray | None = None
+) -> Steps[tuple[np.ndarray, int]]:
     """Unit vectors (n,3) near the given ones with no face folded, if that is found, and the steps taken.
+
+    Vertices held (n,) bool stay.
 
     The caller checks: the method has no guarantee, and gives up where it makes no more progress.
     """
     # In units of the areas asked for; faces of little area must not fold either.
     even = np.full(len(faces.area), 1 / len(faces.area))
     faces = replace(faces, gradient=faces.gradient / np.sqrt(faces.ratio)[:, None], area=(faces.area + even) / 2)
+    most = None
     for k in range(MAX_STEPS):
-        if signed_volumes(positions, faces.triangles).min() > 0:
+        folds = int((~(signed_volumes(positions, faces.triangles) > 0)).sum())
+        most = most or SPREADING * folds
+        if folds == 0 or folds > most:
             return positions, k
         yield Progress("Untangling", k / MAX_STEPS)
-        following = _step(faces, assembly, positions)
+        tries = (_step(faces, assembly, positions, held, share) for share in SHARES)
+        following = next((found for found in tries if found is not None), None)
         if following is None:
-            break
+            return positions, k
         positions = following
     return positions, MAX_STEPS
 
 
-def _step(faces: Elements, assembly: Assembly, positions: np.ndarray) -> np.ndarray | None:
+def _step(faces: Elements, assembly: Assembly, positions: np.ndarray, held, eps_share: float) -> np.ndarray | None:
     face = seen(positions, faces.triangles)
     a, b = derivatives(faces, face.corner)
     worst = min(float((squared(a) - squared(b)).min()), 0.0)
-    eps = np.hypot(LEAST, SHARE * worst)
+    eps = np.hypot(LEAST, eps_share * worst)
     value, local = _energy(faces, a, b, eps), _local(faces, a, b, eps)
     axes = tangents(positions)
-    direction, slope = newton_direction(faces, assembly, positions, axes, face, local)
-    share = 1.0
+    direction, slope = newton_direction(faces, assembly, positions, axes, face, local, held)
+    share = min(1.0, FARTHEST / max(float(np.linalg.norm(direction, axis=1).max()), FARTHEST))
     for _ in range(MAX_HALVINGS):
         trial = moved(positions, axes, share * direction)
         there = derivatives(faces, seen(trial, faces.triangles).corner)
@@ -90,3 +105,28 @@ def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> Local:
     ii = area * (quotient + 2 * first / chi**2)
     block = 2 * by_outer + 4 * outer * oo, -4 * area * np.sqrt(outer * inner) * quotient, 2 * by_inner + 4 * inner * ii
     return local_of(faces, a, b, (by_outer, by_inner), (by_outer, by_inner), block)
+
+
+def locally_untangled(surface: np.ndarray, triangles: np.ndarray, positions: np.ndarray) -> Steps[np.ndarray]:
+    """Unit vectors (n,3) of a map whose few folded faces are straightened, all but a few rings of vertices untouched.
+
+    Every face is to keep the area that it has on the sphere, folded or not. Where that fails the map is returned as it
+    was.
+    """
+    area = np.abs(spherical_areas(positions, triangles))
+    target = np.maximum(area, 1e-9 * np.median(area))
+    touched = np.zeros(len(positions), dtype=bool)
+    touched[triangles[~(signed_volumes(positions, triangles) > 0)]] = True
+    for _ in range(RINGS):
+        touched[triangles[touched[triangles].any(axis=1)]] = True
+    inside = touched[triangles].any(axis=1)
+    vertices, small = np.unique(triangles[inside], return_inverse=True)
+    small = small.reshape(-1, 3)
+    faces = elements(surface[vertices], small, target[inside])
+    assembly = Assembly(small, len(vertices))
+    straight, _ = yield from untangle_on_sphere(faces, assembly, positions[vertices], ~touched[vertices])
+    if not signed_volumes(straight, small).min() > 0:
+        return positions
+    result = positions.copy()
+    result[vertices] = straight
+    return result
