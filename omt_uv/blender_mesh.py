@@ -193,6 +193,16 @@ def target_layer(mesh: bpy.types.Mesh, name: str) -> str:
     return name
 
 
+def corner_uvs(obj: bpy.types.Object, layer: str, corners: np.ndarray, face_start: np.ndarray) -> np.ndarray:
+    """UVs (k,2) of a few corners (k,) of an object in Edit Mode; face_start (f+1,) as in Surface."""
+    edit = bmesh.from_edit_mesh(obj.data)
+    edit.faces.ensure_lookup_table()
+    uv_layer = edit.loops.layers.uv[layer]
+    faces = np.searchsorted(face_start, corners, side="right") - 1
+    places = zip(faces.tolist(), (corners - face_start[faces]).tolist(), strict=True)
+    return np.array([edit.faces[f].loops[k][uv_layer].uv[:] for f, k in places], float).reshape(-1, 2)
+
+
 def write_uv(obj: bpy.types.Object, layer: str, corners: np.ndarray, uv: np.ndarray) -> None:
     """Write uv (k,2) to the given corners (k,) of an existing layer; every other corner keeps its bits."""
     if obj.mode == "EDIT":

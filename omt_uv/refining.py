@@ -73,7 +73,7 @@ def refine_islands(
     Refusal : with the index of the surface and the MeshError that says why
     packing.PackingError : neither packer can place the islands
     """
-    found, warnings = _found(surfaces)
+    found, warnings = found_islands(surfaces)
     total = sum(len(island.chart.triangles) for _, island, _ in found)
     pieces, done = [], 0
     for owner, island, pins in found:
@@ -117,7 +117,7 @@ def _grown_together(pieces: Sequence[_Piece], placed: Sequence[np.ndarray]) -> s
     return "" if more < OVERLAP else f"Islands grew into each other, by {100 * more:.1f} % of the UV area; pack them"
 
 
-def _found(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]], list[tuple[int, str]]]:
+def found_islands(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]], list[tuple[int, str]]]:
     """Islands with the index of their surface and their pins, and warnings."""
     found, warnings = [], []
     for index, (surface, faces, pins) in enumerate(surfaces):

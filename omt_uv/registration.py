@@ -7,6 +7,7 @@ import bpy
 from . import overlay
 from .blender_versions import register_command, unregister_command
 from .operators.density import UV_OT_omt_density_get, UV_OT_omt_density_set
+from .operators.live import UV_OT_omt_live
 from .operators.measure import UV_OT_omt_measure
 from .operators.overlay import UV_OT_omt_histogram, UV_OT_omt_overlay
 from .operators.preset import UV_OT_omt_preset
@@ -24,6 +25,7 @@ CLASSES = (
     UV_OT_omt_unwrap,
     UV_OT_omt_refine,
     UV_OT_omt_seams,
+    UV_OT_omt_live,
     UV_OT_omt_measure,
     OBJECT_OT_omt_remesh,
     UV_OT_omt_overlay,

@@ -102,6 +102,10 @@ NAVIGATION = {
 }
 
 
+# Seconds between two looks of the user at the progress.
+SHOW_EVERY = 0.1
+
+
 class SolverOperator:
     """A long solver behind an operator: subclasses give `steps`, a generator, and `finish`, which writes.
 
@@ -116,6 +120,7 @@ class SolverOperator:
     # Whether it changes the active UVs, so that their figures are worth a look.
     makes_uvs = False
     _timer: bpy.types.Timer | None = None
+    _shown = 0.0
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -206,7 +211,10 @@ class SolverOperator:
         try:
             ended = run.advance()
             if not ended:
-                show_progress(context, run.text())
+                # Drawing takes its time as well, the more so without a graphics card.
+                if time.monotonic() - self._shown > SHOW_EVERY:
+                    show_progress(context, run.text())
+                    self._shown = time.monotonic()
                 return {"RUNNING_MODAL"}
             self._finish(context, run.result, run.seconds)
         except Complaint as complaint:

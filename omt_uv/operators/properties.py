@@ -55,6 +55,13 @@ class MarginSettings:
     )
 
 
+def draw_balance(layout: bpy.types.UILayout, properties) -> None:
+    """The slider, as wide as the panel: left for area, right for angles."""
+    row = layout.row()
+    row.use_property_split = False
+    row.prop(properties, "balance", text="Area - Angle", slider=True)
+
+
 def draw_margin(layout: bpy.types.UILayout, properties) -> None:
     for name in ("margin", "texture_size", "tile"):
         layout.prop(properties, name)

@@ -9,7 +9,7 @@ from ..settings import (
     RefineSettings,
 )
 from .common import Complaint, SolverOperator, read_objects, warn
-from .properties import AreaSettings, MarginSettings, draw_margin
+from .properties import AreaSettings, MarginSettings, draw_balance, draw_margin
 
 
 class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.Operator):
@@ -78,7 +78,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     """The settings of the operator, for the redo panel and the sidebar."""
     layout.use_property_split = True
     layout.use_property_decorate = False
-    layout.prop(properties, "balance", slider=True)
+    draw_balance(layout, properties)
     layout.prop(properties, "quality")
     layout.prop(properties, "keep_boundary")
     column = layout.column()

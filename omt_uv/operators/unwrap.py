@@ -13,7 +13,7 @@ from ..settings import (
     Settings,
 )
 from .common import Complaint, SolverOperator, read_objects, warn
-from .properties import AreaSettings, MarginSettings, choose_group, choose_layer, draw_margin
+from .properties import AreaSettings, MarginSettings, choose_group, choose_layer, draw_balance, draw_margin
 
 
 class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.Operator):
@@ -107,16 +107,16 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     """The settings of the operator, for the redo panel."""
+    draw_balance(layout, properties)
     draw_main(layout, properties)
     layout.separator()
     draw_more(layout, properties)
 
 
 def draw_main(layout: bpy.types.UILayout, properties) -> None:
-    """What everybody looks at."""
+    """What everybody looks at, below the slider."""
     layout.use_property_split = True
     layout.use_property_decorate = False
-    layout.prop(properties, "balance", slider=True)
     layout.prop(properties, "boundary")
     layout.prop(properties, "quality")
 

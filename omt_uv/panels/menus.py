@@ -7,7 +7,7 @@ import bpy
 # In the order of the menu; those that do not exist are left out.
 ENTRIES = (
     *("uv.omt_unwrap", "uv.omt_refine", "uv.omt_magnify", "uv.omt_sphere", "uv.omt_seams", "uv.omt_measure"),
-    *("uv.omt_overlay", "uv.omt_histogram", "uv.omt_density_get", "uv.omt_density_set"),
+    *("uv.omt_live", "uv.omt_overlay", "uv.omt_histogram", "uv.omt_density_get", "uv.omt_density_set"),
 )
 
 

@@ -12,6 +12,7 @@ import bpy
 
 from .. import last_run, overlay, running
 from ..blender_versions import progress_bar
+from ..operators import live
 from ..operators.overlay import HISTOGRAM, KINDS
 from ..operators.unwrap import draw_main, draw_more
 
@@ -84,7 +85,9 @@ class MainPanel(TabPanel):
             row = layout.row()
             row.scale_y = 1.5
             row.operator("uv.omt_unwrap", text="Unwrap", icon="UV")
-        draw_main(layout.column(), settings_of(context, "uv.omt_unwrap"))
+        properties = settings_of(context, "uv.omt_unwrap")
+        draw_live(layout, properties)
+        draw_main(layout.column(), properties)
         if last_run.state.summary is not None:
             draw_summary(layout, last_run.state.summary)
 
@@ -122,9 +125,9 @@ class DistortionPanel(TabPanel):
         for name, title, _, _, _ in KINDS:
             row.operator("uv.omt_overlay", text=title, depress=overlay.kind() == name).show = name
         if overlay.kind() == "AREA":
-            layout.label(text="Blue: too little texture. Red: too much", icon="INFO")
+            layout.label(text="Blue: less, red: more", icon="INFO")
         elif overlay.kind() == "SHEAR":
-            layout.label(text="Dark: angles kept. Yellow: 4 times", icon="INFO")
+            layout.label(text="Dark: none, yellow: 4x", icon="INFO")
         row = layout.row(align=True)
         row.operator("uv.omt_measure", text="Measure", icon="DRIVER_DISTANCE")
         row.operator("uv.omt_histogram", text="Histogram", icon="RNDCURVE")
@@ -148,6 +151,13 @@ class DensityPanel(TabPanel):
         row = layout.row(align=True)
         row.operator("uv.omt_density_get", text="Get", icon="EYEDROPPER").texture_size = properties.texture_size
         row.operator("uv.omt_density_set", text="Set", icon="CHECKMARK")
+
+
+def draw_live(layout: bpy.types.UILayout, properties) -> None:
+    """The slider, and the button that makes the UVs follow it."""
+    row = layout.row(align=True)
+    row.prop(properties, "balance", text="Area - Angle", slider=True)
+    row.operator("uv.omt_live", text="", icon="PLAY", depress=live.current is not None)
 
 
 def draw_run(layout: bpy.types.UILayout, run: running.Run) -> None:

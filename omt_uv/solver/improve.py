@@ -19,7 +19,7 @@ from .pins import Pins, aligned, drag
 from .progress import Progress, Steps
 from .refine import Refinement
 from .renumbering import renumbered
-from .stages import QUALITIES, Found, Task, stages
+from .stages import QUALITIES, Task, stages
 from .starts import disk_start
 from .topology import boundary_loops, halfedges, twins
 from .untangle import count_folds
@@ -86,7 +86,7 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
     several = pins if pins is not None and len(pins.vertices) > 2 else None
     fixed = several is not None
     rim = boundary_edges(triangles)
-    start, warnings = _start(vertices, triangles, given, rim, fixed)
+    start, warnings = island_start(vertices, triangles, given, rim, fixed)
     # Pins may ask for a map that meets itself, as the given one does, and so may handles.
     guard = None if meets_itself(start, rim) else rim
     if guard is None and not (pins is not None and np.isin(rim, pins.vertices).all()):
@@ -98,7 +98,7 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
     found = yield from stages(task, w, balance, settings)
     error = area_error(faces, found.w)
     if several is None:
-        found = replace(found, w=_placed(found, given, faces, pins))
+        found = replace(found, w=placed(found.w, given, faces, pins))
     return found, error, (*warnings, *found.warnings)
 
 
@@ -116,7 +116,7 @@ def meets_itself(w: np.ndarray, rim: np.ndarray) -> bool:
     return not nearest < (1 / TOUCHING) ** 2 or len(crossings(w, rim)) > 0
 
 
-def _start(vertices, triangles, given, rim, fixed: bool) -> tuple[np.ndarray, tuple[str, ...]]:
+def island_start(vertices, triangles, given, rim, fixed: bool) -> tuple[np.ndarray, tuple[str, ...]]:
     """A map (n,) without folds, the given one if it will do, and a warning if it will not."""
     uv = np.column_stack([given.real, given.imag])
     folds = count_folds(uv, triangles)
@@ -186,14 +186,13 @@ def _fans(points: np.ndarray, holes: list[np.ndarray]) -> tuple[np.ndarray, np.n
     return np.concatenate([points, centres]), np.concatenate(fans)
 
 
-def _placed(found: Found, given: np.ndarray, faces, pins: Pins | None) -> np.ndarray:
-    """The map moved, turned and scaled to lie as the given one (n,) does, with its UV area; a pin keeps its place."""
-    w = found.w
+def placed(w: np.ndarray, given: np.ndarray, faces, pins: Pins | None) -> np.ndarray:
+    """The map w (n,) moved, turned and scaled to lie as the given one does, with its UV area; a pin keeps its place."""
     if pins is not None and len(pins.vertices) == 2:
         return aligned(w, pins)
     w = w * np.sqrt(abs(faces.areas(given).sum()) / faces.areas(w).sum())
     mass = np.bincount(faces.triangles.ravel(), np.repeat(faces.area, 3) / 3, len(w))
     centred, aim = w - mass @ w, given - mass @ given
     turn = (mass * centred.conj()) @ aim
-    placed = centred * (turn / abs(turn) if abs(turn) > 0 else 1) + mass @ given
-    return placed if pins is None else placed + (pins.places[0] - placed[pins.vertices[0]])
+    moved = centred * (turn / abs(turn) if abs(turn) > 0 else 1) + mass @ given
+    return moved if pins is None else moved + (pins.places[0] - moved[pins.vertices[0]])

@@ -102,8 +102,13 @@ def weights_of(balance: float, settings: Quality) -> list[float]:
     """The preset's weights; with a balance, those on the way to one between the preset's last and LEAST_WEIGHT."""
     if balance == 0:
         return list(settings.weights)
-    last = settings.weights[-1] ** (1 - balance) * LEAST_WEIGHT**balance
+    last = final_weight(balance, settings)
     return [*(weight for weight in settings.weights if weight < last), last]
+
+
+def final_weight(balance: float, settings: Quality) -> float:
+    """Weight of the area term at a balance from 0 to 1."""
+    return settings.weights[-1] ** (1 - balance) * LEAST_WEIGHT**balance
 
 
 def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Steps[Found]:

@@ -1,0 +1,108 @@
+"""uv.omt_live: UVs that follow the slider and their pins while these are being dragged."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+
+from .. import overlay, running
+from .common import Complaint, read_objects, ready, tell
+
+if TYPE_CHECKING:
+    from ..following import Session
+
+# The session that is on; the panel shows its button pressed.
+current: Session | None = None
+UNWRAP = "uv.omt_unwrap"
+
+
+class UV_OT_omt_live(bpy.types.Operator):
+    """Let the UVs follow the slider from area to angle, and pins that are dragged in the UV editor.
+    Click again or press Enter to keep the result, Esc to have the UVs as they were"""
+
+    bl_idname = "uv.omt_live"
+    bl_label = "Live Balance"
+    bl_options = {"REGISTER", "UNDO"}
+
+    _timer: bpy.types.Timer | None = None
+    _session: Session
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return current is not None or ready(cls, context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if current is not None:
+            # The session sees it at its next tick, and ends.
+            current.wanted = False
+            return {"CANCELLED"}
+        state = self.start(context)
+        if "RUNNING_MODAL" in state and not bpy.app.background:
+            self._timer = context.window_manager.event_timer_add(0.02, window=context.window)
+            context.window_manager.modal_handler_add(self)
+            context.workspace.status_text_set("Live Balance: drag the slider, or pins.      Enter: Keep      Esc: Back")
+        return state
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """For scripts and the redo panel: follow until nothing moves."""
+        state = self.start(context)
+        while "RUNNING_MODAL" in state:
+            if not self._tick(context):
+                return self._end(context, {"FINISHED"})
+        return state
+
+    def start(self, context: bpy.types.Context) -> set[str]:
+        global current
+        from ..following import Refusal, Session
+
+        try:
+            pairs = read_objects(context)
+            current = self._session = Session(context, pairs)
+        except Complaint as complaint:
+            return tell(self, context, complaint)
+        except Refusal as refusal:
+            obj = pairs[refusal.index][0]
+            return tell(self, context, Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error))
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "ESC" and event.value == "PRESS":
+            self._session.restore()
+            return self._end(context, {"CANCELLED"})
+        if event.type in {"RET", "NUMPAD_ENTER"} and event.value == "PRESS":
+            return self._end(context, {"FINISHED"})
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        try:
+            self._tick(context)
+        except running.Disturbed as reason:
+            self.report({"INFO"}, f"Live Balance ended: {reason}")
+            return self._end(context, {"FINISHED"})
+        return {"PASS_THROUGH"} if self._session.wanted else self._end(context, {"FINISHED"})
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        self._end(context, {"CANCELLED"})
+
+    def _tick(self, context: bpy.types.Context) -> bool:
+        wanted = context.window_manager.operator_properties_last(UNWRAP).balance
+        moved = self._session.follow(wanted)
+        if moved:
+            for area in (a for w in context.window_manager.windows for a in w.screen.areas):
+                if area.type in {"VIEW_3D", "IMAGE_EDITOR"}:
+                    area.tag_redraw()
+        return moved
+
+    def _end(self, context: bpy.types.Context, state: set[str]) -> set[str]:
+        global current
+        if current is not None:
+            current.close()
+            current = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        if context.workspace is not None:
+            context.workspace.status_text_set(None)
+        if "FINISHED" in state and overlay.kind() != "NONE":
+            overlay.refresh(context, read_objects(context))
+        return state

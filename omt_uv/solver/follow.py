@@ -1,0 +1,103 @@
+"""A map that follows: a few Newton steps at a time from where it is, while a balance or a pin is being dragged."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from .energy import elements
+from .geometry import face_areas
+from .improve import boundary_edges, island_start, meets_itself, placed
+from .newton import Assembly, Free, Problem, newton_step
+from .pins import Pins, Springs
+from .renumbering import renumbered
+from .stages import FIRST_PRESSURE, NO_ENERGY, QUALITIES, Task, final_weight, rescaled
+
+# Of the springs between pins and where they are dragged to: stiff, as the barrier against folds must only just win.
+STIFFNESS = 1e6
+# Newton promises less than this share of the energy: nothing is left to see.
+AT_REST = 1e-3
+
+
+class Follower:
+    """An island whose map can be asked for at any balance and with its pins anywhere.
+
+    Parameters
+    ----------
+    vertices, triangles, uv : (n,3), (m,3), (n,2) a connected surface and its map
+    pins : vertices (k,) and their places (k,2)
+
+    Attributes
+    ----------
+    at_rest : whether following further would change nothing
+
+    Raises
+    ------
+    FoldedUVError, PinError : see `improve.improve`
+    """
+
+    def __init__(self, vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | None = None):
+        self._mesh = mesh = renumbered(vertices, triangles, uv, pins)
+        self._given = given = mesh.uv @ [1, 1j]
+        vertices = mesh.vertices / np.sqrt(face_areas(mesh.vertices, mesh.triangles).sum())
+        self._faces = elements(vertices, mesh.triangles, face_areas(vertices, mesh.triangles))
+        rim = boundary_edges(mesh.triangles)
+        start, self.warnings = island_start(vertices, mesh.triangles, given, rim, mesh.pins is not None)
+        guard = None if meets_itself(start, rim) else rim
+        motion = Free(np.zeros(len(given), bool))
+        self._task = Task(self._faces, Assembly(mesh.triangles, len(given)), motion, guard, False)
+        self._w, self._pins, self._guarded = start, mesh.pins, False
+        self._balance = -1.0
+        self.at_rest = False
+
+    def follow(self, balance: float, places: np.ndarray | None = None, seconds: float = 0.1) -> np.ndarray:
+        """The map (n,2) after at least one step towards its best at this balance, and no more than so many seconds.
+
+        places (k,2): where the pins are by now, in the order in which they were given
+        """
+        if places is not None and self._pins is not None:
+            self._pull(self._pins, places)
+        if balance != self._balance:
+            self._balance, self.at_rest = balance, False
+        end = time.perf_counter() + seconds
+        while not self.at_rest:
+            self._step()
+            if time.perf_counter() >= end:
+                break
+        return self.uv
+
+    @property
+    def uv(self) -> np.ndarray:
+        """The map (n,2) as it is; without pins it lies as the given one did."""
+        held = self._pins is not None
+        return self._mesh.original(self._w if held else placed(self._w, self._given, self._faces, None))
+
+    def _pull(self, pins: Pins, places: np.ndarray) -> None:
+        # `renumbered` sorts pins by vertex, which `_pins` keeps.
+        wanted = (places * self._mesh.mirror) @ [1, 1j]
+        if not np.array_equal(wanted, pins.places):
+            self._pins, self.at_rest = replace(pins, places=wanted), False
+
+    def _step(self) -> None:
+        """One Newton step; where the boundary would cross itself, the next goes on with a barrier."""
+        task = self._task
+        extras: tuple = ()
+        if self._pins is not None:
+            task = rescaled(task, self._w)
+            unit = np.sqrt(np.abs(task.faces.areas(self._w)).sum())
+            extras = (Springs(self._pins, STIFFNESS, unit),)
+        if self._guarded:
+            extras = (*extras, task.guard(self._w))
+        weight = final_weight(self._balance, QUALITIES["standard"])
+        problem = Problem(task.faces, task.assembly, task.motion, weight, extras)
+        value = problem.energy(self._w)
+        step = newton_step(problem, self._w, value, FIRST_PRESSURE)
+        if step.share == 0:
+            step = newton_step(problem, self._w, value)
+        if not self._guarded and task.crosses(step.w):
+            self._guarded = task.loop is not None
+            return
+        self._w = step.w
+        self.at_rest = step.share == 0 or step.decrement < AT_REST * max(value, NO_ENERGY)
