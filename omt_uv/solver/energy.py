@@ -1,9 +1,10 @@
 """The energy of a piecewise linear map to the plane: shear plus weighted area error, infinite at a fold.
 
-    E = sum_f A_f [ (s1/s2 + s2/s1)/2 - 1 ] + balance * sum_f A_f [ (r + 1/r)/2 - 1 ],   r = s1 s2 / target ratio
+    E = sum_f M_f [ (s1/s2 + s2/s1)/2 - 1 ] + balance * sum_f M_f [ (r + 1/r)/2 - 1 ],   r = s1 s2 / target ratio
 
-with s1 >= s2 the singular values of a face's Jacobian: MIPS (Hormann, Greiner 2000) plus its area
-counterpart (Degener, Meseth, Klein 2003). In complex notation the map is w and its derivatives
+with M_f the target area, so that shear counts by the texture that shows it, and s1 >= s2 the singular values of a
+face's Jacobian: MIPS (Hormann, Greiner 2000) plus its area counterpart (Degener, Meseth, Klein 2003).
+In complex notation the map is w and its derivatives
 a = dw/dz, b = dw/dconj(z); det J = |a|^2 - |b|^2 and the shear term is 2 |b|^2 / det J. The energy depends on
 |a| and |b| alone, so the Hessian's eigensystem is explicit (Smith, de Goes, Kim 2019): the two tangential
 directions i a, i b are eigenvectors and the radial ones form a 2x2 block. No singular value decomposition is needed.
@@ -20,14 +21,16 @@ import numpy as np
 class Elements:
     """Faces of a surface, ready for the energy.
 
-    triangles (m,3); area (m,) of the surface, summing to 1 as weights of the energy; gradient (m,3) complex, the
-    gradients of the hat functions in each face's own plane; ratio (m,) target UV area over surface area.
+    triangles (m,3); area (m,) of the surface, summing to 1; gradient (m,3) complex, the gradients of the hat functions
+    in each face's own plane; ratio (m,) target UV area over surface area; weight (m,) in the energy, the target area,
+    summing to 1.
     """
 
     triangles: np.ndarray
     area: np.ndarray
     gradient: np.ndarray
     ratio: np.ndarray
+    weight: np.ndarray
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dw/dz and dw/dconj(z) per face, (m,) complex each, of a map w (n,) complex."""
@@ -58,7 +61,7 @@ def elements(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray) -
     area = 0.5 * side * y
     # The gradient of a hat function is the opposite side, turned by a quarter, over twice the area.
     gradient = 1j * (local[:, [2, 0, 1]] - local[:, [1, 2, 0]]) / (2 * area)[:, None]
-    return Elements(triangles, area / area.sum(), gradient, target / area)
+    return Elements(triangles, area / area.sum(), gradient, target / area, target / target.sum())
 
 
 def energy(faces: Elements, w: np.ndarray, balance: float) -> float:
@@ -73,7 +76,7 @@ def energy_of(faces: Elements, a: np.ndarray, b: np.ndarray, balance: float) -> 
     if not det.min() > 0:
         return np.inf
     r = det / faces.ratio
-    return float(faces.area @ (2 * inner / det + balance * ((r + 1 / r) / 2 - 1)))
+    return float(faces.weight @ (2 * inner / det + balance * ((r + 1 / r) / 2 - 1)))
 
 
 def gradient(faces: Elements, w: np.ndarray, balance: float) -> np.ndarray:
@@ -140,12 +143,12 @@ def _by_squares(faces, a, b, balance, pressure):
     det = outer - inner
     slope = balance / 2 * (1 / faces.ratio - faces.ratio / det**2)
     bend = balance * faces.ratio / det**3 + 4 * inner / det**3
-    area, shear_outer, shear_inner = faces.area, -2 * inner / det**2, 2 / det + 2 * inner / det**2
-    first = area * (shear_outer + slope), area * (shear_inner - slope)
-    kept = area * (shear_outer + pressure * slope), area * (shear_inner - pressure * slope)
-    aa = 2 * kept[0] + area * 4 * outer * bend
-    ab = -4 * area * np.sqrt(outer * inner) * (bend + 2 / det**2)
-    bb = 2 * kept[1] + area * 4 * inner * (bend + 4 / det**2)
+    weight, shear_outer, shear_inner = faces.weight, -2 * inner / det**2, 2 / det + 2 * inner / det**2
+    first = weight * (shear_outer + slope), weight * (shear_inner - slope)
+    kept = weight * (shear_outer + pressure * slope), weight * (shear_inner - pressure * slope)
+    aa = 2 * kept[0] + weight * 4 * outer * bend
+    ab = -4 * weight * np.sqrt(outer * inner) * (bend + 2 / det**2)
+    bb = 2 * kept[1] + weight * 4 * inner * (bend + 4 / det**2)
     return first, kept, (aa, ab, bb)
 
 

@@ -101,6 +101,18 @@ class DensityError(MeshError):
     remedy = "Give every face a positive, finite density"
 
 
+class WeightError(MeshError):
+    """Weights that mark no region."""
+
+    remedy = "Paint weights between 0 and 1, not the same everywhere"
+
+
+class ShareError(MeshError):
+    """A factor or a share of the texture that no map can have."""
+
+    remedy = "Choose a smaller factor, or paint a smaller region"
+
+
 class PinError(MeshError):
     """Pinned UVs contradict each other or force a fold."""
 

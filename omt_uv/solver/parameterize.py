@@ -17,6 +17,7 @@ from .charts import Chart, Surface
 from .conformal import conformal_disk, conformal_rectangle, sharpest_corners
 from .distortion import measure
 from .domain import Disk, Domain, Rectangle
+from .elliptic import centre_in_disk
 from .embedding import arc_length_parameters, tutte
 from .errors import FoldedUVError, MeshError, PrecisionError, TransportError
 from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
@@ -32,6 +33,8 @@ CONFORMAL, TRANSPORT, REFINEMENT = (0.0, 0.15), (0.15, 0.25), (0.4, 0.6)
 # Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
 # distance counts squared.
 SITE_RESOLUTION = 1e-7
+# A mean this near to the middle of the unit disk is there.
+CENTRED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -235,6 +238,7 @@ def _start(vertices, triangles, mass, loop, corners, domain: Domain, boundary: s
     """
     conformal, sites, trouble = yield from _conformal_sites(vertices, triangles, corners, log)
     if not trouble:
+        sites = _centred(sites, mass, triangles, loop) if corners is None else sites
         cells, trouble = yield from _transport(sites, mass, domain, log)
         if cells is not None:
             return conformal, cells, centroid_map(cells, domain, loop, corners, log.warnings)
@@ -267,6 +271,18 @@ def _conformal_sites(vertices, triangles, corners, log: _Log):
             trouble = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
             return conformal, None, trouble
         return conformal, sites, ""
+
+
+def _centred(sites: np.ndarray, mass: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Sites (n,2) of the disk moved by a Moebius map so that what has most mass is in the middle, if they stay apart.
+
+    The transport then has less to move, and a magnified region meets the circle on all sides at once.
+    """
+    if np.linalg.norm(mass @ sites) < CENTRED * mass.sum():
+        return sites
+    centred = centre_in_disk(sites, mass)
+    centred[loop] /= np.linalg.norm(centred[loop], axis=1)[:, None]
+    return centred if halfedge_lengths(centred, triangles).min() >= SITE_RESOLUTION else sites
 
 
 def _transport(sites, mass, domain: Domain, log: _Log):

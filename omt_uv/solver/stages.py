@@ -80,9 +80,12 @@ class Task:
 
 
 def rescaled(task: Task, w: np.ndarray) -> Task:
-    """The task with its targets scaled so that the map w (n,) has the least area error."""
-    r = task.faces.areas(w) / (task.faces.area * task.faces.ratio)
-    scale = np.sqrt((task.faces.area @ r) / (task.faces.area @ (1 / r)))
+    """The task with its targets scaled to sum to the area of the map w (n,).
+
+    Only then can every face have its target: under any other scale what is missing is taken from the faces that have
+    most, and a magnified region never gets its share.
+    """
+    scale = task.faces.areas(w).sum() / (task.faces.area @ task.faces.ratio)
     return replace(task, faces=replace(task.faces, ratio=task.faces.ratio * scale))
 
 

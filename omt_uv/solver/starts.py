@@ -26,6 +26,8 @@ SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by 
 NEARLY_FLAT = 0.5
 # A map whose signed area is a smaller share of its unsigned area has no orientation to speak of.
 BEYOND_REPAIR = 0.05
+# The same of an outline that is no outline.
+USELESS = 1e-3
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,17 @@ def free_start(vertices, triangles, uv, loop) -> Start:
     uv = uv * np.sqrt(area / np.abs(signed_areas(uv, triangles)).sum())
     if count_folds(uv, triangles) == 0 and not len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
         return Start(uv, motion, (), True)
-    start = disk_start(vertices, triangles, uv - uv.mean(0), loop)
+    start = disk_start(vertices, triangles, uv - _middle(uv[loop]), loop)
     return Start(start.uv, motion, start.warnings, True)
+
+
+def _middle(outline: np.ndarray) -> np.ndarray:
+    """Centroid (2,) of a polygon (b,2). The mean of a map's vertices is where they are dense, which may be anywhere."""
+    a, b = outline - outline[0], np.roll(outline, -1, axis=0) - outline[0]
+    twice = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    if not np.abs(twice.sum()) > USELESS * np.abs(twice).sum():
+        return outline.mean(axis=0)
+    return outline[0] + (twice @ (a + b)) / (3 * twice.sum())
 
 
 def square_start(vertices, triangles, uv, loop) -> Start:

@@ -1,0 +1,76 @@
+"""Curvature of triangle meshes, integrated over the area of each vertex, and how sharp their edges are.
+
+Integrated values add up: the Gaussian ones of a closed surface to 2 pi times its Euler characteristic. They
+need no orientation (Gaussian, sharpness) or a consistent one (mean), and may be taken of any triangles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .geometry import angles_from_lengths, cotangent_laplacian, halfedge_lengths
+from .topology import halfedges, pair_keys, pair_up
+
+
+def gaussian(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Angle defect (n,) in radians: 2 pi minus the angles around a vertex, 0 on the rim (Gauss, Bonnet).
+
+    positions (n,3), triangles (m,3)
+    """
+    angle = angles_from_lengths(halfedge_lengths(positions, triangles).reshape(-1, 3))
+    # The angle opposite to halfedge k lies at vertex k + 2.
+    around = np.bincount(triangles[:, [2, 0, 1]].ravel(), angle.ravel(), len(positions))
+    return np.where(on_rim(triangles, len(positions)), 0.0, 2 * np.pi - around)
+
+
+def mean(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Mean curvature times area (n,), a length, positive on a sphere seen from outside, 0 on the rim.
+
+    Half of the cotangent Laplacian of the positions along the normal (Meyer, Desbrun, Schroeder, Barr 2003, eq. 8).
+    """
+    n = len(positions)
+    turn = cotangent_laplacian(positions, triangles) @ (positions - positions[triangles].mean(axis=(0, 1)))
+    along = 0.5 * (turn * vertex_normals(positions, triangles)).sum(axis=1)
+    return np.where(on_rim(triangles, n), 0.0, along)
+
+
+def sharpness(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The largest angle (n,) in [0, pi] between the normals of two faces that share an edge at a vertex."""
+    first, second = pair_up(pair_keys(*halfedges(triangles)))
+    normal = face_normals(positions, triangles)
+    a, b = normal[first // 3], normal[second // 3]
+    angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
+    sharpest = np.zeros(len(positions))
+    for ends in halfedges(triangles):
+        np.maximum.at(sharpest, ends[first], angle)
+    return sharpest
+
+
+def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (m,3), 0 for a triangle without area."""
+    p = positions[triangles]
+    return _unit(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
+
+
+def vertex_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (n,3), the mean of the adjacent faces' by area, 0 where they cancel."""
+    p = positions[triangles]
+    twice = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    flat = triangles.ravel()
+    total = np.stack([np.bincount(flat, np.repeat(x, 3), len(positions)) for x in twice.T], axis=1)
+    return _unit(total)
+
+
+def on_rim(triangles: np.ndarray, n: int) -> np.ndarray:
+    """Vertices (n,) bool at an edge that does not have two faces."""
+    tail, head = halfedges(triangles)
+    _, index, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
+    open_edge = count[index.ravel()] != 2
+    rim = np.zeros(n, bool)
+    rim[tail[open_edge]] = rim[head[open_edge]] = True
+    return rim
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    size = np.linalg.norm(v, axis=1, keepdims=True)
+    return v / np.where(size > 0, size, 1)

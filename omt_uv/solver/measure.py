@@ -1,0 +1,169 @@
+"""Target measures: how much of the domain every face shall get, as densities relative to its area.
+
+A density (m,) has one positive number per triangle; only ratios count, so densities compose by multiplication. The
+target measure of a face is its area times its density. `area` (m,) below is always that of the surface.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from . import curvature
+from .errors import DensityError, ShareError, WeightError
+from .geometry import face_areas, vertex_areas
+from .topology import halfedges
+
+# A density may not vary more than this over a surface: faces with less would have no place in double precision.
+CONTRAST = 1e6
+
+
+def uniform(area: np.ndarray) -> np.ndarray:
+    """Every face its own area: (m,) of ones."""
+    return np.ones(len(area))
+
+
+def painted(weights: np.ndarray, factor: float) -> np.ndarray:
+    """Density 1 + (factor - 1) w (m,) of weights (m,) in [0, 1]: what has weight 1 gets `factor` times what has 0.
+
+    Raises
+    ------
+    WeightError, ShareError : see `check_weights` and `check_factor`
+    """
+    check_factor(factor)
+    return 1 + (factor - 1) * check_weights(weights)
+
+
+def curved(area: np.ndarray, triangles: np.ndarray, curvature_at: np.ndarray, c: float, whole: float) -> np.ndarray:
+    """Density (m,) of the measure area + c |K|, K (n,) integrated over the vertices (B. Gu 2018, eq. 17).
+
+    whole : value of the integral of |K| that with c = 1 counts as much as the whole area, so that c means the same
+        on every mesh. Each vertex' curvature is spread over its faces by their area.
+    """
+    if not (np.isfinite(c) and c >= 0):
+        raise DensityError(f"The weight of curvature is {c}", remedy="Give it a number that is not negative")
+    at = np.bincount(triangles.ravel(), np.repeat(area / 3, 3), len(curvature_at))
+    amount = np.abs(curvature_at) * (area.sum() / whole)
+    return 1 + c * from_vertices(amount / np.where(at > 0, at, 1), triangles)
+
+
+def gaussian_curvature(positions: np.ndarray, triangles: np.ndarray, c: float = 1.0) -> np.ndarray:
+    """Density (m,) of area + c |K| with K the Gaussian curvature; with c = 1 half of a sphere's measure is curvature.
+
+    positions (n,3), triangles (m,3)
+    """
+    area = face_areas(positions, triangles)
+    return curved(area, triangles, curvature.gaussian(positions, triangles), c, 4 * np.pi)
+
+
+def mean_curvature(positions: np.ndarray, triangles: np.ndarray, c: float = 1.0) -> np.ndarray:
+    """Density (m,) of area + c |H| with H the mean curvature; with c = 1 half of a sphere's measure is curvature.
+
+    Mean curvature is one over a length: the surface is measured by the radius of the sphere that has its area.
+    """
+    area = face_areas(positions, triangles)
+    whole = np.sqrt(4 * np.pi * area.sum())
+    return curved(area, triangles, curvature.mean(positions, triangles), c, whole)
+
+
+def from_vertices(values: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Mean of the corners' values (n,) per triangle, (m,): weights of vertices as weights of faces."""
+    return np.asarray(values, float)[triangles].mean(axis=1)
+
+
+def from_polygons(values: np.ndarray, triangle_face: np.ndarray) -> np.ndarray:
+    """Values (f,) of polygons for their triangles, (m,)."""
+    return np.asarray(values, float)[triangle_face]
+
+
+def attribute(values: np.ndarray) -> np.ndarray:
+    """Any positive numbers (m,) as a density.
+
+    Raises
+    ------
+    DensityError : a value that is not positive and finite, or values of more contrast than `CONTRAST`
+    """
+    density = np.asarray(values, float)
+    wrong = np.flatnonzero(~(np.isfinite(density) & (density > 0)))
+    if len(wrong):
+        raise DensityError("A density is not positive and finite", kind="face", elements=wrong)
+    if density.max(initial=1.0) > CONTRAST * density.min(initial=np.inf):
+        least = np.flatnonzero(density * CONTRAST < density.max())
+        raise DensityError(f"A density varies by more than {CONTRAST:.0e}", "Raise the smallest values", "face", least)
+    return density
+
+
+def combined(*densities: np.ndarray) -> np.ndarray:
+    """The product of densities (m,): each multiplies what the others leave a face."""
+    product = np.ones_like(densities[0])
+    for density in densities:
+        product = product * density
+    return attribute(product)
+
+
+def normalised(density: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """The density (m,) scaled so that the target measure sums to the area."""
+    return density * (area.sum() / (area @ density))
+
+
+def share(weights: np.ndarray, measure: np.ndarray) -> float:
+    """Share sum(w a) / sum(a) of a softly painted region (m,) in a measure (m,): areas in space, or in a UV map."""
+    return float(weights @ measure / measure.sum())
+
+
+def graded(density: np.ndarray, positions: np.ndarray, triangles: np.ndarray, limit: float, samples: int) -> np.ndarray:
+    """The least density (m,) above the given one (m,) whose spacing of samples grows by at most `limit` per length.
+
+    With `samples` points the spacing is h = sqrt(area / (samples density)), and the result obeys
+    h(x) <= h(y) + limit |x - y| along the surface (Persson 2006, "Mesh size functions for implicit geometries",
+    eq. 6; here exactly, by shortest paths along edges). Neighbouring edges then differ by a factor of about 1 + limit.
+
+    Raises
+    ------
+    DensityError : see `attribute`; a limit that is not positive
+    """
+    if not limit > 0:
+        raise DensityError(f"A spacing cannot grow by {limit}", remedy="Give a positive limit")
+    density = normalised(attribute(density), area := face_areas(positions, triangles))
+    n, at = len(positions), vertex_areas(positions, triangles)
+    mean = vertex_areas(positions, triangles, density) / np.where(at > 0, at, 1)
+    spacing = np.sqrt(area.sum() / (samples * np.where(at > 0, mean, 1)))
+    tail, head = halfedges(triangles)
+    length = limit * np.linalg.norm(positions[tail] - positions[head], axis=1)
+    # From one more node, whose edges are as long as the spacing asked, every vertex is as far as its spacing may be.
+    rows = np.concatenate([tail, head, np.full(n, n)])
+    columns = np.concatenate([head, tail, np.arange(n)])
+    key, first = np.unique(rows * (n + 1) + columns, return_index=True)
+    data = np.concatenate([length, length, spacing])[first]
+    graph = csr_matrix((data, (key // (n + 1), key % (n + 1))), shape=(n + 1, n + 1))
+    allowed = dijkstra(graph, indices=n)[:n]
+    finer = (spacing / allowed) ** 2
+    return density * from_vertices(finer, triangles)
+
+
+def check_weights(weights: np.ndarray, kind: str = "face") -> np.ndarray:
+    """Weights as float64, all of them in [0, 1] and not the same everywhere.
+
+    Raises
+    ------
+    WeightError : anything else, with the indices of what is wrong as elements of this kind
+    """
+    weights = np.asarray(weights, float)
+    wrong = np.flatnonzero(~np.isfinite(weights))
+    if len(wrong):
+        raise WeightError("A weight is not a finite number", kind=kind, elements=wrong)
+    wrong = np.flatnonzero((weights < 0) | (weights > 1))
+    if len(wrong):
+        raise WeightError("A weight is not between 0 and 1", kind=kind, elements=wrong)
+    if not weights.any():
+        raise WeightError("All weights are zero: there is no region", "Paint the region first")
+    if np.ptp(weights) == 0:
+        raise WeightError("All weights are the same: there is nothing around the region", "Paint a part only")
+    return weights
+
+
+def check_factor(factor: float) -> None:
+    """Raise ShareError unless a factor is positive and finite."""
+    if not (np.isfinite(factor) and factor > 0):
+        raise ShareError(f"A region cannot have {factor:g} times its share", "Choose a factor above 0")
