@@ -14,8 +14,8 @@ from .solver.budget import unwrap_within
 from .solver.chart_pins import CornerPins, chart_pins
 from .solver.charts import Chart, Surface
 from .solver.errors import MeshError
-from .solver.geometry import face_areas, signed_areas
-from .solver.parameterize import ChartMap, SurfaceMap, located, unwrap, unwrap_chart
+from .solver.measure import Target
+from .solver.parameterize import ChartMap, SurfaceMap, chart_target, located, unwrap, unwrap_chart
 from .solver.progress import Progress, Steps, part_of
 
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
@@ -45,12 +45,14 @@ class Layout:
 
 @dataclass(frozen=True)
 class Job:
-    """A surface, the polygons (f,) bool to unwrap, its pins, and vertices (n,) in [0,1] to keep free of cuts."""
+    """A surface, the polygons (f,) bool to unwrap, its pins, vertices (n,) in [0,1] to keep free of cuts, and what
+    its triangles shall get: their own areas by default. Targets of several surfaces are relative to each other."""
 
     surface: Surface
     faces: np.ndarray | None = None
     pins: CornerPins | None = None
     avoid: np.ndarray | None = None
+    target: Target | None = None
 
 
 def lay_out(
@@ -60,9 +62,9 @@ def lay_out(
 ) -> Steps[Layout]:
     """Unwrap surfaces at one texel density into one unit square.
 
-    Solver results have the area of the surface, so packing with a single scale gives every island of every
-    surface the same texels per area. `spare_packer` takes over, with a warning, where xatlas cannot. Islands with
-    pins are neither scaled nor packed, as in Blender, and the others are packed as if they were not there.
+    Solver results have the area of the surface, or of the target, so packing with a single scale gives every island
+    of every surface the same texels per area. `spare_packer` takes over, with a warning, where xatlas cannot. Islands
+    with pins are neither scaled nor packed, as in Blender, and the others are packed as if they were not there.
 
     Raises
     ------
@@ -84,7 +86,7 @@ def lay_out(
     free = [(c, m.uv) for c, m in charts if not m.pinned]
     if len(free) < len(charts):
         warnings.append((-1, _in_place(len(charts) - len(free), len(free))))
-    islands = [_at_true_area(chart, uv) for chart, uv in free]
+    islands = [uv for _, uv in free]
     packed, complaint = pack_islands(islands, [chart.triangles for chart, _ in free], settings, spare_packer)
     if complaint:
         warnings.append((-1, complaint))
@@ -107,11 +109,14 @@ def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
     options = settings.preparation_arguments()
     if not settings.max_shear:
         arguments = {**settings.solver_arguments(), **options}
-        return (yield from unwrap(job.surface, job.faces, pins=job.pins, avoid=job.avoid, **arguments))
+        return (
+            yield from unwrap(job.surface, job.faces, pins=job.pins, avoid=job.avoid, target=job.target, **arguments)
+        )
 
     def map_chart(chart: Chart) -> Steps[ChartMap]:
         try:
-            return (yield from unwrap_chart(chart, pins=chart_pins(job.pins, chart), **settings.solver_arguments()))
+            arguments = {**settings.solver_arguments(), **chart_target(job.target, job.surface, chart)}
+            return (yield from unwrap_chart(chart, pins=chart_pins(job.pins, chart), **arguments))
         except MeshError as error:
             raise located(error, chart) from error
 
@@ -130,15 +135,6 @@ def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
 def _in_place(pinned: int, others: int) -> str:
     text = "An island with pins stays" if pinned == 1 else f"{pinned} islands with pins stay"
     return f"{text} in place" + ("; the others were packed as if there were none" if others else "")
-
-
-def _at_true_area(chart: Chart, uv: np.ndarray) -> np.ndarray:
-    """Coordinates (n,2) scaled so that the island has the area of its chart to the last digit.
-
-    The polygon inside a circle, for one, is smaller than the circle, the more so the fewer corners it has.
-    """
-    covered = np.abs(signed_areas(uv, chart.triangles)).sum()
-    return uv * np.sqrt(face_areas(chart.vertices, chart.triangles).sum() / covered)
 
 
 def pack_islands(

@@ -218,6 +218,21 @@ def _make(surface: Surface, members: np.ndarray, sheets: Sheets, corner_class: n
     return Chart(positions, local[real], corners[real], owner[real], ids, local[~real])
 
 
+def triangle_rows(surface: Surface, chart: Chart) -> np.ndarray:
+    """Which triangles of the surface the triangles of a chart are, (m,).
+
+    A triangle is known by the smaller two of its corners: no other triangle of its polygon has the same two as such.
+    """
+
+    def key(triangles):
+        ordered = np.sort(triangles, axis=1)
+        return pair_keys(ordered[:, 0], ordered[:, 1])
+
+    keys = key(surface.triangles)
+    order = np.argsort(keys)
+    return order[np.searchsorted(keys[order], key(chart.corners))]
+
+
 def check_edges(chart: Chart) -> None:
     """Straight lines in the plane cannot tell apart two edges, or diagonals, between the same two vertices."""
     tail, head = halfedges(chart.disk)

@@ -6,6 +6,8 @@ target measure of a face is its area times its density. `area` (m,) below is alw
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
@@ -17,6 +19,19 @@ from .topology import halfedges
 
 # A density may not vary more than this over a surface: faces with less would have no place in double precision.
 CONTRAST = 1e6
+
+
+@dataclass(frozen=True)
+class Target:
+    """What every triangle of a surface shall get: density (m,), and the weights (m,) in [0, 1] of a region whose share
+    shall be exact, if there is one."""
+
+    density: np.ndarray
+    region: np.ndarray | None = None
+
+    def of(self, rows: np.ndarray) -> Target:
+        """The target of some triangles (k,)."""
+        return Target(self.density[rows], None if self.region is None else self.region[rows])
 
 
 def uniform(area: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from .energy import Elements, area_error, energy, local_derivatives, scatter, squared
+from .energy import Elements, energy, local_derivatives, scatter, shortfall, squared
 from .linear import Factor
 
 ARMIJO = 1e-4
@@ -157,7 +157,7 @@ class Problem:
         return value + sum(e.energy(w) for e in self.extras) if np.isfinite(value) else value
 
     def area_error(self, w: np.ndarray) -> float:
-        return area_error(self.faces, w)
+        return shortfall(self.faces, w)
 
     def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
         return newton_step(self, w, value, pressure)

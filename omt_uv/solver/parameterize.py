@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .chart_pins import ChartPins, CornerPins, anchored, chart_pins, facing, refuse_outline
-from .charts import Chart, Surface
+from .charts import Chart, Surface, triangle_rows
 from .conformal import conformal_disk, conformal_rectangle, sharpest_corners
 from .distortion import measure
 from .domain import Disk, Domain, Rectangle
@@ -21,6 +21,7 @@ from .elliptic import centre_in_disk
 from .embedding import arc_length_parameters, tutte
 from .errors import FoldedUVError, MeshError, PrecisionError, TransportError
 from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
+from .measure import Target
 from .preparation import prepare
 from .progress import Progress, Steps, part_of
 from .refine import BOUNDARIES, Refinement, refine
@@ -107,6 +108,7 @@ def unwrap(
     seams: str = "auto",
     fill_holes: bool = False,
     avoid: np.ndarray | None = None,
+    target: Target | None = None,
 ) -> Steps[SurfaceMap]:
     """Area-preserving texture coordinates of the polygons `faces` (f,) bool, all by default.
 
@@ -117,6 +119,7 @@ def unwrap(
     balance : from 0, exact areas, to 1, least shear
     pins : corners that keep their places, with a free boundary
     seams, fill_holes, avoid : see `preparation.prepare`
+    target : density (m,) of the triangles of the surface, and a region; every triangle its own area by default
 
     Raises
     ------
@@ -131,7 +134,8 @@ def unwrap(
     done = 0.0
     for chart, fixed in zip(charts, held, strict=True):
         share = len(chart.triangles) / total
-        steps = unwrap_chart(chart, boundary=boundary, quality=quality, balance=balance, pins=fixed)
+        options: dict = {"boundary": boundary, "quality": quality, "balance": balance, "pins": fixed}
+        steps = unwrap_chart(chart, **options, **chart_target(target, surface, chart))
         try:
             maps.append((yield from part_of(steps, done, share)))
         except MeshError as error:
@@ -139,6 +143,14 @@ def unwrap(
         done += share
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
+
+
+def chart_target(target: Target | None, surface: Surface, chart: Chart) -> dict:
+    """Arguments of `unwrap_chart` for the part of a surface's target that a chart has."""
+    if target is None:
+        return {}
+    mine = target.of(triangle_rows(surface, chart))
+    return {"density": mine.density, "region": mine.region}
 
 
 def located_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
@@ -167,6 +179,7 @@ def unwrap_chart(
     quality: str = "standard",
     balance: float = 0.0,
     density: np.ndarray | None = None,
+    region: np.ndarray | None = None,
     pins: ChartPins | None = None,
 ) -> Steps[ChartMap]:
     """Area-preserving map of one chart: conformal map, transport, authalic refinement.
@@ -174,7 +187,8 @@ def unwrap_chart(
     Parameters
     ----------
     boundary, quality, balance : see `unwrap`
-    density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default
+    density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default. The map has the area asked for
+    region : (m,) in [0, 1], weights of a region whose share of the map is to be exact
     pins : two or more fix place, direction and scale; one fixes the place, and the chart stays as large as it is
 
     Raises
@@ -190,8 +204,7 @@ def unwrap_chart(
     vertices, unit = _in_unit_box(chart.vertices)
     # Patches over holes are mapped with the rest, and forgotten afterwards.
     triangles = chart.disk
-    if density is not None:
-        density = np.concatenate([density, np.ones(len(chart.patches))])
+    density, region = _with_patches(density, region, len(chart.patches))
     loop = boundary_loops(triangles)[0]
     if boundary == "square" and len(loop) < 4:
         log.warnings.append("A chart with only three boundary vertices does not fill a square; its boundary is free")
@@ -200,18 +213,19 @@ def unwrap_chart(
     corners = sharpest_corners(vertices, triangles, loop) if boundary == "square" else None
     mass = vertex_areas(vertices, triangles, density)
     conformal, cells, uv = yield from _start(vertices, triangles, mass, loop, corners, domain, boundary, log)
-    target = None if density is None else face_areas(vertices, triangles) * density
+    wanted = None if density is None else face_areas(vertices, triangles) * density
     with log.timed("refinement"):
         uv, held = facing(uv, pins)
-        options = {"target": target, "balance": balance, "quality": quality, "pins": held}
+        options = {"target": wanted, "region": region, "balance": balance, "quality": quality, "pins": held}
         steps = _refined(vertices, triangles, uv, boundary, log, options)
         refined = yield from part_of(steps, *REFINEMENT)
     with log.timed("measure"):
-        figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False)
+        asked = None if density is None else density[: len(chart.triangles)]
+        figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
     if figures.folds:
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
     return ChartMap(
-        refined.uv if held else _in_place(refined.uv, vertices, chart.triangles, unit, pins),
+        refined.uv if held else _in_place(refined.uv, vertices, chart.triangles, asked, unit, pins),
         conformal.iterations if conformal else None,
         conformal.residual if conformal else None,
         cells.iterations if cells else None,
@@ -354,11 +368,20 @@ def _into_corners(domain: Domain, loop, along, corners) -> tuple[np.ndarray, np.
     return loop, np.interp(along, ends, domain.period * np.arange(5) / 4)
 
 
-def _in_place(uv: np.ndarray, vertices, triangles, unit: float, pins: ChartPins | None) -> np.ndarray:
-    """A map uv (n,2) of a chart in a unit box, as large as the chart really is, or where its one or two pins are."""
+def _with_patches(density, region, patches: int) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Density and region of all triangles of a chart's disk, those of the patches over holes included."""
+    return (
+        None if density is None else np.concatenate([density, np.ones(patches)]),
+        None if region is None else np.concatenate([region, np.zeros(patches)]),
+    )
+
+
+def _in_place(uv: np.ndarray, vertices, triangles, density, unit: float, pins: ChartPins | None) -> np.ndarray:
+    """A map uv (n,2) of a chart in a unit box, as large as its target really is, or where its one or two pins are."""
     # A polygon inscribed in the disk is smaller than the disk: one texel density needs its own area.
     covered = signed_areas(uv, triangles).sum()
-    uv = uv * np.sqrt(face_areas(vertices, triangles).sum() / covered)
+    area = face_areas(vertices, triangles)
+    uv = uv * np.sqrt((area.sum() if density is None else area @ density) / covered)
     return uv * unit if pins is None else anchored(uv, triangles, pins)
 
 

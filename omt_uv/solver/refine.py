@@ -54,6 +54,7 @@ def refine(
     *,
     boundary: str = "free",
     target: np.ndarray | None = None,
+    region: np.ndarray | None = None,
     balance: float = 0.0,
     quality: str = "standard",
     pins: tuple[np.ndarray, np.ndarray] | None = None,
@@ -66,6 +67,7 @@ def refine(
         the square about 0 of the target's area, corners fixed
     target : (m,) area that every face shall have relative to the others; the surface's areas by default. They are
         scaled to sum to the area of the surface.
+    region : (m,) in [0, 1], weights of a region whose share of the target's area is to be exact
     balance : 0 for exact areas to 1 for the least shear
     quality : "draft", "standard" or "exact"
     pins : vertices (k,) and their places (k,2), in free mode. Two or more fix place, direction and scale, one fixes the
@@ -94,7 +96,7 @@ def refine(
     mesh = renumbered(vertices, triangles, uv, pins)
     try:
         found, start, area_left = yield from _refined(
-            mesh.vertices, mesh.triangles, mesh.uv, boundary, target, balance, QUALITIES[quality], mesh.pins
+            mesh.vertices, mesh.triangles, mesh.uv, boundary, (target, region), balance, QUALITIES[quality], mesh.pins
         )
     except MeshError as error:
         raise mesh.blame(error) from error
@@ -129,7 +131,7 @@ def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins:
     """Stages on a renumbered chart: what was found, the start it was found from, and the area error that is left."""
     loop = boundary_loops(triangles)[0]
     start = STARTS[boundary](vertices, triangles, uv, loop)
-    faces = elements(vertices, triangles, target)
+    faces = elements(vertices, triangles, *target)
     assembly = Assembly(triangles, len(vertices))
     task = _task(faces, assembly, start, loop, boundary)
     w = start.uv[:, 0] + 1j * start.uv[:, 1]

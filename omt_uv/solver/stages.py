@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from .contact import Contact, contact, crossings
-from .energy import Elements, area_error
+from .energy import Elements, shortfall
 from .newton import Assembly, Motion, Problem, Step
 from .progress import Progress, Steps
 
@@ -139,7 +139,7 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Step
             guarded = True
             continue
         k += 1
-        error = area_error(task.faces, w)
+        error = shortfall(task.faces, w)
         enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
             break

@@ -1,0 +1,137 @@
+"""Magnify a map that exists: the map itself is the planar surface, and a density is applied in its own domain.
+
+The outline stays what it is if it is a circle or has straight sides, and its vertices slide along it; else it is
+free, as when a surface is unwrapped. Outside of the region content stays where it was as far as room is left, since the
+start is the given map and the energy is least where nothing moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .energy import area_error, elements
+from .errors import FoldedUVError, MeshError
+from .geometry import face_areas, signed_areas
+from .improve import boundary_edges, meets_itself
+from .newton import Assembly
+from .outline import Outline, centroid, free, recognised
+from .progress import Progress, Steps
+from .renumbering import Renumbered, renumbered
+from .stages import QUALITIES, Found, Task, stages
+from .topology import boundary_loops
+
+OUTLINES = ("own", "free")
+
+
+@dataclass(frozen=True)
+class Lens:
+    """uv (n,2) of the magnified map; outline "circle", "sides" or "free"; the others as in `refine.Refinement`, with the
+    area error against the density."""
+
+    uv: np.ndarray
+    outline: str
+    iterations: int
+    residual: float
+    status: str
+    area_error: float
+    warnings: tuple[str, ...]
+
+
+def magnify_map(
+    uv: np.ndarray,
+    triangles: np.ndarray,
+    density: np.ndarray,
+    *,
+    region: np.ndarray | None = None,
+    boundary: str = "own",
+    quality: str = "standard",
+) -> Steps[Lens]:
+    """Change the areas of a map uv (n,2), triangles (m,3), by a density (m,), without folds.
+
+    Parameters
+    ----------
+    region : (m,) in [0, 1], weights of a region whose share is to be exact. What lies outside of it keeps its place,
+        as well as it can, where the outline is free
+    boundary : "own" keeps a circle and straight sides; "free"
+    quality : "draft", "standard" or "exact"
+
+    Raises
+    ------
+    FoldedUVError : faces of the map are folded or have no area
+    """
+    if boundary not in OUTLINES:
+        raise ValueError(f"boundary must be one of {', '.join(OUTLINES)}, not {boundary!r}")
+    yield Progress("Magnification", 0.0)
+    refuse_folds(uv, triangles)
+    area = np.abs(signed_areas(uv, triangles))
+    size = np.sqrt(area.sum())
+    middle = (area @ uv[triangles].mean(axis=1)) / area.sum()
+    flat = (uv - middle) / size
+    mesh = renumbered(np.column_stack([flat, np.zeros(len(flat))]), triangles, flat, None)
+    try:
+        found, outline, error = yield from _magnified(mesh, density, region, boundary, QUALITIES[quality])
+    except MeshError as problem:
+        raise mesh.blame(problem) from problem
+    return Lens(
+        mesh.original(found.w) * size + middle,
+        outline.kind,
+        found.steps,
+        found.residual,
+        found.status,
+        error,
+        found.warnings,
+    )
+
+
+def refuse_folds(uv: np.ndarray, triangles: np.ndarray) -> None:
+    """Raise FoldedUVError with the triangles of a map uv (n,2) that are folded, or have no area."""
+    if not np.isfinite(uv).all():
+        wrong = np.flatnonzero(~np.isfinite(uv[triangles]).all(axis=(1, 2)))
+        raise FoldedUVError("The UVs to magnify are not finite", kind="face", elements=wrong)
+    signed = signed_areas(uv, triangles)
+    folded = np.flatnonzero(~(signed * (1 if signed.sum() >= 0 else -1) > 0))
+    if len(folded):
+        raise FoldedUVError(
+            "The UVs to magnify fold, or have no area", "Unwrap or refine these faces first", "face", folded
+        )
+
+
+def _magnified(mesh: Renumbered, density, region, boundary: str, settings) -> Steps[tuple[Found, Outline, float]]:
+    given = mesh.uv @ [1, 1j]
+    outline = recognised(given, _outer(given, mesh.triangles))
+    if boundary == "free":
+        outline = Outline("free", free(len(given)), given, 0j)
+    # The surface is the map as it is on its exact outline: nothing is sheared there.
+    flat = np.column_stack([outline.w.real, outline.w.imag, np.zeros(len(given))])
+    faces = elements(flat, mesh.triangles, face_areas(flat, mesh.triangles) * density, region)
+    rim = boundary_edges(mesh.triangles)
+    if outline.kind != "free":
+        # Holes are free all the same.
+        rim = rim[~np.isin(rim[:, 0], _outer(given, mesh.triangles))]
+    guard = rim if len(rim) and not meets_itself(outline.w, rim) else None
+    task = Task(faces, Assembly(mesh.triangles, len(given)), outline.motion, guard, False, outline.kind != "free")
+    found = yield from stages(task, outline.w, 0.0, settings)
+    error = area_error(faces, found.w)
+    return replace(found, w=_aligned(found.w, given, outline, faces, region)), outline, error
+
+
+def _outer(w: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The boundary loop (b,) around everything."""
+    loops = boundary_loops(triangles)
+    return max(loops, key=lambda loop: centroid(w[loop])[1])
+
+
+def _aligned(w: np.ndarray, given: np.ndarray, outline: Outline, faces, region) -> np.ndarray:
+    """The map turned, and with a free outline moved and scaled, so that what is not magnified lies as it did."""
+    if outline.kind == "sides":
+        return w
+    calm = faces.area if region is None else faces.area * (1 - region)
+    mass = np.bincount(faces.triangles.ravel(), np.repeat(calm / calm.sum(), 3) / 3, len(w))
+    here, there = (0j, outline.centre) if outline.kind == "circle" else (mass @ w, mass @ given)
+    if outline.kind == "free":
+        w = w * np.sqrt(abs(faces.areas(given).sum()) / faces.areas(w).sum())
+        here = mass @ w
+    turn = (mass * (w - here).conj()) @ (given - there)
+    return (w - here) * (turn / abs(turn) if abs(turn) > 0 else 1) + there
