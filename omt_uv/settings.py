@@ -117,3 +117,27 @@ class RemeshSettings:
     ratio: float = 0.5
     strategy: str = DEFAULT_STRATEGY.lower()
     seed: int = 0
+
+
+SOURCES = (
+    ("MESH", "Mesh", "Unwrap anew: every part of the surface gets its share, and the region what was asked"),
+    ("UV", "UVs", "Magnify inside the UV islands that are there, in their own outline, like a lens on a map"),
+)
+OWN_BOUNDARY = ("OWN", "Own", "The outline that islands have: circles and straight sides stay, others are free")
+DEFAULT_SOURCE = "MESH"
+DEFAULT_FACTOR = 4.0
+
+
+@dataclass(frozen=True)
+class MagnifySettings(Settings):
+    """How to magnify a painted region.
+
+    factor : times its share; exact : of the whole texture, otherwise against what has weight 0
+    source : an identifier of SOURCES in lower case; boundary : of BOUNDARIES, or "own" for existing UVs
+    cascade : how often; k times the factor m is m^k, from the mesh at once and from UVs one after the other
+    """
+
+    factor: float = DEFAULT_FACTOR
+    exact: bool = True
+    source: str = DEFAULT_SOURCE.lower()
+    cascade: int = 1

@@ -27,7 +27,7 @@ OUTLINES = ("own", "free")
 
 @dataclass(frozen=True)
 class Lens:
-    """uv (n,2) of the magnified map; outline "circle", "sides" or "free"; the others as in `refine.Refinement`, with the
+    """uv (n,2) of the magnified map; outline "circle", "sides" or "free"; the rest as in `refine.Refinement`, with the
     area error against the density."""
 
     uv: np.ndarray
@@ -121,6 +121,25 @@ def _outer(w: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """The boundary loop (b,) around everything."""
     loops = boundary_loops(triangles)
     return max(loops, key=lambda loop: centroid(w[loop])[1])
+
+
+def aligned_to(
+    uv: np.ndarray, given: np.ndarray, triangles: np.ndarray, calm: np.ndarray, quarters: bool
+) -> np.ndarray:
+    """A map uv (n,2) turned, moved and scaled to lie as the given one does, with its area; both are unmirrored.
+
+    calm (m,) : how much each triangle counts for that; quarters : only quarter turns
+    """
+    w, aim = uv @ [1, 1j], given @ [1, 1j]
+    area = signed_areas(given, triangles)
+    middle = [(a @ x[triangles].mean(axis=1)) / a.sum() for x, a in ((w, signed_areas(uv, triangles)), (aim, area))]
+    weight = np.bincount(triangles.ravel(), np.repeat(area * calm, 3), len(w))
+    turn = (weight * (w - middle[0]).conj()) @ (aim - middle[1])
+    if quarters:
+        turn = 1j ** np.round(2 * np.angle(turn) / np.pi)
+    scale = np.sqrt(area.sum() / signed_areas(uv, triangles).sum())
+    placed = (w - middle[0]) * (scale * (turn / abs(turn) if abs(turn) > 0 else 1)) + middle[1]
+    return np.column_stack([placed.real, placed.imag])
 
 
 def _aligned(w: np.ndarray, given: np.ndarray, outline: Outline, faces, region) -> np.ndarray:

@@ -1,0 +1,314 @@
+"""A painted region gets its share of the texture; the one path of the operator and of the command line.
+
+From the mesh, surfaces are unwrapped with the density as target. From existing UVs, every island is a plane of its own
+and magnified inside its own outline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .settings import MagnifySettings
+from .solver.chart_pins import CornerPins
+from .solver.charts import Surface, check_disk
+from .solver.distortion import measure
+from .solver.errors import EmptyMeshError, MeshError, WeightError
+from .solver.exact_share import ExactShare, exact_share
+from .solver.geometry import face_areas, signed_areas
+from .solver.islands import Island, uv_islands
+from .solver.lens import OUTLINES, Lens, aligned_to, magnify_map, refuse_folds
+from .solver.measure import Target, check_weights, from_vertices, normalised, painted, share
+from .solver.overlap import overlap_share
+from .solver.parameterize import located, unwrap_chart
+from .solver.progress import Steps, part_of
+from .unwrapping import Job, Packer, Refusal, lay_out
+
+# More overlap than this, as a share of the UV area, is said.
+OVERLAP = 1e-4
+
+
+@dataclass(frozen=True)
+class Region:
+    """A surface, the polygons (f,) bool to work on, weights (n,) of its vertices, UVs and pins if it has any."""
+
+    surface: Surface
+    faces: np.ndarray
+    weights: np.ndarray
+    pins: CornerPins | None = None
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Shares of the region before, as asked and as measured in the result; factor of weight 1 and the law."""
+
+    before: float
+    asked: float
+    after: float
+    factor: float
+    law: str
+
+    def text(self) -> str:
+        return (
+            f"The region went from {100 * self.before:.4g} % to {100 * self.after:.4g} % of the texture "
+            f"({100 * self.asked:.4g} % asked)"
+        )
+
+
+@dataclass(frozen=True)
+class Magnified:
+    """Corners (k,) to write and their UVs (k,2) and reports, of each surface; shares of the region; warnings.
+
+    `warnings` are pairs of surface index and text; -1 stands for all surfaces.
+    """
+
+    corners: list[np.ndarray]
+    uv: list[np.ndarray]
+    reports: list[list[dict]]
+    shares: Shares
+    warnings: list[tuple[int, str]]
+
+
+def magnify(
+    regions: Sequence[Region], settings: MagnifySettings, spare_packer: Packer | None = None
+) -> Steps[Magnified]:
+    """Magnify painted regions of surfaces as the settings say.
+
+    Raises
+    ------
+    Refusal : with the index of the surface and the MeshError that says why
+    packing.PackingError : see `unwrapping.lay_out`
+    """
+    for index, region in enumerate(regions):
+        try:
+            _check(region)
+        except MeshError as error:
+            raise Refusal(index, error) from error
+    if settings.source == "uv":
+        return (yield from _from_uv(regions, settings))
+    return (yield from _from_mesh(regions, settings, spare_packer))
+
+
+def _check(region: Region) -> None:
+    """Weights that are no weights, named by their vertices; a region may lie on one of several surfaces alone."""
+    wrong = np.flatnonzero(~np.isfinite(region.weights))
+    if len(wrong):
+        raise WeightError("A weight is not a finite number", kind="vertex", elements=wrong)
+    wrong = np.flatnonzero((region.weights < 0) | (region.weights > 1))
+    if len(wrong):
+        raise WeightError("A weight is not between 0 and 1", kind="vertex", elements=wrong)
+
+
+# ---- from the mesh ------------------------------------------------------------------------------------------
+
+
+def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnified]:
+    """Unwrap with the density as target; the share is that of all surfaces together."""
+    parts = [_triangles(region) for region in regions]
+    area = np.concatenate([a for _, a, _ in parts])
+    weights = np.concatenate([w for *_, w in parts])
+    try:
+        found = wanted(weights, area, settings.factor**settings.cascade, settings.exact)
+    except MeshError as error:
+        raise Refusal(0, error) from error
+    density = normalised(found.density, area)
+    jobs, start = [], 0
+    for region, (rows, a, w) in zip(regions, parts, strict=True):
+        full, inside = np.ones(len(region.surface.triangles)), np.zeros(len(region.surface.triangles))
+        full[rows], inside[rows] = density[start : start + len(a)], w
+        start += len(a)
+        pins = region.pins if region.pins is not None and region.pins.pinned.any() else None
+        jobs.append(Job(region.surface, region.faces, pins, target=Target(full, inside)))
+    if settings.boundary == "own":
+        settings = replace(settings, boundary="free")
+    layout = yield from lay_out(jobs, settings, spare_packer)
+    after = [_uv_areas(*x) for x in zip(regions, parts, layout.corners, layout.uv, strict=True)]
+    shares = Shares(found.before, found.asked, share(weights, np.concatenate(after)), found.factor, found.law)
+    reports = [m.report() for m in layout.maps]
+    warnings = [*layout.warnings, *((-1, text) for text in found.warnings)]
+    return Magnified(layout.corners, layout.uv, reports, shares, warnings)
+
+
+def wanted(weights: np.ndarray, area: np.ndarray, factor: float, exact: bool) -> ExactShare:
+    """The density of a region (m,), for its exact share or for exactly the factor between weight 1 and weight 0."""
+    if exact:
+        return exact_share(weights, area, factor)
+    density = painted(weights, factor)
+    return ExactShare(density, factor, "linear", share(weights, area), share(weights, area * density))
+
+
+def _triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles to work on (k,), their areas in space (k,) and weights (k,)."""
+    surface = region.surface
+    rows = np.flatnonzero(region.faces[surface.triangle_face])
+    vertices = surface.corner_vertex[surface.triangles[rows]]
+    area = face_areas(surface.positions, vertices)
+    return rows, np.where(np.isfinite(area), area, 0.0), from_vertices(region.weights, vertices)
+
+
+def _uv_areas(region: Region, part, corners: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """UV areas of the triangles worked on (k,), 0 for those that were left out."""
+    full = np.zeros((len(region.surface.corner_vertex), 2))
+    full[corners] = uv
+    return np.abs(signed_areas(full, region.surface.triangles[part[0]]))
+
+
+# ---- from existing UVs --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """An island of surface `owner`, its region (m,) and UV area (m,), the share wanted, and what became of it."""
+
+    owner: int
+    island: Island
+    region: np.ndarray
+    area: np.ndarray
+    found: ExactShare
+    uv: np.ndarray
+    outline: str
+    iterations: int
+
+
+def _from_uv(regions, settings: MagnifySettings) -> Steps[Magnified]:
+    """Magnify inside every island that the region touches; the others stay to the bit."""
+    islands, warnings = _islands(regions)
+    total = sum(len(island.chart.triangles) for _, island in islands)
+    pieces: list[_Piece] = []
+    done = 0
+    for owner, island in islands:
+        size = len(island.chart.triangles)
+        weights = from_vertices(regions[owner].weights[island.chart.vertex_ids], island.chart.triangles)
+        try:
+            piece, texts = yield from part_of(_piece(owner, island, weights, settings), done / total, size / total)
+        except MeshError as error:
+            raise Refusal(owner, located(error, island.chart)) from error
+        pieces.append(piece)
+        warnings += [(owner, text) for text in texts]
+        done += size
+    warnings += _grown_together(pieces, islands)
+    corners, uv = _scatter(regions, pieces)
+    reports = [[_report(p) for p in pieces if p.owner == index] for index in range(len(regions))]
+    return Magnified(corners, uv, reports, _overall(pieces), warnings)
+
+
+def _islands(regions) -> tuple[list[tuple[int, Island]], list[tuple[int, str]]]:
+    """Islands with a part of the region and a rest, and warnings."""
+    found, warnings, constant = [], [], 0
+    for index, region in enumerate(regions):
+        try:
+            if region.pins is None:
+                raise EmptyMeshError("There are no UVs to magnify", remedy="Unwrap the mesh first")
+            islands = uv_islands(region.surface, region.pins.uv, region.faces)
+        except MeshError as error:
+            raise Refusal(index, error) from error
+        warnings += [(index, text) for text in islands.warnings]
+        for island in islands.islands:
+            weights = region.weights[island.chart.vertex_ids]
+            if np.ptp(weights) > 0:
+                found.append((index, island))
+            elif weights[0] > 0:
+                constant += 1
+    if not found:
+        try:
+            check_weights(np.concatenate([r.weights for r in regions]), "vertex")
+            raise WeightError("No island has both a part of the region and a rest", "Paint a part of an island")
+        except MeshError as error:
+            raise Refusal(0, error) from error
+    if constant:
+        warnings.append((-1, f"{constant} islands are painted all over; they stay as they are"))
+    return found, warnings
+
+
+def _piece(owner: int, island: Island, weights, settings: MagnifySettings) -> Steps[tuple[_Piece, tuple[str, ...]]]:
+    """An island after all its magnifications."""
+    triangles = island.chart.triangles
+    refuse_folds(island.uv, triangles)
+    area = np.abs(signed_areas(island.uv, triangles))
+    whole = wanted(weights, area, settings.factor**settings.cascade, settings.exact)
+    uv, steps, texts, outline = island.uv, 0, list(whole.warnings), ""
+    for k in range(settings.cascade):
+        now = np.abs(signed_areas(uv, triangles))
+        found = wanted(weights, now, settings.factor, settings.exact)
+        job = _lens(island, uv, triangles, normalised(found.density, now), weights, settings)
+        lens = yield from part_of(job, k / settings.cascade, 1 / settings.cascade)
+        uv, steps, outline = lens.uv, steps + lens.iterations, lens.outline
+        texts += [text for text in lens.warnings if text not in texts]
+    return _Piece(owner, island, weights, area, whole, uv, outline, steps), tuple(texts)
+
+
+def _lens(island: Island, uv, triangles, density, weights, settings: MagnifySettings) -> Steps[Lens]:
+    if settings.boundary in OUTLINES:
+        return (
+            yield from magnify_map(
+                uv, triangles, density, region=weights, boundary=settings.boundary, quality=settings.quality
+            )
+        )
+    # Into a disk or a square: the plane is unwrapped like any other surface.
+    check_disk(island.chart)
+    mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
+    flat = replace(island.chart, vertices=np.column_stack([uv * mirror, np.zeros(len(uv))]))
+    done = yield from unwrap_chart(
+        flat, boundary=settings.boundary, quality=settings.quality, density=density, region=weights
+    )
+    placed = aligned_to(done.uv, uv * mirror, triangles, 1 - weights, quarters=settings.boundary == "square") * mirror
+    iterations = done.newton_refinement
+    return Lens(placed, settings.boundary, iterations, 0.0, done.status, done.area_l1, done.warnings)
+
+
+def _overall(pieces: Sequence[_Piece]) -> Shares:
+    """Shares of the region in all islands that it touches, by their UV area."""
+    size = np.array([piece.area.sum() for piece in pieces])
+    size = size / size.sum()
+    before = size @ [share(p.region, p.area) for p in pieces]
+    asked = size @ [p.found.asked for p in pieces]
+    after = size @ [share(p.region, np.abs(signed_areas(p.uv, p.island.chart.triangles))) for p in pieces]
+    return Shares(float(before), float(asked), float(after), pieces[0].found.factor, pieces[0].found.law)
+
+
+def _grown_together(pieces: Sequence[_Piece], islands) -> list[tuple[int, str]]:
+    """A warning if islands that lay apart cover each other now."""
+    if len(pieces) < 2 or all(p.outline in ("circle", "sides") for p in pieces):
+        return []
+    before, after = (
+        overlap_share(np.concatenate([x[p.island.chart.triangles] for p, x in zip(pieces, maps, strict=True)]))
+        for maps in ([p.island.uv for p in pieces], [p.uv for p in pieces])
+    )
+    grown = after - before
+    return [] if grown < OVERLAP else [(-1, f"Islands grew into each other, by {100 * grown:.1f} %; pack them")]
+
+
+def _scatter(regions, pieces: Sequence[_Piece]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """From island vertices to the corners of each surface."""
+    corners, uv = [], []
+    for index in range(len(regions)):
+        mine = [p for p in pieces if p.owner == index]
+        k = np.concatenate([np.zeros(0, np.int64), *(p.island.chart.corners.ravel() for p in mine)])
+        values = np.concatenate([np.zeros((0, 2)), *(p.uv[p.island.chart.triangles.ravel()] for p in mine)])
+        unique, first = np.unique(k, return_index=True)
+        corners.append(unique)
+        uv.append(values[first])
+    return corners, uv
+
+
+def _report(piece: _Piece) -> dict:
+    chart = piece.island.chart
+    flat = np.column_stack([piece.island.uv, np.zeros(len(piece.uv))])
+    figures = measure(flat, chart.triangles, piece.uv[chart.triangles], density=piece.found.density)
+    now = np.abs(signed_areas(piece.uv, chart.triangles))
+    return {
+        "vertices": len(chart.vertices),
+        "triangles": len(chart.triangles),
+        "outline": piece.outline,
+        "newton_refinement": piece.iterations,
+        "share_before": share(piece.region, piece.area),
+        "share_asked": piece.found.asked,
+        "share_after": share(piece.region, now),
+        "area_l1": figures.area_l1,
+        "angle_mean": figures.angle_mean,
+        "folds": figures.folds,
+        "overlap": figures.overlap,
+        "warnings": list(piece.found.warnings),
+    }

@@ -1,0 +1,118 @@
+"""Scores of vertices to paint with: saliency, curvature, sharp edges, distance; and soft weights from them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from . import curvature
+from .diffusion import Surroundings
+from .errors import EmptyMeshError, WeightError
+from .geometry import vertex_areas
+from .saliency import EPSILON, saliency, unit_size
+from .topology import halfedges, pair_keys, pair_up, previous_halfedge
+
+KINDS = ("saliency", "gaussian", "mean", "sharpness", "distance")
+# Curvature is averaged over so much of the diagonal: single vertices are noise.
+SMOOTH = 3 * EPSILON
+# Scores that differ by less than this share of the largest are the same.
+SAME = 1e-6
+
+
+def score(kind: str, positions: np.ndarray, triangles: np.ndarray, selected: np.ndarray | None = None) -> np.ndarray:
+    """Score (n,) of the vertices of a surface (n,3), (m,3); greater is more. `selected` (n,) bool is for "distance".
+
+    Raises
+    ------
+    EmptyMeshError : no triangles, or nothing selected to be near to
+    """
+    if kind not in KINDS:
+        raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
+    if not len(triangles):
+        raise EmptyMeshError("There are no faces to weigh", "Add some faces")
+    if kind == "saliency":
+        return saliency(positions, triangles)
+    if kind == "sharpness":
+        return curvature.sharpness(positions, triangles)
+    if kind == "distance":
+        if selected is None or not selected[triangles].any():
+            raise EmptyMeshError("No vertex is selected to be near to", "Select one or more vertices in Edit Mode")
+        return -distance(positions, triangles, np.flatnonzero(selected))
+    positions = unit_size(positions, triangles)
+    amount = {"gaussian": curvature.gaussian, "mean": curvature.mean}[kind](positions, triangles)
+    return Surroundings(positions, triangles, SMOOTH).means(np.abs(amount), np.array([SMOOTH]))[0]
+
+
+def soft_weights(
+    values: np.ndarray, area: np.ndarray, low: float = 0.5, high: float = 0.95, invert: bool = False
+) -> np.ndarray:
+    """Weights (n,) in [0,1] from scores (n,): 0 on the share `low` of the area (n,) with the least score, 1 above the
+    share `high`, and a smooth step between; `invert` for the contrary.
+
+    Raises
+    ------
+    WeightError : a range that is none, or scores that are the same everywhere
+    """
+    if not 0 <= low < high <= 1:
+        raise WeightError(
+            f"From {low:g} to {high:g} is no range", "Give two numbers between 0 and 1, the smaller first"
+        )
+    used = area > 0
+    finite = used & np.isfinite(values)
+    v, a = values[finite], area[finite]
+    if not len(v) or np.ptp(v) <= SAME * np.abs(v).max():
+        raise WeightError("The score is the same everywhere", "Choose another kind for this mesh")
+    order = np.argsort(v, kind="stable")
+    below = np.cumsum(a[order]) / a.sum()
+    first, last = (float(v[order][min(np.searchsorted(below, q), len(v) - 1)]) for q in (low, high))
+    if not last > first:
+        # Most of the surface has one score, such as the flat faces of a machine part.
+        first, last = (first, float(v.max())) if v.max() > first else (float(v.min()), last)
+    t = np.clip((np.where(np.isfinite(values), values, v.min()) - first) / (last - first), 0, 1)
+    weights = t * t * (3 - 2 * t)
+    return 1 - weights if invert else weights
+
+
+def distance(positions: np.ndarray, triangles: np.ndarray, sources: np.ndarray) -> np.ndarray:
+    """Distance (n,) along the surface from the nearest of the vertices `sources` (k,), infinite where there is no way.
+
+    Shortest paths along edges and straight across pairs of triangles, a few percent too long at most on even meshes.
+    """
+    n = len(positions)
+    tail, head = halfedges(triangles)
+    a, b, across = _across(positions, triangles)
+    rows, columns = np.concatenate([tail, a]), np.concatenate([head, b])
+    length = np.concatenate([np.linalg.norm(positions[tail] - positions[head], axis=1), across])
+    low, high = np.minimum(rows, columns), np.maximum(rows, columns)
+    order = np.lexsort((length, high, low))
+    low, high, length = low[order], high[order], length[order]
+    first = np.concatenate([[True], (low[1:] != low[:-1]) | (high[1:] != high[:-1])])
+    graph = csr_matrix((length[first], (low[first], high[first])), shape=(n, n))
+    return dijkstra(graph, directed=False, indices=sources, min_only=True)
+
+
+def _across(positions, triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs of vertices opposite to a common edge, (p,), (p,), and their distance when both triangles are laid flat,
+    where the straight line crosses the edge."""
+    tail, head = halfedges(triangles)
+    first, second = pair_up(pair_keys(tail, head))
+    i, j = tail[first], head[first]
+    opposite = [triangles.ravel()[previous_halfedge(h)] for h in (first, second)]
+    edge = positions[j] - positions[i]
+    length = np.maximum(np.linalg.norm(edge, axis=1), np.finfo(float).tiny)
+    x, y = [], []
+    for k in opposite:
+        side = positions[k] - positions[i]
+        along = (side * edge).sum(axis=1) / length
+        x.append(along)
+        y.append(np.sqrt(np.maximum((side**2).sum(axis=1) - along**2, 0)))
+    total = np.maximum(y[0] + y[1], np.finfo(float).tiny)
+    crossing = (x[0] * y[1] + x[1] * y[0]) / total
+    inside = (crossing > 0) & (crossing < length)
+    return opposite[0][inside], opposite[1][inside], np.hypot(x[0] - x[1], total)[inside]
+
+
+def areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Area (n,) of every vertex, finite at any scale."""
+    return vertex_areas(unit_size(positions, triangles), triangles)
