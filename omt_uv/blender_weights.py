@@ -45,9 +45,8 @@ def region_weights(pairs: Sequence[tuple[bpy.types.Object, Reading]], name: str)
             if name
             else f"{names}: No vertex group is named. Choose the one that marks the region."
         )
-    return [
-        np.zeros(len(reading.surface.positions)) if w is None else w for w, (_, reading) in zip(weights, pairs, strict=True)
-    ]
+    sizes = [len(reading.surface.positions) for _, reading in pairs]
+    return [np.zeros(n) if w is None else w for w, n in zip(weights, sizes, strict=True)]
 
 
 def computed_weights(

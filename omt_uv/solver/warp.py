@@ -1,0 +1,100 @@
+"""Bake a picture from an old UV layout to a new one: every pixel looks up where its place was."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from .geometry import cross2
+
+# Pixels at a time, for memory.
+ROWS = 64
+
+
+def warped(picture: np.ndarray, old: np.ndarray, new: np.ndarray, margin: int = 4) -> np.ndarray:
+    """The picture (h,w,c) of the layout `old` as a picture of the same size for the layout `new`, (m,3,2) each.
+
+    UVs count from the lower left corner of the first row of pixels, as in Blender; outside of [0,1] the picture repeats.
+    Sampled bilinearly. Islands are continued by `margin` pixels; what lies farther outside stays as it is.
+    """
+    height, width = picture.shape[:2]
+    place, covered = _places(old, new, height, width)
+    place, known = _padded(place, covered, margin)
+    result = np.array(picture, dtype=float, copy=True)
+    result[known] = _bilinear(picture, place[known])
+    if np.issubdtype(picture.dtype, np.floating):
+        return result.astype(picture.dtype)
+    return _rounded(result, picture.dtype)
+
+
+def _rounded(values: np.ndarray, dtype) -> np.ndarray:
+    limits = np.iinfo(dtype)
+    return np.clip(np.rint(values), limits.min, limits.max).astype(dtype)
+
+
+def _places(old, new, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """The old UV (h,w,2) of every pixel's middle, and which pixels (h,w) bool a face covers.
+
+    All pixels of the faces' bounding boxes at once, in slices of faces so that memory stays bounded.
+    """
+    size = np.array([width, height])
+    corner = new * size - 0.5
+    low = np.clip(np.ceil(corner.min(axis=1) - 1e-9), 0, size).astype(np.int64)
+    high = np.clip(np.floor(corner.max(axis=1) + 1e-9) + 1, 0, size).astype(np.int64)
+    span = np.maximum(high - low, 0)
+    count = span.prod(axis=1)
+    place, covered = np.zeros((height, width, 2)), np.zeros((height, width), bool)
+    for part in np.split(np.arange(len(new)), _cuts(count, ROWS * max(width, 256))):
+        face, k = _expand(count[part])
+        face = part[face]
+        x = low[face, 0] + k % np.maximum(span[face, 0], 1)
+        y = low[face, 1] + k // np.maximum(span[face, 0], 1)
+        share = _barycentric(corner[face], np.stack([x, y], axis=1).astype(float))
+        inside = (share >= -1e-9).all(axis=1)
+        x, y, face, share = x[inside], y[inside], face[inside], share[inside]
+        place[y, x] = np.einsum("ki,kid->kd", share, old[face])
+        covered[y, x] = True
+    return place, covered
+
+
+def _cuts(count: np.ndarray, most: int) -> np.ndarray:
+    """Where to split so that the counts (m,) of a part sum to about `most`."""
+    total = np.cumsum(count)
+    return np.unique(np.searchsorted(total, np.arange(most, int(total[-1]) if len(total) else 0, most)))
+
+
+def _expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _barycentric(corner: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (k,3) of points (k,2) in triangles (k,3,2); NaN where a triangle has no area."""
+    a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
+    total = cross2(b - a, c - a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        v = cross2(point - a, c - a) / total
+        w = cross2(b - a, point - a) / total
+    return np.stack([1 - v - w, v, w], axis=1)
+
+
+def _padded(place: np.ndarray, covered: np.ndarray, margin: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places continued into uncovered pixels nearer than `margin`, each that of its nearest covered pixel."""
+    if margin <= 0 or covered.all() or not covered.any():
+        return place, covered
+    distance, nearest = distance_transform_edt(~covered, return_indices=True)
+    near = distance <= margin
+    return place[nearest[0], nearest[1]], near
+
+
+def _bilinear(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Samples (k,c) of a picture (h,w,c) at UVs (k,2)."""
+    height, width = picture.shape[:2]
+    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    s, t = (x - column)[:, None], (y - row)[:, None]
+    left, right = column % width, (column + 1) % width
+    below, above = row % height, (row + 1) % height
+    lower = picture[below, left] * (1 - s) + picture[below, right] * s
+    upper = picture[above, left] * (1 - s) + picture[above, right] * s
+    return lower * (1 - t) + upper * t
