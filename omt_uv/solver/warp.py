@@ -14,7 +14,7 @@ ROWS = 64
 def warped(picture: np.ndarray, old: np.ndarray, new: np.ndarray, margin: int = 4) -> np.ndarray:
     """The picture (h,w,c) of the layout `old` as a picture of the same size for the layout `new`, (m,3,2) each.
 
-    UVs count from the lower left corner of the first row of pixels, as in Blender; outside of [0,1] the picture repeats.
+    UVs count from the lower left corner of the first row of pixels, as in Blender; beyond [0,1] it repeats.
     Sampled bilinearly. Islands are continued by `margin` pixels; what lies farther outside stays as it is.
     """
     height, width = picture.shape[:2]
