@@ -12,13 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .geometry import face_areas
 from .topology import twins
 
 CANDIDATES = 6
 MOST_SAMPLES = 600_000
 WALK_ROUNDS = 20
-SAMPLES_PER_POINT = 8
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,10 @@ class ClosestPoint:
         self.neighbour = np.where((t := twins(triangles)) >= 0, t // 3, -1).reshape(-1, 3)
         # A normal to the opposite side counts as far as one spacing.
         self.weight = 0.5 * spacing
+        self.spacing = spacing
         self.owner, points = spread_points(vertices, triangles, spacing / 2)
+        self.samples = points
+        self._plain: cKDTree | None = None
         self.tree = cKDTree(np.column_stack([points, self.weight * self.normals[self.owner]]))
 
     def __call__(self, points: np.ndarray, normals: np.ndarray) -> Located:
@@ -114,6 +115,17 @@ class ClosestPoint:
         face = np.take_along_axis(faces, best, 1)[:, 0]
         bary = np.take_along_axis(barycentric, best[..., None], 1)[:, 0]
         return self.walk(points, face, bary)
+
+    @property
+    def plain(self) -> cKDTree:
+        """The samples without their normals."""
+        if self._plain is None:
+            self._plain = cKDTree(self.samples)
+        return self._plain
+
+    def nearest_face(self, points: np.ndarray) -> np.ndarray:
+        """The triangle (k,) of the sample nearest to each of points (k,3): where it is about, for smooth quantities."""
+        return self.owner[self.plain.query(points)[1]]
 
     def walk(self, points: np.ndarray, faces: np.ndarray, barycentric: np.ndarray | None = None) -> Located:
         """From starting faces (k,) across edges for as long as that brings nearer to the points (k,3)."""
@@ -149,65 +161,6 @@ class ClosestPoint:
         u, v, w = (barycentric[..., k, None] for k in range(3))
         off = u * a + v * b + w * c - points
         return barycentric, _dot(off, off)
-
-
-@dataclass(frozen=True)
-class Seen:
-    """Of the samples nearest to every point: their area (k,), their mass, which is area times squared density, (k,),
-    and their first moment about it (k,3)."""
-
-    area: np.ndarray
-    mass: np.ndarray
-    moment: np.ndarray
-
-
-def surface_samples(index: ClosestPoint, density: np.ndarray, count: int) -> tuple[np.ndarray, ...]:
-    """Points (s,3) of the surface, a few times `count` at most, normals (s,3), area (s,), area by density^2 (s,)."""
-    V, T = index.vertices, index.triangles
-    area = face_areas(V, T)
-    owner, points = spread_points(V, T, np.sqrt(2 * area.sum() / count))
-    share = area[owner] / np.bincount(owner, minlength=len(T))[owner]
-    if len(owner) > 2 * count:
-        # Where faces are smaller than the samples' spacing a few of them stand for all, as often as they are large.
-        places = (np.arange(count) + 0.5) / count * share.sum()
-        pick = np.searchsorted(np.cumsum(share), places)
-        owner, points, share = owner[pick], points[pick], np.full(count, share.sum() / count)
-    return points, index.normals[owner], share, share * density[owner] ** 2
-
-
-class Carrier:
-    """Points that move on a surface with a density (m,): a short walk from where they were mostly, and
-    now and then a search, since a walk may end in a nearest point that is not the nearest of all."""
-
-    SEARCH_EVERY = 8
-
-    def __init__(self, index: ClosestPoint, density: np.ndarray):
-        self.index, self.density = index, density
-        self.faces: np.ndarray | None = None
-        self.calls = 0
-        self.samples: tuple[np.ndarray, ...] | None = None
-
-    def onto(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Closest points (k,3) to points (k,3), the surface's normals and density there."""
-        known = self.faces if self.calls % self.SEARCH_EVERY else None
-        self.calls += 1
-        if known is None or len(known) != len(points):
-            found = self.index(points, normals)
-        else:
-            found = self.index.walk(points, known)
-        self.faces = found.faces
-        return found.points, self.index.normals[found.faces], self.density[found.faces]
-
-    def seen_by(self, points: np.ndarray, normals: np.ndarray) -> Seen:
-        """Samples of the surface, each with the nearest of points (k,3) with normals (k,3)."""
-        if self.samples is None:
-            self.samples = surface_samples(self.index, self.density, SAMPLES_PER_POINT * len(points))
-        place, normal, area, weight = self.samples
-        w = self.index.weight
-        near = cKDTree(np.column_stack([points, w * normals])).query(np.column_stack([place, w * normal]))[1]
-        k, off = len(points), weight[:, None] * (place - points[near])
-        moment = np.stack([np.bincount(near, off[:, j], k) for j in range(3)], axis=1)
-        return Seen(np.bincount(near, area, k), np.bincount(near, weight, k), moment)
 
 
 def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:

@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
+from .draft import Draft
 from .embedded_flips import make_delaunay_embedded
 from .errors import CountError
+from .geometry import vertex_areas
 from .mesh_edits import Edit, collapse_edges, independent_splits, interior_edges, split_edges
 from .parts import Part
 from .topology import halfedges, twins
 
+# Edge lengths (k,) wanted at points (k,3).
+Size: TypeAlias = Callable[[np.ndarray], np.ndarray]
+
 MOST_ROUNDS = 500
 # In one round only edges about as short, or as long, as the most wanted ones go.
-SHARE = 0.3
+SHARE = 0.5
+FLIP_ROUNDS = 5
+# Rebalancing: share of the vertices taken at most, in how many rounds; rounds of averaging; excess of density from
+# which on they are taken; what a missing neighbour adds to it.
+REMOVED = 0.05
+REBALANCING = 5
+SMOOTHING = 3
+CROWDED = 0.1
+VALENCE = 0.05
 
 
 def least_vertices(part: Part) -> int:
@@ -59,53 +73,83 @@ def edge_size(measure: float, rim: float, count: int) -> float:
     return float(2 * a / (-b + np.sqrt(b * b + 4 * a * count)))
 
 
-def adjust_count(
-    points: np.ndarray,
-    triangles: np.ndarray,
-    fixed: np.ndarray,
-    locked: np.ndarray,
-    count: int,
-    size: Callable[[np.ndarray], np.ndarray],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The mesh (n,3), (m,3) with exactly `count` vertices, and which of them are fixed, (count,) bool.
+def adjust_count(draft: Draft, count: int, size: Size) -> Draft:
+    """The mesh with exactly `count` vertices.
 
-    Where there are too many the shortest edges collapse, where there are too few the longest are split, next to
-    `size` of their middles. Edges with the keys `locked` and vertices that are `fixed` (n,) stay, and come first.
+    Where there are too many the shortest edges collapse, where there are too few the longest are split, in
+    comparison with the edge length that `size` gives at points (k,3).
 
     Raises
     ------
     CountError : no edge can collapse any more
     """
     for _ in range(MOST_ROUNDS):
-        missing = count - len(points)
+        missing = count - len(draft.points)
         if missing == 0:
-            return points, triangles, fixed
-        h = interior_edges(triangles, locked)
-        tail, head = halfedges(triangles)
-        a, b = points[tail[h]], points[head[h]]
+            return draft
+        h = interior_edges(draft.triangles, draft.locked)
+        tail, head = halfedges(draft.triangles)
+        a, b = draft.points[tail[h]], draft.points[head[h]]
         length = np.linalg.norm(a - b, axis=1) / size((a + b) / 2)
-        edit = _split(points, triangles, h, length, missing) if missing > 0 else None
-        if edit is None:
-            edit = _collapse(points, triangles, h, length, fixed, -missing)
-        fixed = np.where(edit.origin >= 0, fixed[np.maximum(edit.origin, 0)], False)
-        points, triangles = edit.points, edit.triangles.copy()
-        make_delaunay_embedded(points, triangles, twins(triangles), locked, 5)
+        draft = _split(draft, h, length, missing) if missing > 0 else _collapse(draft, h, length, -missing)
     raise CountError(f"{count} vertices cannot be reached")
 
 
-def _split(points, triangles, h, length, missing: int) -> Edit:
-    order = np.argsort(-length, kind="stable")
-    wanted = order[: max(int(SHARE * missing), 8)]
-    return split_edges(points, triangles, independent_splits(triangles, h[wanted])[:missing])
+def _split(draft: Draft, h: np.ndarray, length: np.ndarray, missing: int) -> Draft:
+    wanted = np.argsort(-length, kind="stable")[: max(int(SHARE * missing), 8)]
+    chosen = independent_splits(draft.triangles, h[wanted])[:missing]
+    return _settled(draft, split_edges(draft.points, draft.triangles, chosen))
 
 
-def _collapse(points, triangles, h, length, fixed, spare: int) -> Edit:
+def _collapse(draft: Draft, h: np.ndarray, length: np.ndarray, spare: int) -> Draft:
     order = np.argsort(length, kind="stable")
     reach = 4 * spare + 32
     while True:
-        edit = collapse_edges(points, triangles, h[order[:reach]], fixed, spare)
-        if len(edit.points) < len(points):
-            return edit
+        edit = collapse_edges(draft.points, draft.triangles, h[order[:reach]], draft.fixed, spare)
+        if len(edit.points) < len(draft.points):
+            return _settled(draft, edit)
         if reach >= len(order):
-            raise CountError(f"Boundaries, features and topology take at least {len(points)} vertices")
+            raise CountError(f"Boundaries, features and topology take at least {len(draft.points)} vertices")
         reach *= 4
+
+
+def _settled(draft: Draft, edit: Edit) -> Draft:
+    """The draft after an edit, Delaunay again."""
+    fixed = np.where(edit.origin >= 0, draft.fixed[np.maximum(edit.origin, 0)], False)
+    triangles = edit.triangles.copy()
+    make_delaunay_embedded(edit.points, triangles, twins(triangles), draft.locked, FLIP_ROUNDS)
+    return Draft(edit.points, triangles, fixed, draft.locked)
+
+
+def rebalance(draft: Draft, size: Size) -> Draft:
+    """Take vertices where they are too dense, and put as many where they are too sparse.
+
+    Relaxation evens out neighbours, but takes long to carry vertices across the surface.
+    """
+    n = len(draft.points)
+    for _ in range(REBALANCING):
+        h = interior_edges(draft.triangles, draft.locked)
+        tail, head = halfedges(draft.triangles)
+        valence = np.bincount(tail, minlength=len(draft.points))
+        wanted = _crowding(draft, size) + VALENCE * (6 - valence)
+        wanted = wanted[tail[h]] + wanted[head[h]]
+        order = np.argsort(-wanted, kind="stable")
+        order = order[wanted[order] > 2 * CROWDED]
+        spare = int(REMOVED * n) - (n - len(draft.points))
+        if len(order) == 0 or spare <= 0:
+            break
+        draft = _settled(draft, collapse_edges(draft.points, draft.triangles, h[order], draft.fixed, spare))
+    return adjust_count(draft, n, size)
+
+
+def _crowding(draft: Draft, size: Size) -> np.ndarray:
+    """How much denser than wanted the vertices are around each one, (n,), 0 where they are as dense as they should."""
+    n = len(draft.points)
+    tail, head = halfedges(draft.triangles)
+    share = vertex_areas(draft.points, draft.triangles) / size(draft.points) ** 2 * (2 / np.sqrt(3))
+    # The cell of a boundary vertex is half on the surface.
+    share[np.unique(tail[twins(draft.triangles) < 0])] *= 2
+    valence = np.bincount(tail, minlength=n)
+    for _ in range(SMOOTHING):
+        share = (np.bincount(tail, share[head], n) + 2 * share) / (valence + 2)
+    return 1 / np.maximum(share, 1e-3) - 1

@@ -1,59 +1,114 @@
-"""Vertices moved off the surface so that the triangles between them come closer to it."""
+"""Vertices moved so that the triangles between them come closer to the surface.
+
+A round takes the closest points of samples of both the surface and the mesh, and moves the vertices so that the
+distances along the lines between them vanish in the least squares sense (Hoppe, DeRose, Duchamp, McDonald, Stuetzle
+1993; Chen, Medioni 1992), while vertices stay near the centroids of their cells.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from .closest import ClosestPoint, face_normals, subdivision_centroids, vertex_normals
-from .linear import solve_spd
+from .draft import Draft
+from .embedded_flips import make_delaunay_embedded
+from .geometry import face_areas
+from .linear import solve_by_gradients
+from .progress import Progress, Steps
+from .surface_samples import Samples, area_samples
+from .topology import twins
+from .voronoi import voronoi_cells
 
-ROUNDS = 2
-# Points per triangle: the centroids of 3 x 3 pieces.
-PATTERN = 3
-# Weight of a smooth displacement against a near one.
+ROUNDS = 7
+# Samples of the surface per vertex, and 2 x 2 of every triangle.
+SAMPLES = 6
+PATTERN = 2
+# Weights next to the distances: of even displacements, of the centroids along the surface, of no displacement at all.
 FAIRNESS = 0.02
+CENTROID = 0.2
+STILL = 1e-3
+# Distances below this share of an edge have no direction but the normal's.
+CLOSE = 1e-3
 
 
-def fit_to_surface(
-    points: np.ndarray, triangles: np.ndarray, fixed: np.ndarray, index: ClosestPoint, rounds: int = ROUNDS
-) -> np.ndarray:
-    """Points (n,3) of a mesh moved along their normals to lower its squared distance to the surface; see `_offsets`."""
-    for _ in range(rounds):
-        normals = vertex_normals(points, triangles)
-        points = points + _offsets(points, triangles, normals, fixed, index)[:, None] * normals
-    return points
+@dataclass(frozen=True)
+class Pairs:
+    """Points of the mesh, by triangle (k,) and barycentric coordinates (k,3), the way (k,3) to the surface, weights."""
+
+    faces: np.ndarray
+    barycentric: np.ndarray
+    way: np.ndarray
+    weight: np.ndarray
 
 
-def _offsets(points, triangles, normals, fixed, index: ClosestPoint) -> np.ndarray:
-    """Least squares: point-to-plane distances of samples of the triangles to the surface, (n,)."""
+def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray, spacing: float) -> Steps[Draft]:
+    """A mesh near a surface, edges about `spacing` long, with less squared distance between the two.
+
+    density (m,) of the surface's triangles, for the cells.
+    """
+    samples = area_samples(index, SAMPLES * len(draft.points))
+    triangles, points = draft.triangles.copy(), draft.points
+    twin = twins(triangles)
+    for k in range(ROUNDS):
+        pairs = _pairs(points, triangles, index, samples, spacing)
+        near = index.nearest_face(points)
+        cells = voronoi_cells(points, triangles, density[near] ** 2)
+        pull = cells.moment / np.maximum(cells.mass, 1e-300)[:, None]
+        points = points + _displacements(points, triangles, draft.fixed, pairs, pull, CLOSE * spacing)
+        make_delaunay_embedded(points, triangles, twin, draft.locked)
+        yield Progress("Fit", (k + 1) / ROUNDS)
+    return replace(draft, points=points, triangles=triangles)
+
+
+def _pairs(points, triangles, index: ClosestPoint, samples: Samples, spacing: float) -> Pairs:
+    """Closest points of the samples on the mesh, and of points of the mesh on the surface; each way weighs one half."""
+    near = ClosestPoint(points, triangles, spacing)(samples.points, samples.normals)
     pattern = subdivision_centroids(PATTERN)
-    s, m, n = len(pattern), len(triangles), len(points)
-    mine = np.repeat(np.arange(m), s)
-    weights = np.tile(pattern, (m, 1))
-    samples = np.einsum("kc,kcj->kj", weights, points[triangles[mine]])
-    flat = face_normals(points, triangles)[mine]
-    found = index(samples, flat)
-    away = found.points - samples
-    target = np.einsum("ki,ki->k", away, flat)
-    area = np.linalg.norm(
-        np.cross(points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]),
-        axis=1,
+    owner = np.repeat(np.arange(len(triangles)), len(pattern))
+    bary = np.tile(pattern, (len(triangles), 1))
+    places = np.einsum("kc,kcj->kj", bary, points[triangles[owner]])
+    far = index(places, face_normals(points, triangles)[owner]).points
+    area = face_areas(points, triangles)[owner]
+    return Pairs(
+        np.concatenate([near.faces, owner]),
+        np.concatenate([near.barycentric, bary]),
+        np.concatenate([samples.points - near.points, far - places]),
+        np.concatenate([samples.area / samples.area.sum(), area / area.sum()]) / 2,
     )
-    w = np.sqrt(area / area.mean())[mine]
-    entries = weights * np.einsum("kci,ki->kc", normals[triangles[mine]], flat) * w[:, None]
-    rows = np.repeat(np.arange(len(mine)), 3)
-    A = sp.csr_matrix((entries.ravel(), (rows, triangles[mine].ravel())), shape=(len(mine), n))
-    tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
-    graph = sp.csr_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n))
-    graph = graph + graph.T
-    graph.data[:] = 1
-    degree = np.asarray(graph.sum(axis=1)).ravel()
-    fair = sp.identity(n, format="csr") - sp.diags(1 / np.maximum(degree, 1)) @ graph
-    system = (A.T @ A + FAIRNESS * s * (fair.T @ fair) + 1e-9 * sp.identity(n)).tocsc()
-    right = A.T @ (target * w)
-    free = np.flatnonzero(~fixed)
-    offset = np.zeros(n)
+
+
+def _displacements(points, triangles, fixed, pairs: Pairs, pull, close: float) -> np.ndarray:
+    n = len(points)
+    distance = np.sqrt(np.einsum("ki,ki->k", pairs.way, pairs.way))
+    direction = pairs.way / np.maximum(distance, 1e-300)[:, None]
+    direction = np.where((distance < close)[:, None], face_normals(points, triangles)[pairs.faces], direction)
+    root = np.sqrt(pairs.weight * n)
+    k = len(root)
+    entries = pairs.barycentric[:, :, None] * direction[:, None] * root[:, None, None]
+    columns = 3 * triangles[pairs.faces][:, :, None] + np.arange(3)
+    rows = np.repeat(np.arange(k), 9)
+    A = sp.csr_matrix((entries.ravel(), (rows, columns.ravel())), shape=(k, 3 * n))
+    normals = vertex_normals(points, triangles)
+    along = np.eye(3) - normals[:, :, None] * normals[:, None]
+    slide = sp.bsr_matrix((CENTROID * along + STILL * np.eye(3), np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n))
+    system = (A.T @ A + slide + FAIRNESS * _fairness(triangles, n)).tocsr()
+    right = A.T @ (np.einsum("ki,ki->k", direction, pairs.way) * root)
+    right += CENTROID * np.einsum("nij,nj->ni", along, pull).ravel()
+    free = np.flatnonzero(np.repeat(~fixed, 3))
+    offset = np.zeros(3 * n)
     if len(free):
-        offset[free] = solve_spd(system[free][:, free].tocsc(), right[free])
-    return offset
+        offset[free] = solve_by_gradients(system[free][:, free], right[free])
+    return offset.reshape(n, 3)
+
+
+def _fairness(triangles: np.ndarray, n: int) -> sp.csr_matrix:
+    """Squared difference of every displacement (3n,) from the mean of its neighbours'."""
+    tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    graph = sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
+    graph.data[:] = 1
+    degree = np.maximum(np.diff(graph.indptr), 1)
+    difference = sp.identity(n) - sp.diags(1 / degree) @ graph
+    return sp.kron(difference.T @ difference, sp.identity(3))

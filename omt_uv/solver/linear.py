@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import cg, splu
 
 from .errors import PrecisionError
 
@@ -68,6 +68,13 @@ def solve_spd(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray | None = No
 def solve_general(A: sp.spmatrix, b: np.ndarray) -> np.ndarray:
     """Solve A x = b, A unsymmetric but diagonally dominant (Tutte systems); b (n,) or (n,k). Raises PrecisionError."""
     return Factor(A, "colamd", spd=False).solve(b)
+
+
+def solve_by_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-4, most: int = 200) -> np.ndarray:
+    """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite and close to its diagonal."""
+    inverse = 1 / A.diagonal()
+    x, _ = cg(A, b, rtol=tolerance, maxiter=most, M=sp.diags(inverse))
+    return x
 
 
 def minimum_degree(A: sp.spmatrix) -> np.ndarray:

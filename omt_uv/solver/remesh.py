@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .closest import Carrier, ClosestPoint, vertex_normals
-from .counts import adjust_count, distribute, least_vertices
+from .carrier import Carrier
+from .closest import ClosestPoint, vertex_normals
+from .counts import adjust_count, distribute, least_vertices, rebalance
 from .errors import DensityError
 from .fit import fit_to_surface
 from .parts import Part, split_parts
@@ -23,7 +24,8 @@ from .tessellation import Options, tessellate
 
 # More vertices than this many times the input's tell nothing new about the surface.
 FAR_MORE = 50
-ROUNDS = 100
+ROUNDS = 30
+FIRST_ROUNDS, BALANCES = 10, 3
 # Mean step of a relaxation that has settled, in edge lengths.
 CONVERGED = 0.01
 
@@ -140,32 +142,36 @@ def _counts(parts: list[Part], measure: np.ndarray, count: int, count_of: str) -
 def _remesh_part(part: Part, count: int, density: np.ndarray, options: Options) -> Steps[_Result]:
     """One part in its unit box."""
     level = density / (part.area @ density / part.area.sum())
-    at_vertices = _at_vertices(part, level)
-    start = yield from part_of(tessellate(part, count, level, at_vertices, options), 0.0, 0.4)
-    size = start.size
-    index = ClosestPoint(part.vertices, part.triangles, size)
-    carrier = Carrier(index, level)
-
-    def target(points: np.ndarray) -> np.ndarray:
-        near = index.tree.query(np.column_stack([points, np.zeros((len(points), 3))]))[1]
-        return size / np.sqrt(level[index.owner[near]])
-
-    points, triangles, fixed = start.points, start.triangles, start.fixed
-    warnings, moved = list(start.warnings), 0.0
+    start = yield from part_of(tessellate(part, count, level, _at_vertices(part, level), options), 0.0, 0.3)
+    index = ClosestPoint(part.vertices, part.triangles, start.size)
+    size = _Size(index, level, start.size)
+    draft, moved = start.draft, 0.0
     if options.rounds:
-        first = min(options.rounds, 10)
-        points, triangles, _ = yield from part_of(
-            relax(points, triangles, fixed, start.locked, first, carrier), 0.4, 0.05
-        )
-    points, triangles, fixed = adjust_count(points, triangles, fixed, start.locked, start.count, target)
-    if options.rounds:
-        steps = relax(points, triangles, fixed, start.locked, options.rounds, carrier)
-        points, triangles, moved = yield from part_of(steps, 0.45, 0.45)
+        carrier = Carrier(index, level, start.count)
+        draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.3, 0.05)
+        draft = adjust_count(draft, start.count, size)
+        for k in range(BALANCES):
+            draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.35 + 0.05 * k, 0.05)
+            draft = rebalance(draft, size)
+        draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.5, 0.2)
+    draft = adjust_count(draft, start.count, size)
     if options.fit:
-        points = fit_to_surface(points, triangles, fixed, index)
-    on = index(points, vertex_normals(points, triangles))
-    yield Progress("Remesh", 1.0)
-    return _Result(points, triangles, part.faces[on.faces], on.barycentric, moved, tuple(warnings))
+        draft = yield from part_of(fit_to_surface(draft, index, level, start.size), 0.7, 0.3)
+    on = index(draft.points, vertex_normals(draft.points, draft.triangles))
+    return _Result(draft.points, draft.triangles, part.faces[on.faces], on.barycentric, moved, start.warnings)
+
+
+class _Size:
+    """The edge length wanted at points: `unit` over the square root of the density (m,)."""
+
+    def __init__(self, index: ClosestPoint, density: np.ndarray, unit: float):
+        self.index, self.density, self.unit = index, density, unit
+        self.even = np.ptp(density) == 0
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        if self.even:
+            return np.full(len(points), self.unit)
+        return self.unit / np.sqrt(self.density[self.index.nearest_face(points)])
 
 
 def _at_vertices(part: Part, density: np.ndarray) -> np.ndarray:

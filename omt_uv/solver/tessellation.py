@@ -11,6 +11,7 @@ from .assembly import glue
 from .chart_maps import chart_maps
 from .charts import Chart, triangle_surface
 from .counts import edge_size
+from .draft import Draft
 from .errors import PrecisionError
 from .geometry import face_areas
 from .parts import Part
@@ -34,16 +35,12 @@ class Options:
 
 @dataclass(frozen=True)
 class Tessellation:
-    """A mesh (n,3), (m,3) of a part with about the vertices asked for.
+    """A mesh of a part with about the vertices asked for, samples on boundaries and features fixed, edges there locked.
 
-    fixed (n,) bool: samples on boundaries and features; locked: sorted keys of the features' edges; count: the exact
-    number of vertices to reach; size: edge length at density 1.
+    count: the exact number of vertices to reach; size: edge length at density 1.
     """
 
-    points: np.ndarray
-    triangles: np.ndarray
-    fixed: np.ndarray
-    locked: np.ndarray
+    draft: Draft
     count: int
     size: float
     warnings: tuple[str, ...]
@@ -81,9 +78,14 @@ def tessellate(
         warnings += said
         done += share
     points, triangles = glue(samples.points, borders, patches)
-    fixed = np.zeros(len(points), dtype=bool)
-    fixed[: len(samples.fixed)] = samples.fixed
-    return Tessellation(points, triangles, fixed, _kept(lines, samples), vertices, size, tuple(warnings))
+    # Those that stay come first, so that their numbers stay as well.
+    rank = np.arange(len(points)) + len(points) * ~np.pad(samples.fixed, (0, len(points) - len(samples.fixed)))
+    order = np.argsort(rank, kind="stable")
+    number = np.empty(len(points), np.int64)
+    number[order] = np.arange(len(points))
+    fixed = np.arange(len(points)) < samples.fixed.sum()
+    draft = Draft(points[order], number[triangles], fixed, _kept(lines, samples, number))
+    return Tessellation(draft, vertices, size, tuple(warnings))
 
 
 def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarray) -> float:
@@ -126,7 +128,7 @@ def _patch(
     raise PrecisionError("A chart cannot be triangulated", kind="face", elements=chart.faces)
 
 
-def _kept(lines: Network, samples: ArcSamples) -> np.ndarray:
+def _kept(lines: Network, samples: ArcSamples, number: np.ndarray) -> np.ndarray:
     """Sorted keys of the edges between samples on boundaries and features."""
     keys = [pair_keys(along[:-1], along[1:]) for arc, along in zip(lines.arcs, samples.along, strict=True) if arc.held]
     return np.sort(np.concatenate(keys)) if keys else np.zeros(0, np.int64)

@@ -1,0 +1,65 @@
+"""Vertices that move on a surface: where they are, and which part of the surface is nearest to each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .closest import ClosestPoint
+from .surface_samples import Samples, area_samples, crest_samples
+
+SAMPLES_PER_POINT = 8
+# Steps from face to face may end in a nearest point that is not the nearest of all; so now and then comes a search.
+SEARCH_EVERY = 8
+
+
+@dataclass(frozen=True)
+class Share:
+    """Of the samples nearest to every point: their area (k,), their mass, which is area times squared density, (k,),
+    and their first moment about it (k,3)."""
+
+    area: np.ndarray
+    mass: np.ndarray
+    moment: np.ndarray
+
+
+class Carrier:
+    """A surface with a density (m,) per triangle, and `count` points on it."""
+
+    def __init__(self, index: ClosestPoint, density: np.ndarray, count: int):
+        self.index, self.density = index, density
+        self._samples = area_samples(index, SAMPLES_PER_POINT * count)
+        self._crests = crest_samples(index)
+        self._faces: np.ndarray | None = None
+        self._calls = 0
+
+    def forget(self) -> None:
+        """Search for the next points, whichever they are."""
+        self._faces = None
+
+    def onto(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Closest points (k,3) to points (k,3) with normals (k,3), and the density there; the same points each time."""
+        known = self._faces if self._calls % SEARCH_EVERY else None
+        self._calls = self._calls + 1 if self._faces is not None else 1
+        found = self.index(points, normals) if known is None else self.index.walk(points, known)
+        self._faces = found.faces
+        return found.points, self.density[found.faces]
+
+    def around(self, points: np.ndarray, normals: np.ndarray) -> Share:
+        """What of the surface is nearest to each of points (k,3) with normals (k,3), roughly."""
+        return self._shares(self._samples, points, normals)
+
+    def crests_around(self, points: np.ndarray, normals: np.ndarray) -> Share:
+        """What of its crests is; see `surface_samples.crest_samples`."""
+        return self._shares(self._crests, points, normals)
+
+    def _shares(self, samples: Samples, points: np.ndarray, normals: np.ndarray) -> Share:
+        k, w = len(points), self.index.weight
+        tree = cKDTree(np.column_stack([points, w * normals]))
+        near = tree.query(np.column_stack([samples.points, w * samples.normals]))[1].astype(np.int64)
+        mass = samples.area * self.density[samples.faces] ** 2
+        off = mass[:, None] * (samples.points - points[near])
+        moment = np.stack([np.bincount(near, off[:, j], k) for j in range(3)], axis=1)
+        return Share(np.bincount(near, samples.area, k), np.bincount(near, mass, k), moment)

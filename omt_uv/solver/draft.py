@@ -1,0 +1,18 @@
+"""A mesh in the making."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Draft:
+    """points (n,3), triangles (m,3), fixed (n,) bool: vertices that stay, which come first; locked: sorted keys
+    (`topology.pair_keys`) of edges that stay."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+    fixed: np.ndarray
+    locked: np.ndarray

@@ -1,0 +1,75 @@
+"""Samples of a surface that stand for its area, and samples of its crests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from .closest import ClosestPoint, closest_on_triangles, spread_points
+from .geometry import cotangent_laplacian, face_areas
+from .linear import solve_spd
+
+# Normals are smoothed over this share of an edge of the new mesh; where they then cancel by more than BLUNT there is
+# a crest or a hollow that is sharp at this scale.
+BLUR = 0.2
+BLUNT = 0.03
+# Samples of crests are this share of an edge apart.
+PITCH = 0.22
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Points (s,3) of a surface with its normals (s,3), the area each stands for (s,) and its triangle (s,)."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    area: np.ndarray
+    faces: np.ndarray
+
+
+def area_samples(index: ClosestPoint, count: int) -> Samples:
+    """About `count` samples, at most twice as many, spread evenly over the area."""
+    area = face_areas(index.vertices, index.triangles)
+    owner, points = spread_points(index.vertices, index.triangles, np.sqrt(2 * area.sum() / count))
+    share = area[owner] / np.bincount(owner, minlength=len(area))[owner]
+    if len(owner) > 2 * count:
+        # Where faces are smaller than the samples' spacing a few of them stand for all, as often as they are large.
+        places = (np.arange(count) + 0.5) / count * share.sum()
+        pick = np.minimum(np.searchsorted(np.cumsum(share), places), len(owner) - 1)
+        owner, points, share = owner[pick], points[pick], np.full(count, share.sum() / count)
+    return Samples(points, index.normals[owner], share, owner)
+
+
+def sharpness(index: ClosestPoint) -> np.ndarray:
+    """How much the normals around every vertex cancel, (n,) in [0,1]: 1 - |normal after a little diffusion|.
+
+    The diffusion is one implicit step of the heat equation along the surface, so that the two sides of a thin plate
+    do not see each other but around its rim.
+    """
+    V, T = index.vertices, index.triangles
+    corner, n, third = T.ravel(), len(V), face_areas(V, T) / 3
+    mass = np.bincount(corner, np.repeat(third, 3), n)
+    right = [np.bincount(corner, np.repeat(third * index.normals[:, k], 3), n) for k in range(3)]
+    diffusion = (BLUR * index.spacing) ** 2 * cotangent_laplacian(V, T)
+    system = sp.diags(mass + 1e-9 * mass.mean()) + diffusion
+    normal = solve_spd(system.tocsc(), np.stack(right, axis=1))
+    return np.clip(1 - np.sqrt(np.einsum("ni,ni->n", normal, normal)), 0, 1)
+
+
+def crest_samples(index: ClosestPoint) -> Samples:
+    """Samples around crests and hollows, their area times how sharp the surface is there."""
+    V, T = index.vertices, index.triangles
+    sharp = np.maximum(sharpness(index) - BLUNT, 0)
+    mine = np.flatnonzero(sharp[T].max(axis=1) > 0)
+    if len(mine) == 0:
+        return Samples(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), mine)
+    place, points = spread_points(V, T[mine], PITCH * index.spacing)
+    share = (face_areas(V, T[mine]) / np.bincount(place, minlength=len(mine)))[place]
+    faces = mine[place]
+    corners = T[faces]
+    bary = closest_on_triangles(points, V[corners[:, 0]], V[corners[:, 1]], V[corners[:, 2]])
+    weight = share * np.einsum("sk,sk->s", bary, sharp[corners])
+    kept = weight > 0.01 * weight.max()
+    return Samples(points[kept], index.normals[faces[kept]], weight[kept], faces[kept])
