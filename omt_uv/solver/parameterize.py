@@ -27,7 +27,6 @@ from .progress import Progress, Steps, part_of
 from .refine import BOUNDARIES, Refinement, refine
 from .topology import boundary_loops
 from .transport import Transport, transport
-from .untangle import map_energy
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 CONFORMAL, TRANSPORT, REFINEMENT = (0.0, 0.15), (0.15, 0.25), (0.4, 0.6)
@@ -212,7 +211,7 @@ def unwrap_chart(
     domain: Domain = Rectangle() if boundary == "square" else Disk()
     corners = sharpest_corners(vertices, triangles, loop) if boundary == "square" else None
     mass = vertex_areas(vertices, triangles, density)
-    conformal, cells, uv = yield from _start(vertices, triangles, mass, loop, corners, domain, boundary, log)
+    conformal, cells, uv = yield from _start(vertices, triangles, mass, loop, corners, domain, log)
     wanted = None if density is None else face_areas(vertices, triangles) * density
     with log.timed("refinement"):
         uv, held = facing(uv, pins)
@@ -243,12 +242,10 @@ def unwrap_chart(
     )
 
 
-def _start(vertices, triangles, mass, loop, corners, domain: Domain, boundary: str, log: _Log):
+def _start(vertices, triangles, mass, loop, corners, domain: Domain, log: _Log):
     """Where the refinement starts: the conformal map or None, the transport or None, and coordinates (n,2).
 
-    The conformal map moved by the transport; where rounding decides where its points lie, a mean value map, or what
-    the transport makes of it. Where areas differ that much the transport may squeeze more faces than it helps, and
-    Newton's way from a squeezed start is long and takes its turns by chance.
+    The conformal map moved by the transport; where rounding decides where its points lie, a mean value map so moved.
     """
     conformal, sites, trouble = yield from _conformal_sites(vertices, triangles, corners, log)
     if not trouble:
@@ -262,10 +259,7 @@ def _start(vertices, triangles, mass, loop, corners, domain: Domain, boundary: s
     if cells is None:
         log.warnings.append(f"{trouble}; refined the embedding without transport")
         return conformal, None, sites
-    uv = centroid_map(cells, domain, loop, corners, log.warnings)
-    if boundary == "free" and map_energy(sites, vertices, triangles) < map_energy(uv, vertices, triangles):
-        return conformal, cells, sites
-    return conformal, cells, uv
+    return conformal, cells, centroid_map(cells, domain, loop, corners, log.warnings)
 
 
 def _conformal_sites(vertices, triangles, corners, log: _Log):

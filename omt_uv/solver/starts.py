@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .contact import crossings, expand
-from .embedding import arc_length_parameters
+from .embedding import arc_length_parameters, tutte
 from .energy import elements
 from .errors import FoldedUVError
 from .geometry import face_areas, signed_areas
@@ -24,6 +24,8 @@ SPREAD = "The boundary of the start is not in order; it was spread over the doma
 SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by the length of the boundary"
 # Curvature, summed without sign over the inner vertices, below which a chart may be unrolled at once, in radians.
 NEARLY_FLAT = 0.5
+# Mean energy of a start above which another one may be better.
+RELAXED = 2.0
 # A map whose signed area is a smaller share of its unsigned area has no orientation to speak of.
 BEYOND_REPAIR = 0.05
 # The same of an outline that is no outline.
@@ -71,7 +73,11 @@ def notched_disk(start: Start, triangles, loop) -> Start | None:
 
 
 def free_start(vertices, triangles, uv, loop) -> Start:
-    """Free boundary: the given map if it is one to one, else a disk; charts that are flat are unrolled."""
+    """Free boundary: the given map if it is one to one, else a disk; charts that are flat are unrolled.
+
+    The disk is the given map untangled. Where that squeezes faces, and a mean value map less, it is the latter: Newton's
+    way from squeezed faces is long, and takes its turns by chance.
+    """
     area = face_areas(vertices, triangles).sum()
     motion = Free(np.zeros(len(vertices), bool))
     flat = unroll(vertices, triangles, loop)
@@ -81,6 +87,11 @@ def free_start(vertices, triangles, uv, loop) -> Start:
     if count_folds(uv, triangles) == 0 and not len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
         return Start(uv, motion, (), True)
     start = disk_start(vertices, triangles, uv - _middle(uv[loop]), loop)
+    least = map_energy(start.uv, vertices, triangles)
+    if least > RELAXED:
+        fresh = tutte(vertices, triangles, loop, arc_length_rim(vertices, loop, np.sqrt(area / np.pi)))
+        if map_energy(fresh, vertices, triangles) < least:
+            return Start(fresh, motion, (), True)
     return Start(start.uv, motion, start.warnings, True)
 
 
