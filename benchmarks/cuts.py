@@ -89,9 +89,9 @@ def cotree_length(V, F):
     surface = triangle_surface(V, F)
     faces, triangles, owner = chosen_triangles(surface, None)
     sheets = join(surface, faces, triangles, owner).sheets
-    nowhere = np.zeros(len(sheets.first), bool)
-    everything = np.arange(len(F)), np.arange(len(nowhere))
-    piece = make_piece(sheets, V, corner_classes(sheets), *everything, np.zeros(len(V)), nowhere)
+    ease = np.ones(len(sheets.first))
+    everything = np.arange(len(F)), np.arange(len(ease))
+    piece = make_piece(sheets, V, corner_classes(sheets), *everything, np.zeros(len(V)), ease)
     piece.cost[:] = piece.length
     root = np.array([0] if len(piece.rim) == 0 else [], np.int64)
     return float(piece.length[greedy_arcs(piece, root)].sum())

@@ -77,14 +77,15 @@ def read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, layer: str = "", edit
     mesh.calc_loop_triangles()
     f = len(mesh.polygons)
     starts = np.append(_get(mesh.polygons, "loop_start", f), len(mesh.loops))
-    seam = _get(mesh.edges, "use_seam", len(mesh.edges), bool)
+    ends = _get(mesh.edges, "vertices", 2 * len(mesh.edges)).reshape(-1, 2)
     surface = Surface(
         positions=_stretched(_get(mesh.vertices, "co", 3 * len(mesh.vertices), np.float32).reshape(-1, 3), obj),
         corner_vertex=_get(mesh.loops, "vertex_index", len(mesh.loops)),
         face_start=starts,
         triangles=_get(mesh.loop_triangles, "loops", 3 * len(mesh.loop_triangles)).reshape(-1, 3),
         triangle_face=_get(mesh.loop_triangles, "polygon_index", len(mesh.loop_triangles)),
-        seams=_get(mesh.edges, "vertices", 2 * len(mesh.edges)).reshape(-1, 2)[seam],
+        seams=ends[_get(mesh.edges, "use_seam", len(mesh.edges), bool)],
+        sharp=ends[_get(mesh.edges, "use_edge_sharp", len(mesh.edges), bool)],
     )
     faces = np.ones(f, dtype=bool)
     if edit_mode:
@@ -140,9 +141,10 @@ def weld_split_vertices(reading: Reading) -> Reading:
     # Adding zero makes -0.0 and 0.0 the same bytes.
     _, first, inverse = np.unique(key + 0.0, axis=0, return_index=True, return_inverse=True)
     same = first[inverse.ravel()]
-    return replace(
-        reading, surface=replace(surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams])
+    surface = replace(
+        surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams], sharp=same[surface.sharp]
     )
+    return replace(reading, surface=surface)
 
 
 def read_uv(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:

@@ -11,7 +11,7 @@ from . import packing
 from .segmentation import SegmentationError, chart_seams
 from .settings import Settings
 from .solver.budget import unwrap_within
-from .solver.chart_pins import CornerPins, chart_pins
+from .solver.chart_pins import CornerPins, chart_pins, clear_of_pins
 from .solver.charts import Chart, Surface
 from .solver.errors import MeshError
 from .solver.measure import Target
@@ -120,7 +120,8 @@ def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
         except MeshError as error:
             raise located(error, chart) from error
 
-    found = yield from unwrap_within(job.surface, job.faces, map_chart, settings.max_shear, avoid=job.avoid, **options)
+    avoid = clear_of_pins(job.surface, job.pins, job.avoid)
+    found = yield from unwrap_within(job.surface, job.faces, map_chart, settings.max_shear, avoid=avoid, **options)
     cuts = found.slits if found.prepared.cuts is None else np.concatenate([found.prepared.cuts.edges, found.slits])
     (length, shear), first = found.history[-1], found.history[0]
     warnings = list(found.prepared.warnings)

@@ -1,6 +1,7 @@
 """Cuts: every surface becomes a disk, along short paths, where the artist wants them, whatever the units."""
 
 import sys
+from dataclasses import replace
 
 import meshes
 import numpy as np
@@ -8,9 +9,12 @@ import pytest
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from omt_uv.solver.chart_pins import CornerPins
 from omt_uv.solver.charts import split, triangle_surface
 from omt_uv.solver.cutting import cut
+from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.preparation import prepare
+from omt_uv.solver.progress import drain
 
 sys.path.insert(0, str(meshes.ROOT / "benchmarks"))
 
@@ -117,6 +121,31 @@ def test_an_annulus_is_cut_along_a_shortest_path():
     V, F = meshes.annulus(sectors=24, rings=3)
     cuts = cut(triangle_surface(V, F), extremities=0)
     assert np.isclose(cuts.length, 1.0 - 1 / 4) or len(cuts.edges) == 3
+
+
+def test_cuts_follow_edges_that_are_marked_sharp():
+    """A line of sharp edges from rim to rim of a flat ring, at any place, takes the cut; but not at any price."""
+    V, F = meshes.annulus(sectors=24, rings=3)
+    for sector in (3, 10, 20):
+        line = sector + 24 * np.arange(4)
+        sharp = np.column_stack([line[:-1], line[1:]])
+        cuts = cut(replace(triangle_surface(V, F), sharp=sharp), extremities=0)
+        assert set(map(frozenset, cuts.edges.tolist())) == set(map(frozenset, sharp.tolist()))
+    around = np.column_stack([np.arange(24), (np.arange(24) + 1) % 24]) + 24
+    assert len(cut(replace(triangle_surface(V, F), sharp=around), extremities=0).edges) <= 4
+
+
+def test_cuts_go_around_pinned_vertices():
+    V, F = meshes.annulus(sectors=24, rings=3)
+    surface = triangle_surface(V, F)
+    vertex = surface.corner_vertex
+    inside = (vertex >= 24) & (vertex < 72)
+    pins = CornerPins(inside & ~np.isin(vertex % 24, [7, 8]), V[vertex, :2])
+    result = drain(unwrap(surface, pins=pins))
+    inner = np.setdiff1d(result.seams, np.r_[:24, 72:96])
+    assert len(inner) and not np.isin(inner, vertex[pins.pinned]).any()
+    (chart_map,) = result.maps
+    assert chart_map.pinned and chart_map.folds == 0 and chart_map.angle_mean < 1.001
 
 
 def test_a_moebius_strip_is_cut_across():

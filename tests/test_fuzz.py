@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from omt_uv.solver.progress import drain
 
 CASES = 2100
 CHUNKS = 21
+MODELS = ["cow", "spot", "homer", "suzanne", "teapot", "camel_b", "three_holes", "fertility", "snail", "lilium", "ogre"]
 
 
 # ---- surgery: (rng, V, polygons) -> (V, polygons) -----------------------------------------------------------
@@ -115,8 +118,54 @@ def shuffle(rng, V, P):
     return V[np.argsort(name)], [[int(name[v]) for v in P[i]] for i in rng.permutation(len(P))]
 
 
+def swell(rng, V, P):
+    """A ball of the model is moved, or grows or shrinks by many orders of magnitude."""
+    near = np.linalg.norm(V - V[rng.integers(len(V))], axis=1)
+    ball = near <= np.quantile(near, rng.random())
+    V[ball] *= 10.0 ** rng.uniform(-12, 12)
+    return V, P
+
+
+def zip_open(rng, V, P):
+    """Faces come apart from one another without moving: slits, doubles, loose faces."""
+    loose = rng.random(len(P)) < rng.random() ** 3
+    polygons, extra, n = [], [], len(V)
+    for p, apart in zip(P, loose, strict=True):
+        polygons.append(list(range(n, n + len(p))) if apart else p)
+        if apart:
+            extra.append(V[p])
+            n += len(p)
+    return np.concatenate([V, *extra]), polygons
+
+
+def crush(rng, V, P):
+    """Many vertices come to lie on one, or on a line."""
+    some = rng.choice(len(V), rng.integers(1, max(2, len(V) // 5)), replace=False)
+    V[some] = V[some[0]] + rng.integers(2) * rng.random((len(some), 1)) * (V[some[-1]] - V[some[0]])
+    return V, P
+
+
+def double(rng, V, P):
+    """The whole mesh lies there twice, once perhaps turned over."""
+    turn = -1 if rng.random() < 0.5 else 1
+    return V, [*P, *[p[::turn] for p in P]]
+
+
+def tunnel(rng, V, P):
+    """Two faces go and what was around them is joined: a handle, or an edge of many faces."""
+    if len(P) < 3:
+        return V, P
+    a, b = (P[i] for i in rng.choice(len(P), 2, replace=False))
+    left = [p for p in P if p is not a and p is not b]
+    k = min(len(a), len(b))
+    return V, [*left, *[[a[i], a[(i + 1) % k], b[(-i - 2) % len(b)], b[(-i - 1) % len(b)]] for i in range(k)]]
+
+
 SURGERY = [delete, duplicate, flip, flip_half, weld, collapse, repeat_vertex, needle, not_a_number, far_away, scale,
            offset, flatten, jitter, fin, hole, stray_vertices, second_part, shuffle]  # fmt: skip
+
+# On pieces of real models, which have more of everything.
+OPERATIONS = [*SURGERY, swell, zip_open, crush, double, tunnel]
 
 BASES = [
     meshes.single_triangle,
@@ -159,14 +208,45 @@ def broken_mesh(seed):
             for _ in range(rng.integers(1, 4)):
                 if P:
                     V, P = SURGERY[rng.integers(len(SURGERY))](rng, V.copy(), P)
+    return marked(rng, V, P, auto=0.6)
+
+
+def piece_of_a_model(rng):
+    """The faces around a vertex of a real model, a few to several hundred of them."""
+    V, F = meshes.load_model(MODELS[rng.integers(len(MODELS))])
+    far = np.linalg.norm(V - V[rng.integers(len(V))], axis=1)[F].max(axis=1)
+    F = F[np.argsort(far, kind="stable")[: int(10 ** rng.uniform(0.5, 2.8))]]
+    used, index = np.unique(F, return_inverse=True)
+    return V[used], _lists(index.reshape(-1, 3))
+
+
+def broken_model(seed):
+    """As `broken_mesh`, from a piece of a real model."""
+    rng = np.random.default_rng(seed)
+    V, P = piece_of_a_model(rng)
+    with np.errstate(all="ignore"):
+        for _ in range(rng.integers(0, 5)):
+            if P:
+                V, P = OPERATIONS[rng.integers(len(OPERATIONS))](rng, V.copy(), P)
+    return marked(rng, V, P, auto=0.9, sparse=4)
+
+
+def marked(rng, V, P, auto, sparse=1):
+    """The mesh with random seams, sharp edges, chosen faces and options."""
     seams = rng.integers(len(V), size=(rng.integers(0, 4), 2))
     if P and rng.random() < 0.5:
         edges = np.array([[p[0], p[1]] for p in P])
-        seams = np.concatenate([seams, edges[rng.random(len(edges)) < rng.random()]])
+        seams = np.concatenate([seams, edges[rng.random(len(edges)) < rng.random() ** sparse]])
     surface = meshes.polygon_surface(V, P, seams)
     faces = rng.random(len(P)) < 0.8 if rng.random() < 0.2 else None
     options = {"boundary": str(rng.choice(["disk", "square", "free"])), "quality": "draft"}
-    return surface, faces, {**options, "seams": "existing" if rng.random() < 0.4 else "auto"}
+    options["seams"] = "auto" if rng.random() < auto else "existing"
+    if rng.random() < 0.3:
+        options["fill_holes"] = True
+    if rng.random() < 0.2:
+        surface = replace(surface, sharp=rng.integers(len(V), size=(8, 2)))
+        options["avoid"] = rng.random(len(V))
+    return surface, faces, options
 
 
 def arrays(surface: Surface):
@@ -193,22 +273,33 @@ def check_result(result, surface: Surface, faces):
         assert chart_map.warnings or not chart_map.folds, "a fold was returned without a word"
 
 
+def check_outcome(seed, surface, faces, options):
+    before = arrays(surface)
+    try:
+        result = drain(unwrap(surface, faces, **options))
+    except MeshError as error:
+        check_error(error, surface)
+    except Exception as error:
+        error.add_note(f"case {seed}, {options}")
+        raise
+    else:
+        check_result(result, surface, faces)
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, arrays(surface), strict=True)), seed
+
+
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("chunk", range(CHUNKS))
 def test_every_outcome_is_a_map_or_a_named_error(chunk):
     for seed in range(chunk * CASES // CHUNKS, (chunk + 1) * CASES // CHUNKS):
-        surface, faces, options = broken_mesh(seed)
-        before = arrays(surface)
-        try:
-            result = drain(unwrap(surface, faces, **options))
-        except MeshError as error:
-            check_error(error, surface)
-        except Exception as error:
-            error.add_note(f"broken_mesh({seed}), {options}")
-            raise
-        else:
-            check_result(result, surface, faces)
-        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, arrays(surface), strict=True)), seed
+        check_outcome(seed, *broken_mesh(seed))
+
+
+@meshes.models_missing
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("chunk", range(4))
+def test_every_outcome_on_pieces_of_real_models_is_a_map_or_a_named_error(chunk):
+    for seed in range(10 * chunk, 10 * chunk + 10):
+        check_outcome(seed, *broken_model(seed))
 
 
 def test_the_fuzz_meets_maps_and_every_kind_of_error():

@@ -9,7 +9,7 @@ from omt_uv.solver import errors, repair
 from omt_uv.solver.charts import degenerate_triangles, triangle_surface
 from omt_uv.solver.cutting import cut
 from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.parameterize import unwrap_chart
+from omt_uv.solver.parameterize import unwrap, unwrap_chart
 from omt_uv.solver.preparation import prepare
 from omt_uv.solver.progress import drain
 from omt_uv.solver.sheets import corner_classes
@@ -83,6 +83,48 @@ def test_faces_that_look_the_wrong_way_are_turned_for_the_map():
     # Every corner of the turned mesh belongs to the vertex it belongs to in the sound one.
     np.testing.assert_allclose(mapped(chart).area_l1, mapped(sound).area_l1, rtol=0.1)
     np.testing.assert_array_equal(turned.ravel()[chart.corners], chart.vertex_ids[chart.triangles])
+
+
+def test_faces_turned_for_the_map_are_counted_and_said():
+    """They lie in the map as their neighbours do; in the mesh's own winding just these are mirrored."""
+    V, F = meshes.bumpy(6, 6)
+    F = F.copy()
+    F[[3, 17, 40]] = F[[3, 17, 40]][:, ::-1]
+    result = drain(unwrap(triangle_surface(V, F)))
+    (warning,) = result.warnings
+    assert warning.startswith("3 faces look to the other side") and "Recalculate Outside" in warning
+    corners, uv = result.corner_uv()
+    at = np.empty((F.size, 2))
+    at[corners] = uv
+    signed = signed_areas(at, np.arange(F.size).reshape(-1, 3))
+    np.testing.assert_array_equal(np.flatnonzero(signed < 0), [3, 17, 40])
+    assert np.abs(signed).sum() == pytest.approx(signed[signed > 0].sum() - signed[signed < 0].sum())
+
+
+@pytest.mark.parametrize("places", [[5], [2, 7, 20]])
+def test_what_has_one_side_is_opened_where_its_faces_disagree(places):
+    """Along a Moebius band the winding changes an odd number of times; if once, no face has to be turned over."""
+    V, F = strip(places)
+    result = drain(unwrap(triangle_surface(V, F), seams="auto"))
+    assert len(result.charts) == 1 and len(result.seams) >= 1
+    corners, uv = result.corner_uv()
+    signed = signed_areas(uv[np.argsort(corners)], np.arange(F.size).reshape(-1, 3))
+    assert len(np.unique(np.sign(signed))) == (1 if len(places) == 1 else 2)
+
+
+def strip(places, segments=24):
+    """A Moebius band of triangles whose winding changes at these segments."""
+    angle = 2 * np.pi * np.arange(segments) / segments
+    side = 0.3 * np.stack([np.cos(angle / 2) * np.cos(angle), np.cos(angle / 2) * np.sin(angle), np.sin(angle / 2)], 1)
+    middle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
+    k = np.arange(segments)
+    a, b = k, k + segments
+    # The sides swap where the band closes.
+    c, d = np.append(a[1:], b[0]), np.append(b[1:], a[0])
+    F = np.stack([np.column_stack([a, c, d]), np.column_stack([a, d, b])], 1)
+    for place in places:
+        F[place:] = F[place:, :, ::-1]
+    return np.concatenate([middle + side, middle - side]), F.reshape(-1, 3)
 
 
 def test_the_winding_of_most_of_the_surface_is_kept():

@@ -18,6 +18,7 @@ def add(commands) -> None:
 def run(options: argparse.Namespace) -> None:
     files, blender_mesh, _ = blender()
     from ..blender_seams import GroupError, avoided, mark_seams
+    from ..solver.chart_pins import clear_of_pins
     from ..solver.cutting import cut
     from ..solver.errors import MeshError
 
@@ -29,6 +30,7 @@ def run(options: argparse.Namespace) -> None:
     try:
         free = avoided(objects, options.keep_free)
         for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
+            avoid = clear_of_pins(reading.surface, reading.pins, avoid)
             cuts = cut(reading.surface, reading.faces, avoid=avoid, fill=options.fill_holes)
             told += [(k, text) for text in cuts.warnings]
             mark_seams(obj, cuts.edges)

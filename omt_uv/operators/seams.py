@@ -69,6 +69,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
 
 def _cut_all(readings: list, free: list, options: dict):
     """The cuts of every surface; Refusal says which one has none."""
+    from ..solver.chart_pins import clear_of_pins
     from ..solver.cutting import cut
     from ..solver.errors import MeshError
     from ..solver.progress import Progress
@@ -78,7 +79,8 @@ def _cut_all(readings: list, free: list, options: dict):
     for k, (reading, avoid) in enumerate(zip(readings, free, strict=True)):
         yield Progress("Seams", k / len(readings))
         try:
-            found.append(cut(reading.surface, reading.faces, avoid=avoid, **options))
+            clear = clear_of_pins(reading.surface, reading.pins, avoid)
+            found.append(cut(reading.surface, reading.faces, avoid=clear, **options))
         except MeshError as error:
             raise Refusal(k, error) from error
     return found

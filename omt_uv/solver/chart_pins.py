@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import Chart
+from .charts import Chart, Surface
 from .errors import PinError
 from .pins import Pins, aligned, check_pins
 
@@ -41,6 +41,18 @@ def chart_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
     given = np.asarray(pins.uv, float)[chart.corners]
     checked = check_pins(chart.triangles[mask], given[mask], len(chart.vertices))
     return ChartPins(checked.vertices, np.column_stack([checked.places.real, checked.places.imag]), given)
+
+
+def clear_of_pins(surface: Surface, pins: CornerPins | None, avoid: np.ndarray | None) -> np.ndarray | None:
+    """Vertices (n,) in [0,1] to keep free of cuts: those to `avoid`, and all with a pin; None for none.
+
+    A cut through a pinned vertex would give one point of the surface two places in the texture, both held.
+    """
+    if pins is None or not pins.pinned.any():
+        return avoid
+    free = np.zeros(len(surface.positions)) if avoid is None else np.array(avoid, float)
+    free[surface.corner_vertex[pins.pinned]] = 1.0
+    return free
 
 
 def refuse_outline(pins: ChartPins | None, boundary: str) -> None:

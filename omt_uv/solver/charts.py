@@ -31,7 +31,8 @@ class Surface:
     """A polygon mesh as arrays; a corner is a vertex of one polygon.
 
     positions (n,3), corner_vertex (c,), face_start (f+1,) so that polygon f owns the corners
-    face_start[f]:face_start[f+1], triangles (m,3) of corners, triangle_face (m,), seams (k,2) vertex pairs.
+    face_start[f]:face_start[f+1], triangles (m,3) of corners, triangle_face (m,), seams (k,2) vertex pairs,
+    sharp (k,2) vertex pairs of edges that are marked sharp, where cuts are welcome.
     """
 
     positions: np.ndarray
@@ -40,6 +41,7 @@ class Surface:
     triangles: np.ndarray
     triangle_face: np.ndarray
     seams: np.ndarray
+    sharp: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
 
 @dataclass(frozen=True)
@@ -197,6 +199,11 @@ def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Sheet
 def is_seam(surface: Surface, key: np.ndarray) -> np.ndarray:
     """Whether edges, given by `topology.pair_keys` of their vertices, are seams; (k,) bool."""
     return np.isin(key, pair_keys(surface.seams[:, 0], surface.seams[:, 1]))
+
+
+def is_sharp(surface: Surface, key: np.ndarray) -> np.ndarray:
+    """Whether edges, given by `topology.pair_keys` of their vertices, are marked sharp; (k,) bool."""
+    return np.isin(key, pair_keys(surface.sharp[:, 0], surface.sharp[:, 1]))
 
 
 def assemble(surface: Surface, sheets: Sheets) -> list[Chart]:

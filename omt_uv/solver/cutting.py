@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from .charts import Surface, chosen_triangles, is_seam
+from .charts import Surface, chosen_triangles, is_seam, is_sharp
 from .cut_graph import greedy_arcs, path_to, shorten
 from .extremities import log_scale, spread
 from .geometry import face_areas
 from .holes import fill_holes
-from .piece import NOISE, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
+from .piece import NOISE, SEAM, SHARP, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .repair import Repaired, join, weldable
 from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
 from .steiner import MOST_ENDS, meeting_points
@@ -106,6 +106,8 @@ def open_sheets(
     vertex_count = len(surface.positions)
     positions, unit = _in_unit_box(surface, repaired.sheets)
     sheets, one_sided = _looking_out(repaired.sheets, positions)
+    # What has one side only is not told to look to the other.
+    turned = sheets.triangles[:, 1] != repaired.sheets.triangles[:, 1]
     if fill:
         filled = fill_holes(surface, sheets, one_sided)
         surface, sheets = filled.surface, filled.sheets
@@ -122,6 +124,8 @@ def open_sheets(
     length = sum(p.length for p in report)
     edges = np.concatenate([edges, repaired.torn]).astype(np.int64)
     warnings = list(repaired.warnings)
+    if turned.any():
+        warnings.append(_turned_faces(len(np.unique(repaired.sheets.owner[turned]))))
     if touching:
         warnings.append(f"{touching} boundary vertices lie on one another; Merge by Distance joins the parts there")
     return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, tuple(warnings)), unit)
@@ -134,7 +138,7 @@ def _cut_parts(
     vertices a weld would join."""
     part, corner_class = components(sheets), corner_classes(sheets)
     kind = classify(sheets, corner_class, part, one_sided)
-    seam = is_seam(surface, pair_keys(*sheets.ends(sheets.first)))
+    ease = ease_of_cuts(surface, sheets)
     gone = np.zeros(len(sheets.first), dtype=bool)
     members = groups(part)
     order, start = _by_part(part[sheets.first // 3], len(members))
@@ -143,7 +147,7 @@ def _cut_parts(
     known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
     for k in np.flatnonzero(~kind.is_disk):
         mine = order[start[k] : start[k + 1]]
-        piece = make_piece(sheets, positions, corner_class, members[k], mine, weight, seam)
+        piece = make_piece(sheets, positions, corner_class, members[k], mine, weight, ease)
         name = fingerprint(piece)
         if name not in known:
             known[name] = open_piece(piece, kind, k, extremities)
@@ -153,6 +157,25 @@ def _cut_parts(
         figures = int(kind.boundaries[k]), int(kind.handles[k]), bool(kind.one_sided[k])
         report.append(PieceCut(len(piece.triangles), *figures, length, piece.vertex_ids[tips]))
     return gone, report, weldable(surface, sheets, part, kind.is_disk)
+
+
+def ease_of_cuts(surface: Surface, sheets: Sheets) -> np.ndarray:
+    """Factor (p,) on the cost of cutting each pair: less where the artist marked a seam or a sharp edge.
+
+    What cannot be oriented is rather opened where its faces look to opposite sides: then none has to be turned over.
+    """
+    key = pair_keys(*sheets.ends(sheets.first))
+    ease = np.where(is_sharp(surface, key) | sheets.parallel(), SHARP, 1.0)
+    ease[is_seam(surface, key)] = SEAM
+    return ease
+
+
+def _turned_faces(count: int) -> str:
+    who = "A face looks" if count == 1 else f"{count} faces look"
+    return (
+        f"{who} to the other side than the faces around; mapped with them, so that the texture is mirrored there. "
+        "Use Mesh > Normals > Recalculate Outside"
+    )
 
 
 def _by_part(part: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -97,6 +97,7 @@ def _welded(surface: Surface, uv: np.ndarray) -> tuple[Surface, np.ndarray]:
         positions=surface.positions[origin],
         corner_vertex=index.ravel().astype(np.int64),
         seams=np.zeros((0, 2), np.int64),
+        sharp=np.zeros((0, 2), np.int64),
     )
     return welded, origin
 

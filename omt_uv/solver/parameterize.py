@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .chart_pins import ChartPins, CornerPins, anchored, chart_pins, facing, refuse_outline
+from .chart_pins import ChartPins, CornerPins, anchored, chart_pins, clear_of_pins, facing, refuse_outline
 from .charts import Chart, Surface, triangle_rows
 from .conformal import conformal_disk, conformal_rectangle, sharpest_corners
 from .distortion import measure
@@ -117,7 +117,7 @@ def unwrap(
     quality : "draft", "standard" or "exact", how small the area error of single faces becomes
     balance : from 0, exact areas, to 1, least shear
     pins : corners that keep their places, with a free boundary
-    seams, fill_holes, avoid : see `preparation.prepare`
+    seams, fill_holes, avoid : see `preparation.prepare`; cuts avoid pinned vertices, too
     target : density (m,) of the triangles of the surface, and a region; every triangle its own area by default
 
     Raises
@@ -125,6 +125,7 @@ def unwrap(
     MeshError : see `preparation.prepare` and `unwrap_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
+    avoid = clear_of_pins(surface, pins, avoid)
     prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
     charts = prepared.charts
     held = [located_pins(pins, chart) for chart in charts]

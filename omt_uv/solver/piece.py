@@ -14,6 +14,8 @@ from .topology import halfedges
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
 # angle counts as this share of its length. Shares near 1 keep cuts short: their length is bounded by them.
 CREASE, HOLLOW, SEAM = 0.85, 0.75, 0.3
+# An edge marked sharp is where the artist breaks the shading, and so does one whose faces look to opposite sides.
+SHARP = 0.5
 # Angles up to this one occur within a smooth surface and hide nothing.
 SMOOTH = np.pi / 6
 # Edges between vertices that are to be kept free of seams count as so many times their length.
@@ -112,7 +114,7 @@ def make_piece(
     members: np.ndarray,
     mine: np.ndarray,
     weight: np.ndarray,
-    seam: np.ndarray,
+    ease: np.ndarray,
 ) -> Piece:
     """The piece of the triangles `members` (m,), in ascending order, and the pairs `mine` (e,) between them.
 
@@ -120,7 +122,7 @@ def make_piece(
     ----------
     positions : (n,3) of the surface, in a unit box
     weight : (n,) in [0,1] keeps vertices of the surface free of cuts
-    seam : (p,) pairs that the artist marked
+    ease : (p,) factor by which each pair is cheaper to cut, see `cutting.ease_of_cuts`
     """  # fmt: skip
     corners = sheets.triangles[members]
     _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
@@ -138,7 +140,7 @@ def make_piece(
     floor = 1e-9 * max(float(length.mean()) if len(length) else 1.0, 1e-30)
     noise = 1 + NOISE * np.random.default_rng(0).random(len(pair))
     cost = (length + floor) * _hiding(p, triangles, pair) * noise
-    cost *= np.where(seam[mine], SEAM, 1.0) * (1 + (AVOIDED - 1) * weight[vertex_ids][ends].mean(axis=1))
+    cost *= ease[mine] * (1 + (AVOIDED - 1) * weight[vertex_ids][ends].mean(axis=1))
     cost[patch] *= HOLE
     cost[diagonal] = np.inf
     rim = _open_halfedges(3 * len(triangles), pair[:, 0], pair[:, 1])

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from .charts import Chart, Surface
+from .charts import Chart, Surface, is_sharp
 from .geometry import face_areas
-from .piece import AVOIDED, NOISE
+from .piece import AVOIDED, NOISE, SHARP
 from .sheets import polygon_sides
 from .topology import boundary_loops, halfedges, pair_keys, twins
 
@@ -39,6 +39,7 @@ def slit(surface: Surface, chart: Chart, shear: np.ndarray, avoid: np.ndarray | 
     if avoid is not None:
         weight = np.where(chart.vertex_ids >= 0, np.clip(avoid, 0, 1)[chart.vertex_ids], 0)
     cost *= 1 + (AVOIDED - 1) * (weight[a] + weight[b]) / 2
+    cost[is_sharp(surface, pair_keys(chart.vertex_ids[a], chart.vertex_ids[b]))] *= SHARP
     graph = csr_matrix((np.tile(cost, 2), (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(n, n))
     distance, before, _ = dijkstra(graph, indices=np.flatnonzero(rim), min_only=True, return_predecessors=True)
     worth = np.where(np.isfinite(distance), distance, 0) * local * (1 - weight)

@@ -75,8 +75,8 @@ def notched_disk(start: Start, triangles, loop) -> Start | None:
 def free_start(vertices, triangles, uv, loop) -> Start:
     """Free boundary: the given map if it is one to one, else a disk; charts that are flat are unrolled.
 
-    The disk is the given map untangled. Where that squeezes faces, and a mean value map less, it is the latter: Newton's
-    way from squeezed faces is long, and takes its turns by chance.
+    The disk is the given map untangled. Where that squeezes faces, and a mean value map less, it is the latter:
+    Newton's way from squeezed faces is long, and takes its turns by chance.
     """
     area = face_areas(vertices, triangles).sum()
     motion = Free(np.zeros(len(vertices), bool))

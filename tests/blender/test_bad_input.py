@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import bpy
 
@@ -134,6 +135,8 @@ def test_refused_with_the_culprits_selected(make, mode):
     obj.update_from_editmode()
     counts = {"VERT": obj.data.total_vert_sel, "EDGE": obj.data.total_edge_sel, "FACE": obj.data.total_face_sel}
     assert counts[kind] > 0
+    said = re.search(r"\((\d+) (vert|edge|face)", message)
+    assert said and said[2].upper() == kind and int(said[1]) == counts[kind]
 
 
 def test_the_right_elements_are_selected():

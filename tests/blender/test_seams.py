@@ -91,3 +91,49 @@ def test_holes_may_be_filled():
     assert not seams_of(obj).any()
     mark()
     assert seams_of(obj).any()
+
+
+def ring(height=3):
+    """A tube of quads without ends, 12 around."""
+    angle = 2 * np.pi * np.arange(12) / 12
+    rows = [np.stack([np.cos(angle), np.sin(angle), 0 * angle + k], axis=1) for k in range(height + 1)]
+    k = np.arange(12)
+    quads = [np.stack([k, (k + 1) % 12, (k + 1) % 12 + 12, k + 12], axis=1) + 12 * row for row in range(height)]
+    return scenes.add(np.concatenate(rows), np.concatenate(quads))
+
+
+def cut_edges(obj):
+    return {tuple(sorted(e.vertices)) for e in obj.data.edges if e.use_seam}
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("column", [2, 9])
+def test_edges_marked_sharp_take_the_cut(mode, column):
+    obj = ring()
+    line = {(12 * row + column, 12 * row + 12 + column) for row in range(3)}
+    for edge in obj.data.edges:
+        edge.use_edge_sharp = tuple(sorted(edge.vertices)) in line
+    if mode == "EDIT":
+        scenes.edit(obj)
+    mark(extremities=0)
+    if mode == "EDIT":
+        scenes.leave_edit()
+    assert cut_edges(obj) == line
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_pinned_vertices_are_not_cut_through(mode):
+    obj = ring()
+    mark(extremities=0)
+    used = {v for edge in cut_edges(obj) for v in edge if 12 <= v < 36}
+    assert used
+    for edge in obj.data.edges:
+        edge.use_seam = False
+    obj.data.uv_layers.new(name="UVMap")
+    scenes.pin(obj, used)
+    if mode == "EDIT":
+        scenes.edit(obj)
+    mark(extremities=0)
+    if mode == "EDIT":
+        scenes.leave_edit()
+    assert cut_edges(obj) and not {v for edge in cut_edges(obj) for v in edge} & used

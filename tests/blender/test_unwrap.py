@@ -116,6 +116,39 @@ def test_only_the_uv_layer_changes():
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_shape_keys_normals_creases_and_modifiers_stay(mode):
+    obj = scenes.bump()
+    mesh = obj.data
+    rng = np.random.default_rng(3)
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Smile")
+    shape = rng.random(3 * len(mesh.vertices)).astype(np.float32)
+    key.data.foreach_set("co", shape)
+    key.value = 0.5
+    mesh.normals_split_custom_set([tuple(v) for v in rng.normal(size=(len(mesh.loops), 3))])
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    for edge in mesh.edges:
+        edge.use_edge_sharp = bool(edge.index % 3 == 0)
+
+    def held():
+        shapes = np.zeros((2, len(shape)), np.float32)
+        for row, block in zip(shapes, mesh.shape_keys.key_blocks, strict=True):
+            block.data.foreach_get("co", row)
+        normals = np.array([loop.vector[:] for loop in mesh.corner_normals])
+        values = [block.value for block in mesh.shape_keys.key_blocks]
+        stack = [(m.name, m.type, m.levels) for m in obj.modifiers]
+        return shapes.tobytes(), normals.round(6).tobytes(), values, stack, [e.use_edge_sharp for e in mesh.edges]
+
+    before = held()
+    if mode == "EDIT":
+        scenes.edit(obj)
+    unwrap()
+    if mode == "EDIT":
+        scenes.leave_edit()
+    assert held() == before and np.ptp(scenes.uv_of(obj)) > 0.5
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
 @pytest.mark.parametrize("layer", ["New", "UVMap"])
 def test_undo_restores_everything(mode, layer):
     obj = scenes.bump()
