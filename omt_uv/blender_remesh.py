@@ -12,11 +12,12 @@ import numpy as np
 
 from . import blender_mesh, blender_transfer
 from .blender_transfer import Attributes
-from .remeshing import Job, Level, Series
+from .remeshing import Job, Level, Series, oriented
 from .settings import RemeshSettings
 from .solver.charts import Surface
-from .solver.errors import MeshError
+from .solver.errors import EmptyMeshError, MeshError
 from .solver.features import all_edges, sharp_edges
+from .solver.measure import from_polygons, from_vertices
 
 # Modifiers that keep data for the very vertices of a mesh and are of no use on another.
 BOUND = {
@@ -29,6 +30,10 @@ BOUND = {
     "CLOTH",
     "SOFT_BODY",
 }
+
+
+class SourceError(ValueError):
+    """The vertex group or attribute that should give the density is missing or of no use."""
 
 
 @dataclass(frozen=True)
@@ -50,22 +55,26 @@ def read_request(
 
     Raises
     ------
+    SourceError : see there
     MeshError : no faces, a transformation that is not finite or flattens the object
     """
     with _mesh_of(obj, depsgraph) as mesh:
         reading = blender_mesh.read_mesh(mesh, obj)
         if weld:
             reading = blender_mesh.weld_split_vertices(replace(reading, uv=None))
-        surface = reading.surface
+        if not len(reading.surface.triangles):
+            raise EmptyMeshError("The mesh has no faces", "Choose a mesh with faces")
+        surface, warnings = oriented(reading.surface)
         names = tuple(group.name for group in obj.vertex_groups)
         attributes = blender_transfer.read_attributes(mesh, names, settings.preserve_attributes)
+        values = _density_values(obj, mesh, surface, settings)
     stretch = blender_mesh.stretch(obj)
     if abs(np.linalg.det(stretch)) <= 1e-12 * np.abs(stretch).max() ** 3:
         raise MeshError("The scale of the object is zero along an axis", "Clear or fix its scale")
     jumps = all_edges(
         blender_transfer.uv_seams(attributes, surface), blender_transfer.material_borders(attributes, surface)
     )
-    job = Job(surface, _features(attributes, surface, settings), jumps)
+    job = Job(surface, _features(attributes, surface, settings), jumps, values, warnings)
     return Request(job, attributes, stretch, depsgraph is not None)
 
 
@@ -97,6 +106,31 @@ def _features(attributes: Attributes, surface: Surface, settings: RemeshSettings
     return all_edges(*kept)
 
 
+def _density_values(
+    obj: bpy.types.Object, mesh: bpy.types.Mesh, surface: Surface, settings: RemeshSettings
+) -> np.ndarray | None:
+    """Weights or attribute (m,) per triangle, None where the density needs neither."""
+    triangles = surface.corner_vertex[surface.triangles]
+    if settings.density == "weights":
+        weights = blender_transfer.group_weights(mesh, obj, settings.source)
+        if weights is None:
+            raise SourceError(f"{obj.name}: There is no vertex group {settings.source!r}. Choose one that it has.")
+        return from_vertices(weights, triangles)
+    if settings.density != "attribute":
+        return None
+    attribute = mesh.attributes.get(settings.source)
+    if attribute is None or attribute.data_type != "FLOAT" or attribute.domain not in {"POINT", "FACE"}:
+        raise SourceError(
+            f"{obj.name}: There is no attribute {settings.source!r} of floats on vertices or faces. "
+            "Choose one that it has."
+        )
+    values = np.zeros(len(attribute.data), np.float32)
+    attribute.data.foreach_get("value", values)
+    if attribute.domain == "POINT":
+        return from_vertices(values, triangles)
+    return from_polygons(values, surface.triangle_face)
+
+
 def new_objects(obj: bpy.types.Object, request: Request, series: Series, carried: list[Attributes]) -> list[str]:
     """Make the objects of a series beside the object; returns their names."""
     single = len(series.levels) == 1
@@ -104,6 +138,8 @@ def new_objects(obj: bpy.types.Object, request: Request, series: Series, carried
     for k, (level, attributes) in enumerate(zip(series.levels, carried, strict=True)):
         name = f"{obj.name}_remesh" if single else f"{obj.name}_LOD{k}"
         names.append(_new_object(obj, name, request, level, attributes).name)
+    # Objects that were linked but a moment ago cannot be selected, or left out of a selection.
+    bpy.context.view_layer.update()
     return names
 
 

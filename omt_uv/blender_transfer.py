@@ -164,6 +164,12 @@ def _groups(mesh: bpy.types.Mesh, count: int) -> tuple[np.ndarray, np.ndarray]:
     return weights, member
 
 
+def group_weights(mesh: bpy.types.Mesh, obj: bpy.types.Object, name: str) -> np.ndarray | None:
+    """Weights (n,) of a vertex group of the object on a mesh, 0 outside of it; None if there is none of this name."""
+    group = obj.vertex_groups.get(name)
+    return None if group is None else _groups(mesh, group.index + 1)[0][:, group.index]
+
+
 KEY_SETTINGS = ("slider_min", "slider_max", "value", "mute", "vertex_group", "interpolation")
 
 

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .settings import RemeshSettings
+from .solver import measure
 from .solver.charts import Surface, chosen_triangles
-from .solver.errors import CountError, MeshError
+from .solver.errors import CountError, DensityError, MeshError
 from .solver.features import all_edges
 from .solver.geometry import face_areas
 from .solver.progress import Progress, Steps, part_of
 from .solver.remesh import Remesh, remesh
+from .solver.repair import join
+from .solver.scores import areas, score, soft_weights
+from .solver.sheets import orientations
+from .solver.topology import halfedges
 from .solver.transfer import Footprint, footprint
 
 
@@ -21,11 +27,14 @@ class Job:
     """A surface and what the new mesh shall follow.
 
     features (e,2): vertex pairs of edges to keep; jumps (s,2): edges across which values jump, kept or not;
+    values (m,): weights of the vertex group, or the attribute, per triangle of the surface; warnings: what was mended
     """
 
     surface: Surface
     features: np.ndarray
     jumps: np.ndarray
+    values: np.ndarray | None = None
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -51,20 +60,20 @@ def remesh_series(job: Job, settings: RemeshSettings) -> Steps[Series]:
 
     Raises
     ------
-    MeshError : CountError and those of `solver.remesh.remesh`; elements are vertices, edges and polygons of the
-        surface
+    MeshError : CountError, DensityError, WeightError and those of `solver.remesh.remesh`; elements are vertices,
+        edges and polygons of the surface
     """
     surface = job.surface
     chosen_triangles(surface, None)
     triangles = surface.corner_vertex[surface.triangles]
     count_of, counts = _counts(surface, triangles, settings)
     levels: list[Level] = []
-    warnings: list[str] = []
+    warnings = list(job.warnings)
     for k, count in enumerate(counts):
-        steps = _level(job, triangles, count_of, count, settings)
-        level = yield from part_of(_located(steps, surface), k / len(counts), 1 / len(counts))
-        levels.append(level)
         name = f"LOD{k}: " if len(counts) > 1 else ""
+        steps = _located(_level(job, triangles, count_of, count, settings), surface, name)
+        level = yield from part_of(steps, k / len(counts), 1 / len(counts))
+        levels.append(level)
         warnings += [name + text for text in level.found.warnings]
         if level.footprint.extended:
             warnings.append(f"{name}{level.footprint.extended} faces reach across a seam; UVs are continued there")
@@ -90,11 +99,14 @@ def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -
 
 def _level(job: Job, triangles: np.ndarray, count_of: str, count: int, settings: RemeshSettings) -> Steps[Level]:
     positions = job.surface.positions
+    samples = count if count_of == "vertices" else max(count // 2, 1)
+    density = density_of(job, triangles, samples, settings)
     steps = remesh(
         positions,
         triangles,
         count,
         count_of=count_of,
+        density=density,
         features=job.features if len(job.features) else None,
         preserve_boundary=settings.preserve_boundary,
         strategy=settings.strategy,
@@ -107,12 +119,70 @@ def _level(job: Job, triangles: np.ndarray, count_of: str, count: int, settings:
     return Level(found.vertices, found.triangles, at, found)
 
 
-def _located(steps: Steps[Level], surface: Surface) -> Steps[Level]:
-    """The level; errors name polygons of the surface instead of its triangles."""
+def _located(steps: Steps[Level], surface: Surface, name: str) -> Steps[Level]:
+    """The level; errors say its name, and polygons of the surface instead of triangles."""
     try:
         return (yield from steps)
     except MeshError as error:
-        if error.kind != "face":
-            raise
-        polygons = np.unique(surface.triangle_face[error.elements])
-        raise type(error)(error.cause, error.remedy, "face", polygons) from error
+        elements = error.elements
+        if error.kind == "face":
+            elements = np.unique(surface.triangle_face[elements])
+        raise type(error)(name + error.cause, error.remedy, error.kind, elements) from error
+
+
+def oriented(surface: Surface) -> tuple[Surface, tuple[str, ...]]:
+    """The surface with triangles turned over that look to another side than their neighbours, and warnings."""
+    tail, head = halfedges(surface.corner_vertex[surface.triangles])
+    if len(np.unique(tail * len(surface.positions) + head)) == len(tail):
+        return surface, ()
+    faces = np.ones(len(surface.face_start) - 1, dtype=bool)
+    sheets = join(surface, faces, surface.triangles, surface.triangle_face).sheets
+    turned, _ = orientations(sheets, face_areas(surface.positions, surface.corner_vertex[surface.triangles]))
+    if not turned.any():
+        return surface, ()
+    triangles = np.where(turned[:, None], surface.triangles[:, [0, 2, 1]], surface.triangles)
+    count = len(np.unique(surface.triangle_face[turned]))
+    text = "A face looks to another side than its neighbours" if count == 1 else f"{count} faces look to another side"
+    return replace(surface, triangles=triangles), (f"{text}; turned over in the new mesh",)
+
+
+def density_of(job: Job, triangles: np.ndarray, samples: int, settings: RemeshSettings) -> np.ndarray | None:
+    """Samples per area (m,) up to a factor that the settings ask for, None where it is the same everywhere."""
+    if settings.density == "uniform":
+        return None
+    density = _DENSITIES[settings.density](job, triangles, settings)
+    if settings.grading > 0:
+        density = measure.graded(density, job.surface.positions, triangles, settings.grading, samples)
+    return density
+
+
+def _curvature(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    return measure.mean_curvature(job.surface.positions, triangles, settings.amount)
+
+
+def _saliency(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    positions = job.surface.positions
+    weights = soft_weights(score("saliency", positions, triangles), areas(positions, triangles))
+    return measure.painted(measure.from_vertices(weights, triangles), settings.factor)
+
+
+def _painted(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    return measure.painted(_values(job), settings.factor)
+
+
+def _attribute(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    return measure.attribute(_values(job))
+
+
+def _values(job: Job) -> np.ndarray:
+    if job.values is None:
+        raise DensityError("There is nothing to read the density from", "Name a vertex group or an attribute")
+    return job.values
+
+
+_DENSITIES: dict[str, Callable[[Job, np.ndarray, RemeshSettings], np.ndarray]] = {
+    "curvature": _curvature,
+    "saliency": _saliency,
+    "weights": _painted,
+    "attribute": _attribute,
+}

@@ -36,6 +36,13 @@ COUNTS = (
     ("FACES", "Faces", "As many triangles as asked"),
     ("EDGE", "Edge Length", "As many triangles as make edges of this length on average, in the units of the scene"),
 )
+DENSITIES = (
+    ("UNIFORM", "Uniform", "Triangles of one size everywhere"),
+    ("CURVATURE", "Curvature", "Smaller triangles where the surface curves"),
+    ("SALIENCY", "Saliency", "Smaller triangles where the shape draws attention"),
+    ("WEIGHTS", "Vertex Group", "Smaller triangles where the weights of a vertex group are large"),
+    ("ATTRIBUTE", "Attribute", "Vertices per area in proportion to an attribute of floats, on vertices or faces"),
+)
 STRATEGIES = (
     ("APP-CFP", "APP, CFP", "Sample on the area-preserving map, triangulate on the conformal map"),
     ("APP-APP", "APP, APP", "Sample and triangulate on the area-preserving map"),
@@ -99,6 +106,9 @@ class RemeshSettings:
     """How to make a new mesh.
 
     count_of : an identifier of COUNTS in lower case; count : vertices, faces, or the length of an edge
+    density : an identifier of DENSITIES in lower case; factor : density where the weight, or the saliency, is 1 next to
+        where it is 0; amount : how much curvature counts next to area; source : the vertex group or attribute;
+        grading : most that the edge length may grow by per length, 0 for no limit
     preserve_* : features that edges of the new mesh follow; sharp_angle : edges with more than this many radians
         between their faces are sharp
     levels : how many meshes, each with `ratio` times the count of the one before
@@ -107,6 +117,11 @@ class RemeshSettings:
 
     count_of: str = "vertices"
     count: float = 5000
+    density: str = "uniform"
+    factor: float = 4.0
+    amount: float = 1.0
+    source: str = ""
+    grading: float = 0.0
     preserve_boundary: bool = True
     preserve_sharp: bool = False
     sharp_angle: float = 0.7

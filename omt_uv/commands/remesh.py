@@ -10,6 +10,8 @@ from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
 from .common import CommandError, blender, check_output, drain_shown, read, warn
 from .options import add_files, names
 
+KINDS = ("uniform", "curvature", "saliency")
+
 
 def add(commands) -> None:
     command = commands.add_parser("remesh", help="new meshes of a chosen size, with triangles of even shape")
@@ -19,6 +21,16 @@ def add(commands) -> None:
     count.add_argument("--vertices", type=int, metavar="N", help="vertices of each new mesh")
     count.add_argument("--faces", type=int, metavar="N", help="triangles of each new mesh")
     count.add_argument("--edge", type=float, metavar="L", help="mean length of the edges")
+    command.add_argument(
+        "--density", default="uniform", metavar="D", help=f"{', '.join(KINDS)}, or the name of a vertex group"
+    )
+    command.add_argument(
+        "--factor",
+        type=float,
+        metavar="M",
+        help="density where the weight is 1 next to where it is 0, default 4; amount of curvature, default 1",
+    )
+    command.add_argument("--grading", type=float, default=0.0, metavar="G", help="most growth of edges per length")
     command.add_argument("--levels", type=int, default=1, metavar="K", help="make K meshes, OUT_LOD0 and so on")
     command.add_argument(
         "--ratio", type=_ratio, default=0.5, metavar="R", help="size of a level next to the one before"
@@ -47,7 +59,7 @@ def _ratio(text: str) -> float:
 
 def run(options: argparse.Namespace) -> None:
     files, blender_mesh, _ = blender()
-    from ..blender_remesh import carried_attributes, lost, new_objects, read_request
+    from ..blender_remesh import SourceError, carried_attributes, lost, new_objects, read_request
     from ..remeshing import remesh_series
     from ..solver.errors import MeshError
 
@@ -60,8 +72,8 @@ def run(options: argparse.Namespace) -> None:
         try:
             request = read_request(obj, settings, weld=weld)
             series = drain_shown(remesh_series(request.job, settings))
-        except MeshError as error:
-            raise CommandError(f"{obj.name}: {error}") from error
+        except (SourceError, MeshError) as error:
+            raise CommandError(f"{obj.name}: {error}".replace(f"{obj.name}: {obj.name}", obj.name)) from error
         results.append((obj, request, series, carried_attributes(request, series)))
     told, made = [], []
     for k, (obj, request, series, carried) in enumerate(results):
@@ -77,9 +89,15 @@ def run(options: argparse.Namespace) -> None:
 def _settings(options: argparse.Namespace) -> RemeshSettings:
     counts = {"vertices": options.vertices, "faces": options.faces, "edge": options.edge}
     count_of = next(name for name, count in counts.items() if count is not None)
+    known = options.density in KINDS
     return RemeshSettings(
         count_of=count_of,
         count=counts[count_of],
+        density=options.density if known else "weights",
+        factor=4.0 if options.factor is None else options.factor,
+        amount=1.0 if options.factor is None else options.factor,
+        source="" if known else options.density,
+        grading=options.grading,
         preserve_boundary=not options.no_boundary,
         preserve_sharp=options.sharp is not None,
         sharp_angle=math.radians(options.sharp or 0.0),

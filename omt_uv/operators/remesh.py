@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..settings import COUNTS, DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
+from ..settings import COUNTS, DEFAULT_STRATEGY, DENSITIES, STRATEGIES, RemeshSettings
 from .common import Complaint, SolverOperator, mesh_objects, ready, warn
 
 
@@ -31,6 +31,35 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         soft_max=10,
         precision=4,
         subtype="DISTANCE",
+    )
+    density: EnumProperty(name="Density", description="Where triangles are smaller", items=DENSITIES)
+    weight_group: StringProperty(name="Group", description="Vertex group that says where triangles are smaller")
+    weight_factor: FloatProperty(
+        name="Factor",
+        description="Vertices per area where the weight, or the saliency, is 1, next to where it is 0",
+        default=4.0,
+        min=0.01,
+        max=1000.0,
+        soft_min=1.0,
+        soft_max=32.0,
+    )
+    amount: FloatProperty(
+        name="Amount",
+        description="How much curvature counts next to area. At 1, half of the vertices of a sphere follow it",
+        default=1.0,
+        min=0.0,
+        max=1000.0,
+        soft_max=10.0,
+    )
+    density_attribute: StringProperty(
+        name="Attribute", description="Attribute of positive floats, on vertices or faces"
+    )
+    grading: FloatProperty(
+        name="Grading",
+        description="Most that the edge length grows by per length, so that sizes change gently. 0: any",
+        default=0.0,
+        min=0.0,
+        soft_max=1.0,
     )
     use_preserve_boundary: BoolProperty(
         name="Preserve Boundary", description="Keep the outline of open meshes, and its corners", default=True
@@ -98,6 +127,11 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         return RemeshSettings(
             count_of=self.count_of.lower(),
             count=counts[self.count_of],
+            density=self.density.lower(),
+            factor=self.weight_factor,
+            amount=self.amount,
+            source=self.weight_group if self.density == "WEIGHTS" else self.density_attribute,
+            grading=self.grading,
             preserve_boundary=self.use_preserve_boundary,
             preserve_sharp=self.use_preserve_sharp,
             sharp_angle=self.sharp_angle,
@@ -112,7 +146,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context):
         from .. import running
-        from ..blender_remesh import read_request
+        from ..blender_remesh import SourceError, read_request
         from ..solver.errors import MeshError
         from ..unwrapping import Refusal
 
@@ -123,6 +157,8 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
             for obj in objects:
                 requests.append(read_request(obj, self.settings(), depsgraph))
             results = yield from running.aside(_remesh_all(requests, self.settings()))
+        except SourceError as error:
+            raise Complaint(str(error)) from error
         except MeshError as error:
             raise self._complaint(obj, error) from error
         except Refusal as refusal:
@@ -171,6 +207,16 @@ def _remesh_all(requests: list, settings: RemeshSettings):
     return results
 
 
+# Settings that count for some densities only.
+_DENSITY_SETTINGS = {
+    "weight_group": {"WEIGHTS"},
+    "weight_factor": {"WEIGHTS", "SALIENCY"},
+    "amount": {"CURVATURE"},
+    "density_attribute": {"ATTRIBUTE"},
+    "grading": {"CURVATURE", "SALIENCY", "WEIGHTS", "ATTRIBUTE"},
+}
+
+
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     """The settings of the operator, for the redo panel and the sidebar."""
     layout.use_property_split = True
@@ -178,6 +224,12 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "count_of")
     of = {"VERTICES": "target_vertices", "FACES": "target_faces", "EDGE": "edge_length"}
     layout.prop(properties, of[properties.count_of])
+    layout.prop(properties, "density")
+    column = layout.column()
+    for name, kinds in _DENSITY_SETTINGS.items():
+        row = column.column()
+        row.active = properties.density in kinds
+        row.prop(properties, name)
     for name in ("use_preserve_boundary", "use_preserve_seams", "use_preserve_materials", "use_preserve_sharp"):
         layout.prop(properties, name)
     column = layout.column()

@@ -183,6 +183,24 @@ def test_groups_and_shape_keys_are_carried():
     assert obj.data.shape_keys is not new.data.shape_keys
 
 
+def test_faces_that_look_the_other_way_are_turned_in_the_new_mesh_alone(capfd):
+    obj = ball(rings=24, sectors=40)
+    corner = np.array([loop.vertex_index for loop in obj.data.loops])
+    co = np.array([v.co for v in obj.data.vertices])
+    for k in (5, 77, 200, 300):
+        obj.data.polygons[k].flip()
+    corner = np.array([loop.vertex_index for loop in obj.data.loops])
+    fill(obj.data, "at", "FLOAT_VECTOR", "CORNER", co[corner].astype(np.float32), "vector")
+    before = scenes.state(obj)
+    (new,) = remesh(target_vertices=500)
+    assert scenes.state(obj) == before
+    assert "4 faces look to another side" in capfd.readouterr().out
+    co, faces = arrays(new)
+    volume = np.einsum("fj,fj->f", co[faces[:, 0]], np.cross(co[faces[:, 1]], co[faces[:, 2]]))
+    assert (volume > 0).all()
+    assert np.abs(values(new.data, "at", "vector", 3) - co[faces.ravel()]).max() < 0.02
+
+
 def test_attributes_can_be_left_out():
     dressed()
     (new,) = remesh(target_vertices=200, preserve_attributes=False)
@@ -227,6 +245,38 @@ def test_modifiers_are_applied_only_on_request():
     assert np.linalg.norm(arrays(applied)[0], axis=1).max() > 1.3
 
 
+def test_a_painted_group_is_denser():
+    obj = ball(rings=24, sectors=40)
+    group = obj.vertex_groups.new(name="North")
+    group.add([v.index for v in obj.data.vertices if v.co.z > 0], 1.0, "REPLACE")
+    (new,) = remesh(target_vertices=1500, density="WEIGHTS", weight_group="North", weight_factor=4)
+    z = arrays(new)[0][:, 2]
+    # Away from the border, where the weight is neither 0 nor 1.
+    assert (z > 0.3).sum() / (z < -0.3).sum() == pytest.approx(4, rel=0.05)
+
+
+@pytest.mark.parametrize("arguments", [
+    {"density": "CURVATURE", "amount": 2},
+    {"density": "SALIENCY", "weight_factor": 4},
+    {"density": "ATTRIBUTE", "density_attribute": "fine"},
+    {"density": "ATTRIBUTE", "density_attribute": "fine", "grading": 0.2},
+])  # fmt: skip
+def test_every_density_makes_some_place_denser(arguments):
+    """A ball with a small bump at the top, where curvature, saliency and the attribute are large."""
+    obj = ball(rings=24, sectors=40)
+    co = np.array([v.co for v in obj.data.vertices])
+    near = np.exp(-(((co - [0, 0, 1]) / 0.25) ** 2).sum(axis=1))
+    obj.data.vertices.foreach_set("co", (co * (1 + 0.3 * near)[:, None]).ravel())
+    fill(obj.data, "fine", "FLOAT", "POINT", (1 + 7 * near).astype(np.float32))
+    (new,) = remesh(target_vertices=800, **arguments)
+    co, faces = arrays(new)
+    assert len(co) == 800
+    p = co[faces]
+    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    z = p[:, :, 2].mean(axis=1)
+    assert area[z > 1].mean() < 0.8 * area[z < -0.8].mean()
+
+
 def test_the_same_call_makes_the_same_mesh():
     obj = dressed()
     (first,) = remesh(target_vertices=200)
@@ -250,6 +300,12 @@ def no_faces():
     return scenes.add([(0, 0, 0), (1, 0, 0)], [], edges=[(0, 1)]), {}, "no faces"
 
 
+def no_faces_but_uvs():
+    obj, arguments, words = no_faces()
+    obj.data.uv_layers.new(name="UVMap")
+    return obj, arguments, words
+
+
 def one_sided():
     """A Moebius strip."""
     t = 2 * np.pi * np.arange(24) / 24
@@ -271,6 +327,14 @@ def too_few():
     return dressed(), {"target_vertices": 4}, ""
 
 
+def missing_group():
+    return ball(), {"density": "WEIGHTS", "weight_group": "nowhere"}, "nowhere"
+
+
+def missing_attribute():
+    return ball(), {"density": "ATTRIBUTE", "density_attribute": "nothing"}, "nothing"
+
+
 def flattened():
     obj = ball()
     obj.scale = (1, 1, 0)
@@ -278,7 +342,9 @@ def flattened():
     return obj, {}, "scale"
 
 
-@pytest.mark.parametrize("make", [no_faces, one_sided, not_a_number, too_few, flattened])
+@pytest.mark.parametrize(
+    "make", [no_faces, no_faces_but_uvs, one_sided, not_a_number, too_few, missing_group, missing_attribute, flattened]
+)
 def test_bad_input_is_refused_by_name_and_nothing_changes(make):
     obj, arguments, words = make()
     before, objects, meshes = scenes.state(obj), set(bpy.data.objects), set(bpy.data.meshes)
