@@ -15,6 +15,7 @@ from .operators.refine import UV_OT_omt_refine
 from .operators.remesh import OBJECT_OT_omt_remesh
 from .operators.report import WM_OT_omt_copy_report
 from .operators.seams import UV_OT_omt_seams
+from .operators.sphere import UV_OT_omt_sphere
 from .operators.unwrap import UV_OT_omt_unwrap
 from .panels.menus import draw_remesh, draw_unwrap, menus, remesh_menus
 from .panels.sidebar import PANELS
@@ -25,6 +26,7 @@ CLASSES = (
     UV_OT_omt_unwrap,
     UV_OT_omt_refine,
     UV_OT_omt_seams,
+    UV_OT_omt_sphere,
     UV_OT_omt_live,
     UV_OT_omt_measure,
     OBJECT_OT_omt_remesh,

@@ -24,6 +24,17 @@ SEAMS = (
     ("EXISTING", "Existing", "Islands follow the seams alone; what they do not open into a disk is refused"),
     ("CHARTS", "Charts", "Many islands of little distortion, inside those that the seams make"),
 )
+PROJECTIONS = (
+    ("EQUIRECT", "Equirectangular", "Longitude and latitude: for globe textures and panoramas as they are"),
+    ("LAMBERT", "Lambert Equal Area", "A cylinder that keeps areas: every part gets its share of the texture"),
+    ("OCTAHEDRAL", "Octahedral Equal Area", "A square folded from an octahedron, which keeps areas with less shear"),
+)
+SPHERE_METHODS = (
+    ("NEWTON", "Newton", "Optimal transport on the sphere, refined"),
+    ("FLOW", "Flow", "The flow of Dominitz and Tannenbaum"),
+)
+DEFAULT_PROJECTION = "EQUIRECT"
+DEFAULT_SPHERE_METHOD = "NEWTON"
 DEFAULT_BOUNDARY = "FREE"
 DEFAULT_SEAMS = "AUTO"
 DEFAULT_QUALITY = "STANDARD"
@@ -156,3 +167,17 @@ class MagnifySettings(Settings):
     exact: bool = True
     source: str = DEFAULT_SOURCE.lower()
     cascade: int = 1
+
+
+@dataclass(frozen=True)
+class GlobeSettings:
+    """How to map closed parts to the sphere and the sphere to the plane.
+
+    projection, quality, method : an identifier of the lists above in lower case
+    balance : from 0, exact areas, to 1, least shear
+    """
+
+    projection: str = DEFAULT_PROJECTION.lower()
+    quality: str = DEFAULT_QUALITY.lower()
+    balance: float = DEFAULT_BALANCE
+    method: str = DEFAULT_SPHERE_METHOD.lower()

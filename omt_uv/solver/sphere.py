@@ -15,6 +15,7 @@ from .errors import DensityError, FoldedUVError, PrecisionError, TransportError
 from .geometry import face_areas, vertex_areas
 from .progress import Steps, part_of
 from .sphere_conformal import ConformalSphere, conformal_sphere
+from .sphere_flow import flow_map
 from .sphere_multilevel import multilevel_start
 from .sphere_refine import SphereRefinement, sphere_refine
 from .sphere_transport import sphere_transport
@@ -22,7 +23,7 @@ from .spherical_power import Hull
 from .stages import QUALITIES
 from .topology import twins
 
-METHODS = ("newton",)
+NEWTON, FLOW = METHODS = ("newton", "flow")
 # Where the time goes, roughly, as start and width.
 CONFORMAL, TRANSPORT, REFINEMENT, ANEW = (0.0, 0.15), (0.15, 0.25), (0.4, 0.6), (0.4, 0.3)
 
@@ -60,7 +61,7 @@ def sphere_map(
     density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default
     balance : from 0, exact areas, to 1, least shear
     quality : "draft", "standard" or "exact", how small the area error of single faces becomes
-    method : "newton"
+    method : "newton", optimal transport, or "flow", that of Dominitz and Tannenbaum; both are refined
 
     Raises
     ------
@@ -77,8 +78,11 @@ def sphere_map(
     found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
     refined = None
     if found is not None:
-        mass = vertex_areas(surface.vertices, surface.triangles, density)
-        refined = yield from _transported(surface, found, mass, target, warnings, options)
+        if method == NEWTON:
+            begin = _centroids(found, vertex_areas(surface.vertices, surface.triangles, density))
+        else:
+            begin = _flowed(found, surface.triangles, target)
+        refined = yield from _transported(surface, begin, target, warnings, options)
     if refined is None:
         start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *ANEW)
         refined = yield from _refined(surface, start, target, options)
@@ -113,16 +117,25 @@ def _conformal(surface: ClosedSurface, warnings: list[str]) -> Steps[ConformalSp
 
 
 def _transported(
-    surface: ClosedSurface, found: ConformalSphere, mass, target, warnings: list[str], options: dict
+    surface: ClosedSurface, start: Steps[np.ndarray], target: np.ndarray, warnings: list[str], options: dict
 ) -> Steps[SphereRefinement | None]:
-    """The refined transport map; None, and a warning, where the transport or the straightening of its folds fails."""
+    """The transport map, refined; None, and a warning, where the transport or the straightening of its folds fails."""
     try:
-        hull = Hull(found.triangles, twins(found.triangles))
-        cells = yield from part_of(sphere_transport(found.sites, mass, hull=hull), *TRANSPORT)
-        return (yield from _refined(surface, cells.cells.centroids(), target, options))
+        positions = yield from part_of(start, *TRANSPORT)
+        return (yield from _refined(surface, positions, target, options))
     except (TransportError, FoldedUVError) as error:
         warnings.append(f"{error.cause}; started from coarse to fine instead")
     return None
+
+
+def _centroids(found: ConformalSphere, mass: np.ndarray) -> Steps[np.ndarray]:
+    """Every vertex in the middle of its cell, (n,3)."""
+    hull = Hull(found.triangles, twins(found.triangles))
+    return (yield from sphere_transport(found.sites, mass, hull=hull)).cells.centroids()
+
+
+def _flowed(found: ConformalSphere, triangles: np.ndarray, target: np.ndarray) -> Steps[np.ndarray]:
+    return (yield from flow_map(found.positions, triangles, target)).positions
 
 
 def _refined(surface: ClosedSurface, start: np.ndarray, target: np.ndarray, options: dict) -> Steps[SphereRefinement]:

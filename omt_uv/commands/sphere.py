@@ -1,0 +1,117 @@
+"""sphere: closed meshes of a file mapped to the sphere and laid out as a globe."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..settings import (
+    DEFAULT_PROJECTION,
+    DEFAULT_SPHERE_METHOD,
+    PROJECTIONS,
+    SPHERE_METHODS,
+    GlobeSettings,
+)
+from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
+from .options import add_area_options, add_files, add_report, names
+
+
+def add(commands) -> None:
+    command = commands.add_parser("sphere", help="map closed meshes to a sphere, without a seam, and lay it out")
+    command.set_defaults(run=run)
+    add_files(command)
+    command.add_argument(
+        "--projection", choices=names(PROJECTIONS), default=DEFAULT_PROJECTION.lower(), help="layout of the globe"
+    )
+    add_area_options(command)
+    command.add_argument(
+        "--method", choices=names(SPHERE_METHODS), default=DEFAULT_SPHERE_METHOD.lower(), help="how areas are moved"
+    )
+    command.add_argument(
+        "--weights", default="", metavar="GROUP", help="vertex group that gets more texture, or saliency, curvature"
+    )
+    command.add_argument(
+        "--weight-factor", type=float, default=2.0, metavar="F", help="how many times that of vertices without weight"
+    )
+    command.add_argument("--pole", default="", metavar="GROUP", help="vertex group of the north pole; default: Z is up")
+    command.add_argument("--meridian", default="", metavar="GROUP", help="vertex group of the middle of the map")
+    command.add_argument("--east", default="", metavar="GROUP", help="vertex group on the eastern side of the map")
+    command.add_argument("--image", type=Path, metavar="IN.png", help="equirectangular image to redraw for the layout")
+    command.add_argument("--image-out", type=Path, metavar="OUT.png", help="where the redrawn image is written")
+    command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
+    add_report(command, "globe")
+
+
+def run(options: argparse.Namespace) -> None:
+    files, blender_mesh, _ = blender()
+    from ..blender_markers import globe_densities, group_markers
+    from ..blender_panorama import ImageError
+    from ..blender_seams import GroupError
+    from ..blender_weights import ScoreError
+    from ..projecting import globe_jobs, project
+    from ..solver.errors import MeshError
+    from ..solver.orientation import MarkerError
+    from ..unwrapping import Refusal
+
+    check_output(options.output, files)
+    _check_image(options)
+    settings = GlobeSettings(options.projection, options.quality, options.balance, options.method)
+    pairs = read(options.input, files, blender_mesh, options.uv_layer)
+    objects = [obj for obj, _ in pairs]
+    try:
+        for obj in objects:
+            blender_mesh.check_target(obj.data, options.uv_layer)
+        markers = group_markers(objects, options.pole, options.meridian, options.east)
+        densities = globe_densities(pairs, options.weights, options.weight_factor)
+        jobs = globe_jobs([reading for _, reading in pairs], densities, markers)
+        globes = drain_shown(project(jobs, settings))
+        for obj, corners, uv in zip(objects, globes.corners, globes.uv, strict=True):
+            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
+        image = _redrawn(options)
+        warnings = files.save(options.output, objects)
+        if image is not None:
+            _write_image(options, *image)
+    except Refusal as refusal:
+        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
+    except (GroupError, MarkerError, ImageError, ScoreError, MeshError) as error:
+        raise CommandError(str(error)) from error
+    except (blender_mesh.TargetError, files.FileError) as error:
+        raise CommandError(str(error)) from error
+    warnings = warn(objects, globes.warnings, warnings)
+    if options.report:
+        reports = [[globe.report() for globe in mine] for mine in globes.globes]
+        more = {"projection": options.projection, "method": options.method}
+        write_report(options, more, objects, reports, warnings)
+
+
+def _check_image(options: argparse.Namespace) -> None:
+    """Refuse what cannot be written before the long work."""
+    from ..blender_panorama import ImageError, check_target
+
+    if (options.image is None) != (options.image_out is None):
+        raise CommandError("--image and --image-out go together. Give both.")
+    if options.image_out is None:
+        return
+    try:
+        check_target(options.image_out)
+    except ImageError as error:
+        raise CommandError(str(error)) from error
+    if not options.image.is_file():
+        raise CommandError(f"{options.image}: there is no such file")
+
+
+def _redrawn(options: argparse.Namespace):
+    """Pixels of the redrawn image and the image they come from; None without one."""
+    from ..blender_panorama import load, pixels_of
+    from ..images import redraw
+
+    if options.image is None:
+        return None
+    source = load(options.image)
+    return drain_shown(redraw(pixels_of(source), "equirect", options.projection)), source
+
+
+def _write_image(options: argparse.Namespace, pixels, source) -> None:
+    from ..blender_panorama import save
+
+    save(options.image_out, pixels, source)

@@ -1,0 +1,155 @@
+"""uv.omt_sphere: closed parts to the sphere without a seam, and from there to a layout of the globe."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty, StringProperty
+
+from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
+from .common import Complaint, SolverOperator, read_objects, warn
+from .properties import AreaSettings
+
+ORIENTATIONS = (
+    ("AXES", "Object Axes", "Z is north, the front (-Y) the middle of the map"),
+    ("GROUPS", "Vertex Groups", "Vertex groups mark the north pole, the middle of the map, and its east"),
+    ("PICKED", "Picked Vertices", "Three vertices picked in Edit Mode: north pole, middle of the map, east of it"),
+)
+
+
+class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
+    """Map closed parts to a globe, area preserving and without a seam, and project it to the texture"""
+
+    bl_idname = "uv.omt_sphere"
+    bl_label = "OMT Sphere Projection"
+    bl_options = {"REGISTER", "UNDO"}
+
+    projection: EnumProperty(
+        name="Projection", description="Layout of the globe", items=PROJECTIONS, default=DEFAULT_PROJECTION
+    )
+    method: EnumProperty(
+        name="Method",
+        description="How areas are moved on the sphere",
+        items=SPHERE_METHODS,
+        default=DEFAULT_SPHERE_METHOD,
+    )
+    weight_group: StringProperty(
+        name="Weight Group", description="Vertex group of what gets more of the texture. Empty: none"
+    )
+    weight_factor: FloatProperty(
+        name="Weight Factor",
+        description="How many times the texture of vertices with weight 0 those with weight 1 get",
+        default=2.0,
+        min=0.01,
+        soft_max=16.0,
+    )
+    orientation: EnumProperty(
+        name="Orientation", description="What turns the globe", items=ORIENTATIONS, default="AXES"
+    )
+    pole_group: StringProperty(name="Pole", description="Vertex group of the north pole")
+    meridian_group: StringProperty(name="Meridian", description="Vertex group of the middle of the map. Empty: none")
+    east_group: StringProperty(name="East", description="Vertex group on the eastern side of the map. Empty: none")
+    image: StringProperty(
+        name="Redraw Image",
+        description="Equirectangular image to redraw for the layout, as a new image beside it. Empty: none",
+    )
+    uv_layer: StringProperty(
+        name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_settings(self.layout, self)
+
+    def settings(self) -> GlobeSettings:
+        return GlobeSettings(
+            projection=self.projection.lower(),
+            quality=self.quality.lower(),
+            balance=self.balance,
+            method=self.method.lower(),
+        )
+
+    def steps(self, context: bpy.types.Context):
+        from .. import blender_mesh, running
+        from ..blender_markers import globe_densities
+        from ..blender_seams import GroupError
+        from ..blender_weights import ScoreError
+        from ..images import redraw
+        from ..projecting import globe_jobs, project
+        from ..solver.errors import MeshError
+        from ..solver.orientation import MarkerError
+        from ..unwrapping import Refusal
+
+        pairs = read_objects(context, self.uv_layer)
+        try:
+            for obj, _ in pairs:
+                blender_mesh.check_target(obj.data, self.uv_layer)
+            markers = self._markers(context, [obj for obj, _ in pairs])
+            densities = globe_densities(pairs, self.weight_group, self.weight_factor)
+            jobs = globe_jobs([reading for _, reading in pairs], densities, markers)
+            pixels = self._pixels()
+            globes = yield from running.aside(project(jobs, self.settings()))
+        except Refusal as refusal:
+            obj = pairs[refusal.index][0]
+            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
+        except (blender_mesh.TargetError, GroupError, ScoreError, MarkerError, MeshError) as error:
+            raise Complaint(str(error)) from error
+        if pixels is not None:
+            pixels = yield from running.aside(redraw(pixels, "equirect", self.projection.lower()))
+        return [obj for obj, _ in pairs], globes, pixels
+
+    def _pixels(self):
+        """The pixels of the image to redraw, None without one."""
+        from .. import blender_panorama
+
+        if not self.image:
+            return None
+        try:
+            return blender_panorama.pixels_of(blender_panorama.named(self.image))
+        except blender_panorama.ImageError as error:
+            raise Complaint(str(error)) from error
+
+    def _markers(self, context: bpy.types.Context, objects: list) -> list:
+        from ..blender_markers import group_markers, picked_markers
+        from ..solver.orientation import MarkerError
+
+        if self.orientation == "AXES":
+            return [None] * len(objects)
+        if self.orientation == "GROUPS":
+            if not self.pole_group:
+                raise MarkerError("Name the vertex group that marks the north pole, or turn the globe by the axes.")
+            return group_markers(objects, self.pole_group, self.meridian_group, self.east_group)
+        active = context.view_layer.objects.active
+        return [picked_markers(obj) if obj == active else None for obj in objects]
+
+    def finish(self, context: bpy.types.Context, result) -> None:
+        from .. import blender_mesh, blender_panorama
+
+        objects, globes, pixels = result
+        for obj, corners, uv in zip(objects, globes.corners, globes.uv, strict=True):
+            layer = blender_mesh.target_layer(obj.data, self.uv_layer)
+            blender_mesh.write_uv(obj, layer, corners, uv)
+        if pixels is not None:
+            source = blender_panorama.named(self.image)
+            blender_panorama.make(f"{source.name} {self.projection.lower()}", pixels, source)
+        warn(self, objects, globes.warnings)
+
+
+def draw_settings(layout: bpy.types.UILayout, properties) -> None:
+    """The settings of the operator, for the redo panel and the sidebar."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(properties, "projection")
+    layout.prop(properties, "balance")
+    layout.prop(properties, "quality")
+    layout.prop(properties, "method")
+    layout.prop(properties, "weight_group")
+    column = layout.column()
+    column.active = bool(properties.weight_group)
+    column.prop(properties, "weight_factor")
+    layout.prop(properties, "orientation")
+    if properties.orientation == "GROUPS":
+        for name in ("pole_group", "meridian_group", "east_group"):
+            layout.prop(properties, name)
+    column = layout.column()
+    column.active = properties.projection != "EQUIRECT"
+    column.prop(properties, "image")
+    layout.prop(properties, "uv_layer")

@@ -1,0 +1,238 @@
+"""Closed parts of surfaces to the sphere and on to the plane; the one path of the operator and of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .settings import GlobeSettings
+from .solver.charts import Surface, chosen_triangles
+from .solver.errors import MeshError
+from .solver.geometry import face_areas
+from .solver.globe import Polygons, polygons_of, unfold
+from .solver.globe_areas import equirectangular_areas, plane_areas, with_areas
+from .solver.orientation import MarkerError, along_axes, by_markers
+from .solver.progress import Progress, Steps, part_of
+from .solver.projections import EQUIRECT
+from .solver.sheets import groups
+from .solver.sphere import SphereMap, sphere_map
+from .solver.spherical import spherical_areas
+from .unwrapping import Refusal
+
+# Of the work on one part, what its map to the sphere takes.
+MAPPING = 0.9
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Weights (n,) of the vertices that mark the north pole, a meridian for the middle of the map, and its east."""
+
+    pole: np.ndarray
+    meridian: np.ndarray | None = None
+    side: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class GlobeJob:
+    """A surface, the polygons (f,) bool to map, a density (m,) of its triangles, and markers that turn the globe."""
+
+    surface: Surface
+    faces: np.ndarray | None = None
+    density: np.ndarray | None = None
+    markers: Markers | None = None
+
+
+def globe_jobs(readings: Sequence, densities: Sequence, markers: Sequence) -> list[GlobeJob]:
+    """One job for each Reading of a mesh, its density and its markers, None for none."""
+    rows = zip(readings, densities, markers, strict=True)
+    return [GlobeJob(reading.surface, reading.faces, density, mine) for reading, density, mine in rows]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A closed part: vertices (n,3), triangles (m,3), of the surface the corners (m,3), faces (m,), vertex_ids (n,)
+    and the numbers (m,) of its triangles."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    corners: np.ndarray
+    faces: np.ndarray
+    vertex_ids: np.ndarray
+    members: np.ndarray
+
+
+@dataclass(frozen=True)
+class Globe:
+    """A part, its map to the sphere, that map as it was laid out (n,3), the corners (c,) with their UVs (c,2), of its
+    triangles the shares (m,) of the texture they were to have and the areas (m,) they have, and warnings."""
+
+    part: Part
+    sphere: SphereMap
+    points: np.ndarray
+    corners: np.ndarray
+    uv: np.ndarray
+    shares: np.ndarray
+    areas: np.ndarray
+    warnings: tuple[str, ...]
+
+    def report(self) -> dict:
+        """Figures for a report."""
+        on_sphere = spherical_areas(self.sphere.positions, self.part.triangles)
+        return {
+            "vertices": len(self.part.vertices),
+            "faces": len(np.unique(self.part.faces)),
+            "status": self.sphere.status,
+            "iterations": self.sphere.iterations,
+            "residual": self.sphere.residual,
+            "area_l1_sphere": float(np.abs(on_sphere / on_sphere.sum() - self.shares).sum()),
+            "area_l1": float(np.abs(self.areas / self.areas.sum() - self.shares).sum()),
+        }
+
+
+@dataclass(frozen=True)
+class Globes:
+    """Corners (k,) and their UVs (k,2) of each surface, its globes, and warnings as in `unwrapping.Layout`."""
+
+    corners: list[np.ndarray]
+    uv: list[np.ndarray]
+    globes: list[list[Globe]]
+    warnings: list[tuple[int, str]]
+
+
+def project(jobs: Sequence[GlobeJob], settings: GlobeSettings) -> Steps[Globes]:
+    """Map every closed part of every surface to a sphere of its own, and lay each out over the unit square.
+
+    The axes of the surface turn the globe: Z is north, -Y the central meridian. Markers, where there are any on a
+    part, do it instead.
+
+    Raises
+    ------
+    Refusal : with the index of the surface and the MeshError that says why
+    MarkerError : markers give no direction, or are on no part
+    """
+    globes: list[list[Globe]] = []
+    for index, job in enumerate(jobs):
+        try:
+            globes.append((yield from part_of(_globes(job, settings), index / len(jobs), 1 / len(jobs))))
+        except MeshError as error:
+            raise Refusal(index, error) from error
+    corners = [np.concatenate([g.corners for g in mine]) for mine in globes]
+    uv = [np.concatenate([g.uv for g in mine]) for mine in globes]
+    warnings = [(k, text) for k, mine in enumerate(globes) for g in mine for text in g.warnings]
+    if sum(map(len, globes)) > 1:
+        warnings.append((-1, f"{sum(map(len, globes))} closed parts; every one has the whole texture to itself"))
+    return Globes(corners, uv, globes, warnings)
+
+
+def _globes(job: GlobeJob, settings: GlobeSettings) -> Steps[list[Globe]]:
+    parts = closed_parts(job.surface, job.faces)
+    markers = job.markers
+    if markers is not None and not any(markers.pole[p.vertex_ids].any() for p in parts):
+        raise MarkerError("The marker of the pole is on no part of the mesh. Mark a vertex of the surface.")
+    globes = []
+    for k, part in enumerate(parts):
+        try:
+            globes.append((yield from part_of(_globe(part, job, settings), k / len(parts), 1 / len(parts))))
+        except MeshError as error:
+            raise _located(error, part) from error
+    return globes
+
+
+def closed_parts(surface: Surface, faces: np.ndarray | None = None) -> list[Part]:
+    """Parts of the polygons `faces` (f,) bool that have no vertex in common; seams play no part.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError
+    """
+    chosen, triangles, owner = chosen_triangles(surface, faces)
+    members = np.flatnonzero(chosen[surface.triangle_face])
+    vertex = surface.corner_vertex[triangles]
+    n = len(surface.positions)
+    rows, columns = vertex[:, [0, 1]].ravel(), vertex[:, [1, 2]].ravel()
+    label = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False)[1]
+    parts = []
+    for mine in groups(label[vertex[:, 0]]):
+        ids, local = np.unique(vertex[mine], return_inverse=True)
+        local = local.reshape(-1, 3).astype(np.int64)
+        parts.append(Part(surface.positions[ids], local, triangles[mine], owner[mine], ids, members[mine]))
+    return parts
+
+
+def _globe(part: Part, job: GlobeJob, settings: GlobeSettings) -> Steps[Globe]:
+    density = None if job.density is None else job.density[part.members]
+    found = yield from part_of(
+        sphere_map(part.vertices, part.triangles, density, settings.balance, settings.quality, settings.method),
+        0.0,
+        MAPPING,
+    )
+    points = found.positions @ _rotation(part, found.positions, job.markers).T
+    polygons, corners = polygons_of(part.corners, part.triangles, part.faces)
+    on_sphere = spherical_areas(points, part.triangles) / (4 * np.pi)
+    # Where areas shall be exact, what is left of their error on the sphere need not be kept.
+    shares = _shares(part, density) if settings.balance == 0 else on_sphere
+    laying = _laid_out(points, polygons, shares, settings)
+    uv, points, missed = yield from part_of(laying, MAPPING, 1 - MAPPING)
+    areas = plane_areas(uv, polygons.triangles)
+    warnings = (*found.warnings, *_complaints(missed, int(((areas <= 0) & (on_sphere > 0)).sum())))
+    return Globe(part, found, points, corners, uv, _shares(part, density), areas, warnings)
+
+
+def _laid_out(
+    points: np.ndarray, polygons: Polygons, shares: np.ndarray, settings: GlobeSettings
+) -> Steps[tuple[np.ndarray, np.ndarray, int]]:
+    """UVs (c,2) of the corners, the points (n,3) as laid out, and how many poles were missed.
+
+    shares (m,) of the texture are what every triangle gets in a projection that keeps areas.
+    """
+    yield Progress("Projection", 0.0)
+    unfolded, placed = unfold(points, polygons, settings.projection)
+    areas = shares
+    if settings.projection == EQUIRECT:
+        areas = equirectangular_areas(placed, unfolded, polygons)
+    exact = yield from with_areas(unfolded, polygons, areas, settings.projection)
+    return exact.unfolding.corners(), placed, unfolded.missed
+
+
+def _shares(part: Part, density: np.ndarray | None) -> np.ndarray:
+    """Shares (m,) of the texture that the triangles of a part shall have."""
+    area = face_areas(part.vertices, part.triangles)
+    mass = area if density is None else area * density
+    return mass / mass.sum()
+
+
+def _rotation(part: Part, positions: np.ndarray, markers: Markers | None) -> np.ndarray:
+    if markers is None or not markers.pole[part.vertex_ids].any():
+        return along_axes(positions, part.vertices, part.triangles)
+
+    def middle(weights: np.ndarray | None) -> np.ndarray | None:
+        mine = None if weights is None else weights[part.vertex_ids]
+        return mine @ positions if mine is not None and mine.any() else None
+
+    return by_markers(markers.pole[part.vertex_ids] @ positions, middle(markers.meridian), middle(markers.side))
+
+
+def _complaints(missed: int, folded: int) -> list[str]:
+    told = []
+    if missed:
+        where = "A pole of the projection lies" if missed == 1 else f"{missed} poles of the projection lie"
+        told.append(f"{where} within a face, which is stretched there; subdivide the mesh, or turn the globe")
+    if folded:
+        who = "A face is" if folded == 1 else f"{folded} faces are"
+        told.append(f"{who} folded over near a pole of the projection; subdivide the mesh, or turn the globe")
+    return told
+
+
+def _located(error: MeshError, part: Part) -> MeshError:
+    """The error with indices of the surface in the place of the part's."""
+    ids = part.faces if error.kind == "face" else part.vertex_ids
+    elements = ids[error.elements] if len(error.elements) else error.elements
+    if error.kind == "face":
+        elements = np.unique(elements)
+    if not error.kind:
+        return type(error)(error.cause, error.remedy, "face", np.unique(part.faces))
+    return type(error)(error.cause, error.remedy, error.kind, elements)

@@ -1,0 +1,102 @@
+"""Vertices on the poles: a sphere map pushed, without a change of area, so that given points of the sphere are
+vertices.
+
+A face with a pole inside it has no image in a cylindrical projection, and one with a fourfold point of the octahedral
+layout inside it cannot be laid out flat. Where these points are vertices there is no such face.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from .projections import is_cylindrical
+from .spherical import signed_volumes
+
+POLES = np.array([[0.0, 0, 1], [0, 0, -1]])
+# Where the octahedral layout has only half a turn of angle: midpoints of the sides of its square.
+CONES = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+# How many times as far as it moves the vertex a push reaches: far, which keeps the shear around it low, or not so far,
+# and where that folds a coarse mesh, no farther than the vertex itself.
+REACHES = (12.0, 6.0, 3.0, 0.0)
+# How many of the vertices nearest to a point may be the one that is pushed onto it.
+CANDIDATES = 6
+STEPS = 16
+
+
+def singular_points(projection: str) -> np.ndarray:
+    """Points (k,3) of the sphere that have to be vertices for a projection to lay out every face."""
+    return POLES if is_cylindrical(projection) else CONES
+
+
+def on_vertices(points: np.ndarray, triangles: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n,3) with the vertex nearest to each target (k,3) pushed onto it, and these vertices (k,), -1 for none.
+
+    Other vertices move only nearby and, but for what a mesh does not resolve, without a change of area. A push that
+    would fold a face of triangles (m,3) is not done; then the next nearest vertices are tried.
+    """
+    limit = 0.5 * _separation(targets)
+    found = np.full(len(targets), -1)
+    for k, target in enumerate(targets):
+        sound = signed_volumes(points, triangles) > 0
+        nearest = np.argsort(-(points @ target))[:CANDIDATES]
+        for vertex, reach in product(nearest[~np.isin(nearest, found)], REACHES):
+            pushed = push(points, points[vertex], target, reach, limit)
+            pushed[vertex] = target
+            if (signed_volumes(pushed, triangles)[sound] > 0).all():
+                points, found[k] = pushed, vertex
+                break
+    return points, found
+
+
+def _separation(targets: np.ndarray) -> float:
+    cosine = targets @ targets.T - 2 * np.eye(len(targets))
+    return float(np.arccos(np.clip(cosine.max(), -1, 1)))
+
+
+def push(points: np.ndarray, start: np.ndarray, end: np.ndarray, reach: float, limit: float) -> np.ndarray:
+    """Unit vectors (n,3) moved so that `start` comes to `end`, unless that is farther than `limit`.
+
+    Nothing farther from `end` than `reach` times the distance of the two, or than `limit`, moves.
+
+    The flow of the stream function <axis, x> f(r), with r the distance from `end` and f a smooth step from 1 to 0: near
+    `end` a rotation about the axis, everywhere free of divergence.
+    """
+    axis = np.cross(start, end)
+    sine = np.linalg.norm(axis)
+    angle = np.arctan2(sine, start @ end)
+    inner, outer = 1.02 * angle, min(reach * angle, limit)
+    if sine < 1e-12 or inner >= outer:
+        return points.copy()
+    axis /= sine
+    result = points.copy()
+    near = np.flatnonzero(points @ end > np.cos(outer))
+    x, step = points[near], angle / STEPS
+
+    def velocity(x: np.ndarray) -> np.ndarray:
+        cosine = np.clip(x @ end, -1, 1)
+        swirl = np.cross(end, x)
+        r = np.arctan2(np.linalg.norm(swirl, axis=1), cosine)
+        f, slope = _smooth_step(r, inner, outer)
+        bend = (x @ axis) * slope / np.maximum(np.sin(r), 1e-12)
+        return np.cross(axis, x) * f[:, None] - swirl * bend[:, None]
+
+    for _ in range(STEPS):
+        k1 = velocity(x)
+        k2 = velocity(_unit(x + step / 2 * k1))
+        k3 = velocity(_unit(x + step / 2 * k2))
+        k4 = velocity(_unit(x + step * k3))
+        x = _unit(x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+    result[near] = x
+    return result
+
+
+def _smooth_step(r: np.ndarray, inner: float, outer: float) -> tuple[np.ndarray, np.ndarray]:
+    """A function (n,) that falls from 1 at `inner` to 0 at `outer` with two continuous derivatives, and its slope."""
+    s = np.clip((r - inner) / (outer - inner), 0, 1)
+    return 1 - s**3 * (10 - 15 * s + 6 * s**2), -30 * (s * (1 - s)) ** 2 / (outer - inner)
+
+
+def _unit(x: np.ndarray) -> np.ndarray:
+    return x / np.linalg.norm(x, axis=1, keepdims=True)

@@ -1,0 +1,361 @@
+"""uv.omt_sphere and the command `sphere`: closed parts, orientation, refusals that change nothing."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+
+import meshes
+import numpy as np
+import pytest
+from blender import scenes
+
+ARGUMENTS = {"projection": "LAMBERT"}
+
+
+@pytest.fixture
+def run(package, capfd):
+    def command(*arguments):
+        capfd.readouterr()
+        status = package("cli").main([str(a) for a in arguments])
+        out, err = capfd.readouterr()
+        return status, out, err
+
+    return command
+
+
+def ball(name="Ball", squash=(1.0, 0.8, 1.3), offset=0.0, turn=0.3):
+    """A closed, slightly lopsided ellipsoid of triangles, turned so that no vertex is on an axis."""
+    V, F = meshes.icosphere(2)
+    c, s = np.cos(turn), np.sin(turn)
+    V = V @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return scenes.add(V * squash * (1 + V @ [[0.1], [0.07], [0.05]]) + offset, F, name)
+
+
+def torus():
+    return scenes.add(*meshes.torus(12, 8), "Torus")
+
+
+def project(**arguments):
+    assert bpy.ops.uv.omt_sphere(**{**ARGUMENTS, **arguments}) == {"FINISHED"}
+
+
+def positions(obj):
+    return np.array([tuple(v.co) for v in obj.data.vertices])
+
+
+def corner_vertices(obj):
+    return np.array([loop.vertex_index for loop in obj.data.loops])
+
+
+@pytest.mark.parametrize("projection", ["LAMBERT", "OCTAHEDRAL"])
+def test_every_face_has_its_share_of_the_texture(projection):
+    obj = ball()
+    project(projection=projection)
+    space, uv = scenes.areas(obj)
+    assert (uv > 0).all()
+    assert np.abs(uv / uv.sum() - space / space.sum()).sum() < 0.08
+
+
+def test_the_equirectangular_layout_is_north_up_and_front_in_the_middle():
+    obj = ball()
+    project(projection="EQUIRECT")
+    direction = positions(obj)[corner_vertices(obj)]
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    uv = scenes.uv_of(obj)
+    assert np.corrcoef(direction[:, 2], uv[:, 1])[0, 1] > 0.95
+    front = (direction @ [0, -1, 0]) > 0.95
+    assert front.any() and np.abs(uv[front, 0] - 0.5).max() < 0.1
+    east = (direction @ [1, 0, 0]) > 0.95
+    assert east.any() and np.abs(uv[east, 0] - 0.75).max() < 0.1
+
+
+def test_the_seam_is_no_face_across_the_texture():
+    obj = ball()
+    project(projection="EQUIRECT")
+    _, uv = scenes.triangles_of(obj)
+    assert np.ptp(uv[..., 0], axis=1).max() < 0.4
+    assert uv[..., 0].mean(axis=1).min() > 0 and 1 < uv[..., 0].max() < 1.4
+
+
+def test_edit_mode_with_everything_selected_equals_object_mode():
+    obj = ball()
+    project()
+    expected = scenes.uv_of(obj)
+    obj.data.uv_layers.remove(obj.data.uv_layers[0])
+    scenes.edit(obj)
+    project()
+    scenes.leave_edit()
+    assert (scenes.uv_of(obj) == expected).all()
+
+
+def test_selected_parts_alone_are_written():
+    V, F = meshes.icosphere(1)
+    obj = scenes.add(np.concatenate([V, V + 3]), np.concatenate([F, F + len(V)]), "Two")
+    before = np.random.default_rng(0).random((len(obj.data.loops), 2)).astype(np.float32)
+    scenes.set_uv(obj, before)
+    scenes.edit(obj, faces=range(len(F)))
+    project()
+    scenes.leave_edit()
+    after, corner = scenes.uv_of(obj), 3 * len(F)
+    assert (after[corner:] == before[corner:]).all()
+    assert (after[:corner] != before[:corner]).any(axis=1).all()
+
+
+def test_every_part_and_object_gets_a_globe_of_its_own():
+    one = ball("One")
+    V, F = positions(one), meshes.icosphere(2)[1]
+    two = scenes.add(np.concatenate([V, 2 * V + 5]), np.concatenate([F, F + len(V)]), "Two")
+    project()
+    uv = scenes.uv_of(two).reshape(2, -1, 2)
+    assert np.allclose(uv[0], uv[1], atol=1e-4)
+    assert np.allclose(uv[0], scenes.uv_of(one), atol=1e-4)
+
+
+def test_scale_and_place_do_not_matter():
+    near, far = ball("Near"), ball("Far", offset=500.0)
+    far.scale = (3, 3, 3)
+    bpy.context.view_layer.update()
+    project()
+    assert np.abs(scenes.uv_of(near) - scenes.uv_of(far)).max() < 2e-3
+
+
+def test_vertex_groups_turn_the_globe():
+    obj = ball()
+    V = positions(obj)
+    pole, meridian = int(V[:, 0].argmax()), int(V[:, 2].argmax())
+    for name, vertex in (("pole", pole), ("front", meridian)):
+        obj.vertex_groups.new(name=name).add([vertex], 1.0, "REPLACE")
+    project(projection="EQUIRECT", orientation="GROUPS", pole_group="pole", meridian_group="front")
+    uv, vertex = scenes.uv_of(obj), corner_vertices(obj)
+    assert np.allclose(uv[vertex == pole, 1], 1, atol=1e-6)
+    assert np.allclose(uv[vertex == meridian, 0], 0.5, atol=1e-3)
+
+
+def test_picked_vertices_turn_the_globe():
+    obj = ball()
+    V = positions(obj)
+    picks = [int(V[:, 0].argmax()), int(V[:, 2].argmax()), int(V[:, 1].argmin())]
+    if np.linalg.det(V[picks]) < 0:
+        picks[2] = int(V[:, 1].argmax())
+    scenes.edit(obj)
+    import bmesh
+
+    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    edit = bmesh.from_edit_mesh(obj.data)
+    edit.verts.ensure_lookup_table()
+    for k in picks:
+        edit.select_history.add(edit.verts[k])
+    project(projection="EQUIRECT", orientation="PICKED")
+    scenes.leave_edit()
+    uv, vertex = scenes.uv_of(obj), corner_vertices(obj)
+    assert np.allclose(uv[vertex == picks[0], 1], 1, atol=1e-6)
+    assert np.abs(uv[vertex == picks[1], 0] - 0.5).max() < 0.1
+    assert np.abs(uv[vertex == picks[2], 0] - 0.75).max() < 0.1
+
+
+def test_undo_takes_back_all():
+    obj = ball()
+    before = scenes.state(obj)
+    bpy.ops.ed.undo_push()
+    assert bpy.ops.uv.omt_sphere("EXEC_DEFAULT", True) == {"FINISHED"}
+    bpy.ops.ed.undo()
+    assert scenes.state(bpy.data.objects["Ball"]) == before
+
+
+def open_ball():
+    V, F = meshes.icosphere(2)
+    return scenes.add(V, F[5:], "Open")
+
+
+def two_fans():
+    V, F = meshes.icosphere(1)
+    far = V - 2 * V[0]
+    joined = np.concatenate([V, far])
+    other = F + len(V)
+    twin = len(V) + int(np.linalg.norm(far + V[0], axis=1).argmin())
+    other[other == twin] = 0
+    return scenes.add(joined, np.concatenate([F, other]), "Fans")
+
+
+@pytest.mark.parametrize(
+    ("make", "message", "kind"),
+    [
+        (open_ball, "not closed", "edges"),
+        (torus, "a handle", "polygons"),
+        (two_fans, "fans of faces", "vertices"),
+        (scenes.bump, "not closed", "edges"),
+    ],
+)
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_what_is_no_sphere_is_refused_and_nothing_changes(make, message, kind, mode):
+    obj = make()
+    scenes.set_uv(obj, np.random.default_rng(0).random((len(obj.data.loops), 2)))
+    before = scenes.state(obj)
+    if mode == "EDIT":
+        scenes.edit(obj)
+    assert message in scenes.error_of(bpy.ops.uv.omt_sphere)
+    assert scenes.state(obj) == before
+    if mode == "EDIT":
+        scenes.leave_edit()
+    assert any(element.select for element in getattr(obj.data, kind))
+
+
+def test_one_bad_object_leaves_all_alone():
+    good, bad = ball(), torus()
+    before = scenes.state(good), scenes.state(bad)
+    assert "Torus: " in scenes.error_of(bpy.ops.uv.omt_sphere)
+    assert (scenes.state(good), scenes.state(bad)) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"orientation": "GROUPS"}, "Name the vertex group"),
+        ({"orientation": "GROUPS", "pole_group": "nowhere"}, "no vertex group 'nowhere'"),
+        ({"orientation": "PICKED"}, "Pick the markers"),
+        ({"orientation": "GROUPS", "pole_group": "empty"}, "on no part"),
+        ({"orientation": "GROUPS", "pole_group": "top", "meridian_group": "top"}, "at a pole"),
+    ],
+)
+def test_markers_that_say_nothing_are_refused(arguments, message):
+    obj = ball()
+    obj.vertex_groups.new(name="empty")
+    obj.vertex_groups.new(name="top").add([3], 1.0, "REPLACE")
+    before = scenes.state(obj)
+    assert message in scenes.error_of(bpy.ops.uv.omt_sphere, **arguments)
+    assert scenes.state(obj) == before
+
+
+# ---- images -------------------------------------------------------------------------------------------------
+
+
+def panorama(name="World", rows=16, columns=32):
+    """A smooth image: red goes with the latitude."""
+    image = bpy.data.images.new(name, columns, rows, alpha=True)
+    values = np.ones((rows, columns, 4), np.float32)
+    values[..., 0] = ((np.arange(rows) + 0.5) / rows)[:, None]
+    image.pixels.foreach_set(values.ravel())
+    image.update()
+    return image
+
+
+def red_of(image):
+    values = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], 4)[..., 0]
+
+
+def assert_lambert(red):
+    rows = len(red)
+    latitude = np.arcsin(2 * (np.arange(rows) + 0.5) / rows - 1) / np.pi + 0.5
+    assert np.abs(red - latitude[:, None]).max() < 0.03
+
+
+def test_the_operator_redraws_an_image_beside_the_old_one():
+    obj, image = ball(), panorama()
+    before = red_of(image).copy()
+    project(image="World")
+    assert (red_of(image) == before).all()
+    assert_lambert(red_of(bpy.data.images["World lambert"]))
+    bpy.data.images.remove(bpy.data.images["World lambert"])
+    state = scenes.state(obj)
+    assert "no image 'nowhere'" in scenes.error_of(bpy.ops.uv.omt_sphere, image="nowhere")
+    assert scenes.state(obj) == state
+
+
+def test_the_command_redraws_an_image_file(run, tmp_path):
+    image = panorama()
+    image.filepath_raw, image.file_format = str(tmp_path / "world.png"), "PNG"
+    image.save()
+    save(ball(), tmp_path / "in.blend")
+    arguments = ("sphere", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--projection", "lambert")
+    pictures = ("--image", tmp_path / "world.png", "--image-out", tmp_path / "flat.png")
+    assert run(*arguments, *pictures)[0] == 0
+    assert_lambert(red_of(bpy.data.images.load(str(tmp_path / "flat.png"))))
+    (tmp_path / "out.blend").unlink()
+    for bad, message in (
+        (("--image", tmp_path / "none.png", "--image-out", tmp_path / "x.png"), "no such file"),
+        (("--image", tmp_path / "world.png", "--image-out", tmp_path / "x.doc"), "unknown image format"),
+        (("--image", tmp_path / "in.blend", "--image-out", tmp_path / "x.png"), "cannot be read as an image"),
+        (("--image", tmp_path / "world.png"), "go together"),
+    ):
+        status, _, err = run(*arguments, *bad)
+        assert status == 1 and message in err
+    assert not (tmp_path / "out.blend").exists()
+
+
+# ---- the command --------------------------------------------------------------------------------------------
+
+
+def save(obj, path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False)
+    return obj.name
+
+
+@pytest.mark.parametrize("projection", ["equirect", "lambert", "octahedral"])
+def test_the_command_writes_what_the_operator_writes(run, tmp_path, projection):
+    obj = ball()
+    save(obj, tmp_path / "in.blend")
+    project(projection=projection.upper())
+    expected = scenes.uv_of(obj)
+    report = tmp_path / "report.json"
+    arguments = ("-o", tmp_path / "out.blend", "--projection", projection, "--report", report)
+    assert run("sphere", tmp_path / "in.blend", *arguments)[0] == 0
+    assert (scenes.uv_of(bpy.data.objects["Ball"]) == expected).all()
+    told = json.loads(report.read_text())
+    assert told["projection"] == projection and told["charts"][0]["faces"] == 320
+    assert told["charts"][0]["area_l1_sphere"] < 0.05
+
+
+def test_the_command_takes_markers_and_refuses_what_is_open(run, tmp_path):
+    obj = ball()
+    obj.vertex_groups.new(name="pole").add([5], 1.0, "REPLACE")
+    save(obj, tmp_path / "in.blend")
+    assert run("sphere", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--pole", "pole")[0] == 0
+    obj = bpy.data.objects["Ball"]
+    assert np.allclose(scenes.uv_of(obj)[corner_vertices(obj) == 5, 1], 1, atol=1e-6)
+    status, _, err = run("sphere", tmp_path / "in.blend", "-o", tmp_path / "x.blend", "--meridian", "pole")
+    assert status == 1 and "needs one of the pole" in err
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    save(open_ball(), tmp_path / "open.blend")
+    status, _, err = run("sphere", tmp_path / "open.blend", "-o", tmp_path / "no.blend")
+    assert status == 1 and "not closed" in err and "Open: " in err
+    assert not (tmp_path / "no.blend").exists()
+
+
+def test_a_painted_part_gets_more_of_the_texture(run, tmp_path):
+    obj = ball()
+    V = positions(obj)
+    top = np.flatnonzero(V[:, 2] > 0.6)
+    obj.vertex_groups.new(name="face").add(top.tolist(), 1.0, "REPLACE")
+    save(obj, tmp_path / "in.blend")
+    project()
+    space, _ = scenes.areas(obj)
+    whole = np.isin(corner_vertices(obj).reshape(-1, 3), top).all(axis=1)
+    plain = space[whole].sum() / space.sum()
+    project(weight_group="face", weight_factor=4.0)
+    _, uv = scenes.areas(obj)
+    share = uv[whole].sum() / uv.sum()
+    rest = ~np.isin(corner_vertices(obj).reshape(-1, 3), top).any(axis=1)
+    density = (uv[whole].sum() / space[whole].sum()) / (uv[rest].sum() / space[rest].sum())
+    assert share > 1.5 * plain and density == pytest.approx(4, rel=0.1)
+    expected = scenes.uv_of(obj)
+    arguments = ("-o", tmp_path / "out.blend", "--projection", "lambert", "--weights", "face", "--weight-factor", "4")
+    assert run("sphere", tmp_path / "in.blend", *arguments)[0] == 0
+    assert (scenes.uv_of(bpy.data.objects["Ball"]) == expected).all()
+    for bad, message in (
+        (("--weights", "none"), "no vertex group"),
+        (("--weights", "face", "--weight-factor", "-1"), ""),
+    ):
+        status, _, err = run("sphere", tmp_path / "in.blend", "-o", tmp_path / "x.blend", *bad)
+        assert status == 1 and message in err
+
+
+def test_the_flow_gives_the_same_areas():
+    obj = ball()
+    project(method="FLOW")
+    space, uv = scenes.areas(obj)
+    assert (uv > 0).all()
+    assert np.abs(uv / uv.sum() - space / space.sum()).sum() < 0.08

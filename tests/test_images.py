@@ -1,0 +1,54 @@
+"""Images of the sphere from one layout to another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from omt_uv.images import redraw
+from omt_uv.solver.progress import drain
+from omt_uv.solver.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
+
+
+def picture(layout, rows=64, columns=128):
+    """A smooth function of the sphere, as an image in a layout."""
+    v, u = (np.arange(n) + 0.5 for n in (rows, columns))
+    points = to_sphere(np.stack(np.meshgrid(u / columns, v / rows), axis=-1), layout)
+    return 0.5 + 0.3 * points + 0.2 * points[..., [1, 2, 0]] * points[..., [2, 0, 1]]
+
+
+@pytest.mark.parametrize("source", PROJECTIONS)
+@pytest.mark.parametrize("target", PROJECTIONS)
+def test_a_smooth_picture_comes_out_as_if_drawn_in_the_other_layout(source, target):
+    expected = picture(target, 64, 64)
+    result = drain(redraw(picture(source, 256, 256), source, target, (64, 64)))
+    assert np.abs(result - expected).mean() < 2e-3
+    assert np.abs(result - expected).max() < 0.08
+
+
+def test_equal_area_pixels_keep_the_mean_over_the_sphere():
+    """In an equal-area layout the plain mean is the mean over the sphere, of a picture of noise as well."""
+    noise = np.random.default_rng(0).random((32, 64, 1))
+    latitude = np.cos(np.pi * ((np.arange(32) + 0.5) / 32 - 0.5))
+    wanted = (noise[..., 0] * latitude[:, None]).sum() / (64 * latitude.sum())
+    for target in (LAMBERT, OCTAHEDRAL):
+        assert drain(redraw(noise, EQUIRECT, target, (256, 256))).mean() == pytest.approx(wanted, abs=2e-3)
+
+
+def test_one_colour_stays_that_colour_and_the_seam_does_not_show():
+    flat = np.full((16, 32, 4), 0.25, np.float32)
+    result = drain(redraw(flat, EQUIRECT, OCTAHEDRAL))
+    assert result.shape == (23, 23, 4) and result.dtype == np.float32
+    assert (result == 0.25).all()
+    image = picture(EQUIRECT)
+    for target in (EQUIRECT, LAMBERT):
+        result = drain(redraw(image, EQUIRECT, target))
+        assert result.shape == image.shape
+        across = np.abs(result[:, 0] - result[:, -1]).max()
+        assert across < 2 * np.abs(np.diff(result, axis=1)).max()
+
+
+@pytest.mark.parametrize("shape", [(0, 4, 3), (4, 4)])
+def test_no_pixels_no_picture(shape):
+    with pytest.raises(ValueError, match="an image needs"):
+        drain(redraw(np.zeros(shape), EQUIRECT, LAMBERT))
