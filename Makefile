@@ -28,7 +28,7 @@ matrix: $(STAMP)
 	$(PY) scripts/matrix.py
 
 gui: $(STAMP)
-	$(PY) scripts/gui/run.py
+	OMT_UV_GUI=1 $(PY) -m pytest tests/gui
 
 venv: $(STAMP)
 

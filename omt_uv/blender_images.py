@@ -28,6 +28,13 @@ def show(name: str, picture: np.ndarray) -> bpy.types.Image:
     return image
 
 
+def set_preview(image: bpy.types.Image, picture: np.ndarray) -> None:
+    """Let panels show the picture (h,w,4) in [0,1], top row first, for the image."""
+    preview = image.preview_ensure()
+    preview.image_size = picture.shape[1::-1]
+    preview.image_pixels_float.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
+
+
 def save(path: Path, picture: np.ndarray) -> None:
     """Write the picture (h,w,3) in [0,1] as a PNG file.
 

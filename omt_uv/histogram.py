@@ -30,22 +30,63 @@ def histogram(readings: Sequence[Reading]) -> np.ndarray:
     ------
     EmptyMeshError, NonFiniteError, ZeroAreaFaceError : see `solver.distortion.measure`
     """
-    V, F, uv = triangles_of(readings)
-    octaves, shear = face_distortion(V, F, uv)
-    figures = measure(V, F, uv, overlap=False)
-    weight = face_areas(V, F)
-    share = 100 * weight / weight.sum()
+    octaves, shear, share, figures = _values(readings)
     picture = np.ones((HEIGHT, WIDTH, 3)) * PAPER
     half = WIDTH // 2
     error = f"Area error {100 * figures.area_l1:.2f} %, {figures.folds} folded faces"
-    _plot(picture, 0, half, octaves / (2 * AREA_OCTAVES) + 0.5, share,
-          lambda t: area_colours((2 * t - 1) * AREA_OCTAVES),
+    _plot(picture, 0, half, _area_place(octaves), share,
+          _area_scale,
           [(x / (2 * AREA_OCTAVES) + 0.5, text) for x, text in AREA_TICKS],
           error, "texture that a face gets, over what is due to it")  # fmt: skip
     stretch = f"Mean shear {figures.angle_mean:.3f}, 99 % within {figures.angle_p99:.2f}"
-    _plot(picture, half, WIDTH, np.log(np.maximum(shear, 1)) / np.log(SHEAR_TOP), share,
-          lambda t: shear_colours(SHEAR_TOP**t), SHEAR_TICKS, stretch, "shear s1/s2, 1 keeps angles")  # fmt: skip
+    _plot(picture, half, WIDTH, _shear_place(shear), share,
+          _shear_scale, SHEAR_TICKS, stretch, "shear s1/s2, 1 keeps angles")  # fmt: skip
     return picture
+
+
+def thumbnail(readings: Sequence[Reading], size: int = 256) -> np.ndarray:
+    """Both histograms without words, one above the other, (size,size,4) in [0,1] on a transparent ground.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError, ZeroAreaFaceError : see `histogram`
+    """
+    octaves, shear, share, _ = _values(readings)
+    picture = np.zeros((size, size, 4))
+    half, thick = size // 2, size // 24
+    for top, place, scale in ((0, _area_place(octaves), _area_scale), (half, _shear_place(shear), _shear_scale)):
+        count, _ = np.histogram(np.clip(place, 0, 1), BINS, (0, 1), weights=share)
+        foot = top + half - 3 * thick
+        edges = np.round(np.linspace(0, size, BINS + 1)).astype(int)
+        rgb = scale((np.arange(BINS) + 0.5) / BINS)
+        for k, height in enumerate(np.round(count / count.max() * (foot - top - thick)).astype(int)):
+            picture[foot - height : foot, edges[k] : edges[k + 1] - 1] = (*rgb[k], 1.0)
+        picture[foot + thick // 2 : foot + 2 * thick] = np.column_stack([scale(np.linspace(0, 1, size)), np.ones(size)])
+    return picture
+
+
+def _values(readings: Sequence[Reading]):
+    """Octaves (m,), shear (m,) and share of the surface in percent (m,) of every face, and the figures of all."""
+    V, F, uv = triangles_of(readings)
+    octaves, shear = face_distortion(V, F, uv)
+    weight = face_areas(V, F)
+    return octaves, shear, 100 * weight / weight.sum(), measure(V, F, uv, overlap=False)
+
+
+def _area_place(octaves):
+    return octaves / (2 * AREA_OCTAVES) + 0.5
+
+
+def _area_scale(place):
+    return area_colours((2 * place - 1) * AREA_OCTAVES)
+
+
+def _shear_place(shear):
+    return np.log(np.maximum(shear, 1)) / np.log(SHEAR_TOP)
+
+
+def _shear_scale(place):
+    return shear_colours(SHEAR_TOP**place)
 
 
 def _plot(picture, left: int, right: int, value, share, colours: Callable, ticks, title: str, axis: str) -> None:

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 import bpy
 
+# In the UV editor, so that the outlines of the faces are seen through the colours.
+OPACITY = 0.65
+
 
 @dataclass
 class _Shown:
@@ -51,7 +54,7 @@ def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
         mine = np.repeat(rgb[start : start + len(corners)], 3, axis=0)
         blender_colours.write_colours(obj, corners.ravel(), mine)
         start += len(corners)
-    rgba = np.concatenate([np.repeat(rgb, 3, axis=0), np.ones((3 * len(rgb), 1))], axis=1)
+    rgba = np.concatenate([np.repeat(rgb, 3, axis=0), np.full((3 * len(rgb), 1), OPACITY)], axis=1)
     _shown.kind, _shown.places, _shown.colours = wanted, uv.reshape(-1, 2).tolist(), rgba.tolist()
     _shown.batch = None
     if _shown.handle is None and not bpy.app.background:

@@ -26,7 +26,6 @@ class UV_OT_omt_live(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     _timer: bpy.types.Timer | None = None
-    _session: Session
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -58,7 +57,7 @@ class UV_OT_omt_live(bpy.types.Operator):
 
         try:
             pairs = read_objects(context)
-            current = self._session = Session(context, pairs)
+            current = Session(context, pairs)
         except Complaint as complaint:
             return tell(self, context, complaint)
         except Refusal as refusal:
@@ -67,8 +66,10 @@ class UV_OT_omt_live(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if current is None:
+            return self._end(context, {"CANCELLED"})
         if event.type == "ESC" and event.value == "PRESS":
-            self._session.restore()
+            current.restore()
             return self._end(context, {"CANCELLED"})
         if event.type in {"RET", "NUMPAD_ENTER"} and event.value == "PRESS":
             return self._end(context, {"FINISHED"})
@@ -79,14 +80,14 @@ class UV_OT_omt_live(bpy.types.Operator):
         except running.Disturbed as reason:
             self.report({"INFO"}, f"Live Balance ended: {reason}")
             return self._end(context, {"FINISHED"})
-        return {"PASS_THROUGH"} if self._session.wanted else self._end(context, {"FINISHED"})
+        return {"PASS_THROUGH"} if current.wanted else self._end(context, {"FINISHED"})
 
     def cancel(self, context: bpy.types.Context) -> None:
         self._end(context, {"CANCELLED"})
 
     def _tick(self, context: bpy.types.Context) -> bool:
         wanted = context.window_manager.operator_properties_last(UNWRAP).balance
-        moved = self._session.follow(wanted)
+        moved = current is not None and current.follow(wanted)
         if moved:
             for area in (a for w in context.window_manager.windows for a in w.screen.areas):
                 if area.type in {"VIEW_3D", "IMAGE_EDITOR"}:

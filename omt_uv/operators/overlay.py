@@ -60,17 +60,18 @@ class UV_OT_omt_histogram(bpy.types.Operator):
         return ready(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from ..blender_images import show
-        from ..histogram import histogram
+        from ..blender_images import set_preview, show
+        from ..histogram import histogram, thumbnail
         from ..solver.errors import MeshError
 
         try:
-            image = show(HISTOGRAM, histogram([reading for _, reading in read_objects(context)]))
+            readings = [reading for _, reading in read_objects(context)]
+            image = show(HISTOGRAM, histogram(readings))
+            set_preview(image, thumbnail(readings))
         except Complaint as complaint:
             return tell(self, context, complaint)
         except MeshError as error:
             return tell(self, context, Complaint(str(error)))
-        image.preview_ensure()
         if context.space_data is not None and context.space_data.type == "IMAGE_EDITOR":
             context.space_data.image = image
         else:

@@ -133,7 +133,7 @@ class DistortionPanel(TabPanel):
         row.operator("uv.omt_histogram", text="Histogram", icon="RNDCURVE")
         image = bpy.data.images.get(HISTOGRAM)
         if image is not None and image.preview is not None:
-            layout.template_icon(icon_value=image.preview.icon_id, scale=8.0)
+            layout.template_icon(icon_value=image.preview.icon_id, scale=7.0)
 
 
 class DensityPanel(TabPanel):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import math
 import os
 import subprocess
 import sys
@@ -41,37 +42,37 @@ class Story:
             yield
         return time.monotonic() - begin
 
-    def _x(self, *words):
+    def x(self, *words):
         """xdotool, without waiting in a way that would stop the window it talks to."""
         process = subprocess.Popen(["xdotool", *map(str, words)])
         while process.poll() is None:
             yield
 
     def move(self, x, y):
-        yield from self._x("mousemove", x, y)
+        yield from self.x("mousemove", x, y)
         yield from self.pause(0.2)
 
     def click(self, x, y, button=1):
         self.clicks += 1
         yield from self.move(x, y)
-        yield from self._x("click", button)
+        yield from self.x("click", button)
         yield from self.pause()
 
     def drag(self, start, end, steps=12, keep=None):
         """Press at the start, move to the end, look with `keep` at every place, and let go."""
         yield from self.move(*start)
-        yield from self._x("mousedown", 1)
+        yield from self.x("mousedown", 1)
         for k in range(1, steps + 1):
             place = [round(a + (b - a) * k / steps) for a, b in zip(start, end, strict=True)]
-            yield from self._x("mousemove", *place)
+            yield from self.x("mousemove", *place)
             yield from self.pause(0.15)
             if keep:
                 keep()
-        yield from self._x("mouseup", 1)
+        yield from self.x("mouseup", 1)
         yield from self.pause()
 
     def key(self, name):
-        yield from self._x("key", name)
+        yield from self.x("key", name)
         yield from self.pause()
 
     def shoot(self, name):
@@ -82,6 +83,18 @@ class Story:
             bpy.ops.screen.screenshot(filepath=str(self.out / f"{name}.png"))
         yield from self.pause(0.1)
 
+    def running(self):
+        from omt_uv.omt_uv import running
+
+        return running.current
+
+    def figures(self, obj):
+        """Area error, shear and folds of the active UVs, by the add-on's own measure."""
+        from omt_uv.omt_uv import blender_mesh, measuring
+
+        found = measuring.measure_readings([blender_mesh.read(obj)])
+        return {name: getattr(found, name) for name in ("area_l1", "angle_mean", "folds", "overlap")}
+
     def area(self, kind):
         return next(a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == kind)
 
@@ -89,6 +102,50 @@ class Story:
         """Screen coordinates of a place in an area, counted from its upper right corner."""
         area, window = self.area(kind), bpy.context.window_manager.windows[0]
         return area.x + area.width - from_right, window.height - (area.y + area.height - from_top)
+
+    def window_region(self, area):
+        return next(r for r in area.regions if r.type == "WINDOW")
+
+    def look_at_it(self, view):
+        """From the front and a little above."""
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(window=window, area=view, region=self.window_region(view)):
+            bpy.ops.view3d.view_axis(type="RIGHT")
+            bpy.ops.view3d.view_selected()
+            bpy.ops.view3d.view_orbit(type="ORBITUP")
+
+    def head(self, count):
+        """A bust of quads instead of the cube, open at the neck, selected."""
+        points, faces = _head(count)
+        if "Cube" in bpy.data.objects:
+            bpy.data.objects.remove(bpy.data.objects["Cube"])
+        mesh = bpy.data.meshes.new("Head")
+        mesh.from_pydata(points, [], faces)
+        mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+        obj = bpy.data.objects.new("Head", mesh)
+        bpy.context.collection.objects.link(obj)
+        bpy.context.view_layer.objects.active = obj
+        obj.select_set(True)
+        return obj
+
+
+def _head(count):
+    points, faces = [], []
+    for k in range(1, count + 1):
+        for s in range(count):
+            t, a = math.pi * 0.85 * k / count, 2 * math.pi * s / count
+            points.append((math.sin(t) * math.cos(a), 0.8 * math.sin(t) * math.sin(a), 1.2 * math.cos(t)))
+    for k in range(count - 1):
+        for s in range(count):
+            n = (s + 1) % count
+            faces.append((k * count + s, (k + 1) * count + s, (k + 1) * count + n, k * count + n))
+    faces.append(tuple(range(count)))
+    for centre, amount, width in (((1, 0, 0), 0.5, 0.2), ((0, 1, 0.1), 0.4, 0.25), ((0, -1, 0.1), 0.4, 0.25)):
+        for k, p in enumerate(points):
+            d = sum((x - c) ** 2 for x, c in zip(p, centre, strict=True))
+            factor = 1 + amount * math.exp(-d / (2 * width**2))
+            points[k] = tuple(factor * x for x in p)
+    return points, faces
 
 
 def main():

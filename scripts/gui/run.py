@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 PROGRAMS = ("blender", "Xvfb", "xdotool")
 SIZE = (1600, 900)
-TIME_LIMIT = 240
+TIME_LIMIT = 500
 
 
 def missing() -> str:

@@ -1,46 +1,77 @@
-"""What an artist does in the first two minutes: one click, a look, the redo panel, Esc, the UV editor."""
+"""What an artist does in the first two minutes: one click, a look, the redo panel, Esc."""
 
 from __future__ import annotations
 
-import math
+import time
 
 import bpy
 
+# Places in an editor, pixels from its upper right corner, before and after the box with figures has come.
+TAB, UNWRAP = (10, 213), (127, 105)
+AREA, SHEAR, OFF, HISTOGRAM = (127, 432), (68, 432), (185, 432), (81, 485)
+# The redo panel, pixels of the window from its lower left corner.
+REDO = (150, 104)
+
 
 def tell(story):
-    obj = head(80)
+    obj = story.head(60)
     yield from story.pause(1)
     view = story.area("VIEW_3D")
     view.spaces.active.show_region_ui = True
+    story.look_at_it(view)
     yield from story.pause(1)
-    yield from story.shoot("fresh")
-    yield from story.click(*story.place("VIEW_3D", 10, 263))
+    yield from first_unwrap(story, obj)
+    yield from colours(story)
+    yield from redo(story, obj)
+    yield from cancel(story)
+
+
+def first_unwrap(story, obj):
+    yield from story.click(*story.place("VIEW_3D", *TAB))
     yield from story.shoot("tab")
-    story.facts["object"] = obj.name
+    yield from story.click(*story.place("VIEW_3D", *UNWRAP))
+    yield from story.until(lambda: not story.running() and obj.data.uv_layers)
+    story.facts["clicks to an unwrap"] = story.clicks
+    story.facts["unwrapped"] = story.figures(obj)
+    yield from story.shoot("unwrapped")
 
 
-def head(count):
-    """A bust of quads, open at the neck, selected."""
-    points, faces = [], []
-    for k in range(1, count + 1):
-        for s in range(count):
-            t, a = math.pi * 0.85 * k / count, 2 * math.pi * s / count
-            points.append((math.sin(t) * math.cos(a), 0.8 * math.sin(t) * math.sin(a), 1.2 * math.cos(t)))
-    for k in range(count - 1):
-        for s in range(count):
-            n = (s + 1) % count
-            faces.append((k * count + s, (k + 1) * count + s, (k + 1) * count + n, k * count + n))
-    faces.append(tuple(range(count)))
-    for centre, amount, width in (((1, 0, 0), 0.5, 0.2), ((0, 1, 0.1), 0.4, 0.25), ((0, -1, 0.1), 0.4, 0.25)):
-        for k, p in enumerate(points):
-            d = sum((x - c) ** 2 for x, c in zip(p, centre, strict=True))
-            factor = 1 + amount * math.exp(-d / (2 * width**2))
-            points[k] = tuple(factor * x for x in p)
-    bpy.data.objects.remove(bpy.data.objects["Cube"])
-    mesh = bpy.data.meshes.new("Head")
-    mesh.from_pydata(points, [], faces)
-    obj = bpy.data.objects.new("Head", mesh)
-    bpy.context.collection.objects.link(obj)
-    bpy.context.view_layer.objects.active = obj
-    obj.select_set(True)
-    return obj
+def colours(story):
+    obj = bpy.context.object
+    shading = story.area("VIEW_3D").spaces.active.shading
+    for name, place in (("area", AREA), ("shear", SHEAR)):
+        yield from story.click(*story.place("VIEW_3D", *place))
+        yield from story.shoot(name)
+        story.facts[f"{name} colours"] = [a.name for a in obj.data.color_attributes], shading.color_type
+    yield from story.click(*story.place("VIEW_3D", *HISTOGRAM))
+    yield from story.shoot("histogram")
+    yield from story.click(*story.place("VIEW_3D", *OFF))
+    story.facts["colours off"] = [a.name for a in obj.data.color_attributes], shading.color_type
+
+
+def redo(story, obj):
+    """Unwrap once more, open the redo panel, change a setting there."""
+    yield from story.click(*story.place("VIEW_3D", *UNWRAP))
+    yield from story.until(lambda: not story.running())
+    yield from story.pause(1)
+    yield from story.click(REDO[0], 900 - REDO[1])
+    yield from story.shoot("redo")
+
+
+def cancel(story):
+    """A run of several seconds, and Esc in the middle of it."""
+    bpy.data.objects.remove(bpy.data.objects["Head"])
+    obj = story.head(200)
+    story.look_at_it(story.area("VIEW_3D"))
+    yield from story.pause(1)
+    yield from story.click(*story.place("VIEW_3D", *UNWRAP))
+    yield from story.until(lambda: story.running() and story.running().seconds > 1.5)
+    yield from story.shoot("progress")
+    story.facts["stage cancelled"] = story.running().stage
+    begin = time.monotonic()
+    yield from story.x("key", "Escape")
+    yield from story.until(lambda: not story.running())
+    story.facts["cancelled after"] = time.monotonic() - begin
+    yield from story.pause(0.5)
+    yield from story.shoot("cancelled")
+    story.facts["layers after cancel"] = len(obj.data.uv_layers)

@@ -1,0 +1,83 @@
+"""The add-on in a real window: clicks and keys as an artist's, assertions on what became of the mesh.
+
+`make gui` runs these and keeps the screenshots in build/gui; `make test` leaves them out, as they take minutes.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+OUT = ROOT / "build" / "gui"
+# Seconds from the key to the end of the run: without a graphics card, drawing alone may take most of one.
+PATIENCE = 3.0
+
+
+def load():
+    spec = importlib.util.spec_from_file_location("gui_run", ROOT / "scripts" / "gui" / "run.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def play():
+    if not os.environ.get("OMT_UV_GUI"):
+        pytest.skip("make gui runs these")
+    run = load()
+    if reason := run.missing():
+        pytest.skip(reason)
+    told = {}
+
+    def once(name):
+        if name not in told:
+            told[name] = run.play(ROOT / "scripts" / "gui" / "stories" / f"{name}.py", OUT / name)
+        assert "error" not in told[name], told[name]["error"]
+        return told[name]
+
+    return once
+
+
+def good(figures, area_error=0.01):
+    return figures["folds"] == 0 and figures["overlap"] < 1e-4 and figures["area_l1"] < area_error
+
+
+def test_three_clicks_to_an_unwrap(play):
+    facts = play("tour")
+    assert facts["clicks to an unwrap"] <= 3
+    assert good(facts["unwrapped"])
+
+
+def test_colours_come_and_go(play):
+    facts = play("tour")
+    for name in ("area colours", "shear colours"):
+        assert facts[name] == [["OMT UV Distortion"], "VERTEX"]
+    assert facts["colours off"] == [[], "MATERIAL"]
+
+
+def test_escape_ends_a_run_and_changes_nothing(play):
+    facts = play("tour")
+    assert facts["cancelled after"] < PATIENCE
+    assert facts["layers after cancel"] == 0
+
+
+def test_the_uv_editor_does_the_same(play):
+    assert good(play("uv_editor")["unwrapped in the UV editor"])
+
+
+def test_uvs_follow_the_slider_while_it_is_dragged(play):
+    facts = play("uv_editor")
+    seen = facts["while dragging"]
+    assert seen == sorted(seen) and len(set(seen)) >= 3
+    assert facts["after dragging"]["folds"] == 0
+    assert facts["after dragging"]["area_l1"] > 2 * facts["unwrapped in the UV editor"]["area_l1"]
+
+
+def test_pictures_were_taken(play):
+    for story in ("tour", "uv_editor"):
+        play(story)
+        assert len(list((OUT / story).glob("*.png"))) >= 4
