@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from .. import overlay, running
+from .. import last_run, overlay, running
+from ..settings import DEFAULT_TEXTURE_SIZE
 from .common import Complaint, read_objects, ready, tell
 
 if TYPE_CHECKING:
@@ -104,6 +105,20 @@ class UV_OT_omt_live(bpy.types.Operator):
             self._timer = None
         if context.workspace is not None:
             context.workspace.status_text_set(None)
-        if "FINISHED" in state and overlay.kind() != "NONE":
-            overlay.refresh(context, read_objects(context))
+        if "FINISHED" in state:
+            _show_figures(self.bl_label, context)
         return state
+
+
+def _show_figures(title: str, context: bpy.types.Context) -> None:
+    """Bring the panel and the colours up to date."""
+    try:
+        pairs = read_objects(context)
+    except Complaint:
+        # The objects are gone, or nothing is selected any more: there is nothing to show.
+        return
+    scale = context.scene.unit_settings.scale_length
+    rows = last_run.figures([reading for _, reading in pairs], DEFAULT_TEXTURE_SIZE, scale)
+    last_run.state.summary = last_run.Summary(title, rows)
+    if rows:
+        overlay.refresh(context, pairs)
