@@ -7,6 +7,7 @@ unwrap      area, shear, folds, overlap and time: Blender's unwraps and ours on 
 lion        conformal map and transport alone against Minimum Stretch with 50 iterations
 profile     where our time goes, stage by stage
 memory      peak memory of the unwrap of 100,000 faces
+magnify     the share that a painted region gets, and Minimum Stretch with the same vertex group
 latency     how long Blender waits for a slice of a run and for Esc, wall clock
 """
 
@@ -234,6 +235,12 @@ def print_peak(preset):
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
 
 
+def magnify(args):
+    from magnify import magnify_part
+
+    return magnify_part(args)
+
+
 def latency(args):
     from latency import latency_part
 
@@ -246,6 +253,7 @@ PARTS = {
     "unwrap": unwrap_part,
     "profile": profile_part,
     "memory": memory_part,
+    "magnify": magnify,
     "latency": latency,
 }
 

@@ -7,10 +7,10 @@ import sys
 from collections.abc import Sequence
 
 from . import __version__
-from .commands import measure, refine, remesh, seams, sphere, unwrap
+from .commands import magnify, measure, refine, remesh, seams, sphere, unwrap, weights
 from .commands.common import PROGRAM, CommandError
 
-COMMANDS = (unwrap, refine, seams, sphere, measure, remesh)
+COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, remesh)
 FAILURE = 1
 
 

@@ -24,6 +24,7 @@ from .solver.measure import Target, check_weights, from_vertices, normalised, pa
 from .solver.overlap import overlap_share
 from .solver.parameterize import located, unwrap_chart
 from .solver.progress import Steps, part_of
+from .solver.warp import warped
 from .unwrapping import Job, Packer, Refusal, lay_out
 
 # More overlap than this, as a share of the UV area, is said.
@@ -312,3 +313,17 @@ def _report(piece: _Piece) -> dict:
         "overlap": figures.overlap,
         "warnings": list(piece.found.warnings),
     }
+
+
+def warped_picture(picture: np.ndarray, regions: Sequence[Region], result: Magnified, margin: float) -> np.ndarray:
+    """A picture (h,w,c) of the UVs there were as one of those that the result has, islands continued by the margin."""
+    old, new = [], []
+    for region, corners, uv in zip(regions, result.corners, result.uv, strict=True):
+        before = np.asarray(region.pins.uv, float) if region.pins is not None else np.zeros((0, 2))
+        after = before.copy()
+        after[corners] = uv
+        moved = np.isin(region.surface.triangles[:, 0], corners)
+        triangles = region.surface.triangles[moved]
+        old.append(before[triangles])
+        new.append(after[triangles])
+    return warped(picture, np.concatenate(old), np.concatenate(new), int(margin))

@@ -8,6 +8,7 @@ from . import overlay
 from .blender_versions import register_command, unregister_command
 from .operators.density import UV_OT_omt_density_get, UV_OT_omt_density_set
 from .operators.live import UV_OT_omt_live
+from .operators.magnify import UV_OT_omt_magnify
 from .operators.measure import UV_OT_omt_measure
 from .operators.overlay import UV_OT_omt_histogram, UV_OT_omt_overlay
 from .operators.preset import UV_OT_omt_preset
@@ -17,7 +18,8 @@ from .operators.report import WM_OT_omt_copy_report
 from .operators.seams import UV_OT_omt_seams
 from .operators.sphere import UV_OT_omt_sphere
 from .operators.unwrap import UV_OT_omt_unwrap
-from .panels.menus import draw_remesh, draw_unwrap, menus, remesh_menus
+from .operators.weights import OBJECT_OT_omt_weights
+from .panels.menus import draw_remesh, draw_unwrap, draw_weights, menus, remesh_menus, weights_menus
 from .panels.sidebar import PANELS
 from .preferences import OMTUVPreferences, apply_soon
 from .preset_files import register_folder, unregister_folder
@@ -25,6 +27,8 @@ from .preset_files import register_folder, unregister_folder
 CLASSES = (
     UV_OT_omt_unwrap,
     UV_OT_omt_refine,
+    UV_OT_omt_magnify,
+    OBJECT_OT_omt_weights,
     UV_OT_omt_seams,
     UV_OT_omt_sphere,
     UV_OT_omt_live,
@@ -50,7 +54,8 @@ def register() -> None:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append((bpy.utils.unregister_class, cls))
-        for draw, places in ((draw_unwrap, menus()), (draw_remesh, remesh_menus())):
+        entries = ((draw_unwrap, menus()), (draw_remesh, remesh_menus()), (draw_weights, weights_menus()))
+        for draw, places in entries:
             for menu in places:
                 menu.append(draw)
                 _undo.append((menu.remove, draw))

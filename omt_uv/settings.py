@@ -181,3 +181,19 @@ class GlobeSettings:
     quality: str = DEFAULT_QUALITY.lower()
     balance: float = DEFAULT_BALANCE
     method: str = DEFAULT_SPHERE_METHOD.lower()
+
+
+WEIGHT_KINDS = (
+    (
+        "SALIENCY",
+        "Saliency",
+        "What stands out from its surroundings at several scales: features that the eye looks for",
+    ),
+    ("GAUSSIAN", "Gaussian Curvature", "Tips, saddles and dents, which no flat map keeps"),
+    ("MEAN", "Mean Curvature", "Ridges and valleys as well"),
+    ("SHARPNESS", "Edge Sharpness", "Vertices at sharp edges"),
+    ("DISTANCE", "Distance", "Near to the selected vertices, along the surface"),
+)
+DEFAULT_KIND = "SALIENCY"
+DEFAULT_GROUP = "omt_weights"
+DEFAULT_LOW, DEFAULT_HIGH = 0.5, 0.95

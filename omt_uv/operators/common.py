@@ -119,6 +119,8 @@ class SolverOperator:
     bl_label: str
     # Whether it changes the active UVs, so that their figures are worth a look.
     makes_uvs = False
+    # Rows of a name and a value about the result that `finish` wants to be shown first.
+    said: tuple[tuple[str, str], ...] = ()
     _timer: bpy.types.Timer | None = None
     _shown = 0.0
 
@@ -200,7 +202,7 @@ class SolverOperator:
             scale = context.scene.unit_settings.scale_length
             rows = last_run.figures([r for _, r in pairs], getattr(self, "texture_size", DEFAULT_TEXTURE_SIZE), scale)
             overlay.refresh(context, pairs)
-        rows = (*rows, ("Time", last_run.seconds(seconds)))
+        rows = (*self.said, *rows, ("Time", last_run.seconds(seconds)))
         last_run.state.summary = last_run.Summary(self.bl_label, rows, tuple(last_run.state.warnings))
         last_run.state.error = ""
 
@@ -227,12 +229,12 @@ class SolverOperator:
         return {"FINISHED"}
 
 
-def ready(cls, context: bpy.types.Context) -> bool:
+def ready(cls, context: bpy.types.Context, modes: tuple[str, ...] = ("OBJECT", "EDIT_MESH")) -> bool:
     """Whether an operator on meshes can run; the tooltip of the greyed button says why not."""
     if running.current is not None:
         cls.poll_message_set(f"{running.current.label} is still running. Esc cancels it")
         return False
-    if context.mode in {"OBJECT", "EDIT_MESH"}:
+    if context.mode in modes:
         return True
     cls.poll_message_set("Works in Object Mode and in Edit Mode of a mesh")
     return False

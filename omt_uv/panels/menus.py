@@ -6,7 +6,15 @@ import bpy
 
 # In the order of the menu; those that do not exist are left out.
 ENTRIES = (
-    *("uv.omt_unwrap", "uv.omt_refine", "uv.omt_magnify", "uv.omt_sphere", "uv.omt_seams", "uv.omt_measure"),
+    *(
+        "uv.omt_unwrap",
+        "uv.omt_refine",
+        "uv.omt_magnify",
+        "object.omt_weights",
+        "uv.omt_sphere",
+        "uv.omt_seams",
+        "uv.omt_measure",
+    ),
     *("uv.omt_live", "uv.omt_overlay", "uv.omt_histogram", "uv.omt_density_get", "uv.omt_density_set"),
 )
 
@@ -36,6 +44,16 @@ def menus() -> list:
 def draw_remesh(self, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator("object.omt_remesh", icon="MOD_REMESH")
+
+
+def draw_weights(self, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator("object.omt_weights")
+
+
+def weights_menus() -> list:
+    """The menu of Weight Paint, where the weights are repainted."""
+    return [bpy.types.VIEW3D_MT_paint_weight]
 
 
 def remesh_menus() -> list:

@@ -1,0 +1,147 @@
+"""magnify: a region gets a chosen number of times its share of the texture."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..settings import (
+    BOUNDARIES,
+    DEFAULT_FACTOR,
+    DEFAULT_MARGIN,
+    DEFAULT_QUALITY,
+    DEFAULT_SOURCE,
+    DEFAULT_TEXTURE_SIZE,
+    OWN_BOUNDARY,
+    QUALITIES,
+    SOURCES,
+    MagnifySettings,
+)
+from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
+from .options import FORMATS, add_files, add_report, margin, names, texture_size
+
+
+def add(commands) -> None:
+    command = commands.add_parser("magnify", help="give a region a chosen number of times its share of the texture")
+    command.set_defaults(run=run, balance=0.0)
+    add_files(command, accepts=f"{FORMATS} .off")
+    command.add_argument(
+        "--weights", required=True, metavar="GROUP", help="vertex group of the region; or saliency, or curvature"
+    )
+    command.add_argument(
+        "--factor", type=float, default=DEFAULT_FACTOR, metavar="M", help="times its share (default %(default)s)"
+    )
+    command.add_argument(
+        "--exact",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="M times the share of the whole; otherwise M holds between weight 1 and weight 0",
+    )
+    command.add_argument(
+        "--source", choices=names(SOURCES), default=DEFAULT_SOURCE.lower(), help="unwrap the mesh, or use its UVs"
+    )
+    command.add_argument(
+        "--boundary",
+        choices=names((OWN_BOUNDARY, *BOUNDARIES)),
+        default=OWN_BOUNDARY[0].lower(),
+        help="outline of every island; own: free for the mesh, as it is for UVs",
+    )
+    command.add_argument("--cascade", type=times, default=1, metavar="K", help="magnify K times in a row")
+    command.add_argument("--quality", choices=names(QUALITIES), default=DEFAULT_QUALITY.lower(), help="see unwrap")
+    command.add_argument(
+        "--margin", type=margin, default=DEFAULT_MARGIN, metavar="PX", help="least distance of islands"
+    )
+    command.add_argument("--texture-size", type=texture_size, default=DEFAULT_TEXTURE_SIZE, metavar="PX")
+    command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to use; default: the active one")
+    command.add_argument("--image", type=Path, metavar="PNG", help="picture of the old UVs that shall follow them")
+    command.add_argument("--image-output", type=Path, metavar="PNG", help="where to write the picture of the new UVs")
+    add_report(command, "island")
+
+
+def times(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of times")
+    return value
+
+
+def run(options: argparse.Namespace) -> None:
+    files, blender_mesh, blender_pack = blender()
+    from ..blender_seams import GroupError
+    from ..blender_weights import ScoreError, region_weights
+    from ..magnifying import Region, magnify, warped_picture
+    from ..packing import PackingError
+    from ..unwrapping import Refusal
+
+    check_output(options.output, files)
+    picture = _picture(options)
+    settings = MagnifySettings(
+        boundary=options.boundary,
+        quality=options.quality,
+        margin=options.margin,
+        texture_size=options.texture_size,
+        factor=options.factor,
+        exact=options.exact,
+        source=options.source,
+        cascade=options.cascade,
+    )
+    pairs = read(options.input, files, blender_mesh, options.uv_layer)
+    objects = [obj for obj, _ in pairs]
+    try:
+        for obj in objects:
+            blender_mesh.check_target(obj.data, options.uv_layer)
+        weights = region_weights(pairs, options.weights)
+        regions = [Region(r.surface, r.faces, w, r.all_pins) for (_, r), w in zip(pairs, weights, strict=True)]
+        result = drain_shown(magnify(regions, settings, blender_pack.pack))
+        for obj, corners, uv in zip(objects, result.corners, result.uv, strict=True):
+            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
+        warnings = files.save(options.output, objects)
+    except Refusal as refusal:
+        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
+    except (PackingError, GroupError, ScoreError, blender_mesh.TargetError, files.FileError) as error:
+        raise CommandError(str(error)) from error
+    if picture is not None:
+        _write_picture(options.image_output, warped_picture(picture, regions, result, options.margin))
+    print(result.shares.text())
+    warnings = warn(objects, result.warnings, warnings)
+    if options.report:
+        more = {"weights": options.weights, "factor": options.factor, "exact": options.exact, "source": options.source}
+        shares = {"share": vars(result.shares)}
+        write_report(options, {**more, "cascade": options.cascade, **shares}, objects, result.reports, warnings)
+
+
+def _picture(options: argparse.Namespace):
+    """Pixels (h,w,4) of the picture that shall follow, or None."""
+    if options.image is None and options.image_output is None:
+        return None
+    if options.image is None or options.image_output is None:
+        raise CommandError("A picture needs both --image and --image-output.")
+    if options.source != "uv":
+        raise CommandError("A picture can only follow UVs that exist. Use --source uv.")
+    import bpy
+
+    from ..blender_pictures import ImageError, picture_of
+    from ..quiet import silence
+
+    try:
+        with silence():
+            image = bpy.data.images.load(str(options.image.resolve()))
+        return picture_of(image.name)
+    except (RuntimeError, ImageError) as error:
+        raise CommandError(f"{options.image}: cannot be read as a picture") from error
+
+
+def _write_picture(path: Path, picture) -> None:
+    import bpy
+
+    from ..quiet import silence
+
+    height, width = picture.shape[:2]
+    image = bpy.data.images.new(path.stem, width, height, alpha=True)
+    image.pixels.foreach_set(picture.ravel())
+    image.filepath_raw, image.file_format = str(path.resolve()), "PNG"
+    try:
+        with silence():
+            image.save()
+    except RuntimeError as error:
+        raise CommandError(f"{path}: cannot be written") from error

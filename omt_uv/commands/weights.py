@@ -1,0 +1,45 @@
+"""weights: what stands out, curves or is sharp, written into a vertex group."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
+from .common import CommandError, blender, read, warn
+from .options import add_files, names, share
+
+
+def add(commands) -> None:
+    command = commands.add_parser("weights", help="write saliency, curvature or sharpness into a vertex group")
+    command.set_defaults(run=run)
+    add_files(command, writes=".blend, which keeps vertex groups")
+    command.add_argument("--kind", choices=names(WEIGHT_KINDS), default=DEFAULT_KIND.lower(), help="what is weighed")
+    command.add_argument("--group", default=DEFAULT_GROUP, metavar="NAME", help="vertex group to write or make")
+    command.add_argument("--low", type=share, default=DEFAULT_LOW, metavar="T", help="share of the area with weight 0")
+    command.add_argument("--high", type=share, default=DEFAULT_HIGH, metavar="T", help="share above which it is 1")
+    command.add_argument("--invert", action="store_true", help="weight 1 where it would be 0")
+
+
+def run(options: argparse.Namespace) -> None:
+    files, blender_mesh, _ = blender()
+    from ..blender_seams import GroupError
+    from ..blender_weights import ScoreError, check_group_target, computed_weights, selected_vertices, write_group
+
+    if options.output.suffix.lower() != ".blend":
+        raise CommandError(f"{options.output}: only .blend files keep vertex groups. Write one of these.")
+    pairs = read(options.input, files, blender_mesh)
+    try:
+        found = []
+        for obj, reading in pairs:
+            check_group_target(obj, options.group)
+            found.append(
+                computed_weights(
+                    obj, reading, options.kind, options.low, options.high, options.invert, selected_vertices(obj)
+                )
+            )
+        for (obj, _), weights in zip(pairs, found, strict=True):
+            write_group(obj, options.group, weights)
+        warnings = files.save(options.output, [obj for obj, _ in pairs])
+    except (GroupError, ScoreError, files.FileError) as error:
+        raise CommandError(str(error)) from error
+    warn([obj for obj, _ in pairs], [], warnings)

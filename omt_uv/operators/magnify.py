@@ -1,0 +1,160 @@
+"""uv.omt_magnify: a painted region gets a chosen number of times its share of the texture."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..settings import (
+    BOUNDARIES,
+    DEFAULT_FACTOR,
+    DEFAULT_QUALITY,
+    DEFAULT_SOURCE,
+    OWN_BOUNDARY,
+    QUALITIES,
+    SOURCES,
+    MagnifySettings,
+)
+from .common import Complaint, SolverOperator, read_objects, warn
+from .properties import MarginSettings, choose_group, draw_margin
+
+
+class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
+    """Give a painted region a chosen number of times its share of the texture, smoothly and without folds"""
+
+    bl_idname = "uv.omt_magnify"
+    bl_label = "Magnify"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+    makes_uvs = True
+
+    # Without a hard minimum: what is no factor is refused by name, and not silently made one.
+    factor: FloatProperty(
+        name="Factor",
+        description="How many times its share of the texture the region gets. Below 1 it becomes smaller",
+        default=DEFAULT_FACTOR,
+        soft_min=0.1,
+        soft_max=16.0,
+    )
+    source: EnumProperty(name="Source", description="What is magnified", items=SOURCES, default=DEFAULT_SOURCE)
+    weight_group: StringProperty(
+        name="Region",
+        description="Vertex group that marks the region with weight 1; saliency or curvature if no group has such a "
+        "name. Empty: the active vertex group",
+    )
+    exact: BoolProperty(
+        name="Exact Share",
+        description="The region gets exactly the factor times its share of the whole. "
+        "Otherwise the factor holds between weight 1 and weight 0, and the share follows",
+        default=True,
+    )
+    boundary: EnumProperty(
+        name="Boundary",
+        description="Outline of every island",
+        items=(OWN_BOUNDARY, *BOUNDARIES),
+        default=OWN_BOUNDARY[0],
+    )
+    cascade: IntProperty(
+        name="Times",
+        description="How often in a row; twice by 2 is once by 4",
+        default=1,
+        min=1,
+        max=16,
+        soft_max=4,
+    )
+    quality: EnumProperty(
+        name="Quality", description="How exact the areas become", items=QUALITIES, default=DEFAULT_QUALITY
+    )
+    image: StringProperty(
+        name="Warp Image",
+        description="Image that follows the UVs: a copy is made that looks on the mesh as the old one did. "
+        "Only for existing UVs. Empty: none",
+    )
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_settings(self.layout, self)
+
+    def settings(self) -> MagnifySettings:
+        return MagnifySettings(
+            boundary=self.boundary.lower(),
+            quality=self.quality.lower(),
+            margin=self.margin,
+            texture_size=self.texture_size,
+            tile=self.tile,
+            factor=self.factor,
+            exact=self.exact,
+            source=self.source.lower(),
+            cascade=self.cascade,
+        )
+
+    def steps(self, context: bpy.types.Context):
+        from .. import blender_mesh, blender_pack, packing, running
+        from ..blender_pictures import ImageError, picture_of
+        from ..blender_seams import GroupError
+        from ..blender_weights import ScoreError, region_weights
+        from ..magnifying import Region, magnify, warped_picture
+        from ..unwrapping import Refusal
+
+        pairs = read_objects(context)
+        try:
+            for obj, _ in pairs:
+                blender_mesh.check_target(obj.data, "")
+            picture = picture_of(self.image) if self.image and self.source == "UV" else None
+            weights = region_weights(pairs, self.weight_group or _active_group(context))
+        except (blender_mesh.TargetError, GroupError, ImageError) as error:
+            raise Complaint(str(error)) from error
+        except ScoreError as error:
+            raise Complaint(str(error), error.obj, error.error) from error
+        regions = [Region(r.surface, r.faces, w, r.all_pins) for (_, r), w in zip(pairs, weights, strict=True)]
+        pack = running.in_front(blender_pack.pack)
+        try:
+            result = yield from running.aside(magnify(regions, self.settings(), pack))
+        except Refusal as refusal:
+            obj = pairs[refusal.index][0]
+            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
+        except packing.PackingError as error:
+            raise Complaint(str(error)) from error
+        if picture is not None:
+            picture = warped_picture(picture, regions, result, self.margin)
+        return [obj for obj, _ in pairs], result, picture
+
+    def finish(self, context: bpy.types.Context, result) -> None:
+        from .. import blender_mesh
+        from ..blender_pictures import write_copy
+
+        objects, magnified, picture = result
+        for obj, corners, uv in zip(objects, magnified.corners, magnified.uv, strict=True):
+            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, ""), corners, uv)
+        shares = magnified.shares
+        self.said = (
+            ("Region before", f"{100 * shares.before:.3f} %"),
+            ("Region asked", f"{100 * shares.asked:.3f} %"),
+            ("Region now", f"{100 * shares.after:.3f} %"),
+        )
+        warn(self, objects, magnified.warnings)
+        text = shares.text()
+        if picture is not None:
+            text += f"; the warped image is {write_copy(self.image, picture)!r}"
+        self.report({"INFO"}, text)
+
+
+def _active_group(context: bpy.types.Context) -> str:
+    obj = context.view_layer.objects.active
+    group = obj.vertex_groups.active if obj is not None and obj.type == "MESH" else None
+    return group.name if group is not None else ""
+
+
+def draw_settings(layout: bpy.types.UILayout, properties) -> None:
+    """The settings of the operator, for the redo panel and the sidebar."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(properties, "factor")
+    choose_group(layout, properties, "weight_group")
+    layout.prop(properties, "exact")
+    layout.prop(properties, "source")
+    layout.prop(properties, "boundary")
+    layout.prop(properties, "cascade")
+    layout.prop(properties, "quality")
+    column = layout.column()
+    column.active = properties.source == "UV"
+    column.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
+    draw_margin(layout, properties)

@@ -1,0 +1,93 @@
+"""object.omt_weights: saliency, curvature, sharp edges or distance as a vertex group, to be seen and repainted."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+
+from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
+from .common import Complaint, SolverOperator, mesh_objects, ready
+from .properties import choose_group
+
+
+class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
+    """Weigh vertices by what they show, into a vertex group that can be repainted and magnified"""
+
+    bl_idname = "object.omt_weights"
+    bl_label = "OMT Weights"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    kind: EnumProperty(name="Kind", description="What is weighed", items=WEIGHT_KINDS, default=DEFAULT_KIND)
+    weight_group: StringProperty(
+        name="Vertex Group",
+        description="Vertex group to write, made if there is none of this name",
+        default=DEFAULT_GROUP,
+    )
+    low: FloatProperty(
+        name="From",
+        description="Share of the surface, that with the least score, that gets weight 0",
+        default=DEFAULT_LOW,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    high: FloatProperty(
+        name="To",
+        description="Share of the surface beyond which the weight is 1; between both it grows softly",
+        default=DEFAULT_HIGH,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    invert: BoolProperty(name="Invert", description="Weight 1 where it would be 0, and 0 for 1", default=False)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return ready(cls, context, ("OBJECT", "EDIT_MESH", "PAINT_WEIGHT"))
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_settings(self.layout, self)
+
+    def steps(self, context: bpy.types.Context):
+        from .. import blender_mesh
+        from ..blender_seams import GroupError
+        from ..blender_weights import ScoreError, check_group_target, computed_weights, selected_vertices
+        from ..solver.errors import MeshError
+        from ..solver.progress import Progress
+
+        objects = [context.object] if context.mode == "PAINT_WEIGHT" else mesh_objects(context)
+        results = []
+        for k, obj in enumerate(objects):
+            yield Progress("Weights", k / len(objects))
+            try:
+                check_group_target(obj, self.weight_group)
+                reading = blender_mesh.read(obj)
+                selected = selected_vertices(obj) if self.kind == "DISTANCE" else None
+                options = {"low": self.low, "high": self.high, "invert": self.invert, "selected": selected}
+                results.append((obj, computed_weights(obj, reading, self.kind.lower(), **options)))
+            except GroupError as error:
+                raise Complaint(str(error)) from error
+            except ScoreError as error:
+                raise Complaint(str(error), error.obj, error.error) from error
+            except MeshError as error:
+                raise Complaint(f"{obj.name}: {error}", obj, error) from error
+        return results
+
+    def finish(self, context: bpy.types.Context, result) -> None:
+        from ..blender_weights import write_group
+
+        for obj, weights in result:
+            write_group(obj, self.weight_group, weights)
+        self.report({"INFO"}, f"Weights are in the vertex group {self.weight_group!r}")
+
+
+def draw_settings(layout: bpy.types.UILayout, properties) -> None:
+    """The settings of the operator, for the redo panel and the sidebar."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(properties, "kind")
+    choose_group(layout, properties, "weight_group")
+    column = layout.column(align=True)
+    column.prop(properties, "low", slider=True)
+    column.prop(properties, "high", slider=True)
+    layout.prop(properties, "invert")

@@ -1,0 +1,262 @@
+"""uv.omt_magnify, object.omt_weights and their commands: shares as asked, everything else untouched."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+
+import numpy as np
+import pytest
+from blender import scenes
+
+
+def painted(name="Bump", radius=0.35, group="region", **options):
+    """A bump with the UVs seen from above and a soft region in its middle; the object and its weights (n,)."""
+    obj = scenes.bump(name=name, **options)
+    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.5, (0.1, 0.2)))
+    co = np.array([v.co for v in obj.data.vertices])[:, :2]
+    middle = (co.min(0) + co.max(0)) / 2
+    d = np.linalg.norm(co - middle, axis=1) / np.ptp(co, axis=0).max()
+    weights = np.clip((radius - d) / (0.5 * radius), 0, 1)
+    layer = obj.vertex_groups.new(name=group)
+    for index, weight in enumerate(weights.tolist()):
+        if weight > 0:
+            layer.add([index], weight, "REPLACE")
+    return obj
+
+
+def weights_of(obj, name="region"):
+    group = obj.vertex_groups[name].index
+    return np.array([next((g.weight for g in v.groups if g.group == group), 0.0) for v in obj.data.vertices])
+
+
+def share(obj, areas, group="region"):
+    """Share of the region in areas (m,) of the loop triangles."""
+    corners = np.array([list(t.vertices) for t in obj.data.loop_triangles])
+    weight = weights_of(obj, group)[corners].mean(axis=1)
+    return weight @ np.abs(areas) / np.abs(areas).sum()
+
+
+def magnify(**arguments):
+    assert bpy.ops.uv.omt_magnify(**arguments) == {"FINISHED"}
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("source", ["MESH", "UV"])
+def test_the_region_gets_its_share(source, mode):
+    obj = painted()
+    space, before = scenes.areas(obj)
+    asked = 2.0 * share(obj, space if source == "MESH" else before)
+    untouched = scenes.state(obj, leave_out={"UVMap"})
+    if mode == "EDIT":
+        scenes.edit(obj)
+    magnify(factor=2.0, source=source)
+    if mode == "EDIT":
+        scenes.leave_edit()
+    after = scenes.areas(obj)[1]
+    assert share(obj, after) == pytest.approx(asked, rel=5e-3)
+    assert (after * np.sign(after.sum()) > 0).all()
+    assert scenes.state(obj, leave_out={"UVMap"}) == untouched
+    if source == "UV":
+        assert np.abs(after).sum() == pytest.approx(np.abs(before).sum(), rel=1e-3)
+
+
+def test_cascades_from_uvs():
+    obj = painted()
+    start, before = scenes.uv_of(obj), share(obj, scenes.areas(obj)[1])
+    magnify(factor=1.5, source="UV", cascade=2)
+    both = scenes.uv_of(obj)
+    assert share(obj, scenes.areas(obj)[1]) == pytest.approx(1.5**2 * before, rel=5e-3)
+    scenes.set_uv(obj, start)
+    magnify(factor=1.5, source="UV")
+    magnify(factor=1.5, source="UV")
+    np.testing.assert_allclose(scenes.uv_of(obj), both, atol=1e-3)
+
+
+def test_other_islands_stay_to_the_bit():
+    obj = painted()
+    far = np.array([p.center.x for p in obj.data.polygons])
+    corners = np.zeros(len(obj.data.loops), bool)
+    for index in np.flatnonzero(far > np.quantile(far, 0.85)):
+        corners[list(obj.data.polygons[index].loop_indices)] = True
+    uv = scenes.uv_of(obj)
+    uv[corners] += [3, 0]
+    scenes.set_uv(obj, uv)
+    magnify(factor=2.0, source="UV")
+    assert scenes.uv_of(obj)[corners].tobytes() == uv[corners].tobytes()
+
+
+def test_the_panel_says_the_shares(package):
+    painted()
+    magnify(factor=2.0)
+    rows = dict(package("last_run").state.summary.rows)
+    asked, now = (float(rows[name].split()[0]) for name in ("Region asked", "Region now"))
+    assert now == pytest.approx(asked, rel=5e-3)
+    assert float(rows["Region before"].split()[0]) == pytest.approx(asked / 2, rel=1e-3)
+
+
+def test_a_warped_image_follows():
+    painted()
+    image = bpy.data.images.new("map", 64, 64, alpha=True)
+    y, x = np.mgrid[0:64, 0:64] / 63
+    old = np.stack([x, y, 0 * x, 1 + 0 * x], axis=2).astype(np.float32)
+    image.pixels.foreach_set(old.ravel())
+    magnify(factor=2.0, source="UV", image="map")
+    (new,) = [i for i in bpy.data.images if i.name.startswith("map warped")]
+    pixels = np.zeros(old.size, np.float32)
+    new.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(old.shape)
+    assert np.abs(pixels - old)[..., :2].max() > 0.02
+    assert pixels[..., 3].min() > 0.99
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"weight_group": "nowhere"}, "no vertex group"),
+        ({"weight_group": "nothing"}, "All weights are zero"),
+        ({"factor": -2.0}, "-2 times"),
+        ({"factor": 0.0}, "0 times"),
+        ({"factor": float("nan")}, "nan times"),
+        ({"factor": 1000.0}, "leaves nothing"),
+        ({"factor": 1000.0, "source": "UV"}, "leaves nothing"),
+        ({"image": "no image", "source": "UV"}, "no image"),
+    ],
+)
+def test_refusals_change_nothing(arguments, message, mode):
+    obj = painted()
+    obj.vertex_groups.new(name="nothing")
+    obj.vertex_groups.active_index = 0
+    if mode == "EDIT":
+        scenes.edit(obj)
+    before = scenes.state(obj)
+    assert message in scenes.error_of(bpy.ops.uv.omt_magnify, **arguments)
+    assert scenes.state(obj) == before
+
+
+def test_folded_uvs_are_refused_and_shown():
+    obj = painted()
+    uv = scenes.uv_of(obj)
+    middle = len(obj.data.vertices) // 2
+    moved = np.array([loop.vertex_index == middle for loop in obj.data.loops])
+    uv[moved] += 0.4
+    scenes.set_uv(obj, uv)
+    before = scenes.state(obj)
+    assert "fold" in scenes.error_of(bpy.ops.uv.omt_magnify, source="UV")
+    assert scenes.state(obj) == before
+    assert any(p.select for p in obj.data.polygons) and not all(p.select for p in obj.data.polygons)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT", "WEIGHT_PAINT"])
+@pytest.mark.parametrize("kind", ["SALIENCY", "GAUSSIAN", "MEAN", "SHARPNESS", "DISTANCE"])
+def test_weights(kind, mode):
+    obj = scenes.bump(height=1.0)
+    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    for sequence in (obj.data.polygons, obj.data.edges):
+        sequence.foreach_set("select", [False] * len(sequence))
+    for vertex in obj.data.vertices:
+        vertex.select = vertex.index == 40
+    untouched = scenes.state(obj)
+    bpy.ops.object.mode_set(mode=mode)
+    assert bpy.ops.object.omt_weights(kind=kind, weight_group="w") == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    weights = weights_of(obj, "w")
+    assert (weights.min(), weights.max()) == (0, 1)
+    assert obj.vertex_groups.active.name == "w"
+    after = scenes.state(obj)
+    assert {k: v for k, v in after.items() if k != "groups"} == {k: v for k, v in untouched.items() if k != "groups"}
+    bpy.ops.object.omt_weights(kind=kind, weight_group="w", invert=True)
+    np.testing.assert_allclose(weights_of(obj, "w"), 1 - weights, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"weight_group": ""}, "no name"),
+        ({"low": 0.9, "high": 0.2}, "no range"),
+        ({"kind": "DISTANCE"}, "No vertex is selected"),
+    ],
+)
+def test_weights_that_cannot_be(arguments, message):
+    obj = scenes.bump()
+    for sequence in (obj.data.polygons, obj.data.edges, obj.data.vertices):
+        sequence.foreach_set("select", [False] * len(sequence))
+    before = scenes.state(obj)
+    assert message in scenes.error_of(bpy.ops.object.omt_weights, **arguments)
+    assert scenes.state(obj) == before
+
+
+def test_locked_groups_stay():
+    obj = painted()
+    obj.vertex_groups["region"].lock_weight = True
+    before = scenes.state(obj)
+    assert "locked" in scenes.error_of(bpy.ops.object.omt_weights, weight_group="region")
+    assert scenes.state(obj) == before
+
+
+# ---- commands -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def run(package, capfd):
+    def call(*arguments):
+        capfd.readouterr()
+        status = package("cli").main([str(a) for a in arguments])
+        out, err = capfd.readouterr()
+        return status, out, err
+
+    return call
+
+
+def test_commands(run, tmp_path):
+    scenes.bump(height=1.0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    status, out, err = run(
+        "weights", tmp_path / "in.blend", "-o", tmp_path / "w.blend", "--kind", "mean", "--group", "w"
+    )
+    assert (status, out) == (0, ""), err
+    report = tmp_path / "r.json"
+    files = (tmp_path / "w.blend", "-o", tmp_path / "m.blend", "--weights", "w", "--report", report)
+    status, out, err = run("magnify", *files, "--factor", 2)
+    assert status == 0 and "asked" in out, err
+    told = json.loads(report.read_text())["share"]
+    assert told["asked"] == pytest.approx(2 * told["before"])
+    assert told["after"] == pytest.approx(told["asked"], rel=5e-3)
+    again = (tmp_path / "m.blend", "-o", tmp_path / "n.blend", "--weights", "w", "--report", report)
+    status, out, err = run("magnify", *again, "--factor", 0.7, "--source", "uv", "--cascade", 2)
+    assert status == 0, err
+    lens = json.loads(report.read_text())
+    assert lens["share"]["before"] == pytest.approx(told["after"], rel=1e-3)
+    assert lens["share"]["after"] == pytest.approx(0.49 * told["after"], rel=5e-3)
+    assert lens["charts"][0]["folds"] == 0
+
+
+def test_command_warps_a_picture(run, tmp_path):
+    painted()
+    image = bpy.data.images.new("map", 32, 32)
+    image.filepath_raw, image.file_format = str(tmp_path / "map.png"), "PNG"
+    image.save()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    files = (tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "region", "--factor", 2)
+    pictures = ("--image", tmp_path / "map.png", "--image-output", tmp_path / "new.png")
+    status, _, err = run("magnify", *files, "--source", "uv", *pictures)
+    assert status == 0 and (tmp_path / "new.png").is_file(), err
+    assert run("magnify", *files, *pictures)[0] == 1
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--weights", "none", "--factor", 2),
+        ("--weights", "region", "--factor", -1),
+        ("--weights", "saliency", "--factor", 99),
+    ],
+)
+def test_commands_refuse_on_one_line(run, tmp_path, options):
+    painted()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    status, _, err = run("magnify", tmp_path / "in.blend", "-o", tmp_path / "out.blend", *options)
+    assert status == 1 and len(err.splitlines()) == 1
+    assert not (tmp_path / "out.blend").exists()

@@ -1,0 +1,207 @@
+"""Existing maps magnified, pictures warped with them, and weights from scores."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver import scores
+from omt_uv.solver.charts import split, triangle_surface
+from omt_uv.solver.errors import EmptyMeshError, FoldedUVError, WeightError
+from omt_uv.solver.exact_share import exact_share
+from omt_uv.solver.geometry import face_areas, signed_areas, vertex_areas
+from omt_uv.solver.lens import magnify_map
+from omt_uv.solver.measure import Target, from_vertices, normalised, share
+from omt_uv.solver.overlap import overlap_share
+from omt_uv.solver.parameterize import unwrap, unwrap_chart
+from omt_uv.solver.progress import drain
+from omt_uv.solver.saliency import saliency
+from omt_uv.solver.warp import warped
+
+
+def blob(points, centre, radius):
+    d = np.linalg.norm(points - centre, axis=1)
+    t = np.clip((1.3 * radius - d) / (0.6 * radius), 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def square(n=20):
+    V, F = meshes.grid(n, n)
+    return V[:, :2].copy(), F
+
+
+def disk():
+    V, F = meshes.random_disk(400)
+    return V[:, :2].copy(), F
+
+
+def magnified(uv, F, weights, factor, **options):
+    area, w = np.abs(signed_areas(uv, F)), from_vertices(weights, F)
+    found = exact_share(w, area, factor)
+    result = drain(magnify_map(uv, F, normalised(found.density, area), region=w, **options))
+    return result, found, share(w, np.abs(signed_areas(result.uv, F)))
+
+
+@pytest.mark.parametrize("boundary", ["own", "free"])
+@pytest.mark.parametrize("factor", [0.25, 8.0])
+@pytest.mark.parametrize("make", [square, disk])
+def test_the_region_gets_its_share_without_folds(make, factor, boundary):
+    uv, F = make()
+    result, found, after = magnified(uv, F, blob(uv, uv.mean(0) + 0.05, 0.15 * np.ptp(uv)), factor, boundary=boundary)
+    assert after == pytest.approx(found.asked, rel=5e-3)
+    assert (signed_areas(result.uv, F) > 0).all()
+    assert overlap_share(result.uv[F]) <= 1e-4
+    assert signed_areas(result.uv, F).sum() == pytest.approx(signed_areas(uv, F).sum(), rel=1e-3)
+    assert result.area_error <= 0.01
+
+
+def test_outlines_are_kept():
+    uv, F = square()
+    result, _, _ = magnified(uv, F, blob(uv, [0.3, 0.4], 0.15), 4.0)
+    for k in range(2):
+        for side in (0, 1):
+            on = uv[:, k] == side
+            np.testing.assert_allclose(result.uv[on, k], side, atol=1e-9)
+    uv, F = disk()
+    rim = np.isclose(np.linalg.norm(uv, axis=1), 1)
+    result, _, _ = magnified(uv, F, blob(uv, [0.2, 0.3], 0.3), 3.0)
+    assert np.ptp(np.linalg.norm(result.uv[rim], axis=1)) < 1e-2 and result.outline == "circle"
+
+
+@pytest.mark.parametrize("boundary", ["own", "free"])
+def test_twice_by_two_is_once_by_four(boundary):
+    uv, F = square(30)
+    weights = blob(uv, [0.35, 0.6], 0.12)
+    once, _, share_once = magnified(uv, F, weights, 4.0, boundary=boundary)
+    half, _, _ = magnified(uv, F, weights, 2.0, boundary=boundary)
+    twice, _, share_twice = magnified(half.uv, F, weights, 2.0, boundary=boundary)
+    assert share_twice == pytest.approx(share_once, rel=0.02)
+    assert np.linalg.norm(twice.uv - once.uv, axis=1).max() <= 0.02 * np.ptp(once.uv, axis=0).max()
+
+
+def test_place_size_and_mirroring_do_not_matter():
+    uv, F = square(16)
+    weights = blob(uv, [0.4, 0.5], 0.2)
+    there = lambda x: x * [-7, 7] + [100, 3]  # noqa: E731
+    plain, _, _ = magnified(uv, F, weights, 3.0)
+    moved, _, _ = magnified(there(uv), F, weights, 3.0)
+    np.testing.assert_allclose(moved.uv, there(plain.uv), atol=1e-6)
+
+
+def test_folded_uvs_are_refused():
+    uv, F = square(8)
+    uv[40] += 0.5
+    with pytest.raises(FoldedUVError) as caught:
+        drain(magnify_map(uv, F, np.ones(len(F))))
+    assert set(caught.value.elements) == set(np.flatnonzero(signed_areas(uv, F) <= 0))
+
+
+# ---- from the mesh ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("boundary", ["free", "disk", "square"])
+@pytest.mark.parametrize("factor", [0.25, 4.0])
+def test_a_surface_is_unwrapped_with_a_density(factor, boundary):
+    (chart,) = split(triangle_surface(*meshes.head(16)))
+    V, F = chart.vertices, chart.triangles
+    w = from_vertices(blob(V, V[np.argmax(V[:, 0])], 0.6), F)
+    found = exact_share(w, face_areas(V, F), factor)
+    density = normalised(found.density, face_areas(V, F))
+    result = drain(unwrap_chart(chart, boundary=boundary, density=density, region=w))
+    area = signed_areas(result.uv, F)
+    assert (area > 0).all() and result.area_l1 <= 0.02
+    assert share(w, area) == pytest.approx(found.asked, rel=5e-3)
+    assert area.sum() == pytest.approx(face_areas(V, F).sum(), rel=1e-9)
+
+
+def test_shares_hold_across_charts():
+    V, F = meshes.bumpy(12, 12)
+    surface = triangle_surface(np.vstack([V, V + 5]), np.vstack([F, F + len(V)]))
+    density = np.where(np.arange(2 * len(F)) < len(F), 3.0, 1.0)
+    result = drain(unwrap(surface, target=Target(density)))
+    first, second = (signed_areas(m.uv, c.triangles).sum() for c, m in zip(result.charts, result.maps, strict=True))
+    assert first == pytest.approx(3 * second, rel=1e-6)
+
+
+# ---- pictures -----------------------------------------------------------------------------------------------
+
+
+def test_a_warped_picture_shows_the_same_on_the_mesh():
+    """A picture that is a smooth function of the place has that function's value at every vertex' new place."""
+    uv, F = square(20)
+    result, _, _ = magnified(uv, F, blob(uv, [0.5, 0.5], 0.2), 3.0)
+    n = 256
+    y, x = (np.mgrid[0:n, 0:n] + 0.5) / n
+    picture = np.stack([x, y, x * y, np.ones_like(x)], axis=2)
+    after = warped(picture, uv[F], result.uv[F])
+    inner = (np.abs(uv - 0.5) < 0.45).all(axis=1)
+    column, row = (np.clip(result.uv[inner] * n, 0, n - 1).astype(int)).T
+    expected = np.column_stack([uv, uv.prod(1), np.ones(len(uv))])[inner]
+    assert np.abs(after[row, column] - expected).max() < 3 / n * 3
+    np.testing.assert_allclose(warped(picture, uv[F], uv[F])[1:-1, 1:-1], picture[1:-1, 1:-1], atol=1e-9)
+
+
+def test_pixels_beyond_the_margin_stay():
+    picture = np.random.default_rng(0).integers(0, 255, (64, 64, 3), dtype=np.uint8)
+    uv, F = square(4)
+    after = warped(picture, 0.25 * uv[F], 0.25 * uv[F] + 0.5, margin=2)
+    assert after.dtype == np.uint8
+    np.testing.assert_array_equal(after[:28], picture[:28])
+    np.testing.assert_array_equal(after[34:46, 34:46], picture[2:14, 2:14])
+
+
+# ---- scores -------------------------------------------------------------------------------------------------
+
+
+def bump(n=60):
+    V, F = meshes.grid(n, n)
+    r = np.linalg.norm(V[:, :2] - [0.4, 0.5], axis=1)
+    V[:, 2] = 0.06 * np.exp(-((r / 0.06) ** 2))
+    return V, F, r
+
+
+def test_saliency_finds_a_bump_and_nothing_on_spheres_and_planes():
+    V, F, r = bump()
+    s = saliency(V, F)
+    assert s[r < 0.03].min() > 10 * s[r > 0.3].max() and (s >= 0).all()
+    assert not saliency(*meshes.icosphere(3)).any()
+    assert not saliency(*meshes.grid(20, 20)).any()
+
+
+@pytest.mark.parametrize("kind", ["saliency", "gaussian", "mean", "sharpness"])
+def test_scores_do_not_depend_on_place_direction_or_size(kind):
+    V, F, _ = bump(40)
+    q, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    q = q * np.sign(np.linalg.det(q))
+    before, after = scores.score(kind, V, F), scores.score(kind, 137 * V @ q.T + 20, F)
+    np.testing.assert_allclose(after, before, atol=1e-6 * before.max())
+
+
+def test_distance_along_the_surface():
+    V, F = meshes.grid(40, 40)
+    d = scores.distance(V, F, np.array([0]))
+    straight = np.linalg.norm(V, axis=1)
+    assert (d >= straight - 1e-12).all()
+    assert (d <= 1.09 * straight + 1e-12).all()
+
+
+@pytest.mark.parametrize("invert", [False, True])
+def test_soft_weights_by_area(invert):
+    V, F, _ = bump()
+    area = vertex_areas(V, F)
+    w = scores.soft_weights(V[:, 0], area, 0.4, 0.8, invert)
+    assert (w.min(), w.max()) == (0, 1)
+    assert area[w == (1 if invert else 0)].sum() / area.sum() == pytest.approx(0.4, abs=0.03)
+    assert area[w == (0 if invert else 1)].sum() / area.sum() == pytest.approx(0.2, abs=0.03)
+
+
+def test_weights_of_nothing():
+    V, F = meshes.grid(10, 10)
+    area = vertex_areas(V, F)
+    with pytest.raises(WeightError, match="same everywhere"):
+        scores.soft_weights(scores.score("saliency", V, F), area)
+    with pytest.raises(WeightError, match="no range"):
+        scores.soft_weights(V[:, 0], area, 0.9, 0.1)
+    with pytest.raises(EmptyMeshError, match="selected"):
+        scores.score("distance", V, F, np.zeros(len(V), bool))
+    cube = scores.soft_weights(np.where(np.arange(100) < 95, 0.0, 1.0), np.ones(100))
+    assert cube.sum() == 5
