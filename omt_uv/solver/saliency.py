@@ -17,9 +17,9 @@ from .topology import halfedges
 # Scales, in multiples of EPSILON times the diagonal (section 3.1 and 4: epsilon is 0.3 % of it).
 SCALES = np.array([2.0, 3.0, 4.0, 5.0, 6.0])
 EPSILON = 0.003
-# A map that is nowhere larger, over the diagonal, is the mesh and not the shape: a sphere's curvature is 3.5. Smaller
+# A map that is nowhere larger, over the diagonal, is the mesh and not the shape: a sphere has 3.5. Smaller
 # maxima than this share of the greatest are no maxima.
-NOTHING, MINOR = 0.2, 1e-3
+NOTHING, MINOR = 0.25, 1e-3
 # Neighbours that differ by less are equal, whichever is greater in the last digit.
 EQUAL = 1e-9
 
