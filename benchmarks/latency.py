@@ -15,7 +15,7 @@ import numpy as np
 from cases import Table, meshes
 
 SIZES = (100, 224, 316)
-SLICE_GOAL, CANCEL_GOAL = 200.0, 300.0
+SLICE_GOAL, CANCEL_GOAL, LIVE_GOAL = 200.0, 300.0, 300.0
 OPERATORS = ("uv.omt_unwrap", "uv.omt_refine", "uv.omt_seams")
 TIMER = types.SimpleNamespace(type="TIMER", value="NOTHING")
 ESCAPE = types.SimpleNamespace(type="ESC", value="PRESS")
@@ -35,6 +35,7 @@ def latency_part(args):
             for mode in ("OBJECT", "EDIT"):
                 for name in OPERATORS:
                     _add(table, size, mode, name)
+                _add_live(table, size, mode)
     finally:
         registration.unregister()
     return table
@@ -77,6 +78,39 @@ def _add(table, size, mode, name):
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
+def _add_live(table, size, mode):
+    """The slider dragged from area to angle in steps of a twentieth: the longest wait for the UVs to follow one."""
+    from blender import scenes
+
+    from omt_uv import following, operators
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj = scenes.add(*meshes.head(size))
+    bpy.ops.uv.omt_unwrap(quality="DRAFT")
+    if mode == "EDIT":
+        scenes.edit(obj)
+    session = following.Session(bpy.context, operators.common.read_objects(bpy.context))
+    waits, works = [], []
+    for balance in np.linspace(0, 1, 21):
+        wall, own = time.perf_counter(), time.thread_time()
+        session.follow(float(balance))
+        waits.append(1e3 * (time.perf_counter() - wall))
+        works.append(1e3 * (time.thread_time() - own))
+    session.close()
+    table.add(
+        vertices=len(obj.data.vertices),
+        operator="uv.omt_live",
+        mode=mode,
+        slices=len(waits),
+        slice=max(waits),
+        working=max(works),
+        cancel=max(waits),
+        **{"missed goals": "live" if size <= 100 and max(works) > LIVE_GOAL else ""},
+    )
+    if mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
 def _slices(operator):
     """Wall-clock milliseconds, those of the main thread, and the stage, of every slice."""
     from omt_uv import running
@@ -92,7 +126,7 @@ def _slices(operator):
     return found
 
 
-def _cancelling(operator, seconds, tries=8):
+def _cancelling(operator, seconds, tries=4):
     """The most milliseconds that the answer to Esc takes, at moments spread over a run of so many seconds."""
     most = 0.0
     for k in range(tries):

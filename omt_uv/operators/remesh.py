@@ -14,7 +14,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
 
     bl_idname = "object.omt_remesh"
     bl_label = "Remesh Area Preserving"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     count_of: EnumProperty(name="Count", description="What sets the size of the new mesh", items=COUNTS)
     target_vertices: IntProperty(

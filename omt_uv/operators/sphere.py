@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
 from .common import Complaint, SolverOperator, read_objects, warn
-from .properties import AreaSettings
+from .properties import AreaSettings, choose_group, choose_layer, draw_balance
 
 ORIENTATIONS = (
     ("AXES", "Object Axes", "Z is north, the front (-Y) the middle of the map"),
@@ -21,7 +21,8 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
 
     bl_idname = "uv.omt_sphere"
     bl_label = "OMT Sphere Projection"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+    makes_uvs = True
 
     projection: EnumProperty(
         name="Projection", description="Layout of the globe", items=PROJECTIONS, default=DEFAULT_PROJECTION
@@ -137,19 +138,19 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     """The settings of the operator, for the redo panel and the sidebar."""
     layout.use_property_split = True
     layout.use_property_decorate = False
+    draw_balance(layout, properties)
     layout.prop(properties, "projection")
-    layout.prop(properties, "balance")
     layout.prop(properties, "quality")
     layout.prop(properties, "method")
-    layout.prop(properties, "weight_group")
+    choose_group(layout, properties, "weight_group")
     column = layout.column()
     column.active = bool(properties.weight_group)
     column.prop(properties, "weight_factor")
     layout.prop(properties, "orientation")
     if properties.orientation == "GROUPS":
         for name in ("pole_group", "meridian_group", "east_group"):
-            layout.prop(properties, name)
+            choose_group(layout, properties, name)
     column = layout.column()
     column.active = properties.projection != "EQUIRECT"
-    column.prop(properties, "image")
-    layout.prop(properties, "uv_layer")
+    column.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
+    choose_layer(layout, properties, "uv_layer")

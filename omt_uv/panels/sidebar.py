@@ -17,6 +17,7 @@ from ..operators.overlay import HISTOGRAM, KINDS
 from ..operators.unwrap import draw_main, draw_more
 
 TAB = "OMT"
+WITH_PRESETS = ("uv.omt_unwrap", "uv.omt_sphere", "uv.omt_magnify", "object.omt_remesh")
 EDITORS = {"VIEW3D": "VIEW_3D", "IMAGE": "IMAGE_EDITOR"}
 
 
@@ -180,14 +181,16 @@ def draw_summary(layout: bpy.types.UILayout, summary: last_run.Summary) -> None:
 
 class UV_MT_omt_presets(bpy.types.Menu):
     bl_idname = "UV_MT_omt_presets"
-    bl_label = "Unwrap Presets"
+    bl_label = "OMT Presets"
 
     def draw(self, _context: bpy.types.Context) -> None:
         from ..preset_files import files
 
-        for path in files("uv.omt_unwrap"):
-            entry = self.layout.operator("uv.omt_preset", text=path.stem.replace("_", " "), translate=False)
-            entry.operator, entry.filepath = "uv.omt_unwrap", str(path)
+        for operator in filter(class_of, WITH_PRESETS):
+            for path in files(operator):
+                entry = self.layout.operator("uv.omt_preset", text=path.stem.replace("_", " "), translate=False)
+                entry.operator, entry.filepath = operator, str(path)
+            self.layout.separator()
 
 
 def _panels() -> list[type]:

@@ -169,15 +169,19 @@ def test_wrong_modes_grey_the_buttons(package, mode):
         assert not scenes.class_of(name).poll(bpy.context)
 
 
-def test_presets_name_what_the_operator_has(package):
+@pytest.mark.parametrize(
+    ("operator", "names"), [("uv.omt_unwrap", {"Character", "Scan", "Lightmap"}), ("uv.omt_sphere", {"Globe"})]
+)
+def test_presets_name_what_the_operator_has(package, operator, names):
     presets = package("preset_files")
-    files = presets.files("uv.omt_unwrap")
-    assert {"Character", "Scan", "Lightmap"} <= {path.stem for path in files}
-    properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    files = presets.files(operator)
+    assert names <= {path.stem for path in files}
+    assert "PRESET" in scenes.class_of(operator).bl_options
+    properties = bpy.context.window_manager.operator_properties_last(operator)
     for path in files:
         values = presets.values(path)
-        assert values.keys() <= settings_of("uv.omt_unwrap")
-        assert bpy.ops.uv.omt_preset(operator="uv.omt_unwrap", filepath=str(path)) == {"FINISHED"}
+        assert values.keys() <= settings_of(operator)
+        assert bpy.ops.uv.omt_preset(operator=operator, filepath=str(path)) == {"FINISHED"}
         for name, value in values.items():
             assert getattr(properties, name) == pytest.approx(value)
     for prop in properties.bl_rna.properties:

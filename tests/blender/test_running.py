@@ -16,6 +16,7 @@ OPERATORS = {
     "uv.omt_unwrap": {},
     "uv.omt_refine": {},
     "uv.omt_seams": {},
+    "uv.omt_sphere": {"quality": "DRAFT"},
     "object.omt_remesh": {"target_vertices": 60},
 }
 # Those that make new objects work in Object Mode alone.
@@ -26,9 +27,11 @@ CASES = [
 
 def scene(name, mode):
     """A mesh on which the operator has something to do."""
-    if name == "uv.omt_seams":
-        bpy.ops.mesh.primitive_cube_add()
+    if name in {"uv.omt_seams", "uv.omt_sphere"}:
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
         obj = bpy.context.object
+        obj.scale = (1, 2, 1)
+        bpy.context.view_layer.update()
     else:
         obj = scenes.bump(20, 16)
         scenes.set_uv(obj, scenes.seen_from_above(obj))
