@@ -9,6 +9,7 @@ import pytest
 from omt_uv.solver import transfer
 from omt_uv.solver.closest import ClosestPoint, vertex_normals
 from omt_uv.solver.features import region_borders, sharp_edges, value_jumps
+from omt_uv.solver.sides import cut_open
 from omt_uv.solver.topology import halfedges, pair_keys
 
 
@@ -118,6 +119,30 @@ def test_a_seam_that_is_kept_is_followed_and_both_sides_are_exact(scale, offset)
     assert np.abs(new - meridian((W - offset) / scale, G)[0]).max() < 1e-6 * (1 + 1e-3 * offset)
     assert at.extended == 0
     assert edge_set(at.seams) == edge_set(coarse)
+
+
+def test_a_mesh_that_is_cut_open_keeps_its_two_boundaries_apart_though_they_touch():
+    """As files without shared vertices have it: every point of the cut is a point of both boundaries."""
+    V, F, corners, uv, W, G, coarse = coarse_seam()
+    V, F = opened(V, F, value_jumps(F, corners, uv, 1e-6))
+    W, G = opened(W, G, coarse)
+    on = ClosestPoint(V, F, 0.2)(W, vertex_normals(W, G))
+    at = laid(V, F, np.zeros((0, 2), np.int64), W, G, on)
+    assert np.abs(transfer.to_corners(at, corners, uv, extend=True) - meridian(W, G)[0]).max() < 1e-6
+    # Vertices too take what is on their own side; here every boundary vertex has one longitude.
+    longitude = np.zeros(len(V))
+    longitude[F.ravel()] = uv[:, 0]
+    assert np.abs(transfer.to_vertices(at, F, longitude)[G] - meridian(W, G)[0][:, 0].reshape(-1, 3)).max() < 1e-6
+    assert not len(at.seams)
+    assert at.extended == 0
+
+
+def opened(V, F, seams):
+    """A mesh whose vertices on seams are one for every side."""
+    sides = cut_open(V, F, seams).sides
+    points = np.zeros((sides.max() + 1, 3))
+    points[sides.ravel()] = V[F.ravel()]
+    return points, sides
 
 
 def test_faces_take_the_value_under_them_and_borders_that_are_kept_stay():

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from .closest import ClosestPoint, face_normals
 from .sides import ON_EDGE, CutMesh, apart, cut_open, descend, on_seam
-from .topology import halfedges, pair_keys, pair_up
+from .topology import halfedges, pair_keys, pair_up, twins
 
 # Nearer than this share of the extent is the same point.
 SAME_POINT = 1e-7
@@ -70,20 +70,42 @@ def footprint(
     )
     home, corner_triangle = found.faces.copy(), faces[new_triangles]
     corner_weights, side = barycentric[new_triangles], np.full(new_triangles.shape, -1, np.int64)
-    extended = 0
     lifted = _lift(positions, triangles, faces, barycentric)
-    if len(seams):
-        mesh = cut_open(positions, triangles, seams)
-        near = _near_seams(mesh, lifted[new_triangles], spacing)
+    mesh = cut_open(positions, triangles, np.concatenate([np.reshape(seams, (-1, 2)), rim_edges(triangles)]))
+    near = _near_seams(mesh, lifted[new_triangles], spacing)
+    extended = 0
+    if len(near):
         free = ~on_seam(mesh, faces, barycentric)
         witness = _witnesses(mesh, new_triangles, free, lifted, spacing)
         home[near] = _homes(mesh, new_triangles[near], free, faces[witness], found.points[near], home[near])
         corners = _corners(mesh, new_triangles[near], home[near], free, lifted, faces, barycentric)
         corner_triangle[near], corner_weights[near], side[near], extended = corners
-    else:
-        mesh = None
+        faces, barycentric = _settled(new_triangles, side, corner_triangle, corner_weights, faces, barycentric)
     breaks, origin = _breaks(mesh, new_triangles, side, lifted)
     return Footprint(new_triangles, faces, barycentric, corner_triangle, corner_weights, home, breaks, origin, extended)
+
+
+def rim_edges(triangles: np.ndarray) -> np.ndarray:
+    """Boundary edges (r,2). They part values like seams: two boundaries may touch all along, as in a mesh cut open."""
+    tail, head = halfedges(triangles)
+    rim = twins(triangles) < 0
+    return np.stack([tail[rim], head[rim]], axis=1)
+
+
+def _settled(
+    new_triangles: np.ndarray,
+    side: np.ndarray,
+    corner_triangle: np.ndarray,
+    corner_weights: np.ndarray,
+    faces: np.ndarray,
+    barycentric: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangle (k,) and coordinates (k,3) of the new vertices, those on seams where one of their corners is."""
+    known = np.flatnonzero(side.ravel() >= 0)
+    vertex = new_triangles.ravel()[known]
+    faces, barycentric = faces.copy(), barycentric.copy()
+    faces[vertex], barycentric[vertex] = corner_triangle.ravel()[known], corner_weights.reshape(-1, 3)[known]
+    return faces, barycentric
 
 
 def _spacing(positions: np.ndarray, triangles: np.ndarray) -> float:
@@ -172,18 +194,16 @@ def _corners(
     The side is -1 where a vertex has one only.
     """
     flat = new_triangles.ravel()
-    end, reached = _sought(mesh, np.repeat(home, 3), lifted[flat], faces[flat], free[flat])
+    end, reached, own = _sought(mesh, np.repeat(home, 3), lifted[flat], faces[flat], free[flat])
     weights = _coordinates(mesh, lifted[flat], end)
     weights[reached] = np.clip(weights[reached], 0, 1)
     weights /= weights.sum(axis=1, keepdims=True)
-    # Where a vertex has one side only, its own coordinates are exact.
-    own = reached & free[flat]
     end[own], weights[own] = faces[flat[own]], barycentric[flat[own]]
     # At an old vertex a side is a fan of triangles, on an old edge one triangle.
     corner = weights.argmax(axis=1)
     at_vertex = weights.max(axis=1) > 1 - 2 * ON_EDGE
     side = np.where(at_vertex, len(mesh.triangles) + mesh.sides[end, corner], end)
-    side = np.where(own, -1, side)
+    side = np.where(own & free[flat], -1, side)
     side = np.where(reached, side, -2 - end)
     extended = int((~reached).reshape(-1, 3).any(axis=1).sum())
     shape = new_triangles.shape
@@ -192,19 +212,21 @@ def _corners(
 
 def _sought(
     mesh: CutMesh, start: np.ndarray, points: np.ndarray, faces: np.ndarray, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Triangles (k,) as near to points (k,3) as a way from `start` (k,) leads, and whether it leads there.
 
-    faces (k,): triangles that the points lie on; free (k,): these are the only ones, up to their neighbours
+    faces (k,): triangles that the points lie on, the only ones for `free` (k,) points. Returned last: whether these
+    are on the same side as `start`, so that what is known of the points holds.
     """
     end, distance = descend(mesh, points, start)
     reached = distance <= SAME_POINT * np.ptp(mesh.positions, axis=0).max()
-    stuck = np.flatnonzero(free & ~reached)
+    own = reached & free
+    stuck = np.flatnonzero(~reached)
     corners = mesh.positions[mesh.triangles[start[stuck]]]
     size = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
     limit = LONGEST_WAY * np.linalg.norm(points[stuck] - corners.mean(axis=1), axis=1) + size
-    reached[stuck] = ~apart(mesh, start[stuck], faces[stuck], limit, size)
-    return end, reached
+    own[stuck] = ~apart(mesh, start[stuck], faces[stuck], limit, size)
+    return end, reached | own, own
 
 
 def _coordinates(mesh: CutMesh, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -223,10 +245,10 @@ def _coordinates(mesh: CutMesh, points: np.ndarray, faces: np.ndarray) -> np.nda
 
 
 def _breaks(
-    mesh: CutMesh | None, new_triangles: np.ndarray, side: np.ndarray, lifted: np.ndarray
+    mesh: CutMesh, new_triangles: np.ndarray, side: np.ndarray, lifted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """New edges (s,2) whose two faces see different sides at an end, and the old seam halfedge (s,) next to each."""
-    if mesh is None or not mesh.seam.any():
+    if not mesh.seam.any():
         return np.zeros((0, 2), np.int64), np.zeros(0, np.int64)
     tail, head = halfedges(new_triangles)
     first, second = pair_up(pair_keys(tail, head))

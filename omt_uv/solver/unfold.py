@@ -18,9 +18,9 @@ from .linear import solve_general
 from .topology import halfedges, pair_keys, pair_up
 
 MOST_RINGS = 6
-# A face with less than this share of the median area is as good as folded.
+# A face with less area than this share of the square of its longest side is as good as folded.
 LEAST_AREA = 1e-6
-# What is pushed open gets this share of the median area, in as many rounds at most.
+# What is pushed open gets this share of the area of the faces around it, in as many rounds at most.
 PUSHED_AREA = 0.05
 PUSH_ROUNDS = 30
 
@@ -67,8 +67,16 @@ def _agreed(faces: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 
 def _folded(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
-    area = side * signed_areas(uv, faces)
-    return (area <= LEAST_AREA * np.median(np.abs(area))) & (side != 0)
+    longest = halfedge_lengths(uv, faces).reshape(-1, 3).max(axis=1)
+    return (side * signed_areas(uv, faces) <= LEAST_AREA * longest**2) & (side != 0)
+
+
+def _area_around(uv: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Mean area (t,) of the faces that share a vertex with each; maps may differ in scale by powers of ten."""
+    area = np.abs(signed_areas(uv, faces))
+    count = np.bincount(faces.ravel(), minlength=len(uv))
+    mean = np.bincount(faces.ravel(), np.repeat(area, 3), len(uv)) / np.maximum(count, 1)
+    return mean[faces].mean(axis=1)
 
 
 def _averaged(uv: np.ndarray, faces: np.ndarray, side: np.ndarray, fixed: np.ndarray) -> np.ndarray:
@@ -133,7 +141,7 @@ def _pushed(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
     Every round takes, for each such face by itself, the least step that gives it the area.
     """
     best = current = uv
-    goal = PUSHED_AREA * np.median(np.abs(signed_areas(uv, faces)))
+    goal = PUSHED_AREA * _area_around(uv, faces)
     folded = _folded(uv, faces, side)
     pushed, fewest = folded, int(folded.sum())
     for _ in range(PUSH_ROUNDS):
@@ -143,7 +151,7 @@ def _pushed(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
         low = np.flatnonzero(pushed & (area < goal / 2))
         current = current.copy()
         np.add.at(
-            current, faces[low].ravel(), _opening(current[faces[low]], side[low], goal - area[low]).reshape(-1, 2)
+            current, faces[low].ravel(), _opening(current[faces[low]], side[low], (goal - area)[low]).reshape(-1, 2)
         )
         folded = _folded(current, faces, side)
         pushed = pushed | folded

@@ -365,3 +365,102 @@ def test_edit_mode_says_why_not():
     obj = ball()
     scenes.edit(obj)
     assert not bpy.ops.object.omt_remesh.poll()
+
+
+@pytest.fixture
+def run(package, capfd):
+    """Run the command in this process: exit status, standard output, standard error."""
+
+    def command(*arguments):
+        capfd.readouterr()
+        status = package("cli").main([str(a) for a in arguments])
+        return status, *capfd.readouterr()
+
+    return command
+
+
+def write_ball(path):
+    obj = ball(centre=(1.0, 2.0, 3.0))
+    co = [tuple(v.co) for v in obj.data.vertices]
+    lines = ["v {:.9g} {:.9g} {:.9g}".format(*p) for p in co]
+    lines += ["f " + " ".join(str(i + 1) for i in p.vertices) for p in obj.data.polygons]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def read_points(path):
+    lines = [line.split() for line in path.read_text().splitlines()]
+    return np.array([list(map(float, line[1:4])) for line in lines if line[:1] == ["v"]])
+
+
+def test_command_writes_the_new_mesh_alone_in_the_coordinates_of_the_input(run, tmp_path):
+    write_ball(tmp_path / "in.obj")
+    status, _, err = run("remesh", tmp_path / "in.obj", "-o", tmp_path / "out.obj", "--vertices", 200)
+    assert (status, err) == (0, "")
+    points = read_points(tmp_path / "out.obj")
+    assert len(points) == 200
+    assert np.abs(np.linalg.norm(points - [1, 2, 3], axis=1) - 1).max() < 0.1
+
+
+def test_command_writes_a_file_for_every_level(run, tmp_path):
+    write_ball(tmp_path / "in.obj")
+    status, _, err = run(
+        "remesh", tmp_path / "in.obj", "-o", tmp_path / "o.obj", "--faces", 400, "--levels", 3, "--ratio", 0.5
+    )
+    assert (status, err) == (0, "")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["in.obj", "o_LOD0.obj", "o_LOD1.obj", "o_LOD2.obj"]
+    # A closed surface has two vertices more than half of its triangles.
+    assert [len(read_points(tmp_path / f"o_LOD{k}.obj")) for k in range(3)] == [202, 102, 52]
+
+
+def test_command_writes_both_objects_to_a_blend_file(run, tmp_path):
+    write_ball(tmp_path / "in.obj")
+    status, _, _ = run("remesh", tmp_path / "in.obj", "-o", tmp_path / "out.blend", "--edge", 0.3)
+    assert status == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    assert {obj.name for obj in bpy.data.objects} == {"in", "in_remesh"}
+
+
+@pytest.mark.parametrize("arguments, words", [
+    ([], "--vertices --faces --edge"),
+    (["--vertices", 100, "--faces", 200], "not allowed with"),
+    (["--vertices", 0], "a number above 0"),
+    (["--vertices", 3], "at least"),
+    (["--edge", "nan"], "a number above 0"),
+    (["--vertices", 100, "--density", "nowhere"], "no vertex group 'nowhere'"),
+    (["--vertices", 100, "--levels", 2, "--ratio", 1.5], "between 0 and 1"),
+])  # fmt: skip
+def test_command_says_what_is_wrong_with_its_arguments(run, tmp_path, arguments, words):
+    write_ball(tmp_path / "in.obj")
+    status, _, err = run("remesh", tmp_path / "in.obj", "-o", tmp_path / "out.obj", *arguments)
+    assert status != 0
+    assert words in err
+    assert not (tmp_path / "out.obj").exists()
+
+
+def test_glb_is_joined_where_the_format_had_to_split_it(run, tmp_path):
+    """A file of this format has a vertex for every UV; the new mesh must not come apart along the seams."""
+    obj = scenes.cube()
+    bpy.ops.uv.omt_unwrap()
+    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "in.glb"), export_format="GLB", use_selection=True)
+    assert obj.name == "Cube"
+    status, _, _ = run("remesh", tmp_path / "in.glb", "-o", tmp_path / "out.blend", "--vertices", 300, "--sharp")
+    assert status == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    mesh = bpy.data.objects["Cube_remesh"].data
+    assert len(mesh.vertices) - len(mesh.edges) + len(mesh.polygons) == 2
+
+
+@pytest.mark.parametrize("count", [150, 900])
+def test_carried_uvs_have_no_fold_and_as_many_islands(count):
+    """Closed, cut open by seams that zigzag over the faces, unwrapped, and remeshed coarser and finer."""
+    obj = ball(rings=16, sectors=24)
+    scenes.select([obj])
+    bpy.ops.uv.omt_unwrap()
+    space, area = scenes.areas(obj)
+    (new,) = remesh(target_vertices=count)
+    new_space, new_area = scenes.areas(new)
+    assert (area > 0).all()
+    assert (new_area > 0).all()
+    # Texels per area stay what they were, which the source has even to a percent.
+    density = new_area / new_space
+    assert np.percentile(density, [5, 95]) == pytest.approx(area.sum() / space.sum(), rel=0.25)

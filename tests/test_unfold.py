@@ -1,0 +1,80 @@
+"""Folds of carried UVs: opened where they are, nothing else moved, and no fold opened that was meant."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.geometry import signed_areas
+from omt_uv.solver.topology import boundary_loops
+from omt_uv.solver.unfold import straightened
+
+
+def flat(columns=12, rows=10):
+    V, F = meshes.bumpy(columns, rows, height=0.0)
+    return V[:, :2], F
+
+
+def corners(uv, F):
+    return uv[F].reshape(-1, 2)
+
+
+def areas(values):
+    return signed_areas(values, np.arange(len(values)).reshape(-1, 3))
+
+
+def test_a_sound_map_keeps_every_bit():
+    uv, F = flat()
+    values = corners(uv, F)
+    new, left = straightened(F, values, np.ones(len(F)))
+    assert left == 0
+    assert new.tobytes() == values.tobytes()
+
+
+@pytest.mark.parametrize("scale, offset", [(1.0, 0.0), (1e-5, 0.0), (1e3, 1e4)])
+@pytest.mark.parametrize("mirrored", [1, -1])
+def test_folds_are_opened_and_the_rest_stays(scale, offset, mirrored):
+    uv, F = flat()
+    wrong = uv.copy()
+    middle = np.argsort(np.linalg.norm(uv - uv.mean(axis=0), axis=1))[0]
+    wrong[middle] += 2.2 * (uv[F[0]].max(axis=0) - uv[F[0]].min(axis=0))
+    wrong = wrong * [mirrored * scale, scale] + offset
+    values = corners(wrong, F)
+    assert (mirrored * areas(values) <= 0).any()
+    new, left = straightened(F, values, np.full(len(F), mirrored))
+    assert left == 0
+    assert (mirrored * areas(new) > 0).all()
+    far = np.linalg.norm(uv - uv[middle], axis=1) > 0.6
+    assert (new[far[F.ravel()]] == values[far[F.ravel()]]).all()
+
+
+def test_a_corner_of_the_outline_that_is_folded_in_is_pushed_open():
+    uv, F = flat()
+    a, b = boundary_loops(F)[0][:2]
+    out = np.array([uv[b, 1] - uv[a, 1], uv[a, 0] - uv[b, 0]])
+    F = np.concatenate([F, [[b, a, len(uv)]]])
+    # The tip is on the wrong side of its base, inside of the map.
+    wrong = np.concatenate([uv, [(uv[a] + uv[b]) / 2 - 0.4 * out]])
+    new, left = straightened(F, corners(wrong, F), np.ones(len(F)))
+    assert left == 0
+    assert (areas(new) > 0).all()
+
+
+def test_a_map_that_folds_along_a_line_of_symmetry_is_left_alone():
+    """Both halves of a face on one half of the texture: an island that is connected, and folded on purpose."""
+    uv, F = flat()
+    centre = uv[F].mean(axis=1)[:, 0] > np.median(np.unique(uv[:, 0]))
+    folded = np.stack([np.abs(uv[:, 0] - np.median(np.unique(uv[:, 0]))), uv[:, 1]], axis=1)
+    values = corners(folded, F)
+    new, left = straightened(F, values, np.where(centre, 1, -1))
+    assert left == 0
+    assert (new == values).all()
+
+
+def test_uvs_without_extent_are_left_alone():
+    _, F = flat()
+    values = np.zeros((F.size, 2))
+    new, left = straightened(F, values, np.zeros(len(F)))
+    assert left == 0
+    assert (new == values).all()
