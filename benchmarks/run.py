@@ -8,6 +8,7 @@ lion        conformal map and transport alone against Minimum Stretch with 50 it
 profile     where our time goes, stage by stage
 memory      peak memory of the unwrap of 100,000 faces
 magnify     the share that a painted region gets, and Minimum Stretch with the same vertex group
+sphere      closed surfaces to the sphere: area, shear, folds, Newton steps, and time against Minimum Stretch
 latency     how long Blender waits for a slice of a run and for Esc, wall clock
 """
 
@@ -247,6 +248,12 @@ def latency(args):
     return latency_part(args)
 
 
+def sphere(args):
+    from sphere import sphere_part
+
+    return sphere_part(args)
+
+
 PARTS = {
     "transport": transport_part,
     "lion": lion_part,
@@ -255,6 +262,7 @@ PARTS = {
     "memory": memory_part,
     "magnify": magnify,
     "latency": latency,
+    "sphere": sphere,
 }
 
 

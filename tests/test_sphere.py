@@ -5,11 +5,17 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import errors
+from omt_uv.solver.coarsening import coarsened
+from omt_uv.solver.energy import derivatives_of, elements
 from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
 from omt_uv.solver.moebius import boost, centred, to_plane, to_sphere
+from omt_uv.solver.newton import Assembly
 from omt_uv.solver.progress import drain
 from omt_uv.solver.sphere import sphere_map
 from omt_uv.solver.sphere_conformal import conformal_sphere
+from omt_uv.solver.sphere_multilevel import multilevel_start
+from omt_uv.solver.sphere_newton import SphereProblem, derivatives, moved, newton_direction, seen, tangents
+from omt_uv.solver.sphere_refine import sphere_refine
 from omt_uv.solver.sphere_transport import sphere_transport
 from omt_uv.solver.spherical import normalized, signed_volumes, spherical_areas
 from omt_uv.solver.spherical_power import Hull, by_flips, by_hull, spherical_cells
@@ -212,14 +218,14 @@ def test_the_plane_agrees():
     """Stereographic projection, spherical measure on the plane, one unbounded cell (Su 2015): the same areas."""
     V, F = blob(2)
     found = drain(conformal_sphere(V, F))
-    moved = drain(sphere_transport(found.sites, vertex_areas(V, F)))
-    cells = moved.cells
+    carried = drain(sphere_transport(found.sites, vertex_areas(V, F)))
+    cells = carried.cells
     # Turned so that one site is the pole, far inside its cell.
     k = 7
     turn = np.linalg.svd(found.sites[k][None])[2][[1, 2, 0]]
     turn[2] = found.sites[k]
     turn[0] *= np.sign(np.linalg.det(turn))
-    np.testing.assert_allclose(plane_areas(found.sites @ turn.T, moved.weights, k), cells.area, atol=1e-7)
+    np.testing.assert_allclose(plane_areas(found.sites @ turn.T, carried.weights, k), cells.area, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -228,10 +234,10 @@ def test_transport(name):
     found = drain(conformal_sphere(V, F))
     mass = vertex_areas(V, F)
     hull = Hull(found.triangles, twins(found.triangles))
-    moved = drain(sphere_transport(found.sites, mass, hull=hull))
-    assert moved.residual <= 1e-6 and moved.iterations <= 25
-    np.testing.assert_allclose(moved.cells.area, 4 * np.pi * mass / mass.sum(), rtol=1e-6)
-    np.testing.assert_allclose(moved.cells.area.sum(), 4 * np.pi, rtol=1e-12)
+    carried = drain(sphere_transport(found.sites, mass, hull=hull))
+    assert carried.residual <= 1e-6 and carried.iterations <= 25
+    np.testing.assert_allclose(carried.cells.area, 4 * np.pi * mass / mass.sum(), rtol=1e-6)
+    np.testing.assert_allclose(carried.cells.area.sum(), 4 * np.pi, rtol=1e-12)
 
 
 def test_transport_refuses_masses_that_are_not_positive():
@@ -278,3 +284,138 @@ def test_map(name):
         assert figures(V, F, found.positions)[0] == 0 and len(found.warnings) == 1
     else:
         check(V, F, found)
+
+
+def star(length=12):
+    """A cube with six arms, each a row of cubes: conformally, their ends vanish."""
+    cells = {(0, 0, 0)}
+    for axis in range(3):
+        cells |= {tuple(sign * k * (np.arange(3) == axis)) for k in range(1, length) for sign in (-1, 1)}
+    quads = []
+    for cell in sorted(cells):
+        for axis in range(3):
+            u, v = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
+            for sign in (0, 1):
+                step = np.eye(3, dtype=int)[axis]
+                if tuple(np.array(cell) + (2 * sign - 1) * step) not in cells:
+                    base = np.array(cell) + sign * step
+                    quad = [base, base + u, base + u + v, base + v]
+                    quads += quad if sign else quad[::-1]
+    V, index = np.unique(quads, axis=0, return_inverse=True)
+    Q = index.reshape(-1, 4)
+    return V.astype(float), np.concatenate([Q[:, [0, 1, 2]], Q[:, [0, 2, 3]]])
+
+
+def test_long_limbs_are_mapped_from_coarse_to_fine():
+    """Where the conformal map leaves double precision there still is a map without folds, and the result says so."""
+    V, F = star(30)
+    found = drain(sphere_map(V, F))
+    assert any("coarse to fine" in w for w in found.warnings)
+    assert (signed_volumes(found.positions, F) > 0).all() and (signed_volumes(found.conformal, F) > 0).all()
+    np.testing.assert_allclose(spherical_areas(found.positions, F).sum(), 4 * np.pi, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_coarse_to_fine_never_folds(name):
+    V, F = SHAPES[name]
+    area = face_areas(V, F)
+    for level in (levels := coarsened(V, F, area)):
+        assert len(level.triangles) == 2 * len(level.vertices) - 4 and (twins(level.triangles) >= 0).all()
+        np.testing.assert_allclose(level.mass.sum(), area.sum())
+        assert len(level.mass) == len(level.triangles) and level.mass.min() > 0
+    assert len(levels[-1].vertices) == 4
+    p, _ = drain(multilevel_start(V, F, area))
+    assert (signed_volumes(p, F) > 0).all()
+
+
+def test_both_starts_lead_to_the_same_shear():
+    V, F = blob(2)
+    area = face_areas(V, F)
+    found = drain(sphere_map(V, F, quality="exact"))
+    start, _ = drain(multilevel_start(V, F, area))
+    other = drain(sphere_refine(V, F, start, area, quality="exact"))
+    u, _, v = np.linalg.svd(found.positions.T @ other.positions)
+    assert np.abs(found.positions @ u @ v - other.positions).max() < 0.05
+
+
+def test_folds_are_straightened():
+    V, F = blob()
+    p = normalized(V)
+    rng = np.random.default_rng(0)
+    tangled = normalized(p + 0.05 * rng.normal(size=p.shape) * (rng.random((len(p), 1)) < 0.1))
+    assert not (signed_volumes(tangled, F) > 0).all()
+    found = drain(sphere_refine(V, F, tangled, face_areas(V, F)))
+    assert found.untangling > 0 and (signed_volumes(found.positions, F) > 0).all()
+
+
+def test_the_slope_is_the_derivative():
+    V, F = blob(1)
+    target = face_areas(V, F)
+    target *= 4 * np.pi / target.sum()
+    faces = elements(V, F, target)
+    problem = SphereProblem(faces, target, faces.ratio, Assembly(F, len(V)), 3.0)
+    p = normalized(V)
+    axes, face = tangents(p), seen(p, F)
+    local = derivatives_of(faces, *derivatives(faces, face.corner), 3.0, 1.0)
+    direction, slope = newton_direction(faces, problem.assembly, p, axes, face, local)
+    before, after = (problem.energy(moved(p, axes, s * direction)) for s in (-1e-6, 1e-6))
+    np.testing.assert_allclose((after - before) / 2e-6, slope, rtol=1e-5)
+
+
+def test_density():
+    V, F = blob(3, 5)
+    density = np.where(V[F].mean(1)[:, 2] > 0.3, 4.0, 1.0)
+    check(V, F, drain(sphere_map(V, F, density=density)), density)
+    for wrong in (0.0, -1.0, np.nan):
+        density[7] = wrong
+        with pytest.raises(errors.DensityError) as caught:
+            drain(sphere_map(V, F, density=density))
+        assert caught.value.elements.tolist() == [7]
+
+
+def test_balance_trades_area_for_shear():
+    V, F = blob(3, 6)
+    shear, error = [], []
+    for balance in (0.0, 0.3, 0.6, 1.0):
+        found = drain(sphere_map(V, F, balance=balance))
+        a, b = derivatives(elements(V, F, face_areas(V, F)), seen(found.positions, F).corner)
+        shear.append((np.abs(b) / np.abs(a)).mean())
+        error.append(figures(V, F, found.positions)[1])
+    assert (np.diff(shear) < 0).all() and (np.diff(error) > 0).all()
+    with pytest.raises(ValueError, match="balance"):
+        drain(sphere_map(V, F, balance=1.5))
+
+
+def test_exact_is_more_exact():
+    V, F = blob(3, 7)
+    assert figures(V, F, drain(sphere_map(V, F, quality="exact")).positions)[1] <= 0.001
+
+
+@pytest.mark.parametrize("scale, offset", [(1e-3, 0.0), (1e4, 0.0), (1.0, 1e5)])
+def test_pose_does_not_count(scale, offset):
+    V, F = blob(2)
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    p, q = (drain(sphere_map(x, F)).positions for x in (V, scale * V @ turn.T + offset))
+    u, _, v = np.linalg.svd(q.T @ p)
+    np.testing.assert_allclose(q @ u @ v, p, atol=1e-3)
+
+
+def test_the_same_twice():
+    V, F = blob(2)
+    np.testing.assert_array_equal(*(drain(sphere_map(V, F)).positions for _ in range(2)))
+
+
+MODELS = ["spot", "bunny_small", "max_planck"]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_models(name):
+    if not meshes.model_path(name):
+        pytest.skip(f"no {name} in {meshes.models_folder()}: set OMT_UV_MODELS")
+    V, F = meshes.load_model(name)
+    check(V, F, drain(sphere_map(V, F)))
+    found = drain(conformal_sphere(V, F))
+    mass = vertex_areas(V, F)
+    carried = drain(sphere_transport(found.sites, mass, hull=Hull(found.triangles, twins(found.triangles))))
+    assert carried.residual <= 1e-6 and carried.iterations <= 25

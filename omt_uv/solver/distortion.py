@@ -166,10 +166,10 @@ def _measure_faces(V, F, uv, area):
     mirrored = np.bincount(chart, uv_area, charts) < 0
     weight = area / area.sum()
     share = np.where(mirrored[chart], -uv_area, uv_area) / max(np.abs(uv_area).sum(), np.finfo(float).tiny)
-    return _Faces(weight, share / weight, _shear(V, F, a, b), charts)
+    return _Faces(weight, share / weight, shear_of(V, F, a, b), charts)
 
 
-def _shear(V, F, a, b):
+def shear_of(V, F, a, b):
     """s1/s2 (m,) of the maps that send the edges 01 and 02 of the faces to `a` and `b` (m,2), capped."""
     e, f = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
     base = np.linalg.norm(e, axis=1)

@@ -87,7 +87,7 @@ def sphere_map(
         start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *ANEW)
         refined = yield from _refined(surface, start, target, options)
     if balance == 0 and refined.area_error > QUALITIES[quality].area_error:
-        warnings.append(f"Areas of faces are off by {100 * refined.area_error:.1f} % on average")
+        warnings.append(f"An area error of {100 * refined.area_error:.1f} % is left")
     conformal = found.positions if found else (yield from _least_shear(surface, refined))
     return SphereMap(
         refined.positions, conformal, refined.status, refined.iterations, refined.residual, tuple(warnings)

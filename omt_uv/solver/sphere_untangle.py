@@ -41,7 +41,7 @@ def untangle_on_sphere(
     """
     # In units of the areas asked for; faces of little area must not fold either.
     even = np.full(len(faces.area), 1 / len(faces.area))
-    faces = replace(faces, gradient=faces.gradient / np.sqrt(faces.ratio)[:, None], area=(faces.area + even) / 2)
+    faces = replace(faces, gradient=faces.gradient / np.sqrt(faces.ratio)[:, None], weight=(faces.weight + even) / 2)
     most = None
     for k in range(MAX_STEPS):
         folds = int((~(signed_volumes(positions, faces.triangles) > 0)).sum())
@@ -86,7 +86,7 @@ def _chi(det: np.ndarray, eps: float) -> tuple[np.ndarray, np.ndarray, np.ndarra
 def _energy(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> float:
     outer, inner = squared(a), squared(b)
     chi, _, _ = _chi(outer - inner, eps)
-    return float(faces.area @ ((outer + inner) / chi + AREA_WEIGHT * (chi + 1 / chi) / 2))
+    return float(faces.weight @ ((outer + inner) / chi + AREA_WEIGHT * (chi + 1 / chi) / 2))
 
 
 def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> Local:
@@ -98,12 +98,16 @@ def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> Local:
     slope = AREA_WEIGHT / 2 * (1 - 1 / chi**2) * first
     bend = AREA_WEIGHT * (first**2 / chi**3 + (1 - 1 / chi**2) * second / 2)
     quotient = total * (2 * first**2 / chi**3 - second / chi**2) + bend
-    area = faces.area
-    by_outer = area * (1 / chi - total * first / chi**2 + slope)
-    by_inner = area * (1 / chi + total * first / chi**2 - slope)
-    oo = area * (quotient - 2 * first / chi**2)
-    ii = area * (quotient + 2 * first / chi**2)
-    block = 2 * by_outer + 4 * outer * oo, -4 * area * np.sqrt(outer * inner) * quotient, 2 * by_inner + 4 * inner * ii
+    weight = faces.weight
+    by_outer = weight * (1 / chi - total * first / chi**2 + slope)
+    by_inner = weight * (1 / chi + total * first / chi**2 - slope)
+    oo = weight * (quotient - 2 * first / chi**2)
+    ii = weight * (quotient + 2 * first / chi**2)
+    block = (
+        2 * by_outer + 4 * outer * oo,
+        -4 * weight * np.sqrt(outer * inner) * quotient,
+        2 * by_inner + 4 * inner * ii,
+    )
     return local_of(faces, a, b, (by_outer, by_inner), (by_outer, by_inner), block)
 
 
