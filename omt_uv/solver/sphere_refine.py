@@ -72,7 +72,7 @@ def sphere_refine(
     start, steps = yield from untangle_on_sphere(problem.faces, problem.assembly, positions[order])
     folded = np.flatnonzero(~(signed_volumes(start, problem.faces.triangles) > 0))
     if len(folded):
-        raise FoldedUVError("The start of the refinement is folded on the sphere", kind="face", elements=folded)
+        raise FoldedUVError("Folds of the transport map could not be straightened", kind="face", elements=folded)
     found = yield from _stages(problem, start, balance, QUALITIES[quality])
     yield Progress("Refinement", 1.0)
     return replace(found, positions=_in_order(found.positions, order), untangling=steps)

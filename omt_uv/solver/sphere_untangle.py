@@ -20,7 +20,7 @@ MAX_STEPS = 40
 MAX_HALVINGS = 12
 # eps is one of these shares of the worst fold, the next where no step helps, and at least LEAST.
 SHARES = (0.2, 1.0, 5.0)
-LEAST = 1e-6
+LEAST = 0.05
 # No vertex moves farther in a step.
 FARTHEST = 0.05
 # Folds may become this many times as many on the way.
