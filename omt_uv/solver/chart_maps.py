@@ -10,8 +10,8 @@ from .conformal import conformal_disk
 from .domain import Disk
 from .embedding import arc_length_parameters, tutte
 from .errors import PrecisionError, TransportError
+from .first_map import SITE_RESOLUTION, centroid_map
 from .geometry import halfedge_lengths, vertex_areas
-from .parameterize import SITE_RESOLUTION, centroid_map
 from .progress import Steps, part_of
 from .topology import boundary_loops
 from .transport import transport

@@ -79,15 +79,24 @@ def energy(faces: Elements, w: np.ndarray, balance: float) -> float:
 
 def energy_of(faces: Elements, a: np.ndarray, b: np.ndarray, balance: float) -> float:
     """The energy of the derivatives a, b (m,) complex; infinity where a face is folded."""
+    return float(_energies(faces, a, b, balance).sum())
+
+
+def energies(faces: Elements, w: np.ndarray, balance: float | np.ndarray) -> np.ndarray:
+    """The energy of every face (m,) of a map w (n,) complex, infinite where it is folded; balance: one, or (m,)."""
+    return _energies(faces, *faces.derivatives(w), balance)
+
+
+def _energies(faces, a, b, balance):
     outer, inner = squared(a), squared(b)
     det = outer - inner
-    if not det.min() > 0:
-        return np.inf
-    r = det / faces.ratio
-    return float(faces.weight @ (2 * inner / det + balance * ((r + 1 / r) / 2 - 1)))
+    good = det > 0
+    safe = np.where(good, det, 1)
+    r = safe / faces.ratio
+    return np.where(good, faces.weight * (2 * inner / safe + balance * ((r + 1 / r) / 2 - 1)), np.inf)
 
 
-def gradient(faces: Elements, w: np.ndarray, balance: float) -> np.ndarray:
+def gradient(faces: Elements, w: np.ndarray, balance: float | np.ndarray) -> np.ndarray:
     """Gradient (n,) complex: real part by u, imaginary part by v."""
     return scatter(faces, local_derivatives(faces, w, balance).gradient, len(w))
 
@@ -109,7 +118,9 @@ class Local:
     rows: np.ndarray
 
 
-def local_derivatives(faces: Elements, w: np.ndarray, balance: float, pressure: float = 1.0) -> Local:
+def local_derivatives(
+    faces: Elements, w: np.ndarray, balance: float | np.ndarray, pressure: float | np.ndarray = 1.0
+) -> Local:
     """Gradients and projected Hessians of all faces of a map w (n,) complex without folds.
 
     The area term bends the energy in two ways: by how fast its slope grows with the area, and by its slope times the
@@ -120,7 +131,9 @@ def local_derivatives(faces: Elements, w: np.ndarray, balance: float, pressure: 
     return derivatives_of(faces, *faces.derivatives(w), balance, pressure)
 
 
-def derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, balance: float, pressure: float) -> Local:
+def derivatives_of(
+    faces: Elements, a: np.ndarray, b: np.ndarray, balance: float | np.ndarray, pressure: float | np.ndarray
+) -> Local:
     """As `local_derivatives`, from the derivatives a, b (m,) complex of the map."""
     return local_of(faces, a, b, *_by_squares(faces, a, b, balance, pressure))
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from .energy import Elements, energy, local_derivatives, scatter, shortfall, squared
+from .energy import Elements, energies, local_derivatives, scatter, shortfall, squared
 from .linear import Factor
 
 ARMIJO = 1e-4
@@ -144,16 +144,16 @@ class Extra(Protocol):
 
 @dataclass(frozen=True)
 class Problem:
-    """What Newton minimises: faces, the weight of their area term, the motion of vertices, further energies."""
+    """What Newton minimises: faces, the weight of their area term, one or (m,), the motion, further energies."""
 
     faces: Elements
     assembly: Assembly
     motion: Motion
-    weight: float
+    weight: float | np.ndarray
     extras: tuple[Extra, ...] = ()
 
     def energy(self, w: np.ndarray) -> float:
-        value = energy(self.faces, w, self.weight)
+        value = float(energies(self.faces, w, self.weight).sum())
         return value + sum(e.energy(w) for e in self.extras) if np.isfinite(value) else value
 
     def area_error(self, w: np.ndarray) -> float:
@@ -173,7 +173,7 @@ class Step:
     share: float
 
 
-def newton_direction(problem: Problem, w: np.ndarray, pressure: float = 1.0) -> tuple[np.ndarray, float]:
+def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarray = 1.0) -> tuple[np.ndarray, float]:
     """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
     n, faces, motion = len(w), problem.faces, problem.motion
     local = local_derivatives(faces, w, problem.weight, pressure)
@@ -224,6 +224,11 @@ def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:
 
 def fold_share(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> float:
     """The smallest t > 0 at which a face with the derivatives a + t da, b + t db (m,) complex has no area."""
+    return float(fold_shares(a, b, da, db).min(initial=np.inf))
+
+
+def fold_shares(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> np.ndarray:
+    """The same for every face (m,); infinity where there is none."""
     c = squared(a) - squared(b)
     h = (a.conj() * da).real - (b.conj() * db).real
     q = squared(da) - squared(db)
@@ -231,7 +236,7 @@ def fold_share(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> 
     root = h * h - q * c
     denominator = -h + np.sqrt(np.maximum(root, 0))
     hit = (root >= 0) & (denominator > 0)
-    return float((c[hit] / denominator[hit]).min(initial=np.inf))
+    return np.where(hit, c / np.where(hit, denominator, 1), np.inf)
 
 
 def linear_forms(vertices: np.ndarray, rows: np.ndarray, n: int) -> sp.csr_matrix:

@@ -6,35 +6,29 @@ Each stage may be replaced by a milder one where its mathematics leaves double p
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from .chart_pins import ChartPins, CornerPins, anchored, chart_pins, clear_of_pins, facing, refuse_outline
 from .charts import Chart, Surface, triangle_rows
-from .conformal import conformal_disk, conformal_rectangle, sharpest_corners
+from .conformal import sharpest_corners
 from .distortion import measure
 from .domain import Disk, Domain, Rectangle
-from .elliptic import centre_in_disk
-from .embedding import arc_length_parameters, tutte
-from .errors import FoldedUVError, MeshError, PrecisionError, TransportError
-from .geometry import face_areas, halfedge_lengths, signed_areas, vertex_areas
+from .errors import FoldedUVError, MeshError
+from .first_map import COARSE_ABOVE, FirstMap, Log, coarse_first_map, first_map, mean_value_sites
+from .geometry import face_areas, signed_areas
+from .many import Maps, solve_many
 from .measure import Target
 from .preparation import prepare
 from .progress import Progress, Steps, part_of
 from .refine import BOUNDARIES, Refinement, refine
 from .topology import boundary_loops
-from .transport import Transport, transport
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
-CONFORMAL, TRANSPORT, REFINEMENT = (0.0, 0.15), (0.15, 0.25), (0.4, 0.6)
-# Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
-# distance counts squared.
-SITE_RESOLUTION = 1e-7
-# A mean this near to the middle of the unit disk is there.
-CENTRED = 1e-3
+FIRST, REFINEMENT = (0.0, 0.4), (0.4, 0.6)
+# Charts of at most SMALL triangles are solved together where there are at least MANY, about BATCH triangles at a time.
+SMALL, MANY, BATCH = 1000, 8, 50_000
 
 
 @dataclass(frozen=True)
@@ -129,11 +123,18 @@ def unwrap(
     prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
     charts = prepared.charts
     held = [located_pins(pins, chart) for chart in charts]
-    maps = []
+    maps: list[ChartMap] = []
     total = sum(len(c.triangles) for c in charts)
-    done = 0.0
-    for chart, fixed in zip(charts, held, strict=True):
-        share = len(chart.triangles) / total
+    alike = [k for k, c in enumerate(charts) if boundary == "free" and target is None and held[k] is None and _small(c)]
+    done = sum(len(charts[k].triangles) for k in alike) / total
+    found = yield from part_of(_together([charts[k] for k in alike], quality, balance), 0.0, done)
+    together = dict(zip(alike, found, strict=True))
+    for k, (chart, fixed) in enumerate(zip(charts, held, strict=True)):
+        ready = together.get(k)
+        if ready is not None:
+            maps.append(ready)
+            continue
+        share = 0.0 if k in together else len(chart.triangles) / total
         options: dict = {"boundary": boundary, "quality": quality, "balance": balance, "pins": fixed}
         steps = unwrap_chart(chart, **options, **chart_target(target, surface, chart))
         try:
@@ -143,6 +144,56 @@ def unwrap(
         done += share
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
+
+
+def _small(chart: Chart) -> bool:
+    return len(chart.triangles) <= SMALL and not len(chart.patches)
+
+
+def _together(charts: list[Chart], quality: str, balance: float) -> Steps[list[ChartMap | None]]:
+    """Maps with free boundaries of small charts, solved together if they are many; None where one has to go alone."""
+    found: list[ChartMap | None] = [None] * len(charts)
+    if len(charts) < MANY:
+        return found
+    sizes = np.cumsum([len(c.triangles) for c in charts])
+    for batch in np.split(np.arange(len(charts)), np.flatnonzero(np.diff(sizes // BATCH)) + 1):
+        members = [charts[k] for k in batch]
+        begin = time.perf_counter()
+        done = float(sizes[batch[0]] / sizes[-1])
+        try:
+            boxes = [_in_unit_box(c.vertices) for c in members]
+            meshes = [(v, c.triangles) for (v, _), c in zip(boxes, members, strict=True)]
+            maps = yield from part_of(
+                solve_many(meshes, quality, balance), done, float(sizes[batch[-1]] / sizes[-1]) - done
+            )
+        except MeshError:
+            continue  # one of them is to blame, and will say so alone
+        seconds = (time.perf_counter() - begin) / len(members)
+        pieces = np.split(maps.uv, np.cumsum([len(v) for v, _ in meshes])[:-1])
+        for k, (vertices, unit), chart, uv, place in zip(batch, boxes, members, pieces, range(len(batch)), strict=True):
+            if maps.solved[place]:
+                uv = _in_place(uv, vertices, chart.triangles, None, unit, None)
+                found[k] = _of_many(maps, place, uv, seconds)
+    return found
+
+
+def _of_many(maps: Maps, k: int, uv: np.ndarray, seconds: float) -> ChartMap:
+    return ChartMap(
+        uv,
+        None,
+        None,
+        None,
+        None,
+        int(maps.steps[k]),
+        float(maps.residual[k]),
+        "converged",
+        float(maps.area_l1[k]),
+        float(maps.area_sd[k]),
+        float(maps.angle_mean[k]),
+        0,
+        (),
+        {"refinement": seconds},
+    )
 
 
 def chart_target(target: Target | None, surface: Surface, chart: Chart) -> dict:
@@ -200,7 +251,7 @@ def unwrap_chart(
     if boundary not in BOUNDARIES:
         raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
     refuse_outline(pins, boundary)
-    log = _Log()
+    log = Log()
     vertices, unit = _in_unit_box(chart.vertices)
     # Patches over holes are mapped with the rest, and forgotten afterwards.
     triangles = chart.disk
@@ -211,11 +262,14 @@ def unwrap_chart(
         boundary = "free"
     domain: Domain = Rectangle() if boundary == "square" else Disk()
     corners = sharpest_corners(vertices, triangles, loop) if boundary == "square" else None
-    mass = vertex_areas(vertices, triangles, density)
-    conformal, cells, uv = yield from _start(vertices, triangles, mass, loop, corners, domain, log)
-    wanted = None if density is None else face_areas(vertices, triangles) * density
+    area = face_areas(vertices, triangles)
+    wanted = None if density is None else area * density
+    asked_for = area if wanted is None else wanted
+    way = _first_map(vertices, triangles, asked_for, loop, corners, domain, boundary, balance, log)
+    first = yield from part_of(way, *FIRST)
+    conformal, cells = first.conformal, first.cells
     with log.timed("refinement"):
-        uv, held = facing(uv, pins)
+        uv, held = facing(first.uv, pins)
         options = {"target": wanted, "region": region, "balance": balance, "quality": quality, "pins": held}
         steps = _refined(vertices, triangles, uv, boundary, log, options)
         refined = yield from part_of(steps, *REFINEMENT)
@@ -243,67 +297,21 @@ def unwrap_chart(
     )
 
 
-def _start(vertices, triangles, mass, loop, corners, domain: Domain, log: _Log):
-    """Where the refinement starts: the conformal map or None, the transport or None, and coordinates (n,2).
-
-    The conformal map moved by the transport; where rounding decides where its points lie, a mean value map so moved.
-    """
-    conformal, sites, trouble = yield from _conformal_sites(vertices, triangles, corners, log)
-    if not trouble:
-        sites = _centred(sites, mass, triangles, loop) if corners is None else sites
-        cells, trouble = yield from _transport(sites, mass, domain, log)
-        if cells is not None:
-            return conformal, cells, centroid_map(cells, domain, loop, corners, log.warnings)
-    log.warnings.append(f"{trouble}; started from a mean value map instead")
-    sites = _mean_value_sites(vertices, triangles, loop, corners, domain)
-    cells, trouble = yield from _transport(sites, mass, domain, log)
-    if cells is None:
-        log.warnings.append(f"{trouble}; refined the embedding without transport")
-        return conformal, None, sites
-    return conformal, cells, centroid_map(cells, domain, loop, corners, log.warnings)
-
-
-def _conformal_sites(vertices, triangles, corners, log: _Log):
-    """Conformal map, its coordinates (n,2) in the domain, and why they cannot be used or an empty text."""
-    with log.timed("conformal"):
+def _first_map(
+    vertices, triangles, target, loop, corners, domain: Domain, boundary: str, balance: float, log: Log
+) -> Steps[FirstMap]:
+    """Where the refinement starts; a large chart with a free boundary comes by way of coarser ones."""
+    if boundary == "free" and len(vertices) > COARSE_ABOVE:
         try:
-            if corners is None:
-                conformal = yield from part_of(conformal_disk(vertices, triangles), *CONFORMAL)
-                sites = conformal.uv
-            else:
-                conformal = yield from part_of(conformal_rectangle(vertices, triangles, corners), *CONFORMAL)
-                sites = conformal.uv / [1, conformal.aspect] - 0.5
-        except PrecisionError as error:
-            return None, None, error.cause
-        nearest = halfedge_lengths(sites, triangles).min()
-        if nearest < SITE_RESOLUTION:
-            trouble = f"The conformal map puts neighbours {nearest:.0e} apart, too close for the transport"
-            return conformal, None, trouble
-        return conformal, sites, ""
+            found = yield from coarse_first_map(vertices, triangles, target, loop, balance, log)
+            if found is not None:
+                return found
+        except MeshError as error:
+            log.warnings.append(f"{error.cause}; refined without a coarser mesh")
+    return (yield from first_map(vertices, triangles, target, loop, corners, domain, log))
 
 
-def _centred(sites: np.ndarray, mass: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Sites (n,2) of the disk moved by a Moebius map so that what has most mass is in the middle, if they stay apart.
-
-    The transport then has less to move, and a magnified region meets the circle on all sides at once.
-    """
-    if np.linalg.norm(mass @ sites) < CENTRED * mass.sum():
-        return sites
-    centred = centre_in_disk(sites, mass)
-    centred[loop] /= np.linalg.norm(centred[loop], axis=1)[:, None]
-    return centred if halfedge_lengths(centred, triangles).min() >= SITE_RESOLUTION else sites
-
-
-def _transport(sites, mass, domain: Domain, log: _Log):
-    """The transport, or None and why there is none."""
-    with log.timed("transport"):
-        try:
-            return (yield from part_of(transport(sites, mass, domain), *TRANSPORT)), ""
-        except TransportError as error:
-            return None, error.cause
-
-
-def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: _Log, options: dict) -> Steps[Refinement]:
+def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: Log, options: dict) -> Steps[Refinement]:
     """The refined map, with a free boundary where the domain asked for leaves faces folded."""
     try:
         return (yield from refine(vertices, triangles, uv, boundary=boundary, **options))
@@ -312,55 +320,8 @@ def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: _Log, opti
             raise
         log.warnings.append(f"The {boundary} has no room for this chart ({error.cause}); its boundary is free instead")
     loop = boundary_loops(triangles)[0]
-    uv = _mean_value_sites(vertices, triangles, loop, None, Disk())
+    uv = mean_value_sites(vertices, triangles, loop, None, Disk())
     return (yield from refine(vertices, triangles, uv, boundary="free", **options))
-
-
-def _mean_value_sites(vertices, triangles, loop, corners, domain: Domain) -> np.ndarray:
-    """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
-    if corners is not None:
-        # Each side of the square takes the boundary between two corners.
-        loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
-    share = arc_length_parameters(vertices, loop)
-    if corners is not None:
-        first = np.append(share[np.isin(loop, corners)], 1.0)
-        share = np.interp(share, first, np.arange(5) / 4)
-    return tutte(vertices, triangles, loop, domain.map_boundary(share))
-
-
-def centroid_map(cells: Transport, domain: Domain, loop, corners, warnings: list[str]) -> np.ndarray:
-    """The inverse of the transport map, (n,2): every vertex at the centroid of its cell.
-
-    Boundary vertices (b,) move on to the boundary of the domain, in their order, and `corners` (4,), if given,
-    into those of the rectangle.
-    """
-    uv = cells.cells.centroid.copy()
-    s = domain.boundary_parameter(uv[loop])
-    step = (np.roll(s, -1) - s + domain.period / 2) % domain.period - domain.period / 2
-    if not np.isclose(step.sum(), domain.period):
-        warnings.append("The transport tangles the boundary; it was spread evenly instead")
-        step = np.full(len(loop), domain.period / len(loop))
-    # Start behind the largest gap: there nothing can be out of order.
-    first = (int(step.argmax()) + 1) % len(loop)
-    along = s[first] + np.concatenate([[0.0], np.cumsum(np.roll(step, -first)[:-1])])
-    if (np.diff(along) <= 0).any():
-        along = np.maximum.accumulate(along)
-        spread = along[0] + domain.period * np.arange(len(loop)) / len(loop)
-        along = 0.9 * along + 0.1 * spread
-    loop = np.roll(loop, -first)
-    if corners is not None:
-        loop, along = _into_corners(domain, loop, along, corners)
-    uv[loop] = domain.boundary_point(along)
-    return uv
-
-
-def _into_corners(domain: Domain, loop, along, corners) -> tuple[np.ndarray, np.ndarray]:
-    """Warp boundary parameters in order (b,) piecewise linearly so that the corners come to lie in corners."""
-    first = int(np.flatnonzero(loop == corners[0])[0])
-    loop, along = np.roll(loop, -first), np.concatenate([along[first:], along[:first] + domain.period])
-    place = np.flatnonzero(np.isin(loop, corners))
-    ends = np.append(along[place], along[0] + domain.period)
-    return loop, np.interp(along, ends, domain.period * np.arange(5) / 4)
 
 
 def _with_patches(density, region, patches: int) -> tuple[np.ndarray | None, np.ndarray | None]:
@@ -386,19 +347,3 @@ def _in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:
     # Halves first: the difference of two huge numbers may be infinite.
     extent = 2 * float((high / 2 - low / 2).max())
     return (positions - (low / 2 + high / 2)) / extent, extent
-
-
-class _Log:
-    """What happened to one chart: warnings, and seconds per stage."""
-
-    def __init__(self):
-        self.warnings: list[str] = []
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        begin = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin

@@ -1,0 +1,257 @@
+"""A coarser mesh of the same disk, and the way back without folds.
+
+Vertices are removed by half-edge collapses, an independent set in every round (Hoppe 1996; the rounds after Kirkpatrick
+1983). The mesh is carried along as an embedding in the plane: a collapse that keeps all its triangles positive there
+keeps the mesh a disk. On the way back every vertex returns into the star that it left: the vertex it was collapsed to
+sees all of that star, so near it there is always a place where no face folds (Shen, Jiang, Zorin, Panozzo 2019).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .contact import expand
+from .energy import Elements, elements, energies, local_derivatives
+from .geometry import cross2, dot2
+from .progress import Progress, Steps
+from .topology import halfedges, twins
+
+# A vertex with more faces stays: comparing all its collapses costs the square of their number.
+MOST_FACES = 9
+# Shape (1: equilateral) that new faces need in space, unless the old ones were worse, and in the plane.
+LEAST_SHAPE, LEAST_FLAT_SHAPE = 0.15, 1e-7
+# Rounds end when one removes a smaller share of the vertices.
+LEAST_PROGRESS = 0.03
+# Passes that add to the independent set of a round.
+PASSES = 3
+# Share of the area at a safe place that every returning face keeps.
+KEPT_AREA = 0.1
+# Newton steps of a returning vertex, weight of the area term in them, halvings of a step.
+RELAX_STEPS, RELAX_WEIGHT, RELAX_HALVINGS = 6, 10.0, 5
+
+
+@dataclass(frozen=True)
+class Removal:
+    """One round: vertex (k,) went to `into` (k,); it returns to the mean of corner (k,3) with the weights share (k,3).
+
+    Its star was the triangles (vertex[row], after, before), all (s,), and is kept as `faces` with their target areas.
+    """
+
+    vertex: np.ndarray
+    into: np.ndarray
+    corner: np.ndarray
+    share: np.ndarray
+    row: np.ndarray
+    after: np.ndarray
+    before: np.ndarray
+    faces: Elements
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """Vertices kept (c,), triangles (t,3) of them, mass (t,) of the triangles, and the rounds that led there."""
+
+    kept: np.ndarray
+    triangles: np.ndarray
+    mass: np.ndarray
+    rounds: list[Removal]
+
+    def prolonged(self, uv: np.ndarray, n: int) -> Steps[np.ndarray]:
+        """A map uv (c,2) of the coarse mesh without folds, carried to all n vertices, without folds."""
+        w = np.zeros(n, complex)
+        w[self.kept] = uv[:, 0] + 1j * uv[:, 1]
+        for k, removal in enumerate(reversed(self.rounds)):
+            yield Progress("Coarser mesh", k / len(self.rounds))
+            w[removal.vertex] = _returned(removal, w)
+            _relax(removal, w)
+        return np.column_stack([w.real, w.imag])
+
+
+def coarsened(vertices, triangles, flat, mass, goal: int) -> Steps[Coarse]:
+    """Coarsen a disk (n,3), (m,3) to about `goal` vertices.
+
+    flat (n,2): an embedding in the plane with a convex boundary; mass (m,): what the triangles' areas in the final map
+    are to be, handed on.
+    """
+    rounds: list[Removal] = []
+    left = count = len(vertices)
+    while left > goal:
+        yield Progress("Coarser mesh", np.log(count / left) / np.log(count / goal))
+        rank = np.random.default_rng(len(rounds)).permutation(count)
+        triangles, mass, removal = _round(vertices, triangles, flat, mass, rank)
+        rounds.append(removal)
+        left -= len(removal.vertex)
+        if len(removal.vertex) < LEAST_PROGRESS * left:
+            break
+    kept = np.unique(triangles)
+    place = np.full(count, -1)
+    place[kept] = np.arange(len(kept))
+    return Coarse(kept, place[triangles], mass, rounds)
+
+
+def _round(V, F, flat, mass, rank):
+    """Collapse an independent set: triangles and mass afterwards, and the removal."""
+    tail, head = halfedges(F)
+    rim = twins(F) < 0
+    ahead = np.full(len(V), -1)
+    ahead[tail[rim]] = head[rim]
+    star, v, after, before = _stars(F, _independent(F, rank))
+    into, good = _best_collapses(V, flat, v, after, before, ahead)
+    star, v, after, before, into = (x[good] for x in (star, v, after, before, into))
+    vertex, row = np.unique(v, return_inverse=True)
+    stays = (after != into) & (before != into)
+    new = np.column_stack([into, after, before])[stays]
+    corner, share = _places(V, flat, vertex, row[stays], new, ahead)
+    faces = elements(V, np.column_stack([v, after, before]), mass[star])
+    removal = Removal(
+        vertex, new[np.searchsorted(row[stays], np.arange(len(vertex))), 0], corner, share, row, after, before, faces
+    )
+    size = np.linalg.norm(_normal(V, new), axis=1)
+    whole, total = np.bincount(row[stays], size, len(vertex)), np.bincount(row, mass[star], len(vertex))
+    others = np.ones(len(F), bool)
+    others[star] = False
+    handed = size * (total / np.maximum(whole, 1e-300))[row[stays]]
+    return np.concatenate([F[others], new]), np.concatenate([mass[others], handed]), removal
+
+
+def _independent(F, rank):
+    """Vertices (n,) bool, no two in one face, by rank; vertices with many faces, and those with one, are left out."""
+    faces = np.bincount(F.ravel(), minlength=len(rank))
+    rank = np.where((faces > MOST_FACES) | (faces < 2), -1, rank)
+    chosen = np.zeros(len(rank), bool)
+    for _ in range(PASSES):
+        here = rank[F]
+        wins = here.argmax(1)
+        winner = np.take_along_axis(F, wins[:, None], 1)[:, 0]
+        chosen |= (np.bincount(winner, minlength=len(rank)) == faces) & (rank >= 0)
+        rank[F[chosen[F].any(1)].ravel()] = -1
+    return chosen
+
+
+def _stars(F, chosen):
+    """Faces around the chosen vertices: index, vertex, and the corners after and before it, sorted by vertex."""
+    star = np.flatnonzero(chosen[F].any(1))
+    at = chosen[F[star]].argmax(1)
+    v, after, before = (F[star, (at + k) % 3] for k in range(3))
+    order = np.argsort(v, kind="stable")
+    return star[order], v[order], after[order], before[order]
+
+
+def _best_collapses(V, flat, v, after, before, ahead):
+    """For every face (s,) of the stars: the best vertex that its own may collapse to, and whether it is good enough.
+
+    A vertex of the rim may only go to the next one.
+    """
+    if not len(v):
+        return v, np.zeros(0, bool)
+    _, first, row, size = np.unique(v, return_index=True, return_inverse=True, return_counts=True)
+    # All pairs of a candidate, the corner `after` of one face, and another face of the same star.
+    candidate, other = expand(size[row])
+    other = other + first[row[candidate]]
+    into = after[candidate]
+    gone = (after[other] == into) | (before[other] == into)
+    new = np.column_stack([into, after[other], before[other]])
+    normal = _normal(V, np.column_stack([v, after, before]))
+    whole = np.column_stack([np.bincount(row, normal[:, k]) for k in range(3)])
+    turned = (_normal(V, new) * whole[row[candidate]]).sum(1) <= 0
+    begin = np.searchsorted(candidate, np.arange(len(v)))
+    score = np.minimum.reduceat(np.where(gone, np.inf, _shape(V, new)), begin)
+    bad = np.logical_or.reduceat(~gone & (turned | (_flat_shape(flat, new) < LEAST_FLAT_SHAPE)), begin)
+    bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ~np.isfinite(score)
+    old = np.minimum.reduceat(_shape(V, np.column_stack([v, after, before])), first)[row]
+    bad |= score < np.minimum(LEAST_SHAPE, old / 2)
+    # Coarse marks, so that rounding does not choose among equals.
+    mark = np.where(bad, -1, np.floor(np.minimum(score, 1) * 20 + 0.37).astype(np.int64))
+    best = np.maximum.reduceat(mark * len(v) - np.arange(len(v)), first)
+    winner = (-best % len(v))[row]
+    return after[winner], ~bad[winner]
+
+
+def _places(V, flat, vertex, row, new, ahead):
+    """Corners and weights (k,3) to return to: of the new triangle around the vertex; on the rim, of its chord."""
+    a, b, c = flat[new].transpose(1, 0, 2)
+    p = flat[vertex[row]]
+    weights = np.column_stack([cross2(b - p, c - p), cross2(c - p, a - p), cross2(a - p, b - p)])
+    weights /= weights.sum(1)[:, None]
+    order = np.lexsort((-weights.min(1), row))
+    around = order[np.searchsorted(row[order], np.arange(len(vertex)))]
+    corner, share = new[around], weights[around]
+    back = np.full(len(V), -1)
+    rim = np.flatnonzero(ahead >= 0)
+    back[ahead[rim]] = rim
+    on_rim = np.flatnonzero(ahead[vertex] >= 0)
+    v = vertex[on_rim]
+    forth, past = (np.linalg.norm(V[v] - V[x[v]], axis=1) for x in (ahead, back))
+    part = past / np.maximum(forth + past, 1e-300)
+    corner[on_rim] = np.column_stack([ahead[v], back[v], back[v]])
+    share[on_rim] = np.column_stack([part, 1 - part, np.zeros(len(v))])
+    return corner, share
+
+
+def _returned(removal: Removal, w: np.ndarray) -> np.ndarray:
+    """Places (k,) of the vertices that return: where they belong, or as near to it as their stars allow."""
+    target = (removal.share * w[removal.corner]).sum(1)
+    row, count, base = removal.row, len(removal.vertex), w[removal.into]
+    a, b = w[removal.after], w[removal.before]
+    touching = (removal.after == removal.into[row]) | (removal.before == removal.into[row])
+    inward = np.where(touching, 1j * (b - a) / np.maximum(np.abs(b - a), 1e-300), 0)
+    heading = np.bincount(row, inward.real, count) + 1j * np.bincount(row, inward.imag, count)
+    slope, room = _cross(b - a, heading[row]), _cross(a - base[row], b - base[row])
+    reach = np.where(touching | (slope >= 0), np.inf, room / np.maximum(-slope, 1e-300))
+    nearest = np.full(count, np.inf)
+    np.minimum.at(nearest, row, reach)
+    nearest = np.where(np.isfinite(nearest), nearest, np.abs(target - base))
+    safe = base + 0.5 * nearest * heading
+    at_safe, at_target = (_cross(a - x[row], b - x[row]) for x in (safe, target))
+    short = at_target < KEPT_AREA * at_safe
+    way = np.ones(count)
+    np.minimum.at(way, row[short], ((1 - KEPT_AREA) * at_safe / np.maximum(at_safe - at_target, 1e-300))[short])
+    return safe + way * (target - safe)
+
+
+def _cross(a, b):
+    return a.real * b.imag - a.imag * b.real
+
+
+def _relax(removal: Removal, w: np.ndarray) -> None:
+    """A few Newton steps of every returned vertex within its star, in place."""
+    vertex, row, k, faces = removal.vertex, removal.row, len(removal.vertex), removal.faces
+    value = np.bincount(row, energies(faces, w, RELAX_WEIGHT), k)
+    for _ in range(RELAX_STEPS):
+        local = local_derivatives(faces, w, RELAX_WEIGHT, 0.3)
+        form = local.rows[:, :, 0]
+        xx, xy, yy = (np.bincount(row, x.sum(1), k) for x in (form.real**2, -form.real * form.imag, form.imag**2))
+        g = [np.bincount(row, x, k) for x in (local.gradient[:, 0].real, local.gradient[:, 0].imag)]
+        det = xx * yy - xy**2 + 1e-12 * (xx + yy) ** 2
+        step = (-(yy * g[0] - xy * g[1]) - 1j * (xx * g[1] - xy * g[0])) / det
+        moving = np.ones(k, bool)
+        for _ in range(RELAX_HALVINGS):
+            trial = w.copy()
+            trial[vertex[moving]] += step[moving]
+            new = np.bincount(row, energies(faces, trial, RELAX_WEIGHT), k)
+            better = moving & (new < value)
+            w[vertex[better]] += step[better]
+            value = np.where(better, new, value)
+            moving &= ~better
+            if not moving.any():
+                break
+            step *= 0.5
+
+
+def _normal(V, F):
+    return np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+
+
+def _shape(V, F):
+    """4 sqrt(3) area over the squared sides, (m,): 1 for equilateral triangles, 0 for degenerate ones."""
+    sides = [V[F[:, (k + 1) % 3]] - V[F[:, k]] for k in range(3)]
+    squares = sum((s**2).sum(1) for s in sides)
+    return 2 * np.sqrt(3) * np.linalg.norm(_normal(V, F), axis=1) / np.maximum(squares, 1e-300)
+
+
+def _flat_shape(uv, F):
+    a, b, c = (uv[F[:, k]] for k in range(3))
+    squares = dot2(b - a, b - a) + dot2(c - b, c - b) + dot2(a - c, a - c)
+    return 2 * np.sqrt(3) * cross2(b - a, c - a) / np.maximum(squares, 1e-300)

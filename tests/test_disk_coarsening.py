@@ -1,0 +1,60 @@
+"""Coarser meshes and the way back."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.disk_coarsening import coarsened
+from omt_uv.solver.domain import Disk
+from omt_uv.solver.first_map import COARSE_ABOVE, mean_value_sites
+from omt_uv.solver.geometry import face_areas, signed_areas
+from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.progress import drain
+from omt_uv.solver.topology import boundary_loops, twins
+
+SHAPES = ["head", "random_disk", "cap", "bumpy", "grid"]
+
+
+def coarse_of(name, share=8):
+    V, F = getattr(meshes, name)()
+    flat = mean_value_sites(V, F, boundary_loops(F)[0], None, Disk())
+    mass = face_areas(V, F)
+    return V, F, flat, mass, drain(coarsened(V, F, flat, mass, len(V) // share))
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_coarser_mesh_is_the_same_disk(name):
+    V, F, flat, mass, coarse = coarse_of(name)
+    T = coarse.triangles
+    assert len(coarse.kept) < len(V) / 2 and len(boundary_loops(T)) == 1
+    assert len(coarse.kept) - (3 * len(T) + (twins(T) < 0).sum()) // 2 + len(T) == 1  # Euler
+    assert (signed_areas(flat[coarse.kept], T) > 0).all()
+    assert coarse.mass.sum() == pytest.approx(mass.sum()) and (coarse.mass > 0).all()
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_no_face_folds_on_the_way_back(name):
+    V, F, flat, _, coarse = coarse_of(name)
+    uv = drain(coarse.prolonged(flat[coarse.kept], len(V)))
+    assert (signed_areas(uv, F) > 0).all()
+    np.testing.assert_array_equal(uv[coarse.kept], flat[coarse.kept])
+
+
+def test_places_are_found_even_in_stars_without_room():
+    V, F, flat, _, coarse = coarse_of("head")
+    squeezed = flat[coarse.kept] * [1.0, 1e-3]
+    squeezed[:, 0] += squeezed[:, 1] * 1e3
+    assert (signed_areas(drain(coarse.prolonged(squeezed, len(V))), F) > 0).all()
+
+
+def test_large_charts_come_by_way_of_coarser_ones():
+    V, F = meshes.head(75)
+    assert len(V) > COARSE_ABOVE
+    (chart_map,) = drain(unwrap(triangle_surface(V, F))).maps
+    assert "coarsening" in chart_map.seconds and chart_map.newton_refinement <= 25
+    assert chart_map.folds == 0 and chart_map.area_l1 <= 0.01 and not chart_map.warnings
+    moved = drain(unwrap(triangle_surface(1e3 * V + 2e3, F))).maps[0].uv / 1e3
+    a, b = (x[:, 0] + 1j * x[:, 1] for x in (moved, chart_map.uv))
+    turn = np.vdot(a, b)
+    np.testing.assert_allclose(a * turn / abs(turn), b, atol=1e-5 * np.abs(b).max())

@@ -1,0 +1,79 @@
+"""Many small charts solved together."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver import parameterize
+from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.distortion import measure
+from omt_uv.solver.geometry import face_areas, signed_areas
+from omt_uv.solver.parameterize import MANY, unwrap
+from omt_uv.solver.progress import drain
+
+SHAPES = ["bumpy", "cone", "hemisphere", "random_disk", "comb", "grid", "quad_patch", "spiral_strip"]
+
+
+def side_by_side(shapes, scale=1.0, shift=0.0):
+    """Charts of different shapes and sizes in one surface."""
+    found, count = [], 0
+    for k, (V, F) in enumerate(shapes):
+        found.append((scale * (V * (1 + k % 3) + [20.0 * k, 0, 0]) + shift, F + count))
+        count += len(V)
+    return triangle_surface(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def all_shapes():
+    shapes = [getattr(meshes, name)() for name in SHAPES]
+    return [*shapes, *(meshes.random_disk(80, seed) for seed in range(4)), meshes.grid(1, 1)]
+
+
+def one_by_one(monkeypatch, surface, **options):
+    with monkeypatch.context() as patch:
+        patch.setattr(parameterize, "MANY", 1000)
+        return drain(unwrap(surface, **options))
+
+
+@pytest.mark.parametrize(("quality", "balance"), [("standard", 0.0), ("exact", 0.0), ("standard", 0.5)])
+def test_together_is_as_good_as_one_by_one(monkeypatch, quality, balance):
+    surface = side_by_side(all_shapes())
+    assert len(all_shapes()) >= MANY
+    together = drain(unwrap(surface, quality=quality, balance=balance))
+    alone = one_by_one(monkeypatch, surface, quality=quality, balance=balance)
+    assert sum(m.newton_transport is None for m in together.maps) >= len(SHAPES)
+    for chart, a, b in zip(together.charts, together.maps, alone.maps, strict=True):
+        assert a.folds == 0 and (signed_areas(a.uv, chart.triangles) > 0).all()
+        figures = measure(chart.vertices, chart.triangles, a.uv[chart.triangles])
+        assert figures.overlap <= 1e-4 and figures.area_l1 == pytest.approx(a.area_l1, abs=1e-9)
+        assert figures.area_sd == pytest.approx(a.area_sd, abs=1e-9)
+        assert figures.angle_mean == pytest.approx(a.angle_mean, rel=1e-6)
+        assert a.angle_mean <= 1.02 * b.angle_mean and a.area_l1 <= max(1.5 * b.area_l1, 1e-3)
+        assert a.newton_transport is not None or a.newton_refinement <= 25
+        covered = signed_areas(a.uv, chart.triangles).sum()
+        assert covered == pytest.approx(face_areas(chart.vertices, chart.triangles).sum(), rel=1e-9)
+
+
+def test_flat_charts_are_congruent():
+    surface = side_by_side([meshes.grid(3, k + 1) for k in range(MANY)])
+    for chart, found in zip(*(lambda r: (r.charts, r.maps))(drain(unwrap(surface))), strict=True):
+        sides = [np.linalg.norm(np.roll(p[chart.triangles], -1, 1) - p[chart.triangles], axis=2)
+                 for p in (chart.vertices, found.uv)]  # fmt: skip
+        np.testing.assert_allclose(sides[0], sides[1], rtol=1e-6)
+
+
+def test_units_and_places_only_scale_the_result():
+    # The spiral is not solved together with the others: its boundary needs a barrier.
+    shapes = [getattr(meshes, name)() for name in SHAPES[:-1]] + [meshes.grid(1, 1)]
+    reference = drain(unwrap(side_by_side(shapes)))
+    moved = drain(unwrap(side_by_side(shapes, 1e3, 1e4)))
+    for a, b in zip(reference.maps, moved.maps, strict=True):
+        np.testing.assert_allclose(b.uv / 1e3, a.uv, atol=1e-5 * np.abs(a.uv).max())
+
+
+def test_a_chart_that_fails_together_says_so_alone():
+    V, F = meshes.bumpy(4, 4)
+    needle = np.array([[0, 0, 0], [1, 0, 0], [2, 1e-13, 0.0]]), np.array([[0, 1, 2]])
+    surface = side_by_side([(V, F)] * MANY + [needle])
+    result = drain(unwrap(surface))
+    assert len(result.maps) == MANY + 1 and all(np.isfinite(m.uv).all() for m in result.maps)
+    assert all(m.area_l1 <= 0.01 for m in result.maps[:MANY])
