@@ -12,8 +12,9 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "benchmarks"))
+sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "docs")]
 
+import magnified_graph
 import pictures
 import rivals
 from cases import load_case, meshes, our_uv
@@ -101,6 +102,7 @@ def main():
             gallery(name, args.out, Path(scratch), args.pixels)
         favourite = "lion" if "lion" in args.models else args.models[0]
         balance_sheet(favourite, args.out, Path(scratch), 3 * args.pixels // 4)
+    magnified_graph.make(args.out / "graph_magnified.png")
     for path in sorted(args.out.glob("*.png")):
         print(f"{path} {path.stat().st_size // 1000} kB")
 

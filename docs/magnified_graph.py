@@ -1,0 +1,99 @@
+"""A radial graph of 200 nodes drawn on a square grid of 10,201 vertices, and its crowded centre magnified four times.
+
+After Zhao et al. 2013, figure 9: the picture itself is warped through the map, the outline of the square stays.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
+
+import matplotlib
+import numpy as np
+from cases import meshes
+from PIL import Image, ImageDraw
+from pictures import _font
+
+from omt_uv.solver.exact_share import exact_share
+from omt_uv.solver.geometry import signed_areas
+from omt_uv.solver.lens import magnify_map
+from omt_uv.solver.measure import from_vertices, normalised, share
+from omt_uv.solver.progress import drain
+from omt_uv.solver.warp import warped
+
+CELLS = 100  # of the grid along one side: 101 * 101 vertices
+FACTOR, RADIUS = 4.0, 0.15
+# Nodes of each ring about the root, and the ring's radius: the centre is crowded.
+RINGS = ((12, 0.055), (34, 0.105), (61, 0.27), (92, 0.43))
+PIXELS = 2048
+INK, PAPER = (38, 44, 56), (250, 249, 246)
+
+
+def graph():
+    """Places (200,2) of the nodes in the unit square, the ring (200,) of each, and edges to the parents (199,2)."""
+    places, ring, edges = [np.array([0.5, 0.5])], [0], []
+    before = [(0, 0.0)]
+    for k, (count, radius) in enumerate(RINGS, start=1):
+        angles = 2 * np.pi * (np.arange(count) + 0.5 * (k % 2)) / count
+        now = []
+        for angle in angles.tolist():
+            parent = min(before, key=lambda p: abs((p[1] - angle + np.pi) % (2 * np.pi) - np.pi))[0]
+            edges.append((parent, len(places)))
+            now.append((len(places), angle))
+            places.append(0.5 + radius * np.array([np.cos(angle), np.sin(angle)]))
+            ring.append(k)
+        before = now
+    return np.array(places), np.array(ring), np.array(edges)
+
+
+def drawn(grid_every=10):
+    """The graph over a faint grid as a picture (h,w,3), lowest row first."""
+    places, ring, edges = graph()
+    image = Image.new("RGB", (PIXELS, PIXELS), PAPER)
+    draw = ImageDraw.Draw(image)
+    for k in range(0, CELLS + 1, grid_every):
+        x = k / CELLS * (PIXELS - 1)
+        draw.line([x, 0, x, PIXELS], fill=(216, 214, 208), width=3)
+        draw.line([0, x, PIXELS, x], fill=(216, 214, 208), width=3)
+    at = places * PIXELS
+    for a, b in edges:
+        draw.line([*at[a], *at[b]], fill=(132, 140, 152), width=5)
+    colours = matplotlib.colormaps["viridis"](np.linspace(0.05, 0.85, len(RINGS) + 1))
+    font = _font(15)
+    for k, (x, y) in enumerate(at.tolist()):
+        r = 17 if k else 24
+        fill = tuple(int(255 * c) for c in colours[ring[k]][:3])
+        draw.ellipse([x - r, y - r, x + r, y + r], fill=fill, outline=INK, width=3)
+        draw.text((x, y), str(k), "white" if ring[k] < 3 else INK, font, anchor="mm")
+    return np.asarray(image)[::-1]
+
+
+def magnified():
+    """Old and new corner UVs (m,3,2) of the grid, and the shares before and after."""
+    V, F = meshes.grid(CELLS, CELLS)
+    uv = V[:, :2]
+    t = np.clip((1.25 * RADIUS - np.linalg.norm(uv - 0.5, axis=1)) / (0.5 * RADIUS), 0, 1)
+    weights, area = from_vertices(t * t * (3 - 2 * t), F), signed_areas(uv, F)
+    found = exact_share(weights, area, FACTOR)
+    result = drain(magnify_map(uv, F, normalised(found.density, area), region=weights))
+    return uv[F], result.uv[F], found.before, share(weights, signed_areas(result.uv, F))
+
+
+def make(path: Path, pixels=720):
+    """Write the graph before and after, side by side."""
+    old, new, before, after = magnified()
+    picture = drawn()
+    sheet = Image.new("RGB", (2 * pixels + 30, pixels + 56), "white")
+    draw = ImageDraw.Draw(sheet)
+    captions = (f"centre {100 * before:.1f} % of the picture", f"magnified {FACTOR:g} x: {100 * after:.1f} %")
+    for k, (image, caption) in enumerate(zip((picture, warped(picture, old, new)), captions, strict=True)):
+        small = Image.fromarray(image[::-1]).resize((pixels, pixels), Image.Resampling.LANCZOS)
+        sheet.paste(small, (k * (pixels + 30), 0))
+        draw.text((k * (pixels + 30) + pixels / 2, pixels + 28), caption, "#333333", _font(24, bold=False), anchor="mm")
+    sheet.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+if __name__ == "__main__":
+    make(Path(sys.argv[1]))
