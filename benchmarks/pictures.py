@@ -39,6 +39,7 @@ VIEWS = {
     "lion": View("Y", 130, 5),
     "lilium": View("Z", 30, 50),
     "max_planck": View("Y", 100, 5),
+    "bunny": View("Y", -10, 12),
     "spot": View("Y", 155, 15),
     "head": View("Z", 30, 5),
 }
@@ -49,7 +50,7 @@ def checker(path, cell=128):
     size = TILE * cell
     image = Image.new("RGB", (size, size))
     draw = ImageDraw.Draw(image)
-    font = _font(cell // 3)
+    font = typeface(cell // 3)
     for row in range(TILE):
         for column in range(TILE):
             dark = (row + column) % 2
@@ -122,7 +123,7 @@ def sheet(path, columns, rows):
         (colour function, tick labels) for a colour bar under the row
     """
     size = Image.open(rows[0][1][0]).width
-    font, small = _font(size // 20), _font(size // 26, bold=False)
+    font, small = typeface(size // 20), typeface(size // 26, bold=False)
     left, top, under = size // 10, size // 9, size // 11
     heights = [size + under + (under if scale else 0) for *_, scale in rows]
     out = Image.new("RGB", (left + size * len(columns), top + sum(heights)), "white")
@@ -162,7 +163,7 @@ def _bar(colour, length, thick):
     return Image.fromarray(np.broadcast_to(rgb, (thick, length, 3)).copy())
 
 
-def _font(size, bold=True):
+def typeface(size, bold=True):
     return ImageFont.truetype(
         str(Path(matplotlib.get_data_path()) / f"fonts/ttf/DejaVuSans{'-Bold' * bold}.ttf"), max(size, 9)
     )
@@ -188,6 +189,13 @@ AREA_SCALE = (
     ["1/4 texture", "1/2", "as asked", "2x", "4x texture"],
 )
 SHEAR_SCALE = (lambda t: shear_colours(SHEAR_TOP**t), ["conformal", "s1/s2 = 2", "4"])
+
+
+def front_to_south(view):
+    """Rotation (3,3) that brings the model's up to +Z and what faces the camera of a view to -Y, Blender's front."""
+    up, towards = _axes(view, 0.0)
+    up, towards = np.array(up), np.array(towards)
+    return np.stack([np.cross(up, -towards) * -1, -towards, up])
 
 
 def render_checker(V, F, uv, view, path, texture, pixels=480):
@@ -240,13 +248,19 @@ def _render(obj, points, view, path, color_type, pixels):
     bpy.data.cameras.remove(data)
 
 
-def _camera(points, view):
-    """An orthographic camera that fits the points (n,3)."""
+def _axes(view, elevation):
+    """Up, and the direction to the camera at an elevation in degrees."""
     up = Vector({"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1)}[view.up[-1]]) * (-1 if view.up[0] == "-" else 1)
     side = up.orthogonal().normalized()
     forward = up.cross(side)
-    a, e = np.radians(view.azimuth), np.radians(view.elevation)
+    a, e = np.radians(view.azimuth), np.radians(elevation)
     towards = (side * np.cos(a) + forward * np.sin(a)) * np.cos(e) + up * np.sin(e)
+    return up, towards
+
+
+def _camera(points, view):
+    """An orthographic camera that fits the points (n,3)."""
+    up, towards = _axes(view, view.elevation)
     right = up.cross(towards).normalized()
     axes = np.array([right, towards.cross(right), towards])
     local = points @ axes.T

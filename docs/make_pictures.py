@@ -17,13 +17,22 @@ sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "docs")]
 import magnified_graph
 import pictures
 import rivals
+import world_map
 from cases import load_case, meshes, our_uv
+from sphere import sphere_figures
 
+from omt_uv.projecting import GlobeJob, project
+from omt_uv.settings import GlobeSettings
+from omt_uv.solver.charts import triangle_surface
 from omt_uv.solver.distortion import face_distortion, measure
+from omt_uv.solver.globe import polygons_of, unfold
+from omt_uv.solver.orientation import along_axes
+from omt_uv.solver.progress import drain
 
 CELLS = {"lilium": 120}  # how many checker cells cover the model
 RIVALS = {"Blender Angle Based": "Angle Based", "Blender Minimum Stretch": "Minimum Stretch 50"}
 OURS = "OMT UV"
+GLOBES = ("max_planck", "bunny")
 BALANCES = (0.0, 0.25, 0.5, 1.0)
 
 
@@ -80,6 +89,41 @@ def balance_sheet(name, out, scratch, pixels):
     pictures.sheet(out / f"{name}_balance.png", titles, rows)
 
 
+def globe_sheet(names, out, scratch, pixels):
+    """A map of the world on closed models, from conformal to area preserving, by their equirectangular layouts."""
+    world = world_map.draw(scratch / "world.png")
+    rows = []
+    for name in names:
+        V, F = meshes.load_model(name)
+        view = view_of(name)
+        turned = V @ pictures.front_to_south(view).T
+        renders, captions = [], []
+        for k, (points, uv) in enumerate(globe_maps(turned, F)):
+            renders.append(scratch / f"{name}_globe_{k}.png")
+            pictures.render_checker(V, F, uv, view, renders[-1], world, pixels)
+            captions.append(sphere_caption(V, F, points))
+        rows.append((name.replace("_", " "), renders, captions, None))
+    pictures.sheet(out / "globes.png", ["Conformal", "Balance 0.5", "Area preserving"], rows)
+
+
+def globe_maps(V, F):
+    """Maps to the sphere (n,3) from conformal to area preserving, and their equirectangular UVs (m,3,2)."""
+    maps = []
+    for balance in (0.5, 0.0):
+        settings = GlobeSettings(projection="equirect", balance=balance)
+        globe = drain(project([GlobeJob(triangle_surface(V, F))], settings)).globes[0][0]
+        maps.append((globe.points, globe.uv.reshape(-1, 3, 2)))
+    conformal = globe.sphere.conformal @ along_axes(globe.sphere.conformal, V, F).T
+    polygons, _ = polygons_of(globe.part.corners, F, globe.part.faces)
+    unfolded, _ = unfold(conformal, polygons, "equirect")
+    return [(conformal, unfolded.corners()[polygons.triangles]), *maps]
+
+
+def sphere_caption(V, F, points):
+    figures = sphere_figures(V, F, points)
+    return f"area error {figures['area_l1']:.3f}   shear {figures['angle_mean']:.2f}"
+
+
 def caption(case, uv):
     figures = measure(case.V, case.F, uv)
     return f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}"
@@ -93,6 +137,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     present = [n for n in ("face", "lion", "lilium", "max_planck") if meshes.model_path(n)]
     parser.add_argument("--models", nargs="+", default=present or ["head"])
+    parser.add_argument("--globes", nargs="*", default=GLOBES, help="closed models with a map of the world")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures")
     parser.add_argument("--pixels", type=int, default=400, help="of one panel")
     args = parser.parse_args()
@@ -100,6 +145,9 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         for name in args.models:
             gallery(name, args.out, Path(scratch), args.pixels)
+        globes = [n for n in args.globes if meshes.model_path(n)]
+        if globes:
+            globe_sheet(globes, args.out, Path(scratch), 5 * args.pixels // 4)
         favourite = "lion" if "lion" in args.models else args.models[0]
         balance_sheet(favourite, args.out, Path(scratch), 3 * args.pixels // 4)
     magnified_graph.make(args.out / "graph_magnified.png")
