@@ -13,8 +13,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
 import matplotlib
 import numpy as np
 from cases import meshes
+from pictures import typeface
 from PIL import Image, ImageDraw
-from pictures import _font
 
 from omt_uv.solver.exact_share import exact_share
 from omt_uv.solver.geometry import signed_areas
@@ -61,7 +61,7 @@ def drawn(grid_every=10):
     for a, b in edges:
         draw.line([*at[a], *at[b]], fill=(132, 140, 152), width=5)
     colours = matplotlib.colormaps["viridis"](np.linspace(0.05, 0.85, len(RINGS) + 1))
-    font = _font(15)
+    font = typeface(15)
     for k, (x, y) in enumerate(at.tolist()):
         r = 17 if k else 24
         fill = tuple(int(255 * c) for c in colours[ring[k]][:3])
@@ -91,7 +91,9 @@ def make(path: Path, pixels=720):
     for k, (image, caption) in enumerate(zip((picture, warped(picture, old, new)), captions, strict=True)):
         small = Image.fromarray(image[::-1]).resize((pixels, pixels), Image.Resampling.LANCZOS)
         sheet.paste(small, (k * (pixels + 30), 0))
-        draw.text((k * (pixels + 30) + pixels / 2, pixels + 28), caption, "#333333", _font(24, bold=False), anchor="mm")
+        draw.text(
+            (k * (pixels + 30) + pixels / 2, pixels + 28), caption, "#333333", typeface(24, bold=False), anchor="mm"
+        )
     sheet.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
