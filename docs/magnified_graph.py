@@ -91,9 +91,8 @@ def make(path: Path, pixels=720):
     for k, (image, caption) in enumerate(zip((picture, warped(picture, old, new)), captions, strict=True)):
         small = Image.fromarray(image[::-1]).resize((pixels, pixels), Image.Resampling.LANCZOS)
         sheet.paste(small, (k * (pixels + 30), 0))
-        draw.text(
-            (k * (pixels + 30) + pixels / 2, pixels + 28), caption, "#333333", typeface(24, bold=False), anchor="mm"
-        )
+        middle = k * (pixels + 30) + pixels / 2, pixels + 28
+        draw.text(middle, caption, "#333333", typeface(24, bold=False), anchor="mm")
     sheet.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
