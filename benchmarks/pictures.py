@@ -66,6 +66,25 @@ def checker(path, cell=128):
     return path
 
 
+def circle_packing(path, size=2048, columns=14):
+    """Write a texture of equal circles that touch six others each, as dense as circles can lie in the plane."""
+    # 16 rows at a distance of sqrt(3)/2 are 13.86 columns wide: the tile closes with a hundredth of stretch.
+    rows = 2 * round(columns / np.sqrt(3))
+    scale = 2
+    image = Image.new("RGB", (scale * size, scale * size), "#f7f3ea")
+    draw = ImageDraw.Draw(image)
+    step, rise = scale * size / columns, scale * size / rows
+    for row in range(-1, rows + 1):
+        for column in range(-1, columns + 1):
+            x, y = (column + 0.5 * (row % 2) + 0.25) * step, (row + 0.5) * rise
+            hue = ((row % rows) * 5 + (column % columns) * 3) % 24 / 24
+            fill = tuple(int(255 * c) for c in matplotlib.colors.hsv_to_rgb([hue, 0.42, 0.88]))
+            r, ry = 0.47 * step, 0.47 * rise * 2 / np.sqrt(3)
+            draw.ellipse([x - r, y - ry, x + r, y + ry], fill=fill, outline="#3a3a3a", width=scale * size // 420)
+    image.resize((size, size), Image.Resampling.LANCZOS).save(path)
+    return path
+
+
 def checker_material(texture):
     """A material that shows the image file `texture` by the active UV layer, in Workbench and the viewport."""
     material = bpy.data.materials.new("checker")

@@ -1,7 +1,7 @@
 """Make the pictures of the README: our unwrap beside Blender's own, on the same chart at the same texel density.
 
 Needs bpy, matplotlib and published models (OMT_UV_MODELS); a procedural head where there are none.
-usage: make_pictures.py [--models NAME ...] [--out FOLDER]
+usage: make_pictures.py [--models NAME ...] [--circles NAME ...] [--out FOLDER]
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from omt_uv.solver.orientation import along_axes
 from omt_uv.solver.progress import drain
 
 CELLS = {"lilium": 120}  # how many checker cells cover the model
+CIRCLES = {"max_planck": 260}  # likewise, in squares as large as those of the checker
 RIVALS = {"Blender Angle Based": "Angle Based", "Blender Minimum Stretch": "Minimum Stretch 50"}
 OURS = "OMT UV"
 GLOBES = ("max_planck", "bunny")
@@ -124,6 +125,29 @@ def sphere_caption(V, F, points):
     return f"area error {figures['area_l1']:.3f}   shear {figures['angle_mean']:.2f}"
 
 
+def circle_sheet(name, out, scratch, pixels):
+    """A packing of equal circles on the surface: a conformal map keeps them round, ours keeps their areas.
+
+    As Su 2015, figure 14.
+    """
+    case = load_case(name)
+    texture = pictures.circle_packing(scratch / "circles.png")
+    uvs = {"Blender Angle Based: any size": rivals.unwrap(case.V, case.F, case.seams, "Angle Based").uv}
+    for balance, title in ((0.5, "OMT UV, balance 0.5"), (0.0, "OMT UV: one size")):
+        uvs[title] = our_uv(case, "free", "standard", balance)[0]
+    renders, layouts, captions = [], [], []
+    for k, uv in enumerate(uvs.values()):
+        renders.append(scratch / f"{name}_circles_{k}.png")
+        layouts.append(scratch / f"{name}_circles_{k}_layout.png")
+        captions.append(caption(case, uv))
+        scaled = pictures.equal_density(case.V, case.F, uv, CIRCLES.get(name, 600))
+        pictures.render_checker(case.V, case.F, scaled, view_of(name), renders[-1], texture, pixels)
+        octaves, _ = face_distortion(case.V, case.F, uv)
+        pictures.layout(uv, pictures.lit(case.V, case.F, pictures.area_colours(octaves)), layouts[-1], pixels)
+    rows = [("", renders, captions, None), ("", layouts, [""] * len(uvs), pictures.AREA_SCALE)]
+    pictures.sheet(out / f"{name}_circles.png", list(uvs), rows)
+
+
 def caption(case, uv):
     figures = measure(case.V, case.F, uv)
     return f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}"
@@ -136,20 +160,25 @@ def view_of(name):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     present = [n for n in ("face", "lion", "lilium", "max_planck") if meshes.model_path(n)]
-    parser.add_argument("--models", nargs="+", default=present or ["head"])
+    parser.add_argument("--models", nargs="*", default=present or ["head"])
+    found = [n for n in ("lion", "max_planck") if n in present]
+    parser.add_argument("--circles", nargs="*", default=found or ["head"], help="models with a circle packing on them")
     parser.add_argument("--globes", nargs="*", default=GLOBES, help="closed models with a map of the world")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures")
     parser.add_argument("--pixels", type=int, default=400, help="of one panel")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
+        for name in args.circles:
+            circle_sheet(name, args.out, Path(scratch), args.pixels)
         for name in args.models:
             gallery(name, args.out, Path(scratch), args.pixels)
         globes = [n for n in args.globes if meshes.model_path(n)]
         if globes:
             globe_sheet(globes, args.out, Path(scratch), 5 * args.pixels // 4)
-        favourite = "lion" if "lion" in args.models else args.models[0]
-        balance_sheet(favourite, args.out, Path(scratch), 3 * args.pixels // 4)
+        favourite = "lion" if "lion" in args.models else next(iter(args.models), "")
+        if favourite:
+            balance_sheet(favourite, args.out, Path(scratch), 3 * args.pixels // 4)
     magnified_graph.make(args.out / "graph_magnified.png")
     for path in sorted(args.out.glob("*.png")):
         print(f"{path} {path.stat().st_size // 1000} kB")

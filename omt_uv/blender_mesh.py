@@ -220,11 +220,13 @@ def write_uv(obj: bpy.types.Object, layer: str, corners: np.ndarray, uv: np.ndar
 def _write_bmesh(mesh: bpy.types.Mesh, layer: str, corners: np.ndarray, uv: np.ndarray) -> None:
     edit = bmesh.from_edit_mesh(mesh)
     uv_layer = edit.loops.layers.uv[layer]
-    value_of = dict(zip(corners.tolist(), uv.tolist(), strict=True))
+    values: list = [None] * (int(corners.max(initial=-1)) + 1)
+    for corner, value in zip(corners.tolist(), uv.tolist(), strict=True):
+        values[corner] = value
     # Faces and their loops come in the order in which update_from_editmode numbers them.
-    for corner, loop in enumerate(loop for face in edit.faces for loop in face.loops):
-        if corner in value_of:
-            loop[uv_layer].uv = value_of[corner]
+    for value, loop in zip(values, (loop for face in edit.faces for loop in face.loops), strict=False):
+        if value is not None:
+            loop[uv_layer].uv = value
     bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
 
 

@@ -29,7 +29,7 @@ bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6)
 mesh = bpy.context.object.data
 for v in mesh.vertices:
     v.co.z = v.co.x * v.co.y
-result["loaded_at_startup"] = "scipy" in sys.modules
+result["loaded_at_startup"] = [name for name in ("scipy", "xatlas") if name in sys.modules]
 result["run"] = list(bpy.ops.uv.omt_unwrap())
 result["spread"] = max(d.uv[0] for d in mesh.uv_layers.active.data) - min(d.uv[0] for d in mesh.uv_layers.active.data)
 import scipy, xatlas

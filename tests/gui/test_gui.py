@@ -34,8 +34,12 @@ def play():
     told = {}
 
     def once(name):
+        story = ROOT / "scripts" / "gui" / "stories" / f"{name}.py"
         if name not in told:
-            told[name] = run.play(ROOT / "scripts" / "gui" / "stories" / f"{name}.py", OUT / name)
+            told[name] = run.play(story, OUT / name)
+            if "error" in told[name]:
+                # On a busy machine a click may come before the panel does.
+                told[name] = run.play(story, OUT / name)
         assert "error" not in told[name], told[name]["error"]
         return told[name]
 
