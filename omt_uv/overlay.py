@@ -59,6 +59,9 @@ def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
     _shown.batch = None
     if _shown.handle is None and not bpy.app.background:
         _shown.handle = bpy.types.SpaceImageEditor.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
+    for kind, function in _handlers():
+        if function not in kind:
+            kind.append(function)
     _redraw(context)
 
 
@@ -81,6 +84,9 @@ def forget() -> None:
     """Stop drawing; also when the add-on goes."""
     if _shown.handle is not None:
         bpy.types.SpaceImageEditor.draw_handler_remove(_shown.handle, "WINDOW")
+    for kind, function in _handlers():
+        if function in kind:
+            kind.remove(function)
     _shown.__init__()  # type: ignore[misc]
 
 
@@ -88,6 +94,23 @@ def refresh(context: bpy.types.Context, pairs: list) -> None:
     """Colour anew what is shown, after the UVs changed."""
     if _shown.kind != "NONE":
         show(context, pairs, _shown.kind)
+
+
+def _handlers() -> list:
+    handlers = bpy.app.handlers
+    return [(handlers.undo_post, _after_undo), (handlers.redo_post, _after_undo), (handlers.load_pre, _before_load)]
+
+
+def _after_undo(*_) -> None:
+    """Where undo took the attribute away, shading and drawing go with it."""
+    from .blender_colours import has_colours
+
+    if not any(map(has_colours, bpy.data.meshes)):
+        hide(bpy.context)
+
+
+def _before_load(*_) -> None:
+    forget()
 
 
 def _paint_views(context: bpy.types.Context) -> None:

@@ -16,7 +16,7 @@ def patch(package):
     obj = scenes.bump(12, 10)
     scenes.set_uv(obj, scenes.seen_from_above(obj) * [1.0, 0.5])
     yield obj
-    if obj.mode == "EDIT":
+    if bpy.context.mode == "EDIT_MESH":
         scenes.leave_edit()
     bpy.ops.uv.omt_overlay(show="NONE")
 
@@ -71,6 +71,22 @@ def test_colours_follow_the_uvs(patch, package):
     bpy.ops.uv.omt_unwrap()
     after = colours(patch)
     assert np.ptp(after[:, :3], axis=1).mean() < 0.3 * np.ptp(before[:, :3], axis=1).mean()  # pale: as due
+
+
+def test_undo_takes_the_colours_away(patch, package):
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.uv.omt_overlay("EXEC_DEFAULT", True, show="AREA")
+    assert package("overlay").kind() == "AREA"
+    bpy.ops.ed.undo()
+    assert package("overlay").kind() == "NONE"
+    assert ATTRIBUTE not in bpy.data.objects["Bump"].data.color_attributes
+
+
+def test_another_file_starts_without_colours(patch, package):
+    bpy.ops.uv.omt_overlay(show="AREA")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert package("overlay").kind() == "NONE"
+    assert not [f for f in bpy.app.handlers.undo_post if "omt" in f.__module__]
 
 
 def test_unregistering_stops_the_drawing(patch, package):
