@@ -16,12 +16,14 @@ OPERATORS = {
     "uv.omt_unwrap": {},
     "uv.omt_refine": {},
     "uv.omt_seams": {},
+    "uv.omt_magnify": {"weight_group": "Region"},
     "uv.omt_sphere": {"quality": "DRAFT"},
+    "object.omt_weights": {},
     "object.omt_remesh": {"target_vertices": 60},
 }
-# Those that make new objects work in Object Mode alone.
+# What makes new objects works in Object Mode alone.
 CASES = [
-    (name, mode) for name in OPERATORS for mode in ("OBJECT", "EDIT") if name.startswith("uv.") or mode == "OBJECT"
+    (name, mode) for name in OPERATORS for mode in ("OBJECT", "EDIT") if name != "object.omt_remesh" or mode == "OBJECT"
 ]
 
 
@@ -35,6 +37,7 @@ def scene(name, mode):
     else:
         obj = scenes.bump(20, 16)
         scenes.set_uv(obj, scenes.seen_from_above(obj))
+        obj.vertex_groups.new(name="Region").add(list(range(100, 160)), 1.0, "REPLACE")
     if mode == "EDIT":
         scenes.edit(obj)
     return obj
