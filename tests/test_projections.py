@@ -108,6 +108,16 @@ def test_axes_of_a_sphere_are_its_own():
     assert np.allclose(along_axes(V, V, F), np.eye(3), atol=1e-12)
 
 
+def test_a_surface_that_looks_inwards_has_north_up_and_the_front_in_the_middle():
+    V, F = head()
+    direction = V - V.mean(axis=0)
+    points = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    outside = along_axes(points, V, F)
+    # Turned inside out it maps to the mirror image.
+    inside = along_axes(points * [-1, 1, 1], V, F[:, ::-1]) * [-1, 1, 1]
+    assert np.allclose((points @ inside.T)[:, 1:], (points @ outside.T)[:, 1:], atol=0.05)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_markers_give_pole_meridian_and_side(seed):
     pole, meridian, side = random_points(3, seed)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from .geometry import face_areas, vertex_areas
+from .spherical import signed_volumes
 
 NORTH, FRONT, EAST = np.array([0.0, 0, 1]), np.array([0.0, -1, 0]), np.array([1.0, 0, 0])
 # Two markers closer than this to each other or to the opposite point give no direction.
@@ -22,12 +23,16 @@ def along_axes(points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray) 
     """Rotation (3,3) that brings unit vectors (n,3) nearest to the directions of the surface's vertices (n,3).
 
     Least squares over the surface between the images and the positions seen from its centre of area (Kabsch 1976): what
-    is high on the surface lies north, what is in front of it at the central meridian.
+    is high on the surface lies north, what is in front of it at the central meridian. A surface that looks inwards is
+    seen from inside, where east is on the other side.
     """
     weight = vertex_areas(vertices, triangles)
     area = face_areas(vertices, triangles)
     centre = (area[:, None] * vertices[triangles].mean(axis=1)).sum(axis=0) / area.sum()
-    return nearest_rotation(points, vertices - centre, weight)
+    directions = vertices - centre
+    if signed_volumes(directions, triangles).sum() < 0:
+        directions = directions * [-1, 1, 1]
+    return nearest_rotation(points, directions, weight)
 
 
 def nearest_rotation(points: np.ndarray, directions: np.ndarray, weight: np.ndarray) -> np.ndarray:
