@@ -27,12 +27,13 @@ class Regular:
     """Triangles (k,3) of sites, counter-clockwise, and their twin halfedges (3k,), -1 on the hull.
 
     whole: the triangles fill the convex hull of all sites, so that edges which are regular one by one prove that the
-    triangulation is. Not so where sites lie on a straight rim, or are hidden.
+    triangulation is. Not so where sites lie on a straight rim, or are hidden. flips: of edges that led here.
     """
 
     triangles: np.ndarray
     twin: np.ndarray
     whole: bool
+    flips: int = 0
 
 
 def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
@@ -68,16 +69,21 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
     triangles, twin = start.triangles.copy(), start.twin.copy()
     flat = triangles.reshape(-1)
 
+    waiting = [np.zeros(0, np.int64)]
+
     def violation(edges):
         below, convex = _below(sites, weights, flat, edges, twin[edges])
+        waiting.append(edges[(below < 0) & ~convex])
         return np.where(convex, below, 0.0)
 
-    _, settled = flip_until_none(twin, violation, lambda edges: flip_in_place(triangles, twin, edges), MAX_ROUNDS)
-    edges = np.flatnonzero(twin > np.arange(len(twin)))
+    flips, settled = flip_until_none(twin, violation, lambda edges: flip_in_place(triangles, twin, edges), MAX_ROUNDS)
+    # Edges that wanted to flip and could not; a flip next to them may have helped since.
+    edges = np.unique(np.concatenate(waiting))
+    edges = edges[twin[edges] >= 0]
     below, _ = _below(sites, weights, flat, edges, twin[edges])
     stuck = edges[below < 0]
     if settled and len(stuck) == 0:
-        return Regular(triangles, twin, start.whole), False
+        return Regular(triangles, twin, start.whole, flips), False
     degree = np.bincount(flat, minlength=len(sites))
     on_hull = np.zeros(len(sites), dtype=bool)
     on_hull[flat[twin < 0]] = True

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .dissection import Dissection
 from .domain import Domain
 from .errors import TransportError
 from .geometry import laplacian_from_weights
@@ -20,11 +21,14 @@ from .regular import by_flips
 TOLERANCE = 5e-7
 MAX_STEPS = 100
 MAX_HALVINGS = 30
+# An elimination order serves until so many edges a site have flipped.
+FLIPS_PER_ORDER = 0.01
 
 
 @dataclass(frozen=True)
 class Transport:
-    """Weights (n,) and cells; residual: largest |area - mass| / mass; cost; Newton steps, diagrams and hulls built."""
+    """Weights (n,) and cells; residual: largest |area - mass| / mass; cost; Newton steps; diagrams
+    and hulls built; flips of edges."""
 
     weights: np.ndarray
     cells: PowerDiagram
@@ -33,6 +37,7 @@ class Transport:
     iterations: int
     diagrams: int
     hulls: int
+    flips: int
 
 
 def transport(
@@ -75,8 +80,8 @@ def transport(
                 cells = diagrams.anew(w)
                 residual = _residual(cells, mass)
             if residual <= tolerance:
-                return Transport(w, cells, residual, cells.cost(sites), iteration, diagrams.count, diagrams.hulls)
-        direction = _newton_direction(sites, cells, mass)
+                return Transport(w, cells, residual, cells.cost(sites), iteration, *diagrams.counts())
+        direction = _newton_direction(sites, cells, mass, diagrams.order(cells))
         error = float(np.linalg.norm(cells.area - mass))
         step = min(1.0, 4 * step)
         for _ in range(MAX_HALVINGS):
@@ -96,8 +101,21 @@ class _Diagrams:
 
     def __init__(self, sites: np.ndarray, domain: Domain):
         self.sites, self.domain = sites, domain
-        self.count = self.hulls = 0
+        self.count = self.hulls = self.flips = 0
         self.flipped = False
+        self._dissection = Dissection(sites[1:])
+        self._order, self._stale = np.zeros(0, np.int64), np.inf
+
+    def counts(self) -> tuple[int, int, int]:
+        """Diagrams, hulls and flips so far."""
+        return self.count, self.hulls, self.flips
+
+    def order(self, cells: PowerDiagram) -> np.ndarray:
+        """Elimination order of all sites but the first, as old as flips allow: they fill the factors of an old one."""
+        if self._stale > FLIPS_PER_ORDER * len(self.sites):
+            edges = cells.edges[(cells.edges > 0).all(axis=1)].T - 1
+            self._order, self._stale = self._dissection.order(*edges), 0
+        return self._order
 
     def anew(self, weights: np.ndarray) -> PowerDiagram:
         self.count, self.hulls, self.flipped = self.count + 1, self.hulls + 1, False
@@ -111,6 +129,8 @@ class _Diagrams:
         if dual is None:
             return self.anew(weights)
         self.count, self.flipped = self.count + 1, True
+        self.flips += dual.flips
+        self._stale += dual.flips
         return power_diagram(self.sites, weights, self.domain, dual)
 
 
@@ -122,10 +142,13 @@ def _residual(cells: PowerDiagram, mass: np.ndarray) -> float:
     return float(np.max(np.abs(cells.area - mass) / mass))
 
 
-def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray) -> np.ndarray:
-    """Derivative of area i by weight j: -|side ij| / (2 |y_i - y_j|); a common weight is its kernel."""
+def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Derivative of area i by weight j: -|side ij| / (2 |y_i - y_j|); a common weight is its kernel.
+
+    `order`: see `dissection`.
+    """
     n = len(sites)
     i, j = cells.edges.T
     conductance = cells.length / (2 * np.linalg.norm(sites[i] - sites[j], axis=1))
     hessian = laplacian_from_weights(i, j, conductance, n)[1:, 1:]
-    return np.concatenate([[0.0], solve_spd(hessian.tocsc(), (mass - cells.area)[1:], order="mmd")])
+    return np.concatenate([[0.0], solve_spd(hessian.tocsc(), (mass - cells.area)[1:], order)])
