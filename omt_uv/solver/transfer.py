@@ -80,6 +80,8 @@ def footprint(
         home[near] = _homes(mesh, new_triangles[near], free, faces[witness], found.points[near], home[near])
         corners = _corners(mesh, new_triangles[near], home[near], free, lifted, faces, barycentric)
         corner_triangle[near], corner_weights[near], side[near], extended = corners
+        alone = _away_from(mesh, seams, lifted, spacing)
+        _unite(new_triangles, alone, corner_triangle, corner_weights, side)
         faces, barycentric = _settled(new_triangles, side, corner_triangle, corner_weights, faces, barycentric)
     breaks, origin = _breaks(mesh, new_triangles, side, lifted)
     return Footprint(new_triangles, faces, barycentric, corner_triangle, corner_weights, home, breaks, origin, extended)
@@ -90,6 +92,42 @@ def rim_edges(triangles: np.ndarray) -> np.ndarray:
     tail, head = halfedges(triangles)
     rim = twins(triangles) < 0
     return np.stack([tail[rim], head[rim]], axis=1)
+
+
+def _away_from(mesh: CutMesh, seams: np.ndarray, points: np.ndarray, distance: float) -> np.ndarray:
+    """Points (k,3) so far from all seams, boundaries apart, that all faces around them are on one side; (k,) bool."""
+    if not len(seams):
+        return np.ones(len(points), dtype=bool)
+    near, _ = _seam_points(cut_open(mesh.positions, mesh.triangles, seams), distance / 2)
+    return cKDTree(near).query(points)[0] > 1.5 * distance if len(near) else np.ones(len(points), dtype=bool)
+
+
+def _unite(
+    new_triangles: np.ndarray,
+    alone: np.ndarray,
+    corner_triangle: np.ndarray,
+    corner_weights: np.ndarray,
+    side: np.ndarray,
+) -> None:
+    """Give all corners of vertices `alone` (k,) the side that most of them have; arrays (t,3), (t,3,3), (t,3) in place.
+
+    Next to boundaries that touch, single faces may have found the other one.
+    """
+    corner = np.flatnonzero(alone[new_triangles.ravel()])
+    # All that could not reach the vertex agree in that: it lies, as on a thin part, on the sheet behind.
+    vertex, own = new_triangles.ravel()[corner], np.maximum(side.ravel()[corner], -2)
+    order = np.lexsort([own, vertex])
+    first = np.flatnonzero(np.r_[True, (np.diff(vertex[order]) != 0) | (np.diff(own[order]) != 0)][: len(order)])
+    votes = np.diff(np.r_[first, len(order)])
+    best = np.lexsort([-votes, vertex[order[first]]])
+    voters = vertex[order[first]][best]
+    elected = order[first[best[np.r_[True, np.diff(voters) != 0][: len(best)]]]]
+    leader = np.zeros(len(alone), np.int64)
+    leader[vertex[elected]] = corner[elected]
+    chosen = leader[vertex]
+    corner_triangle.ravel()[corner] = corner_triangle.ravel()[chosen]
+    corner_weights.reshape(-1, 3)[corner] = corner_weights.reshape(-1, 3)[chosen]
+    side.ravel()[corner] = side.ravel()[chosen]
 
 
 def _settled(
