@@ -49,29 +49,28 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         draw_settings(self.layout, self)
 
     def steps(self, context: bpy.types.Context):
-        from .. import blender_mesh
+        from .. import blender_mesh, running
         from ..blender_seams import GroupError
-        from ..blender_weights import ScoreError, check_group_target, computed_weights, selected_vertices
+        from ..blender_weights import ScoreError, check_group_target, selected_vertices
         from ..solver.errors import MeshError
-        from ..solver.progress import Progress
 
         objects = [context.object] if context.mode == "PAINT_WEIGHT" else mesh_objects(context)
-        results = []
-        for k, obj in enumerate(objects):
-            yield Progress("Weights", k / len(objects))
+        jobs = []
+        for obj in objects:
             try:
                 check_group_target(obj, self.weight_group)
-                reading = blender_mesh.read(obj)
                 selected = selected_vertices(obj) if self.kind == "DISTANCE" else None
-                options = {"low": self.low, "high": self.high, "invert": self.invert, "selected": selected}
-                results.append((obj, computed_weights(obj, reading, self.kind.lower(), **options)))
+                jobs.append((obj, blender_mesh.read(obj), selected))
             except GroupError as error:
                 raise Complaint(str(error)) from error
-            except ScoreError as error:
-                raise Complaint(str(error), error.obj, error.error) from error
             except MeshError as error:
                 raise Complaint(f"{obj.name}: {error}", obj, error) from error
-        return results
+        options = {"low": self.low, "high": self.high, "invert": self.invert}
+        try:
+            weights = yield from running.aside(_weigh_all(jobs, self.kind.lower(), options))
+        except ScoreError as error:
+            raise Complaint(str(error), error.obj, error.error) from error
+        return list(zip(objects, weights, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
         from ..blender_weights import write_group
@@ -79,6 +78,18 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         for obj, weights in result:
             write_group(obj, self.weight_group, weights)
         self.report({"INFO"}, f"Weights are in the vertex group {self.weight_group!r}")
+
+
+def _weigh_all(jobs: list, kind: str, options: dict):
+    """Weights (n,) for every object, reading and selection; the object is for messages alone."""
+    from ..blender_weights import computed_weights
+    from ..solver.progress import Progress
+
+    found = []
+    for k, (obj, reading, selected) in enumerate(jobs):
+        yield Progress("Weights", k / len(jobs))
+        found.append(computed_weights(obj, reading, kind, selected=selected, **options))
+    return found
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
