@@ -23,11 +23,11 @@ class Texels:
 
 @dataclass(frozen=True)
 class _Faces:
-    """UVs (c,2), triangles (m,3) of corners, the island (m,) of each, their areas (m,) in space and in UV."""
+    """UVs (c,2), triangles (m,3) of corners, of vertices, and their areas (m,) in space and in UV."""
 
     uv: np.ndarray
     corners: np.ndarray
-    island: np.ndarray
+    vertices: np.ndarray
     space: np.ndarray
     uv_area: np.ndarray
 
@@ -63,19 +63,19 @@ def with_density(
     for face in faces:
         corners, first = np.unique(face.corners, return_index=True)
         uv = face.uv[corners]
-        island = np.repeat(face.island, 3)[first]
         if each_island:
-            factor, centre = _of_islands(face, island, uv, wanted, texels)
+            factor, centre = _of_islands(face, first, uv, wanted, texels)
         else:
             factor, centre = np.full(len(uv), common), middle
         result.append((corners, centre + (uv - centre) * factor[:, None]))
     return result
 
 
-def _of_islands(face: _Faces, island, uv, wanted: float, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
-    """Factor (k,) and centre (k,2) for every corner, of its island; islands without area stay as they are."""
-    count = int(face.island.max()) + 1
-    space, covered = np.bincount(face.island, face.space, count), np.bincount(face.island, face.uv_area, count)
+def _of_islands(face: _Faces, first, uv, wanted: float, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
+    """Factor (k,) and centre (k,2) of the islands of corners first (k,); islands without area stay as they are."""
+    count, of_face = uv_charts(face.vertices, face.uv[face.corners])
+    space, covered = np.bincount(of_face, face.space, count), np.bincount(of_face, face.uv_area, count)
+    island = np.repeat(of_face, 3)[first]
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = wanted * texels.metres / texels.texture_size * np.sqrt(space / covered)
     factor = np.where(np.isfinite(factor) & (factor > 0), factor, 1.0)
@@ -93,8 +93,7 @@ def _faces(reading: Reading) -> _Faces:
     if not len(corners):
         raise EmptyMeshError("There are no faces to measure")
     uv, triangles = reading.uv.astype(float), surface.corner_vertex[corners]
-    _, island = uv_charts(triangles, uv[corners])
-    return _Faces(uv, corners, island, face_areas(surface.positions, triangles), np.abs(signed_areas(uv, corners)))
+    return _Faces(uv, corners, triangles, face_areas(surface.positions, triangles), np.abs(signed_areas(uv, corners)))
 
 
 def _density(space: float, covered: float, texels: Texels) -> float:

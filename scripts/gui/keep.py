@@ -26,7 +26,9 @@ def main() -> None:
     for story, names in KEPT.items():
         for name in names:
             path = args.target / f"{name}.png"
-            Image.open(args.source / story / f"{name}.png").convert("RGB").quantize(256).save(path, optimize=True)
+            Image.open(args.source / story / f"{name}.png").convert("RGB").quantize(
+                256, method=Image.Quantize.MAXCOVERAGE, kmeans=2
+            ).save(path, optimize=True)
             print(f"{path} {path.stat().st_size // 1000} kB")
 
 

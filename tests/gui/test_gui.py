@@ -61,6 +61,8 @@ def test_colours_come_and_go(play):
     for name in ("area colours", "shear colours"):
         assert facts[name] == [["OMT UV Distortion"], "VERTEX"]
     assert facts["colours off"] == [[], "MATERIAL"]
+    facts = play("uv_editor")
+    assert facts["uv_area"] == facts["uv_shear"] == ["OMT UV Distortion"]
 
 
 def test_escape_ends_a_run_and_changes_nothing(play):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-# Places in the editor, pixels from its upper right corner, before and after the box with figures has come.
+# Places in the editor, pixels from its upper right corner, before and after the box with the figures of a live session.
 TAB, UNWRAP, LIVE = (14, 168), (127, 105), (50, 136)
 SLIDER = (200, 136), (110, 136)
-AREA, SHEAR, OFF = (127, 432), (68, 432), (185, 432)
+AREA, SHEAR, OFF = (127, 415), (68, 415), (185, 415)
 
 
 def tell(story):
@@ -34,6 +34,7 @@ def tell(story):
     for name, place in (("uv_area", AREA), ("uv_shear", SHEAR)):
         yield from story.click(*story.place("IMAGE_EDITOR", *place))
         yield from story.shoot(name)
+        story.facts[name] = [a.name for a in obj.data.color_attributes]
     yield from story.click(*story.place("IMAGE_EDITOR", *OFF))
 
 
