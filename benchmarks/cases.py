@@ -20,7 +20,7 @@ from omt_uv.solver.charts import triangle_surface
 from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.progress import drain
 
-CUT_MODELS = ["max_planck", "spot", "homer", "bunny", "stanford_bunny"]
+CUT_MODELS = ["max_planck", "spot", "homer", "bunny", "stanford_bunny", "armadillo"]
 MODELS = meshes.DISK_MODELS + CUT_MODELS
 
 

@@ -32,7 +32,7 @@ class Quality:
 QUALITIES = {
     "draft": Quality(0.05, (10.0, 100.0), 1e3, 40, 1e-2),
     "standard": Quality(0.008, (30.0, 500.0), 1e6, 150, 1e-2),
-    "exact": Quality(0.0005, (10.0, 100.0, 1000.0, 1e4), 1e8, 300, 1e-3),
+    "exact": Quality(0.0003, (30.0, 1000.0, 3e4), 1e8, 300, 1e-2),
 }
 # A stage on the way, or one that reaches the goal, ends when Newton promises less than this share of the energy.
 LOOSE = 3e-2
