@@ -1,7 +1,7 @@
 """How long Blender waits for a run: the longest slice between two looks at the keyboard, and what cancelling takes.
 
-Wall-clock milliseconds, which other jobs on the machine lengthen, and those that the main thread itself worked. The
-last slice writes, which cannot be cancelled; it stands apart.
+`slice` and `cancel` are wall-clock milliseconds, which other jobs on the machine lengthen; `working` and `writing` those
+that the main thread itself worked. The last slice writes and measures, which cannot be cancelled; it stands apart.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _add(table, size, mode, name):
     begin = time.perf_counter()
     slices = _slices(scenes.stand_in(name))
     seconds = time.perf_counter() - begin
-    *during, (writing, _, _) = slices
+    *during, (_, writing, _) = slices
     longest = max(during, default=(0.0, 0.0, ""))
     worked = max((own for _, own, _ in during), default=0.0)
     cancel = longest[0] + _cancelling(scenes.stand_in(name), seconds)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-from importlib import metadata, util
-
 import bpy
 
 from .. import __version__, last_run
@@ -25,6 +22,8 @@ class WM_OT_omt_copy_report(bpy.types.Operator):
 
 def report_text(context: bpy.types.Context) -> str:
     """Lines of text; names of objects and files are left out."""
+    import platform
+
     lines = [f"OMT UV {__version__}", f"Blender {bpy.app.version_string}", platform.platform()]
     lines += [
         f"Python {platform.python_version()}",
@@ -46,6 +45,9 @@ def report_text(context: bpy.types.Context) -> str:
 
 
 def _version(name: str) -> str:
+    # Slow to import, and needed here alone.
+    from importlib import metadata, util
+
     if util.find_spec(name) is None:
         return "missing"
     try:
