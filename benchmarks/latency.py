@@ -1,7 +1,7 @@
 """How long Blender waits for a run: the longest slice between two looks at the keyboard, and what cancelling takes.
 
 `slice` and `cancel` are wall-clock milliseconds, which other jobs on the machine lengthen; `working` and `writing` are
-those that the main thread itself worked. The last slice writes and measures, which cannot be cancelled; it stands apart.
+those that the main thread itself worked. The last slice writes and measures: it cannot be cancelled, and stands apart.
 """
 
 from __future__ import annotations
