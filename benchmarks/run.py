@@ -12,6 +12,7 @@ growth      time of the same surface, subdivided again and again, and the expone
 islands     a thousand small islands against Minimum Stretch
 magnify     the share that a painted region gets, and Minimum Stretch with the same vertex group
 sphere      closed surfaces to the sphere: area, shear, folds, Newton steps, and time against Minimum Stretch
+remesh      triangles, distances and time beside QuadriFlow and Decimate; the four strategies of B. Gu 2018
 latency     how long Blender waits for a slice of a run and for Esc, wall clock
 """
 
@@ -286,6 +287,12 @@ def speed(name):
     return part
 
 
+def remesh(args):
+    from remesh import remesh_part
+
+    return remesh_part(args)
+
+
 def latency(args):
     from latency import latency_part
 
@@ -310,6 +317,7 @@ PARTS = {
     "magnify": magnify,
     "latency": latency,
     "sphere": sphere,
+    "remesh": remesh,
 }
 
 

@@ -43,21 +43,35 @@ class Network:
     sides: list[list[Side]]
 
 
-def network(positions: np.ndarray, charts: list[Chart], held: np.ndarray, corners: bool = True) -> Network:
-    """Arcs of the boundaries of charts of one part, positions (n,3); held: sorted keys of the edges to keep."""
+def network(positions: np.ndarray, charts: list[Chart], held: np.ndarray, size: np.ndarray | None = None) -> Network:
+    """Arcs of the boundaries of charts of one part, positions (n,3); held: sorted keys of the edges to keep.
+
+    With `size` (n,), the edge length at every vertex, held arcs end at corners too.
+    """
     loops = [boundary_loops(chart.disk)[0] for chart in charts]
     ids = [chart.vertex_ids[loop] for chart, loop in zip(charts, loops, strict=True)]
     keys = [pair_keys(i, np.roll(i, -1)) for i in ids]
-    node = _nodes(positions, np.unique(np.concatenate(keys)), held, corners)
+    node = _nodes(len(positions), np.unique(np.concatenate(keys)), held)
     for i in ids:
         if not node[i].any():
             node[i.min()] = True
+    found = _network(loops, ids, keys, node, held)
+    if size is None:
+        return found
+    corners = [_corners(positions, arc.vertices, size) for arc in found.arcs if arc.held]
+    node[np.concatenate([np.zeros(0, np.int64), *corners])] = True
+    return _network(loops, ids, keys, node, held)
+
+
+def _network(loops: list[np.ndarray], ids: list[np.ndarray], keys: list[np.ndarray], node, held) -> Network:
     arcs: list[Arc] = []
     number: dict[int, int] = {}
     sides: list[list[Side]] = []
-    for c, (i, key) in enumerate(zip(ids, keys, strict=True)):
+    turned = []
+    for loop, i, key in zip(loops, ids, keys, strict=True):
         first = int(np.flatnonzero(node[i])[0])
-        loops[c], i, key = np.roll(loops[c], -first), np.roll(i, -first), np.roll(key, -first)
+        i, key = np.roll(i, -first), np.roll(key, -first)
+        turned.append(np.roll(loop, -first))
         starts = np.flatnonzero(node[i])
         labels = np.minimum.reduceat(key, starts)
         ends = np.append(starts[1:], len(i))
@@ -70,26 +84,40 @@ def network(positions: np.ndarray, charts: list[Chart], held: np.ndarray, corner
                 arcs.append(Arc(closed[start : end + 1], bool(_among(key[start : start + 1], held)[0])))
             mine.append(Side(number[int(label)], again, int(start)))
         sides.append(mine)
-    return Network(arcs, loops, sides)
+    return Network(arcs, turned, sides)
 
 
-def _nodes(positions: np.ndarray, keys: np.ndarray, held: np.ndarray, corners: bool) -> np.ndarray:
-    """Vertices (n,) bool where arcs end: branches, ends, changes of kind, and corners of lines that are kept."""
-    n = len(positions)
-    a, b = keys >> 32, keys & 0xFFFFFFFF
-    ends, other = np.concatenate([a, b]), np.concatenate([b, a])
+def _nodes(n: int, keys: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Vertices (n,) bool where arcs end: branches, ends, and changes of kind."""
+    ends = np.concatenate([keys >> 32, keys & 0xFFFFFFFF])
     degree = np.bincount(ends, minlength=n)
     kept = np.bincount(ends, np.tile(_among(keys, held), 2), n)
-    node = (degree > 0) & ((degree != 2) | (kept == 1))
-    if corners:
-        order = np.argsort(ends, kind="stable")
-        ends, other = ends[order], other[order]
-        first = np.flatnonzero((degree[ends] == 2) & (kept[ends] == 2))[::2]
-        v = ends[first]
-        p, q = positions[other[first]] - positions[v], positions[other[first + 1]] - positions[v]
-        size = np.linalg.norm(p, axis=1) * np.linalg.norm(q, axis=1)
-        node[v[-np.einsum("ij,ij->i", p, q) < np.cos(CORNER) * size]] = True
-    return node
+    return (degree > 0) & ((degree != 2) | (kept == 1))
+
+
+def _corners(positions: np.ndarray, vertices: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Vertices of an arc (k,) where it turns by more than CORNER between half an edge before and half an edge after.
+
+    At this scale a scan's frayed boundary has few corners, and a true one is not lost to a bevel.
+    """
+    p = positions[vertices]
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
+    reach = np.minimum(size[vertices] / 2, s[-1] / 4)
+    if vertices[0] == vertices[-1]:
+        s_long, p_long = np.concatenate([s[:-1] - s[-1], s, s[1:] + s[-1]]), np.concatenate([p[:-1], p, p[1:]])
+    else:
+        s_long, p_long = s, p
+    before, after = (
+        np.stack([np.interp(s + d, s_long, p_long[:, k]) for k in range(3)], axis=1) for d in (-reach, reach)
+    )
+    u, v = p - before, after - p
+    length = np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1)
+    cosine = np.einsum("ij,ij->i", u, v) / np.maximum(length, 1e-300)
+    inner = (s > 0) & (s < s[-1]) if vertices[0] != vertices[-1] else s < s[-1]
+    at = np.flatnonzero((cosine < np.cos(CORNER)) & (length > 0) & inner)
+    near = np.abs(s[at][:, None] - s[at]) < reach[at][:, None]
+    sharper = (cosine[at] < cosine[at][:, None]) | ((cosine[at] == cosine[at][:, None]) & (at < at[:, None]))
+    return vertices[at[~(near & sharper).any(axis=1)]]
 
 
 def _among(keys: np.ndarray, ordered: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from .topology import twins
 
-CANDIDATES = 6
+CANDIDATES = 4
 MOST_SAMPLES = 600_000
 WALK_ROUNDS = 20
 

@@ -15,10 +15,10 @@ import scipy.sparse as sp
 from .closest import ClosestPoint, face_normals, subdivision_centroids, vertex_normals
 from .draft import Draft
 from .embedded_flips import make_delaunay_embedded
-from .geometry import face_areas
+from .geometry import angles_from_lengths, face_areas, halfedge_lengths
 from .linear import solve_by_gradients
 from .progress import Progress, Steps
-from .surface_samples import Samples, area_samples
+from .surface_samples import Samples, area_samples, joined, tip_samples
 from .topology import twins
 from .voronoi import voronoi_cells
 
@@ -28,8 +28,15 @@ SAMPLES = 6
 PATTERN = 2
 # Weights next to the distances: of even displacements, of the centroids along the surface, of no displacement at all.
 FAIRNESS = 0.02
-CENTROID = 0.2
+CENTROID = 0.35
 STILL = 1e-3
+# Distances of this many times their mean count double, and up to 1 + FARTHEST^2 times.
+FAR, FARTHEST = 3.0, 3.0
+# Where angles fall below the first the centroid's weight rises, by PRESS for every step to the second.
+SMALL, SMALLER = np.radians(42.0), np.radians(34.0)
+PRESS = 3.0
+# Vertices stay within this share of an edge of the surface.
+TETHER = 0.15
 # Distances below this share of an edge have no direction but the normal's.
 CLOSE = 1e-3
 
@@ -49,18 +56,30 @@ def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray, spaci
 
     density (m,) of the surface's triangles, for the cells.
     """
-    samples = area_samples(index, SAMPLES * len(draft.points))
+    samples = joined(area_samples(index, SAMPLES * len(draft.points)), tip_samples(index, len(draft.points)))
     triangles, points = draft.triangles.copy(), draft.points
     twin = twins(triangles)
+    near = index.nearest_face(points)
     for k in range(ROUNDS):
         pairs = _pairs(points, triangles, index, samples, spacing)
-        near = index.nearest_face(points)
         cells = voronoi_cells(points, triangles, density[near] ** 2)
         pull = cells.moment / np.maximum(cells.mass, 1e-300)[:, None]
         points = points + _displacements(points, triangles, draft.fixed, pairs, pull, CLOSE * spacing)
+        points, near = _tethered(points, triangles, index, TETHER * spacing)
         make_delaunay_embedded(points, triangles, twin, draft.locked)
         yield Progress("Fit", (k + 1) / ROUNDS)
     return replace(draft, points=points, triangles=triangles)
+
+
+def _tethered(points, triangles, index: ClosestPoint, longest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n,3) no farther than that from the surface, and the triangles (n,) nearest to them.
+
+    Few distances see a vertex at a tip, and what they say in a straight line may lead far out.
+    """
+    on = index(points, vertex_normals(points, triangles))
+    way = points - on.points
+    distance = np.sqrt(np.einsum("ni,ni->n", way, way))
+    return on.points + way * np.minimum(1, longest / np.maximum(distance, 1e-300))[:, None], on.faces
 
 
 def _pairs(points, triangles, index: ClosestPoint, samples: Samples, spacing: float) -> Pairs:
@@ -85,7 +104,8 @@ def _displacements(points, triangles, fixed, pairs: Pairs, pull, close: float) -
     distance = np.sqrt(np.einsum("ki,ki->k", pairs.way, pairs.way))
     direction = pairs.way / np.maximum(distance, 1e-300)[:, None]
     direction = np.where((distance < close)[:, None], face_normals(points, triangles)[pairs.faces], direction)
-    root = np.sqrt(pairs.weight * n)
+    far = distance / (FAR * np.sqrt(np.average(distance**2, weights=pairs.weight)) + 1e-300)
+    root = np.sqrt(pairs.weight * n * (1 + np.minimum(far, FARTHEST) ** 2))
     k = len(root)
     entries = pairs.barycentric[:, :, None] * direction[:, None] * root[:, None, None]
     columns = 3 * triangles[pairs.faces][:, :, None] + np.arange(3)
@@ -93,15 +113,26 @@ def _displacements(points, triangles, fixed, pairs: Pairs, pull, close: float) -
     A = sp.csr_matrix((entries.ravel(), (rows, columns.ravel())), shape=(k, 3 * n))
     normals = vertex_normals(points, triangles)
     along = np.eye(3) - normals[:, :, None] * normals[:, None]
-    slide = sp.bsr_matrix((CENTROID * along + STILL * np.eye(3), np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n))
+    hold = _hold(points, triangles)
+    blocks = hold[:, None, None] * along + STILL * np.eye(3)
+    slide = sp.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n))
     system = (A.T @ A + slide + FAIRNESS * _fairness(triangles, n)).tocsr()
     right = A.T @ (np.einsum("ki,ki->k", direction, pairs.way) * root)
-    right += CENTROID * np.einsum("nij,nj->ni", along, pull).ravel()
+    right += (hold[:, None] * np.einsum("nij,nj->ni", along, pull)).ravel()
     free = np.flatnonzero(np.repeat(~fixed, 3))
     offset = np.zeros(3 * n)
     if len(free):
         offset[free] = solve_by_gradients(system[free][:, free], right[free])
     return offset.reshape(n, 3)
+
+
+def _hold(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Weight of the centroid at every vertex, (n,): more at triangles with small angles."""
+    angle = angles_from_lengths(halfedge_lengths(points, triangles).reshape(-1, 3)).min(axis=1)
+    bad = np.clip((SMALL - angle) / (SMALL - SMALLER), 0, 2)
+    worst = np.zeros(len(points))
+    np.maximum.at(worst, triangles.ravel(), np.repeat(bad, 3))
+    return CENTROID * (1 + PRESS * worst)
 
 
 def _fairness(triangles: np.ndarray, n: int) -> sp.csr_matrix:

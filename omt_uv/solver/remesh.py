@@ -25,7 +25,7 @@ from .tessellation import Options, tessellate
 # More vertices than this many times the input's tell nothing new about the surface.
 FAR_MORE = 50
 ROUNDS = 30
-FIRST_ROUNDS, BALANCES = 10, 3
+FIRST_ROUNDS, BALANCES = 10, 4
 # Mean step of a relaxation that has settled, in edge lengths.
 CONVERGED = 0.01
 
@@ -151,9 +151,9 @@ def _remesh_part(part: Part, count: int, density: np.ndarray, options: Options) 
         draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.3, 0.05)
         draft = adjust_count(draft, start.count, size)
         for k in range(BALANCES):
-            draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.35 + 0.05 * k, 0.05)
+            draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.35 + 0.04 * k, 0.04)
             draft = rebalance(draft, size)
-        draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.5, 0.2)
+        draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.51, 0.19)
     draft = adjust_count(draft, start.count, size)
     if options.fit:
         draft = yield from part_of(fit_to_surface(draft, index, level, start.size), 0.7, 0.3)

@@ -20,7 +20,7 @@ from .power_diagram import power_diagram
 from .regular import by_hull
 from .topology import twins
 
-ROUNDS = 8
+ROUNDS = 5
 # Strategies name the map to sample on and the map to triangulate on.
 STRATEGIES = ("app-cfp", "app-app", "cfp-cfp", "cfp-app")
 # Where all of them leave double precision: an embedding with the boundary samples at equal angles.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,6 +17,8 @@ BLUR = 0.2
 BLUNT = 0.03
 # Samples of crests are this share of an edge apart.
 PITCH = 0.22
+# Length of a vertex's mean normal below which it is a tip, or lies on an edge.
+POINTED = 0.9
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,30 @@ def area_samples(index: ClosestPoint, count: int) -> Samples:
         pick = np.minimum(np.searchsorted(np.cumsum(share), places), len(owner) - 1)
         owner, points, share = owner[pick], points[pick], np.full(count, share.sum() / count)
     return Samples(points, index.normals[owner], share, owner)
+
+
+def tip_samples(index: ClosestPoint, most: int) -> Samples:
+    """The vertices around which the normals differ most, `most` at the most; each counts as much as a usual triangle.
+
+    Few as they are, samples spread over the area would miss the points that stick out.
+    """
+    V, T = index.vertices, index.triangles
+    area, corner, n = face_areas(V, T), T.ravel(), len(V)
+    total = np.bincount(corner, np.repeat(area, 3), n)
+    sums = [np.bincount(corner, np.repeat(area * index.normals[:, k], 3), n) for k in range(3)]
+    normal = np.stack(sums, axis=1) / np.maximum(total, 1e-300)[:, None]
+    length = np.sqrt(np.einsum("ni,ni->n", normal, normal))
+    tips = np.argsort(length, kind="stable")[:most]
+    tips = tips[(length[tips] < POINTED) & (total[tips] > 0)]
+    face = np.empty(n, np.int64)
+    face[corner] = np.repeat(np.arange(len(T)), 3)
+    weight = np.full(len(tips), area.sum() / (4 * most))
+    return Samples(V[tips], normal[tips] / np.maximum(length[tips], 1e-300)[:, None], weight, face[tips])
+
+
+def joined(a: Samples, b: Samples) -> Samples:
+    """All samples of both."""
+    return Samples(*(np.concatenate([getattr(a, f.name), getattr(b, f.name)]) for f in fields(Samples)))
 
 
 def sharpness(index: ClosestPoint) -> np.ndarray:

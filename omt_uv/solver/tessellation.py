@@ -58,13 +58,14 @@ def tessellate(
     yield Progress("Charts", 0.0)
     held = np.union1d(part.rim, pair_keys(part.features[:, 0], part.features[:, 1]))
     charts = prepare(triangle_surface(part.vertices, part.triangles, part.features)).charts
-    lines = network(part.vertices, charts, held, options.corners)
     measure, rim = float(part.area @ density), _weighted_length(part.vertices, part.rim, at_vertices)
     vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
     size = edge_size(measure, rim, vertices)
-    samples = sample_arcs(part.vertices, lines.arcs, size / np.sqrt(at_vertices))
+    lengths = size / np.sqrt(at_vertices)
+    lines = network(part.vertices, charts, held, lengths if options.corners else None)
+    samples = sample_arcs(part.vertices, lines.arcs, lengths)
     if options.count_of == "faces":
-        samples, vertices = _for_faces(part, lines, samples, count, size / np.sqrt(at_vertices))
+        samples, vertices = _for_faces(part, lines, samples, count, lengths)
     borders = [border(sides, samples, lines.arcs) for sides in lines.sides]
     inner = _inner_counts(charts, borders, density, vertices - len(samples.points))
     patches: list[Patch] = []

@@ -1,0 +1,159 @@
+"""Remeshing to 5,000 vertices beside Blender's QuadriFlow and Decimate, and the four strategies of B. Gu 2018.
+
+Shapes are of triangles, quads cut along a diagonal. Distances are both ways, in shares of the box's diagonal.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+import numpy as np
+from cases import Table, load_case, timed
+from rivals import make_object, remove_object
+
+from omt_uv.solver.carrier import Carrier
+from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.closest import ClosestPoint, spread_points
+from omt_uv.solver.draft import Draft
+from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths
+from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.progress import drain
+from omt_uv.solver.relaxation import relax
+from omt_uv.solver.remesh import remesh
+from omt_uv.solver.sampling import STRATEGIES
+from omt_uv.solver.topology import halfedges, pair_keys, twins
+
+MODELS = ["lion", "face", "max_planck", "rocker_arm"]
+COUNT = 5000
+# What our meshes should reach.
+ANGLE_GOAL, THIN_GOAL, EDGE_GOAL, TIME_GOAL = 39.0, 0.1, 0.10, 3.0
+# Rounds of relaxation on the surface that every strategy gets in the second half of its table.
+SAME_ROUNDS = 10
+
+
+def shape(V, F):
+    """angle_p1 (degrees), pct_below_30, edge_cv, area_cv of triangles."""
+    least = np.degrees(angles_from_lengths(halfedge_lengths(V, F).reshape(-1, 3)).min(axis=1))
+    a, b = halfedges(F)
+    edges = np.unique(pair_keys(a, b))
+    length = np.linalg.norm(V[edges >> 32] - V[edges & 0xFFFFFFFF], axis=1)
+    area = face_areas(V, F)
+    return {
+        "angle_p1": float(np.percentile(least, 1)),
+        "below 30 %": float(100 * (least < 30).mean()),
+        "edge_cv": float(length.std() / length.mean()),
+        "area_cv": float(area.std() / area.mean()),
+    }
+
+
+def distances(V, F, W, G):
+    """Largest and root mean square distance of two meshes, over the diagonal of the first."""
+    spacing = np.sqrt(face_areas(V, F).sum() / COUNT)
+    largest, squares = [], []
+    for source, target in (((V, F), (W, G)), ((W, G), (V, F))):
+        owner, points = spread_points(*source, spacing / 3)
+        weight = (face_areas(*source) / np.bincount(owner, minlength=len(source[1])))[owner]
+        # Without normals the search is by position alone.
+        found = ClosestPoint(*target, spacing)(points, np.zeros(points.shape))
+        d = np.linalg.norm(found.points - points, axis=1)
+        largest.append(d.max())
+        squares.append(np.average(d**2, weights=weight))
+    diagonal = np.linalg.norm(np.ptp(V, axis=0))
+    return {"hausdorff": max(largest) / diagonal, "rms": float(np.sqrt(np.mean(squares))) / diagonal}
+
+
+def _triangles_of(obj):
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    mesh.calc_loop_triangles()
+    V, F = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.vertices.foreach_get("co", V)
+    mesh.loop_triangles.foreach_get("vertices", F)
+    return V.reshape(-1, 3).astype(float), F.reshape(-1, 3).astype(np.int64)
+
+
+def quadriflow(V, F):
+    """Blender's QuadriFlow with as many quads as vertices are asked for."""
+    obj = make_object(V, F)
+    _, seconds = timed(lambda: bpy.ops.object.quadriflow_remesh(mode="FACES", target_faces=COUNT, seed=0))
+    found = _triangles_of(obj)
+    remove_object(obj)
+    return found, seconds
+
+
+def decimate(V, F):
+    """Blender's Decimate modifier."""
+    obj = make_object(V, F)
+    modifier = obj.modifiers.new("Decimate", "DECIMATE")
+    modifier.ratio = min(1.0, 2 * COUNT / len(F))
+    found, seconds = timed(lambda: _triangles_of(obj))
+    remove_object(obj)
+    return found, seconds
+
+
+def ours(V, F):
+    result, seconds = timed(lambda: drain(remesh(V, F, COUNT)))
+    return (result.vertices, result.triangles), seconds
+
+
+METHODS = {"ours": ours, "QuadriFlow": quadriflow, "Decimate": decimate}
+
+
+def _model(name):
+    case = load_case(name)
+    used, place = np.unique(case.F, return_inverse=True)
+    return case.V[used], place.reshape(-1, 3)
+
+
+def remesh_part(args):
+    table = Table(
+        f"Remeshed to {COUNT} vertices; ratio = time / time of our unwrap",
+        {"model": 15, "method": 15, "vertices": 8, "angle_p1": 8, "below 30 %": 10, "edge_cv": 8, "area_cv": 8}
+        | {"hausdorff": 9, "rms": 9, "time": 8, "ratio": 7, "missed goals": 20},
+    )
+    for name in args.models or MODELS:
+        V, F = _model(name)
+        _, unit = timed(lambda V=V, F=F: drain(unwrap(triangle_surface(V, F))))
+        for method, work in METHODS.items():
+            (W, G), seconds = work(V, F)
+            row = {**shape(W, G), **distances(V, F, W, G), "time": seconds, "ratio": seconds / unit}
+            missed = ", ".join(_missed(row)) if method == "ours" else ""
+            table.add(model=name, method=method, vertices=len(W), **row, **{"missed goals": missed})
+    _strategies(args)
+    return table
+
+
+def _missed(row):
+    if row["angle_p1"] < ANGLE_GOAL or row["below 30 %"] > THIN_GOAL:
+        yield "angles"
+    if row["edge_cv"] > EDGE_GOAL:
+        yield "edges"
+    if row["ratio"] > TIME_GOAL:
+        yield "time"
+
+
+def _strategies(args):
+    """Sampled on one map, triangulated on another: alone, and after the same few rounds on the surface."""
+    columns = ["angle_p1", "edge_cv", "area_cv"]
+    table = Table(
+        f"Strategies: sampled on the first map, triangulated on the second; then {SAME_ROUNDS} rounds for all alike",
+        {"model": 15, "strategy": 15} | {f"{c} {when}": 16 for when in ("raw", "relaxed") for c in columns},
+    )
+    for name in args.models or MODELS[:2]:
+        V, F = _model(name)
+        for strategy in STRATEGIES:
+            raw = drain(remesh(V, F, COUNT, strategy=strategy, rounds=0, fit=False))
+            relaxed = _relaxed(V, F, raw)
+            row = {}
+            for when, (W, G) in {"raw": (raw.vertices, raw.triangles), "relaxed": relaxed}.items():
+                row |= {f"{c} {when}": v for c, v in shape(W, G).items() if c in columns}
+            table.add(model=name, strategy=strategy, **row)
+    table.write(args.out / "strategies.tsv")
+
+
+def _relaxed(V, F, raw):
+    rim = np.unique(raw.triangles.ravel()[twins(raw.triangles) < 0])
+    fixed = np.isin(np.arange(COUNT), rim)
+    index = ClosestPoint(V, F, np.sqrt(face_areas(V, F).sum() / COUNT * 2 / np.sqrt(3)))
+    draft = Draft(raw.vertices, raw.triangles, fixed, np.zeros(0, np.int64))
+    found, _ = drain(relax(draft, SAME_ROUNDS, Carrier(index, np.ones(len(F)), COUNT)))
+    return found.points, found.triangles
