@@ -30,7 +30,7 @@ class Carrier:
 
     def __init__(self, index: ClosestPoint, density: np.ndarray, count: int):
         self.index, self.density = index, density
-        self._samples = area_samples(index, SAMPLES_PER_POINT * count)
+        self._samples = area_samples(index, SAMPLES_PER_POINT * count, density)
         self._crests = crest_samples(index)
         self._faces: np.ndarray | None = None
         self._calls = 0

@@ -56,8 +56,9 @@ def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray, spaci
 
     density (m,) of the surface's triangles, for the cells.
     """
-    samples = joined(area_samples(index, SAMPLES * len(draft.points)), tip_samples(index, len(draft.points)))
-    triangles, points = draft.triangles.copy(), draft.points
+    points = draft.points
+    samples = joined(area_samples(index, SAMPLES * len(points), density), tip_samples(index, len(points)))
+    triangles = draft.triangles.copy()
     twin = twins(triangles)
     near = index.nearest_face(points)
     for k in range(ROUNDS):

@@ -70,7 +70,7 @@ def solve_general(A: sp.spmatrix, b: np.ndarray) -> np.ndarray:
     return Factor(A, "colamd", spd=False).solve(b)
 
 
-def solve_by_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-4, most: int = 200) -> np.ndarray:
+def solve_by_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-6, most: int = 200) -> np.ndarray:
     """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite and close to its diagonal."""
     inverse = 1 / A.diagonal()
     x, _ = cg(A, b, rtol=tolerance, maxiter=most, M=sp.diags(inverse))

@@ -31,16 +31,18 @@ class Samples:
     faces: np.ndarray
 
 
-def area_samples(index: ClosestPoint, count: int) -> Samples:
-    """About `count` samples, at most twice as many, spread evenly over the area."""
+def area_samples(index: ClosestPoint, count: int, density: np.ndarray) -> Samples:
+    """About `count` samples, at most twice as many, in proportion to the area times the density (m,), of mean 1."""
     area = face_areas(index.vertices, index.triangles)
-    owner, points = spread_points(index.vertices, index.triangles, np.sqrt(2 * area.sum() / count))
+    spacing = np.sqrt(2 * area.sum() / (count * density.max()))
+    owner, points = spread_points(index.vertices, index.triangles, spacing)
     share = area[owner] / np.bincount(owner, minlength=len(area))[owner]
     if len(owner) > 2 * count:
-        # Where faces are smaller than the samples' spacing a few of them stand for all, as often as they are large.
-        places = (np.arange(count) + 0.5) / count * share.sum()
-        pick = np.minimum(np.searchsorted(np.cumsum(share), places), len(owner) - 1)
-        owner, points, share = owner[pick], points[pick], np.full(count, share.sum() / count)
+        # A few of them stand for all, as often as their measure is large.
+        measure = np.cumsum(share * density[owner])
+        pick = np.searchsorted(measure, (np.arange(count) + 0.5) / count * measure[-1])
+        owner, points = owner[pick], points[pick]
+        share = measure[-1] / count / density[owner]
     return Samples(points, index.normals[owner], share, owner)
 
 

@@ -17,7 +17,7 @@ class Cells:
 
 
 def voronoi_cells(points: np.ndarray, triangles: np.ndarray, density: np.ndarray) -> Cells:
-    """Cells of a Delaunay mesh (n,3), (m,3) with density (n,) at the vertices, linear in between.
+    """Cells of a Delaunay mesh (n,3), (m,3) with density (n,) at the vertices, geometric means in between.
 
     Every triangle is parted by the lines from its circumcentre to the middles of its sides, with signs where the
     circumcentre lies outside.
@@ -37,13 +37,16 @@ def voronoi_cells(points: np.ndarray, triangles: np.ndarray, density: np.ndarray
     w = np.clip(w, -1, 2)
     w = w / w.sum(axis=1, keepdims=True)
     centre = np.einsum("mk,mki->mi", w, p)
-    middle_rho = rho.mean(axis=1)
+    # Geometric means in between: where a long edge leads from many small cells to a few large ones, the arithmetic mean
+    # would say that half of it belongs to the small ones, and these would draw vertices from the large.
+    log_rho = np.log(rho)
+    middle_rho = np.exp(log_rho.mean(axis=1))
     n = len(points)
     mass, moment, energy = np.zeros(n), np.zeros((n, 3)), 0.0
     v = centre[:, None] - p
     for far, sign in ((1, 1.0), (2, -1.0)):
         u = (e if far == 1 else -e[:, [2, 0, 1]]) / 2
-        side_rho = (rho + rho[:, [1, 2, 0] if far == 1 else [2, 0, 1]]) / 2
+        side_rho = np.exp((log_rho + log_rho[:, [1, 2, 0] if far == 1 else [2, 0, 1]]) / 2)
         area = 0.5 * sign * np.einsum("mki,mi->mk", np.cross(u, v), normal)
         total = rho + side_rho + middle_rho[:, None]
         part = (area / 12)[..., None] * (
