@@ -32,6 +32,17 @@ def test_transport_of_random_sites():
     assert tally.factorisations == found.iterations and tally.nonzeros <= 95 * found.iterations * len(sites)
 
 
+def test_the_order_of_large_meshes_gives_the_same_maps(monkeypatch):
+    from omt_uv.solver import dissection, embedding
+
+    V, F = meshes.head(40)
+    (reference,) = drain(unwrap(triangle_surface(V, F))).maps
+    for module in (dissection, embedding):
+        monkeypatch.setattr(module, "LARGE", 100)
+    (dissected,) = drain(unwrap(triangle_surface(V, F))).maps
+    np.testing.assert_allclose(dissected.uv, reference.uv, atol=1e-6 * np.abs(reference.uv).max())
+
+
 def test_dissection_fills_little_more_than_minimum_degree():
     sites = random_sites(5000)
     tail, head = halfedges(by_hull(sites, np.zeros(len(sites))).triangles)

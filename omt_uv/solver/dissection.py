@@ -8,7 +8,13 @@ large meshes that is faster than a minimum degree order, and so are its factors,
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_matrix
 
+from .linear import minimum_degree
+from .topology import halfedges
+
+# From this many vertices on dissection is the better order of the two; on fewer, minimum degree has less fill.
+LARGE = 100_000
 # Parts of this many vertices are not halved any more.
 LEAF = 16
 
@@ -34,6 +40,19 @@ class Dissection:
         # A separator comes when its part has been eliminated, the smaller ones first.
         below = self.depth - level
         return np.lexsort((below, ((self.part >> below) + 1) << below))
+
+
+def mesh_order(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Elimination order (n,) for the vertices of a mesh (n,d), (m,3), the better of the two for its size."""
+    if len(points) < LARGE:
+        return minimum_degree(vertex_graph(triangles, len(points)))
+    return Dissection(points).order(*halfedges(triangles))
+
+
+def vertex_graph(triangles: np.ndarray, n: int) -> coo_matrix:
+    """Which of n vertices share a triangle (m,3), themselves included: (n,n), entries positive."""
+    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
+    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
 
 
 def _upper_half(points, part, count) -> np.ndarray:

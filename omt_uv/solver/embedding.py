@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from .dissection import LARGE, Dissection
 from .geometry import angles_from_lengths, halfedge_lengths
 from .linear import solve_general
 from .topology import halfedges
@@ -41,8 +42,15 @@ def tutte(positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, target
         total = np.asarray(rows.sum(axis=1)).ravel()
         rows = csr_matrix((rows.data / np.repeat(total, np.diff(rows.indptr)), rows.indices, rows.indptr), rows.shape)
         matrix = csr_matrix((np.ones(inside.sum()), (np.arange(inside.sum()),) * 2)) - rows[:, inside]
-        uv[inside] = solve_general(matrix.tocsc(), rows[:, loop] @ target)
+        order = "colamd" if n < LARGE else _inner_order(positions, triangles, inside)
+        uv[inside] = solve_general(matrix.tocsc(), rows[:, loop] @ target, order)
     return uv
+
+
+def _inner_order(positions, triangles, inside) -> np.ndarray:
+    """Elimination order of the vertices `inside` (n,) bool, numbered among themselves."""
+    order = Dissection(positions).order(*halfedges(triangles))
+    return (np.cumsum(inside) - 1)[order[inside[order]]]
 
 
 def arc_length_parameters(positions: np.ndarray, loop: np.ndarray) -> np.ndarray:

@@ -65,9 +65,9 @@ def solve_spd(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray | None = No
     return Factor(A, order).solve(b)
 
 
-def solve_general(A: sp.spmatrix, b: np.ndarray) -> np.ndarray:
+def solve_general(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray = "colamd") -> np.ndarray:
     """Solve A x = b, A unsymmetric but diagonally dominant (Tutte systems); b (n,) or (n,k). Raises PrecisionError."""
-    return Factor(A, "colamd", spd=False).solve(b)
+    return Factor(A, order, spd=False).solve(b)
 
 
 def solve_by_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-6, most: int = 200) -> np.ndarray:

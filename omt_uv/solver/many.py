@@ -14,13 +14,13 @@ import numpy as np
 
 from .contact import crossings
 from .control import Control
+from .dissection import vertex_graph
 from .embedding import arc_length_parameters, tutte
 from .energy import Elements, elements, energies, gradient
 from .geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
 from .linear import minimum_degree
 from .newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
 from .progress import Progress, Steps
-from .renumbering import vertex_graph
 from .starts import NEARLY_FLAT, unroll
 from .topology import boundary_loops
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
+from .dissection import mesh_order
 from .errors import MeshError
 from .geometry import signed_areas
-from .linear import minimum_degree
 from .pins import Pins, check_pins
 from .starts import check_start
 
@@ -50,7 +49,7 @@ def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | No
     uv = np.asarray(uv, float)
     check_start(uv, triangles)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
-    order = minimum_degree(vertex_graph(triangles, len(vertices)))
+    order = mesh_order(vertices, triangles)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     held = None
@@ -58,9 +57,3 @@ def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | No
         checked = check_pins(np.asarray(pins[0]), np.asarray(pins[1], float).reshape(-1, 2) * mirror, len(order))
         held = Pins(place[checked.vertices], checked.places)
     return Renumbered(vertices[order], place[triangles], uv[order] * mirror, held, order, mirror)
-
-
-def vertex_graph(triangles: np.ndarray, n: int) -> coo_matrix:
-    """Which of n vertices share a triangle (m,3), themselves included: (n,n), entries positive."""
-    pairs = np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, (1, 3)).ravel()
-    return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .dissection import mesh_order
 from .energy import elements, squared
 from .errors import FoldedUVError
-from .linear import minimum_degree
 from .newton import Assembly
 from .progress import Progress, Steps
-from .renumbering import vertex_graph
 from .sphere_newton import SphereProblem, derivatives, seen
 from .sphere_untangle import untangle_on_sphere
 from .spherical import signed_volumes, spherical_areas
@@ -89,7 +88,7 @@ def relax(
 
 def _renumbered(vertices, triangles, target) -> tuple[SphereProblem, np.ndarray]:
     """The problem with vertices in the order (n,) in which they are eliminated."""
-    order = minimum_degree(vertex_graph(triangles, len(vertices)))
+    order = mesh_order(vertices, triangles)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     triangles, target = place[triangles], target * (4 * np.pi / target.sum())
