@@ -11,6 +11,7 @@ from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_len
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remesh import STRATEGIES, remesh
 from omt_uv.solver.topology import boundary_loops, halfedges, pair_keys
+from omt_uv.solver.voronoi import voronoi_cells
 
 CASES = {
     "disk": lambda: meshes.bumpy(24, 24),
@@ -153,3 +154,10 @@ def test_one_sided_surfaces_are_refused():
 def test_many_more_vertices_than_the_input_has_are_warned_of():
     V, F = meshes.quad_patch()
     assert any("times" in w for w in run(V, F, 300, rounds=5).warnings)
+
+
+def test_cells_of_flat_triangles_have_mass():
+    """Where flips are not allowed, triangles may be so obtuse that a signed cell is less than nothing."""
+    V = np.array([[0.0, 0, 0], [10, 0, 0], [5, 0.01, 0], [5, -0.01, 0]])
+    cells = voronoi_cells(V, np.array([[0, 1, 2], [0, 3, 1]]), np.ones(4))
+    assert (cells.mass > 0).all() and np.isfinite(cells.moment).all()

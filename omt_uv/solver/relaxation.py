@@ -130,4 +130,4 @@ def _shortest(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     shortest = np.full(len(points), np.inf)
     np.minimum.at(shortest, triangles.ravel(), length.ravel())
     np.minimum.at(shortest, triangles[:, [1, 2, 0]].ravel(), length.ravel())
-    return shortest
+    return np.maximum(shortest, 1e-6 * length.mean())

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+# Share of a third of the adjacent area that a cell has at least.
+LEAST = 0.2
+
 
 @dataclass(frozen=True)
 class Cells:
@@ -58,4 +61,6 @@ def voronoi_cells(points: np.ndarray, triangles: np.ndarray, density: np.ndarray
         mass += np.bincount(flat, (area * total / 3).ravel(), n)
         for k in range(3):
             moment[:, k] += np.bincount(flat, part[..., k].ravel(), n)
-    return Cells(mass, moment, energy)
+    # Where flips could not reach Delaunay cells may be small, or less than nothing: a step must not divide by that.
+    usual = np.bincount(triangles.ravel(), np.repeat(double / 6 * middle_rho, 3), n)
+    return Cells(np.maximum(mass, np.maximum(LEAST * usual, 1e-9 * usual.mean())), moment, energy)
