@@ -240,7 +240,20 @@ def render_colours(V, F, rgb, view, path, pixels=480):
     remove_object(obj)
 
 
-def _render(obj, points, view, path, color_type, pixels):
+def render_wires(V, F, view, path, pixels=480):
+    """Render the mesh in clay with its edges drawn on it to `path`."""
+    points = V[np.unique(F)]
+    clay, wires = make_object(V, F), make_object(V, F, name="wires")
+    clay.color, wires.color = (0.75, 0.8, 0.86, 1), (0.03, 0.05, 0.09, 1)
+    modifier = wires.modifiers.new("wires", "WIREFRAME")
+    modifier.use_even_offset = False
+    modifier.thickness = 0.0022 * float(np.linalg.norm(np.ptp(points, axis=0)))
+    _render(clay, points, view, path, "OBJECT", pixels, also=(wires,))
+    remove_object(wires)
+    remove_object(clay)
+
+
+def _render(obj, points, view, path, color_type, pixels, also=()):
     obj.data.shade_smooth()
     scene = bpy.context.scene
     scene.render.engine = "BLENDER_WORKBENCH"
@@ -255,7 +268,8 @@ def _render(obj, points, view, path, color_type, pixels):
     shading.show_shadows = False
     camera = _camera(points, view)
     scene.camera = camera
-    hidden = [o for o in scene.objects if o.type == "MESH" and o is not obj and not o.hide_render]
+    shown = (obj, *also)
+    hidden = [o for o in scene.objects if o.type == "MESH" and o not in shown and not o.hide_render]
     for other in hidden:
         other.hide_render = True
     scene.render.filepath = str(path)

@@ -71,10 +71,10 @@ def _triangles_of(obj):
     return V.reshape(-1, 3).astype(float), F.reshape(-1, 3).astype(np.int64)
 
 
-def quadriflow(V, F):
+def quadriflow(V, F, count=COUNT):
     """Blender's QuadriFlow with as many quads as vertices are asked for."""
     obj = make_object(V, F)
-    _, seconds = timed(lambda: bpy.ops.object.quadriflow_remesh(mode="FACES", target_faces=COUNT, seed=0))
+    _, seconds = timed(lambda: bpy.ops.object.quadriflow_remesh(mode="FACES", target_faces=count, seed=0))
     found = _triangles_of(obj)
     remove_object(obj)
     return found, seconds

@@ -15,10 +15,12 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "docs")]
 
 import magnified_graph
+import numpy as np
 import pictures
 import rivals
 import world_map
 from cases import load_case, meshes, our_uv
+from remesh import quadriflow, shape
 from sphere import sphere_figures
 
 from omt_uv.projecting import GlobeJob, project
@@ -26,8 +28,10 @@ from omt_uv.settings import GlobeSettings
 from omt_uv.solver.charts import triangle_surface
 from omt_uv.solver.distortion import face_distortion, measure
 from omt_uv.solver.globe import polygons_of, unfold
+from omt_uv.solver.measure import mean_curvature
 from omt_uv.solver.orientation import along_axes
 from omt_uv.solver.progress import drain
+from omt_uv.solver.remesh import remesh
 
 CELLS = {"lilium": 120}  # how many checker cells cover the model
 CIRCLES = {"max_planck": 260}  # likewise, in squares as large as those of the checker
@@ -35,6 +39,7 @@ RIVALS = {"Blender Angle Based": "Angle Based", "Blender Minimum Stretch": "Mini
 OURS = "OMT UV"
 GLOBES = ("max_planck", "bunny")
 BALANCES = (0.0, 0.25, 0.5, 1.0)
+REMESHED, REMESHED_COUNT = ("max_planck", "rocker_arm"), 3000
 
 
 def maps(case):
@@ -148,6 +153,28 @@ def circle_sheet(name, out, scratch, pixels):
     pictures.sheet(out / f"{name}_circles.png", list(uvs), rows)
 
 
+def remesh_sheet(names, out, scratch, pixels):
+    """Wireframes of about as many vertices: QuadriFlow's, and ours, uniform and by curvature."""
+    rows = []
+    for name in names:
+        V, F = meshes.load_model(name)
+        found = [quadriflow(V, F, REMESHED_COUNT)[0], _remeshed(V, F, None), _remeshed(V, F, mean_curvature(V, F, 2.0))]
+        renders, captions = [], []
+        for k, (W, G) in enumerate([(V, F), *found]):
+            renders.append(scratch / f"{name}_wires_{k}.png")
+            pictures.render_wires(W, G, view_of(name), renders[-1], pixels)
+            figures = shape(W, G)
+            captions.append(f"{len(np.unique(G)):,} vertices, {figures['below 30 %']:.1f} % below 30 degrees")
+        rows.append((name.replace("_", " "), renders, captions, None))
+    titles = ["Input", "Blender QuadriFlow", f"{OURS}, uniform", f"{OURS}, by curvature"]
+    pictures.sheet(out / "remesh.png", titles, rows)
+
+
+def _remeshed(V, F, density):
+    found = drain(remesh(V, F, REMESHED_COUNT, density=density))
+    return found.vertices, found.triangles
+
+
 def caption(case, uv):
     figures = measure(case.V, case.F, uv)
     return f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}"
@@ -164,6 +191,7 @@ def main():
     found = [n for n in ("lion", "max_planck") if n in present]
     parser.add_argument("--circles", nargs="*", default=found or ["head"], help="models with a circle packing on them")
     parser.add_argument("--globes", nargs="*", default=GLOBES, help="closed models with a map of the world")
+    parser.add_argument("--remeshed", nargs="*", default=REMESHED, help="models whose remeshes are drawn as wires")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "pictures")
     parser.add_argument("--pixels", type=int, default=400, help="of one panel")
     args = parser.parse_args()
@@ -176,6 +204,9 @@ def main():
         globes = [n for n in args.globes if meshes.model_path(n)]
         if globes:
             globe_sheet(globes, args.out, Path(scratch), 5 * args.pixels // 4)
+        remeshed = [n for n in args.remeshed if meshes.model_path(n)]
+        if remeshed:
+            remesh_sheet(remeshed, args.out, Path(scratch), 5 * args.pixels // 4)
         favourite = "lion" if "lion" in args.models else next(iter(args.models), "")
         if favourite:
             balance_sheet(favourite, args.out, Path(scratch), 3 * args.pixels // 4)
