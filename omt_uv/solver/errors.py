@@ -129,3 +129,17 @@ class CountError(MeshError):
     """A remesh was asked for fewer vertices or faces than its topology and features take."""
 
     remedy = "Ask for more vertices, or keep fewer features"
+
+
+def positive_density(density: np.ndarray) -> np.ndarray:
+    """The density (m,) of faces as floats.
+
+    Raises
+    ------
+    DensityError : a value that is not positive and finite
+    """
+    density = np.asarray(density, float)
+    wrong = np.flatnonzero(~(np.isfinite(density) & (density > 0)))
+    if len(wrong):
+        raise DensityError("A density is not positive and finite", kind="face", elements=wrong)
+    return density

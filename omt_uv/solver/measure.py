@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from . import curvature
-from .errors import DensityError, ShareError, WeightError
+from .errors import DensityError, ShareError, WeightError, positive_density
 from .geometry import face_areas, vertex_areas
 from .topology import halfedges
 
@@ -99,10 +99,7 @@ def attribute(values: np.ndarray) -> np.ndarray:
     ------
     DensityError : a value that is not positive and finite, or values of more contrast than `CONTRAST`
     """
-    density = np.asarray(values, float)
-    wrong = np.flatnonzero(~(np.isfinite(density) & (density > 0)))
-    if len(wrong):
-        raise DensityError("A density is not positive and finite", kind="face", elements=wrong)
+    density = positive_density(values)
     if density.max(initial=1.0) > CONTRAST * density.min(initial=np.inf):
         least = np.flatnonzero(density * CONTRAST < density.max())
         raise DensityError(f"A density varies by more than {CONTRAST:.0e}", "Raise the smallest values", "face", least)

@@ -15,7 +15,7 @@ from .charts import Chart, Surface, triangle_rows
 from .conformal import sharpest_corners
 from .distortion import measure
 from .domain import Disk, Domain, Rectangle
-from .errors import FoldedUVError, MeshError
+from .errors import FoldedUVError, MeshError, positive_density
 from .first_map import COARSE_ABOVE, FirstMap, Log, coarse_first_map, first_map, mean_value_sites
 from .geometry import face_areas, signed_areas
 from .many import Maps, solve_many
@@ -327,7 +327,7 @@ def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: Log, optio
 def _with_patches(density, region, patches: int) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Density and region of all triangles of a chart's disk, those of the patches over holes included."""
     return (
-        None if density is None else np.concatenate([density, np.ones(patches)]),
+        None if density is None else np.concatenate([positive_density(density), np.ones(patches)]),
         None if region is None else np.concatenate([region, np.zeros(patches)]),
     )
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .energy import Elements, area_error, elements
-from .errors import DensityError, MeshError
+from .errors import MeshError, positive_density
 from .geometry import face_areas
 from .newton import Assembly
 from .pins import Pins, drag
@@ -120,10 +120,7 @@ def refine(
 def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     if target is None:
         return area
-    target = np.asarray(target, float)
-    wrong = np.flatnonzero(~(np.isfinite(target) & (target > 0)))
-    if len(wrong):
-        raise DensityError("A face has no positive, finite target area", kind="face", elements=wrong)
+    target = positive_density(target)
     return target * (area.sum() / target.sum())
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from .carrier import Carrier
 from .closest import ClosestPoint, vertex_normals
 from .counts import adjust_count, distribute, least_vertices, rebalance
-from .errors import DensityError
+from .errors import positive_density
 from .fit import fit_to_surface
 from .parts import Part, split_parts
 from .progress import Progress, Steps, part_of
@@ -120,13 +120,10 @@ class _Result:
 def _checked_density(density: np.ndarray | None, m: int) -> np.ndarray:
     if density is None:
         return np.ones(m)
-    density = np.asarray(density, dtype=float)
+    density = np.asarray(density, float)
     if density.shape != (m,):
         raise ValueError(f"density must have one value for each of {m} triangles, not the shape {density.shape}")
-    wrong = np.flatnonzero(~(np.isfinite(density) & (density > 0)))
-    if len(wrong):
-        raise DensityError("Remeshing needs a positive, finite density", kind="face", elements=wrong)
-    return density
+    return positive_density(density)
 
 
 def _counts(parts: list[Part], measure: np.ndarray, count: int, count_of: str) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .closed import ClosedSurface, closed_surface
-from .errors import DensityError, FoldedUVError, PrecisionError, TransportError
+from .errors import FoldedUVError, PrecisionError, TransportError, positive_density
 from .geometry import face_areas, vertex_areas
 from .progress import Steps, part_of
 from .sphere_conformal import ConformalSphere, conformal_sphere
@@ -99,11 +99,7 @@ def _target(surface: ClosedSurface, density: np.ndarray | None) -> np.ndarray:
     area = face_areas(surface.vertices, surface.triangles)
     if density is None:
         return area
-    density = np.asarray(density, float)
-    wrong = np.flatnonzero(~(np.isfinite(density) & (density > 0)))
-    if len(wrong):
-        raise DensityError("A face has no positive, finite density", kind="face", elements=wrong)
-    return area * density
+    return area * positive_density(density)
 
 
 def _conformal(surface: ClosedSurface, warnings: list[str]) -> Steps[ConformalSphere | None]:
