@@ -56,6 +56,17 @@ def test_triangles_are_nearly_equilateral(name):
     assert np.percentile(angles(result.vertices, result.triangles).min(axis=1), 1) > 36
 
 
+def test_cuts_between_boundaries_leave_no_trace():
+    """A pipe falls into a chart with a cut from end to end; edges along it must flip like any other."""
+    V, F = meshes.grid(32, 48)
+    P = np.concatenate([np.cos(V[:, :1] * 2 * np.pi), 6 * V[:, 1:2], -np.sin(V[:, :1] * 2 * np.pi)], axis=1)
+    number = np.arange(len(P)).reshape(49, 33)
+    number[:, 32] = number[:, 0]
+    result = run(P, number.ravel()[F], 800)
+    assert topology(result.triangles) == (0, 2)
+    assert angles(result.vertices, result.triangles).min() > 30
+
+
 def test_points_of_the_input_under_the_new_vertices():
     V, F = meshes.bumpy(24, 24)
     result = run(V, F, 300, rounds=20, fit=False)

@@ -130,6 +130,7 @@ def _patch(
 
 
 def _kept(lines: Network, samples: ArcSamples, number: np.ndarray) -> np.ndarray:
-    """Sorted keys of the edges between samples on boundaries and features."""
-    keys = [pair_keys(along[:-1], along[1:]) for arc, along in zip(lines.arcs, samples.along, strict=True) if arc.held]
+    """Sorted keys of the edges between samples on boundaries and features, after renumbering by `number` (s,)."""
+    held = [number[along] for arc, along in zip(lines.arcs, samples.along, strict=True) if arc.held]
+    keys = [pair_keys(along[:-1], along[1:]) for along in held]
     return np.sort(np.concatenate(keys)) if keys else np.zeros(0, np.int64)
