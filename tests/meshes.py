@@ -13,9 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay
-
-from omt_uv.solver.charts import Surface
 
 ROOT = Path(__file__).resolve().parent.parent
 DISK_MODELS = ["snail", "lilium", "camel_b", "face", "lion", "alligator", "woody", "hemisphere", "maze"]
@@ -122,6 +119,8 @@ def random_disk(count=300, seed=0, height=0.3):
     inner, turn = 0.95 * np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
     P = np.concatenate([np.column_stack([np.cos(angle), np.sin(angle)]),
                         np.column_stack([inner * np.cos(turn), inner * np.sin(turn)])])  # fmt: skip
+    from scipy.spatial import Delaunay  # Blender's tests import this module where scipy comes with the extension
+
     F = Delaunay(P).simplices.astype(np.int64)
     e1, e2 = P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]]
     clockwise = e1[:, 0] * e2[:, 1] < e1[:, 1] * e2[:, 0]
@@ -213,6 +212,8 @@ def torus(major=24, minor=12, radius=0.4):
 
 def polygon_surface(V, polygons, seams=()):
     """The `Surface` of a polygon mesh, polygons (lists of vertices) cut into fans of triangles."""
+    from omt_uv.solver.charts import Surface
+
     sizes = np.array([len(p) for p in polygons], dtype=np.int64)
     start = np.concatenate([[0], np.cumsum(sizes)])
     fans = [(s, s + k, s + k + 1) for s, size in zip(start[:-1], sizes, strict=True) for k in range(1, size - 1)]
