@@ -110,7 +110,6 @@ def _level(job: Job, triangles: np.ndarray, count_of: str, count: int, settings:
         features=job.features if len(job.features) else None,
         preserve_boundary=settings.preserve_boundary,
         strategy=settings.strategy,
-        seed=settings.seed,
     )
     found = yield from part_of(steps, 0.0, 0.95)
     yield Progress("Attributes", 0.95)

@@ -142,7 +142,6 @@ class RemeshSettings:
     levels: int = 1
     ratio: float = 0.5
     strategy: str = DEFAULT_STRATEGY.lower()
-    seed: int = 0
 
 
 SOURCES = (

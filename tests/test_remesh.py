@@ -9,7 +9,7 @@ import pytest
 from omt_uv.solver.errors import CountError, DensityError, EmptyMeshError, NonFiniteError, OrientationError
 from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remesh import STRATEGIES, remesh
+from omt_uv.solver.remesh import STRATEGIES, remesh, summed_up
 from omt_uv.solver.topology import boundary_loops, halfedges, pair_keys
 from omt_uv.solver.voronoi import voronoi_cells
 
@@ -137,6 +137,40 @@ def test_parts_share_the_count():
 def test_too_few_vertices_are_refused(name, count):
     with pytest.raises(CountError):
         run(*CASES[name](), count)
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("count", [14, 24])
+def test_coarse_meshes_keep_the_topology(name, count):
+    V, F = CASES[name]()
+    result = run(V, F, count)
+    assert len(result.vertices) == count == len(np.unique(result.triangles))
+    assert topology(result.triangles) == topology(F)
+    assert np.isfinite(result.vertices).all()
+
+
+def test_closed_surfaces_go_down_to_a_tetrahedron():
+    result = run(*meshes.icosphere(2), 4)
+    assert len(result.vertices) == 4 and topology(result.triangles) == (2, 0)
+
+
+def test_large_parts_make_up_for_small_ones():
+    """A leaf of one triangle takes more than its share."""
+    V, F = meshes.bumpy(12, 12)
+    leaf = np.array([[0.0, 0, 2], [1e-3, 0, 2], [0, 1e-3, 2]])
+    result = run(np.concatenate([V, leaf]), np.concatenate([F, [[len(V), len(V) + 1, len(V) + 2]]]), 120)
+    assert len(result.vertices) == 120 and topology(result.triangles) == (2, 2)
+
+
+def test_odd_numbers_of_faces_are_warned_of_on_closed_surfaces():
+    V, F = meshes.icosphere(2)
+    result = run(V, F, 201, count_of="faces", rounds=5)
+    assert len(result.triangles) == 200 and any("200 instead of 201" in w for w in result.warnings)
+    assert run(V, F, 200, count_of="faces", rounds=5).warnings == ()
+
+
+def test_the_same_warnings_are_summed_up():
+    assert summed_up(["a", "b", "a"]) == ["a (2 times)", "b"]
 
 
 def test_bad_input_is_named():

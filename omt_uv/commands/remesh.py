@@ -38,7 +38,6 @@ def add(commands) -> None:
     command.add_argument("--strategy", choices=names(STRATEGIES), default=DEFAULT_STRATEGY.lower(), help="two maps")
     _add_features(command)
     command.add_argument("--no-attributes", action="store_true", help="carry no UVs, groups, colours, shape keys")
-    command.add_argument("--seed", type=int, default=0, metavar="N", help="another number, another mesh of the kind")
 
 
 def _add_features(command: argparse.ArgumentParser) -> None:
@@ -107,7 +106,6 @@ def _settings(options: argparse.Namespace) -> RemeshSettings:
         levels=options.levels,
         ratio=options.ratio,
         strategy=options.strategy,
-        seed=options.seed,
     )
 
 

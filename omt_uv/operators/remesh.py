@@ -110,7 +110,6 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         items=STRATEGIES,
         default=DEFAULT_STRATEGY,
     )
-    seed: IntProperty(name="Seed", description="Another number, another mesh of the same kind", default=0, min=0)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -141,7 +140,6 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
             levels=self.levels,
             ratio=self.ratio,
             strategy=self.strategy.lower(),
-            seed=self.seed,
         )
 
     def steps(self, context: bpy.types.Context):
@@ -242,4 +240,3 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     column.active = properties.levels > 1
     column.prop(properties, "ratio")
     layout.prop(properties, "strategy")
-    layout.prop(properties, "seed")

@@ -136,17 +136,20 @@ class ArcSamples:
     share: list[np.ndarray]
 
 
-def sample_arcs(positions: np.ndarray, arcs: list[Arc], size: np.ndarray, longer: int = -1) -> ArcSamples:
+def sample_arcs(
+    positions: np.ndarray, arcs: list[Arc], size: np.ndarray, longer: int = -1, stretch: float = 1.0
+) -> ArcSamples:
     """Samples about `size` (n,), an edge length at every vertex, apart: a whole number of equal pieces on every arc.
 
     Arcs that begin and end at one node get two samples more, and several arcs between the same two one. The arc number
-    `longer` gets one piece more.
+    `longer` gets one piece more. On held arcs samples are `stretch` times as far apart.
     """
     pieces, places = [], []
     for arc in arcs:
         p = positions[arc.vertices]
         local = (size[arc.vertices][1:] + size[arc.vertices][:-1]) / 2
         length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1) / local)])
+        length /= stretch if arc.held else 1.0
         places.append(length)
         pieces.append(max(1, round(float(length[-1]))))
     ends = np.sort([[a.vertices[0], a.vertices[-1]] for a in arcs], axis=1)

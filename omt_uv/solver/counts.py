@@ -11,14 +11,24 @@ from .draft import Draft
 from .embedded_flips import make_delaunay_embedded
 from .errors import CountError
 from .geometry import vertex_areas
-from .mesh_edits import Edit, collapse_edges, independent_splits, interior_edges, split_edges
+from .mesh_edits import LEAST_COSINE, Edit, collapse_edges, independent_splits, interior_edges, split_edges
 from .parts import Part
-from .topology import halfedges, twins
+from .topology import boundary_loops, halfedges, twins
+
+
+class StuckError(Exception):
+    """No edge of the draft can collapse any more."""
+
+    def __init__(self, draft: Draft):
+        super().__init__()
+        self.draft = draft
+
 
 # Edge lengths (k,) wanted at points (k,3).
 Size: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 MOST_ROUNDS = 500
+ANY_COSINE = -2.0
 # In one round only edges about as short, or as long, as the most wanted ones go.
 SHARE = 0.5
 FLIP_ROUNDS = 5
@@ -34,18 +44,18 @@ VALENCE = 0.05
 def least_vertices(part: Part) -> int:
     """Vertices that a surface of this topology takes at least (Heawood's bound; Jungerman, Ringel 1980)."""
     if len(part.rim):
-        return 3
+        return 3 * len(boundary_loops(part.triangles))
     euler = min(part.euler, 2)
     return int(np.ceil((7 + np.sqrt(49 - 24 * euler)) / 2 - 1e-9))
 
 
-def distribute(count: int, share: np.ndarray, least: np.ndarray) -> np.ndarray:
+def distribute(count: int, share: np.ndarray, least: np.ndarray, of: str = "vertices") -> np.ndarray:
     """Whole numbers (k,) that sum to `count`, in proportion to `share` (k,) but none below `least` (k,).
 
     Raises CountError if there are not enough.
     """
     if count < least.sum():
-        raise CountError(f"{count} vertices are too few: this topology takes at least {least.sum()}")
+        raise CountError(f"{count} {of} are too few: this topology takes at least {least.sum()}")
     given = least.astype(float)
     free = np.ones(len(share), dtype=bool)
     for _ in range(len(share)):
@@ -73,15 +83,17 @@ def edge_size(measure: float, rim: float, count: int) -> float:
     return float(2 * a / (-b + np.sqrt(b * b + 4 * a * count)))
 
 
-def adjust_count(draft: Draft, count: int, size: Size) -> Draft:
+def adjust_count(draft: Draft, count: int, size: Size, anyhow: bool = False) -> Draft:
     """The mesh with exactly `count` vertices.
 
     Where there are too many the shortest edges collapse, where there are too few the longest are split, in
     comparison with the edge length that `size` gives at points (k,3).
 
+    Where nothing else is possible faces may turn over, if `anyhow`.
+
     Raises
     ------
-    CountError : no edge can collapse any more
+    StuckError : no edge can collapse any more
     """
     for _ in range(MOST_ROUNDS):
         missing = count - len(draft.points)
@@ -91,8 +103,16 @@ def adjust_count(draft: Draft, count: int, size: Size) -> Draft:
         tail, head = halfedges(draft.triangles)
         a, b = draft.points[tail[h]], draft.points[head[h]]
         length = np.linalg.norm(a - b, axis=1) / size((a + b) / 2)
-        draft = _split(draft, h, length, missing) if missing > 0 else _collapse(draft, h, length, -missing)
-    raise CountError(f"{count} vertices cannot be reached")
+        if missing > 0:
+            draft = _split(draft, h, length, missing)
+            continue
+        try:
+            draft = _collapse(draft, h, length, -missing, LEAST_COSINE)
+        except StuckError:
+            if not anyhow:
+                raise
+            draft = _collapse(draft, h, length, -missing, ANY_COSINE)
+    raise StuckError(draft)
 
 
 def _split(draft: Draft, h: np.ndarray, length: np.ndarray, missing: int) -> Draft:
@@ -101,15 +121,15 @@ def _split(draft: Draft, h: np.ndarray, length: np.ndarray, missing: int) -> Dra
     return _settled(draft, split_edges(draft.points, draft.triangles, chosen))
 
 
-def _collapse(draft: Draft, h: np.ndarray, length: np.ndarray, spare: int) -> Draft:
+def _collapse(draft: Draft, h: np.ndarray, length: np.ndarray, spare: int, least_cosine: float) -> Draft:
     order = np.argsort(length, kind="stable")
     reach = 4 * spare + 32
     while True:
-        edit = collapse_edges(draft.points, draft.triangles, h[order[:reach]], draft.fixed, spare)
+        edit = collapse_edges(draft.points, draft.triangles, h[order[:reach]], draft.fixed, spare, least_cosine)
         if len(edit.points) < len(draft.points):
             return _settled(draft, edit)
         if reach >= len(order):
-            raise CountError(f"Boundaries, features and topology take at least {len(draft.points)} vertices")
+            raise StuckError(draft)
         reach *= 4
 
 

@@ -128,7 +128,7 @@ class FoldedUVError(MeshError):
 class CountError(MeshError):
     """A remesh was asked for fewer vertices or faces than its topology and features take."""
 
-    remedy = "Ask for more vertices, or keep fewer features"
+    remedy = "Ask for more, or keep fewer features"
 
 
 def positive_density(density: np.ndarray) -> np.ndarray:

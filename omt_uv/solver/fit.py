@@ -65,7 +65,10 @@ def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray, spaci
         pairs = _pairs(points, triangles, index, samples, spacing)
         cells = voronoi_cells(points, triangles, density[near] ** 2)
         pull = cells.moment / np.maximum(cells.mass, 1e-300)[:, None]
-        points = points + _displacements(points, triangles, draft.fixed, pairs, pull, CLOSE * spacing)
+        moved = points + _displacements(points, triangles, draft.fixed, pairs, pull, CLOSE * spacing)
+        if not np.isfinite(moved).all():
+            break
+        points = moved
         points, near = _tethered(points, triangles, index, TETHER * spacing)
         make_delaunay_embedded(points, triangles, twin, draft.locked)
         yield Progress("Fit", (k + 1) / ROUNDS)

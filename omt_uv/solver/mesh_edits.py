@@ -54,10 +54,18 @@ def independent_splits(triangles: np.ndarray, h: np.ndarray) -> np.ndarray:
     return h[(first[t] == rank) & (first[s] == rank)]
 
 
-def collapse_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray, fixed: np.ndarray, most: int) -> Edit:
+def collapse_edges(
+    points: np.ndarray,
+    triangles: np.ndarray,
+    h: np.ndarray,
+    fixed: np.ndarray,
+    most: int,
+    least_cosine: float = LEAST_COSINE,
+) -> Edit:
     """Collapse up to `most` of the edges of interior halfedges h (k,), most wanted first; see `_possible`.
 
-    The two ends meet in the middle, or where the one is that is `fixed` (n,) bool.
+    The two ends meet in the middle, or where the one is that is `fixed` (n,) bool. No face turns by more than
+    `least_cosine`.
     """
     n = len(points)
     tail, head = halfedges(triangles)
@@ -75,7 +83,7 @@ def collapse_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray, fix
     keep, gone, place = keep[ok], gone[ok], place[ok]
     chosen = _apart(neighbours, keep, gone)
     keep, gone, place = keep[chosen], gone[chosen], place[chosen]
-    sound = _unfolded(points, triangles, keep, gone, place)
+    sound = _unfolded(points, triangles, keep, gone, place, least_cosine)
     keep, gone, place = keep[sound][:most], gone[sound][:most], place[sound][:most]
     moved, target = points.copy(), np.arange(n)
     moved[keep] = place
@@ -116,7 +124,7 @@ def _apart(neighbours: csr_matrix, keep: np.ndarray, gone: np.ndarray) -> np.nda
     return ~lost
 
 
-def _unfolded(points, triangles, keep, gone, place) -> np.ndarray:
+def _unfolded(points, triangles, keep, gone, place, least_cosine: float) -> np.ndarray:
     """Collapses (k,) bool that turn no face around them over."""
     n = len(points)
     moved, target, owner = points.copy(), np.arange(n), np.full(n, -1)
@@ -130,7 +138,7 @@ def _unfolded(points, triangles, keep, gone, place) -> np.ndarray:
     old, new = points[t], moved[t]
     before = unit(np.cross(old[:, 1] - old[:, 0], old[:, 2] - old[:, 0]))
     after = unit(np.cross(new[:, 1] - new[:, 0], new[:, 2] - new[:, 0]))
-    folded = stays & (np.einsum("ij,ij->i", before, after) < LEAST_COSINE)
+    folded = stays & (np.einsum("ij,ij->i", before, after) < least_cosine)
     sound = np.ones(len(keep), dtype=bool)
     sound[mine[folded]] = False
     return sound

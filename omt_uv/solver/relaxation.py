@@ -61,10 +61,12 @@ def relax(draft: Draft, rounds: int, carrier: Carrier) -> Steps[tuple[Draft, flo
         shortest = _shortest(points, triangles)
         share = np.minimum(1, REACH * shortest / np.maximum(size, 1e-300))
         moved = float(np.mean((share * size / shortest)[~fixed])) if not fixed.all() else 0.0
-        trial = points + share[:, None] * step
+        trial = points + np.nan_to_num(share[:, None] * step, posinf=0.0, neginf=0.0)
         normal = vertex_normals(trial, triangles)
         trial, density = carrier.onto(trial, normal)
-        points = np.where(fixed[:, None], points, trial)
+        # A vertex that found no place stays where it is.
+        found = ~fixed & np.isfinite(trial).all(axis=1)
+        points = np.where(found[:, None], trial, points)
         yield Progress("Relaxation", (k + 1) / rounds)
     make_delaunay_embedded(points, triangles, twin, draft.locked)
     return replace(draft, points=points, triangles=triangles), moved

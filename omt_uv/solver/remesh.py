@@ -13,19 +13,21 @@ import numpy as np
 
 from .carrier import Carrier
 from .closest import ClosestPoint, vertex_normals
-from .counts import adjust_count, distribute, least_vertices, rebalance
-from .errors import positive_density
+from .counts import StuckError, adjust_count, distribute, least_vertices, rebalance
+from .errors import CountError, positive_density
 from .fit import fit_to_surface
 from .parts import Part, split_parts
 from .progress import Progress, Steps, part_of
 from .relaxation import relax
 from .sampling import STRATEGIES
-from .tessellation import Options, tessellate
+from .tessellation import Options, Tessellation, tessellate
 
 # More vertices than this many times the input's tell nothing new about the surface.
 FAR_MORE = 50
 ROUNDS = 30
 FIRST_ROUNDS, BALANCES = 10, 4
+# How often boundaries and features are thinned out to reach a count.
+ATTEMPTS, THINNED = 3, 2.0
 # Mean step of a relaxation that has settled, in edge lengths.
 CONVERGED = 0.01
 
@@ -61,7 +63,6 @@ def remesh(
     strategy: str = "app-cfp",
     fit: bool = True,
     rounds: int = ROUNDS,
-    seed: int = 0,
 ) -> Steps[Remesh]:
     """A new mesh of the surface (n,3), (m,3) with `count` vertices, its triangles equilateral as far as can be.
 
@@ -74,7 +75,6 @@ def remesh(
     strategy : map to sample on and map to triangulate on, each the measure-preserving ("app") or the conformal ("cfp")
     fit : move vertices off the surface to halve the distance of the triangles to it
     rounds : of relaxation on the surface; 0 leaves the strategy's mesh as it is
-    seed : of the walks that locate points
 
     Raises
     ------
@@ -96,14 +96,12 @@ def remesh(
     if count > FAR_MORE * (len(vertices) if count_of == "vertices" else len(triangles)):
         warnings.append(f"{count} {count_of} are more than {FAR_MORE} times the input's; they add no detail")
     measure = np.array([float(p.area @ wanted[p.faces]) for p in found.parts])
-    counts = _counts(found.parts, measure, count, count_of)
-    done, results = 0.0, []
-    options = Options(count_of, strategy, fit, rounds, preserve_boundary, seed)
-    for part, share, number in zip(found.parts, measure / measure.sum(), counts, strict=True):
-        steps = _remesh_part(part, int(number), wanted[part.faces], options)
-        results.append((yield from part_of(steps, done, float(share))))
-        done += float(share)
-        warnings += [w for w in results[-1].warnings if w not in warnings]
+    options = Options(count_of, strategy, fit, rounds, preserve_boundary)
+    results = yield from _remesh_parts(found.parts, measure, wanted, count, options)
+    warnings += summed_up([w for r in results for w in r.warnings])
+    made = sum(len(r.triangles) for r in results)
+    if count_of == "faces" and made != count:
+        warnings.append(f"Closed surfaces have an even number of triangles: {made} instead of {count}")
     return _joined(results, found.centre, found.size, warnings, rounds)
 
 
@@ -126,34 +124,79 @@ def _checked_density(density: np.ndarray | None, m: int) -> np.ndarray:
     return positive_density(density)
 
 
-def _counts(parts: list[Part], measure: np.ndarray, count: int, count_of: str) -> np.ndarray:
-    """Vertices, or faces, of every part."""
+def _remesh_parts(
+    parts: list[Part], measure: np.ndarray, density: np.ndarray, count: int, options: Options
+) -> Steps[list[_Result]]:
+    """All parts, the smallest first, so that the larger ones make up for those that take more than their share."""
+    least = _least(parts, options.count_of)
+    left = np.argsort(measure, kind="stable")
+    results: list[_Result] = [None] * len(parts)  # type: ignore[list-item]
+    done = 0.0
+    while len(left):
+        k, share = left[0], float(measure[left[0]] / measure.sum())
+        number = int(distribute(count, measure[left], least[left], options.count_of)[0])
+        steps = _remesh_part(parts[k], number, density[parts[k].faces], options, last=len(left) == 1)
+        results[k] = yield from part_of(steps, done, share)
+        count -= len(results[k].points if options.count_of == "vertices" else results[k].triangles)
+        left, done = left[1:], done + share
+    return results
+
+
+def _least(parts: list[Part], count_of: str) -> np.ndarray:
+    """Vertices, or faces, that every part takes at least."""
     least = np.array([least_vertices(p) for p in parts])
     if count_of == "vertices":
-        return distribute(count, measure, least)
+        return least
     closed = np.array([len(p.rim) == 0 for p in parts])
     euler = np.array([p.euler for p in parts])
-    return distribute(count, measure, np.where(closed, 2 * (least - euler), 1))
+    return np.where(closed, 2 * (least - euler), 1)
 
 
-def _remesh_part(part: Part, count: int, density: np.ndarray, options: Options) -> Steps[_Result]:
-    """One part in its unit box."""
+def summed_up(texts: list[str]) -> list[str]:
+    """Every text once, and how often it was said."""
+    return [text if (k := texts.count(text)) == 1 else f"{text} ({k} times)" for text in dict.fromkeys(texts)]
+
+
+def _remesh_part(part: Part, count: int, density: np.ndarray, options: Options, last: bool) -> Steps[_Result]:
+    """One part in its unit box; boundaries and features get fewer samples where the count cannot be reached.
+
+    Only the last part has to keep to its count; it makes up for the others.
+    """
     level = density / (part.area @ density / part.area.sum())
-    start = yield from part_of(tessellate(part, count, level, _at_vertices(part, level), options), 0.0, 0.3)
+    stretch, attempt = 1.0, 0
+    while True:
+        attempt += 1
+        steps = tessellate(part, count, level, _at_vertices(part, level), options, stretch)
+        start = yield from part_of(steps, 0.0, 0.3)
+        anyhow = attempt == ATTEMPTS or not start.draft.fixed.any()
+        try:
+            return (yield from part_of(_settle(part, start, level, options, anyhow), 0.3, 0.7))
+        except StuckError as error:
+            if anyhow and last:
+                text = f"{start.count} vertices are too few: edges of this topology, with its boundaries and features,"
+                raise CountError(f"{text} collapse to {len(error.draft.points)} at the least") from error
+            if anyhow:
+                # What could be reached is the count then.
+                count = len(error.draft.points if options.count_of == "vertices" else error.draft.triangles)
+        stretch = start.stretch * THINNED
+
+
+def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options, anyhow: bool) -> Steps[_Result]:
+    """Relax, count and fit a first mesh."""
     index = ClosestPoint(part.vertices, part.triangles, start.size)
     size = _Size(index, level, start.size)
     draft, moved = start.draft, 0.0
     if options.rounds:
         carrier = Carrier(index, level, start.count)
-        draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.3, 0.05)
-        draft = adjust_count(draft, start.count, size)
+        draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.0, 0.07)
+        draft = adjust_count(draft, start.count, size, anyhow)
         for k in range(BALANCES):
-            draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.35 + 0.04 * k, 0.04)
+            draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.07 + 0.057 * k, 0.057)
             draft = rebalance(draft, size)
-        draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.51, 0.19)
-    draft = adjust_count(draft, start.count, size)
+        draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.3, 0.27)
+    draft = adjust_count(draft, start.count, size, anyhow)
     if options.fit:
-        draft = yield from part_of(fit_to_surface(draft, index, level, start.size), 0.7, 0.3)
+        draft = yield from part_of(fit_to_surface(draft, index, level, start.size), 0.57, 0.43)
     on = index(draft.points, vertex_normals(draft.points, draft.triangles))
     return _Result(draft.points, draft.triangles, part.faces[on.faces], on.barycentric, moved, start.warnings)
 

@@ -12,13 +12,18 @@ from .chart_maps import chart_maps
 from .charts import Chart, triangle_surface
 from .counts import edge_size
 from .draft import Draft
-from .errors import PrecisionError
+from .errors import CountError, PrecisionError
 from .geometry import face_areas
 from .parts import Part
 from .preparation import prepare
 from .progress import Progress, Steps, part_of
 from .sampling import EVEN, Patch, triangulate_chart
 from .topology import pair_keys
+
+# Vertices that every part has at first.
+FEWEST = 100
+# Samples on boundaries and features that are too many move apart by this factor, again and again, up to so many edges.
+STRETCH, LONGEST = 1.25, 1e3
 
 
 @dataclass(frozen=True)
@@ -30,29 +35,33 @@ class Options:
     fit: bool
     rounds: int
     corners: bool
-    seed: int
 
 
 @dataclass(frozen=True)
 class Tessellation:
     """A mesh of a part with about the vertices asked for, samples on boundaries and features fixed, edges there locked.
 
-    count: the exact number of vertices to reach; size: edge length at density 1.
+    count: the exact number of vertices to reach; size: edge length at density 1; stretch: that of the samples on
+    boundaries and features next to it.
     """
 
     draft: Draft
     count: int
     size: float
+    stretch: float
     warnings: tuple[str, ...]
 
 
 def tessellate(
-    part: Part, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options
+    part: Part, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float = 1.0
 ) -> Steps[Tessellation]:
     """Samples of a part with density (m,), and at_vertices (n,), of mean 1, triangulated by the strategy.
 
+    On boundaries and features they are `stretch` edges apart, or more where there would be too many.
+
     Raises
     ------
+    CountError : boundaries and features alone take more
     PrecisionError : a chart cannot be triangulated
     """
     yield Progress("Charts", 0.0)
@@ -61,13 +70,22 @@ def tessellate(
     measure, rim = float(part.area @ density), _weighted_length(part.vertices, part.rim, at_vertices)
     vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
     size = edge_size(measure, rim, vertices)
+    # A few samples make no sound mesh of a surface, so these are taken away only afterwards.
+    finer = edge_size(measure, rim, max(vertices, FEWEST)) / size
     lengths = size / np.sqrt(at_vertices)
-    lines = network(part.vertices, charts, held, lengths if options.corners else None)
-    samples = sample_arcs(part.vertices, lines.arcs, lengths)
-    if options.count_of == "faces":
-        samples, vertices = _for_faces(part, lines, samples, count, lengths)
+    while True:
+        lines = network(part.vertices, charts, held, stretch * lengths if options.corners else None)
+        samples = sample_arcs(part.vertices, lines.arcs, finer * lengths, stretch=stretch / finer)
+        if options.count_of == "faces":
+            samples, vertices = _for_faces(part, lines, samples, count, finer * lengths, stretch / finer)
+        if samples.fixed.sum() <= vertices:
+            break
+        if stretch > LONGEST:
+            cause = f"{vertices} vertices are too few: boundaries, features and their corners take at least"
+            raise CountError(f"{cause} {samples.fixed.sum()} here")
+        stretch *= STRETCH
     borders = [border(sides, samples, lines.arcs) for sides in lines.sides]
-    inner = _inner_counts(charts, borders, density, vertices - len(samples.points))
+    inner = _inner_counts(charts, borders, density, max(vertices, FEWEST) - len(samples.points))
     patches: list[Patch] = []
     warnings: list[str] = []
     done = 0.0
@@ -86,7 +104,7 @@ def tessellate(
     number[order] = np.arange(len(points))
     fixed = np.arange(len(points)) < samples.fixed.sum()
     draft = Draft(points[order], number[triangles], fixed, _kept(lines, samples, number))
-    return Tessellation(draft, vertices, size, tuple(warnings))
+    return Tessellation(draft, vertices, size, stretch, tuple(warnings))
 
 
 def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarray) -> float:
@@ -95,13 +113,13 @@ def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarra
     return float(length @ np.sqrt((density[a] + density[b]) / 2))
 
 
-def _for_faces(part: Part, lines: Network, samples: ArcSamples, count: int, size) -> tuple[ArcSamples, int]:
+def _for_faces(part: Part, lines: Network, samples: ArcSamples, count: int, size, stretch) -> tuple[ArcSamples, int]:
     """Samples whose boundary fits a number of faces, F = 2 V - 2 euler - b, and the number of vertices."""
     rim = [k for k, arc in enumerate(lines.arcs) if np.isin(pair_keys(*arc.vertices[:2, None]), part.rim)[0]]
     b = sum(len(samples.along[k]) - 1 for k in rim)
     if (count + b) % 2 and rim:
         longest = max(rim, key=lambda k: len(samples.along[k]))
-        samples = sample_arcs(part.vertices, lines.arcs, size, longer=longest)
+        samples = sample_arcs(part.vertices, lines.arcs, size, longer=longest, stretch=stretch)
         b += 1
     return samples, (count + b) // 2 + part.euler
 
