@@ -52,12 +52,13 @@ class Level:
     kept: np.ndarray
 
 
-def coarsened(vertices: np.ndarray, triangles: np.ndarray, mass: np.ndarray) -> list[Level]:
+def coarsened(vertices: np.ndarray, triangles: np.ndarray, mass: np.ndarray, seed: int = 0) -> list[Level]:
     """Levels of a closed surface of genus 0 (n,3), (m,3) with face masses (m,), the finest first.
 
     The last level is a tetrahedron, without rounds. Masses move to the faces that fill a hole; their sum is kept.
+    Another seed removes vertices in another order.
     """
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     levels = []
     while len(vertices) > 4:
         level, triangles, mass = _level(vertices, triangles, mass, rng)

@@ -19,6 +19,7 @@ from .sphere_flow import flow_map
 from .sphere_multilevel import multilevel_start
 from .sphere_refine import SphereRefinement, sphere_refine
 from .sphere_transport import sphere_transport
+from .spherical import spherical_areas
 from .spherical_power import Hull
 from .stages import QUALITIES
 from .topology import twins
@@ -87,7 +88,7 @@ def sphere_map(
         start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *ANEW)
         refined = yield from _refined(surface, start, target, options)
     if balance == 0 and refined.area_error > QUALITIES[quality].area_error:
-        warnings.append(f"An area error of {100 * refined.area_error:.1f} % is left")
+        warnings.append(_left(refined.positions, surface.triangles, target))
     conformal = found.positions if found else (yield from _least_shear(surface, refined))
     return SphereMap(
         refined.positions, conformal, refined.status, refined.iterations, refined.residual, tuple(warnings)
@@ -100,6 +101,17 @@ def _target(surface: ClosedSurface, density: np.ndarray | None) -> np.ndarray:
     if density is None:
         return area
     return area * positive_density(density)
+
+
+def _left(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> str:
+    """How far areas on the sphere are from what was asked for."""
+    share = target / target.sum()
+    off = np.abs(spherical_areas(positions, triangles) / (4 * np.pi * share) - 1)
+    mean, deviation = 100 * (share @ off), 100 * np.sqrt(share @ off**2)
+    return (
+        f"On the sphere, the area of a face is off by {mean:.1f} % on average, standard deviation {deviation:.1f} %; "
+        "a finer mesh on long limbs helps"
+    )
 
 
 def _conformal(surface: ClosedSurface, warnings: list[str]) -> Steps[ConformalSphere | None]:

@@ -13,11 +13,15 @@ import numpy as np
 from .coarsening import Level, Round, coarsened
 from .errors import PrecisionError
 from .progress import Progress, Steps
+from .sphere_newton import seen
 from .sphere_refine import relax
 from .spherical import normalized, signed_volumes, triple_products
 
 # Distances from the neighbour, in widths of the hole, at which a vertex that comes back tries to settle.
 TRIES = 2.0 ** -np.concatenate([np.arange(0, 5, 0.5), np.arange(5, 24, 2)])
+# Up to so many vertices the way is tried again, up to so many times, while a face has a corner farther from its middle
+# than the angle with this cosine; every other time meshes of up to REGULAR vertices are taken for regular ones.
+FEW, ATTEMPTS, IN_SIGHT, REGULAR = 1200, 8, 0.3, 100
 
 
 def multilevel_start(vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> Steps[tuple[np.ndarray, int]]:
@@ -26,16 +30,47 @@ def multilevel_start(vertices: np.ndarray, triangles: np.ndarray, target: np.nda
     Also the Newton steps taken. Raises PrecisionError where a vertex finds no place in double precision.
     """
     levels = coarsened(vertices, triangles, target)
-    base = levels[-1]
-    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
-    positions = corners * (1 if signed_volumes(corners, base.triangles).min() > 0 else -1)
-    steps = 0
-    for level in reversed(levels[:-1]):
-        yield Progress("Coarse to fine", float(np.log(len(positions) / 4) / np.log(len(vertices) / 4)))
-        positions = _refilled(level, positions)
-        positions, more = yield from relax(level.vertices, level.triangles, positions, level.mass)
+    few = next(k for k, level in enumerate(levels) if len(level.vertices) <= FEW or k == len(levels) - 1)
+    positions, steps = yield from _few(levels[few:])
+    for k, level in enumerate(reversed(levels[:few])):
+        yield Progress("Coarse to fine", (k + 1) / (few + 1))
+        positions, more = yield from _finer(level, positions)
         steps += more
     return positions, steps
+
+
+def _few(levels: list[Level]) -> Steps[tuple[np.ndarray, int]]:
+    """Unit vectors (n,3) of the finest of a few levels, and the steps taken, over all attempts.
+
+    Where a large face of a coarse level comes to reach around the sphere, it never lets go, and all its descendants are
+    slivers of half a turn. Which does is chance, so another way down is tried.
+    """
+    top, steps = levels[0], 0
+    best, widest = None, -np.inf
+    for attempt in range(ATTEMPTS):
+        regular = REGULAR if attempt % 2 else 0
+        if attempt > 0:
+            levels = coarsened(top.vertices, top.triangles, top.mass, attempt)
+        positions = _tetrahedron(levels[-1])
+        for level in reversed(levels[:-1]):
+            positions, more = yield from _finer(level, positions, len(level.vertices) <= regular)
+            steps += more
+        sight = float(seen(positions, top.triangles).least.min())
+        if sight > widest:
+            best, widest = positions, sight
+        if sight >= IN_SIGHT:
+            break
+    return best, steps
+
+
+def _tetrahedron(level: Level) -> np.ndarray:
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
+    return corners * (1 if signed_volumes(corners, level.triangles).min() > 0 else -1)
+
+
+def _finer(level: Level, positions: np.ndarray, regular: bool = False) -> Steps[tuple[np.ndarray, int]]:
+    """Unit vectors (n,3) of a level, relaxed, from those of the coarser one, and the steps taken."""
+    return (yield from relax(level.vertices, level.triangles, _refilled(level, positions), level.mass, regular))
 
 
 def _refilled(level: Level, coarse: np.ndarray) -> np.ndarray:

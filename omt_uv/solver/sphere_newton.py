@@ -20,11 +20,15 @@ from .spherical import normalized, signed_volumes, spherical_areas
 
 @dataclass(frozen=True)
 class Seen:
-    """Faces from above: axes (m,2,3) of their frames, corners (m,3) complex, mixing (m,3,3) of what corners change."""
+    """Faces from above: axes (m,2,3) of their frames, corners (m,3) complex, mixing (m,3,3) of what corners change.
+
+    least (m,): cosine of the distance from the middle to the farthest corner.
+    """
 
     axes: np.ndarray
     corner: np.ndarray
     mixing: np.ndarray
+    least: np.ndarray
 
     def change(self, vectors: np.ndarray) -> np.ndarray:
         """How the corners (m,3) complex change when those on the sphere move by vectors (m,3,3)."""
@@ -42,8 +46,9 @@ def seen(positions: np.ndarray, triangles: np.ndarray) -> Seen:
     first = normalized(side - np.einsum("md,md->m", side, up)[:, None] * up)
     axes = np.stack([first, np.cross(up, first)], axis=1)
     part = np.einsum("mad,mkd->mka", axes, p - p[:, :1])
-    height = np.einsum("md,mkd->mk", up, p) / np.maximum(size, 1e-300)
-    return Seen(axes, part[..., 0] + 1j * part[..., 1], np.eye(3) - height[:, :, None])
+    height = np.einsum("md,mkd->mk", up, p)
+    mixing = np.eye(3) - (height / np.maximum(size, 1e-300))[:, :, None]
+    return Seen(axes, part[..., 0] + 1j * part[..., 1], mixing, height.min(axis=1))
 
 
 def derivatives(faces: Elements, corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .dissection import mesh_order
-from .energy import elements, squared
+from .energy import Elements, elements, squared
 from .errors import FoldedUVError
 from .newton import Assembly
 from .progress import Progress, Steps
@@ -78,12 +78,27 @@ def sphere_refine(
 
 
 def relax(
-    vertices: np.ndarray, triangles: np.ndarray, positions: np.ndarray, target: np.ndarray
+    vertices: np.ndarray, triangles: np.ndarray, positions: np.ndarray, target: np.ndarray, regular: bool = False
 ) -> Steps[tuple[np.ndarray, int]]:
-    """A few steps from a map without folds (n,3), and their number: areas roughly right, shear low."""
-    problem, order = _renumbered(vertices, triangles, target)
+    """A few steps from a map without folds (n,3), and their number: areas roughly right, shear low.
+
+    regular: every face counts as equilateral, whatever its shape.
+    """
+    problem, order = _renumbered(vertices, triangles, np.ones(len(target)) if regular else target)
+    if regular:
+        faces = _equilateral(problem)
+        problem = replace(problem, faces=faces, ratio=faces.ratio)
     found = yield from _stages(problem, positions[order], 0.0, RELAXING)
     return _in_order(found.positions, order), found.iterations
+
+
+def _equilateral(problem: SphereProblem) -> Elements:
+    """The faces as they were if each were equilateral, of the area that it asks for."""
+    m = len(problem.target)
+    side = np.sqrt(problem.target)[:, None, None]
+    corners = side * np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(0.75), 0]])
+    faces = elements(corners.reshape(-1, 3), np.arange(3 * m).reshape(-1, 3), problem.target)
+    return replace(faces, triangles=problem.faces.triangles)
 
 
 def _renumbered(vertices, triangles, target) -> tuple[SphereProblem, np.ndarray]:

@@ -21,11 +21,17 @@ MAX_HALVINGS = 30
 # Where cells start tiny, so do steps: from one to the next they may grow by this, and below SMALL they shrink by 4.
 GROWTH = 16.0
 SMALL = 0.05
+# Among cells that were 1e-19 of the sphere at first, rounding may end the search before the tolerance is reached. Below
+# this residual a step that would have to be small tells of that, and what is reached will do.
+ENOUGH = 1e-3
 
 
 @dataclass(frozen=True)
 class SphereTransport:
-    """Weights (n,) and cells; residual: largest |area - mass| / mass; Newton steps, and diagrams built."""
+    """Weights (n,) and cells; residual: largest |area - mass| / mass; Newton steps, and diagrams built.
+
+    The residual is above the tolerance, but at most ENOUGH, where rounding ended the search.
+    """
 
     weights: np.ndarray
     cells: SphericalCells
@@ -74,6 +80,8 @@ def sphere_transport(
             if trial is not None and _acceptable(trial, mass, floor, (1 - step / 2) * error):
                 break
             step /= 2 if step > SMALL else 4
+            if residual <= ENOUGH and step <= SMALL:
+                return SphereTransport(h, cells, residual, iteration, diagrams)
         else:
             raise TransportError(f"The transport is stuck at a residual of {residual:.1e}")
         h, cells = h + step * direction, trial
