@@ -11,8 +11,10 @@ from itertools import product
 
 import numpy as np
 
+from .progress import drain
 from .projections import is_cylindrical
-from .spherical import signed_volumes
+from .sphere_untangle import around, straightened
+from .spherical import signed_volumes, spherical_areas
 
 POLES = np.array([[0.0, 0, 1], [0, 0, -1]])
 # Where the octahedral layout has only half a turn of angle: midpoints of the sides of its square.
@@ -34,7 +36,8 @@ def on_vertices(points: np.ndarray, triangles: np.ndarray, targets: np.ndarray) 
     """Points (n,3) with the vertex nearest to each target (k,3) pushed onto it, and these vertices (k,), -1 for none.
 
     Other vertices move only nearby and, but for what a mesh does not resolve, without a change of area. A push that
-    would fold a face of triangles (m,3) is not done; then the next nearest vertices are tried.
+    would fold a face of triangles (m,3) is not done; then the next nearest vertices are tried. Where all would, as
+    among the slivers of a limb, the first one that can be is put there, and the faces around it are straightened.
     """
     limit = 0.5 * _separation(targets)
     found = np.full(len(targets), -1)
@@ -47,7 +50,38 @@ def on_vertices(points: np.ndarray, triangles: np.ndarray, targets: np.ndarray) 
             if (signed_volumes(pushed, triangles)[sound] > 0).all():
                 points, found[k] = pushed, vertex
                 break
+        else:
+            corners = _holding(points, triangles, target)
+            candidates = np.concatenate([corners, nearest[~np.isin(nearest, corners)]])
+            points, found[k] = _straightened(points, triangles, target, candidates[~np.isin(candidates, found)], found)
     return points, found
+
+
+def _holding(points: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Corners of the faces that hold the target, the one that would move least first."""
+    p = points[triangles]
+    inside = (np.cross(p, np.roll(p, -1, axis=1)) @ target >= 0).all(axis=1)
+    corners = np.unique(triangles[inside])
+    return corners[np.argsort(-(points[corners] @ target), kind="stable")]
+
+
+def _straightened(
+    points: np.ndarray, triangles: np.ndarray, target: np.ndarray, candidates: np.ndarray, taken: np.ndarray
+) -> tuple[np.ndarray, int]:
+    """Points (n,3) with the first of the candidates (c,) put onto the target around which faces can be straightened,
+    and which, -1 for none. Vertices taken (k,) stay."""
+    area = np.maximum(spherical_areas(points, triangles), 0)
+    before = signed_volumes(points, triangles) > 0
+    for vertex in candidates.tolist():
+        moved = points.copy()
+        moved[vertex] = target
+        wrong = before & ~(signed_volumes(moved, triangles) > 0)
+        free = around(triangles, wrong | (triangles == vertex).any(axis=1), len(points))
+        free[[vertex, *taken[taken >= 0]]] = False
+        found = drain(straightened(points, triangles, moved, area, free))
+        if found is not None and (signed_volumes(found, triangles)[before] > 0).all():
+            return found, vertex
+    return points, -1
 
 
 def _separation(targets: np.ndarray) -> float:

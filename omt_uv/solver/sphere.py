@@ -119,7 +119,7 @@ def _conformal(surface: ClosedSurface, warnings: list[str]) -> Steps[ConformalSp
     try:
         found = yield from conformal_sphere(surface.vertices, surface.triangles)
     except PrecisionError as error:
-        warnings.append(f"{error.cause}; started from coarse to fine instead")
+        warnings.append(f"{error.cause}; the map was built from coarse to fine instead")
         return None
     return found
 
@@ -132,7 +132,7 @@ def _transported(
         positions = yield from part_of(start, *TRANSPORT)
         return (yield from _refined(surface, positions, target, options))
     except (TransportError, FoldedUVError) as error:
-        warnings.append(f"{error.cause}; started from coarse to fine instead")
+        warnings.append(f"{error.cause}; the map was built from coarse to fine instead")
     return None
 
 

@@ -45,22 +45,34 @@ def _few(levels: list[Level]) -> Steps[tuple[np.ndarray, int]]:
     Where a large face of a coarse level comes to reach around the sphere, it never lets go, and all its descendants are
     slivers of half a turn. Which does is chance, so another way down is tried.
     """
-    top, steps = levels[0], 0
-    best, widest = None, -np.inf
+    top, steps, widest = levels[0], 0, -np.inf
+    best, failure = None, None
     for attempt in range(ATTEMPTS):
-        regular = REGULAR if attempt % 2 else 0
         if attempt > 0:
             levels = coarsened(top.vertices, top.triangles, top.mass, attempt)
-        positions = _tetrahedron(levels[-1])
-        for level in reversed(levels[:-1]):
-            positions, more = yield from _finer(level, positions, len(level.vertices) <= regular)
-            steps += more
+        try:
+            positions, more = yield from _raised(levels, REGULAR if attempt % 2 else 0)
+        except PrecisionError as error:
+            failure = error
+            continue
+        steps += more
         sight = float(seen(positions, top.triangles).least.min())
         if sight > widest:
             best, widest = positions, sight
         if sight >= IN_SIGHT:
             break
+    if best is None:
+        raise failure or PrecisionError("Faces are too small for double precision on the sphere")
     return best, steps
+
+
+def _raised(levels: list[Level], regular: int) -> Steps[tuple[np.ndarray, int]]:
+    """From the tetrahedron to the finest of the levels, those of up to `regular` vertices taken for regular meshes."""
+    positions, steps = _tetrahedron(levels[-1]), 0
+    for level in reversed(levels[:-1]):
+        positions, more = yield from _finer(level, positions, len(level.vertices) <= regular)
+        steps += more
+    return positions, steps
 
 
 def _tetrahedron(level: Level) -> np.ndarray:

@@ -117,20 +117,38 @@ def locally_untangled(surface: np.ndarray, triangles: np.ndarray, positions: np.
     Every face is to keep the area that it has on the sphere, folded or not. Where that fails the map is returned as it
     was.
     """
+    touched = around(triangles, ~(signed_volumes(positions, triangles) > 0), len(positions))
     area = np.abs(spherical_areas(positions, triangles))
+    straight = yield from straightened(surface, triangles, positions, area, touched)
+    return positions if straight is None else straight
+
+
+def straightened(
+    reference: np.ndarray, triangles: np.ndarray, positions: np.ndarray, area: np.ndarray, free: np.ndarray
+) -> Steps[np.ndarray | None]:
+    """Unit vectors (n,3) without a fold among the faces at the vertices free (n,) bool, which alone move; None where
+    that fails.
+
+    The faces are to keep the shapes of the reference (n,3) and the area (m,).
+    """
     target = np.maximum(area, 1e-9 * np.median(area))
-    touched = np.zeros(len(positions), dtype=bool)
-    touched[triangles[~(signed_volumes(positions, triangles) > 0)]] = True
-    for _ in range(RINGS):
-        touched[triangles[touched[triangles].any(axis=1)]] = True
-    inside = touched[triangles].any(axis=1)
+    inside = free[triangles].any(axis=1)
     vertices, small = np.unique(triangles[inside], return_inverse=True)
     small = small.reshape(-1, 3)
-    faces = elements(surface[vertices], small, target[inside])
+    faces = elements(reference[vertices], small, target[inside])
     assembly = Assembly(small, len(vertices))
-    straight, _ = yield from untangle_on_sphere(faces, assembly, positions[vertices], ~touched[vertices])
+    straight, _ = yield from untangle_on_sphere(faces, assembly, positions[vertices], ~free[vertices])
     if not signed_volumes(straight, small).min() > 0:
-        return positions
+        return None
     result = positions.copy()
     result[vertices] = straight
     return result
+
+
+def around(triangles: np.ndarray, faces: np.ndarray, n: int) -> np.ndarray:
+    """Vertices (n,) bool of the faces (m,) bool and of a few rings around them."""
+    touched = np.zeros(n, dtype=bool)
+    touched[triangles[faces]] = True
+    for _ in range(RINGS):
+        touched[triangles[touched[triangles].any(axis=1)]] = True
+    return touched
