@@ -61,6 +61,7 @@ class Chart:
 
     @property
     def disk(self) -> np.ndarray:
+        """Triangles and patches together, (m+k,3) vertex indices."""
         return np.concatenate([self.triangles, self.patches]) if len(self.patches) else self.triangles
 
 

@@ -17,6 +17,7 @@ class Descent:
         self.last: tuple[np.ndarray, np.ndarray] | None = None
 
     def reset(self) -> None:
+        """Forget all steps and gradients: the next direction is the negative gradient times the diagonal."""
         self.pairs.clear()
         self.last = None
 

@@ -69,6 +69,7 @@ class _Faces:
 
     @property
     def folded(self) -> np.ndarray:
+        """Faces (m,) bool that are folded, or without UV area."""
         return self.ratio <= 0
 
 

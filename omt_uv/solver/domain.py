@@ -67,21 +67,29 @@ class Disk:
         self.period = 2 * np.pi
 
     def contains(self, points):
+        """Which points (k,2) lie inside or on the circle, (k,) bool."""
         return dot2(points, points) <= self.radius**2
 
     def clip(self, origin, direction):
+        """Parameters t (k,), (k,) where lines from origin (k,2) along unit directions (k,2) enter and leave.
+
+        Where a line misses the disk or only touches it, enter > leave.
+        """
         middle = -dot2(origin, direction)
         offset = cross2(origin, direction)
         half = np.sqrt(np.maximum(self.radius**2 - offset**2, 0))
         return middle - half, np.where(np.abs(offset) < self.radius, middle + half, middle - half - 1)
 
     def boundary_parameter(self, points):
+        """Angle s (k,) of points (k,2), in radians from the first axis, modulo 2 pi."""
         return np.arctan2(points[:, 1], points[:, 0]) % (2 * np.pi)
 
     def boundary_point(self, s):
+        """Points (k,2) of the circle at the angles s (k,)."""
         return self.radius * np.stack([np.cos(s), np.sin(s)], axis=1)
 
     def boundary_integrals(self, s):
+        """The four integrals along the circle from angle 0 to s (k,), (4,k)."""
         r, cos, sin = self.radius, np.cos(s), np.sin(s)
         return np.stack(
             [
@@ -93,9 +101,11 @@ class Disk:
         )
 
     def total_integrals(self):
+        """The four integrals once around the circle, (4,)."""
         return np.array([2 * self.area, 0.0, 0.0, np.pi * self.radius**4 / 2])
 
     def map_boundary(self, share):
+        """Points (k,2) of the circle at shares (k,) in [0, 1) of its length."""
         return self.boundary_point(2 * np.pi * share)
 
 
@@ -118,9 +128,14 @@ class ConvexPolygon:
         self._reach = (self.normal * self.corners).sum(axis=1)
 
     def contains(self, points):
+        """Which points (k,2) lie inside or on a side, (k,) bool."""
         return (points @ self.normal.T <= self._reach).all(axis=1)
 
     def clip(self, origin, direction):
+        """Parameters t (k,), (k,) where lines from origin (k,2) along directions (k,2) enter and leave.
+
+        Where a line misses the polygon, enter > leave. Directions may have any length but 0.
+        """
         enter, leave = np.full(len(origin), -np.inf), np.full(len(origin), np.inf)
         for normal, reach in zip(self.normal, self._reach, strict=True):
             speed, room = direction @ normal, reach - origin @ normal
@@ -132,6 +147,7 @@ class ConvexPolygon:
         return enter, leave
 
     def boundary_parameter(self, points):
+        """Length s (k,) from corner 0, in [0, period), to the point of the boundary nearest to points (k,2)."""
         along = ((points[:, None] - self.corners) * self.tangent).sum(axis=2)
         along = np.clip(along, 0, self.length)
         foot = self.corners + along[..., None] * self.tangent
@@ -140,19 +156,23 @@ class ConvexPolygon:
         return np.where(s >= self.period, 0.0, s)
 
     def boundary_point(self, s):
+        """Points (k,2) of the boundary at the lengths s (k,) from corner 0, modulo the period."""
         s = s % self.period
         side = np.clip(np.searchsorted(self.start, s, side="right") - 1, 0, len(self.corners) - 1)
         return self.corners[side] + (s - self.start[side])[:, None] * self.tangent[side]
 
     def boundary_integrals(self, s):
+        """The four integrals along the sides from corner 0 to s (k,) in [0, period], (4,k)."""
         side = np.clip(np.searchsorted(self.start, s, side="right") - 1, 0, len(self.corners) - 1)
         point = self.corners[side] + (s - self.start[side])[:, None] * self.tangent[side]
         return self._cumulative[:, side] + segment_integrals(self.corners[side], point)
 
     def total_integrals(self):
+        """The four integrals once around the polygon, (4,)."""
         return self._cumulative[:, -1]
 
     def map_boundary(self, share):
+        """Points (k,2) of the boundary at shares (k,) in [0, 1) of its length, from corner 0."""
         return self.boundary_point(share * self.period)
 
 

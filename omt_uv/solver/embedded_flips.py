@@ -53,9 +53,11 @@ class _Edges:
         self.update(triangles)
 
     def update(self, triangles: np.ndarray) -> None:
+        """Take the edges of triangles (m,3) for those that exist."""
         self.keys = np.sort(pair_keys(*halfedges(triangles)))
 
     def contain(self, keys: np.ndarray) -> np.ndarray:
+        """Which keys (k,), see `topology.pair_keys`, are those of edges, (k,) bool."""
         return _is_in(keys, self.keys)
 
 

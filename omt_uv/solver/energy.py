@@ -182,6 +182,7 @@ def _split(aa, ab, bb):
 
 
 def squared(z):
+    """|z|^2 of complex numbers, in their shape, without the root that `abs` takes."""
     return z.real**2 + z.imag**2
 
 

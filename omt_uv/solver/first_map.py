@@ -192,6 +192,7 @@ class Log:
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
+        """Context that adds the seconds spent in it to those of a stage, also when it ends in an error."""
         begin = time.perf_counter()
         try:
             yield

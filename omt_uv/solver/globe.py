@@ -30,6 +30,7 @@ class Polygons:
 
     @property
     def vertex_triangles(self) -> np.ndarray:
+        """The triangles by vertices instead of corners, (m,3)."""
         return self.vertex[self.triangles]
 
 

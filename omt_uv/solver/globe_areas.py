@@ -137,6 +137,7 @@ class _Problem:
         return np.argsort(place[self.free])
 
     def residual(self, uv: np.ndarray) -> np.ndarray:
+        """Share of the area less the share asked for, times `scale`, (m,), with the points at uv (k,2)."""
         areas = plane_areas(moved(self.unfolded, uv).corners(), self.triangles)
         return (areas / areas.sum() - self.shares) * self.scale
 
@@ -157,10 +158,16 @@ class _Problem:
         return ANCHOR * (self.metric * (uv - self.unfolded.uv)).ravel()
 
     def energy(self, uv: np.ndarray) -> float:
+        """Sum of the squared residuals, plus ANCHOR times the squared displacement to uv (k,2) in the metric."""
         residual = self.residual(uv)
         return float(residual @ residual + self.pull(uv) @ (uv - self.unfolded.uv).ravel())
 
     def step(self, uv: np.ndarray, damping: float, order: np.ndarray) -> np.ndarray:
+        """Damped Gauss-Newton step (k,2) from uv (k,2), 0 where coordinates are fixed.
+
+        damping: in units of the metric; order: elimination order of the free coordinates.
+        Raises PrecisionError.
+        """
         p = moved(self.unfolded, uv).corners()[self.triangles]
         opposite = np.roll(p, -1, axis=1) - np.roll(p, 1, axis=1)
         slope = 0.5 * self.sign[..., None] * np.stack([opposite[..., 1], -opposite[..., 0]], axis=-1)

@@ -124,6 +124,7 @@ class _Flow:
         return direction
 
     def polygon(self, residual: float, iterations: int) -> FlatPolygon:
+        """The flat polygon at these scales; residual, in radians, and iterations are passed on."""
         tail, head = halfedges(self.tri.triangles)
         opposite = tail[previous_halfedge(np.arange(len(tail)))]
         # A side runs the other way round in the strip behind it.

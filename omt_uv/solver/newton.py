@@ -41,12 +41,15 @@ class Free:
         self.free = np.repeat(~pinned[:, None], 2, axis=1)
 
     def frame(self, w):
+        """1 for every vertex, (n,) complex: the axes are those of the plane."""
         return np.ones(len(w), complex)
 
     def bend(self, w, gradient):
+        """0 for every vertex, (n,): the axes are straight."""
         return np.zeros(len(w))
 
     def move(self, w, step):
+        """The map w (n,) plus a step (n,), complex."""
         return w + step
 
 
@@ -59,17 +62,20 @@ class OnCircle:
         self.free[loop, 1] = False
 
     def frame(self, w):
+        """First axis (n,) as unit complex numbers: along the circle for the loop, 1 for the others."""
         axis = np.ones(len(w), complex)
         axis[self.loop] = 1j * w[self.loop] / np.abs(w[self.loop])
         return axis
 
     def bend(self, w, gradient):
+        """Second derivative (n,) by arc length: -Re(conj(gradient) w) / radius^2 on the loop, 0 elsewhere."""
         second = np.zeros(len(w))
         at = w[self.loop]
         second[self.loop] = -(gradient[self.loop].conj() * at).real / self.radius**2
         return second
 
     def move(self, w, step):
+        """The map (n,) complex after a step (n,); the loop goes by arc lengths Re(step) and stays on the circle."""
         moved = w + self.frame(w) * step
         turn = np.angle(w[self.loop]) + step[self.loop].real / self.radius
         moved[self.loop] = self.radius * np.exp(1j * turn)
@@ -87,12 +93,15 @@ class OnLines:
         self.free[fixed] = False
 
     def frame(self, w):
+        """First axis (n,) as complex numbers: the direction of the line where a vertex slides, 1 for the others."""
         return self.axis
 
     def bend(self, w, gradient):
+        """0 for every vertex, (n,): lines are straight."""
         return np.zeros(len(w))
 
     def move(self, w, step):
+        """The map (n,) complex after a step (n,) in the frame's axes."""
         return w + self.axis * step
 
 
@@ -133,7 +142,8 @@ class Assembly:
 class Extra(Protocol):
     """An energy beside that of the faces, for example a barrier."""
 
-    def energy(self, w: np.ndarray) -> float: ...
+    def energy(self, w: np.ndarray) -> float:
+        """The energy of a map w (n,) complex, to be added to that of the faces."""
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Gradient (n,) complex; vertices (k,q) and rows (k,q) of linear forms whose squares are the Hessian."""
@@ -153,13 +163,16 @@ class Problem:
     extras: tuple[Extra, ...] = ()
 
     def energy(self, w: np.ndarray) -> float:
+        """Energy of the faces and of all extras at a map w (n,) complex; infinity where a face is folded."""
         value = float(energies(self.faces, w, self.weight).sum())
         return value + sum(e.energy(w) for e in self.extras) if np.isfinite(value) else value
 
     def area_error(self, w: np.ndarray) -> float:
+        """What a map w (n,) complex lacks of its areas, see `energy.shortfall`."""
         return shortfall(self.faces, w)
 
     def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
+        """A Newton step from a map w (n,) complex of energy `value`, see `newton_step`. Raises PrecisionError."""
         return newton_step(self, w, value, pressure)
 
 

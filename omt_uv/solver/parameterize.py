@@ -267,12 +267,10 @@ def unwrap_chart(
     asked_for = area if wanted is None else wanted
     way = _first_map(vertices, triangles, asked_for, loop, corners, domain, boundary, balance, log)
     first = yield from part_of(way, *FIRST)
-    conformal, cells = first.conformal, first.cells
     with log.timed("refinement"):
         uv, held = facing(first.uv, pins)
         options = {"target": wanted, "region": region, "balance": balance, "quality": quality, "pins": held}
-        steps = _refined(vertices, triangles, uv, boundary, log, options)
-        refined = yield from part_of(steps, *REFINEMENT)
+        refined = yield from part_of(_refined(vertices, triangles, uv, boundary, log, options), *REFINEMENT)
     with log.timed("measure"):
         asked = None if density is None else density[: len(chart.triangles)]
         figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
@@ -280,10 +278,10 @@ def unwrap_chart(
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
     return ChartMap(
         refined.uv if held else _in_place(refined.uv, vertices, chart.triangles, asked, unit, pins),
-        conformal.iterations if conformal else None,
-        conformal.residual if conformal else None,
-        cells.iterations if cells else None,
-        cells.residual if cells else None,
+        first.conformal.iterations if first.conformal else None,
+        first.conformal.residual if first.conformal else None,
+        first.cells.iterations if first.cells else None,
+        first.cells.residual if first.cells else None,
         refined.iterations,
         refined.residual,
         refined.status,

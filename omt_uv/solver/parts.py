@@ -29,6 +29,7 @@ class Part:
 
     @property
     def area(self) -> np.ndarray:
+        """Areas (m,) of the triangles, in the unit box."""
         return face_areas(self.vertices, self.triangles)
 
     @property
@@ -40,6 +41,7 @@ class Part:
 
     @property
     def euler(self) -> int:
+        """Euler characteristic: vertices - edges + triangles."""
         edges = (3 * len(self.triangles) + len(self.rim)) // 2
         return len(self.vertices) - edges + len(self.triangles)
 

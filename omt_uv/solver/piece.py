@@ -50,6 +50,7 @@ class Piece:
 
     @property
     def count(self) -> int:
+        """Number n of vertices."""
         return len(self.positions)
 
     def welcome(self) -> np.ndarray:
@@ -77,6 +78,7 @@ class Kind:
 
     @property
     def is_disk(self) -> np.ndarray:
+        """Which parts are disks, (k,) bool: one boundary, and neither handles nor crosscaps."""
         return (self.boundaries == 1) & (self.handles == 0)
 
 

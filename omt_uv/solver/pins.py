@@ -62,9 +62,11 @@ class Springs:
     unit: float
 
     def energy(self, w):
+        """The energy of a map w (n,) complex."""
         return float(self.stiffness * squared((w[self.pins.vertices] - self.pins.places) / self.unit).sum())
 
     def derivatives(self, w):
+        """Gradient (n,) complex; vertices (2k,1) and rows (2k,1) of linear forms whose squares are the Hessian."""
         factor = 2 * self.stiffness / self.unit**2
         gradient = np.zeros(len(w), complex)
         gradient[self.pins.vertices] = factor * (w[self.pins.vertices] - self.pins.places)
@@ -72,6 +74,7 @@ class Springs:
         return gradient, np.tile(self.pins.vertices, 2)[:, None], rows
 
     def limit(self, w, step):
+        """Infinity: springs allow every step."""
         return np.inf
 
 

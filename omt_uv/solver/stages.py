@@ -66,6 +66,10 @@ class Task:
     scale_free: bool = False
 
     def problem(self, w: np.ndarray, weight: float, guarded: bool) -> Problem:
+        """What Newton minimises at a weight of the area term; guarded: with the barrier `guard` of the map w (n,).
+
+        Raises ValueError where guarded without a loop.
+        """
         extras = (self.guard(w),) if guarded else ()
         return Problem(self.faces, self.assembly, self.motion, weight, extras)
 
@@ -76,6 +80,7 @@ class Task:
         return contact(w, self.loop, CONTACT_STRENGTH / len(self.faces.area))
 
     def crosses(self, w: np.ndarray) -> bool:
+        """Whether the boundary of the map w (n,) crosses itself; never without a loop."""
         return self.loop is not None and len(crossings(w, self.loop)) > 0
 
 
@@ -160,11 +165,14 @@ class Stage:
 class Minimised(Protocol):
     """An energy of maps w, arrays of any shape, with a Newton step that never folds a face."""
 
-    def energy(self, w: np.ndarray) -> float: ...
+    def energy(self, w: np.ndarray) -> float:
+        """The energy of a map; infinity where a face is folded."""
 
-    def area_error(self, w: np.ndarray) -> float: ...
+    def area_error(self, w: np.ndarray) -> float:
+        """What a map lacks of its areas: 0 where every face has its own."""
 
-    def step(self, w: np.ndarray, value: float, pressure: float) -> Step: ...
+    def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
+        """A line-searched step from a map of energy `value`; pressure: see `energy.local_derivatives`."""
 
 
 def minimise(

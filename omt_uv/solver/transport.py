@@ -118,6 +118,7 @@ class _Diagrams:
         return self._order
 
     def anew(self, weights: np.ndarray) -> PowerDiagram:
+        """The diagram of weights (n,), from a hull of its own. Raises TransportError."""
         self.count, self.hulls, self.flipped = self.count + 1, self.hulls + 1, False
         return power_diagram(self.sites, weights, self.domain)
 
