@@ -8,22 +8,10 @@ import bpy
 
 import numpy as np
 
+from .blender_attributes import TYPES
+
 # Blender's own caches, made and dropped as it likes.
 _DERIVED = (".select_", ".uv_select_", ".hide_")
-_FIELD = {
-    "FLOAT": ("value", 1, np.float32),
-    "INT": ("value", 1, np.int32),
-    "INT8": ("value", 1, np.int32),
-    "BOOLEAN": ("value", 1, bool),
-    "FLOAT_VECTOR": ("vector", 3, np.float32),
-    "FLOAT2": ("vector", 2, np.float32),
-    "FLOAT_COLOR": ("color", 4, np.float32),
-    "BYTE_COLOR": ("color", 4, np.float32),
-    "INT32_2D": ("value", 2, np.int32),
-    "INT16_2D": ("value", 2, np.int32),
-    "QUATERNION": ("value", 4, np.float32),
-    "FLOAT4X4": ("value", 16, np.float32),
-}
 
 
 def fingerprint(obj: bpy.types.Object) -> bytes:
@@ -58,9 +46,9 @@ def _digest(mesh: bpy.types.Mesh, digest) -> None:
         collection.foreach_get(name, values)
         digest.update(values.tobytes())
     for attribute in sorted(mesh.attributes, key=lambda a: a.name):
-        if attribute.data_type not in _FIELD or attribute.name.startswith(_DERIVED):
+        if attribute.data_type not in TYPES or attribute.name.startswith(_DERIVED):
             continue
-        field, width, kind = _FIELD[attribute.data_type]
+        field, width, kind, _ = TYPES[attribute.data_type]
         values = np.zeros(len(attribute.data) * width, kind)
         attribute.data.foreach_get(field, values)
         if kind is not bool or values.any():

@@ -12,6 +12,7 @@ import bpy
 
 import numpy as np
 
+from .blender_attributes import TYPES
 from .solver import transfer
 from .solver.charts import Surface
 from .solver.features import all_edges, region_borders, value_jumps
@@ -19,21 +20,6 @@ from .solver.geometry import signed_areas
 from .solver.topology import pair_keys
 from .solver.unfold import straightened
 
-# Type of an attribute: property of its elements, numbers each, numpy type, and whether values can be interpolated.
-TYPES: dict[str, tuple[str, int, type, bool]] = {
-    "FLOAT": ("value", 1, np.float32, True),
-    "FLOAT2": ("vector", 2, np.float32, True),
-    "FLOAT_VECTOR": ("vector", 3, np.float32, True),
-    "FLOAT_COLOR": ("color", 4, np.float32, True),
-    "BYTE_COLOR": ("color", 4, np.float32, True),
-    "QUATERNION": ("value", 4, np.float32, False),
-    "FLOAT4X4": ("value", 16, np.float32, False),
-    "INT": ("value", 1, np.int32, False),
-    "INT8": ("value", 1, np.int32, False),
-    "INT16_2D": ("value", 2, np.int32, False),
-    "INT32_2D": ("value", 2, np.int32, False),
-    "BOOLEAN": ("value", 1, bool, False),
-}
 # What the mesh is made of, what is written otherwise, and what follows from the shape.
 OWN = {"position", "material_index", "sharp_face", "sharp_edge", "uv_seam", "crease_edge", "custom_normal"}
 SCULPT = {".sculpt_mask", ".sculpt_face_set"}
