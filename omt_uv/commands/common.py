@@ -17,7 +17,7 @@ class CommandError(Exception):
 
 
 def blender():
-    """The modules that need Blender, which the help and a misspelt option do not."""
+    """The modules that need Blender, which the help and a misspelt option do not; says what is missing."""
     from ..quiet import silence
 
     try:

@@ -17,7 +17,8 @@ from ..settings import (
     SOURCES,
     MagnifySettings,
 )
-from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
+from .common import CommandError, blender, drain_shown, write_report
+from .layers import read_layers, refusals, write_layers
 from .options import FORMATS, add_files, add_report, margin, names, texture_size
 
 
@@ -66,14 +67,12 @@ def times(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> None:
-    files, blender_mesh, blender_pack = blender()
+    _, _, blender_pack = blender()
     from ..blender_seams import GroupError
     from ..blender_weights import ScoreError, region_weights
     from ..magnifying import Region, magnify, warped_picture
     from ..packing import PackingError
-    from ..unwrapping import Refusal
 
-    check_output(options.output, files)
     picture = _picture(options)
     settings = MagnifySettings(
         boundary=options.boundary,
@@ -85,25 +84,16 @@ def run(options: argparse.Namespace) -> None:
         source=options.source,
         cascade=options.cascade,
     )
-    pairs = read(options.input, files, blender_mesh, options.uv_layer)
+    pairs = read_layers(options)
     objects = [obj for obj, _ in pairs]
-    try:
-        for obj in objects:
-            blender_mesh.check_target(obj.data, options.uv_layer)
+    with refusals(objects, PackingError, GroupError, ScoreError):
         weights = region_weights(pairs, options.weights)
         regions = [Region(r.surface, r.faces, w, r.all_pins) for (_, r), w in zip(pairs, weights, strict=True)]
         result = drain_shown(magnify(regions, settings, blender_pack.pack))
-        for obj, corners, uv in zip(objects, result.corners, result.uv, strict=True):
-            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
-        warnings = files.save(options.output, objects)
-    except Refusal as refusal:
-        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
-    except (PackingError, GroupError, ScoreError, blender_mesh.TargetError, files.FileError) as error:
-        raise CommandError(str(error)) from error
+        warnings = write_layers(options, objects, result)
     if picture is not None:
         _write_picture(options.image_output, warped_picture(picture, regions, result, options.margin))
     print(result.shares.text())
-    warnings = warn(objects, result.warnings, warnings)
     if options.report:
         more = {"weights": options.weights, "factor": options.factor, "exact": options.exact, "source": options.source}
         shares = {"share": vars(result.shares)}

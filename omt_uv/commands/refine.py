@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 
 from ..settings import RefineSettings
-from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
+from .common import CommandError, blender, drain_shown, write_report
+from .layers import read_layers, refusals, write_layers
 from .options import FORMATS, add_area_options, add_files, add_report
 
 
@@ -20,28 +21,17 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    files, blender_mesh, _ = blender()
+    blender()
     from ..refining import refine_islands
-    from ..unwrapping import Refusal
 
-    check_output(options.output, files)
-    pairs = read(options.input, files, blender_mesh, options.uv_layer)
+    pairs = read_layers(options)
     objects = [obj for obj, _ in pairs]
     for obj in objects:
         if options.uv_layer and options.uv_layer not in obj.data.uv_layers:
             raise CommandError(f"{obj.name} has no UV map {options.uv_layer!r}. Name one that it has.")
     settings = RefineSettings(quality=options.quality, balance=options.balance, keep_boundary=options.keep_boundary)
-    try:
-        for obj in objects:
-            blender_mesh.check_target(obj.data, options.uv_layer)
+    with refusals(objects):
         refined = drain_shown(refine_islands([(r.surface, r.faces, r.all_pins) for _, r in pairs], settings))
-        for obj, corners, uv in zip(objects, refined.corners, refined.uv, strict=True):
-            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
-        warnings = files.save(options.output, objects)
-    except Refusal as refusal:
-        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
-    except (blender_mesh.TargetError, files.FileError) as error:
-        raise CommandError(str(error)) from error
-    warnings = warn(objects, refined.warnings, warnings)
+        warnings = write_layers(options, objects, refined)
     if options.report:
         write_report(options, {"keep_boundary": options.keep_boundary}, objects, refined.reports, warnings)

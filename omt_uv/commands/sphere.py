@@ -12,7 +12,8 @@ from ..settings import (
     SPHERE_METHODS,
     GlobeSettings,
 )
-from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
+from .common import CommandError, blender, drain_shown, write_report
+from .layers import read_layers, refusals, write_layers
 from .options import add_area_options, add_files, add_report, names
 
 
@@ -43,7 +44,7 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    files, blender_mesh, _ = blender()
+    blender()
     from ..blender_markers import globe_densities, group_markers
     from ..blender_panorama import ImageError
     from ..blender_seams import GroupError
@@ -51,33 +52,20 @@ def run(options: argparse.Namespace) -> None:
     from ..projecting import globe_jobs, project
     from ..solver.errors import MeshError
     from ..solver.orientation import MarkerError
-    from ..unwrapping import Refusal
 
-    check_output(options.output, files)
     _check_image(options)
     settings = GlobeSettings(options.projection, options.quality, options.balance, options.method)
-    pairs = read(options.input, files, blender_mesh, options.uv_layer)
+    pairs = read_layers(options)
     objects = [obj for obj, _ in pairs]
-    try:
-        for obj in objects:
-            blender_mesh.check_target(obj.data, options.uv_layer)
+    with refusals(objects, GroupError, MarkerError, ImageError, ScoreError, MeshError):
         markers = group_markers(objects, options.pole, options.meridian, options.east)
         densities = globe_densities(pairs, options.weights, options.weight_factor)
         jobs = globe_jobs([reading for _, reading in pairs], densities, markers)
         globes = drain_shown(project(jobs, settings))
-        for obj, corners, uv in zip(objects, globes.corners, globes.uv, strict=True):
-            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
         image = _redrawn(options)
-        warnings = files.save(options.output, objects)
+        warnings = write_layers(options, objects, globes)
         if image is not None:
             _write_image(options, *image)
-    except Refusal as refusal:
-        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
-    except (GroupError, MarkerError, ImageError, ScoreError, MeshError) as error:
-        raise CommandError(str(error)) from error
-    except (blender_mesh.TargetError, files.FileError) as error:
-        raise CommandError(str(error)) from error
-    warnings = warn(objects, globes.warnings, warnings)
     if options.report:
         reports = [[globe.report() for globe in mine] for mine in globes.globes]
         more = {"projection": options.projection, "method": options.method}

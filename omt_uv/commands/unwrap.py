@@ -14,7 +14,8 @@ from ..settings import (
     SEAMS,
     Settings,
 )
-from .common import CommandError, blender, check_output, drain_shown, read, warn, write_report
+from .common import blender, drain_shown, write_report
+from .layers import read_layers, refusals, write_layers
 from .options import add_area_options, add_cut_options, add_files, add_report, margin, names, shear, texture_size, tile
 
 
@@ -46,12 +47,11 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    files, blender_mesh, blender_pack = blender()
+    _, _, blender_pack = blender()
     from ..blender_seams import GroupError, avoided
     from ..packing import PackingError
-    from ..unwrapping import Job, Refusal, lay_out
+    from ..unwrapping import Job, lay_out
 
-    check_output(options.output, files)
     settings = Settings(
         boundary=options.boundary,
         quality=options.quality,
@@ -64,22 +64,13 @@ def run(options: argparse.Namespace) -> None:
         fill_holes=options.fill_holes,
         max_shear=options.max_shear,
     )
-    pairs = read(options.input, files, blender_mesh, options.uv_layer)
+    pairs = read_layers(options)
     objects = [obj for obj, _ in pairs]
-    try:
-        for obj in objects:
-            blender_mesh.check_target(obj.data, options.uv_layer)
+    with refusals(objects, PackingError, GroupError):
         free = avoided(objects, options.keep_free)
         jobs = [Job(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
         layout = drain_shown(lay_out(jobs, settings, blender_pack.pack))
-        for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):
-            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, options.uv_layer), corners, uv)
-        warnings = files.save(options.output, objects)
-    except Refusal as refusal:
-        raise CommandError(f"{objects[refusal.index].name}: {refusal.error}") from refusal
-    except (PackingError, GroupError, blender_mesh.TargetError, files.FileError) as error:
-        raise CommandError(str(error)) from error
-    warnings = warn(objects, layout.warnings, warnings)
+        warnings = write_layers(options, objects, layout)
     if options.report:
         charts = [surface_map.report() for surface_map in layout.maps]
         packing = {"packer": layout.packing.packer, "scale": layout.packing.scale}
