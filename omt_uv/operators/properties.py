@@ -77,6 +77,11 @@ def choose_layer(layout: bpy.types.UILayout, properties, name: str) -> None:
     _choose(layout, properties, name, "uv_layers", "GROUP_UVS")
 
 
+def choose_attribute(layout: bpy.types.UILayout, properties, name: str) -> None:
+    """A field for the name of an attribute, with those of the active mesh to choose from."""
+    _choose(layout, properties, name, "attributes", "SPREADSHEET")
+
+
 def _choose(layout: bpy.types.UILayout, properties, name: str, collection: str, icon: str) -> None:
     obj = bpy.context.object
     if obj is None or obj.type != "MESH":

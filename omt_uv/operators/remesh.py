@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..settings import COUNTS, DEFAULT_STRATEGY, DENSITIES, STRATEGIES, RemeshSettings
 from .common import Complaint, SolverOperator, mesh_objects, ready, warn
+from .properties import choose_attribute, choose_group
 
 
 class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
@@ -205,38 +206,41 @@ def _remesh_all(requests: list, settings: RemeshSettings):
     return results
 
 
-# Settings that count for some densities only.
-_DENSITY_SETTINGS = {
-    "weight_group": {"WEIGHTS"},
-    "weight_factor": {"WEIGHTS", "SALIENCY"},
-    "amount": {"CURVATURE"},
-    "density_attribute": {"ATTRIBUTE"},
-    "grading": {"CURVATURE", "SALIENCY", "WEIGHTS", "ATTRIBUTE"},
-}
-
-
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
-    """The settings of the operator, for the redo panel and the sidebar."""
+    """The settings of the operator that count as others stand, for the redo panel and the sidebar."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "count_of")
     of = {"VERTICES": "target_vertices", "FACES": "target_faces", "EDGE": "edge_length"}
     layout.prop(properties, of[properties.count_of])
     layout.prop(properties, "density")
-    column = layout.column()
-    for name, kinds in _DENSITY_SETTINGS.items():
-        row = column.column()
-        row.active = properties.density in kinds
-        row.prop(properties, name)
-    for name in ("use_preserve_boundary", "use_preserve_seams", "use_preserve_materials", "use_preserve_sharp"):
-        layout.prop(properties, name)
-    column = layout.column()
-    column.active = properties.use_preserve_sharp
-    column.prop(properties, "sharp_angle")
-    layout.prop(properties, "preserve_attributes")
-    layout.prop(properties, "use_modifiers")
+    _draw_density(layout, properties)
+    _draw_preserved(layout.column(heading="Preserve"), properties)
+    layout.column(heading="Apply").prop(properties, "use_modifiers", text="Modifiers")
     layout.prop(properties, "levels")
-    column = layout.column()
-    column.active = properties.levels > 1
-    column.prop(properties, "ratio")
+    if properties.levels > 1:
+        layout.prop(properties, "ratio")
     layout.prop(properties, "strategy")
+
+
+def _draw_density(layout: bpy.types.UILayout, properties) -> None:
+    if properties.density == "WEIGHTS":
+        choose_group(layout, properties, "weight_group")
+    if properties.density == "ATTRIBUTE":
+        choose_attribute(layout, properties, "density_attribute")
+    if properties.density in ("WEIGHTS", "SALIENCY"):
+        layout.prop(properties, "weight_factor")
+    if properties.density == "CURVATURE":
+        layout.prop(properties, "amount")
+    if properties.density != "UNIFORM":
+        layout.prop(properties, "grading")
+
+
+def _draw_preserved(column: bpy.types.UILayout, properties) -> None:
+    column.prop(properties, "use_preserve_boundary", text="Boundary")
+    column.prop(properties, "use_preserve_seams", text="Seams")
+    column.prop(properties, "use_preserve_materials", text="Materials")
+    column.prop(properties, "use_preserve_sharp", text="Sharp Edges")
+    column.prop(properties, "preserve_attributes", text="Attributes")
+    if properties.use_preserve_sharp:
+        column.prop(properties, "sharp_angle")

@@ -34,10 +34,10 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         default=DEFAULT_SPHERE_METHOD,
     )
     weight_group: StringProperty(
-        name="Weight Group", description="Vertex group of what gets more of the texture. Empty: none"
+        name="Weights", description="Vertex group of what gets more of the texture. Empty: none"
     )
     weight_factor: FloatProperty(
-        name="Weight Factor",
+        name="Factor",
         description="How many times the texture of vertices with weight 0 those with weight 1 get",
         default=2.0,
         min=0.01,
@@ -135,7 +135,7 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
-    """The settings of the operator, for the redo panel and the sidebar."""
+    """The settings of the operator that count as others stand, for the redo panel and the sidebar."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     draw_balance(layout, properties)
@@ -143,14 +143,12 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "quality")
     layout.prop(properties, "method")
     choose_group(layout, properties, "weight_group")
-    column = layout.column()
-    column.active = bool(properties.weight_group)
-    column.prop(properties, "weight_factor")
+    if properties.weight_group:
+        layout.prop(properties, "weight_factor")
     layout.prop(properties, "orientation")
     if properties.orientation == "GROUPS":
         for name in ("pole_group", "meridian_group", "east_group"):
             choose_group(layout, properties, name)
-    column = layout.column()
-    column.active = properties.projection != "EQUIRECT"
-    column.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
+    if properties.projection != "EQUIRECT":
+        layout.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
     choose_layer(layout, properties, "uv_layer")

@@ -88,6 +88,18 @@ class Story:
 
         return running.current
 
+    def said(self):
+        """What the panel says about the last run: title and rows, None before the first."""
+        from omt_uv.omt_uv import last_run
+
+        summary = last_run.state.summary
+        return None if summary is None else [summary.title, *summary.rows]
+
+    def forget(self):
+        from omt_uv.omt_uv import last_run
+
+        last_run.state.summary = None
+
     def figures(self, obj):
         """Area error, shear and folds of the active UVs, by the add-on's own measure."""
         from omt_uv.omt_uv import blender_mesh, measuring

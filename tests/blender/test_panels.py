@@ -109,6 +109,34 @@ def test_redo_panels_show_every_setting_once(package, name):
     assert sorted(record) == sorted(settings_of(f"uv.omt_{name}"))
 
 
+@pytest.mark.parametrize(
+    ("operator", "module"),
+    [("object.omt_remesh", "remesh"), ("uv.omt_sphere", "sphere"), ("uv.omt_magnify", "magnify")],
+)
+def test_settings_that_count_for_some_choices_only_come_with_them(package, operator, module):
+    """Each at most once at a time, and each for some choice of one of the others."""
+    properties = bpy.context.window_manager.operator_properties_last(operator)
+    switches = [
+        (
+            p.identifier,
+            p.enum_items.keys() if p.type == "ENUM" else {"BOOLEAN": [False, True], "STRING": ["", "A"]}[p.type],
+        )
+        for p in properties.bl_rna.properties
+        if p.type in ("ENUM", "BOOLEAN", "STRING") and p.identifier in settings_of(operator)
+    ]
+    switches += [("levels", [1, 3])] if module == "remesh" else []
+    seen = set()
+    for name, values in switches:
+        for value in values:
+            setattr(properties, name, value)
+            record = []
+            package(f"operators.{module}").draw_settings(Layout(record), properties)
+            assert len(record) == len(set(record))
+            seen |= set(record)
+        properties.property_unset(name)
+    assert seen == settings_of(operator)
+
+
 def test_the_result_of_the_last_run_is_shown(package):
     scenes.bump()
     bpy.ops.uv.omt_unwrap()
