@@ -119,7 +119,7 @@ class SolverOperator:
     bl_label: str
     # Whether it changes the active UVs, so that their figures are worth a look.
     makes_uvs = False
-    # Rows of a name and a value about the result that `finish` wants to be shown first.
+    # Rows of a name and a value on the result that `finish` wants to be shown first, instead of others of that name.
     said: tuple[tuple[str, str], ...] = ()
     _timer: bpy.types.Timer | None = None
     _shown = 0.0
@@ -202,7 +202,8 @@ class SolverOperator:
             scale = context.scene.unit_settings.scale_length
             rows = last_run.figures([r for _, r in pairs], getattr(self, "texture_size", DEFAULT_TEXTURE_SIZE), scale)
             overlay.refresh(context, pairs)
-        rows = (*self.said, *rows, ("Time", last_run.seconds(seconds)))
+        told = {name for name, _ in self.said}
+        rows = (*self.said, *(row for row in rows if row[0] not in told), ("Time", last_run.seconds(seconds)))
         last_run.state.summary = last_run.Summary(self.bl_label, rows, tuple(last_run.state.warnings))
         last_run.state.error = ""
 

@@ -183,8 +183,24 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
             new.select_set(True)
         if made:
             context.view_layer.objects.active = made[0]
+        self.said = _figures([series.levels[0] for _, _, series, _ in result])
         warn(self, [obj for obj, *_ in result], warnings)
         self.report({"INFO"}, f"Made {', '.join(names)}")
+
+
+def _figures(levels: list) -> tuple[tuple[str, str], ...]:
+    """Rows for the panel about the finest mesh of every object: size and the smallest angles of its triangles."""
+    import numpy as np
+
+    from ..solver.geometry import angles_from_lengths, halfedge_lengths
+
+    lengths = [halfedge_lengths(level.positions, level.triangles).reshape(-1, 3) for level in levels]
+    least = np.degrees(angles_from_lengths(np.concatenate(lengths)).min(axis=1))
+    return (
+        ("Vertices", f"{sum(len(level.positions) for level in levels)}"),
+        ("Triangles", f"{len(least)}"),
+        ("Angles, 99 %", f"above {np.percentile(least, 1):.1f}°"),
+    )
 
 
 def _remesh_all(requests: list, settings: RemeshSettings):

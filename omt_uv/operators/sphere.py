@@ -125,6 +125,9 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         from .. import blender_mesh, blender_panorama
 
         objects, globes, pixels = result
+        # A layout of the whole globe cannot keep areas; the map to the sphere does.
+        worst = max(globe.report()["area_l1_sphere"] for mine in globes.globes for globe in mine)
+        self.said = (("Area error", f"{100 * worst:.2f} %"),)
         for obj, corners, uv in zip(objects, globes.corners, globes.uv, strict=True):
             layer = blender_mesh.target_layer(obj.data, self.uv_layer)
             blender_mesh.write_uv(obj, layer, corners, uv)

@@ -94,6 +94,8 @@ def test_the_panel_says_the_shares(package):
     asked, now = (float(rows[name].split()[0]) for name in ("Region asked", "Region now"))
     assert now == pytest.approx(asked, rel=5e-3)
     assert float(rows["Region before"].split()[0]) == pytest.approx(asked / 2, rel=1e-3)
+    # Against what was asked: next to plain areas it would be large.
+    assert float(rows["Area error"].split()[0]) < 1
 
 
 def test_a_warped_image_follows():

@@ -121,6 +121,14 @@ def test_a_new_object_beside_the_old_one():
     assert not new.data.validate()
 
 
+def test_the_panel_says_what_was_made(package):
+    ball()
+    (new,) = remesh(target_vertices=300)
+    rows = dict(package("last_run").state.summary.rows)
+    assert (int(rows["Vertices"]), int(rows["Triangles"])) == (len(new.data.vertices), len(new.data.polygons))
+    assert 30 < float(rows["Angles, 99 %"].removeprefix("above ").removesuffix("°")) < 60
+
+
 def test_faces_and_edges_are_counted_too():
     obj = ball()
     (new,) = remesh(count_of="FACES", target_faces=400)

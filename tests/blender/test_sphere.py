@@ -58,6 +58,14 @@ def test_every_face_has_its_share_of_the_texture(projection):
     assert np.abs(uv / uv.sum() - space / space.sum()).sum() < 0.08
 
 
+def test_the_panel_says_how_exact_the_sphere_is(package):
+    ball()
+    project(projection="EQUIRECT")
+    rows = package("last_run").state.summary.rows
+    assert [name for name, _ in rows].count("Area error") == 1
+    assert float(dict(rows)["Area error"].split()[0]) < 1
+
+
 def test_the_equirectangular_layout_is_north_up_and_front_in_the_middle():
     obj = ball()
     project(projection="EQUIRECT")
