@@ -12,46 +12,50 @@ from .embedding import arc_length_parameters, tutte
 from .errors import PrecisionError, TransportError
 from .first_map import SITE_RESOLUTION, centroid_map
 from .geometry import halfedge_lengths, vertex_areas
-from .progress import Steps, part_of
+from .progress import Steps
 from .topology import boundary_loops
 from .transport import transport
 from .untangle import untangle
 
 
 @dataclass(frozen=True)
-class ChartMaps:
-    """Conformal and measure-preserving image (n,2) of a chart in the unit disk, boundaries on the circle."""
+class Image:
+    """Image (n,2) of a chart in the unit disk, boundaries on the circle, and why it is not the one asked for."""
 
-    conformal: np.ndarray
-    preserving: np.ndarray
+    uv: np.ndarray
     warnings: tuple[str, ...]
 
 
-def chart_maps(vertices: np.ndarray, triangles: np.ndarray, density: np.ndarray) -> Steps[ChartMaps]:
-    """Maps of a disk (n,3), (m,3) with density (m,).
-
-    The second is the inverse of the optimal transport to the first (see `transport.py`), straightened by one linear
-    system (see `untangle.py`). Where one of them leaves double precision there is a milder one, and a warning.
-    """
-    warnings: list[str] = []
-    loop = boundary_loops(triangles)[0]
-    circle = Disk()
-    mild = None
+def conformal_image(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Image]:
+    """Conformal map of a disk (n,3), (m,3); where that leaves double precision a milder one, and a warning."""
     try:
-        conformal = (yield from part_of(conformal_disk(vertices, triangles), 0.0, 0.5)).uv
-        if halfedge_lengths(conformal, triangles).min() < SITE_RESOLUTION:
-            mild = "A conformal map puts neighbours too close together"
+        uv = (yield from conformal_disk(vertices, triangles)).uv
+        if halfedge_lengths(uv, triangles).min() >= SITE_RESOLUTION:
+            return Image(uv, ())
+        mild = "A conformal map puts neighbours too close together"
     except PrecisionError as error:
         mild = error.cause
-    if mild:
-        warnings.append(f"{mild}; samples were carried to a mean value map instead")
-        conformal = tutte(vertices, triangles, loop, circle.map_boundary(arc_length_parameters(vertices, loop)))
+    loop = boundary_loops(triangles)[0]
+    uv = tutte(vertices, triangles, loop, Disk().map_boundary(arc_length_parameters(vertices, loop)))
+    return Image(uv, (f"{mild}; samples were carried to a mean value map instead",))
+
+
+def preserving_image(
+    vertices: np.ndarray, triangles: np.ndarray, conformal: np.ndarray, density: np.ndarray
+) -> Steps[Image]:
+    """Map of a disk (n,3), (m,3) that keeps areas times density (m,), from the conformal one (n,2).
+
+    It is the inverse of the optimal transport (see `transport.py`), straightened by one linear system (see
+    `untangle.py`); where that fails the conformal map itself, and a warning.
+    """
+    warnings: list[str] = []
+    loop, circle = boundary_loops(triangles)[0], Disk()
     try:
         mass = vertex_areas(vertices, triangles, density)
-        cells = yield from part_of(transport(conformal, mass, circle, tolerance=1e-2), 0.5, 0.5)
+        cells = yield from transport(conformal, mass, circle, tolerance=1e-2)
         uv = centroid_map(cells, circle, loop, None, warnings)
         uv, _ = untangle(uv, vertices, triangles, loop, uv[loop])
     except TransportError as error:
         warnings.append(f"{error.cause}; samples were spread without transport")
         uv = conformal
-    return ChartMaps(conformal, uv, tuple(warnings))
+    return Image(uv, tuple(warnings))

@@ -45,6 +45,11 @@ class Part:
         edges = (3 * len(self.triangles) + len(self.rim)) // 2
         return len(self.vertices) - edges + len(self.triangles)
 
+    @property
+    def spherical(self) -> bool:
+        """Whether it is closed and has no handle."""
+        return len(self.rim) == 0 and self.euler == 2
+
 
 @dataclass(frozen=True)
 class Parts:

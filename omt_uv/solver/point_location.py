@@ -1,4 +1,4 @@
-"""Which triangle of a plane triangulation holds a point: walks through the triangles, all points at once."""
+"""Which triangle of a triangulation, in the plane or on the sphere, holds a point: walks, all points at once."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ MOST_STEPS = 2000
 def locate(uv: np.ndarray, triangles: np.ndarray, points: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Triangle (k,) and barycentric coordinates (k,3) of points (k,2) in a map without folds (n,2), (m,3).
 
-    A point outside of the map goes to the boundary triangle where its walk ends, coordinates clamped. A step crosses
-    one of the edges that the point lies beyond, chosen at random, so that no walk goes round in circles
-    (Devillers, Pion, Teillaud 2002).
+    Points (k,3) and maps (n,3) are those of the unit sphere. A point outside of the map goes to the boundary triangle
+    where its walk ends, coordinates clamped. A step crosses one of the edges that the point lies beyond, chosen at
+    random, so that no walk goes round in circles (Devillers, Pion, Teillaud 2002).
     """
     twin = twins(triangles).reshape(-1, 3)
     rng = np.random.default_rng(seed)
@@ -40,6 +40,11 @@ def locate(uv: np.ndarray, triangles: np.ndarray, points: np.ndarray, seed: int 
 
 def _barycentric(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     a, b, c = (corners[:, k] - points for k in range(3))
-    parts = np.stack([cross2(b, c), cross2(c, a), cross2(a, b)], axis=1)
+    if points.shape[1] == 3:
+        # Seen along the point itself.
+        parts = np.stack([np.einsum("ki,ki->k", points, np.cross(u, v)) for u, v in ((b, c), (c, a), (a, b))], axis=1)
+    else:
+        parts = np.stack([cross2(b, c), cross2(c, a), cross2(a, b)], axis=1)
     total = parts.sum(axis=1, keepdims=True)
-    return np.where(total > 0, parts / np.where(total > 0, total, 1), 1 / 3)
+    # In a folded triangle all are negative: the walk goes on.
+    return np.where(total != 0, parts / np.where(total != 0, np.abs(total), 1), 1 / 3)

@@ -16,6 +16,7 @@ from .closest import ClosestPoint, vertex_normals
 from .counts import StuckError, adjust_count, distribute, least_vertices, rebalance
 from .errors import CountError, positive_density
 from .fit import fit_to_surface
+from .part_maps import PartMaps
 from .parts import Part, split_parts
 from .progress import Progress, Steps, part_of
 from .relaxation import relax
@@ -163,10 +164,11 @@ def _remesh_part(part: Part, count: int, density: np.ndarray, options: Options, 
     Only the last part has to keep to its count; it makes up for the others.
     """
     level = density / (part.area @ density / part.area.sum())
+    maps = PartMaps(part)
     stretch, attempt = 1.0, 0
     while True:
         attempt += 1
-        steps = tessellate(part, count, level, _at_vertices(part, level), options, stretch)
+        steps = tessellate(maps, count, level, _at_vertices(part, level), options, stretch)
         start = yield from part_of(steps, 0.0, 0.3)
         anyhow = attempt == ATTEMPTS or not start.draft.fixed.any()
         try:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arcs import Border
-from .chart_maps import ChartMaps
 from .domain import Disk
 from .embedding import tutte
 from .errors import TransportError
+from .part_maps import Maps
 from .point_location import locate
 from .power_diagram import power_diagram
 from .regular import by_hull
@@ -39,7 +39,7 @@ def triangulate_chart(
     vertices: np.ndarray,
     triangles: np.ndarray,
     loop: np.ndarray,
-    maps: ChartMaps,
+    maps: Maps,
     border: Border,
     count: int,
     strategy: str,
@@ -48,10 +48,10 @@ def triangulate_chart(
 
     strategy : one of STRATEGIES, or EVEN
     """
-    images = {"app": maps.preserving, "cfp": maps.conformal}
     if strategy == EVEN:
-        images = {"even": _even_map(vertices, triangles, loop, border)}
-    from_map, to_map = (images[name] for name in strategy.split("-"))
+        from_map = to_map = _even_map(vertices, triangles, loop, border)
+    else:
+        from_map, to_map = maps.pair(strategy)
     spread = spread_samples(_on_circle(from_map, loop, border), count)
     face, bary = locate(from_map, triangles, spread)
     corners = triangles[face]

@@ -8,16 +8,16 @@ import numpy as np
 
 from .arcs import ArcSamples, Border, Network, border, network, sample_arcs
 from .assembly import glue
-from .chart_maps import chart_maps
-from .charts import Chart, triangle_surface
+from .charts import Chart
 from .counts import edge_size
 from .draft import Draft
 from .errors import CountError, PrecisionError
 from .geometry import face_areas
+from .part_maps import PartMaps
 from .parts import Part
-from .preparation import prepare
 from .progress import Progress, Steps, part_of
 from .sampling import EVEN, Patch, triangulate_chart
+from .sphere_sampling import sample_sphere
 from .topology import pair_keys
 
 # Vertices that every part has at first.
@@ -53,20 +53,45 @@ class Tessellation:
 
 
 def tessellate(
-    part: Part, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float = 1.0
+    maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float = 1.0
 ) -> Steps[Tessellation]:
     """Samples of a part with density (m,), and at_vertices (n,), of mean 1, triangulated by the strategy.
 
-    On boundaries and features they are `stretch` edges apart, or more where there would be too many.
+    Closed parts of genus 0 without features go by way of the sphere, all others, or where that fails, by way of charts.
+    On boundaries and features samples are `stretch` edges apart, or more where there would be too many.
 
     Raises
     ------
     CountError : boundaries and features alone take more
     PrecisionError : a chart cannot be triangulated
     """
+    found = (yield from _by_sphere(maps, count, density, options)) if maps.spherical else None
+    return found or (yield from _by_charts(maps, count, density, at_vertices, options, stretch))
+
+
+def _by_sphere(maps: PartMaps, count: int, density: np.ndarray, options: Options) -> Steps[Tessellation | None]:
+    """The part by way of the sphere; None where that has no room for it."""
+    part = maps.part
+    found = yield from maps.of_sphere(density)
+    if found is None:
+        return None
+    vertices = count if options.count_of == "vertices" else max(count // 2 + 2, 4)
+    try:
+        samples = sample_sphere(part.vertices, part.triangles, *found.pair(options.strategy), max(vertices, FEWEST))
+    except PrecisionError as error:
+        maps.give_up(error.cause)
+        return None
+    points = samples.points
+    draft = Draft(points, samples.triangles, np.zeros(len(points), dtype=bool), np.zeros(0, np.int64))
+    return Tessellation(draft, vertices, edge_size(float(part.area @ density), 0.0, vertices), 1.0, found.warnings)
+
+
+def _by_charts(
+    maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float
+) -> Steps[Tessellation]:
     yield Progress("Charts", 0.0)
+    part, charts = maps.part, maps.charts
     held = np.union1d(part.rim, pair_keys(part.features[:, 0], part.features[:, 1]))
-    charts = prepare(triangle_surface(part.vertices, part.triangles, part.features)).charts
     measure, rim = float(part.area @ density), _weighted_length(part.vertices, part.rim, at_vertices)
     vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
     size = edge_size(measure, rim, vertices)
@@ -87,11 +112,11 @@ def tessellate(
     borders = [border(sides, samples, lines.arcs) for sides in lines.sides]
     inner = _inner_counts(charts, borders, density, max(vertices, FEWEST) - len(samples.points))
     patches: list[Patch] = []
-    warnings: list[str] = []
+    warnings = list(maps.warnings)
     done = 0.0
-    for chart, loop, edge, number in zip(charts, lines.loops, borders, inner, strict=True):
-        share = len(chart.triangles) / len(part.triangles)
-        steps = _patch(chart, loop, edge, int(number), density, options.strategy)
+    for k, (loop, edge, number) in enumerate(zip(lines.loops, borders, inner, strict=True)):
+        share = len(charts[k].triangles) / len(part.triangles)
+        steps = _patch(maps, k, loop, edge, int(number), density, options.strategy)
         patch, said = yield from part_of(steps, done, share)
         patches.append(patch)
         warnings += said
@@ -135,15 +160,16 @@ def _inner_counts(charts: list[Chart], borders: list[Border], density: np.ndarra
 
 
 def _patch(
-    chart: Chart, loop: np.ndarray, edge: Border, number: int, density: np.ndarray, strategy: str
+    maps: PartMaps, k: int, loop: np.ndarray, edge: Border, number: int, density: np.ndarray, strategy: str
 ) -> Steps[tuple[Patch, tuple[str, ...]]]:
     if len(edge.samples) == 3 and number == 0:
         return Patch(np.zeros((0, 3)), np.arange(3)[None]), ()
-    maps = yield from chart_maps(chart.vertices, chart.disk, density[chart.faces])
+    found = yield from maps.of_chart(k, density)
+    chart = maps.charts[k]
     for name in (strategy, EVEN):
-        patch = triangulate_chart(chart.vertices, chart.disk, loop, maps, edge, number, name)
+        patch = triangulate_chart(chart.vertices, chart.disk, loop, found, edge, number, name)
         if patch is not None:
-            return patch, maps.warnings
+            return patch, found.warnings
     raise PrecisionError("A chart cannot be triangulated", kind="face", elements=chart.faces)
 
 

@@ -1,0 +1,99 @@
+"""The maps of a part, kept while it is remeshed: for other numbers of vertices they are the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .chart_maps import Image, conformal_image, preserving_image
+from .charts import Chart, triangle_surface
+from .errors import MeshError
+from .parts import Part
+from .preparation import prepare
+from .progress import Steps, part_of
+from .sphere_conformal import ConformalSphere, conformal_sphere
+from .sphere_sampling import sphere_image
+
+# Where the time of two maps goes, as start and width.
+FIRST, SECOND = (0.0, 0.5), (0.5, 0.5)
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Conformal and measure-preserving image of a chart in the unit disk, (n,2) each, or of a part on the unit sphere,
+    (n,3)."""
+
+    conformal: np.ndarray
+    preserving: np.ndarray
+    warnings: tuple[str, ...]
+
+    def pair(self, strategy: str) -> tuple[np.ndarray, np.ndarray]:
+        """The map to sample on and the map to triangulate on that a strategy as "app-cfp" names."""
+        of = {"app": self.preserving, "cfp": self.conformal}
+        first, second = strategy.split("-")
+        return of[first], of[second]
+
+
+class PartMaps:
+    """A part with a density (m,) of its triangles: the charts into which it falls, and maps of these or of the whole.
+
+    Each is made when it is first asked for: conformal ones once, measure-preserving ones for the last density.
+    """
+
+    def __init__(self, part: Part):
+        self.part = part
+        self._sphere: ConformalSphere | None = None
+        self._charts: list[Chart] | None = None
+        self._conformal: dict[int, Image] = {}
+        self._latest: dict[int, tuple[np.ndarray, Maps]] = {}
+        # Whether to map it to the sphere: charts end at features.
+        self.spherical = part.spherical and len(part.features) == 0
+        self.warnings: tuple[str, ...] = ()
+
+    @property
+    def charts(self) -> list[Chart]:
+        """The part cut into disks."""
+        if self._charts is None:
+            part = self.part
+            self._charts = prepare(triangle_surface(part.vertices, part.triangles, part.features)).charts
+        return self._charts
+
+    def of_sphere(self, density: np.ndarray) -> Steps[Maps | None]:
+        """Maps to the sphere; None, and a warning from then on, where there are none in double precision."""
+        if (known := self._known(-1, density)) is not None:
+            return known
+        V, T = self.part.vertices, self.part.triangles
+        try:
+            if self._sphere is None:
+                self._sphere = yield from part_of(conformal_sphere(V, T), *FIRST)
+            preserving = yield from part_of(sphere_image(V, T, self._sphere, density), *SECOND)
+        except MeshError as error:
+            self.give_up(error.cause)
+            return None
+        return self._keep(-1, density, Maps(self._sphere.positions, preserving, ()))
+
+    def give_up(self, cause: str) -> None:
+        """From now on, cut the part open."""
+        self.spherical = False
+        self.warnings = (f"{cause}; a part was cut open instead of mapped to the sphere",)
+
+    def of_chart(self, k: int, density: np.ndarray) -> Steps[Maps]:
+        """Maps of chart number k to the disk, and warnings where they are milder than asked for."""
+        if (known := self._known(k, density)) is not None:
+            return known
+        chart = self.charts[k]
+        if k not in self._conformal:
+            self._conformal[k] = yield from part_of(conformal_image(chart.vertices, chart.disk), *FIRST)
+        first = self._conformal[k]
+        steps = preserving_image(chart.vertices, chart.disk, first.uv, density[chart.faces])
+        second = yield from part_of(steps, *SECOND)
+        return self._keep(k, density, Maps(first.uv, second.uv, first.warnings + second.warnings))
+
+    def _known(self, k: int, density: np.ndarray) -> Maps | None:
+        latest = self._latest.get(k)
+        return latest[1] if latest is not None and np.array_equal(latest[0], density) else None
+
+    def _keep(self, k: int, density: np.ndarray, maps: Maps) -> Maps:
+        self._latest[k] = (density, maps)
+        return maps

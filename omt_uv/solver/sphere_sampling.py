@@ -1,0 +1,89 @@
+"""Samples of a closed surface of genus 0, evenly by measure, and their triangulation, by way of the sphere.
+
+As `sampling.py`, without a cut: points that are uniform on the measure-preserving sphere are uniform on the surface,
+and the convex hull of their conformal images is a Delaunay triangulation (B. Gu 2018).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .closed import closed_surface
+from .errors import PrecisionError, TransportError
+from .geometry import vertex_areas
+from .moebius import centred
+from .point_location import locate
+from .progress import Steps
+from .sphere_conformal import ConformalSphere
+from .sphere_transport import sphere_transport
+from .spherical import normalized
+from .spherical_power import Hull, by_hull, spherical_cells
+from .topology import twins
+
+# Rounds of moving samples to the centroids of their cells.
+ROUNDS = 5
+# Areas of cells may be off by this share: the relaxation on the surface makes up for more.
+TOLERANCE = 1e-2
+# Share of the samples that may lie too close together for the hull, in so many attempts without them.
+LOST, ATTEMPTS = 0.05, 5
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Points (k,3) on a surface, and triangles (2k-4,3) between them."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+
+
+def sphere_image(
+    vertices: np.ndarray, triangles: np.ndarray, conformal: ConformalSphere, density: np.ndarray
+) -> Steps[np.ndarray]:
+    """Map (n,3) of a closed surface (n,3), (m,3) to the sphere by optimal transport, areas times density (m,).
+
+    A few faces may be folded. Raises TransportError where the transport fails.
+    """
+    sound = closed_surface(vertices, triangles)
+    mass = vertex_areas(sound.vertices, triangles, density)
+    hull = Hull(conformal.triangles, twins(conformal.triangles))
+    found = yield from sphere_transport(conformal.sites, mass, TOLERANCE, hull)
+    return found.cells.centroids()
+
+
+def sample_sphere(
+    vertices: np.ndarray, triangles: np.ndarray, from_map: np.ndarray, to_map: np.ndarray, count: int
+) -> Sampled:
+    """About `count` points of a closed surface (n,3), (m,3), uniform in one of its images on the sphere (n,3), joined
+    by the convex hull of where they lie in the other (n,3).
+
+    Raises PrecisionError where too many of them coincide there.
+    """
+    face, bary = locate(from_map, triangles, spread_on_sphere(count))
+    corners = triangles[face]
+    images = normalized(np.einsum("kc,kcj->kj", bary, to_map[corners]))
+    # Moebius maps leave circles circles, and what is Delaunay so; the middle is where the hull is best seen from.
+    images = centred(images, np.ones(count))
+    kept = np.arange(count)
+    for _ in range(ATTEMPTS):
+        try:
+            hull = by_hull(images[kept], np.zeros(len(kept)))
+            return Sampled(np.einsum("kc,kcj->kj", bary, vertices[corners])[kept], hull.triangles)
+        except TransportError as error:
+            kept = np.delete(kept, error.elements)
+            if not len(error.elements) or len(kept) < (1 - LOST) * count:
+                break
+    raise PrecisionError("Samples come too close together on the sphere")
+
+
+def spread_on_sphere(count: int, rounds: int = ROUNDS) -> np.ndarray:
+    """Unit vectors (count,3) that spread evenly: a spiral of equal steps in height, and what centroids make of it."""
+    k = np.arange(count) + 0.5
+    height, turn = 1 - 2 * k / count, k * np.pi * (3 - np.sqrt(5))
+    radius = np.sqrt(1 - height**2)
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height])
+    weights = np.zeros(count)
+    for _ in range(rounds):
+        points = spherical_cells(points, weights, by_hull(points, weights)).centroids()
+    return points
