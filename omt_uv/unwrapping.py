@@ -15,7 +15,16 @@ from .solver.chart_pins import CornerPins, chart_pins, clear_of_pins
 from .solver.charts import Chart, Surface
 from .solver.errors import MeshError
 from .solver.measure import Target
-from .solver.parameterize import ChartMap, SurfaceMap, chart_target, located, unwrap, unwrap_chart
+from .solver.parameterize import (
+    ChartMap,
+    SurfaceMap,
+    chart_target,
+    located,
+    located_pins,
+    unwrap,
+    unwrap_chart,
+    with_open_corners,
+)
 from .solver.progress import Progress, Steps, part_of
 
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
@@ -122,6 +131,8 @@ def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
 
     avoid = clear_of_pins(job.surface, job.pins, job.avoid)
     found = yield from unwrap_within(job.surface, job.faces, map_chart, settings.max_shear, avoid=avoid, **options)
+    charts, held = found.prepared.charts, [located_pins(job.pins, c) for c in found.prepared.charts]
+    maps = with_open_corners(job.surface, charts, found.maps, held, settings.boundary, settings.quality, job.target)
     cuts = found.slits if found.prepared.cuts is None else np.concatenate([found.prepared.cuts.edges, found.slits])
     (length, shear), first = found.history[-1], found.history[0]
     warnings = list(found.prepared.warnings)
@@ -130,7 +141,7 @@ def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
             f"The mean shear went from {first[1]:.3g} to {shear:.3g} with {length - first[0]:.3g} more of seam, "
             f"not below {settings.max_shear:.3g}; the least that was found is kept"
         )
-    return SurfaceMap(found.prepared.charts, found.maps, cuts, tuple(warnings))
+    return SurfaceMap(charts, maps, cuts, tuple(warnings))
 
 
 def _in_place(pinned: int, others: int) -> str:

@@ -249,13 +249,18 @@ models_missing = pytest.mark.skipif(
 @functools.cache
 def load_model(name):
     """A published model by its name, polygons cut into fans; the arrays are shared, so they are read-only."""
-    path = model_path(name)
-    if path is None:
-        raise FileNotFoundError(f"no {name}.obj or {name}.off in {models_folder()}; set OMT_UV_MODELS")
-    V, polygons = (_read_off if path.suffix == ".off" else _read_obj)(path)
+    V, polygons = load_polygons(name)
     F = np.array([(p[0], p[k], p[k + 1]) for p in polygons for k in range(1, len(p) - 1)], dtype=np.int64)
     V.flags.writeable = F.flags.writeable = False
     return V, F
+
+
+def load_polygons(name):
+    """Positions of a published model by its name, and its polygons, lists of vertices."""
+    path = model_path(name)
+    if path is None:
+        raise FileNotFoundError(f"no {name}.obj or {name}.off in {models_folder()}; set OMT_UV_MODELS")
+    return (_read_off if path.suffix == ".off" else _read_obj)(path)
 
 
 def _read_obj(path):

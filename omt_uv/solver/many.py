@@ -61,6 +61,7 @@ class Maps:
     area_l1: np.ndarray
     area_sd: np.ndarray
     angle_mean: np.ndarray
+    weight: np.ndarray
 
 
 def solve_many(meshes: list[tuple[np.ndarray, np.ndarray]], quality: str, balance: float) -> Steps[Maps]:
@@ -98,6 +99,7 @@ def solve_many(meshes: list[tuple[np.ndarray, np.ndarray]], quality: str, balanc
         parts.sums(weight * np.abs(ratio - 1)),
         np.sqrt(parts.sums(weight * (ratio - 1) ** 2)),
         parts.sums(weight * (a + b) / np.maximum(a - b, 1e-300)),
+        control.weight,
     )
 
 

@@ -6,13 +6,15 @@ Each stage may be replaced by a milder one where its mathematics leaves double p
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .chart_pins import ChartPins, CornerPins, anchored, chart_pins, clear_of_pins, facing, refuse_outline
 from .charts import Chart, Surface, triangle_rows
 from .conformal import sharpest_corners
+from .convex import opened
 from .distortion import measure
 from .domain import Disk, Domain, Rectangle
 from .errors import FoldedUVError, MeshError, positive_density
@@ -23,24 +25,28 @@ from .measure import Target
 from .preparation import prepare
 from .progress import Progress, Steps, part_of
 from .refine import BOUNDARIES, Refinement, refine
+from .stages import QUALITIES
 from .topology import boundary_loops
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 FIRST, REFINEMENT = (0.0, 0.4), (0.4, 0.6)
 # Charts of at most SMALL triangles are solved together where there are at least MANY, about BATCH triangles at a time.
 SMALL, MANY, BATCH = 1000, 8, 50_000
+# The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
+AREA_KEPT = 1.25
 
 
 @dataclass(frozen=True)
 class ChartMap:
     """Texture coordinates of one chart.
 
-    uv (n,2) in the units of the surface: the UV area is the area of the chart, its centroid is 0. A chart with pins
+    uv (n,2) in the units of the surface: the UV area is the area of the chart, and 0 the centroid of a chart with a
+    free boundary, the middle of its disk or square otherwise. A chart with pins
     (pinned) is where its pins are instead, at a scale that follows from them.
     newton_conformal, newton_transport : Newton steps; None where a stage was replaced
     residual_conformal : largest error of an angle sum, radians; residual_transport : |cell area - mass| / mass
     newton_refinement, residual_refinement, status : see `refine.Refinement`
-    warnings : what was replaced and why; seconds : wall-clock time per stage
+    warnings : what was replaced and why; seconds : wall-clock time per stage; weight : of the area term at the end
     """
 
     uv: np.ndarray
@@ -58,6 +64,7 @@ class ChartMap:
     warnings: tuple[str, ...]
     seconds: dict[str, float]
     pinned: bool = False
+    weight: float = 0.0
 
     def report(self, chart: Chart) -> dict:
         """Everything but the coordinates, for a JSON file."""
@@ -142,8 +149,56 @@ def unwrap(
         except MeshError as error:
             raise located(error, chart) from error
         done += share
+    maps = with_open_corners(surface, charts, maps, held, boundary, quality, target)
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
+
+
+def with_open_corners(
+    surface: Surface,
+    charts: list[Chart],
+    maps: list[ChartMap],
+    held: Sequence[ChartPins | None],
+    boundary: str,
+    quality: str,
+    target: Target | None = None,
+) -> list[ChartMap]:
+    """The maps with polygons that are convex on the surface convex in them, too, as far as may be: `convex.opened`.
+
+    held: the pins of every chart; the others as for `unwrap`. A map that would lose its areas stays as it is.
+    """
+    fixed = [_fixed(c, p, boundary) for c, p in zip(charts, held, strict=True)]
+    density = [chart_target(target, surface, c).get("density") for c in charts]
+    new = list(maps)
+    for k, uv in opened(surface, charts, [m.uv for m in maps], fixed, density, [m.weight for m in maps]).items():
+        chart, old = charts[k], maps[k]
+        figures = measure(chart.vertices, chart.triangles, uv[chart.triangles], overlap=False, density=density[k])
+        if figures.area_l1 <= AREA_KEPT * max(old.area_l1, QUALITIES[quality].area_error) and not figures.folds:
+            if not fixed[k].any():
+                uv = _as_before(uv, old.uv, chart.triangles)
+            new[k] = replace(
+                old, uv=uv, area_l1=figures.area_l1, area_sd=figures.area_sd, angle_mean=figures.angle_mean
+            )
+    return new
+
+
+def _fixed(chart: Chart, pins: ChartPins | None, boundary: str) -> np.ndarray:
+    """Vertices (n,) bool of a chart that stay where the refinement left them: pins, and those on a disk or a square."""
+    fixed = np.zeros(len(chart.vertices), bool)
+    if pins is not None:
+        fixed[pins.vertices] = True
+    if boundary != "free":
+        fixed[boundary_loops(chart.disk)[0]] = True
+    return fixed
+
+
+def _as_before(uv: np.ndarray, given: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """A map (n,2) moved, turned and scaled to the place, direction and area of another one of the same triangles."""
+    centre = given.mean(axis=0)
+    w, aim = ((x - x.mean(axis=0)) @ [1, 1j] for x in (uv, given))
+    w = w * np.exp(1j * np.angle(np.vdot(w, aim)))
+    w = w * np.sqrt(signed_areas(given, triangles).sum() / signed_areas(uv, triangles).sum())
+    return np.column_stack([w.real, w.imag]) + centre
 
 
 def _small(chart: Chart) -> bool:
@@ -172,7 +227,7 @@ def _together(charts: list[Chart], quality: str, balance: float) -> Steps[list[C
         pieces = np.split(maps.uv, np.cumsum([len(v) for v, _ in meshes])[:-1])
         for k, (vertices, unit), chart, uv, place in zip(batch, boxes, members, pieces, range(len(batch)), strict=True):
             if maps.solved[place]:
-                uv = _in_place(uv, vertices, chart.triangles, None, unit, None)
+                uv = _about_zero(_in_place(uv, vertices, chart.triangles, None, unit, None), chart.triangles)
                 found[k] = _of_many(maps, place, uv, seconds)
     return found
 
@@ -193,6 +248,7 @@ def _of_many(maps: Maps, k: int, uv: np.ndarray, seconds: float) -> ChartMap:
         0,
         (),
         {"refinement": seconds},
+        weight=float(maps.weight[k]),
     )
 
 
@@ -276,8 +332,9 @@ def unwrap_chart(
         figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
     if figures.folds:
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
+    uv = refined.uv if held else _in_place(refined.uv, vertices, chart.triangles, asked, unit, pins)
     return ChartMap(
-        refined.uv if held else _in_place(refined.uv, vertices, chart.triangles, asked, unit, pins),
+        _about_zero(uv, chart.triangles) if pins is None and boundary == "free" else uv,
         first.conformal.iterations if first.conformal else None,
         first.conformal.residual if first.conformal else None,
         first.cells.iterations if first.cells else None,
@@ -292,6 +349,7 @@ def unwrap_chart(
         tuple(log.warnings) + refined.warnings,
         log.seconds,
         pins is not None,
+        refined.weight,
     )
 
 
@@ -337,6 +395,12 @@ def _in_place(uv: np.ndarray, vertices, triangles, density, unit: float, pins: C
     area = face_areas(vertices, triangles)
     uv = uv * np.sqrt((area.sum() if density is None else area @ density) / covered)
     return uv * unit if pins is None else anchored(uv, triangles, pins)
+
+
+def _about_zero(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """A map (n,2) with its centroid moved to 0."""
+    area = signed_areas(uv, triangles)
+    return uv - area @ uv[triangles].mean(axis=1) / area.sum()
 
 
 def _in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:

@@ -1,0 +1,99 @@
+"""Corners of polygons: the triangle of a vertex and its two neighbours, and a barrier for its area."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .charts import Surface
+
+# A corner counts where it has the share SHARP of its polygon's area on the surface, and is open where it has more
+# than the share OPEN of that in the map.
+SHARP, OPEN = 1e-3, 0.02
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Corners of polygons: triangles (k,3) of vertices, areas wanted (k,), and those of the polygons, whole (k,)."""
+
+    triangles: np.ndarray
+    wanted: np.ndarray
+    whole: np.ndarray
+
+    def areas(self, w: np.ndarray) -> np.ndarray:
+        """Signed areas (k,) in a map w (n,) complex."""
+        a, b, c = w[self.triangles].T
+        return 0.5 * ((b - a).conj() * (c - a)).imag
+
+    def shut(self, w: np.ndarray) -> np.ndarray:
+        """Which corners (k,) are not open in a map w (n,) complex."""
+        return ~(self.areas(w) > OPEN * self.wanted)
+
+    def of(self, chosen: np.ndarray, place: np.ndarray) -> Corners:
+        """Some of the corners, (k,) bool, with the vertices renumbered, vertex v as place[v]."""
+        return Corners(place[self.triangles[chosen]], self.wanted[chosen], self.whole[chosen])
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """The energy of corners with slack (k,) and strength (k,); one of the extras of `newton.Problem`."""
+
+    corners: Corners
+    slack: np.ndarray
+    strength: np.ndarray
+
+    def energies(self, w: np.ndarray) -> np.ndarray:
+        """The energy (k,) of every corner in a map w (n,) complex, infinite where r is not positive."""
+        r = self._ratio(w)
+        safe = np.where(r > 0, r, 1)
+        return np.where(r > 0, self.strength * ((safe + 1 / safe) / 2 - 1), np.inf)
+
+    def energy(self, w: np.ndarray) -> float:
+        """The sum of the energies."""
+        return float(self.energies(w).sum())
+
+    def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Gradient (n,) complex; vertices and rows (k,3) of linear forms whose squares are the Gauss-Newton Hessian."""
+        r, unit, t = self._ratio(w), self.corners.wanted + self.slack, self.corners.triangles
+        q = w[t]
+        across = 0.5j * (q[:, [2, 0, 1]] - q[:, [1, 2, 0]])
+        slope = self.strength * (1 - 1 / r**2) / 2 / unit
+        values = (slope[:, None] * across).ravel()
+        sums = np.bincount(t.ravel(), values.real, len(w)) + 1j * np.bincount(t.ravel(), values.imag, len(w))
+        return sums, t, np.sqrt(self.strength / r**3 / unit**2)[:, None] * across.conj()
+
+    def limit(self, w: np.ndarray, step: np.ndarray) -> float:
+        """Infinity: the line search sees to it."""
+        return np.inf
+
+    def _ratio(self, w):
+        return (self.corners.areas(w) + self.slack) / (self.corners.wanted + self.slack)
+
+
+def convex_corners(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners of the polygons, of four and more, that have no reflex corner; the straight ones left out.
+
+    Triangles (k,3) of a corner of the surface, the next and the one before it; their polygons (k,), and their shares
+    (k,) of the polygons' areas.
+    """
+    size = np.diff(surface.face_start)
+    polygon = np.repeat(np.arange(len(size)), size)
+    here = np.flatnonzero(size[polygon] > 3)
+    polygon = polygon[here]
+    first, last = surface.face_start[polygon], surface.face_start[polygon + 1] - 1
+    corner = np.column_stack([here, np.where(here == last, first, here + 1), np.where(here == first, last, here - 1)])
+    p = surface.positions[surface.corner_vertex[corner]]
+    base = surface.positions[surface.corner_vertex[first]]
+    # Differences over an extent, so that neither place nor unit costs digits.
+    unit = np.maximum(np.ptp(p.reshape(-1, 3) / 2, axis=0).max(initial=0.0), np.finfo(float).tiny)
+    after, before, reach = (
+        (x / 2 - y / 2) / unit for x, y in ((p[:, 1], p[:, 0]), (p[:, 2], p[:, 0]), (p[:, 0], base))
+    )
+    twice = np.cross(reach, after)
+    normal = np.column_stack([np.bincount(polygon, twice[:, k], len(size)) for k in range(3)])[polygon]
+    ear = np.cross(after, before)
+    share = (ear * normal).sum(1) / np.maximum((normal**2).sum(1), np.finfo(float).tiny)
+    reflex = np.bincount(polygon, share < -SHARP, len(size)) > 0
+    kept = ~reflex[polygon] & (share > SHARP)
+    return corner[kept], polygon[kept], share[kept]

@@ -1,0 +1,108 @@
+"""Polygons that are convex on the surface are convex in the map, whichever way they are cut into triangles."""
+
+import functools
+from dataclasses import replace
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.charts import split
+from omt_uv.solver.convex import opened
+from omt_uv.solver.corners import Barrier, Corners, convex_corners
+from omt_uv.solver.geometry import signed_areas
+from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.progress import drain
+
+
+def quads(columns=6, rows=6, height=0.0):
+    """A square of quads, wavy if it has a height."""
+    y, x = np.mgrid[0 : rows + 1, 0 : columns + 1] / [[[rows]], [[columns]]]
+    z = height * np.sin(9 * x) * np.cos(7 * y)
+    a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    polygons = np.column_stack([a, a + 1, a + columns + 2, a + columns + 1]).tolist()
+    return meshes.polygon_surface(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), polygons)
+
+
+def corner_areas(surface, result):
+    """Areas of all corners that count, over the areas of their polygons on the surface."""
+    corner, _, share = convex_corners(surface)
+    corners, uv = result.corner_uv()
+    everywhere = np.full((len(surface.corner_vertex), 2), np.nan)
+    everywhere[corners] = uv
+    return signed_areas(everywhere, corner) / share
+
+
+def test_only_corners_of_convex_polygons_count_and_no_straight_ones():
+    V = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 2, 0], [0.5, 0.5, 0], [3, 0, 0], [3, 2, 0]], float)
+    polygons = [[0, 1, 2, 4, 3], [0, 1, 5, 3], [1, 6, 7], [1, 6, 7, 2]]
+    surface = meshes.polygon_surface(1e5 + 1e-3 * V, polygons)
+    corner, polygon, share = convex_corners(surface)
+    assert sorted(surface.corner_vertex[corner[polygon == 0, 0]]) == [0, 1, 2, 3]
+    assert set(polygon) == {0, 3}
+    np.testing.assert_allclose(share[polygon == 3], 0.5, rtol=1e-6)
+
+
+def test_the_barrier_is_the_integral_of_its_gradient():
+    rng = np.random.default_rng(0)
+    w = rng.normal(size=6) + 1j * rng.normal(size=6)
+    corners = Corners(np.array([[0, 1, 2], [2, 3, 4], [5, 1, 0]]), np.ones(3), np.ones(3))
+    barrier = Barrier(corners, np.full(3, 9.0), np.array([1.0, 2, 3]))
+    direction = rng.normal(size=6) + 1j * rng.normal(size=6)
+    difference = (barrier.energy(w + 1e-6 * direction) - barrier.energy(w - 1e-6 * direction)) / 2e-6
+    slope, vertices, rows = barrier.derivatives(w)
+    assert difference == pytest.approx((slope.conj() @ direction).real, rel=1e-6)
+    assert vertices.shape == rows.shape == (3, 3)
+
+
+def darts():
+    """A flat square of quads, and a map of it in which two quads are darts, one of them with a corner at the rim."""
+    surface = quads()
+    (chart,) = split(surface)
+    uv = chart.vertices[:, :2].copy()
+    uv[np.isin(chart.vertex_ids, [0, 24])] += 0.1
+    assert (signed_areas(uv, chart.triangles) > 0).all()
+    return surface, chart, uv
+
+
+def test_darts_open_and_what_is_fixed_stays():
+    surface, chart, uv = darts()
+    corner, _, share = convex_corners(surface)
+    vertex = np.empty(len(surface.corner_vertex), int)
+    vertex[chart.corners] = chart.triangles
+    assert (signed_areas(uv, vertex[corner]) < 0).sum() >= 2
+    for held in (np.zeros(len(uv), bool), chart.vertex_ids == 30):
+        found = opened(surface, [chart], [uv], [held], [None], [500.0])[0]
+        area = signed_areas(found, chart.triangles)
+        assert (signed_areas(found, vertex[corner]) > 0).all() and (area > 0).all()
+        np.testing.assert_array_equal(found[held], uv[held])
+
+
+def test_maps_without_darts_are_left_alone():
+    surface = quads(height=0.1)
+    (chart,) = split(surface)
+    flat = chart.vertices[:, :2]
+    assert opened(surface, [chart], [flat], [np.zeros(len(flat), bool)], [None], [500.0]) == {}
+
+
+@pytest.mark.parametrize("scale, shift", [(1, 0), (1e-6, 0), (1e6, 0), (1, 1e5)])
+def test_quads_of_a_rugged_surface_are_convex_in_its_map(scale, shift):
+    surface = quads(14, 14, height=0.35)
+    result = drain(unwrap(replace(surface, positions=scale * surface.positions + shift)))
+    (chart_map,) = result.maps
+    assert chart_map.folds == 0 and chart_map.area_l1 <= 0.01
+    assert (corner_areas(surface, result) > 0).all()
+    np.testing.assert_allclose(chart_map.uv / scale, _rugged().uv, atol=1e-5)
+
+
+@functools.cache
+def _rugged():
+    return drain(unwrap(quads(14, 14, height=0.35))).maps[0]
+
+
+@meshes.models_missing
+def test_no_fan_of_suzanne_folds():
+    surface = meshes.polygon_surface(*meshes.load_polygons("suzanne"))
+    result = drain(unwrap(surface))
+    assert (corner_areas(surface, result) > 0).all()
+    assert max(m.area_l1 for m in result.maps) <= 0.01 and sum(m.folds for m in result.maps) == 0
