@@ -10,8 +10,11 @@ import bpy
 
 import numpy as np
 
-from . import blender_mesh, blender_transfer
-from .blender_transfer import Attributes
+from . import blender_mesh
+from .attributes import Attributes, followed, marked_sharp, material_borders, uv_seams
+from .blender_read_attributes import group_weights, read_attributes
+from .blender_write_attributes import write_attributes
+from .carrying import carry
 from .remeshing import Job, Level, Series, oriented
 from .settings import RemeshSettings
 from .solver.charts import Surface
@@ -66,16 +69,15 @@ def read_request(
             raise EmptyMeshError("The mesh has no faces", "Choose a mesh with faces")
         surface, warnings = oriented(reading.surface)
         names = tuple(group.name for group in obj.vertex_groups)
-        attributes = blender_transfer.read_attributes(mesh, names, settings.preserve_attributes)
+        attributes = read_attributes(mesh, names, settings.preserve_attributes)
         values = _density_values(obj, mesh, surface, settings)
     stretch = blender_mesh.stretch(obj)
     if abs(np.linalg.det(stretch)) <= 1e-12 * np.abs(stretch).max() ** 3:
         raise MeshError("The scale of the object is zero along an axis", "Clear or fix its scale")
-    jumps = all_edges(
-        blender_transfer.uv_seams(attributes, surface), blender_transfer.material_borders(attributes, surface)
-    )
-    job = Job(surface, _features(attributes, surface, settings), jumps, values, warnings)
-    return Request(job, attributes, stretch, depsgraph is not None)
+    jumps = all_edges(uv_seams(attributes, surface), material_borders(attributes, surface))
+    features = _features(attributes, surface, settings)
+    kept = followed(attributes, all_edges(features, jumps))
+    return Request(Job(surface, features, jumps, values, warnings), kept, stretch, depsgraph is not None)
 
 
 @contextmanager
@@ -96,13 +98,13 @@ def _features(attributes: Attributes, surface: Surface, settings: RemeshSettings
     kept = []
     if settings.preserve_sharp:
         kept += [
-            blender_transfer.marked_sharp(attributes),
+            marked_sharp(attributes),
             sharp_edges(surface.positions, triangles, settings.sharp_angle),
         ]
     if settings.preserve_seams:
-        kept += [surface.seams, blender_transfer.uv_seams(attributes, surface)]
+        kept += [surface.seams, uv_seams(attributes, surface)]
     if settings.preserve_materials:
-        kept.append(blender_transfer.material_borders(attributes, surface))
+        kept.append(material_borders(attributes, surface))
     return all_edges(*kept)
 
 
@@ -112,7 +114,7 @@ def _density_values(
     """Weights or attribute (m,) per triangle, None where the density needs neither."""
     triangles = surface.corner_vertex[surface.triangles]
     if settings.density == "weights":
-        weights = blender_transfer.group_weights(mesh, obj, settings.source)
+        weights = group_weights(mesh, obj, settings.source)
         if weights is None:
             raise SourceError(f"{obj.name}: There is no vertex group {settings.source!r}. Choose one that it has.")
         return from_vertices(weights, triangles)
@@ -131,13 +133,31 @@ def _density_values(
     return from_polygons(values, surface.triangle_face)
 
 
-def new_objects(obj: bpy.types.Object, request: Request, series: Series, carried: list[Attributes]) -> list[str]:
-    """Make the objects of a series beside the object; returns their names."""
+def alike(objects: list[bpy.types.Object], applied: bool) -> list[list[bpy.types.Object]]:
+    """Objects that can have one new mesh together: they share theirs at one scale, and no modifiers are applied."""
+    groups: dict = {}
+    for obj in objects:
+        matrix = np.array(obj.matrix_world)[:3, :3]
+        # Lengths and angles of the axes, whatever way they point.
+        metric = matrix.T @ matrix
+        size = np.trace(metric)
+        scale = f"{size:.5g}", (metric / (size or 1)).round(5).tobytes()
+        groups.setdefault(obj if applied else (obj.data, scale), []).append(obj)
+    return list(groups.values())
+
+
+def new_objects(
+    group: list[bpy.types.Object], request: Request, series: Series, carried: list[Attributes]
+) -> list[str]:
+    """Make the objects of a series beside each object of a group that shares a mesh; returns their names."""
     single = len(series.levels) == 1
     names = []
     for k, (level, attributes) in enumerate(zip(series.levels, carried, strict=True)):
-        name = f"{obj.name}_remesh" if single else f"{obj.name}_LOD{k}"
-        names.append(_new_object(obj, name, request, level, attributes).name)
+        ending = "_remesh" if single else f"_LOD{k}"
+        mesh = _new_mesh(group[0], group[0].name + ending, request, level)
+        new = [_new_object(obj, obj.name + ending, mesh, request.evaluated) for obj in group]
+        write_attributes(new[0], attributes)
+        names += [obj.name for obj in new]
     # Objects that were linked but a moment ago cannot be selected, or left out of a selection.
     bpy.context.view_layer.update()
     return names
@@ -146,26 +166,27 @@ def new_objects(obj: bpy.types.Object, request: Request, series: Series, carried
 def carried_attributes(request: Request, series: Series) -> list[Attributes]:
     """What the meshes of a series carry."""
     surface = request.job.surface
-    return [blender_transfer.carry(request.attributes, surface, level.footprint) for level in series.levels]
+    return [carry(request.attributes, surface, level.footprint) for level in series.levels]
 
 
-def _new_object(
-    obj: bpy.types.Object, name: str, request: Request, level: Level, attributes: Attributes
-) -> bpy.types.Object:
+def _new_mesh(obj: bpy.types.Object, name: str, request: Request, level: Level) -> bpy.types.Mesh:
     positions = np.linalg.solve(request.stretch, level.positions.T).T
     mesh = blender_mesh.new_mesh(name, positions.tolist(), level.triangles.tolist())
     for material in obj.data.materials:
         mesh.materials.append(material)
+    return mesh
+
+
+def _new_object(obj: bpy.types.Object, name: str, mesh: bpy.types.Mesh, applied: bool) -> bpy.types.Object:
     new = obj.copy()
     new.name = name
     new.data = mesh
     for slot, old in zip(new.material_slots, obj.material_slots, strict=False):
         slot.link, slot.material = old.link, old.material
-    _drop_modifiers(new, request.evaluated)
+    _drop_modifiers(new, applied)
     collections = [c for c in obj.users_collection if c.library is None] or [bpy.context.scene.collection]
     for collection in collections:
         collection.objects.link(new)
-    blender_transfer.write_attributes(new, attributes)
     return new
 
 
@@ -182,7 +203,10 @@ def lost(obj: bpy.types.Object, request: Request, carried: list[Attributes]) -> 
     if folded:
         texts.append(f"{folded} faces of the new mesh are folded in a UV map")
     if request.attributes.left:
-        texts.append(f"Attributes on edges or of text are not carried: {', '.join(request.attributes.left)}")
+        names = ", ".join(request.attributes.left)
+        texts.append(f"Attributes of text, and those of edges that the new mesh does not follow, are left out: {names}")
+    if request.attributes.custom_normals:
+        texts.append("Custom normals are left out; normals follow the new shape")
     bound = [m.name for m in obj.modifiers if m.type in BOUND]
     if bound and not request.evaluated:
         texts.append(f"Modifiers bound to the vertices of the old mesh are left out: {', '.join(bound)}")

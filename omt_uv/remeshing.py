@@ -12,6 +12,7 @@ from .solver import measure
 from .solver.charts import Surface, chosen_triangles
 from .solver.errors import CountError, DensityError, MeshError
 from .solver.features import all_edges
+from .solver.footprint import Footprint, footprint
 from .solver.geometry import face_areas
 from .solver.progress import Progress, Steps, part_of
 from .solver.remesh import Remesh, remesh
@@ -19,7 +20,6 @@ from .solver.repair import join
 from .solver.scores import areas, score, soft_weights
 from .solver.sheets import orientations
 from .solver.topology import halfedges
-from .solver.transfer import Footprint, footprint
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import pytest
 from omt_uv.solver import transfer
 from omt_uv.solver.closest import ClosestPoint, vertex_normals
 from omt_uv.solver.features import region_borders, sharp_edges, value_jumps
+from omt_uv.solver.footprint import footprint
 from omt_uv.solver.sides import cut_open
 from omt_uv.solver.topology import halfedges, pair_keys
 
@@ -33,7 +34,7 @@ def meridian(V, F):
 
 
 def laid(V, F, seams, W, G, on):
-    return transfer.footprint(V, F, seams, W, G, on.faces, on.barycentric)
+    return footprint(V, F, seams, W, G, on.faces, on.barycentric)
 
 
 def edge_set(edges):

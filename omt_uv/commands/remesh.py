@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> None:
     told, made = [], []
     for k, (obj, request, series, carried) in enumerate(results):
         told += [(k, text) for text in (*lost(obj, request, carried), *series.warnings)]
-        made.append(new_objects(obj, request, series, carried))
+        made.append(new_objects([obj], request, series, carried))
     try:
         warnings = _save(options.output, made, files)
     except files.FileError as error:

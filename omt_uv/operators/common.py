@@ -22,8 +22,8 @@ class Complaint(Exception):
         self.obj, self.error = obj, error
 
 
-def mesh_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """Mesh objects to work on, the active one first, one for each mesh data-block.
+def mesh_objects(context: bpy.types.Context, shared: bool = False) -> list[bpy.types.Object]:
+    """Mesh objects to work on, the active one first, one for each mesh data-block, or with `shared` all of them.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def mesh_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
     else:
         objects = [obj for obj in context.selected_objects if obj.type == "MESH"]
     objects.sort(key=lambda obj: obj != context.view_layer.objects.active)
-    unique = list({obj.data: obj for obj in reversed(objects)}.values())[::-1]
+    unique = objects if shared else list({obj.data: obj for obj in reversed(objects)}.values())[::-1]
     if not unique:
         raise Complaint("No mesh is selected. Select one or more mesh objects.")
     return unique

@@ -145,11 +145,12 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context):
         from .. import running
-        from ..blender_remesh import SourceError, read_request
+        from ..blender_remesh import SourceError, alike, read_request
         from ..solver.errors import MeshError
         from ..unwrapping import Refusal
 
-        objects = mesh_objects(context)
+        groups = alike(mesh_objects(context, shared=True), self.use_modifiers)
+        objects = [group[0] for group in groups]
         depsgraph = context.evaluated_depsgraph_get() if self.use_modifiers else None
         requests = []
         try:
@@ -162,7 +163,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
             raise self._complaint(obj, error) from error
         except Refusal as refusal:
             raise self._complaint(objects[refusal.index], refusal.error) from refusal
-        return [(obj, request, *result) for obj, request, result in zip(objects, requests, results, strict=True)]
+        return [(group, request, *result) for group, request, result in zip(groups, requests, results, strict=True)]
 
     def _complaint(self, obj: bpy.types.Object, error) -> Complaint:
         # Elements of a mesh with modifiers are none of the object's.
@@ -172,9 +173,9 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         from ..blender_remesh import lost, new_objects
 
         names, warnings = [], []
-        for k, (obj, request, series, carried) in enumerate(result):
-            warnings += [(k, text) for text in (*lost(obj, request, carried), *series.warnings)]
-            names += new_objects(obj, request, series, carried)
+        for k, (group, request, series, carried) in enumerate(result):
+            warnings += [(k, text) for text in (*lost(group[0], request, carried), *series.warnings)]
+            names += new_objects(group, request, series, carried)
         for obj in context.selected_objects:
             obj.select_set(False)
         # Those in a collection that the view layer leaves out cannot be selected.
@@ -184,7 +185,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         if made:
             context.view_layer.objects.active = made[0]
         self.said = _figures([series.levels[0] for _, _, series, _ in result])
-        warn(self, [obj for obj, *_ in result], warnings)
+        warn(self, [group[0] for group, *_ in result], warnings)
         self.report({"INFO"}, f"Made {', '.join(names)}")
 
 

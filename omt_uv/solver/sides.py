@@ -57,6 +57,17 @@ def cut_open(positions: np.ndarray, triangles: np.ndarray, seams: np.ndarray) ->
     return CutMesh(positions, triangles, label.reshape(-1, 3).astype(np.int64), seam, star)
 
 
+def seam_points(mesh: CutMesh, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (s,3) along the seams, no farther apart than `spacing`, and the halfedge (s,) of each."""
+    tail, head = halfedges(mesh.triangles)
+    h = np.flatnonzero(mesh.seam)
+    a, b = mesh.positions[tail[h]], mesh.positions[head[h]]
+    count = np.clip(np.ceil(np.linalg.norm(b - a, axis=1) / spacing), 1, 1000).astype(np.int64)
+    which = np.repeat(np.arange(len(h)), count)
+    t = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[which]
+    return a[which] + t[:, None] * (b - a)[which], h[which]
+
+
 def on_seam(mesh: CutMesh, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
     """Whether points (k,) given by triangle and barycentric coordinates (k,3) lie on a seam, (k,) bool."""
     zero = barycentric <= ON_EDGE

@@ -1,0 +1,112 @@
+"""Everything that a mesh carries besides its shape, as arrays, and the edges at which it jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .solver.charts import Surface
+from .solver.features import all_edges, region_borders, value_jumps
+from .solver.topology import pair_keys
+
+# UVs nearer than this share of their extent are the same.
+SAME_UV = 1e-5
+
+
+@dataclass(frozen=True)
+class Layer:
+    """An attribute: values (elements of its domain, numbers each)."""
+
+    name: str
+    domain: str
+    data_type: str
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class ShapeKey:
+    """A shape key: offsets (n,3) from the shape of the mesh, and its settings by name."""
+
+    name: str
+    offsets: np.ndarray
+    relative_to: int
+    settings: dict
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Edges (e,2) that carry a mark, and the marks: seam (e,) bool, sharp (e,) bool, crease (e,), other attributes.
+
+    Of the other attributes only values other than 0 are marks.
+    """
+
+    edges: np.ndarray
+    seam: np.ndarray
+    sharp: np.ndarray
+    crease: np.ndarray
+    layers: tuple[Layer, ...] = ()
+
+
+@dataclass(frozen=True)
+class Attributes:
+    """What a mesh carries.
+
+    groups: names of vertex groups, weights (n,g), member (n,g) bool; material_index (f,), smooth (f,) bool;
+    uv_flags, color_flags: the active and the rendered one; left: names of what cannot be carried;
+    custom_normals: whether there were some, which are not carried; folded: faces that carrying left folded in a UV map
+    """
+
+    material_index: np.ndarray
+    smooth: np.ndarray
+    marks: Marks
+    layers: tuple[Layer, ...] = ()
+    groups: tuple[str, ...] = ()
+    weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    member: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), bool))
+    keys: tuple[ShapeKey, ...] = ()
+    keys_relative: bool = True
+    uv_flags: tuple[str, str] = ("", "")
+    color_flags: tuple[str, str] = ("", "")
+    left: tuple[str, ...] = ()
+    custom_normals: bool = False
+    folded: int = 0
+
+
+def is_uv(layer: Layer) -> bool:
+    """Every attribute of this kind is a UV map."""
+    return layer.domain == "CORNER" and layer.data_type == "FLOAT2"
+
+
+def marked_sharp(attributes: Attributes) -> np.ndarray:
+    """Edges (k,2) that are marked sharp, creased, or to be bevelled."""
+    marks = attributes.marks
+    bevels = [layer.values > 0 for layer in marks.layers if layer.name == "bevel_weight_edge"]
+    return marks.edges[np.logical_or.reduce([marks.sharp, marks.crease > 0, *bevels])]
+
+
+def followed(attributes: Attributes, lines: np.ndarray) -> Attributes:
+    """The attributes without those of edges that are marks elsewhere than on `lines` (k,2), which are left.
+
+    A line of marks that the new mesh does not follow would come out in pieces.
+    """
+    marks = attributes.marks
+    off = ~np.isin(pair_keys(*marks.edges.T), pair_keys(*lines.T))
+    kept = tuple(layer for layer in marks.layers if not layer.values[off].any())
+    gone = tuple(layer.name for layer in marks.layers if layer not in kept)
+    return replace(attributes, marks=replace(marks, layers=kept), left=attributes.left + gone)
+
+
+def uv_seams(attributes: Attributes, surface: Surface) -> np.ndarray:
+    """Edges (k,2) where islands of any UV map end."""
+    triangles = surface.corner_vertex[surface.triangles]
+    maps = [layer.values for layer in attributes.layers if is_uv(layer)]
+    return all_edges(
+        *(value_jumps(triangles, surface.triangles, uv, SAME_UV * np.ptp(uv, axis=0).max(initial=0)) for uv in maps)
+    )
+
+
+def material_borders(attributes: Attributes, surface: Surface) -> np.ndarray:
+    """Edges (k,2) between faces of different materials."""
+    triangles = surface.corner_vertex[surface.triangles]
+    return region_borders(triangles, attributes.material_index[surface.triangle_face])
