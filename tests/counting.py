@@ -6,20 +6,22 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from omt_uv.solver import linear
+from omt_uv.solver.multigrid import Multigrid
 
 
 @dataclass
 class Tally:
-    """Sparse factorisations, and the nonzeros of all their factors."""
+    """Sparse factorisations, the nonzeros of all their factors, and cycles of multigrid."""
 
     factorisations: int = 0
     nonzeros: int = 0
+    cycles: int = 0
 
 
 @contextmanager
 def counted():
     """A `Tally` of what is factored meanwhile."""
-    tally, original = Tally(), linear.splu
+    tally, original, cycle = Tally(), linear.splu, Multigrid.cycle
 
     def counting(*arguments, **options):
         factors = original(*arguments, **options)
@@ -27,8 +29,12 @@ def counted():
         tally.nonzeros += factors.nnz
         return factors
 
-    linear.splu = counting
+    def cycling(self, b, level=0):
+        tally.cycles += level == 0
+        return cycle(self, b, level)
+
+    linear.splu, Multigrid.cycle = counting, cycling
     try:
         yield tally
     finally:
-        linear.splu = original
+        linear.splu, Multigrid.cycle = original, cycle

@@ -51,14 +51,17 @@ def flip_until_none(
     violation: Callable[[np.ndarray], np.ndarray],
     flip: Callable[[np.ndarray], None],
     max_rounds: int,
+    edges: np.ndarray | None = None,
 ) -> tuple[int, bool]:
     """Flip edges in rounds until none wants to; the number of flips, and whether the rounds came to an end.
 
     `violation` gives of interior halfedges (e,) a number that is negative where the edge is to flip, the lower the
     sooner; `flip` flips an independent set in place. A round takes the edges that are the worst in both of their
-    triangles; the next one looks only at triangles that were touched and at edges that had to wait.
+    triangles; the next one looks only at triangles that were touched and at edges that had to wait. The first one looks
+    at all edges, or at those given as one halfedge each (e,).
     """
-    edges = np.flatnonzero(twin > np.arange(len(twin)))
+    if edges is None:
+        edges = np.flatnonzero(twin > np.arange(len(twin)))
     flips = 0
     worst = np.full(len(twin) // 3, len(twin), dtype=np.int64)
     for _ in range(max_rounds):

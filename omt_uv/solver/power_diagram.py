@@ -12,8 +12,8 @@ import numpy as np
 
 from .domain import Domain, segment_integrals
 from .geometry import cross2, dot2
-from .regular import Regular, by_hull
-from .topology import halfedges
+from .regular import Regular, by_hull, power_centres
+from .topology import next_halfedge
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,12 @@ class PowerDiagram:
         """The transport cost, the integral of |x - y_i|^2 over all cells i of sites (n,2)."""
         return float((self.second - 2 * dot2(sites, self.moment) + dot2(sites, sites) * self.area).sum())
 
+    def renumbered(self, order: np.ndarray) -> PowerDiagram:
+        """The same cells with site k called order[k], (n,)."""
+        place = np.argsort(order)
+        area, moment, second = (values[place] for values in (self.area, self.moment, self.second))
+        return PowerDiagram(area, moment, second, order[self.edges], self.length, self.dual.renumbered(order))
+
 
 def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: Regular | None = None) -> PowerDiagram:
     """Power diagram of sites (n,2) with power weights (n,) inside the domain; hidden sites have area 0.
@@ -57,28 +63,21 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: 
     n = len(sites)
     if dual is None:
         dual = by_hull(sites, weights)
-    edge = _dual_edges(sites, weights, dual)
-    centre_inside = np.append(domain.contains(edge.centre), False)
-    right_inside, left_inside = centre_inside[edge.right], centre_inside[edge.left]
-    enter, leave = domain.clip(edge.origin, edge.direction)
-    middle = (enter + leave) / 2
-    # A side with both ends outside may still pass through the domain.
-    through = ~right_inside & ~left_inside & (enter < leave) & (edge.t_right < middle) & (middle < edge.t_left)
-    keep = np.flatnonzero(right_inside | left_inside | through)
-    entering, leaving = ~right_inside[keep], ~left_inside[keep]
-    # Where rounding lets the line miss the domain next to an end inside, the side shrinks to that end.
-    low, high = edge.t_right[keep], edge.t_left[keep]
-    start = np.where(entering, np.minimum(enter[keep], np.where(leaving, np.inf, high)), low)
-    end = np.where(leaving, np.maximum(leave[keep], start), high)
-    origin, direction, pairs = edge.origin[keep], edge.direction[keep], edge.pairs[keep]
-    p, q = origin + start[:, None] * direction, origin + end[:, None] * direction
+    centre = power_centres(sites, weights, dual)
+    inside = np.append(domain.contains(centre), False)
+    once = np.flatnonzero(dual.twin < np.arange(len(dual.twin)))
+    whole = inside[once // 3] & inside[dual.twin[once] // 3]
+    sides = _whole_sides(sites, centre, dual, once[whole])
+    cut, entering, leaving = _cut_sides(sites, weights, centre, inside, dual, once[~whole], domain)
+    pairs, p, q, length = (np.concatenate(both) for both in zip(sides, cut, strict=True))
 
     integrals = np.zeros((4, n))
     _scatter(integrals, pairs[:, 0], pairs[:, 1], segment_integrals(p, q))
     # At a crossing of the boundary one cell's arc ends and its neighbour's begins.
-    crossing = np.concatenate([p[entering], q[leaving]])
-    ends = np.concatenate([pairs[entering, 0], pairs[leaving, 1]])
-    begins = np.concatenate([pairs[entering, 1], pairs[leaving, 0]])
+    cut_pairs, cut_p, cut_q, _ = cut
+    crossing = np.concatenate([cut_p[entering], cut_q[leaving]])
+    ends = np.concatenate([cut_pairs[entering, 0], cut_pairs[leaving, 1]])
+    begins = np.concatenate([cut_pairs[entering, 1], cut_pairs[leaving, 0]])
     arcs = np.zeros((4, n))
     if len(crossing):
         _scatter(arcs, ends, begins, domain.boundary_integrals(domain.boundary_parameter(crossing)))
@@ -89,52 +88,49 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: 
         around = int((((sites - corner) ** 2).sum(axis=1) - weights).argmin())
     arcs[:, around] += domain.total_integrals()
     integrals += arcs
-    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], pairs, np.maximum(end - start, 0), dual)
+    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], pairs, length, dual)
 
 
-@dataclass(frozen=True)
-class _DualEdges:
-    """Sides between cells as pieces t_right < t < t_left of their lines; left, right index centres, -1 far away."""
+def _whole_sides(sites, centre, dual: Regular, h):
+    """Sides of the halfedges h (k,) that end at the power centres to their right, p (k,2), and to their left, q (k,2).
 
-    pairs: np.ndarray
-    origin: np.ndarray
-    direction: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
-    t_left: np.ndarray
-    t_right: np.ndarray
-    centre: np.ndarray
+    Returns the pairs of sites (k,2), p, q and the lengths (k,).
+    """
+    pairs = _pairs(dual, h)
+    p, q = centre[dual.twin[h] // 3], centre[h // 3]
+    apart = sites[pairs[:, 1]] - sites[pairs[:, 0]]
+    length = cross2(apart, q - p) / np.sqrt(dot2(apart, apart))
+    return pairs, p, q, np.maximum(length, 0)
 
 
-def _dual_edges(sites, weights, dual: Regular) -> _DualEdges:
-    centre = _power_centres(sites, weights, dual.triangles)
-    tail, head = halfedges(dual.triangles)
-    inner = np.flatnonzero(dual.twin > np.arange(len(dual.twin)))
-    rim = np.flatnonzero(dual.twin < 0)
-    h = np.concatenate([inner, rim])
-    left = h // 3
-    right = np.concatenate([dual.twin[inner] // 3, np.full(len(rim), -1)])
-    i, j = tail[h], head[h]
+def _cut_sides(sites, weights, centre, inside, dual: Regular, h, domain: Domain):
+    """Sides that reach out of the domain, as `_whole_sides`, cut; which of them enter (k,), and which leave, (k,)."""
+    pairs, left, right = _pairs(dual, h), h // 3, dual.twin[h] // 3
+    i, j = pairs.T
     apart = sites[j] - sites[i]
     squared = dot2(apart, apart)
     share = 0.5 + (weights[i] - weights[j]) / (2 * squared)
     origin = sites[i] + share[:, None] * apart
     direction = np.stack([-apart[:, 1], apart[:, 0]], axis=1) / np.sqrt(squared)[:, None]
     t_left = dot2(centre[left] - origin, direction)
-    t_right = dot2(centre[right] - origin, direction)
-    t_right[len(inner) :] = -np.inf
-    return _DualEdges(np.stack([i, j], axis=1), origin, direction, left, right, t_left, t_right, centre)
+    t_right = np.where(right < 0, -np.inf, dot2(centre[right] - origin, direction))
+    enter, leave = domain.clip(origin, direction)
+    middle = (enter + leave) / 2
+    entering, leaving = ~inside[right], ~inside[left]
+    # A side with both ends outside may still pass through the domain.
+    through = (enter < leave) & (t_right < middle) & (middle < t_left)
+    keep = ~(entering & leaving) | through
+    # Where rounding lets the line miss the domain next to an end inside, the side shrinks to that end.
+    start = np.where(entering, np.minimum(enter, np.where(leaving, np.inf, t_left)), t_right)[keep]
+    end = np.maximum(np.where(leaving, leave, t_left)[keep], start)
+    p, q = (origin[keep] + t[:, None] * direction[keep] for t in (start, end))
+    return (pairs[keep], p, q, end - start), entering[keep], leaving[keep]
 
 
-def _power_centres(sites, weights, triangles) -> np.ndarray:
-    """Point of equal power of each triangle, (k,2), relative to its first corner so that clusters keep precision."""
-    a = sites[triangles[:, 0]]
-    b, c = sites[triangles[:, 1]] - a, sites[triangles[:, 2]] - a
-    rb = dot2(b, b) - weights[triangles[:, 1]] + weights[triangles[:, 0]]
-    rc = dot2(c, c) - weights[triangles[:, 2]] + weights[triangles[:, 0]]
-    twice = 2 * cross2(b, c)
-    twice = np.where(np.abs(twice) > 1e-300, twice, 1e-300)
-    return a + np.stack([rb * c[:, 1] - rc * b[:, 1], rc * b[:, 0] - rb * c[:, 0]], axis=1) / twice[:, None]
+def _pairs(dual: Regular, h: np.ndarray) -> np.ndarray:
+    """Tails and heads of halfedges h (k,), (k,2)."""
+    corners = dual.triangles.ravel()
+    return np.stack([corners[h], corners[next_halfedge(h)]], axis=1)
 
 
 def _scatter(target: np.ndarray, plus: np.ndarray, minus: np.ndarray, values: np.ndarray) -> None:

@@ -5,7 +5,7 @@ The regular triangulation is the lower convex hull of the lifted points (y, |y|^
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -35,6 +35,10 @@ class Regular:
     whole: bool
     flips: int = 0
 
+    def renumbered(self, order: np.ndarray) -> Regular:
+        """The same triangles with site k called order[k], (n,)."""
+        return replace(self, triangles=order[self.triangles])
+
 
 def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
     """Regular triangulation of sites (n,2) with weights (n,); sites above the hull are in no triangle.
@@ -53,6 +57,8 @@ def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
     of_sites = triangles.max(axis=1) < len(sites)
     whole = not (np.abs(slope[of_sites]) <= STEEP).any()
     triangles = triangles[(slope < -STEEP) & of_sites]
+    # Triangles are neighbours in memory where their sites are.
+    triangles = triangles[np.argsort(triangles.min(axis=1), kind="stable")]
     a, b, c = (sites[triangles[:, k]] for k in range(3))
     turned = cross2(b - a, c - a) < 0
     triangles[turned] = triangles[turned][:, [0, 2, 1]]
@@ -76,7 +82,10 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
         waiting.append(edges[(below < 0) & ~convex])
         return np.where(convex, below, 0.0)
 
-    flips, settled = flip_until_none(twin, violation, lambda edges: flip_in_place(triangles, twin, edges), MAX_ROUNDS)
+    def flip(edges):
+        flip_in_place(triangles, twin, edges)
+
+    flips, settled = flip_until_none(twin, violation, flip, MAX_ROUNDS, _backward(sites, weights, start))
     # Edges that wanted to flip and could not; a flip next to them may have helped since.
     edges = np.unique(np.concatenate(waiting))
     edges = edges[twin[edges] >= 0]
@@ -89,6 +98,28 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
     on_hull[flat[twin < 0]] = True
     ends = np.concatenate([flat[stuck], flat[twin[stuck]]])
     return None, bool(((degree[ends] == 3) & ~on_hull[ends]).any())
+
+
+def power_centres(sites: np.ndarray, weights: np.ndarray, dual: Regular) -> np.ndarray:
+    """Point of equal power of each triangle, (k,2), relative to its first corner so that clusters keep precision."""
+    i, j, k = dual.triangles.T
+    a = sites[i]
+    b, c = sites[j] - a, sites[k] - a
+    rb = dot2(b, b) - weights[j] + weights[i]
+    rc = dot2(c, c) - weights[k] + weights[i]
+    twice = 2 * cross2(b, c)
+    twice = np.where(np.abs(twice) > 1e-300, twice, 1e-300)
+    return a + np.stack([rb * c[:, 1] - rc * b[:, 1], rc * b[:, 0] - rb * c[:, 0]], axis=1) / twice[:, None]
+
+
+def _backward(sites, weights, start: Regular) -> np.ndarray:
+    """The edges whose side between two cells runs backwards, as one of each pair of halfedges: those that may flip."""
+    centre = power_centres(sites, weights, start)
+    h = np.flatnonzero(start.twin > np.arange(len(start.twin)))
+    g, tail = start.twin[h], start.triangles.ravel()
+    x, y = (sites[tail[g], k] - sites[tail[h], k] for k in range(2))
+    left, right = h // 3, g // 3
+    return h[x * (centre[left, 1] - centre[right, 1]) <= y * (centre[left, 0] - centre[right, 0])]
 
 
 def _below(sites, weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from .dissection import Dissection
 from .domain import Domain
 from .errors import TransportError
-from .geometry import laplacian_from_weights
-from .linear import solve_spd
+from .geometry import dot2, laplacian_from_weights
+from .multigrid import solve_laplacian
 from .power_diagram import PowerDiagram, power_diagram
 from .progress import Progress, Steps
 from .regular import by_flips
@@ -21,8 +21,8 @@ from .regular import by_flips
 TOLERANCE = 5e-7
 MAX_STEPS = 100
 MAX_HALVINGS = 30
-# An elimination order serves until so many edges a site have flipped.
-FLIPS_PER_ORDER = 0.01
+# Directions are solved for to so many digits of the residual; with fewer there are more Newton steps.
+ENOUGH = 1e-3
 
 
 @dataclass(frozen=True)
@@ -58,15 +58,20 @@ def transport(
     """
     mass = np.asarray(mass, dtype=float)
     wrong = np.flatnonzero(~(np.isfinite(mass) & (mass > 0)))
+    nowhere = np.flatnonzero(~np.isfinite(sites).all(axis=1))
+    if len(nowhere):
+        raise TransportError("Sites have no finite place", kind="vertex", elements=nowhere)
     if len(wrong):
         raise TransportError("Transport needs positive, finite masses", "Give every vertex area", "vertex", wrong)
-    mass = mass * (domain.area / mass.sum())
-    w = np.zeros(len(sites)) if weights is None else weights - weights.mean()
+    # Neighbours in the plane become neighbours in memory, and `Multigrid` wants them so.
+    order = cKDTree(sites).indices
+    sites, mass = sites[order], mass[order] * (domain.area / mass.sum())
+    w = np.zeros(len(sites)) if weights is None else weights[order] - weights.mean()
     diagrams = _Diagrams(sites, domain)
     cells = diagrams.anew(w)
     hidden = np.flatnonzero(cells.area <= 0)
     if len(hidden):
-        raise TransportError("Sites coincide or lie outside the domain", kind="vertex", elements=hidden)
+        raise TransportError("Sites coincide or lie outside the domain", kind="vertex", elements=np.sort(order[hidden]))
     floor = 0.5 * min(cells.area.min(), mass.min())
     first = max(_residual(cells, mass), tolerance)
     step = 1.0
@@ -80,8 +85,9 @@ def transport(
                 cells = diagrams.anew(w)
                 residual = _residual(cells, mass)
             if residual <= tolerance:
-                return Transport(w, cells, residual, cells.cost(sites), iteration, *diagrams.counts())
-        direction = _newton_direction(sites, cells, mass, diagrams.order(cells))
+                cost, place = cells.cost(sites), np.argsort(order)
+                return Transport(w[place], cells.renumbered(order), residual, cost, iteration, *diagrams.counts())
+        direction = _newton_direction(sites, cells, mass)
         error = float(np.linalg.norm(cells.area - mass))
         step = min(1.0, 4 * step)
         for _ in range(MAX_HALVINGS):
@@ -103,19 +109,10 @@ class _Diagrams:
         self.sites, self.domain = sites, domain
         self.count = self.hulls = self.flips = 0
         self.flipped = False
-        self._dissection = Dissection(sites[1:])
-        self._order, self._stale = np.zeros(0, np.int64), np.inf
 
     def counts(self) -> tuple[int, int, int]:
         """Diagrams, hulls and flips so far."""
         return self.count, self.hulls, self.flips
-
-    def order(self, cells: PowerDiagram) -> np.ndarray:
-        """Elimination order of all sites but the first, as old as flips allow: they fill the factors of an old one."""
-        if self._stale > FLIPS_PER_ORDER * len(self.sites):
-            edges = cells.edges[(cells.edges > 0).all(axis=1)].T - 1
-            self._order, self._stale = self._dissection.order(*edges), 0
-        return self._order
 
     def anew(self, weights: np.ndarray) -> PowerDiagram:
         """The diagram of weights (n,), from a hull of its own. Raises TransportError."""
@@ -131,7 +128,6 @@ class _Diagrams:
             return self.anew(weights)
         self.count, self.flipped = self.count + 1, True
         self.flips += dual.flips
-        self._stale += dual.flips
         return power_diagram(self.sites, weights, self.domain, dual)
 
 
@@ -143,13 +139,10 @@ def _residual(cells: PowerDiagram, mass: np.ndarray) -> float:
     return float(np.max(np.abs(cells.area - mass) / mass))
 
 
-def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """Derivative of area i by weight j: -|side ij| / (2 |y_i - y_j|); a common weight is its kernel.
-
-    `order`: see `dissection`.
-    """
-    n = len(sites)
+def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray) -> np.ndarray:
+    """Derivative of area i by weight j: -|side ij| / (2 |y_i - y_j|); a common weight is its kernel."""
     i, j = cells.edges.T
-    conductance = cells.length / (2 * np.linalg.norm(sites[i] - sites[j], axis=1))
-    hessian = laplacian_from_weights(i, j, conductance, n)[1:, 1:]
-    return np.concatenate([[0.0], solve_spd(hessian.tocsc(), (mass - cells.area)[1:], order)])
+    apart = sites[i] - sites[j]
+    conductance = cells.length / (2 * np.sqrt(dot2(apart, apart)))
+    hessian = laplacian_from_weights(i, j, conductance, len(sites))
+    return solve_laplacian(hessian, mass - cells.area, mass, ENOUGH)

@@ -1,0 +1,73 @@
+"""Laplacians by conjugate gradients, preconditioned by smoothed aggregation (Vanek, Mandel, Brezina 1996).
+
+Unknowns lie at points, and eight that follow each other in the order of a kd-tree make one of the next level. No
+factorisation but that of the coarsest level is needed, so that time and memory grow with the number of unknowns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from .linear import Factor, solve_spd
+
+BLOCK = 8
+# Up to this many unknowns are factored.
+COARSEST = 1000
+# Of Jacobi's method: 4/3 over the largest eigenvalue of D^-1 A, which is at most 2.
+DAMPING = 2 / 3
+MOST = 200
+
+
+class Multigrid:
+    """A preconditioner for the Laplacian (n,n) of a connected graph with positive weights; its kernel are constants.
+
+    The unknowns are numbered along a kd-tree over their points, `cKDTree(points).indices`.
+    """
+
+    def __init__(self, A: sp.csr_matrix):
+        self._levels = []
+        while A.shape[0] > COARSEST:
+            n = A.shape[0]
+            coarse = -(-n // BLOCK)
+            # As the tree does, to halve the range is to halve the points.
+            block = np.arange(n) * coarse // n
+            jump = sp.csr_matrix((np.ones(n), block, np.arange(n + 1)), shape=(n, coarse))
+            smoother = DAMPING / A.diagonal()
+            prolong = (jump - sp.diags(smoother) @ (A @ jump)).tocsr()
+            restrict = prolong.T.tocsr()
+            self._levels.append((A, smoother, prolong, restrict))
+            A = (restrict @ (A @ prolong)).tocsr()
+        self._coarsest = Factor(A[1:, 1:])
+
+    def cycle(self, b: np.ndarray, level: int = 0) -> np.ndarray:
+        """One V-cycle for A x = b (n,), with a sweep of Jacobi's method before and after, so that it is symmetric."""
+        if level == len(self._levels):
+            return np.concatenate([[0.0], self._coarsest.solve(b[1:])])
+        A, smoother, prolong, restrict = self._levels[level]
+        x = smoother * b
+        x += prolong @ self.cycle(restrict @ (b - A @ x), level + 1)
+        return x + smoother * (b - A @ x)
+
+
+def solve_laplacian(A: sp.csr_matrix, b: np.ndarray, scale: np.ndarray, tolerance: float) -> np.ndarray:
+    """Solve A x = b (n,), A and its unknowns as in `Multigrid`; the mean of x is 0.
+
+    Ends at max(|b - A x| / scale) <= tolerance max(|b| / scale), scale (n,) > 0. Raises PrecisionError.
+    """
+    residual = b - b.mean()
+    cycle = Multigrid(A).cycle
+    x, enough = np.zeros(len(b)), tolerance * np.abs(residual / scale).max()
+    direction, power = 0.0, 1.0
+    for _ in range(MOST):
+        if np.abs(residual / scale).max() <= enough:
+            return x - x.mean()
+        z = cycle(residual)
+        power, before = residual @ z, power
+        direction = z + (power / before) * direction
+        image = A @ direction
+        step = power / (direction @ image)
+        x += step * direction
+        residual -= step * image
+    x = np.concatenate([[0.0], solve_spd(A[1:, 1:], (b - b.mean())[1:])])
+    return x - x.mean()
