@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .closest import ClosestPoint
+from .closest import ClosestPoint, Memory
 from .surface_samples import Samples, area_samples, crest_samples
 
 SAMPLES_PER_POINT = 8
-# Steps from face to face may end in a nearest point that is not the nearest of all; so now and then comes a search.
-SEARCH_EVERY = 8
+# Rounds after which closest points are searched for again; see `closest.Memory`.
+SEARCH_EVERY = 10
 
 
 @dataclass(frozen=True)
@@ -32,19 +32,15 @@ class Carrier:
         self.index, self.density = index, density
         self._samples = area_samples(index, SAMPLES_PER_POINT * count, density)
         self._crests = crest_samples(index)
-        self._faces: np.ndarray | None = None
-        self._calls = 0
+        self._memory = Memory(SEARCH_EVERY)
 
     def forget(self) -> None:
         """Search for the next points, whichever they are."""
-        self._faces = None
+        self._memory = Memory(SEARCH_EVERY)
 
     def onto(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Closest points (k,3) to points (k,3) with normals (k,3), and the density there; the same points each time."""
-        known = self._faces if self._calls % SEARCH_EVERY else None
-        self._calls = self._calls + 1 if self._faces is not None else 1
-        found = self.index(points, normals) if known is None else self.index.walk(points, known)
-        self._faces = found.faces
+        found = self._memory(self.index, points, normals)
         return found.points, self.density[found.faces]
 
     def around(self, points: np.ndarray, normals: np.ndarray) -> Share:

@@ -8,6 +8,7 @@ on across edges while that brings it nearer.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -97,16 +98,13 @@ class ClosestPoint:
         # A normal to the opposite side counts as far as one spacing.
         self.weight = 0.5 * spacing
         self.spacing = spacing
-        self.owner, points = spread_points(vertices, triangles, spacing / 2)
-        self.samples = points
-        self._plain: cKDTree | None = None
-        self.tree = cKDTree(np.column_stack([points, self.weight * self.normals[self.owner]]))
 
     def __call__(self, points: np.ndarray, normals: np.ndarray) -> Located:
         """Closest points to points (k,3) where the surface looks about the way of normals (k,3)."""
-        k = min(CANDIDATES, len(self.owner))
-        _, index = self.tree.query(np.column_stack([points, self.weight * normals]), k=k)
-        faces = self.owner[index.reshape(len(points), -1)]
+        owner, _ = self._spread
+        k = min(CANDIDATES, len(owner))
+        _, index = self._tree.query(np.column_stack([points, self.weight * normals]), k=k)
+        faces = owner[index.reshape(len(points), -1)]
         barycentric, distance = self._distance(points[:, None], faces)
         # The right side first, then the distance.
         back = np.einsum("kcj,kj->kc", self.normals[faces], normals) < 0
@@ -116,16 +114,24 @@ class ClosestPoint:
         bary = np.take_along_axis(barycentric, best[..., None], 1)[:, 0]
         return self.walk(points, face, bary)
 
-    @property
-    def plain(self) -> cKDTree:
+    # Walks need no trees, so these come when they are first asked for.
+    @cached_property
+    def _spread(self) -> tuple[np.ndarray, np.ndarray]:
+        return spread_points(self.vertices, self.triangles, self.spacing / 2)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        owner, samples = self._spread
+        return cKDTree(np.column_stack([samples, self.weight * self.normals[owner]]))
+
+    @cached_property
+    def _plain(self) -> cKDTree:
         """The samples without their normals."""
-        if self._plain is None:
-            self._plain = cKDTree(self.samples)
-        return self._plain
+        return cKDTree(self._spread[1])
 
     def nearest_face(self, points: np.ndarray) -> np.ndarray:
         """The triangle (k,) of the sample nearest to each of points (k,3): where it is about, for smooth quantities."""
-        return self.owner[self.plain.query(points)[1]]
+        return self._spread[0][self._plain.query(points)[1]]
 
     def walk(self, points: np.ndarray, faces: np.ndarray, barycentric: np.ndarray | None = None) -> Located:
         """From starting faces (k,) across edges for as long as that brings nearer to the points (k,3)."""
@@ -161,6 +167,26 @@ class ClosestPoint:
         u, v, w = (barycentric[..., k, None] for k in range(3))
         off = u * a + v * b + w * c - points
         return barycentric, _dot(off, off)
+
+
+class Memory:
+    """Closest points for the same points again and again, while they or the mesh move little by little: from the last
+    answer on it is a few steps, but these may end in a nearest point that is not the nearest of all, so that every few
+    calls there is a search."""
+
+    def __init__(self, search_every: int):
+        self.search_every = search_every
+        self._faces: np.ndarray | None = None
+        self._calls = 0
+
+    def __call__(self, index: ClosestPoint, points: np.ndarray, normals: np.ndarray) -> Located:
+        """As `ClosestPoint.__call__` of an index, whose triangles have the numbers of the last one's."""
+        if self._faces is None or self._calls % self.search_every == 0:
+            found = index(points, normals)
+        else:
+            found = index.walk(points, self._faces)
+        self._faces, self._calls = found.faces, self._calls + 1
+        return found
 
 
 def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from .closest import ClosestPoint, face_normals, subdivision_centroids, vertex_normals
+from .closest import ClosestPoint, Memory, face_normals, subdivision_centroids, vertex_normals
 from .draft import Draft
 from .embedded_flips import make_delaunay_embedded
 from .geometry import angles_from_lengths, face_areas, halfedge_lengths
@@ -37,6 +37,8 @@ SMALL, SMALLER = np.radians(42.0), np.radians(34.0)
 PRESS = 3.0
 # Vertices stay within this share of an edge of the surface.
 TETHER = 0.15
+# Rounds after which closest points are searched for again, and not only looked for near the last ones.
+SEARCH_EVERY = 4
 # Distances below this share of an edge have no direction but the normal's.
 CLOSE = 1e-3
 
@@ -61,39 +63,40 @@ def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray, spaci
     triangles = draft.triangles.copy()
     twin = twins(triangles)
     near = index.nearest_face(points)
+    there, back, home = (Memory(SEARCH_EVERY) for _ in range(3))
     for k in range(ROUNDS):
-        pairs = _pairs(points, triangles, index, samples, spacing)
+        pairs = _pairs(points, triangles, index, samples, spacing, there, back)
         cells = voronoi_cells(points, triangles, density[near] ** 2)
         pull = cells.moment / np.maximum(cells.mass, 1e-300)[:, None]
         moved = points + _displacements(points, triangles, draft.fixed, pairs, pull, CLOSE * spacing)
         if not np.isfinite(moved).all():
             break
         points = moved
-        points, near = _tethered(points, triangles, index, TETHER * spacing)
+        points, near = _tethered(points, triangles, index, TETHER * spacing, home)
         make_delaunay_embedded(points, triangles, twin, draft.locked)
         yield Progress("Fit", (k + 1) / ROUNDS)
     return replace(draft, points=points, triangles=triangles)
 
 
-def _tethered(points, triangles, index: ClosestPoint, longest: float) -> tuple[np.ndarray, np.ndarray]:
+def _tethered(points, triangles, index: ClosestPoint, longest: float, home: Memory) -> tuple[np.ndarray, np.ndarray]:
     """Points (n,3) no farther than that from the surface, and the triangles (n,) nearest to them.
 
     Few distances see a vertex at a tip, and what they say in a straight line may lead far out.
     """
-    on = index(points, vertex_normals(points, triangles))
+    on = home(index, points, vertex_normals(points, triangles))
     way = points - on.points
     distance = np.sqrt(np.einsum("ni,ni->n", way, way))
     return on.points + way * np.minimum(1, longest / np.maximum(distance, 1e-300))[:, None], on.faces
 
 
-def _pairs(points, triangles, index: ClosestPoint, samples: Samples, spacing: float) -> Pairs:
+def _pairs(points, triangles, index: ClosestPoint, samples: Samples, spacing: float, there, back: Memory) -> Pairs:
     """Closest points of the samples on the mesh, and of points of the mesh on the surface; each way weighs one half."""
-    near = ClosestPoint(points, triangles, spacing)(samples.points, samples.normals)
+    near = there(ClosestPoint(points, triangles, spacing), samples.points, samples.normals)
     pattern = subdivision_centroids(PATTERN)
     owner = np.repeat(np.arange(len(triangles)), len(pattern))
     bary = np.tile(pattern, (len(triangles), 1))
     places = np.einsum("kc,kcj->kj", bary, points[triangles[owner]])
-    far = index(places, face_normals(points, triangles)[owner]).points
+    far = back(index, places, face_normals(points, triangles)[owner]).points
     area = face_areas(points, triangles)[owner]
     return Pairs(
         np.concatenate([near.faces, owner]),

@@ -25,7 +25,7 @@ from .voronoi import Cells, voronoi_cells
 # No vertex moves farther in one step, in shares of its shortest edge's length.
 REACH = 0.4
 # Rounds after which the surface is looked at again.
-LOOK_EVERY = 8
+LOOK_EVERY = 10
 # Area of the surface over area of the mesh from which, and at which fully, samples of the surface are trusted.
 UNSEEN = (1.1, 1.3)
 # Weight of crests.
