@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from .solver.errors import CountError, DensityError, MeshError
 from .solver.features import all_edges
 from .solver.footprint import Footprint, footprint
 from .solver.geometry import face_areas
+from .solver.part_maps import Original
 from .solver.progress import Progress, Steps, part_of
 from .solver.remesh import Remesh, remesh
 from .solver.repair import join
@@ -56,7 +58,7 @@ class Series:
 
 
 def remesh_series(job: Job, settings: RemeshSettings) -> Steps[Series]:
-    """Remesh a surface as often as the settings say, each time from the surface itself.
+    """Remesh a surface as often as the settings say, each time from the surface itself and with the same maps of it.
 
     Raises
     ------
@@ -67,12 +69,16 @@ def remesh_series(job: Job, settings: RemeshSettings) -> Steps[Series]:
     chosen_triangles(surface, None)
     triangles = surface.corner_vertex[surface.triangles]
     count_of, counts = _counts(surface, triangles, settings)
+    original = Original(surface.positions, triangles, job.features)
+    with _located(surface, ""):
+        density = density_of(job, triangles, settings)
     levels: list[Level] = []
     warnings = list(job.warnings)
     for k, count in enumerate(counts):
         name = f"LOD{k}: " if len(counts) > 1 else ""
-        steps = _located(_level(job, triangles, count_of, count, settings), surface, name)
-        level = yield from part_of(steps, k / len(counts), 1 / len(counts))
+        steps = _level(job, original, density, count_of, count, settings)
+        with _located(surface, name):
+            level = yield from part_of(steps, k / len(counts), 1 / len(counts))
         levels.append(level)
         warnings += [name + text for text in level.found.warnings]
         if level.footprint.extended:
@@ -97,19 +103,25 @@ def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -
     return count_of, counts
 
 
-def _level(job: Job, triangles: np.ndarray, count_of: str, count: int, settings: RemeshSettings) -> Steps[Level]:
-    positions = job.surface.positions
-    samples = count if count_of == "vertices" else max(count // 2, 1)
-    density = density_of(job, triangles, samples, settings)
+def _level(
+    job: Job,
+    original: Original,
+    density: np.ndarray | None,
+    count_of: str,
+    count: int,
+    settings: RemeshSettings,
+) -> Steps[Level]:
+    positions, triangles = original.vertices, original.triangles
     steps = remesh(
         positions,
         triangles,
         count,
         count_of=count_of,
         density=density,
-        features=job.features if len(job.features) else None,
         preserve_boundary=settings.preserve_boundary,
         strategy=settings.strategy,
+        grading=settings.grading,
+        original=original,
     )
     found = yield from part_of(steps, 0.0, 0.95)
     yield Progress("Attributes", 0.95)
@@ -118,10 +130,11 @@ def _level(job: Job, triangles: np.ndarray, count_of: str, count: int, settings:
     return Level(found.vertices, found.triangles, at, found)
 
 
-def _located(steps: Steps[Level], surface: Surface, name: str) -> Steps[Level]:
-    """The level; errors say its name, and polygons of the surface instead of triangles."""
+@contextmanager
+def _located(surface: Surface, name: str) -> Iterator[None]:
+    """Errors say the level's name, and polygons of the surface instead of triangles."""
     try:
-        return (yield from steps)
+        yield
     except MeshError as error:
         elements = error.elements
         if error.kind == "face":
@@ -145,14 +158,9 @@ def oriented(surface: Surface) -> tuple[Surface, tuple[str, ...]]:
     return replace(surface, triangles=triangles), (f"{text}; turned over in the new mesh",)
 
 
-def density_of(job: Job, triangles: np.ndarray, samples: int, settings: RemeshSettings) -> np.ndarray | None:
+def density_of(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray | None:
     """Samples per area (m,) up to a factor that the settings ask for, None where it is the same everywhere."""
-    if settings.density == "uniform":
-        return None
-    density = _DENSITIES[settings.density](job, triangles, settings)
-    if settings.grading > 0:
-        density = measure.graded(density, job.surface.positions, triangles, settings.grading, samples)
-    return density
+    return None if settings.density == "uniform" else _DENSITIES[settings.density](job, triangles, settings)
 
 
 def _curvature(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:

@@ -16,12 +16,12 @@ from omt_uv.solver.errors import (
     PrecisionError,
 )
 from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
-from omt_uv.solver.part_maps import PartMaps
+from omt_uv.solver.part_maps import Original, PartMaps
 from omt_uv.solver.parts import split_parts
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remesh import STRATEGIES, remesh, summed_up
 from omt_uv.solver.sphere_sampling import sample_sphere
-from omt_uv.solver.topology import boundary_loops, halfedges, pair_keys
+from omt_uv.solver.topology import boundary_loops, halfedges, pair_keys, twins
 from omt_uv.solver.voronoi import voronoi_cells
 
 CASES = {
@@ -250,3 +250,41 @@ def test_what_has_no_map_to_the_sphere_is_cut_open(monkeypatch):
     result = run(V, F, 120, rounds=5)
     assert len(result.vertices) == 120 and topology(result.triangles) == (2, 0)
     assert any("No room" in w for w in result.warnings)
+
+
+def test_maps_serve_again_with_other_counts(monkeypatch):
+    calls = []
+
+    def counted(name):
+        whole = getattr(part_maps, name)
+
+        def once(*given):
+            calls.append(name)
+            return (yield from whole(*given))
+
+        monkeypatch.setattr(part_maps, name, once)
+
+    for name in ("conformal_sphere", "sphere_image", "conformal_image", "preserving_image"):
+        counted(name)
+    for V, F, kinds in ((*meshes.icosphere(3), 2), (*meshes.bumpy(12, 12), 2)):
+        calls.clear()
+        original = Original(V, F)
+        first, second = (run(V, F, count, rounds=5, original=original) for count in (200, 120))
+        assert len(calls) == kinds
+        assert (first.vertices == run(V, F, 200, rounds=5).vertices).all()
+        assert (second.vertices == run(V, F, 120, rounds=5).vertices).all()
+
+
+def test_grading_bounds_how_fast_edges_grow():
+    V, F = meshes.icosphere(4)
+    density = np.where(V[F].mean(axis=1)[:, 2] > 0, 16.0, 1.0)
+    growth = []
+    for grading in (0.0, 0.25):
+        result = run(V, F, 1500, density=density, grading=grading, fit=False)
+        size = np.sqrt(face_areas(result.vertices, result.triangles) * 4 / np.sqrt(3))
+        middle = result.vertices[result.triangles].mean(axis=1)
+        twin = twins(result.triangles)
+        one, other = np.arange(len(twin)) // 3, twin // 3
+        step = np.linalg.norm(middle[one] - middle[other], axis=1)
+        growth.append(np.percentile(np.abs(size[one] - size[other]) / step, 99))
+    assert growth[1] < 0.7 * growth[0]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from .chart_maps import Image, conformal_image, preserving_image
 from .charts import Chart, triangle_surface
 from .errors import MeshError
-from .parts import Part
+from .parts import Part, Parts, split_parts
 from .preparation import prepare
 from .progress import Steps, part_of
 from .sphere_conformal import ConformalSphere, conformal_sphere
@@ -44,20 +45,17 @@ class PartMaps:
     def __init__(self, part: Part):
         self.part = part
         self._sphere: ConformalSphere | None = None
-        self._charts: list[Chart] | None = None
         self._conformal: dict[int, Image] = {}
         self._latest: dict[int, tuple[np.ndarray, Maps]] = {}
         # Whether to map it to the sphere: charts end at features.
         self.spherical = part.spherical and len(part.features) == 0
         self.warnings: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def charts(self) -> list[Chart]:
         """The part cut into disks."""
-        if self._charts is None:
-            part = self.part
-            self._charts = prepare(triangle_surface(part.vertices, part.triangles, part.features)).charts
-        return self._charts
+        part = self.part
+        return prepare(triangle_surface(part.vertices, part.triangles, part.features)).charts
 
     def of_sphere(self, density: np.ndarray) -> Steps[Maps | None]:
         """Maps to the sphere; None, and a warning from then on, where there are none in double precision."""
@@ -97,3 +95,24 @@ class PartMaps:
     def _keep(self, k: int, density: np.ndarray, maps: Maps) -> Maps:
         self._latest[k] = (density, maps)
         return maps
+
+
+class Original:
+    """A surface (n,3), (m,3), with edges (e,2) to keep, to be remeshed once or several times: its parts and their maps,
+    made when they are first asked for."""
+
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, features: np.ndarray | None = None):
+        self.vertices = np.asarray(vertices, dtype=float)
+        self.triangles = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
+        empty = np.zeros((0, 2), np.int64)
+        self.features = empty if features is None else np.asarray(features, np.int64).reshape(-1, 2)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """What the surface consists of; for errors see `parts.split_parts`."""
+        return split_parts(self.vertices, self.triangles, self.features)
+
+    @cached_property
+    def maps(self) -> list[PartMaps]:
+        """The maps of every part."""
+        return [PartMaps(part) for part in self.parts.parts]

@@ -16,8 +16,9 @@ from .closest import ClosestPoint, vertex_normals
 from .counts import StuckError, adjust_count, distribute, least_vertices, rebalance
 from .errors import CountError, positive_density
 from .fit import fit_to_surface
-from .part_maps import PartMaps
-from .parts import Part, split_parts
+from .measure import graded
+from .part_maps import Original, PartMaps
+from .parts import Part
 from .progress import Progress, Steps, part_of
 from .relaxation import relax
 from .sampling import STRATEGIES
@@ -64,6 +65,8 @@ def remesh(
     strategy: str = "app-cfp",
     fit: bool = True,
     rounds: int = ROUNDS,
+    grading: float = 0.0,
+    original: Original | None = None,
 ) -> Steps[Remesh]:
     """A new mesh of the surface (n,3), (m,3) with `count` vertices, its triangles equilateral as far as can be.
 
@@ -76,6 +79,8 @@ def remesh(
     strategy : map to sample on and map to triangulate on, each the measure-preserving ("app") or the conformal ("cfp")
     fit : move vertices off the surface to halve the distance of the triangles to it
     rounds : of relaxation on the surface; 0 leaves the strategy's mesh as it is
+    grading : most that edges grow by per length, see `measure.graded`; 0 for as fast as the density has it
+    original : the same surface and features, remeshed before: the maps that were made then serve again
 
     Raises
     ------
@@ -88,17 +93,17 @@ def remesh(
     if count_of not in ("vertices", "faces"):
         raise ValueError(f"count_of must be 'vertices' or 'faces', not {count_of!r}")
     yield Progress("Parts", 0.0)
-    vertices = np.asarray(vertices, dtype=float)
-    triangles = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
-    lines = np.zeros((0, 2), np.int64) if features is None else np.asarray(features, np.int64).reshape(-1, 2)
-    wanted = _checked_density(density, len(triangles))
-    found = split_parts(vertices, triangles, lines)
+    original = original or Original(vertices, triangles, features)
+    wanted = _checked_density(density, len(original.triangles))
+    found = original.parts
+    if grading > 0 and np.ptp(wanted) > 0:
+        samples = count if count_of == "vertices" else max(count // 2, 1)
+        wanted = graded(wanted, original.vertices, original.triangles, grading, samples)
     warnings = list(found.warnings)
-    if count > FAR_MORE * (len(vertices) if count_of == "vertices" else len(triangles)):
+    if count > FAR_MORE * len(original.vertices if count_of == "vertices" else original.triangles):
         warnings.append(f"{count} {count_of} are more than {FAR_MORE} times the input's; they add no detail")
-    measure = np.array([float(p.area @ wanted[p.faces]) for p in found.parts])
     options = Options(count_of, strategy, fit, rounds, preserve_boundary)
-    results = yield from _remesh_parts(found.parts, measure, wanted, count, options)
+    results = yield from _remesh_parts(original.maps, wanted, count, options)
     warnings += summed_up([w for r in results for w in r.warnings])
     made = sum(len(r.triangles) for r in results)
     if count_of == "faces" and made != count:
@@ -125,10 +130,10 @@ def _checked_density(density: np.ndarray | None, m: int) -> np.ndarray:
     return positive_density(density)
 
 
-def _remesh_parts(
-    parts: list[Part], measure: np.ndarray, density: np.ndarray, count: int, options: Options
-) -> Steps[list[_Result]]:
+def _remesh_parts(maps: list[PartMaps], density: np.ndarray, count: int, options: Options) -> Steps[list[_Result]]:
     """All parts, the smallest first, so that the larger ones make up for those that take more than their share."""
+    parts = [m.part for m in maps]
+    measure = np.array([float(p.area @ density[p.faces]) for p in parts])
     least = _least(parts, options.count_of)
     left = np.argsort(measure, kind="stable")
     results: list[_Result] = [None] * len(parts)  # type: ignore[list-item]
@@ -136,7 +141,7 @@ def _remesh_parts(
     while len(left):
         k, share = left[0], float(measure[left[0]] / measure.sum())
         number = int(distribute(count, measure[left], least[left], options.count_of)[0])
-        steps = _remesh_part(parts[k], number, density[parts[k].faces], options, last=len(left) == 1)
+        steps = _remesh_part(maps[k], number, density[parts[k].faces], options, last=len(left) == 1)
         results[k] = yield from part_of(steps, done, share)
         count -= len(results[k].points if options.count_of == "vertices" else results[k].triangles)
         left, done = left[1:], done + share
@@ -158,13 +163,13 @@ def summed_up(texts: list[str]) -> list[str]:
     return [text if (k := texts.count(text)) == 1 else f"{text} ({k} times)" for text in dict.fromkeys(texts)]
 
 
-def _remesh_part(part: Part, count: int, density: np.ndarray, options: Options, last: bool) -> Steps[_Result]:
+def _remesh_part(maps: PartMaps, count: int, density: np.ndarray, options: Options, last: bool) -> Steps[_Result]:
     """One part in its unit box; boundaries and features get fewer samples where the count cannot be reached.
 
     Only the last part has to keep to its count; it makes up for the others.
     """
+    part = maps.part
     level = density / (part.area @ density / part.area.sum())
-    maps = PartMaps(part)
     stretch, attempt = 1.0, 0
     while True:
         attempt += 1

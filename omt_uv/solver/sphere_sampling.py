@@ -43,12 +43,13 @@ def sphere_image(
 ) -> Steps[np.ndarray]:
     """Map (n,3) of a closed surface (n,3), (m,3) to the sphere by optimal transport, areas times density (m,).
 
-    A few faces may be folded. Raises TransportError where the transport fails.
+    A few faces may be folded. Raises TransportError, or PrecisionError, where the transport fails.
     """
     sound = closed_surface(vertices, triangles)
     mass = vertex_areas(sound.vertices, triangles, density)
     hull = Hull(conformal.triangles, twins(conformal.triangles))
-    found = yield from sphere_transport(conformal.sites, mass, TOLERANCE, hull)
+    # Half of a mass that is gathered on one side has no transport; Moebius maps keep the hull's triangles.
+    found = yield from sphere_transport(centred(conformal.sites, mass), mass, TOLERANCE, hull)
     return found.cells.centroids()
 
 
@@ -63,7 +64,7 @@ def sample_sphere(
     face, bary = locate(from_map, triangles, spread_on_sphere(count))
     corners = triangles[face]
     images = normalized(np.einsum("kc,kcj->kj", bary, to_map[corners]))
-    # Moebius maps leave circles circles, and what is Delaunay so; the middle is where the hull is best seen from.
+    # Moebius maps leave circles circles, and what is Delaunay so; the hull is best seen from the middle.
     images = centred(images, np.ones(count))
     kept = np.arange(count)
     for _ in range(ATTEMPTS):
