@@ -16,6 +16,16 @@ def dot2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
 
 
+def as_complex(points: np.ndarray) -> np.ndarray:
+    """Points of the plane (n,2) as complex numbers (n,), gathered four times as fast: conj(a) b = a . b + i a x b."""
+    return np.ascontiguousarray(points, dtype=float).view(complex)[:, 0]
+
+
+def as_points(z: np.ndarray) -> np.ndarray:
+    """Complex numbers (n,) as points of the plane (n,2)."""
+    return z.view(float).reshape(-1, 2)
+
+
 def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Length of every halfedge, (3m,), of positions (n,2) or (n,3)."""
     p = positions[triangles]
@@ -70,9 +80,9 @@ def cotangents_from_lengths(length: np.ndarray) -> np.ndarray:
 
 def laplacian_from_weights(tail: np.ndarray, head: np.ndarray, weight: np.ndarray, n: int) -> csr_matrix:
     """Positive semidefinite graph Laplacian (n,n) of edges with weights (each pair may repeat)."""
-    rows = np.concatenate([tail, head, tail, head])
-    columns = np.concatenate([head, tail, tail, head])
-    return csr_matrix((np.concatenate([-weight, -weight, weight, weight]), (rows, columns)), shape=(n, n))
+    degree = np.bincount(tail, weight, n) + np.bincount(head, weight, n)
+    rows, columns = np.concatenate([tail, head, np.arange(n)]), np.concatenate([head, tail, np.arange(n)])
+    return csr_matrix((np.concatenate([-weight, -weight, degree]), (rows, columns)), shape=(n, n))
 
 
 def cotangent_laplacian(positions: np.ndarray, triangles: np.ndarray) -> csr_matrix:

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .domain import Domain, segment_integrals
-from .geometry import cross2, dot2
+from .geometry import as_complex, as_points, dot2
 from .regular import Regular, by_hull, power_centres
 from .topology import next_halfedge
+
+PART = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -63,24 +65,26 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: 
     n = len(sites)
     if dual is None:
         dual = by_hull(sites, weights)
-    centre = power_centres(sites, weights, dual)
-    inside = np.append(domain.contains(centre), False)
+    z = as_complex(sites)
+    centre = power_centres(z, weights, dual)
+    inside = np.append(domain.contains(as_points(centre)), False)
     once = np.flatnonzero(dual.twin < np.arange(len(dual.twin)))
     whole = inside[once // 3] & inside[dual.twin[once] // 3]
-    sides = _whole_sides(sites, centre, dual, once[whole])
-    cut, entering, leaving = _cut_sides(sites, weights, centre, inside, dual, once[~whole], domain)
-    pairs, p, q, length = (np.concatenate(both) for both in zip(sides, cut, strict=True))
+    sides = _whole_sides(z, centre, dual, once[whole])
+    cut, entering, leaving = _cut_sides(z, weights, centre, inside, dual, once[~whole], domain)
+    i, j, p, q, length = (np.concatenate(both) for both in zip(sides, cut, strict=True))
+    edges = np.stack([i, j], axis=1)
 
     integrals = np.zeros((4, n))
-    _scatter(integrals, pairs[:, 0], pairs[:, 1], segment_integrals(p, q))
+    _scatter(integrals, i, j, _integrals_along(p, q))
     # At a crossing of the boundary one cell's arc ends and its neighbour's begins.
-    cut_pairs, cut_p, cut_q, _ = cut
-    crossing = np.concatenate([cut_p[entering], cut_q[leaving]])
-    ends = np.concatenate([cut_pairs[entering, 0], cut_pairs[leaving, 1]])
-    begins = np.concatenate([cut_pairs[entering, 1], cut_pairs[leaving, 0]])
+    i, j, p, q, _ = cut
+    crossing = np.concatenate([p[entering], q[leaving]])
+    ends = np.concatenate([i[entering], j[leaving]])
+    begins = np.concatenate([j[entering], i[leaving]])
     arcs = np.zeros((4, n))
     if len(crossing):
-        _scatter(arcs, ends, begins, domain.boundary_integrals(domain.boundary_parameter(crossing)))
+        _scatter(arcs, ends, begins, domain.boundary_integrals(domain.boundary_parameter(as_points(crossing))))
         # Only the arc that runs through parameter 0 comes out negative.
         around = int(arcs[0].argmin())
     else:
@@ -88,49 +92,49 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: 
         around = int((((sites - corner) ** 2).sum(axis=1) - weights).argmin())
     arcs[:, around] += domain.total_integrals()
     integrals += arcs
-    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], pairs, length, dual)
+    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], edges, length, dual)
 
 
-def _whole_sides(sites, centre, dual: Regular, h):
-    """Sides of the halfedges h (k,) that end at the power centres to their right, p (k,2), and to their left, q (k,2).
+def _whole_sides(z, centre, dual: Regular, h):
+    """Sides of the halfedges h (k,) that end at the power centres to their right, p, and to their left, q.
 
-    Returns the pairs of sites (k,2), p, q and the lengths (k,).
+    Returns the sites i, j on both sides (k,), p, q (k,) complex, and the lengths (k,).
     """
-    pairs = _pairs(dual, h)
-    p, q = centre[dual.twin[h] // 3], centre[h // 3]
-    apart = sites[pairs[:, 1]] - sites[pairs[:, 0]]
-    length = cross2(apart, q - p) / np.sqrt(dot2(apart, apart))
-    return pairs, p, q, np.maximum(length, 0)
+    g, tail = dual.twin[h], dual.triangles.ravel()
+    i, j, p, q = tail[h], tail[g], centre[g // 3], centre[h // 3]
+    apart = z[j] - z[i]
+    length = (apart.conj() * (q - p)).imag / np.sqrt((apart * apart.conj()).real)
+    return i, j, p, q, np.maximum(length, 0)
 
 
-def _cut_sides(sites, weights, centre, inside, dual: Regular, h, domain: Domain):
+def _cut_sides(z, weights, centre, inside, dual: Regular, h, domain: Domain):
     """Sides that reach out of the domain, as `_whole_sides`, cut; which of them enter (k,), and which leave, (k,)."""
-    pairs, left, right = _pairs(dual, h), h // 3, dual.twin[h] // 3
-    i, j = pairs.T
-    apart = sites[j] - sites[i]
-    squared = dot2(apart, apart)
-    share = 0.5 + (weights[i] - weights[j]) / (2 * squared)
-    origin = sites[i] + share[:, None] * apart
-    direction = np.stack([-apart[:, 1], apart[:, 0]], axis=1) / np.sqrt(squared)[:, None]
-    t_left = dot2(centre[left] - origin, direction)
-    t_right = np.where(right < 0, -np.inf, dot2(centre[right] - origin, direction))
-    enter, leave = domain.clip(origin, direction)
+    tail, left, right = dual.triangles.ravel(), h // 3, dual.twin[h] // 3
+    i, j = tail[h], tail[next_halfedge(h)]
+    apart = z[j] - z[i]
+    distance = np.abs(apart)
+    origin = z[i] + (0.5 + (weights[i] - weights[j]) / (2 * distance**2)) * apart
+    direction = 1j * apart / distance
+    t_left = ((centre[left] - origin) * direction.conj()).real
+    t_right = np.where(right < 0, -np.inf, ((centre[right] - origin) * direction.conj()).real)
+    enter, leave = domain.clip(as_points(origin), as_points(direction))
     middle = (enter + leave) / 2
     entering, leaving = ~inside[right], ~inside[left]
     # A side with both ends outside may still pass through the domain.
     through = (enter < leave) & (t_right < middle) & (middle < t_left)
-    keep = ~(entering & leaving) | through
     # Where rounding lets the line miss the domain next to an end inside, the side shrinks to that end.
-    start = np.where(entering, np.minimum(enter, np.where(leaving, np.inf, t_left)), t_right)[keep]
-    end = np.maximum(np.where(leaving, leave, t_left)[keep], start)
-    p, q = (origin[keep] + t[:, None] * direction[keep] for t in (start, end))
-    return (pairs[keep], p, q, end - start), entering[keep], leaving[keep]
+    start = np.where(entering, np.minimum(enter, np.where(leaving, np.inf, t_left)), t_right)
+    end = np.maximum(np.where(leaving, leave, t_left), start)
+    p, q = origin + start * direction, origin + end * direction
+    keep = ~(entering & leaving) | through
+    return [x[keep] for x in (i, j, p, q, end - start)], entering[keep], leaving[keep]
 
 
-def _pairs(dual: Regular, h: np.ndarray) -> np.ndarray:
-    """Tails and heads of halfedges h (k,), (k,2)."""
-    corners = dual.triangles.ravel()
-    return np.stack([corners[h], corners[next_halfedge(h)]], axis=1)
+def _integrals_along(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """`segment_integrals` from p to q (k,) complex, in parts so small that they stay in the cache."""
+    count = len(p) // PART + 1
+    ends = zip(*(np.array_split(as_points(x), count) for x in (p, q)), strict=True)
+    return np.concatenate([segment_integrals(*both) for both in ends], axis=1)
 
 
 def _scatter(target: np.ndarray, plus: np.ndarray, minus: np.ndarray, values: np.ndarray) -> None:

@@ -12,8 +12,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from .errors import TransportError
 from .flips import flip_in_place, flip_until_none
-from .geometry import cross2, dot2
-from .topology import next_halfedge, previous_halfedge, twins
+from .geometry import as_complex, dot2
+from .topology import previous_halfedge, twins
 
 # A facet this steep stands on the rim of the hull; its power centre is far out of any domain.
 STEEP = 1e-9
@@ -59,8 +59,8 @@ def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
     triangles = triangles[(slope < -STEEP) & of_sites]
     # Triangles are neighbours in memory where their sites are.
     triangles = triangles[np.argsort(triangles.min(axis=1), kind="stable")]
-    a, b, c = (sites[triangles[:, k]] for k in range(3))
-    turned = cross2(b - a, c - a) < 0
+    a, b, c = as_complex(sites)[triangles.T]
+    turned = ((b - a).conj() * (c - a)).imag < 0
     triangles[turned] = triangles[turned][:, [0, 2, 1]]
     whole = whole and len(np.unique(triangles)) == len(sites)
     return Regular(triangles, twins(triangles), whole)
@@ -72,24 +72,24 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
     Returns the regular triangulation, or None where flips alone do not reach it, and whether a site is certainly
     hidden: it has three neighbours and lies above their plane.
     """
-    triangles, twin = start.triangles.copy(), start.twin.copy()
+    z, triangles, twin = as_complex(sites), start.triangles.copy(), start.twin.copy()
     flat = triangles.reshape(-1)
 
     waiting = [np.zeros(0, np.int64)]
 
     def violation(edges):
-        below, convex = _below(sites, weights, flat, edges, twin[edges])
+        below, convex = _below(z, weights, flat, edges, twin[edges])
         waiting.append(edges[(below < 0) & ~convex])
         return np.where(convex, below, 0.0)
 
     def flip(edges):
         flip_in_place(triangles, twin, edges)
 
-    flips, settled = flip_until_none(twin, violation, flip, MAX_ROUNDS, _backward(sites, weights, start))
+    flips, settled = flip_until_none(twin, violation, flip, MAX_ROUNDS, _backward(z, weights, start))
     # Edges that wanted to flip and could not; a flip next to them may have helped since.
     edges = np.unique(np.concatenate(waiting))
     edges = edges[twin[edges] >= 0]
-    below, _ = _below(sites, weights, flat, edges, twin[edges])
+    below, _ = _below(z, weights, flat, edges, twin[edges])
     stuck = edges[below < 0]
     if settled and len(stuck) == 0:
         return Regular(triangles, twin, start.whole, flips), False
@@ -100,37 +100,36 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
     return None, bool(((degree[ends] == 3) & ~on_hull[ends]).any())
 
 
-def power_centres(sites: np.ndarray, weights: np.ndarray, dual: Regular) -> np.ndarray:
-    """Point of equal power of each triangle, (k,2), relative to its first corner so that clusters keep precision."""
+def power_centres(z: np.ndarray, weights: np.ndarray, dual: Regular) -> np.ndarray:
+    """Point of equal power of each triangle, (k,) complex, of sites z (n,) complex with weights (n,)."""
     i, j, k = dual.triangles.T
-    a = sites[i]
-    b, c = sites[j] - a, sites[k] - a
-    rb = dot2(b, b) - weights[j] + weights[i]
-    rc = dot2(c, c) - weights[k] + weights[i]
-    twice = 2 * cross2(b, c)
+    # Relative to the first corner, so that clusters keep precision.
+    a, base = z[i], weights[i]
+    b, c = z[j] - a, z[k] - a
+    rb = (b * b.conj()).real - weights[j] + base
+    rc = (c * c.conj()).real - weights[k] + base
+    twice = 2 * (b.conj() * c).imag
     twice = np.where(np.abs(twice) > 1e-300, twice, 1e-300)
-    return a + np.stack([rb * c[:, 1] - rc * b[:, 1], rc * b[:, 0] - rb * c[:, 0]], axis=1) / twice[:, None]
+    return a - 1j * (rb * c - rc * b) / twice
 
 
-def _backward(sites, weights, start: Regular) -> np.ndarray:
+def _backward(z, weights, start: Regular) -> np.ndarray:
     """The edges whose side between two cells runs backwards, as one of each pair of halfedges: those that may flip."""
-    centre = power_centres(sites, weights, start)
+    centre, tail = power_centres(z, weights, start), start.triangles.ravel()
     h = np.flatnonzero(start.twin > np.arange(len(start.twin)))
-    g, tail = start.twin[h], start.triangles.ravel()
-    x, y = (sites[tail[g], k] - sites[tail[h], k] for k in range(2))
-    left, right = h // 3, g // 3
-    return h[x * (centre[left, 1] - centre[right, 1]) <= y * (centre[left, 0] - centre[right, 0])]
+    g = start.twin[h]
+    return h[((z[tail[g]] - z[tail[h]]).conj() * (centre[h // 3] - centre[g // 3])).imag <= 0]
 
 
-def _below(sites, weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
+def _below(z, weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
     """How far the far corner of g lies below the lifted triangle of h, negative when it does, else 0; flip possible?"""
-    i, j, k, far = flat[h], flat[g], flat[previous_halfedge(h)], flat[next_halfedge(next_halfedge(g))]
-    a, b, c = sites[i] - sites[far], sites[j] - sites[far], sites[k] - sites[far]
-    base = weights[far]
-    za, zb, zc = (dot2(x, x) - weights[v] + base for x, v in ((a, i), (b, j), (c, k)))
-    bc, ca, ab = cross2(b, c), cross2(c, a), cross2(a, b)
-    terms = np.stack([za * bc, zb * ca, zc * ab])
-    determinant = terms.sum(axis=0)
-    size = np.abs(terms).sum(axis=0)
+    i, j, k, far = flat[h], flat[g], flat[previous_halfedge(h)], flat[previous_halfedge(g)]
+    origin, base = z[far], weights[far]
+    a, b, c = z[i] - origin, z[j] - origin, z[k] - origin
+    za, zb, zc = ((x * x.conj()).real - weights[v] + base for x, v in ((a, i), (b, j), (c, k)))
+    bc, ca, ab = ((x.conj() * y).imag for x, y in ((b, c), (c, a), (a, b)))
+    terms = za * bc, zb * ca, zc * ab
+    determinant = sum(terms)
+    size = sum(np.abs(term) for term in terms)
     convex = (bc > 0) & (ca > 0)
     return np.where(determinant > ROUNDING * size, -determinant / np.maximum(size, 1e-300), 0.0), convex

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from .domain import Domain
 from .errors import TransportError
-from .geometry import dot2, laplacian_from_weights
+from .geometry import as_complex, laplacian_from_weights
 from .multigrid import solve_laplacian
 from .power_diagram import PowerDiagram, power_diagram
 from .progress import Progress, Steps
@@ -142,7 +142,7 @@ def _residual(cells: PowerDiagram, mass: np.ndarray) -> float:
 def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray) -> np.ndarray:
     """Derivative of area i by weight j: -|side ij| / (2 |y_i - y_j|); a common weight is its kernel."""
     i, j = cells.edges.T
-    apart = sites[i] - sites[j]
-    conductance = cells.length / (2 * np.sqrt(dot2(apart, apart)))
+    z = as_complex(sites)
+    conductance = cells.length / (2 * np.abs(z[i] - z[j]))
     hessian = laplacian_from_weights(i, j, conductance, len(sites))
     return solve_laplacian(hessian, mass - cells.area, mass, ENOUGH)
