@@ -4,13 +4,17 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.charts import split, triangle_rows, triangle_surface
 from omt_uv.solver.disk_coarsening import coarsened
 from omt_uv.solver.domain import Disk
+from omt_uv.solver.energy import elements, energy
+from omt_uv.solver.exact_share import exact_share
 from omt_uv.solver.first_map import COARSE_ABOVE, mean_value_sites
 from omt_uv.solver.geometry import face_areas, signed_areas
+from omt_uv.solver.measure import Target, share
 from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.progress import drain
+from omt_uv.solver.smoothing import smoothed
 from omt_uv.solver.topology import boundary_loops, twins
 
 SHAPES = ["head", "random_disk", "cap", "bumpy", "grid"]
@@ -58,3 +62,41 @@ def test_large_charts_come_by_way_of_coarser_ones():
     a, b = (x[:, 0] + 1j * x[:, 1] for x in (moved, chart_map.uv))
     turn = np.vdot(a, b)
     np.testing.assert_allclose(a * turn / abs(turn), b, atol=1e-5 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("boundary", ["disk", "square"])
+def test_domains_are_reached_by_way_of_coarser_charts_too(boundary):
+    V, F = meshes.head(75)
+    (chart_map,) = drain(unwrap(triangle_surface(V, F), boundary=boundary, quality="draft")).maps
+    assert "coarsening" in chart_map.seconds
+    assert chart_map.folds == 0 and chart_map.area_l1 <= 0.05 and not chart_map.warnings
+
+
+def test_coarser_meshes_keep_their_boundary():
+    V, F, _, _, coarse = coarse_of("head")
+    np.testing.assert_array_equal(
+        np.sort(coarse.kept[boundary_loops(coarse.triangles)[0]]), np.sort(boundary_loops(F)[0])
+    )
+
+
+def test_a_region_of_most_of_the_texture_gets_it_by_way_of_coarser_charts():
+    V, F = meshes.head(75)
+    surface = triangle_surface(V, F)
+    centre = V[F].mean(axis=1)
+    w = np.clip(2 - 4 * np.linalg.norm(centre - V[np.argmax(V[:, 2])], axis=1) / np.ptp(V[:, 2]), 0, 1)
+    found = exact_share(w, area := face_areas(V, F), 0.8 / share(w, area))
+    (chart_map,) = drain(unwrap(surface, target=Target(found.density, w), quality="draft")).maps
+    assert chart_map.folds == 0 and "coarsening" in chart_map.seconds
+    (chart,) = split(surface)
+    has = signed_areas(chart_map.uv, chart.triangles)
+    assert share(w[triangle_rows(surface, chart)], has) == pytest.approx(0.8, rel=0.02)
+
+
+def test_smoothing_lowers_the_energy_and_folds_nothing():
+    V, F, flat, mass, coarse = coarse_of("head")
+    uv = drain(coarse.prolonged(flat[coarse.kept], len(V)))
+    faces, rim = elements(V, F, mass), boundary_loops(F)[0]
+    w = uv @ [1, 1j] * np.sqrt(mass.sum() / signed_areas(uv, F).sum())
+    smooth = drain(smoothed(faces, w, 100.0, 2))
+    assert (faces.areas(smooth) > 0).all() and energy(faces, smooth, 100.0) < energy(faces, w, 100.0)
+    np.testing.assert_array_equal(smooth[rim], w[rim])

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .contact import expand
-from .energy import Elements, elements, energies, local_derivatives
+from .energy import Elements, elements
 from .geometry import cross2, dot2
 from .progress import Progress, Steps
-from .topology import halfedges, twins
+from .smoothing import independent, relax, stars
+from .topology import boundary_loops, halfedges, twins
 
 # A vertex with more faces stays: comparing all its collapses costs the square of their number.
 MOST_FACES = 9
@@ -24,12 +25,12 @@ MOST_FACES = 9
 LEAST_SHAPE, LEAST_FLAT_SHAPE = 0.15, 1e-7
 # Rounds end when one removes a smaller share of the vertices.
 LEAST_PROGRESS = 0.03
-# Passes that add to the independent set of a round.
-PASSES = 3
+# Vertices of the boundary stay while they are at most this share of those that are left.
+RIM_SHARE = 0.25
 # Share of the area at a safe place that every returning face keeps.
 KEPT_AREA = 0.1
-# Newton steps of a returning vertex, weight of the area term in them, halvings of a step.
-RELAX_STEPS, RELAX_WEIGHT, RELAX_HALVINGS = 6, 10.0, 5
+# Newton steps of a returning vertex, and the weight of the area term in them.
+RELAX_STEPS, RELAX_WEIGHT = 6, 10.0
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Coarse:
         for k, removal in enumerate(reversed(self.rounds)):
             yield Progress("Coarser mesh", k / len(self.rounds))
             w[removal.vertex] = _returned(removal, w)
-            _relax(removal, w)
+            relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS)
         return np.column_stack([w.real, w.imag])
 
 
@@ -77,12 +78,16 @@ def coarsened(vertices, triangles, flat, mass, goal: int) -> Steps[Coarse]:
     """
     rounds: list[Removal] = []
     left = count = len(vertices)
+    rim = boundary_loops(triangles)[0]
     while left > goal:
         yield Progress("Coarser mesh", np.log(count / left) / np.log(count / goal))
         rank = np.random.default_rng(len(rounds)).permutation(count)
+        if len(rim) <= RIM_SHARE * left:
+            rank[rim] = -1
         triangles, mass, removal = _round(vertices, triangles, flat, mass, rank)
         rounds.append(removal)
         left -= len(removal.vertex)
+        rim = rim[~np.isin(rim, removal.vertex)]
         if len(removal.vertex) < LEAST_PROGRESS * left:
             break
     kept = np.unique(triangles)
@@ -97,7 +102,9 @@ def _round(V, F, flat, mass, rank):
     rim = twins(F) < 0
     ahead = np.full(len(V), -1)
     ahead[tail[rim]] = head[rim]
-    star, v, after, before = _stars(F, _independent(F, rank))
+    count = np.bincount(F.ravel(), minlength=len(V))
+    star, turned = stars(F, independent(F, np.where((count > MOST_FACES) | (count < 2), -1, rank)))
+    v, after, before = np.take_along_axis(F[star], turned, 1).T
     into, good = _best_collapses(V, flat, v, after, before, ahead)
     star, v, after, before, into = (x[good] for x in (star, v, after, before, into))
     vertex, row = np.unique(v, return_inverse=True)
@@ -114,29 +121,6 @@ def _round(V, F, flat, mass, rank):
     others[star] = False
     handed = size * (total / np.maximum(whole, 1e-300))[row[stays]]
     return np.concatenate([F[others], new]), np.concatenate([mass[others], handed]), removal
-
-
-def _independent(F, rank):
-    """Vertices (n,) bool, no two in one face, by rank; vertices with many faces, and those with one, are left out."""
-    faces = np.bincount(F.ravel(), minlength=len(rank))
-    rank = np.where((faces > MOST_FACES) | (faces < 2), -1, rank)
-    chosen = np.zeros(len(rank), bool)
-    for _ in range(PASSES):
-        here = rank[F]
-        wins = here.argmax(1)
-        winner = np.take_along_axis(F, wins[:, None], 1)[:, 0]
-        chosen |= (np.bincount(winner, minlength=len(rank)) == faces) & (rank >= 0)
-        rank[F[chosen[F].any(1)].ravel()] = -1
-    return chosen
-
-
-def _stars(F, chosen):
-    """Faces around the chosen vertices: index, vertex, and the corners after and before it, sorted by vertex."""
-    star = np.flatnonzero(chosen[F].any(1))
-    at = chosen[F[star]].argmax(1)
-    v, after, before = (F[star, (at + k) % 3] for k in range(3))
-    order = np.argsort(v, kind="stable")
-    return star[order], v[order], after[order], before[order]
 
 
 def _best_collapses(V, flat, v, after, before, ahead):
@@ -159,7 +143,8 @@ def _best_collapses(V, flat, v, after, before, ahead):
     begin = np.searchsorted(candidate, np.arange(len(v)))
     score = np.minimum.reduceat(np.where(gone, np.inf, _shape(V, new)), begin)
     bad = np.logical_or.reduceat(~gone & (turned | (_flat_shape(flat, new) < LEAST_FLAT_SHAPE)), begin)
-    bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ~np.isfinite(score)
+    # Nor does an inner vertex go to the rim: edges across would cut off parts that have no room in a domain.
+    bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ((ahead[v] < 0) & (ahead[after] >= 0)) | ~np.isfinite(score)
     old = np.minimum.reduceat(_shape(V, np.column_stack([v, after, before])), first)[row]
     bad |= score < np.minimum(LEAST_SHAPE, old / 2)
     # Coarse marks, so that rounding does not choose among equals.
@@ -213,31 +198,6 @@ def _returned(removal: Removal, w: np.ndarray) -> np.ndarray:
 
 def _cross(a, b):
     return a.real * b.imag - a.imag * b.real
-
-
-def _relax(removal: Removal, w: np.ndarray) -> None:
-    """A few Newton steps of every returned vertex within its star, in place."""
-    vertex, row, k, faces = removal.vertex, removal.row, len(removal.vertex), removal.faces
-    value = np.bincount(row, energies(faces, w, RELAX_WEIGHT), k)
-    for _ in range(RELAX_STEPS):
-        local = local_derivatives(faces, w, RELAX_WEIGHT, 0.3)
-        form = local.rows[:, :, 0]
-        xx, xy, yy = (np.bincount(row, x.sum(1), k) for x in (form.real**2, -form.real * form.imag, form.imag**2))
-        g = [np.bincount(row, x, k) for x in (local.gradient[:, 0].real, local.gradient[:, 0].imag)]
-        det = xx * yy - xy**2 + 1e-12 * (xx + yy) ** 2
-        step = (-(yy * g[0] - xy * g[1]) - 1j * (xx * g[1] - xy * g[0])) / det
-        moving = np.ones(k, bool)
-        for _ in range(RELAX_HALVINGS):
-            trial = w.copy()
-            trial[vertex[moving]] += step[moving]
-            new = np.bincount(row, energies(faces, trial, RELAX_WEIGHT), k)
-            better = moving & (new < value)
-            w[vertex[better]] += step[better]
-            value = np.where(better, new, value)
-            moving &= ~better
-            if not moving.any():
-                break
-            step *= 0.5
 
 
 def _normal(V, F):

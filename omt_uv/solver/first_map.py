@@ -15,64 +15,92 @@ import numpy as np
 
 from .conformal import ConformalMap, conformal_disk, conformal_rectangle
 from .disk_coarsening import coarsened
-from .domain import Disk, Domain
+from .domain import Disk, Domain, Rectangle
 from .elliptic import centre_in_disk
 from .embedding import arc_length_parameters, tutte
+from .energy import elements
 from .errors import PrecisionError, TransportError
-from .geometry import halfedge_lengths
+from .geometry import face_areas, halfedge_lengths
+from .measure import entropy
 from .progress import Steps, part_of
 from .refine import refine
+from .smoothing import smoothed
 from .topology import boundary_loops
 from .transport import Transport, transport
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 CONFORMAL, TRANSPORT = (0.0, 0.4), (0.4, 0.6)
-COARSENING, COARSE_MAP, COARSE_REFINEMENT, RETURN = (0.0, 0.3), (0.3, 0.2), (0.5, 0.3), (0.8, 0.2)
+COARSENING, COARSE_MAP, COARSE_REFINEMENT, RETURN = (0.0, 0.3), (0.3, 0.2), (0.5, 0.3), (0.8, 0.1)
+SMOOTHED = (0.9, 0.1)
 # Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
 # distance counts squared.
 SITE_RESOLUTION = 1e-7
 # A mean this near to the middle of the unit disk is there.
 CENTRED = 1e-3
 # Charts with more vertices than this come by way of one with an eighth of their vertices, or at most a quarter.
-COARSE_ABOVE, COARSER, COARSE_ENOUGH = 5000, 8, 4
+COARSE_ABOVE, COARSER, COARSE_ENOUGH = 5000, 8, 0.25
+# Where the target is farther than this from the surface's areas, in relative entropy, coarser meshes say less: they are
+# taken in smaller steps, and what comes back is smoothed before Newton.
+FAR, COARSER_FAR, COARSE_ENOUGH_FAR = 0.5, 5, 0.4
+SWEEPS, SMOOTHING = 5, 500.0
 
 
 @dataclass(frozen=True)
 class FirstMap:
-    """Coordinates uv (n,2), and the conformal map and the transport they come from, on the coarsest mesh, or None."""
+    """Coordinates uv (n,2), and the conformal map and the transport they come from, on the coarsest mesh, or None.
+
+    near: the map comes from a refined one, and is smooth.
+    """
 
     conformal: ConformalMap | None
     cells: Transport | None
     uv: np.ndarray
+    near: bool = False
 
 
-def coarse_first_map(vertices, triangles, target, loop, balance, log: Log, flat=None) -> Steps[FirstMap | None]:
-    """A first map with a free boundary by way of a coarser mesh; None where the mesh cannot be coarsened.
+def coarse_first_map(
+    vertices, triangles, target, loop, corners, boundary: str, balance, log: Log, flat=None
+) -> Steps[FirstMap | None]:
+    """A first map by way of a coarser mesh; None where the mesh cannot be coarsened, or where that does not pay.
 
     target (m,): areas of the triangles in the map; flat (n,2): an embedding, a mean value map by default.
     """
+    far = entropy(target, face_areas(vertices, triangles)) > FAR
+    if far and boundary != "free":
+        return None  # the transport of all vertices to a domain leaves less shear than that of few
     with log.timed("coarsening"):
         if flat is None:
             flat = mean_value_sites(vertices, triangles, loop, None, Disk())
-        coarse = yield from part_of(coarsened(vertices, triangles, flat, target, len(vertices) // COARSER), *COARSENING)
-    if len(coarse.kept) > len(vertices) // COARSE_ENOUGH:
+        goal = len(vertices) // (COARSER_FAR if far else COARSER)
+        coarse = yield from part_of(coarsened(vertices, triangles, flat, target, goal), *COARSENING)
+    if len(coarse.kept) > (COARSE_ENOUGH_FAR if far else COARSE_ENOUGH) * len(vertices):
         return None
     points, mesh, mass = vertices[coarse.kept], coarse.triangles, coarse.mass
     found: FirstMap | None = None
     rim = boundary_loops(mesh)[0]
+    if boundary != "free" and len(rim) < len(loop):
+        return None  # what returned to the rim would lie on a chord
+    corners = None if corners is None else np.searchsorted(coarse.kept, corners)
     if len(points) > COARSE_ABOVE:
-        steps = coarse_first_map(points, mesh, mass, rim, balance, log, flat[coarse.kept])
+        steps = coarse_first_map(points, mesh, mass, rim, corners, boundary, balance, log, flat[coarse.kept])
         found = yield from part_of(steps, *COARSE_MAP)
     if found is None:
-        direct = first_map(points, mesh, mass, rim, None, Disk(), log)
+        domain = Rectangle() if boundary == "square" else Disk()
+        direct = first_map(points, mesh, mass, rim, corners, domain, log)
         found = yield from part_of(direct, *COARSE_MAP)
     with log.timed("coarse refinement"):
-        refinement = refine(points, mesh, found.uv, target=mass, balance=balance)
-        refined = yield from part_of(refinement, *COARSE_REFINEMENT)
+        options: dict = {"boundary": boundary, "target": mass, "balance": balance, "quality": "rough"}
+        refined = yield from part_of(refine(points, mesh, found.uv, near=found.near, **options), *COARSE_REFINEMENT)
     log.warnings += refined.warnings
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
-    return FirstMap(found.conformal, found.cells, uv)
+        if far:
+            faces = elements(vertices, triangles, target)
+            w = uv @ [1, 1j]
+            w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
+            w = yield from part_of(smoothed(faces, w, SMOOTHING, SWEEPS), *SMOOTHED)
+            uv = np.column_stack([w.real, w.imag])
+    return FirstMap(found.conformal, found.cells, uv, far)
 
 
 def first_map(vertices, triangles, target, loop, corners, domain: Domain, log: Log) -> Steps[FirstMap]:

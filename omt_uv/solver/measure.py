@@ -124,6 +124,13 @@ def share(weights: np.ndarray, measure: np.ndarray) -> float:
     return float(weights @ measure / measure.sum())
 
 
+def entropy(target: np.ndarray, area: np.ndarray) -> float:
+    """Relative entropy sum(p log(p / q)) of a target measure (m,) against the areas (m,): 0 if all densities are 1."""
+    p, q = target / target.sum(), area / area.sum()
+    held = (p > 0) & (q > 0)
+    return float(p[held] @ np.log(p[held] / q[held]))
+
+
 def graded(density: np.ndarray, positions: np.ndarray, triangles: np.ndarray, limit: float, samples: int) -> np.ndarray:
     """The least density (m,) above the given one (m,) whose spacing of samples grows by at most `limit` per length.
 

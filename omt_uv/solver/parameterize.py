@@ -326,6 +326,7 @@ def unwrap_chart(
     with log.timed("refinement"):
         uv, held = facing(first.uv, pins)
         options = {"target": wanted, "region": region, "balance": balance, "quality": quality, "pins": held}
+        options["near"] = first.near and held is None
         refined = yield from part_of(_refined(vertices, triangles, uv, boundary, log, options), *REFINEMENT)
     with log.timed("measure"):
         asked = None if density is None else density[: len(chart.triangles)]
@@ -356,10 +357,10 @@ def unwrap_chart(
 def _first_map(
     vertices, triangles, target, loop, corners, domain: Domain, boundary: str, balance: float, log: Log
 ) -> Steps[FirstMap]:
-    """Where the refinement starts; a large chart with a free boundary comes by way of coarser ones."""
-    if boundary == "free" and len(vertices) > COARSE_ABOVE:
+    """Where the refinement starts; a large chart comes by way of coarser ones."""
+    if len(vertices) > COARSE_ABOVE:
         try:
-            found = yield from coarse_first_map(vertices, triangles, target, loop, balance, log)
+            found = yield from coarse_first_map(vertices, triangles, target, loop, corners, boundary, balance, log)
             if found is not None:
                 return found
         except MeshError as error:
@@ -377,7 +378,7 @@ def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: Log, optio
         log.warnings.append(f"The {boundary} has no room for this chart ({error.cause}); its boundary is free instead")
     loop = boundary_loops(triangles)[0]
     uv = mean_value_sites(vertices, triangles, loop, None, Disk())
-    return (yield from refine(vertices, triangles, uv, boundary="free", **options))
+    return (yield from refine(vertices, triangles, uv, boundary="free", **{**options, "near": False}))
 
 
 def _with_patches(density, region, patches: int) -> tuple[np.ndarray | None, np.ndarray | None]:

@@ -58,6 +58,7 @@ def refine(
     balance: float = 0.0,
     quality: str = "standard",
     pins: tuple[np.ndarray, np.ndarray] | None = None,
+    near: bool = False,
 ) -> Steps[Refinement]:
     """Refine a map uv (n,2) of a disk (n,3), (m,3) until every face has its area.
 
@@ -69,7 +70,8 @@ def refine(
         scaled to sum to the area of the surface.
     region : (m,) in [0, 1], weights of a region whose share of the target's area is to be exact
     balance : 0 for exact areas to 1 for the least shear
-    quality : "draft", "standard" or "exact"
+    quality : "draft", "standard" or "exact"; "rough" for the start of a finer mesh
+    near : the map is nearly the one that is looked for, and needs no detour through small weights
     pins : vertices (k,) and their places (k,2), in free mode. Two or more fix place, direction and scale, one fixes the
         place; with one, scale and direction are those of `uv`. Without pins the map has the area of the surface, and
         the place and the direction of `uv`.
@@ -96,7 +98,15 @@ def refine(
     mesh = renumbered(vertices, triangles, uv, pins)
     try:
         found, start, area_left = yield from _refined(
-            mesh.vertices, mesh.triangles, mesh.uv, boundary, (target, region), balance, QUALITIES[quality], mesh.pins
+            mesh.vertices,
+            mesh.triangles,
+            mesh.uv,
+            boundary,
+            (target, region),
+            balance,
+            QUALITIES[quality],
+            mesh.pins,
+            near,
         )
     except MeshError as error:
         raise mesh.blame(error) from error
@@ -124,7 +134,7 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     return target * (area.sum() / target.sum())
 
 
-def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins: Pins | None):
+def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins: Pins | None, near: bool):
     """Stages on a renumbered chart: what was found, the start it was found from, and the area error that is left."""
     loop = boundary_loops(triangles)[0]
     start = STARTS[boundary](vertices, triangles, uv, loop)
@@ -134,7 +144,7 @@ def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins:
     w = start.uv[:, 0] + 1j * start.uv[:, 1]
     if pins is not None and len(pins.vertices) > 1:
         task, w = yield from drag(task, w, pins)
-    found = yield from stages(task, w, balance, settings)
+    found = yield from stages(task, w, balance, settings, near)
     error = area_error(faces, found.w)
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * settings.area_error):
         notched = notched_disk(start, triangles, loop)

@@ -30,6 +30,7 @@ class Quality:
 
 
 QUALITIES = {
+    "rough": Quality(0.03, (30.0, 500.0), 1e4, 80, 1e-2),
     "draft": Quality(0.05, (10.0, 100.0), 1e3, 40, 1e-2),
     "standard": Quality(0.008, (30.0, 500.0), 1e6, 150, 1e-2),
     "exact": Quality(0.0003, (30.0, 1000.0, 3e4), 1e8, 300, 1e-2),
@@ -119,13 +120,16 @@ def final_weight(balance: float, settings: Quality) -> float:
     return settings.weights[-1] ** (1 - balance) * LEAST_WEIGHT**balance
 
 
-def stages(task: Task, w: np.ndarray, balance: float, settings: Quality) -> Steps[Found]:
+def stages(task: Task, w: np.ndarray, balance: float, settings: Quality, near: bool = False) -> Steps[Found]:
     """Newton in stages of growing weight, until the area error is small enough.
 
+    near: the map w (n,) is nearly the one that is looked for; the least weight would lead away from it.
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
     weights = weights_of(balance, settings)
-    if task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
+    if near and len(weights) > 1:
+        weights = weights[1:]
+    elif task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
     overlap, guarded, steps, k = task.crosses(w), task.guarded, 0, 0
     warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()

@@ -1,0 +1,109 @@
+"""Newton steps of single vertices within their stars: what is wrong between neighbours goes, at little cost.
+
+Vertices without a common face move together, one such set after the other (a coloured Gauss-Seidel sweep). Newton's
+method on the whole mesh is at its worst with such errors, since the one face that folds first stops the step of all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .energy import Elements, energies, local_derivatives
+from .progress import Progress, Steps
+from .topology import halfedges, twins
+
+# Share of the area term's indefinite Hessian kept, halvings of a step, and steps of a vertex in a sweep.
+PRESSURE, HALVINGS, STEPS = 0.3, 5, 2
+# Passes that add to an independent set, and sets that make a sweep; what is in none of them waits for Newton.
+PASSES, SETS = 3, 8
+
+
+def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int) -> Steps[np.ndarray]:
+    """A map w (n,) complex without folds after sweeps over all its vertices but those of the boundary, without folds.
+
+    weight: that of the area term.
+    """
+    w = w.copy()
+    sets = list(_sets(faces, len(w)))
+    for k in range(sweeps):
+        for vertex, row, star in sets:
+            relax(vertex, row, star, w, weight, STEPS)
+        yield Progress("Smoothing", (k + 1) / sweeps)
+    return w
+
+
+def _sets(faces: Elements, n: int):
+    """Independent sets of inner vertices: vertices (k,), and the rows (s,) and faces of their stars."""
+    F = faces.triangles
+    random = np.random.default_rng(0)
+    inner = np.ones(n, bool)
+    tail, head = halfedges(F)
+    rim = twins(F) < 0
+    inner[tail[rim]] = inner[head[rim]] = False
+    for _ in range(SETS):
+        chosen = independent(F, np.where(inner, random.permutation(n), -1))
+        inner &= ~chosen
+        star, corner = stars(F, chosen)
+        vertex, row = np.unique(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0], return_inverse=True)
+        yield vertex, row, part(faces, star, corner)
+
+
+def independent(F: np.ndarray, rank: np.ndarray) -> np.ndarray:
+    """Vertices (n,) bool, no two in one face, those of high rank (n,) first; none of negative rank."""
+    faces = np.bincount(F.ravel(), minlength=len(rank))
+    rank = rank.copy()
+    chosen = np.zeros(len(rank), bool)
+    for _ in range(PASSES):
+        here = rank[F]
+        wins = here.argmax(1)
+        winner = np.take_along_axis(F, wins[:, None], 1)[:, 0]
+        chosen |= (np.bincount(winner, minlength=len(rank)) == faces) & (rank >= 0)
+        rank[F[chosen[F].any(1)]] = -1
+    return chosen
+
+
+def stars(F: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Faces (s,) around the chosen vertices (n,) bool, sorted by vertex, and their corners (s,3), that vertex first."""
+    star = np.flatnonzero(chosen[F].any(1))
+    corner = (chosen[F[star]].argmax(1)[:, None] + np.arange(3)) % 3
+    order = np.argsort(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0], kind="stable")
+    return star[order], corner[order]
+
+
+def part(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Elements:
+    """Some faces (s,), with their corners in the order (s,3)."""
+    triangles, gradient = (np.take_along_axis(x[star], corner, 1) for x in (faces.triangles, faces.gradient))
+    return Elements(triangles, faces.area[star], gradient, faces.ratio[star], faces.weight[star])
+
+
+def relax(vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, weight: float, steps: int) -> None:
+    """Newton steps of every vertex (k,) within its star, in place, each only as far as its own energy falls.
+
+    row (s,): which of the vertices is the first corner of a face of the stars.
+    """
+    k = len(vertex)
+    value = np.bincount(row, energies(faces, w, weight), k)
+    for _ in range(steps):
+        step = _directions(row, faces, w, weight, k)
+        moving = np.ones(k, bool)
+        for _ in range(HALVINGS):
+            trial = w.copy()
+            trial[vertex[moving]] += step[moving]
+            new = np.bincount(row, energies(faces, trial, weight), k)
+            better = moving & (new < value)
+            w[vertex[better]] += step[better]
+            value = np.where(better, new, value)
+            moving &= ~better
+            if not moving.any():
+                break
+            step *= 0.5
+
+
+def _directions(row, faces: Elements, w, weight: float, k: int) -> np.ndarray:
+    """Newton steps (k,) of single vertices."""
+    local = local_derivatives(faces, w, weight, PRESSURE)
+    form = local.rows[:, :, 0]
+    xx, xy, yy = (np.bincount(row, x.sum(1), k) for x in (form.real**2, -form.real * form.imag, form.imag**2))
+    g = [np.bincount(row, x, k) for x in (local.gradient[:, 0].real, local.gradient[:, 0].imag)]
+    det = xx * yy - xy**2 + 1e-12 * (xx + yy) ** 2
+    return (-(yy * g[0] - xy * g[1]) - 1j * (xx * g[1] - xy * g[0])) / det
