@@ -12,7 +12,7 @@ from .settings import RemeshSettings
 from .solver import measure
 from .solver.charts import Surface, chosen_triangles
 from .solver.errors import CountError, DensityError, MeshError
-from .solver.features import all_edges
+from .solver.features import all_edges, within_resolution
 from .solver.footprint import Footprint, footprint
 from .solver.geometry import face_areas
 from .solver.part_maps import Original
@@ -69,18 +69,21 @@ def remesh_series(job: Job, settings: RemeshSettings) -> Steps[Series]:
     chosen_triangles(surface, None)
     triangles = surface.corner_vertex[surface.triangles]
     count_of, counts = _counts(surface, triangles, settings)
-    original = Original(surface.positions, triangles, job.features)
+    originals: dict[bytes, Original] = {}
     with _located(surface, ""):
         density = density_of(job, triangles, settings)
     levels: list[Level] = []
     warnings = list(job.warnings)
     for k, count in enumerate(counts):
         name = f"LOD{k}: " if len(counts) > 1 else ""
+        features, joined = _features(job, triangles, density, count if count_of == "vertices" else count // 2)
+        # As a rule all levels can show the same features, and then one set of maps serves them all.
+        original = originals.setdefault(features.tobytes(), Original(surface.positions, triangles, features))
         steps = _level(job, original, density, count_of, count, settings)
         with _located(surface, name):
             level = yield from part_of(steps, k / len(counts), 1 / len(counts))
         levels.append(level)
-        warnings += [name + text for text in level.found.warnings]
+        warnings += [name + text for text in (*joined, *level.found.warnings)]
         if level.footprint.extended:
             warnings.append(f"{name}{level.footprint.extended} faces reach across a seam; UVs are continued there")
     return Series(levels, warnings)
@@ -101,6 +104,19 @@ def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -
     if count_of == "faces":
         counts = [counts[0], *(c + c % 2 for c in counts[1:])]
     return count_of, counts
+
+
+def _features(
+    job: Job, triangles: np.ndarray, density: np.ndarray | None, samples: int
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The features (e,2) that a mesh of so many vertices can show, and a warning about others."""
+    area = face_areas(job.surface.positions, triangles)
+    level = np.ones(len(area)) if density is None else density
+    # Every vertex has the area of two equilateral triangles.
+    size = np.sqrt(area @ level / (max(samples, 1) * np.sqrt(3) / 2) / level)
+    features, joined = within_resolution(job.surface.positions, triangles, job.features, size)
+    text = "1 region is" if joined == 1 else f"{joined} regions between features are"
+    return features, (f"{text} too small for triangles of this size and not kept apart",) if joined else ()
 
 
 def _level(
@@ -125,7 +141,7 @@ def _level(
     )
     found = yield from part_of(steps, 0.0, 0.95)
     yield Progress("Attributes", 0.95)
-    seams = all_edges(job.features, job.jumps)
+    seams = all_edges(original.features, job.jumps)
     at = footprint(positions, triangles, seams, found.vertices, found.triangles, found.faces, found.barycentric)
     return Level(found.vertices, found.triangles, at, found)
 

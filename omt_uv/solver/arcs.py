@@ -15,6 +15,8 @@ from .topology import boundary_loops, pair_keys
 
 # A boundary or a feature that turns by more than this, radians, has a corner there.
 CORNER = np.radians(50.0)
+# Corners are at least so many edges apart, and from the ends of an arc.
+CLOSEST = 0.6
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,12 @@ def _corners(positions: np.ndarray, vertices: np.ndarray, size: np.ndarray) -> n
     cosine = np.einsum("ij,ij->i", u, v) / np.maximum(length, 1e-300)
     inner = (s > 0) & (s < s[-1]) if vertices[0] != vertices[-1] else s < s[-1]
     at = np.flatnonzero((cosine < np.cos(CORNER)) & (length > 0) & inner)
-    near = np.abs(s[at][:, None] - s[at]) < reach[at][:, None]
+    apart = CLOSEST * size[vertices]
+    if vertices[0] == vertices[-1]:
+        apart = np.minimum(apart, s[-1] / 4)
+    else:
+        at = at[np.minimum(s[at], s[-1] - s[at]) > apart[at]]
+    near = np.abs(s[at][:, None] - s[at]) < apart[at][:, None]
     sharper = (cosine[at] < cosine[at][:, None]) | ((cosine[at] == cosine[at][:, None]) & (at < at[:, None]))
     return vertices[at[~(near & sharper).any(axis=1)]]
 

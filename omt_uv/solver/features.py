@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from .closest import face_normals
-from .topology import halfedges, pair_keys, pair_up
+from .geometry import face_areas, halfedge_lengths
+from .topology import halfedges, pair_keys, pair_up, twins
 
 NO_EDGES = np.zeros((0, 2), np.int64)
+# A region of fewer new triangles than this, or narrower than this share of a new edge, has no shape of its own.
+FEWEST_TRIANGLES, NARROWEST = 0.7, 0.25
 
 
 def sharp_edges(positions: np.ndarray, triangles: np.ndarray, angle: float) -> np.ndarray:
@@ -48,3 +53,55 @@ def _pairs(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def all_edges(*sets: np.ndarray) -> np.ndarray:
     """The union (k,2) of sets of edges, every edge once, the smaller vertex first."""
     return np.unique(np.sort(np.concatenate([NO_EDGES, *(np.reshape(s, (-1, 2)) for s in sets)]), axis=1), axis=0)
+
+
+def within_resolution(
+    positions: np.ndarray, triangles: np.ndarray, features: np.ndarray, size: np.ndarray
+) -> tuple[np.ndarray, int]:
+    """The features (e,2) of a mesh (n,3), (m,3) without the borders of regions too small to show.
+
+    size (m,): how long the edges of a new mesh are to be on every triangle. Regions are the connected pieces between
+    features. One with too few new triangles, or too narrow, joins the neighbour with which it has most of its border in
+    common. Returns the remaining features, and how many regions joined another.
+    """
+    first, second, edges = _pairs(triangles)
+    keys = pair_keys(*features.T)
+    parts = np.isin(pair_keys(*edges.T), keys)
+    count, label = _components(first[~parts] // 3, second[~parts] // 3, len(triangles))
+    own, other = label[first[parts] // 3], label[second[parts] // 3]
+    length = halfedge_lengths(positions, triangles) / np.repeat(size, 3)
+    open_ = np.flatnonzero(twins(triangles) < 0)
+    area = np.bincount(label, face_areas(positions, triangles) / size**2, count)
+    rim = np.bincount(label[open_ // 3], length[open_], count)
+    group = _merged(area, rim, own, other, (length[first] + length[second])[parts] / 2)
+    lost = edges[parts][(own != other) & (group[own] == group[other])]
+    return features[~np.isin(keys, pair_keys(*lost.T))], count - len(np.unique(group))
+
+
+def _components(a: np.ndarray, b: np.ndarray, count: int) -> tuple[int, np.ndarray]:
+    return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)
+
+
+def _merged(area: np.ndarray, rim: np.ndarray, own: np.ndarray, other: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Group (r,) of every region after small ones have joined others, as often as it takes.
+
+    area (r,) and rim (r,), the length of the mesh's boundary, in units of new edges; own, other (e,): regions on the
+    two sides of every border edge, length (e,).
+    """
+    group, count = np.arange(len(area)), len(area)
+    while True:
+        a, b = group[own], group[other]
+        between = a != b
+        a, b, shared = a[between], b[between], np.tile(length[between], 2)
+        side = np.concatenate([a, b])
+        border = np.bincount(side, shared, count) + np.bincount(group, rim, count)
+        inside = np.bincount(group, area, count)
+        small = (inside < FEWEST_TRIANGLES * np.sqrt(3) / 4) | (2 * inside < NARROWEST * border)
+        pair, index = np.unique(side * count + np.concatenate([b, a]), return_inverse=True)
+        total = np.bincount(index, shared, len(pair))
+        pair, total = pair[small[pair // count]], total[small[pair // count]]
+        if not len(pair):
+            return group
+        order = np.lexsort([-total, pair // count])
+        best = pair[order[np.r_[True, np.diff(pair[order] // count) > 0]]]
+        group = _components(best // count, best % count, count)[1][group]
