@@ -314,3 +314,58 @@ def test_models_of_many_parts(name, parts):
     prepared = prepare(triangle_surface(V, F))
     assert len(prepared.charts) == parts
     assert sum(len(c.triangles) for c in prepared.charts) == len(F)
+
+
+def prism(sides, height=2.0, taper=1.0):
+    """A closed prism, or with a taper a frustum, with one polygon on top and one below."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    k = np.arange(sides)
+    walls = np.column_stack([k, (k + 1) % sides, (k + 1) % sides + sides, k + sides])
+    return np.vstack([ring, taper * ring + [0, 0, height]]), [*walls.tolist(), k[::-1].tolist(), (k + sides).tolist()]
+
+
+def notched_block():
+    """A long block with a step, all of it in unit cubes: flat vertices between the corners."""
+    x, y, z = np.mgrid[0:4, 0:2, 0:2]
+    solid = (z == 0) | (x < 2)
+    faces = []
+    for axis in range(3):
+        for side in (0, 1):
+            step = np.zeros(3, int)
+            step[axis] = 2 * side - 1
+            for cell in np.argwhere(solid):
+                near = cell + step
+                if (near >= 0).all() and (near < solid.shape).all() and solid[tuple(near)]:
+                    continue
+                one, two = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
+                base = cell + side * np.eye(3, dtype=int)[axis]
+                quad = [base, base + one, base + one + two, base + two]
+                faces.append([tuple(v) for v in (quad if side else quad[::-1])])
+    names = {v: k for k, v in enumerate(sorted({v for f in faces for v in f}))}
+    return np.array(sorted(names), float), [[names[v] for v in f] for f in faces]
+
+
+NETS = {
+    "cube": lambda: prism(4, np.sqrt(2)), "slab": lambda: prism(4, 0.1), "hexagon": lambda: prism(6),
+    "cylinder": lambda: prism(48), "frustum": lambda: prism(24, 1.0, 0.5), "block": notched_block,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("scale, shift", [(1, 0), (1e-6, 0), (1, 1e5)])
+@pytest.mark.parametrize("name", sorted(NETS))
+def test_bodies_with_flat_sides_unroll(name, scale, shift):
+    V, polygons = NETS[name]()
+    result = drain(unwrap(meshes.polygon_surface(scale * V + shift, polygons)))
+    (chart_map,) = result.maps
+    assert chart_map.area_l1 < 1e-5 and chart_map.angle_mean < 1 + 1e-5 and not chart_map.warnings
+
+
+def test_smooth_bodies_and_those_to_be_kept_free_of_seams_have_no_net():
+    sphere = cut(triangle_surface(*meshes.icosphere(2)))
+    assert len(sphere.pieces[0].extremities) <= 8
+    V, polygons = prism(12)
+    surface = meshes.polygon_surface(V, polygons)
+    avoid = (V[:, 2] > 1).astype(float)
+    cuts = cut(surface, avoid=avoid)
+    assert (avoid[cuts.edges].min(axis=1) > 0).sum() < (avoid[cut(surface).edges].min(axis=1) > 0).sum() == 11

@@ -1,7 +1,7 @@
 """Cuts that turn every part of a surface into a disk, short and where they are least seen.
 
 Boundaries are joined by shortest paths, handles are opened along short loops, and a surface that has to be cut
-anyway is cut to the extremities that would be distorted most.
+anyway is cut to the extremities that would be distorted most, or, where its sides are flat, to a net.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from .cut_graph import greedy_arcs, path_to, shorten
 from .extremities import log_scale, spread
 from .geometry import face_areas
 from .holes import fill_holes
+from .nets import net
 from .piece import NOISE, SEAM, SHARP, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .repair import Repaired, join, weldable
 from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
@@ -83,7 +84,7 @@ def cut(
     ----------
     avoid : (n,) in [0,1], vertices to keep free of seams
     fill : take holes for filled, all boundaries but the longest of every part
-    extremities : tips that a surface is opened through, at most
+    extremities : tips that a surface is opened through, at most, where it has no net
 
     Raises
     ------
@@ -150,7 +151,9 @@ def _cut_parts(
         piece = make_piece(sheets, positions, corner_class, members[k], mine, weight, ease)
         name = fingerprint(piece)
         if name not in known:
-            known[name] = open_piece(piece, kind, k, extremities)
+            filled = (sheets.owner[members[k]] < 0).any()
+            unrolled = net(piece) if extremities and not filled else None
+            known[name] = unrolled or open_piece(piece, kind, k, extremities)
         chosen, tips = known[name]
         gone[piece.sheet_pair[chosen]] = True
         length = float(piece.length[chosen].sum()) * unit

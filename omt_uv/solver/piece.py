@@ -149,8 +149,11 @@ def make_piece(
     return Piece(p, triangles, pair, mine, ends, length, cost, rim, members, vertex_ids, weight[vertex_ids])
 
 
-def _hiding(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> np.ndarray:
-    """Factor (e,) that makes creased and hollow edges cheaper, by the angle between the faces of an edge."""
+def fold_angles(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> np.ndarray:
+    """Angle (e,) between the normals of the two faces (m,3) at pairs of halfedges (e,2), radians.
+
+    Negative where the surface is hollow, 0 beside faces without area.
+    """
     p = positions[triangles]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     size = np.linalg.norm(normal, axis=1)
@@ -161,8 +164,14 @@ def _hiding(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> n
     far = positions[triangles[s, (pair[:, 1] + 2) % 3]] - positions[triangles[t, pair[:, 0] % 3]]
     rise = (normal[t] * far).sum(axis=1)
     depth = np.where((size[t] > 0) & (size[s] > 0), np.arccos(cosine), 0.0)
-    share = np.clip((depth - SMOOTH) / (np.pi / 2 - SMOOTH), 0, 1)
-    return 1 - share * np.where(rise > 0, 1 - HOLLOW, 1 - CREASE)
+    return np.where(rise > 0, -depth, depth)
+
+
+def _hiding(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> np.ndarray:
+    """Factor (e,) that makes creased and hollow edges cheaper, by the angle between the faces of an edge."""
+    fold = fold_angles(positions, triangles, pair)
+    share = np.clip((np.abs(fold) - SMOOTH) / (np.pi / 2 - SMOOTH), 0, 1)
+    return 1 - share * np.where(fold < 0, 1 - HOLLOW, 1 - CREASE)
 
 
 def edge_graph(piece: Piece, edges: np.ndarray, ends: np.ndarray, n: int) -> csr_matrix:
