@@ -58,7 +58,9 @@ def opened(
     if not (np.diff(surface.face_start) > 3).any():
         return {}
     first = np.cumsum([0, *(len(uv) for uv in maps)])
-    w = np.concatenate(maps) @ [1, 1j]
+    # In units of the map, so that no area under- or overflows.
+    unit = float(np.abs(np.concatenate(maps)).max())
+    w = np.concatenate([uv / unit for uv in maps]) @ [1, 1j]
     triangles = np.concatenate([c.triangles + k for c, k in zip(charts, first, strict=False)])
     corners = _mapped_corners(surface, charts, triangles, w)
     if not corners.shut(w).any():
@@ -73,7 +75,12 @@ def opened(
         if not any(map(len, crossed)):
             break
         held[np.concatenate(crossed)] = True
-    return {int(k): np.column_stack([moved.real, moved.imag])[first[k] : first[k + 1]] for k in changed}
+    new = {int(k): maps[k].copy() for k in changed}
+    for k, uv in new.items():
+        mine = slice(first[k], first[k + 1])
+        rows = np.flatnonzero(moved[mine] != w[mine])
+        uv[rows] = unit * np.column_stack([moved.real, moved.imag])[mine][rows]
+    return new
 
 
 @dataclass(frozen=True)
@@ -93,6 +100,8 @@ class _Mesh:
 def _union(charts, first, density, weights, w) -> _Mesh:
     """All charts side by side, patches over holes included; they ask for their own areas."""
     positions = np.concatenate([c.vertices for c in charts])
+    low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
+    positions = (positions / 2 - low) / (high - low).max()
     triangles = np.concatenate([c.disk + k for c, k in zip(charts, first, strict=False)])
     target = face_areas(positions, triangles)
     covered = signed_areas(np.column_stack([w.real, w.imag]), triangles)

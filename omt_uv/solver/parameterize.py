@@ -172,10 +172,11 @@ def with_open_corners(
     new = list(maps)
     for k, uv in opened(surface, charts, [m.uv for m in maps], fixed, density, [m.weight for m in maps]).items():
         chart, old = charts[k], maps[k]
-        figures = measure(chart.vertices, chart.triangles, uv[chart.triangles], overlap=False, density=density[k])
+        (vertices, _), (flat, unit) = _in_unit_box(chart.vertices), _in_unit_box(uv)
+        figures = measure(vertices, chart.triangles, flat[chart.triangles], overlap=False, density=density[k])
         if figures.area_l1 <= AREA_KEPT * max(old.area_l1, QUALITIES[quality].area_error) and not figures.folds:
             if not fixed[k].any():
-                uv = _as_before(uv, old.uv, chart.triangles)
+                uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
             new[k] = replace(
                 old, uv=uv, area_l1=figures.area_l1, area_sd=figures.area_sd, angle_mean=figures.angle_mean
             )
@@ -227,7 +228,7 @@ def _together(charts: list[Chart], quality: str, balance: float) -> Steps[list[C
         pieces = np.split(maps.uv, np.cumsum([len(v) for v, _ in meshes])[:-1])
         for k, (vertices, unit), chart, uv, place in zip(batch, boxes, members, pieces, range(len(batch)), strict=True):
             if maps.solved[place]:
-                uv = _about_zero(_in_place(uv, vertices, chart.triangles, None, unit, None), chart.triangles)
+                uv = _in_place(uv, vertices, chart.triangles, None, unit, None)
                 found[k] = _of_many(maps, place, uv, seconds)
     return found
 
@@ -333,9 +334,9 @@ def unwrap_chart(
         figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
     if figures.folds:
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
-    uv = refined.uv if held else _in_place(refined.uv, vertices, chart.triangles, asked, unit, pins)
+    free = boundary == "free"
     return ChartMap(
-        _about_zero(uv, chart.triangles) if pins is None and boundary == "free" else uv,
+        refined.uv if held else _in_place(refined.uv, vertices, chart.triangles, asked, unit, pins, free),
         first.conformal.iterations if first.conformal else None,
         first.conformal.residual if first.conformal else None,
         first.cells.iterations if first.cells else None,
@@ -389,13 +390,20 @@ def _with_patches(density, region, patches: int) -> tuple[np.ndarray | None, np.
     )
 
 
-def _in_place(uv: np.ndarray, vertices, triangles, density, unit: float, pins: ChartPins | None) -> np.ndarray:
-    """A map uv (n,2) of a chart in a unit box, as large as its target really is, or where its one or two pins are."""
+def _in_place(
+    uv: np.ndarray, vertices, triangles, density, unit: float, pins: ChartPins | None, centred: bool = True
+) -> np.ndarray:
+    """A map uv (n,2) of a chart in a unit box, as large as its target really is, or where its one or two pins are.
+
+    centred : with its centroid at 0, if it has no pins
+    """
     # A polygon inscribed in the disk is smaller than the disk: one texel density needs its own area.
     covered = signed_areas(uv, triangles).sum()
     area = face_areas(vertices, triangles)
     uv = uv * np.sqrt((area.sum() if density is None else area @ density) / covered)
-    return uv * unit if pins is None else anchored(uv, triangles, pins)
+    if pins is not None:
+        return anchored(uv, triangles, pins)
+    return (_about_zero(uv, triangles) if centred else uv) * unit
 
 
 def _about_zero(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
