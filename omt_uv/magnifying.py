@@ -13,14 +13,14 @@ import numpy as np
 
 from .settings import MagnifySettings
 from .solver.chart_pins import CornerPins
-from .solver.charts import Surface, check_disk
+from .solver.charts import Surface, check_disk, triangle_rows
 from .solver.distortion import measure
 from .solver.errors import EmptyMeshError, MeshError, WeightError
 from .solver.exact_share import ExactShare, exact_share
 from .solver.geometry import face_areas, signed_areas
 from .solver.islands import Island, uv_islands
 from .solver.lens import OUTLINES, Lens, aligned_to, magnify_map, refuse_folds
-from .solver.measure import Target, check_weights, from_vertices, normalised, painted, share
+from .solver.measure import Target, check_weights, from_polygons, from_vertices, normalised, painted, share
 from .solver.overlap import overlap_share
 from .solver.parameterize import located, unwrap_chart
 from .solver.progress import Steps, part_of
@@ -33,12 +33,20 @@ OVERLAP = 1e-4
 
 @dataclass(frozen=True)
 class Region:
-    """A surface, the polygons (f,) bool to work on, weights (n,) of its vertices, UVs and pins if it has any."""
+    """A surface, the polygons (f,) bool to work on, weights of its vertices (n,), or of its polygons (f,) where
+    `kind` is "face", UVs and pins if it has any."""
 
     surface: Surface
     faces: np.ndarray
     weights: np.ndarray
     pins: CornerPins | None = None
+    kind: str = "vertex"
+
+    def of_triangles(self, rows: np.ndarray) -> np.ndarray:
+        """Weights (k,) of some triangles (k,) of the surface."""
+        if self.kind == "face":
+            return from_polygons(self.weights, self.surface.triangle_face[rows])
+        return from_vertices(self.weights, self.surface.corner_vertex[self.surface.triangles[rows]])
 
 
 @dataclass(frozen=True)
@@ -93,13 +101,13 @@ def magnify(
 
 
 def _check(region: Region) -> None:
-    """Weights that are no weights, named by their vertices; a region may lie on one of several surfaces alone."""
+    """Weights that are no weights, by their elements; a region may lie on one of several surfaces alone."""
     wrong = np.flatnonzero(~np.isfinite(region.weights))
     if len(wrong):
-        raise WeightError("A weight is not a finite number", kind="vertex", elements=wrong)
+        raise WeightError("A weight is not a finite number", kind=region.kind, elements=wrong)
     wrong = np.flatnonzero((region.weights < 0) | (region.weights > 1))
     if len(wrong):
-        raise WeightError("A weight is not between 0 and 1", kind="vertex", elements=wrong)
+        raise WeightError("A weight is not between 0 and 1", kind=region.kind, elements=wrong)
 
 
 # ---- from the mesh ------------------------------------------------------------------------------------------
@@ -146,7 +154,7 @@ def _triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rows = np.flatnonzero(region.faces[surface.triangle_face])
     vertices = surface.corner_vertex[surface.triangles[rows]]
     area = face_areas(surface.positions, vertices)
-    return rows, np.where(np.isfinite(area), area, 0.0), from_vertices(region.weights, vertices)
+    return rows, np.where(np.isfinite(area), area, 0.0), region.of_triangles(rows)
 
 
 def _uv_areas(region: Region, part, corners: np.ndarray, uv: np.ndarray) -> np.ndarray:
@@ -181,7 +189,7 @@ def _from_uv(regions, settings: MagnifySettings) -> Steps[Magnified]:
     done = 0
     for owner, island in islands:
         size = len(island.chart.triangles)
-        weights = from_vertices(regions[owner].weights[island.chart.vertex_ids], island.chart.triangles)
+        weights = _weights_of(regions[owner], island)
         try:
             piece, texts = yield from part_of(_piece(owner, island, weights, settings), done / total, size / total)
         except MeshError as error:
@@ -207,20 +215,25 @@ def _islands(regions) -> tuple[list[tuple[int, Island]], list[tuple[int, str]]]:
             raise Refusal(index, error) from error
         warnings += [(index, text) for text in islands.warnings]
         for island in islands.islands:
-            weights = region.weights[island.chart.vertex_ids]
+            weights = _weights_of(region, island)
             if np.ptp(weights) > 0:
                 found.append((index, island))
             elif weights[0] > 0:
                 constant += 1
     if not found:
         try:
-            check_weights(np.concatenate([r.weights for r in regions]), "vertex")
+            check_weights(np.concatenate([r.weights for r in regions]), regions[0].kind)
             raise WeightError("No island has both a part of the region and a rest", "Paint a part of an island")
         except MeshError as error:
             raise Refusal(0, error) from error
     if constant:
         warnings.append((-1, f"{constant} islands are painted all over; they stay as they are"))
     return found, warnings
+
+
+def _weights_of(region: Region, island: Island) -> np.ndarray:
+    """Weights (m,) of an island's triangles."""
+    return region.of_triangles(triangle_rows(region.surface, island.chart))
 
 
 def _piece(owner: int, island: Island, weights, settings: MagnifySettings) -> Steps[tuple[_Piece, tuple[str, ...]]]:

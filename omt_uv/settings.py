@@ -148,6 +148,15 @@ SOURCES = (
     ("MESH", "Mesh", "Unwrap anew: every part of the surface gets its share, and the region what was asked"),
     ("UV", "UVs", "Magnify inside the UV islands that are there, in their own outline, like a lens on a map"),
 )
+REGIONS = (
+    (
+        "GROUP",
+        "Vertex Group",
+        "Painted in Weight Paint; or saliency or curvature, computed where no group has that name",
+    ),
+    ("ATTRIBUTE", "Attribute", "Floats on vertices or faces, such as those that Geometry Nodes store"),
+)
+DEFAULT_REGION = "GROUP"
 OWN_BOUNDARY = ("OWN", "Own", "The outline that islands have: circles and straight sides stay, others are free")
 DEFAULT_SOURCE = "MESH"
 DEFAULT_FACTOR = 4.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from ..settings import (
@@ -27,7 +28,10 @@ def add(commands) -> None:
     command.set_defaults(run=run, balance=0.0)
     add_files(command, accepts=f"{FORMATS} .off")
     command.add_argument(
-        "--weights", required=True, metavar="GROUP", help="vertex group of the region; or saliency, or curvature"
+        "--weights",
+        required=True,
+        metavar="NAME",
+        help="vertex group of the region, or an attribute of floats on vertices or faces; or saliency, or curvature",
     )
     command.add_argument(
         "--factor", type=float, default=DEFAULT_FACTOR, metavar="M", help="times its share (default %(default)s)"
@@ -69,7 +73,7 @@ def times(text: str) -> int:
 def run(options: argparse.Namespace) -> None:
     _, _, blender_pack = blender()
     from ..blender_seams import GroupError
-    from ..blender_weights import ScoreError, region_weights
+    from ..blender_weights import ScoreError, named_weights
     from ..magnifying import Region, magnify, warped_picture
     from ..packing import PackingError
 
@@ -87,9 +91,12 @@ def run(options: argparse.Namespace) -> None:
     pairs = read_layers(options)
     objects = [obj for obj, _ in pairs]
     with refusals(objects, PackingError, GroupError, ScoreError):
-        weights = region_weights(pairs, options.weights)
-        regions = [Region(r.surface, r.faces, w, r.all_pins) for (_, r), w in zip(pairs, weights, strict=True)]
+        weights, told = named_weights(pairs, options.weights)
+        regions = [
+            Region(r.surface, r.faces, w.values, r.all_pins, w.kind) for (_, r), w in zip(pairs, weights, strict=True)
+        ]
         result = drain_shown(magnify(regions, settings, blender_pack.pack))
+        result = replace(result, warnings=[*told, *result.warnings])
         warnings = write_layers(options, objects, result)
     if picture is not None:
         _write_picture(options.image_output, warped_picture(picture, regions, result, options.margin))

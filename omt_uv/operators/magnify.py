@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
@@ -9,14 +11,16 @@ from ..settings import (
     BOUNDARIES,
     DEFAULT_FACTOR,
     DEFAULT_QUALITY,
+    DEFAULT_REGION,
     DEFAULT_SOURCE,
     OWN_BOUNDARY,
     QUALITIES,
+    REGIONS,
     SOURCES,
     MagnifySettings,
 )
 from .common import Complaint, SolverOperator, read_objects, warn
-from .properties import MarginSettings, choose_group, draw_margin
+from .properties import MarginSettings, choose_attribute, choose_group, draw_margin
 
 
 class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
@@ -36,10 +40,15 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         soft_max=16.0,
     )
     source: EnumProperty(name="Source", description="What is magnified", items=SOURCES, default=DEFAULT_SOURCE)
+    region: EnumProperty(name="Region", description="What marks the region", items=REGIONS, default=DEFAULT_REGION)
     weight_group: StringProperty(
-        name="Region",
+        name="Vertex Group",
         description="Vertex group that marks the region with weight 1; saliency or curvature if no group has such a "
         "name. Empty: the active vertex group",
+    )
+    attribute: StringProperty(
+        name="Attribute",
+        description="Attribute of floats on vertices or faces that marks the region with 1, or its largest value",
     )
     exact: BoolProperty(
         name="Exact Share",
@@ -90,7 +99,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         from .. import blender_mesh, blender_pack, packing, running
         from ..blender_pictures import ImageError, picture_of
         from ..blender_seams import GroupError
-        from ..blender_weights import ScoreError, region_weights
+        from ..blender_weights import ScoreError
         from ..magnifying import Region, magnify, warped_picture
         from ..unwrapping import Refusal
 
@@ -99,12 +108,14 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             for obj, _ in pairs:
                 blender_mesh.check_target(obj.data, "")
             picture = picture_of(self.image) if self.image and self.source == "UV" else None
-            weights = region_weights(pairs, self.weight_group or _active_group(context))
+            weights, warnings = self._weights(context, pairs)
         except (blender_mesh.TargetError, GroupError, ImageError) as error:
             raise Complaint(str(error)) from error
         except ScoreError as error:
             raise Complaint(str(error), error.obj, error.error) from error
-        regions = [Region(r.surface, r.faces, w, r.all_pins) for (_, r), w in zip(pairs, weights, strict=True)]
+        regions = [
+            Region(r.surface, r.faces, w.values, r.all_pins, w.kind) for (_, r), w in zip(pairs, weights, strict=True)
+        ]
         pack = running.in_front(blender_pack.pack)
         try:
             result = yield from running.aside(magnify(regions, self.settings(), pack))
@@ -115,7 +126,16 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             raise Complaint(str(error)) from error
         if picture is not None:
             picture = warped_picture(picture, regions, result, self.margin)
+        result = replace(result, warnings=[*warnings, *result.warnings])
         return [obj for obj, _ in pairs], result, picture
+
+    def _weights(self, context: bpy.types.Context, pairs):
+        """Weights of each object, and warnings. Raises GroupError, ScoreError."""
+        from ..blender_weights import Weights, attribute_weights, region_weights
+
+        if self.region == "ATTRIBUTE":
+            return attribute_weights(pairs, self.attribute)
+        return [Weights(w) for w in region_weights(pairs, self.weight_group or _active_group(context))], []
 
     def finish(self, context: bpy.types.Context, result) -> None:
         from .. import blender_mesh
@@ -150,7 +170,11 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "factor")
-    choose_group(layout, properties, "weight_group")
+    layout.prop(properties, "region")
+    if properties.region == "ATTRIBUTE":
+        choose_attribute(layout, properties, "attribute")
+    else:
+        choose_group(layout, properties, "weight_group")
     layout.prop(properties, "exact")
     layout.prop(properties, "source")
     layout.prop(properties, "boundary")

@@ -138,6 +138,91 @@ def test_refusals_change_nothing(arguments, message, mode):
     assert scenes.state(obj) == before
 
 
+def with_attribute(values, domain="POINT", name="heat", data_type="FLOAT", **options):
+    """A painted bump with an attribute as well; the object."""
+    obj = painted(**options)
+    attribute = obj.data.attributes.new(name, data_type, domain)
+    if data_type == "FLOAT":
+        attribute.data.foreach_set("value", np.asarray(values(obj), np.float32))
+    return obj
+
+
+def of_group(obj):
+    return weights_of(obj)
+
+
+def of_faces(obj):
+    w = weights_of(obj)
+    return [w[list(p.vertices)].mean() for p in obj.data.polygons]
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("source", ["MESH", "UV"])
+def test_attributes_of_vertices_are_as_good_as_groups(source, mode):
+    obj = with_attribute(lambda obj: 4 * of_group(obj))
+    start = scenes.uv_of(obj)
+    magnify(factor=2.0, source=source)
+    by_group = scenes.uv_of(obj)
+    scenes.set_uv(obj, start)
+    if mode == "EDIT":
+        scenes.edit(obj)
+    # Four times the weights: what goes beyond 1 is divided by the largest value.
+    magnify(factor=2.0, source=source, region="ATTRIBUTE", attribute="heat")
+    if mode == "EDIT":
+        scenes.leave_edit()
+    np.testing.assert_allclose(scenes.uv_of(obj), by_group, atol=1e-4)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("source", ["MESH", "UV"])
+def test_attributes_of_faces_get_their_share(source, mode):
+    obj = with_attribute(of_faces, "FACE")
+    values = np.array(of_faces(obj))
+
+    def has(areas):
+        w = values[[t.polygon_index for t in obj.data.loop_triangles]]
+        return w @ np.abs(areas) / np.abs(areas).sum()
+
+    asked = 2.0 * has(scenes.areas(obj)[0 if source == "MESH" else 1])
+    untouched = scenes.state(obj, leave_out={"UVMap"})
+    if mode == "EDIT":
+        scenes.edit(obj)
+    magnify(factor=2.0, source=source, region="ATTRIBUTE", attribute="heat")
+    if mode == "EDIT":
+        scenes.leave_edit()
+    assert has(scenes.areas(obj)[1]) == pytest.approx(asked, rel=5e-3)
+    assert scenes.state(obj, leave_out={"UVMap"}) == untouched
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("domain", ["POINT", "FACE"])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda w: np.where(np.arange(len(w)) == 7, np.nan, w), "not a finite number"),
+        (lambda w: np.where(np.arange(len(w)) == 7, -0.5, w), "not between 0 and 1"),
+        (lambda w: 0 * w, "All weights are zero"),
+    ],
+)
+def test_attributes_that_are_no_weights_change_nothing(change, message, domain, mode):
+    of = of_group if domain == "POINT" else of_faces
+    obj = with_attribute(lambda obj: change(np.array(of(obj))), domain)
+    if mode == "EDIT":
+        scenes.edit(obj)
+    before = scenes.state(obj)
+    assert message in scenes.error_of(bpy.ops.uv.omt_magnify, region="ATTRIBUTE", attribute="heat")
+    assert scenes.state(obj) == before
+
+
+@pytest.mark.parametrize("name", ["", "nowhere", "colour"])
+def test_attributes_that_cannot_be_used_are_named(name):
+    obj = with_attribute(None, "CORNER", "colour", "FLOAT_COLOR")
+    before = scenes.state(obj)
+    told = scenes.error_of(bpy.ops.uv.omt_magnify, region="ATTRIBUTE", attribute=name)
+    assert "attribute" in told and (name or "named") in told
+    assert scenes.state(obj) == before
+
+
 def test_folded_uvs_are_refused_and_shown():
     obj = painted()
     uv = scenes.uv_of(obj)
@@ -262,3 +347,26 @@ def test_commands_refuse_on_one_line(run, tmp_path, options):
     status, _, err = run("magnify", tmp_path / "in.blend", "-o", tmp_path / "out.blend", *options)
     assert status == 1 and len(err.splitlines()) == 1
     assert not (tmp_path / "out.blend").exists()
+
+
+def test_command_finds_groups_first_then_attributes(run, tmp_path):
+    with_attribute(of_group)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    report = tmp_path / "r.json"
+    files = (tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--factor", 2, "--report", report)
+    shares = {}
+    for name in ("region", "heat"):
+        status, _, err = run("magnify", *files, "--weights", name)
+        assert (status, err) == (0, "")
+        shares[name] = json.loads(report.read_text())["share"]["after"]
+    assert shares["heat"] == pytest.approx(shares["region"], rel=1e-3)
+
+
+def test_command_says_where_a_name_is_both(run, tmp_path):
+    obj = with_attribute(lambda obj: 1 - of_group(obj))
+    obj.vertex_groups["region"].name = "heat"
+    if "heat" not in obj.vertex_groups or "heat" not in obj.data.attributes:
+        pytest.skip("this Blender keeps the names of groups and attributes apart")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    status, _, err = run("magnify", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "heat")
+    assert status == 0 and "a vertex group and an attribute" in err
