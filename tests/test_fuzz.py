@@ -294,6 +294,20 @@ def test_every_outcome_is_a_map_or_a_named_error(chunk):
         check_outcome(seed, *broken_mesh(seed))
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("seed", [107536, 110622])
+def test_systems_that_rounding_makes_singular_have_a_map(seed):
+    surface, faces, options = broken_mesh(seed)
+    check_result(drain(unwrap(surface, faces, **options)), surface, faces)
+
+
+@meshes.models_missing
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_transport_that_rounding_makes_singular_is_replaced():
+    surface, faces, options = broken_model(101133)
+    check_result(drain(unwrap(surface, faces, **options)), surface, faces)
+
+
 @meshes.models_missing
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("chunk", range(4))

@@ -160,7 +160,7 @@ def _transport(sites, mass, domain: Domain, log: Log):
     with log.timed("transport"):
         try:
             return (yield from part_of(transport(sites, mass, domain), *TRANSPORT)), ""
-        except TransportError as error:
+        except (TransportError, PrecisionError) as error:
             return None, error.cause
 
 

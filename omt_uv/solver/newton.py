@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from .energy import Elements, energies, local_derivatives, scatter, shortfall, squared
+from .errors import PrecisionError
 from .linear import Factor
 
 ARMIJO = 1e-4
@@ -17,6 +18,8 @@ MAX_HALVINGS = 40
 FOLD_SHARE = 0.9
 # Added to the diagonal, relative to its mean: a free map has no place and no direction of its own.
 SHIFT = 1e-10
+# So many times as much where that is not enough.
+SHIFT_GROWTH = 1e3
 
 
 class Motion(Protocol):
@@ -209,8 +212,21 @@ def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarr
     matrix = problem.assembly.matrix(blocks, diagonal.ravel() + SHIFT * scale)
     if problem.extras:
         matrix = matrix + extra
-    step = -Factor(matrix, "natural").solve(axes.ravel())
+    step = -_solution(matrix, axes.ravel(), scale)
     return step.view(complex), float(step @ axes.ravel())
+
+
+def _solution(matrix: sp.spmatrix, b: np.ndarray, scale: float) -> np.ndarray:
+    """Solution x (n,) of matrix x = b; shifted where rounding makes it singular: a shorter step, which goes down still."""
+    shift = SHIFT
+    while True:
+        try:
+            return Factor(matrix, "natural").solve(b)
+        except PrecisionError:
+            if shift > 1:
+                raise
+            shift *= SHIFT_GROWTH
+            matrix = matrix + shift * scale * sp.identity(len(b))
 
 
 def newton_step(problem: Problem, w: np.ndarray, value: float, pressure: float = 1.0) -> Step:
