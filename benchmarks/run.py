@@ -30,6 +30,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 from cases import ROOT, Table, available, load_case, our_uv, timed  # first: it finds the modules below
+from counting import counted
 from scipy.spatial import ConvexHull
 
 from omt_uv.solver.charts import split, triangle_surface
@@ -54,7 +55,8 @@ OVERLAP_GOAL = 1e-4
 SD_GOAL = 1e-3
 TIME_GOALS = {"standard": 1.0, "exact": 3.0}
 PEAK_GOAL = 2 * 2**30
-HULL_GOAL = 6.0  # at 100,000 sites and more
+HULL_GOAL = 6.0  # at 100,000 sites
+MILLION_GOAL = 15.0  # times the time at 100,000 sites
 
 
 def median_of(runs, work):
@@ -81,35 +83,48 @@ def transport_part(args):
             "diagrams": 9,
             "hulls": 5,
             "flips": 8,
+            "cycles": 6,
             "residual": 9,
             "area error": 10,
             "hull": 8,
             "time": 8,
             "ratio": 7,
+            "peak MiB": 9,
         }
         | {"missed goals": 20},
     )
+    times = {}
     for count in args.sites:
         sites = random_sites(count)
         lifted = np.column_stack([sites, (sites**2).sum(1)])
         _, hull = median_of(args.runs, lambda lifted=lifted: ConvexHull(lifted))
-        result, seconds = median_of(args.runs, lambda s=sites, n=count: drain(transport(s, np.ones(n), Disk())))
+        with counted() as tally:
+            result, seconds = median_of(args.runs, lambda s=sites, n=count: drain(transport(s, np.ones(n), Disk())))
+        times[count] = seconds
         table.add(
             sites=count,
             Newton=result.iterations,
             diagrams=result.diagrams,
             hulls=result.hulls,
             flips=result.flips,
+            cycles=tally.cycles // args.runs,
             residual=result.residual,
             hull=hull,
             time=seconds,
             ratio=seconds / hull,
             **{
                 "area error": abs(float(result.cells.area.sum()) / np.pi - 1),
-                "missed goals": "time" if count >= 100_000 and seconds > HULL_GOAL * hull else "",
+                "peak MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
+                "missed goals": "time" if _transport_is_slow(count, seconds, hull, times) else "",
             },
         )
     return table
+
+
+def _transport_is_slow(count, seconds, hull, times):
+    if count == 1_000_000 and 100_000 in times:
+        return seconds > MILLION_GOAL * times[100_000]
+    return count >= 100_000 and seconds > HULL_GOAL * hull
 
 
 # ---- unwraps ------------------------------------------------------------------------------------------------

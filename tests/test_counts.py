@@ -29,8 +29,8 @@ def test_transport_of_random_sites():
         found = drain(transport(sites, np.ones(len(sites)), Disk()))
     assert found.iterations <= 9 and found.diagrams <= 11 and found.hulls <= 2
     assert found.flips <= 5000
-    assert tally.factorisations == found.iterations and tally.nonzeros <= 3 * found.iterations * len(sites)
-    assert tally.cycles <= 20 * found.iterations
+    assert tally.factorisations <= 4 and tally.nonzeros <= 3 * tally.factorisations * len(sites)
+    assert tally.cycles <= 25 * found.iterations
 
 
 def test_the_order_of_large_meshes_gives_the_same_maps(monkeypatch):

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.sparse import csr_matrix
+
+PART = 1 << 14
 
 
 def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -24,6 +28,12 @@ def as_complex(points: np.ndarray) -> np.ndarray:
 def as_points(z: np.ndarray) -> np.ndarray:
     """Complex numbers (n,) as points of the plane (n,2)."""
     return z.view(float).reshape(-1, 2)
+
+
+def in_parts(*arrays: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
+    """Parts of arrays (k, ...), so small that what is computed from one of them stays in the cache."""
+    count = len(arrays[0]) // PART + 1
+    return zip(*(np.array_split(a, count) for a in arrays), strict=True)
 
 
 def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -17,6 +17,8 @@ COARSEST = 1000
 # Of Jacobi's method: 4/3 over the largest eigenvalue of D^-1 A, which is at most 2.
 DAMPING = 2 / 3
 MOST = 200
+# A hierarchy of an older matrix serves while it takes at most so many times the cycles it took for its own.
+SLOWER = 1.5
 
 
 class Multigrid:
@@ -50,24 +52,39 @@ class Multigrid:
         return x + smoother * (b - A @ x)
 
 
-def solve_laplacian(A: sp.csr_matrix, b: np.ndarray, scale: np.ndarray, tolerance: float) -> np.ndarray:
-    """Solve A x = b (n,), A and its unknowns as in `Multigrid`; the mean of x is 0.
+class Laplacians:
+    """Solves with one Laplacian after the other, each a little different: a hierarchy serves until it is slow."""
 
-    Ends at max(|b - A x| / scale) <= tolerance max(|b| / scale), scale (n,) > 0. Raises PrecisionError.
-    """
-    residual = b - b.mean()
-    cycle = Multigrid(A).cycle
-    x, enough = np.zeros(len(b)), tolerance * np.abs(residual / scale).max()
+    def __init__(self):
+        self._hierarchy: Multigrid | None = None
+        self._most = 0.0
+
+    def solve(self, A: sp.csr_matrix, b: np.ndarray, scale: np.ndarray, tolerance: float) -> np.ndarray:
+        """Solve A x = b (n,), A and its unknowns as in `Multigrid`; the mean of x is 0.
+
+        Ends at max(|b - A x| / scale) <= tolerance max(|b| / scale), scale (n,) > 0. Raises PrecisionError.
+        """
+        hierarchy = self._hierarchy or Multigrid(A)
+        x, cycles = _by_gradients(A, b - b.mean(), scale, tolerance, hierarchy)
+        if self._hierarchy is None:
+            self._most = SLOWER * cycles
+        self._hierarchy = hierarchy if cycles <= self._most else None
+        return x - x.mean()
+
+
+def _by_gradients(A, b, scale, tolerance, hierarchy: Multigrid) -> tuple[np.ndarray, int]:
+    """Conjugate gradients: the solution and the number of cycles. Where they do not converge, A is factored."""
+    residual, x = b.copy(), np.zeros(len(b))
+    enough = tolerance * np.abs(b / scale).max()
     direction, power = 0.0, 1.0
-    for _ in range(MOST):
+    for cycles in range(MOST):
         if np.abs(residual / scale).max() <= enough:
-            return x - x.mean()
-        z = cycle(residual)
+            return x, cycles
+        z = hierarchy.cycle(residual)
         power, before = residual @ z, power
         direction = z + (power / before) * direction
         image = A @ direction
         step = power / (direction @ image)
         x += step * direction
         residual -= step * image
-    x = np.concatenate([[0.0], solve_spd(A[1:, 1:], (b - b.mean())[1:])])
-    return x - x.mean()
+    return np.concatenate([[0.0], solve_spd(A[1:, 1:], b[1:])]), MOST

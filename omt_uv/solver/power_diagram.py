@@ -11,11 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .domain import Domain, segment_integrals
-from .geometry import as_complex, as_points, dot2
+from .geometry import as_complex, as_points, dot2, in_parts
 from .regular import Regular, by_hull, power_centres
 from .topology import next_halfedge
-
-PART = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,6 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: 
     ------
     TransportError : the sites cannot be triangulated
     """
-    n = len(sites)
     if dual is None:
         dual = by_hull(sites, weights)
     z = as_complex(sites)
@@ -70,45 +67,48 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: 
     inside = np.append(domain.contains(as_points(centre)), False)
     once = np.flatnonzero(dual.twin < np.arange(len(dual.twin)))
     whole = inside[once // 3] & inside[dual.twin[once] // 3]
-    sides = _whole_sides(z, centre, dual, once[whole])
-    cut, entering, leaving = _cut_sides(z, weights, centre, inside, dual, once[~whole], domain)
-    i, j, p, q, length = (np.concatenate(both) for both in zip(sides, cut, strict=True))
-    edges = np.stack([i, j], axis=1)
-
-    integrals = np.zeros((4, n))
-    _scatter(integrals, i, j, _integrals_along(p, q))
+    cut, p, q, entering, leaving = _cut_sides(z, weights, centre, inside, dual, once[~whole], domain)
+    parts = [_whole_sides(z, centre, dual, h) for (h,) in in_parts(once[whole])]
+    i, j, length, along = (np.concatenate(kind, axis=-1) for kind in zip(*parts, cut, strict=True))
     # At a crossing of the boundary one cell's arc ends and its neighbour's begins.
-    i, j, p, q, _ = cut
-    crossing = np.concatenate([p[entering], q[leaving]])
-    ends = np.concatenate([i[entering], j[leaving]])
-    begins = np.concatenate([j[entering], i[leaving]])
-    arcs = np.zeros((4, n))
+    a, b, *_ = cut
+    ends, begins = np.concatenate([a[entering], b[leaving]]), np.concatenate([b[entering], a[leaving]])
+    integrals = _arcs(z, weights, domain, np.concatenate([p[entering], q[leaving]]), ends, begins)
+    _scatter(integrals, i, j, along)
+    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], np.stack([i, j], axis=1), length, dual)
+
+
+def _arcs(z, weights, domain: Domain, crossing, ends, begins) -> np.ndarray:
+    """The four integrals of every cell along the boundary, (4,n); which cells end and begin at the crossings (k,)."""
+    arcs = np.zeros((4, len(z)))
     if len(crossing):
         _scatter(arcs, ends, begins, domain.boundary_integrals(domain.boundary_parameter(as_points(crossing))))
         # Only the arc that runs through parameter 0 comes out negative.
         around = int(arcs[0].argmin())
     else:
-        corner = domain.boundary_point(np.zeros(1))
-        around = int((((sites - corner) ** 2).sum(axis=1) - weights).argmin())
+        corner = as_complex(domain.boundary_point(np.zeros(1)))
+        around = int((np.abs(z - corner) ** 2 - weights).argmin())
     arcs[:, around] += domain.total_integrals()
-    integrals += arcs
-    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], edges, length, dual)
+    return arcs
 
 
-def _whole_sides(z, centre, dual: Regular, h):
-    """Sides of the halfedges h (k,) that end at the power centres to their right, p, and to their left, q.
+def _whole_sides(z, centre, dual: Regular, h) -> tuple[np.ndarray, ...]:
+    """Sides of the halfedges h (k,) that end at power centres inside the domain, the one to their left last.
 
-    Returns the sites i, j on both sides (k,), p, q (k,) complex, and the lengths (k,).
+    Returns the sites i, j on both sides (k,), the lengths (k,), and the integrals along (4,k).
     """
     g, tail = dual.twin[h], dual.triangles.ravel()
     i, j, p, q = tail[h], tail[g], centre[g // 3], centre[h // 3]
     apart = z[j] - z[i]
     length = (apart.conj() * (q - p)).imag / np.sqrt((apart * apart.conj()).real)
-    return i, j, p, q, np.maximum(length, 0)
+    return i, j, np.maximum(length, 0), segment_integrals(as_points(p), as_points(q))
 
 
 def _cut_sides(z, weights, centre, inside, dual: Regular, h, domain: Domain):
-    """Sides that reach out of the domain, as `_whole_sides`, cut; which of them enter (k,), and which leave, (k,)."""
+    """Sides that reach out of the domain, cut, as `_whole_sides`.
+
+    Also their ends p, q (k,) complex, and which of them enter (k,), and which leave, (k,).
+    """
     tail, left, right = dual.triangles.ravel(), h // 3, dual.twin[h] // 3
     i, j = tail[h], tail[next_halfedge(h)]
     apart = z[j] - z[i]
@@ -125,16 +125,11 @@ def _cut_sides(z, weights, centre, inside, dual: Regular, h, domain: Domain):
     # Where rounding lets the line miss the domain next to an end inside, the side shrinks to that end.
     start = np.where(entering, np.minimum(enter, np.where(leaving, np.inf, t_left)), t_right)
     end = np.maximum(np.where(leaving, leave, t_left), start)
+    keep = np.flatnonzero(~(entering & leaving) | through)
+    i, j, origin, direction, start, end = (x[keep] for x in (i, j, origin, direction, start, end))
     p, q = origin + start * direction, origin + end * direction
-    keep = ~(entering & leaving) | through
-    return [x[keep] for x in (i, j, p, q, end - start)], entering[keep], leaving[keep]
-
-
-def _integrals_along(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """`segment_integrals` from p to q (k,) complex, in parts so small that they stay in the cache."""
-    count = len(p) // PART + 1
-    ends = zip(*(np.array_split(as_points(x), count) for x in (p, q)), strict=True)
-    return np.concatenate([segment_integrals(*both) for both in ends], axis=1)
+    along = segment_integrals(as_points(p), as_points(q))
+    return (i, j, end - start, along), p, q, entering[keep], leaving[keep]
 
 
 def _scatter(target: np.ndarray, plus: np.ndarray, minus: np.ndarray, values: np.ndarray) -> None:

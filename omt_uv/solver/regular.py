@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from .errors import TransportError
 from .flips import flip_in_place, flip_until_none
-from .geometry import as_complex, dot2
+from .geometry import as_complex, dot2, in_parts
 from .topology import previous_halfedge, twins
 
 # A facet this steep stands on the rim of the hull; its power centre is far out of any domain.
@@ -102,7 +102,10 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
 
 def power_centres(z: np.ndarray, weights: np.ndarray, dual: Regular) -> np.ndarray:
     """Point of equal power of each triangle, (k,) complex, of sites z (n,) complex with weights (n,)."""
-    i, j, k = dual.triangles.T
+    return np.concatenate([_power_centres(z, weights, *corners.T) for (corners,) in in_parts(dual.triangles)])
+
+
+def _power_centres(z, weights, i, j, k) -> np.ndarray:
     # Relative to the first corner, so that clusters keep precision.
     a, base = z[i], weights[i]
     b, c = z[j] - a, z[k] - a
@@ -116,9 +119,11 @@ def power_centres(z: np.ndarray, weights: np.ndarray, dual: Regular) -> np.ndarr
 def _backward(z, weights, start: Regular) -> np.ndarray:
     """The edges whose side between two cells runs backwards, as one of each pair of halfedges: those that may flip."""
     centre, tail = power_centres(z, weights, start), start.triangles.ravel()
-    h = np.flatnonzero(start.twin > np.arange(len(start.twin)))
-    g = start.twin[h]
-    return h[((z[tail[g]] - z[tail[h]]).conj() * (centre[h // 3] - centre[g // 3])).imag <= 0]
+    found, edges = [], np.flatnonzero(start.twin > np.arange(len(start.twin)))
+    for h, g in in_parts(edges, start.twin[edges]):
+        apart, side = z[tail[g]] - z[tail[h]], centre[h // 3] - centre[g // 3]
+        found.append(h[(apart.conj() * side).imag <= 0])
+    return np.concatenate(found)
 
 
 def _below(z, weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from .domain import Domain
 from .errors import TransportError
 from .geometry import as_complex, laplacian_from_weights
-from .multigrid import solve_laplacian
+from .multigrid import Laplacians
 from .power_diagram import PowerDiagram, power_diagram
 from .progress import Progress, Steps
 from .regular import by_flips
@@ -67,7 +67,7 @@ def transport(
     order = cKDTree(sites).indices
     sites, mass = sites[order], mass[order] * (domain.area / mass.sum())
     w = np.zeros(len(sites)) if weights is None else weights[order] - weights.mean()
-    diagrams = _Diagrams(sites, domain)
+    diagrams, laplacians = _Diagrams(sites, domain), Laplacians()
     cells = diagrams.anew(w)
     hidden = np.flatnonzero(cells.area <= 0)
     if len(hidden):
@@ -87,7 +87,7 @@ def transport(
             if residual <= tolerance:
                 cost, place = cells.cost(sites), np.argsort(order)
                 return Transport(w[place], cells.renumbered(order), residual, cost, iteration, *diagrams.counts())
-        direction = _newton_direction(sites, cells, mass)
+        direction = _newton_direction(sites, cells, mass, laplacians)
         error = float(np.linalg.norm(cells.area - mass))
         step = min(1.0, 4 * step)
         for _ in range(MAX_HALVINGS):
@@ -139,10 +139,10 @@ def _residual(cells: PowerDiagram, mass: np.ndarray) -> float:
     return float(np.max(np.abs(cells.area - mass) / mass))
 
 
-def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray) -> np.ndarray:
+def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray, laplacians: Laplacians) -> np.ndarray:
     """Derivative of area i by weight j: -|side ij| / (2 |y_i - y_j|); a common weight is its kernel."""
     i, j = cells.edges.T
     z = as_complex(sites)
     conductance = cells.length / (2 * np.abs(z[i] - z[j]))
     hessian = laplacian_from_weights(i, j, conductance, len(sites))
-    return solve_laplacian(hessian, mass - cells.area, mass, ENOUGH)
+    return laplacians.solve(hessian, mass - cells.area, mass, ENOUGH)
