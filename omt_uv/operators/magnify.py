@@ -42,7 +42,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
     source: EnumProperty(name="Source", description="What is magnified", items=SOURCES, default=DEFAULT_SOURCE)
     region: EnumProperty(name="Region", description="What marks the region", items=REGIONS, default=DEFAULT_REGION)
     weight_group: StringProperty(
-        name="Vertex Group",
+        name="Group",
         description="Vertex group that marks the region with weight 1; saliency or curvature if no group has such a "
         "name. Empty: the active vertex group",
     )
@@ -166,7 +166,7 @@ def _active_group(context: bpy.types.Context) -> str:
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
-    """The settings of the operator, for the redo panel and the sidebar."""
+    """The settings of the operator that count as others stand, for the redo panel and the sidebar."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "factor")
@@ -180,7 +180,6 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "boundary")
     layout.prop(properties, "cascade")
     layout.prop(properties, "quality")
-    column = layout.column()
-    column.active = properties.source == "UV"
-    column.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
+    if properties.source == "UV":
+        layout.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
     draw_margin(layout, properties)

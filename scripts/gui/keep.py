@@ -13,6 +13,7 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = {
     "tour": ("tab", "unwrapped", "area", "shear", "histogram", "redo", "progress"),
+    "sections": ("magnify", "sphere", "remesh"),
     "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear"),
 }
 

@@ -83,7 +83,19 @@ def test_uvs_follow_the_slider_while_it_is_dragged(play):
     assert facts["after dragging"]["area_l1"] > 2 * facts["unwrapped in the UV editor"]["area_l1"]
 
 
+def test_the_sections_work(play):
+    facts = play("sections")
+    (_, *magnified), (_, *sphere), (_, *remeshed) = (facts[name] for name in ("magnified", "sphere", "remeshed"))
+    asked, now = (float(dict(magnified)[f"Region {name}"].split()[0]) for name in ("asked", "now"))
+    assert abs(now / asked - 1) < 5e-3
+    for rows in (magnified, sphere):
+        assert dict(rows)["Folded faces"] == "0"
+        assert float(dict(rows)["Area error"].split()[0]) < 1
+    assert dict(remeshed)["Vertices"] == "5000"
+    assert {"Head", "Head_remesh"} <= set(facts["objects"])
+
+
 def test_pictures_were_taken(play):
-    for story in ("tour", "uv_editor"):
+    for story, least in (("tour", 4), ("uv_editor", 4), ("sections", 3)):
         play(story)
-        assert len(list((OUT / story).glob("*.png"))) >= 4
+        assert len(list((OUT / story).glob("*.png"))) >= least

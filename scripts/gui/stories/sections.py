@@ -1,0 +1,84 @@
+"""The sections below the main one: a painted region magnified, a globe, a new mesh beside the old."""
+
+from __future__ import annotations
+
+import bpy
+
+import bmesh
+
+# Places in an editor, pixels from its upper right corner: the tab, headers of sections while all are closed, and the
+# button of each while it alone is open.
+TAB = (10, 213)
+MAGNIFY = (173, 359), (127, 651)
+SPHERE = (173, 411), (127, 612)
+REMESH = (173, 437), (127, 725)
+
+
+def tell(story):
+    obj = closed_head(story)
+    paint(obj)
+    dress(obj)
+    view = story.area("VIEW_3D")
+    view.spaces.active.shading.color_type = "TEXTURE"
+    view.spaces.active.show_region_ui = True
+    view.spaces.active.overlay.show_stats = True
+    story.look_at_it(view)
+    yield from story.pause(1)
+    yield from story.click(*story.place("VIEW_3D", *TAB))
+    story.facts["magnified"] = yield from run(story, "magnify", *MAGNIFY)
+    story.facts["sphere"] = yield from run(story, "sphere", *SPHERE)
+    story.facts["remeshed"] = yield from run(story, "remesh", *REMESH)
+    story.facts["objects"] = sorted(bpy.data.objects.keys())
+
+
+def run(story, name, header, button):
+    """Open a section, click its button, look, and leave the tab as it was."""
+    yield from story.click(*story.place("VIEW_3D", *header))
+    yield from story.click(*story.place("VIEW_3D", *button))
+    yield from story.until(lambda: not story.running() and story.said())
+    if name == "remesh":
+        show_alone(story, bpy.context.view_layer.objects.active)
+    yield from story.shoot(name)
+    said = story.said()
+    story.forget()
+    yield from story.pause(0.5)
+    yield from story.click(*story.place("VIEW_3D", *header))
+    return said
+
+
+def show_alone(story, obj):
+    """With its wires, not among those of the object that it was made from."""
+    story.area("VIEW_3D").spaces.active.shading.color_type = "MATERIAL"
+    obj.show_wire = obj.show_all_edges = True
+    bpy.data.objects["Head"].hide_set(True)
+    obj.select_set(False)
+
+
+def closed_head(story):
+    obj = story.head(60)
+    mesh = bmesh.new()
+    mesh.from_mesh(obj.data)
+    bmesh.ops.holes_fill(mesh, edges=[edge for edge in mesh.edges if edge.is_boundary])
+    mesh.to_mesh(obj.data)
+    mesh.free()
+    return obj
+
+
+def paint(obj):
+    """A soft brush on the nose."""
+    group = obj.vertex_groups.new(name="Nose")
+    nose = max((vertex.co for vertex in obj.data.vertices), key=lambda place: place.x)
+    for vertex in obj.data.vertices:
+        group.add([vertex.index], max(0.0, min(1.0, 1.5 - 2 * (vertex.co - nose).length)), "REPLACE")
+
+
+def dress(obj):
+    """A checker: where texture is dense its squares are small."""
+    image = bpy.data.images.new("Checker", 2048, 2048)
+    image.generated_type = "UV_GRID"
+    material = bpy.data.materials.new("Checker")
+    material.use_nodes = True
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    material.node_tree.nodes.active = node
+    obj.data.materials.append(material)
