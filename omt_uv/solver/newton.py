@@ -217,7 +217,7 @@ def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarr
 
 
 def _solution(matrix: sp.spmatrix, b: np.ndarray, scale: float) -> np.ndarray:
-    """Solution x (n,) of matrix x = b; shifted where rounding makes it singular, for a shorter step that still goes down."""
+    """Solution x (n,) of matrix x = b, shifted where rounding makes it singular: the step is shorter, and goes down."""
     shift = SHIFT
     while True:
         try:
