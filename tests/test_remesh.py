@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import meshes
 import numpy as np
 import pytest
@@ -174,6 +176,36 @@ def test_large_parts_make_up_for_small_ones():
     assert len(result.vertices) == 120 and topology(result.triangles) == (2, 2)
 
 
+def test_corners_are_kept_while_there_are_vertices_for_them():
+    V, F = meshes.grid(6, 6)
+    V, F = np.concatenate([V, 0.2 * V + 3]), np.concatenate([F, F + len(V)])
+    kept, fewer = run(V, F, 8, rounds=5), run(V, F, 6, rounds=5)
+    assert np.abs(kept.vertices[:, None] - V[[0, 6, 42, 48, 49, 55, 91, 97]]).sum(axis=2).min(axis=0).max() < 1e-12
+    assert kept.warnings == () and any("corners" in w for w in fewer.warnings)
+    assert topology(fewer.triangles) == (2, 2) and len(fewer.vertices) == 6
+    with pytest.raises(CountError, match="takes at least 6"):
+        run(V, F, 5)
+
+
+@pytest.mark.parametrize("name, count_of", [("annulus", "vertices"), ("annulus", "faces"), ("torus", "vertices")])
+def test_the_least_number_that_is_told_can_be_reached(name, count_of):
+    V, F = CASES[name]()
+    patch, leaf = meshes.grid(3, 3), np.array([[0.0, 0, 9], [1e-2, 0, 9], [0, 1e-2, 9]])
+    V = np.concatenate([V, patch[0] + 5, leaf])
+    F = np.concatenate([F, patch[1] + V.shape[0] - 3 - len(patch[0]), [[len(V) - 3, len(V) - 2, len(V) - 1]]])
+    told = [5]
+    while True:
+        try:
+            result = run(V, F, told[-1] + told[-1] % 2, count_of=count_of, rounds=5)
+            break
+        except CountError as error:
+            told.append(int(re.findall(r"\d+", str(error))[1]))
+    # A bound of the topology, and at the most what edges can collapse to.
+    assert told == sorted(set(told)) and len(told) <= 3
+    assert len(getattr(result, {"faces": "triangles"}.get(count_of, count_of))) == told[-1] + told[-1] % 2
+    assert topology(result.triangles) == topology(F)
+
+
 def test_odd_numbers_of_faces_are_warned_of_on_closed_surfaces():
     V, F = meshes.icosphere(2)
     result = run(V, F, 201, count_of="faces", rounds=5)
@@ -269,10 +301,12 @@ def test_maps_serve_again_with_other_counts(monkeypatch):
     for V, F, kinds in ((*meshes.icosphere(3), 2), (*meshes.bumpy(12, 12), 2)):
         calls.clear()
         original = Original(V, F)
-        first, second = (run(V, F, count, rounds=5, original=original) for count in (200, 120))
+        options = {"rounds": 0, "fit": False}
+        again = [run(V, F, count, original=original, **options) for count in (200, 120)]
         assert len(calls) == kinds
-        assert (first.vertices == run(V, F, 200, rounds=5).vertices).all()
-        assert (second.vertices == run(V, F, 120, rounds=5).vertices).all()
+        for result in again:
+            alone = run(V, F, len(result.vertices), **options)
+            assert (result.vertices == alone.vertices).all()
 
 
 def test_grading_bounds_how_fast_edges_grow():
@@ -280,7 +314,7 @@ def test_grading_bounds_how_fast_edges_grow():
     density = np.where(V[F].mean(axis=1)[:, 2] > 0, 16.0, 1.0)
     growth = []
     for grading in (0.0, 0.25):
-        result = run(V, F, 1500, density=density, grading=grading, fit=False)
+        result = run(V, F, 800, density=density, grading=grading, fit=False)
         size = np.sqrt(face_areas(result.vertices, result.triangles) * 4 / np.sqrt(3))
         middle = result.vertices[result.triangles].mean(axis=1)
         twin = twins(result.triangles)

@@ -54,14 +54,18 @@ def network(positions: np.ndarray, charts: list[Chart], held: np.ndarray, size: 
     ids = [chart.vertex_ids[loop] for chart, loop in zip(charts, loops, strict=True)]
     keys = [pair_keys(i, np.roll(i, -1)) for i in ids]
     node = _nodes(len(positions), np.unique(np.concatenate(keys)), held)
-    for i in ids:
-        if not node[i].any():
-            node[i.min()] = True
+    rings = [i for i in ids if not node[i].any()]
+    for i in rings:
+        node[i.min()] = True
     found = _network(loops, ids, keys, node, held)
     if size is None:
         return found
     corners = [_corners(positions, arc.vertices, size) for arc in found.arcs if arc.held]
-    node[np.concatenate([np.zeros(0, np.int64), *corners])] = True
+    at = np.concatenate([np.zeros(0, np.int64), *corners])
+    node[at] = True
+    for i in rings:
+        # A ring with a corner needs no other place to start from.
+        node[i.min()] = i.min() in at or not node[i].sum() > 1
     return _network(loops, ids, keys, node, held)
 
 
@@ -100,11 +104,12 @@ def _nodes(n: int, keys: np.ndarray, held: np.ndarray) -> np.ndarray:
 def _corners(positions: np.ndarray, vertices: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Vertices of an arc (k,) where it turns by more than CORNER between half an edge before and half an edge after.
 
-    At this scale a scan's frayed boundary has few corners, and a true one is not lost to a bevel.
+    At this scale a scan's frayed boundary has few corners, and a true one is not lost to a bevel. An eighth of the arc
+    is the most: on a square a quarter would see two corners at once from anywhere.
     """
     p = positions[vertices]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
-    reach = np.minimum(size[vertices] / 2, s[-1] / 4)
+    reach = np.minimum(size[vertices] / 2, s[-1] / 8)
     if vertices[0] == vertices[-1]:
         s_long, p_long = np.concatenate([s[:-1] - s[-1], s, s[1:] + s[-1]]), np.concatenate([p[:-1], p, p[1:]])
     else:

@@ -9,7 +9,6 @@ import numpy as np
 
 from .draft import Draft
 from .embedded_flips import make_delaunay_embedded
-from .errors import CountError
 from .geometry import vertex_areas
 from .mesh_edits import LEAST_COSINE, Edit, collapse_edges, independent_splits, interior_edges, split_edges
 from .parts import Part
@@ -42,20 +41,27 @@ VALENCE = 0.05
 
 
 def least_vertices(part: Part) -> int:
-    """Vertices that a surface of this topology takes at least (Heawood's bound; Jungerman, Ringel 1980)."""
+    """Vertices that a surface of this topology takes at least, closed ones by Heawood's bound (Jungerman, Ringel 1980).
+
+    With a boundary of B edges, 3 for every loop at the least and n at the most, there are 3 (n - euler) - B edges, for
+    which there have to be enough pairs of vertices.
+    """
     if len(part.rim):
-        return 3 * len(boundary_loops(part.triangles))
+        rings = 3 * len(boundary_loops(part.triangles))
+        return max(rings, int(np.ceil((5 + np.sqrt(25 - 24 * part.euler)) / 2 - 1e-9)))
     euler = min(part.euler, 2)
     return int(np.ceil((7 + np.sqrt(49 - 24 * euler)) / 2 - 1e-9))
 
 
-def distribute(count: int, share: np.ndarray, least: np.ndarray, of: str = "vertices") -> np.ndarray:
-    """Whole numbers (k,) that sum to `count`, in proportion to `share` (k,) but none below `least` (k,).
+def least_faces(part: Part, vertices: int) -> int:
+    """Triangles of a part with so many vertices at least: with a boundary, when all of them are on it."""
+    return vertices - 2 * part.euler if len(part.rim) else 2 * (vertices - part.euler)
 
-    Raises CountError if there are not enough.
+
+def distribute(count: int, share: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Whole numbers (k,) that sum to `count`, in proportion to `share` (k,) but none below `least` (k,), which sum to
+    less.
     """
-    if count < least.sum():
-        raise CountError(f"{count} {of} are too few: this topology takes at least {least.sum()}")
     given = least.astype(float)
     free = np.ones(len(share), dtype=bool)
     for _ in range(len(share)):

@@ -13,7 +13,7 @@ import numpy as np
 
 from .carrier import Carrier
 from .closest import ClosestPoint, vertex_normals
-from .counts import StuckError, adjust_count, distribute, least_vertices, rebalance
+from .counts import StuckError, adjust_count, distribute, least_faces, least_vertices, rebalance
 from .errors import CountError, positive_density
 from .fit import fit_to_surface
 from .measure import graded
@@ -22,7 +22,7 @@ from .parts import Part
 from .progress import Progress, Steps, part_of
 from .relaxation import relax
 from .sampling import STRATEGIES
-from .tessellation import Options, Tessellation, tessellate
+from .tessellation import Options, Tessellation, least_samples, tessellate
 
 # More vertices than this many times the input's tell nothing new about the surface.
 FAR_MORE = 50
@@ -131,31 +131,58 @@ def _checked_density(density: np.ndarray | None, m: int) -> np.ndarray:
 
 
 def _remesh_parts(maps: list[PartMaps], density: np.ndarray, count: int, options: Options) -> Steps[list[_Result]]:
-    """All parts, the smallest first, so that the larger ones make up for those that take more than their share."""
-    parts = [m.part for m in maps]
-    measure = np.array([float(p.area @ density[p.faces]) for p in parts])
-    least = _least(parts, options.count_of)
+    """All parts; what takes more than was thought makes the others do with less.
+
+    Raises CountError where there are not enough vertices, or faces, for all.
+    """
+    few = f"{count} {options.count_of} are too few:"
+    # Corners are kept where the count allows it.
+    for corners in (True, False):
+        least = _least(maps, options.count_of, corners and options.corners)
+        if least.sum() <= count:
+            break
+    else:
+        raise CountError(f"{few} this topology, with its boundaries and features, takes at least {least.sum()}")
+    while least.sum() <= count:
+        results, least = yield from _with_least(maps, density, count, least, options)
+        if results:
+            return results
+    raise CountError(f"{few} edges of this surface, with its boundaries and features, collapse to {least.sum()}")
+
+
+def _with_least(
+    maps: list[PartMaps], density: np.ndarray, count: int, least: np.ndarray, options: Options
+) -> Steps[tuple[list[_Result], np.ndarray]]:
+    """All parts, the smallest first, so that the larger ones make up for those that take more than their share.
+
+    An empty list where that leaves too little for the others; and what every part takes at least as far as is known.
+    """
+    least = least.copy()
+    measure = np.array([float(m.part.area @ density[m.part.faces]) for m in maps])
     left = np.argsort(measure, kind="stable")
-    results: list[_Result] = [None] * len(parts)  # type: ignore[list-item]
+    results: list[_Result] = [None] * len(maps)  # type: ignore[list-item]
     done = 0.0
     while len(left):
         k, share = left[0], float(measure[left[0]] / measure.sum())
-        number = int(distribute(count, measure[left], least[left], options.count_of)[0])
-        steps = _remesh_part(maps[k], number, density[parts[k].faces], options, last=len(left) == 1)
+        number = int(distribute(count, measure[left], least[left])[0])
+        steps = _remesh_part(maps[k], number, density[maps[k].part.faces], options)
         results[k] = yield from part_of(steps, done, share)
-        count -= len(results[k].points if options.count_of == "vertices" else results[k].triangles)
+        made = len(results[k].points if options.count_of == "vertices" else results[k].triangles)
+        if made > number:
+            least[k] = made
+        count -= made
         left, done = left[1:], done + share
-    return results
+        if count < least[left].sum():
+            return [], least
+    return results, least
 
 
-def _least(parts: list[Part], count_of: str) -> np.ndarray:
+def _least(maps: list[PartMaps], count_of: str, corners: bool) -> np.ndarray:
     """Vertices, or faces, that every part takes at least."""
-    least = np.array([least_vertices(p) for p in parts])
+    vertices = [max(least_vertices(m.part), least_samples(m, corners)) for m in maps]
     if count_of == "vertices":
-        return least
-    closed = np.array([len(p.rim) == 0 for p in parts])
-    euler = np.array([p.euler for p in parts])
-    return np.where(closed, 2 * (least - euler), 1)
+        return np.array(vertices)
+    return np.array([least_faces(m.part, n) for m, n in zip(maps, vertices, strict=True)])
 
 
 def summed_up(texts: list[str]) -> list[str]:
@@ -163,11 +190,9 @@ def summed_up(texts: list[str]) -> list[str]:
     return [text if (k := texts.count(text)) == 1 else f"{text} ({k} times)" for text in dict.fromkeys(texts)]
 
 
-def _remesh_part(maps: PartMaps, count: int, density: np.ndarray, options: Options, last: bool) -> Steps[_Result]:
-    """One part in its unit box; boundaries and features get fewer samples where the count cannot be reached.
-
-    Only the last part has to keep to its count; it makes up for the others.
-    """
+def _remesh_part(maps: PartMaps, count: int, density: np.ndarray, options: Options) -> Steps[_Result]:
+    """One part in its unit box; boundaries and features get fewer samples where the count cannot be reached, and what
+    can be is the count then."""
     part = maps.part
     level = density / (part.area @ density / part.area.sum())
     stretch, attempt = 1.0, 0
@@ -175,15 +200,11 @@ def _remesh_part(maps: PartMaps, count: int, density: np.ndarray, options: Optio
         attempt += 1
         steps = tessellate(maps, count, level, _at_vertices(part, level), options, stretch)
         start = yield from part_of(steps, 0.0, 0.3)
-        anyhow = attempt == ATTEMPTS or not start.draft.fixed.any()
+        anyhow = attempt >= ATTEMPTS or not start.draft.fixed.any()
         try:
             return (yield from part_of(_settle(part, start, level, options, anyhow), 0.3, 0.7))
         except StuckError as error:
-            if anyhow and last:
-                text = f"{start.count} vertices are too few: edges of this topology, with its boundaries and features,"
-                raise CountError(f"{text} collapse to {len(error.draft.points)} at the least") from error
             if anyhow:
-                # What could be reached is the count then.
                 count = len(error.draft.points if options.count_of == "vertices" else error.draft.triangles)
         stretch = start.stretch * THINNED
 

@@ -11,7 +11,7 @@ from .assembly import glue
 from .charts import Chart
 from .counts import edge_size
 from .draft import Draft
-from .errors import CountError, PrecisionError
+from .errors import PrecisionError
 from .geometry import face_areas
 from .part_maps import PartMaps
 from .parts import Part
@@ -60,10 +60,8 @@ def tessellate(
     Closed parts of genus 0 without features go by way of the sphere, all others, or where that fails, by way of charts.
     On boundaries and features samples are `stretch` edges apart, or more where there would be too many.
 
-    Raises
-    ------
-    CountError : boundaries and features alone take more
-    PrecisionError : a chart cannot be triangulated
+    There may be more than asked for, where boundaries and features take as many. Raises PrecisionError where a chart
+    cannot be triangulated.
     """
     found = (yield from _by_sphere(maps, count, density, options)) if maps.spherical else None
     return found or (yield from _by_charts(maps, count, density, at_vertices, options, stretch))
@@ -90,29 +88,34 @@ def _by_charts(
     maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float
 ) -> Steps[Tessellation]:
     yield Progress("Charts", 0.0)
-    part, charts = maps.part, maps.charts
-    held = np.union1d(part.rim, pair_keys(part.features[:, 0], part.features[:, 1]))
+    part, charts, held = maps.part, maps.charts, _held(maps.part)
     measure, rim = float(part.area @ density), _weighted_length(part.vertices, part.rim, at_vertices)
     vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
     size = edge_size(measure, rim, vertices)
     # A few samples make no sound mesh of a surface, so these are taken away only afterwards.
     finer = edge_size(measure, rim, max(vertices, FEWEST)) / size
     lengths = size / np.sqrt(at_vertices)
+    first, corners = stretch, options.corners
     while True:
-        lines = network(part.vertices, charts, held, stretch * lengths if options.corners else None)
+        lines = network(part.vertices, charts, held, stretch * lengths if corners else None)
         samples = sample_arcs(part.vertices, lines.arcs, finer * lengths, stretch=stretch / finer)
         if options.count_of == "faces":
             samples, vertices = _for_faces(part, lines, samples, count, finer * lengths, stretch / finer)
         if samples.fixed.sum() <= vertices:
             break
-        if stretch > LONGEST:
-            cause = f"{vertices} vertices are too few: boundaries, features and their corners take at least"
-            raise CountError(f"{cause} {samples.fixed.sum()} here")
         stretch *= STRETCH
+        if stretch > LONGEST:
+            if not corners:
+                break
+            stretch, corners = first, False
     borders = [border(sides, samples, lines.arcs) for sides in lines.sides]
     inner = _inner_counts(charts, borders, density, max(vertices, FEWEST) - len(samples.points))
     patches: list[Patch] = []
     warnings = list(maps.warnings)
+    if options.corners and not corners:
+        warnings.append(
+            f"{vertices} vertices for a part are too few to keep the corners of its boundaries and features"
+        )
     done = 0.0
     for k, (loop, edge, number) in enumerate(zip(lines.loops, borders, inner, strict=True)):
         share = len(charts[k].triangles) / len(part.triangles)
@@ -130,6 +133,21 @@ def _by_charts(
     fixed = np.arange(len(points)) < samples.fixed.sum()
     draft = Draft(points[order], number[triangles], fixed, _kept(lines, samples, number))
     return Tessellation(draft, vertices, size, stretch, tuple(warnings))
+
+
+def _held(part: Part) -> np.ndarray:
+    """Sorted keys of the edges on boundaries and features."""
+    return np.union1d(part.rim, pair_keys(part.features[:, 0], part.features[:, 1]))
+
+
+def least_samples(maps: PartMaps, corners: bool) -> int:
+    """Samples that the boundaries and features of a part take at least, with their corners or without."""
+    part, held = maps.part, _held(maps.part)
+    if len(held) == 0:
+        return 0
+    endless = np.full(len(part.vertices), np.inf)
+    lines = network(part.vertices, maps.charts, held, endless if corners else None)
+    return int(sample_arcs(part.vertices, lines.arcs, endless).fixed.sum())
 
 
 def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarray) -> float:
