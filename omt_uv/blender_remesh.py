@@ -108,6 +108,12 @@ def _features(attributes: Attributes, surface: Surface, settings: RemeshSettings
     return all_edges(*kept)
 
 
+def source_of(obj: bpy.types.Object, settings: RemeshSettings) -> str:
+    """The density of settings that name a vertex group: that of the attribute where only such a one has the name."""
+    named = settings.density == "weights" and settings.source not in obj.vertex_groups
+    return "attribute" if named and settings.source in obj.data.attributes else settings.density
+
+
 def _density_values(
     obj: bpy.types.Object, mesh: bpy.types.Mesh, surface: Surface, settings: RemeshSettings
 ) -> np.ndarray | None:

@@ -16,8 +16,8 @@ from . import obj_text
 from .blender_mesh import new_mesh
 from .quiet import silence
 
-READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".off")
-WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb")
+READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx", ".off")
+WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx")
 # Blender turns these two formats by default; their axes are taken as they are.
 AXES = {"forward_axis": "Y", "up_axis": "Z"}
 
@@ -43,7 +43,9 @@ def load(path: Path) -> list[bpy.types.Object]:
         raise FileError(f"{path}: {_last_line(str(error)) or 'cannot be read'}") from error
     objects = [obj for obj in bpy.context.scene.objects if obj.type == "MESH"]
     if not objects:
-        raise FileError(f"{path}: {_last_line(log()) or 'the file has no mesh'}")
+        told = _last_line(log())
+        # Readers that find nothing to read may say no more than how long that took.
+        raise FileError(f"{path}: {told if told and 'took' not in told else 'the file has no mesh'}")
     bpy.context.view_layer.update()
     return objects
 
@@ -123,6 +125,19 @@ def _read_off(path: str) -> None:
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
+def _read_fbx(path: str) -> None:
+    # Blender 4.5 and later have a reader of their own; the one in Python came before.
+    if "fbx_import" in dir(bpy.ops.wm):
+        bpy.ops.wm.fbx_import(filepath=path, validate_meshes=False, use_anim=False)
+    else:
+        bpy.ops.import_scene.fbx(filepath=path, use_anim=False)
+    for obj in bpy.context.scene.objects:
+        # Turned to other axes and back, with a rest of 4e-8.
+        matrix = np.array(obj.matrix_basis)
+        if np.abs(matrix - matrix.round()).max() < 1e-6:
+            obj.matrix_basis = matrix.round().T
+
+
 # Validation would drop faces; what is wrong with them is reported later, by name.
 _READERS: dict[str, Callable[[str], None]] = {
     ".blend": _read_blend,
@@ -132,6 +147,7 @@ _READERS: dict[str, Callable[[str], None]] = {
     ".ply": _reader(lambda path: bpy.ops.wm.ply_import(filepath=path, merge_verts=False, **AXES)),
     ".stl": _reader(lambda path: bpy.ops.wm.stl_import(filepath=path, use_mesh_validate=False, **AXES)),
     ".glb": _reader(lambda path: bpy.ops.import_scene.gltf(filepath=path, merge_vertices=False)),
+    ".fbx": _reader(_read_fbx),
     ".off": _reader(_read_off),
 }
 
@@ -230,7 +246,7 @@ def _is_uv_seam(edge: bmesh.types.BMEdge, layer) -> bool:
 def _write_stl(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
     _select_only(objects)
     bpy.ops.wm.stl_export(filepath=str(path), export_selected_objects=True, apply_modifiers=False, **AXES)
-    return ["STL files hold no UVs; write .blend, .obj, .ply or .glb to keep them"]
+    return ["STL files hold no UVs; write .blend, .obj, .ply, .glb or .fbx to keep them"]
 
 
 def _write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
@@ -245,9 +261,18 @@ def _write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
     return []
 
 
+def _write_fbx(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
+    _select_only(objects)
+    bpy.ops.export_scene.fbx(
+        filepath=str(path), use_selection=True, object_types={"MESH"}, use_mesh_modifiers=False, bake_anim=False
+    )
+    return []
+
+
 _WRITERS: dict[str, Callable[[Path, Sequence[bpy.types.Object]], list[str]]] = {
     ".obj": _write_obj,
     ".ply": _write_ply,
     ".stl": _write_stl,
     ".glb": _write_glb,
+    ".fbx": _write_fbx,
 }

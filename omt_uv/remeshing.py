@@ -111,6 +111,8 @@ def _features(
 ) -> tuple[np.ndarray, tuple[str, ...]]:
     """The features (e,2) that a mesh of so many vertices can show, and a warning about others."""
     area = face_areas(job.surface.positions, triangles)
+    if not len(job.features) or not area.sum() > 0:
+        return job.features, ()
     level = np.ones(len(area)) if density is None else density
     # Every vertex has the area of two equilateral triangles.
     size = np.sqrt(area @ level / (max(samples, 1) * np.sqrt(3) / 2) / level)

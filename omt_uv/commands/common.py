@@ -57,6 +57,8 @@ def read(path: Path, files, blender_mesh, layer: str = "") -> list:
 def check_output(path: Path, files) -> None:
     if path.suffix.lower() not in files.WRITABLE:
         raise CommandError(f"{path}: unknown format. Use one of {' '.join(files.WRITABLE)}.")
+    if not path.resolve().parent.is_dir():
+        raise CommandError(f"{path}: there is no such folder")
 
 
 def drain_shown(steps):

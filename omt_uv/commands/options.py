@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..settings import DEFAULT_BALANCE, DEFAULT_QUALITY, FIRST_TILE, QUALITIES
 
-FORMATS = ".blend .obj .ply .stl .glb"
+FORMATS = ".blend .obj .ply .stl .glb .fbx"
 
 
 def add_files(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off", writes: str = FORMATS) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
@@ -22,7 +23,10 @@ def add(commands) -> None:
     count.add_argument("--faces", type=int, metavar="N", help="triangles of each new mesh")
     count.add_argument("--edge", type=float, metavar="L", help="mean length of the edges")
     command.add_argument(
-        "--density", default="uniform", metavar="D", help=f"{', '.join(KINDS)}, or the name of a vertex group"
+        "--density",
+        default="uniform",
+        metavar="D",
+        help=f"{', '.join(KINDS)}, or the name of a vertex group or attribute",
     )
     command.add_argument(
         "--factor",
@@ -30,8 +34,8 @@ def add(commands) -> None:
         metavar="M",
         help="density where the weight is 1 next to where it is 0, default 4; amount of curvature, default 1",
     )
-    command.add_argument("--grading", type=float, default=0.0, metavar="G", help="most growth of edges per length")
-    command.add_argument("--levels", type=int, default=1, metavar="K", help="make K meshes, OUT_LOD0 and so on")
+    command.add_argument("--grading", type=_growth, default=0.0, metavar="G", help="most growth of edges per length")
+    command.add_argument("--levels", type=_positive, default=1, metavar="K", help="make K meshes, OUT_LOD0 and so on")
     command.add_argument(
         "--ratio", type=_ratio, default=0.5, metavar="R", help="size of a level next to the one before"
     )
@@ -49,6 +53,20 @@ def _add_features(command: argparse.ArgumentParser) -> None:
     command.add_argument("--no-materials", action="store_true", help="do not keep borders of materials")
 
 
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of meshes")
+    return value
+
+
+def _growth(text: str) -> float:
+    value = float(text)
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is no growth per length")
+    return value
+
+
 def _ratio(text: str) -> float:
     value = float(text)
     if not 0 < value < 1:
@@ -58,17 +76,20 @@ def _ratio(text: str) -> float:
 
 def run(options: argparse.Namespace) -> None:
     files, blender_mesh, _ = blender()
-    from ..blender_remesh import SourceError, carried_attributes, lost, new_objects, read_request
+    from ..blender_remesh import SourceError, carried_attributes, lost, new_objects, read_request, source_of
     from ..remeshing import remesh_series
     from ..solver.errors import MeshError
 
     check_output(options.output, files)
-    settings = _settings(options)
+    if options.input.resolve() in [path.resolve() for path in _targets(options.output, options.levels)]:
+        raise CommandError(f"{options.input}: the new mesh would replace the input. Give another name.")
+    common = _settings(options)
     objects = [obj for obj, _ in read(options.input, files, blender_mesh)]
     weld = options.input.suffix.lower() == ".glb"
     results = []
     for obj in objects:
         try:
+            settings = replace(common, density=source_of(obj, common))
             request = read_request(obj, settings, weld=weld)
             series = drain_shown(remesh_series(request.job, settings))
         except (SourceError, MeshError) as error:
@@ -116,8 +137,13 @@ def _save(path: Path, made: list[list[str]], files) -> list[str]:
     if path.suffix.lower() == ".blend":
         return files.save(path, [])
     warnings: list[str] = []
-    levels = len(made[0])
-    for k in range(levels):
-        target = path if levels == 1 else path.with_name(f"{path.stem}_LOD{k}{path.suffix}")
+    for k, target in enumerate(_targets(path, len(made[0]))):
         warnings += files.save(target, [bpy.data.objects[names[k]] for names in made])
-    return warnings
+    return list(dict.fromkeys(warnings))
+
+
+def _targets(path: Path, levels: int) -> list[Path]:
+    """Files that hold new meshes alone, one for every level; none for a .blend, which keeps the input."""
+    if path.suffix.lower() == ".blend":
+        return []
+    return [path] if levels == 1 else [path.with_name(f"{path.stem}_LOD{k}{path.suffix}") for k in range(levels)]

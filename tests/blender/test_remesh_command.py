@@ -1,0 +1,79 @@
+"""`remesh` on the command line: every format, what it refuses, and that the input stays."""
+
+from __future__ import annotations
+
+import bpy
+
+import numpy as np
+import pytest
+from blender import scenes
+from blender.test_remesh import arrays, ball, fill, read_points, run, write_ball
+
+__all__ = ["run"]
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".glb", ".fbx"])
+def test_every_format_holds_the_levels_in_the_coordinates_of_the_input(package, run, tmp_path, suffix):
+    write_ball(tmp_path / "in.obj")
+    before = (tmp_path / "in.obj").read_bytes()
+    status, out, err = run(
+        "remesh", tmp_path / "in.obj", "-o", tmp_path / f"o{suffix}", "--vertices", 160, "--levels", 2, "--ratio", 0.5
+    )
+    assert (status, out) == (0, "")
+    assert len(err.splitlines()) == (suffix == ".stl")
+    assert (tmp_path / "in.obj").read_bytes() == before
+    assert {p.name for p in tmp_path.iterdir()} == {"in.obj", f"o_LOD0{suffix}", f"o_LOD1{suffix}"}
+    for level, count in enumerate((160, 80)):
+        (obj,) = package("files").load(tmp_path / f"o_LOD{level}{suffix}")
+        co, _ = arrays(obj)
+        assert len(co) == count
+        assert np.abs(np.linalg.norm(co - [1, 2, 3], axis=1) - 1).max() < 0.15
+
+
+def test_an_attribute_gives_the_density_where_no_group_has_its_name(run, tmp_path):
+    obj = ball(rings=24, sectors=40)
+    z = np.array([v.co.z for v in obj.data.vertices])
+    fill(obj.data, "fine", "FLOAT", "POINT", np.where(z > 0, 4, 1).astype(np.float32))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    arguments = ["--vertices", 800, "--density", "fine", "--no-attributes"]
+    assert run("remesh", tmp_path / "in.blend", "-o", tmp_path / "out.obj", *arguments)[0] == 0
+    z = read_points(tmp_path / "out.obj")[:, 2]
+    assert (z > 0.3).sum() / (z < -0.3).sum() == pytest.approx(4, rel=0.1)
+
+
+@pytest.mark.parametrize("arguments, status", [
+    (["--vertices", 100, "--levels", 0], 2),
+    (["--vertices", 100, "--grading", -1], 2),
+    (["--vertices", "many"], 2),
+    (["--edge", "inf"], 1),
+    (["--vertices", 100, "--density", "curvature", "--factor", -1], 1),
+])  # fmt: skip
+def test_statuses_tell_options_from_meshes(run, tmp_path, arguments, status):
+    write_ball(tmp_path / "in.obj")
+    found, out, err = run("remesh", tmp_path / "in.obj", "-o", tmp_path / "out.obj", *arguments)
+    assert (found, out) == (status, "")
+    assert "error: " in err.splitlines()[-1]
+    assert [p.name for p in tmp_path.iterdir()] == ["in.obj"]
+
+
+@pytest.mark.parametrize("name, more", [("in.obj", []), ("in_LOD1.obj", ["--levels", 2])])
+def test_the_input_is_never_replaced(run, tmp_path, name, more):
+    write_ball(tmp_path / name)
+    before = (tmp_path / name).read_bytes()
+    status, _, err = run("remesh", tmp_path / name, "-o", tmp_path / "in.obj", "--vertices", 100, *more)
+    assert status == 1
+    assert "replace the input" in err
+    assert (tmp_path / name).read_bytes() == before
+
+
+def test_a_blend_keeps_the_old_object_as_it_was(run, tmp_path):
+    obj = ball()
+    obj.scale = (1, 2, 1)
+    bpy.context.view_layer.update()
+    before = scenes.state(obj)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    command = ["remesh", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--faces", 200, "--levels", 2]
+    assert run(*command)[0] == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    assert {obj.name for obj in bpy.data.objects} == {"Ball", "Ball_LOD0", "Ball_LOD1"}
+    assert scenes.state(bpy.data.objects["Ball"]) == before
