@@ -202,8 +202,11 @@ def _drop_modifiers(new: bpy.types.Object, applied: bool) -> None:
             new.modifiers.remove(modifier)
 
 
-def lost(obj: bpy.types.Object, request: Request, carried: list[Attributes]) -> list[str]:
-    """Warnings about what the new objects do not have, or not as it was."""
+def lost(obj: bpy.types.Object, request: Request, carried: list[Attributes], by_hand: bool = True) -> list[str]:
+    """Warnings about what the new objects do not have, or not as it was.
+
+    by_hand : whether custom normals are somebody's work; many file formats hold normals of any mesh
+    """
     texts = []
     folded = sum(attributes.folded for attributes in carried)
     if folded:
@@ -211,7 +214,7 @@ def lost(obj: bpy.types.Object, request: Request, carried: list[Attributes]) -> 
     if request.attributes.left:
         names = ", ".join(request.attributes.left)
         texts.append(f"Attributes of text, and those of edges that the new mesh does not follow, are left out: {names}")
-    if request.attributes.custom_normals:
+    if request.attributes.custom_normals and by_hand:
         texts.append("Custom normals are left out; normals follow the new shape")
     bound = [m.name for m in obj.modifiers if m.type in BOUND]
     if bound and not request.evaluated:

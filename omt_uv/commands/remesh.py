@@ -96,8 +96,9 @@ def run(options: argparse.Namespace) -> None:
             raise CommandError(f"{obj.name}: {error}".replace(f"{obj.name}: {obj.name}", obj.name)) from error
         results.append((obj, request, series, carried_attributes(request, series)))
     told, made = [], []
+    by_hand = options.input.suffix.lower() == ".blend"
     for k, (obj, request, series, carried) in enumerate(results):
-        told += [(k, text) for text in (*lost(obj, request, carried), *series.warnings)]
+        told += [(k, text) for text in (*lost(obj, request, carried, by_hand), *series.warnings)]
         made.append(new_objects([obj], request, series, carried))
     try:
         warnings = _save(options.output, made, files)
