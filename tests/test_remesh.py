@@ -131,6 +131,22 @@ def test_boundary_corners_stay():
         assert np.linalg.norm(result.vertices - corner, axis=1).min() < 1e-12
 
 
+def test_boundaries_that_need_not_be_kept_lose_their_frays():
+    """A disk with a rough boundary, teeth smaller than the new edges."""
+    V, F = meshes.polar(lambda r: r, lambda r: 0 * r, 4, 480)
+    rim = boundary_loops(F)[0]
+    V[rim] *= 1 + 0.04 * np.random.default_rng(0).uniform(-1, 1, (len(rim), 1))
+    radius = []
+    for keep in (True, False):
+        result = run(V, F, 150, preserve_boundary=keep, rounds=10)
+        assert topology(result.triangles) == (1, 1) and len(result.vertices) == 150
+        loop = result.vertices[boundary_loops(result.triangles)[0]]
+        radius.append(np.linalg.norm(loop, axis=1))
+        edges = np.linalg.norm(loop - np.roll(loop, -1, axis=0), axis=1)
+    assert radius[1].std() < 0.6 * radius[0].std() and abs(radius[1].mean() - 1) < 0.02
+    assert edges.std() < 0.1 * edges.mean()
+
+
 def test_features_are_lines_of_the_new_mesh():
     V, F = meshes.cube()
     E = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])

@@ -48,7 +48,7 @@ def _add_features(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--sharp", type=float, nargs="?", const=40.0, metavar="DEGREES", help="keep sharp edges, by default above 40"
     )
-    command.add_argument("--no-boundary", action="store_true", help="do not keep the boundary")
+    command.add_argument("--no-boundary", action="store_true", help="smooth the boundary, and do not keep its corners")
     command.add_argument("--no-seams", action="store_true", help="do not keep seams and outlines of UV islands")
     command.add_argument("--no-materials", action="store_true", help="do not keep borders of materials")
 

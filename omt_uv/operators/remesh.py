@@ -63,7 +63,10 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         soft_max=1.0,
     )
     use_preserve_boundary: BoolProperty(
-        name="Preserve Boundary", description="Keep the outline of open meshes, and its corners", default=True
+        name="Preserve Boundary",
+        description="Keep the outline of open meshes, and its corners. Without, it is smoothed as far as the new edges "
+        "are too long to show it, and vertices are even along it",
+        default=True,
     )
     use_preserve_sharp: BoolProperty(
         name="Preserve Sharp",

@@ -75,7 +75,8 @@ def remesh(
     count_of : "vertices" or "faces"
     density : (m,) > 0, how many vertices per area every input triangle gets, in proportion; 1 by default
     features : (e,2) pairs of input vertices, edges to keep as lines of the new mesh
-    preserve_boundary : keep vertices on the corners of boundaries
+    preserve_boundary : keep vertices on boundaries and on their corners; without, a boundary still is one, but its
+        vertices slide until they are evenly apart, and it is smoothed as far as the new edges are too long to show it
     strategy : map to sample on and map to triangulate on, each the measure-preserving ("app") or the conformal ("cfp")
     fit : move vertices off the surface to halve the distance of the triangles to it
     rounds : of relaxation on the surface; 0 leaves the strategy's mesh as it is

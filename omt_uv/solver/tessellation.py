@@ -16,6 +16,7 @@ from .geometry import face_areas
 from .part_maps import PartMaps
 from .parts import Part
 from .progress import Progress, Steps, part_of
+from .rims import smooth_rims
 from .sampling import EVEN, Patch, triangulate_chart
 from .sphere_sampling import sample_sphere
 from .topology import pair_keys
@@ -108,6 +109,8 @@ def _by_charts(
             if not corners:
                 break
             stretch, corners = first, False
+    if not options.corners:
+        samples = smooth_rims(part, lines, samples, lengths)
     borders = [border(sides, samples, lines.arcs) for sides in lines.sides]
     inner = _inner_counts(charts, borders, density, max(vertices, FEWEST) - len(samples.points))
     patches: list[Patch] = []
