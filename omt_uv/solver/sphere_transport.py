@@ -8,16 +8,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .errors import TransportError
 from .geometry import laplacian_from_weights
-from .linear import solve_spd
+from .multigrid import Laplacians
 from .progress import Progress, Steps
 from .spherical_power import Hull, SphericalCells, by_flips, by_hull, spherical_cells
 
 TOLERANCE = 5e-7
 MAX_STEPS = 100
 MAX_HALVINGS = 30
+# Directions are solved for up to this residual, relative to that of the areas.
+SOLVED = 1e-4
 # Where cells start tiny, so do steps: from one to the next they may grow by this, and below SMALL they shrink by 4.
 GROWTH = 16.0
 SMALL = 0.05
@@ -62,7 +65,7 @@ def sphere_transport(
     if hull is not None:
         hull, _ = by_flips(hull, sites, h)
     cells = spherical_cells(sites, h, hull or by_hull(sites, h))
-    step, diagrams = 0.0, 1
+    step, diagrams, newton = 0.0, 1, _Newton(sites)
     floor = 0.5 * min(cells.area.min(), mass.min())
     first = max(_residual(cells, mass), tolerance)
     for iteration in range(MAX_STEPS):
@@ -71,7 +74,7 @@ def sphere_transport(
         yield Progress("Optimal transport", float(np.clip(done, 0, 1)))
         if residual <= tolerance:
             return SphereTransport(h, cells, residual, iteration, diagrams)
-        direction = _newton_direction(cells, mass)
+        direction = newton.direction(cells, mass)
         error = float(np.linalg.norm(cells.area - mass))
         step = min(1.0, GROWTH * (step or _first_step(sites, cells, direction)))
         for _ in range(MAX_HALVINGS):
@@ -116,9 +119,16 @@ def _residual(cells: SphericalCells, mass: np.ndarray) -> float:
     return float(np.max(np.abs(cells.area - mass) / mass))
 
 
-def _newton_direction(cells: SphericalCells, mass: np.ndarray) -> np.ndarray:
-    """A common weight changes nothing: one is held, and the mean is 0 afterwards."""
-    i, j = cells.edges.T
-    hessian = laplacian_from_weights(i, j, cells.conductance, len(mass))[1:, 1:]
-    direction = np.concatenate([[0.0], solve_spd(hessian.tocsc(), (mass - cells.area)[1:], order="mmd")])
-    return direction - direction.mean()
+class _Newton:
+    """Newton's directions for sites (n,3), numbered along a kd-tree for `Multigrid`."""
+
+    def __init__(self, sites: np.ndarray):
+        self._order = cKDTree(sites).indices
+        self._place, self._laplacians = np.argsort(self._order), Laplacians()
+
+    def direction(self, cells: SphericalCells, mass: np.ndarray) -> np.ndarray:
+        """A common weight changes nothing: the mean is 0."""
+        i, j = self._place[cells.edges.T]
+        hessian = laplacian_from_weights(i, j, cells.conductance, len(mass))
+        left, scale = (mass - cells.area)[self._order], mass[self._order]
+        return self._laplacians.solve(hessian, left, scale, SOLVED)[self._place]
