@@ -15,6 +15,7 @@ from .stages import (
     SQUEEZED,
     STAGE_STEPS,
     STRICT,
+    growth,
     weights_of,
 )
 
@@ -69,7 +70,7 @@ class Control:
         self.solved |= finished & ~failed
         self.live = self.live & ~finished
         further = ended & ~finished
-        more = self.weight * np.clip((error / settings.area_error) ** 2, 2.0, 10.0)
+        more = self.weight * growth(error / settings.area_error)
         planned = self.weights[np.clip(self.level, 0, last - 1)]
         self.weight = np.where(further, np.where(self.level < last, planned, more), self.weight)
         self.pressure[further], self.stage_steps[further] = FIRST_PRESSURE, 0

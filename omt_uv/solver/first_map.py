@@ -30,8 +30,8 @@ from .transport import Transport, transport
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 CONFORMAL, TRANSPORT = (0.0, 0.4), (0.4, 0.6)
-COARSENING, COARSE_MAP, COARSE_REFINEMENT, RETURN = (0.0, 0.3), (0.3, 0.2), (0.5, 0.3), (0.8, 0.1)
-SMOOTHED = (0.9, 0.1)
+COARSENING, COARSE_MAP, COARSE_REFINEMENT = (0.0, 0.3), (0.3, 0.2), (0.5, 0.3)
+RETURN, SMOOTHING = (0.8, 0.1), (0.9, 0.1)
 # Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
 # distance counts squared.
 SITE_RESOLUTION = 1e-7
@@ -40,9 +40,10 @@ CENTRED = 1e-3
 # Charts with more vertices than this come by way of one with an eighth of their vertices, or at most a quarter.
 COARSE_ABOVE, COARSER, COARSE_ENOUGH = 5000, 8, 0.25
 # Where the target is farther than this from the surface's areas, in relative entropy, coarser meshes say less: they are
-# taken in smaller steps, and what comes back is smoothed before Newton.
+# taken in smaller steps.
 FAR, COARSER_FAR, COARSE_ENOUGH_FAR = 0.5, 5, 0.4
-SWEEPS, SMOOTHING = 5, 500.0
+# What comes back is smoothed so many times, with these weights of the area term.
+SWEEPS, SMOOTH_WEIGHT, SMOOTH_WEIGHT_FAR = 8, 30.0, 500.0
 
 
 @dataclass(frozen=True)
@@ -89,17 +90,17 @@ def coarse_first_map(
         direct = first_map(points, mesh, mass, rim, corners, domain, log)
         found = yield from part_of(direct, *COARSE_MAP)
     with log.timed("coarse refinement"):
-        options: dict = {"boundary": boundary, "target": mass, "balance": balance, "quality": "rough"}
+        options: dict = {"boundary": boundary, "target": mass, "balance": balance}
+        options["quality"] = "rough" if far else "relaxed"
         refined = yield from part_of(refine(points, mesh, found.uv, near=found.near, **options), *COARSE_REFINEMENT)
     log.warnings += refined.warnings
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
-        if far:
-            faces = elements(vertices, triangles, target)
-            w = uv @ [1, 1j]
-            w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
-            w = yield from part_of(smoothed(faces, w, SMOOTHING, SWEEPS), *SMOOTHED)
-            uv = np.column_stack([w.real, w.imag])
+        faces, w = elements(vertices, triangles, target), uv @ [1, 1j]
+        w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
+        sweeps = smoothed(faces, w, SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT, SWEEPS)
+        w = yield from part_of(sweeps, *SMOOTHING)
+        uv = np.column_stack([w.real, w.imag])
     return FirstMap(found.conformal, found.cells, uv, far)
 
 

@@ -15,6 +15,8 @@ from .errors import PrecisionError
 
 # Below this many unknowns minimum degree is the faster order of the two.
 SMALL = 50_000
+# Columns of SuperLU's panels, up to this many unknowns; beyond, its own default is faster.
+PANEL, FEW = 4, 100_000
 _ORDERS = {"mmd": "MMD_AT_PLUS_A", "colamd": "COLAMD", "natural": "NATURAL"}
 
 
@@ -89,5 +91,7 @@ def minimum_degree(A: sp.spmatrix) -> np.ndarray:
 
 
 def _splu(A: sp.spmatrix, spec: str):
-    # No panel size or relaxation of our own: SuperLU sizes work arrays by its defaults, and larger ones overrun them.
-    return splu(sp.csc_matrix(A), permc_spec=spec, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    # No larger panels than SuperLU's own, and no other relaxation: it sizes work arrays by its defaults.
+    panel = PANEL if A.shape[0] <= FEW else None
+    options = {"SymmetricMode": True}
+    return splu(sp.csc_matrix(A), permc_spec=spec, diag_pivot_thresh=0.0, panel_size=panel, options=options)

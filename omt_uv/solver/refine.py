@@ -70,7 +70,7 @@ def refine(
         scaled to sum to the area of the surface.
     region : (m,) in [0, 1], weights of a region whose share of the target's area is to be exact
     balance : 0 for exact areas to 1 for the least shear
-    quality : "draft", "standard" or "exact"; "rough" for the start of a finer mesh
+    quality : "draft", "standard" or "exact"; "relaxed" or "rough" for the start of a finer mesh
     near : the map is nearly the one that is looked for, and needs no detour through small weights
     pins : vertices (k,) and their places (k,2), in free mode. Two or more fix place, direction and scale, one fixes the
         place; with one, scale and direction are those of `uv`. Without pins the map has the area of the surface, and

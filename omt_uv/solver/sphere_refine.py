@@ -16,6 +16,8 @@ from .sphere_untangle import untangle_on_sphere
 from .spherical import signed_volumes, spherical_areas
 from .stages import LOOSE, QUALITIES, SQUEEZED, STAGE_STEPS, STRICT, Quality, minimise, weights_of
 
+# Where the area error is not reached, a weight is left for a greater one when Newton promises less than this.
+TOLERANCE = 1e-2
 # Steps on the way from coarse to fine: the finer levels do the rest.
 RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
 
@@ -128,7 +130,7 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
-        tolerance = settings.tolerance if balance == 0 else STRICT
+        tolerance = TOLERANCE if balance == 0 else STRICT
         stage = yield from minimise(current, p, goal, allowed, k, None, tolerance)
         p, steps, weight, k = stage.w, steps + stage.steps, weights[k], k + 1
         before, error = error, problem.area_error(p)

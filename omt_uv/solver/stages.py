@@ -30,13 +30,16 @@ class Quality:
 
 
 QUALITIES = {
+    # For the start of a finer mesh: little shear alone, or areas about right, too.
+    "relaxed": Quality(0.1, (30.0,), 1e4, 80, 3e-2),
     "rough": Quality(0.03, (30.0, 500.0), 1e4, 80, 1e-2),
     "draft": Quality(0.05, (10.0, 100.0), 1e3, 40, 1e-2),
-    "standard": Quality(0.008, (30.0, 500.0), 1e6, 150, 1e-2),
+    "standard": Quality(0.008, (30.0, 500.0), 1e6, 150, 3e-2),
     "exact": Quality(0.0003, (30.0, 1000.0, 3e4), 1e8, 300, 1e-2),
 }
-# A stage on the way, or one that reaches the goal, ends when Newton promises less than this share of the energy.
-LOOSE = 3e-2
+# A stage that reaches the goal ends when Newton promises less than this share of the energy. One on the way ends sooner
+# where the boundary is free; vertices on a circle or on sides do not make up for it later.
+LOOSE, ON_THE_WAY = 3e-2, 0.05
 # With a balance the weight alone decides, and neighbouring balances must not differ by chance.
 STRICT = 1e-4
 # Weight of the area term at balance 1. Without it the map of least shear has no scale; and much below this the mean
@@ -44,6 +47,8 @@ STRICT = 1e-4
 LEAST_WEIGHT = 1e-2
 # Mean energy above which a start is so squeezed that its shear must relax before its areas.
 SQUEEZED = 50.0
+# Where the error is not reached, the weight grows by at least and at most so much.
+LEAST_GROWTH, MOST_GROWTH = 1.3, 10.0
 # A stage that takes longer gives way to the next, which may find a way around.
 STAGE_STEPS = 40
 # Share of the area term's indefinite Hessian kept: at the start of a stage, and the least before it is dropped.
@@ -120,6 +125,11 @@ def final_weight(balance: float, settings: Quality) -> float:
     return settings.weights[-1] ** (1 - balance) * LEAST_WEIGHT**balance
 
 
+def growth(excess: np.ndarray | float) -> np.ndarray | float:
+    """Factors for weights that leave area errors so many times (any shape) as large as they are to be."""
+    return np.clip(np.square(excess), LEAST_GROWTH, MOST_GROWTH)
+
+
 def stages(task: Task, w: np.ndarray, balance: float, settings: Quality, near: bool = False) -> Steps[Found]:
     """Newton in stages of growing weight, until the area error is small enough.
 
@@ -142,7 +152,8 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality, near: b
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
         watch = None if guarded or overlap else task.crosses
         tolerance = settings.tolerance if balance == 0 else STRICT
-        stage = yield from minimise(problem, w, goal, allowed, k, watch, tolerance)
+        loose = ON_THE_WAY if balance == 0 and not task.scale_free and k < len(weights) - 1 else LOOSE
+        stage = yield from minimise(problem, w, goal, allowed, k, watch, tolerance, loose)
         w, steps = stage.w, steps + stage.steps
         if stage.status == "crossed":
             guarded = True
@@ -153,7 +164,7 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality, near: b
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
             break
         if k >= len(weights):
-            weights.append(weights[-1] * min(max(2.0, (error / settings.area_error) ** 2), 10.0))
+            weights.append(weights[-1] * float(growth(error / settings.area_error)))
     return Found(w, steps, stage.residual, weight, stage.energy, stage.status, task.crosses(w), warnings)
 
 
@@ -187,8 +198,9 @@ def minimise(
     place: int,
     watch: Callable[[np.ndarray], bool] | None = None,
     tolerance: float = LOOSE,
+    loose: float = LOOSE,
 ) -> Steps[Stage]:
-    """Newton until it promises little, at least LOOSE; where that leaves the area error above the goal, `tolerance`.
+    """Newton until it promises less than `loose`; where that leaves the area error above the goal, than `tolerance`.
 
     place: the number of this stage, for the progress; watch: a step to where this is true is not taken, and the
     stage ends "crossed".
@@ -207,7 +219,7 @@ def minimise(
         if step.share == 0 and used == 1.0:
             status = "stalled"
             break
-        if residual < LOOSE and problem.area_error(w) <= goal:
+        if residual < loose and problem.area_error(w) <= goal:
             status = "converged"
             break
         if residual < tolerance:

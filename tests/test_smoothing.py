@@ -1,0 +1,73 @@
+"""Newton steps of single vertices."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver import smoothing
+from omt_uv.solver.embedding import arc_length_parameters, tutte
+from omt_uv.solver.energy import elements, energies, energy
+from omt_uv.solver.geometry import face_areas
+from omt_uv.solver.progress import drain
+from omt_uv.solver.topology import boundary_loops
+
+WEIGHT = 30.0
+
+
+@pytest.fixture(scope="module")
+def chart():
+    """Elements of a head with uneven targets, an embedding in the disk, and its boundary."""
+    V, F = meshes.head(16)
+    loop = boundary_loops(F)[0]
+    turn = 2 * np.pi * arc_length_parameters(V, loop)
+    w = tutte(V, F, loop, np.column_stack([np.cos(turn), np.sin(turn)])) @ [1, 1j]
+    density = np.random.default_rng(0).uniform(0.5, 2, len(F))
+    return elements(V, F, face_areas(V, F) * density), w, loop
+
+
+def test_sweeps_lower_the_energy_and_leave_the_boundary(chart):
+    faces, w, loop = chart
+    before = energy(faces, w, WEIGHT)
+    for sweeps in (1, 4):
+        smooth = drain(smoothing.smoothed(faces, w, WEIGHT, sweeps))
+        after = energy(faces, smooth, WEIGHT)
+        assert after < before
+        np.testing.assert_array_equal(smooth[loop], w[loop])
+        before = after
+
+
+def test_sets_are_independent_and_hold_nearly_all_vertices_once(chart):
+    faces, w, loop = chart
+    held = np.concatenate([vertex for vertex, _, _ in smoothing._sets(faces, len(w))])
+    assert len(np.unique(held)) == len(held) >= 0.97 * (len(w) - len(loop))
+    for vertex, row, star in smoothing._sets(faces, len(w)):
+        chosen = np.isin(star.triangles, vertex)
+        assert (chosen.sum(1) == 1).all() and chosen[:, 0].all()
+        np.testing.assert_array_equal(star.triangles[:, 0], vertex[row])
+
+
+def test_a_step_is_newtons(chart):
+    faces, w, _ = chart
+    vertex, row, star = next(smoothing._sets(faces, len(w)))
+
+    def at(move):
+        moved = w.copy()
+        moved[vertex] += move
+        return np.bincount(row, energies(star, moved, WEIGHT), len(vertex))
+
+    def slope(move):
+        return (at(move) - at(-move)) / (2 * abs(move))
+
+    def bend(move):
+        return (at(move) + at(-move) - 2 * at(0)) / abs(move) ** 2
+
+    h = 1e-4
+    xx, yy, xy = bend(h), bend(1j * h), (bend(h + 1j * h) - bend(h - 1j * h)) / 2
+    hessian = np.stack([np.stack([xx, xy], 1), np.stack([xy, yy], 1)], 1)
+    convex = np.linalg.eigvalsh(hessian)
+    convex = convex[:, 0] > 2 * smoothing.CONVEX * convex[:, 1]
+    assert convex.mean() > 0.8
+    gradient = np.stack([slope(1e-5), slope(1e-5j)], 1)
+    expected = -np.linalg.solve(hessian, gradient[..., None])[..., 0] @ [1, 1j]
+    found = smoothing._directions(row, star, w, WEIGHT, len(vertex))
+    np.testing.assert_allclose(found[convex], expected[convex], atol=1e-3 * np.abs(expected).max())
