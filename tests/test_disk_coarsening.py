@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.charts import split, triangle_rows, triangle_surface
+from omt_uv.solver.contact import crossings
 from omt_uv.solver.disk_coarsening import coarsened
 from omt_uv.solver.domain import Disk
 from omt_uv.solver.energy import elements, energy
@@ -100,3 +101,15 @@ def test_smoothing_lowers_the_energy_and_folds_nothing():
     smooth = drain(smoothed(faces, w, 100.0, 2))
     assert (faces.areas(smooth) > 0).all() and energy(faces, smooth, 100.0) < energy(faces, w, 100.0)
     np.testing.assert_array_equal(smooth[rim], w[rim])
+
+
+def test_what_returns_to_the_boundary_crosses_nothing():
+    V, F = meshes.head(60)
+    flat = mean_value_sites(V, F, boundary_loops(F)[0], None, Disk())
+    coarse = drain(coarsened(V, F, flat, face_areas(V, F), len(V) // 12))
+    # A conformal map whose boundary is not convex.
+    w = flat[coarse.kept] @ [1, 1j]
+    w = w + 0.12 * w**5
+    assert (signed_areas(np.column_stack([w.real, w.imag]), coarse.triangles) > 0).all()
+    fine = drain(coarse.prolonged(np.column_stack([w.real, w.imag]), len(V)))
+    assert not len(crossings(fine @ [1, 1j], boundary_loops(F)[0]))

@@ -66,7 +66,9 @@ class Coarse:
         for k, removal in enumerate(reversed(self.rounds)):
             yield Progress("Coarser mesh", k / len(self.rounds))
             w[removal.vertex] = _returned(removal, w)
-            relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS)
+            # On the rim they stay on the chords: where the coarse boundary does not cross itself, neither does this.
+            rim = removal.corner[:, 1] == removal.corner[:, 2]
+            relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS, rim)
         return np.column_stack([w.real, w.imag])
 
 
@@ -187,7 +189,8 @@ def _returned(removal: Removal, w: np.ndarray) -> np.ndarray:
     reach = np.where(touching | (slope >= 0), np.inf, room / np.maximum(-slope, 1e-300))
     nearest = np.full(count, np.inf)
     np.minimum.at(nearest, row, reach)
-    nearest = np.where(np.isfinite(nearest), nearest, np.abs(target - base))
+    # Lines that hardly slope meet the heading far outside of the star.
+    nearest = np.minimum(nearest, np.maximum.reduceat(np.abs(a - base[row]), np.searchsorted(row, np.arange(count))))
     safe = base + 0.5 * nearest * heading
     at_safe, at_target = (_cross(a - x[row], b - x[row]) for x in (safe, target))
     short = at_target < KEPT_AREA * at_safe

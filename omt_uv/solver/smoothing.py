@@ -77,16 +77,18 @@ def part(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Elements:
     return Elements(triangles, faces.area[star], gradient, faces.ratio[star], faces.weight[star])
 
 
-def relax(vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, weight: float, steps: int) -> None:
+def relax(
+    vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, weight: float, steps: int, held=False
+) -> None:
     """Newton steps of every vertex (k,) within its star, in place, each only as far as its own energy falls.
 
-    row (s,): which of the vertices is the first corner of a face of the stars.
+    row (s,): which of the vertices is the first corner of a face of the stars; held: vertices (k,) bool that stay.
     """
     k = len(vertex)
     value = np.bincount(row, energies(faces, w, weight), k)
     for _ in range(steps):
         step = _directions(row, faces, w, weight, k)
-        moving = np.ones(k, bool)
+        moving = np.ones(k, bool) & ~np.asarray(held)
         for _ in range(HALVINGS):
             trial = w.copy()
             trial[vertex[moving]] += step[moving]
