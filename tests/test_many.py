@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import parameterize
-from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.charts import triangle_rows, triangle_surface
 from omt_uv.solver.distortion import measure
+from omt_uv.solver.exact_share import exact_share
 from omt_uv.solver.geometry import face_areas, signed_areas
+from omt_uv.solver.measure import Target
 from omt_uv.solver.parameterize import MANY, unwrap
 from omt_uv.solver.progress import drain
 
@@ -77,3 +79,24 @@ def test_a_chart_that_fails_together_says_so_alone():
     result = drain(unwrap(surface))
     assert len(result.maps) == MANY + 1 and all(np.isfinite(m.uv).all() for m in result.maps)
     assert all(m.area_l1 <= 0.01 for m in result.maps[:MANY])
+
+
+def test_regions_get_their_shares_together_as_one_by_one(monkeypatch):
+    surface = side_by_side(all_shapes()[3:11])
+    centre = surface.positions[surface.corner_vertex[surface.triangles]].mean(axis=1)
+    w = np.clip(1.5 - 2 * np.abs(centre[:, 1] % 1 - 0.5) - (centre[:, 0] % 20 > 0.5), 0, 1)
+    area = face_areas(surface.positions, surface.corner_vertex[surface.triangles])
+    target = Target(exact_share(w, area, 2.0).density, w)
+    together = drain(unwrap(surface, target=target))
+    alone = one_by_one(monkeypatch, surface, target=target)
+    assert sum(m.newton_transport is None for m in together.maps) >= MANY - 2
+    for chart, a, b in zip(together.charts, together.maps, alone.maps, strict=True):
+        has = signed_areas(a.uv, chart.triangles)
+        mine = target.of(triangle_rows(surface, chart))
+        asked = mine.density * face_areas(chart.vertices, chart.triangles)
+        assert (has > 0).all() and has.sum() == pytest.approx(asked.sum(), rel=1e-9)
+        assert mine.region @ has == pytest.approx(mine.region @ asked, rel=5e-3, abs=1e-3 * asked.sum())
+        figures = measure(chart.vertices, chart.triangles, a.uv[chart.triangles], density=mine.density)
+        assert figures.overlap <= 1e-4 and figures.area_l1 == pytest.approx(a.area_l1, abs=1e-9)
+        assert figures.angle_mean == pytest.approx(a.angle_mean, rel=1e-6)
+        assert a.angle_mean <= 1.05 * b.angle_mean and a.area_l1 <= max(1.5 * b.area_l1, 1e-3)

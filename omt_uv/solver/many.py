@@ -16,7 +16,7 @@ from .contact import crossings
 from .control import Control
 from .dissection import vertex_graph
 from .embedding import arc_length_parameters, tutte
-from .energy import Elements, elements, energies, gradient
+from .energy import SHARE, SINGLE, Elements, elements, energies, gradient
 from .geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
 from .linear import minimum_degree
 from .newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
@@ -64,8 +64,17 @@ class Maps:
     weight: np.ndarray
 
 
-def solve_many(meshes: list[tuple[np.ndarray, np.ndarray]], quality: str, balance: float) -> Steps[Maps]:
+def solve_many(
+    meshes: list[tuple[np.ndarray, np.ndarray]],
+    quality: str,
+    balance: float,
+    density: np.ndarray | None = None,
+    region: np.ndarray | None = None,
+) -> Steps[Maps]:
     """Area-preserving maps with free boundaries of disks, vertices (n,3) of unit extent and triangles (m,3) each.
+
+    density, region : of the triangles of all disks, one after the other, see `parameterize.unwrap_chart`. Every map has
+        the area of its disk
 
     Raises
     ------
@@ -74,8 +83,10 @@ def solve_many(meshes: list[tuple[np.ndarray, np.ndarray]], quality: str, balanc
     yield Progress("Small charts", 0.0)
     parts = _union(meshes)
     area = 0.5 * np.linalg.norm(_normals(parts), axis=1)
-    faces = elements(parts.positions, parts.triangles, area)
-    share = parts.sums(faces.area)
+    wanted = area if density is None else area * density
+    wanted = wanted * (parts.sums(area) / parts.sums(wanted))[parts.of_face]
+    faces = elements(parts.positions, parts.triangles, wanted, region)
+    share = parts.sums(faces.weight)
     w = _starts(parts, meshes, area)
     order = minimum_degree(vertex_graph(parts.triangles, len(w)))
     control = Control(
@@ -89,8 +100,9 @@ def solve_many(meshes: list[tuple[np.ndarray, np.ndarray]], quality: str, balanc
             yield Progress("Small charts", 1 - control.live.mean())
     control.solved[parts.of_rim[crossings(_apart(parts, w), parts.rim)]] = False
     a, b = (np.abs(x) for x in faces.derivatives(w))
-    ratio = (a**2 - b**2) / (parts.sums(faces.area * (a**2 - b**2)) / share)[parts.of_face]
-    weight = faces.area / share[parts.of_face]
+    has, target = faces.areas(w), faces.area * faces.ratio
+    weight = target / parts.sums(target)[parts.of_face]
+    ratio = has / parts.sums(has)[parts.of_face] / weight
     return Maps(
         np.column_stack([w.real, w.imag]),
         control.solved,
@@ -144,10 +156,13 @@ class _Group:
         place[self.vertices] = np.arange(len(self.vertices))
         kept = live[parts.of_face]
         triangles = place[faces.triangles[kept]]
-        self.faces = Elements(triangles, faces.area[kept], faces.gradient[kept], faces.ratio[kept], faces.weight[kept])
+        region = None if faces.region is None else faces.region[kept]
+        self.faces = Elements(
+            triangles, faces.area[kept], faces.gradient[kept], faces.ratio[kept], faces.weight[kept], region
+        )
         self.of_face, self.of_vertex = parts.of_face[kept], parts.of_vertex[self.vertices]
         self.count = parts.count
-        self.share = np.maximum(self._sums(self.faces.area), 1e-300)
+        self.share = np.maximum(self._sums(self.faces.weight), 1e-300)
         self.assembly = Assembly(triangles, len(self.vertices))
         self.motion = Free(np.zeros(len(self.vertices), bool))
 
@@ -181,9 +196,18 @@ class _Group:
         return self._sums(energies(self.faces, w, weight)) / self.share
 
     def _errors(self, w):
+        """`energy.shortfall` of every chart, (c,)."""
         area, target = self.faces.areas(w), self.faces.area * self.faces.ratio
-        parts = [x / np.maximum(self._sums(x), 1e-300)[self.of_face] for x in (area, target)]
-        return self._sums(np.abs(parts[0] - parts[1]))
+        area, target = (x / np.maximum(self._sums(x), 1e-300)[self.of_face] for x in (area, target))
+        error = area - target
+        worst = self._sums(np.abs(error))
+        region = self.faces.region
+        for part in () if region is None else (region, 1 - region):
+            share = self._sums(part * target)
+            held = np.where(share > 0, share, np.inf)
+            single = SINGLE * self._sums(part * np.abs(error)) / held
+            worst = np.maximum.reduce([worst, SHARE * np.abs(self._sums(part * error)) / held, single])
+        return worst
 
     def _sums(self, face_values):
         return np.bincount(self.of_face, face_values, self.count)

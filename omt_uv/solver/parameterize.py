@@ -132,9 +132,10 @@ def unwrap(
     held = [located_pins(pins, chart) for chart in charts]
     maps: list[ChartMap] = []
     total = sum(len(c.triangles) for c in charts)
-    alike = [k for k, c in enumerate(charts) if boundary == "free" and target is None and held[k] is None and _small(c)]
+    alike = [k for k, c in enumerate(charts) if boundary == "free" and held[k] is None and _small(c)]
     done = sum(len(charts[k].triangles) for k in alike) / total
-    found = yield from part_of(_together([charts[k] for k in alike], quality, balance), 0.0, done)
+    targets = [chart_target(target, surface, charts[k]) for k in alike]
+    found = yield from part_of(_together([charts[k] for k in alike], targets, quality, balance), 0.0, done)
     together = dict(zip(alike, found, strict=True))
     for k, (chart, fixed) in enumerate(zip(charts, held, strict=True)):
         ready = together.get(k)
@@ -206,8 +207,11 @@ def _small(chart: Chart) -> bool:
     return len(chart.triangles) <= SMALL and not len(chart.patches)
 
 
-def _together(charts: list[Chart], quality: str, balance: float) -> Steps[list[ChartMap | None]]:
-    """Maps with free boundaries of small charts, solved together if they are many; None where one has to go alone."""
+def _together(charts: list[Chart], targets: list[dict], quality: str, balance: float) -> Steps[list[ChartMap | None]]:
+    """Maps with free boundaries of small charts, solved together if they are many; None where one has to go alone.
+
+    targets : density and region of each, or nothing, see `chart_target`
+    """
     found: list[ChartMap | None] = [None] * len(charts)
     if len(charts) < MANY:
         return found
@@ -220,7 +224,9 @@ def _together(charts: list[Chart], quality: str, balance: float) -> Steps[list[C
             boxes = [_in_unit_box(c.vertices) for c in members]
             meshes = [(v, c.triangles) for (v, _), c in zip(boxes, members, strict=True)]
             maps = yield from part_of(
-                solve_many(meshes, quality, balance), done, float(sizes[batch[-1]] / sizes[-1]) - done
+                solve_many(meshes, quality, balance, **_side_by_side([targets[k] for k in batch])),
+                done,
+                float(sizes[batch[-1]] / sizes[-1]) - done,
             )
         except MeshError:
             continue  # one of them is to blame, and will say so alone
@@ -228,9 +234,18 @@ def _together(charts: list[Chart], quality: str, balance: float) -> Steps[list[C
         pieces = np.split(maps.uv, np.cumsum([len(v) for v, _ in meshes])[:-1])
         for k, (vertices, unit), chart, uv, place in zip(batch, boxes, members, pieces, range(len(batch)), strict=True):
             if maps.solved[place]:
-                uv = _in_place(uv, vertices, chart.triangles, None, unit, None)
+                uv = _in_place(uv, vertices, chart.triangles, targets[k].get("density"), unit, None)
                 found[k] = _of_many(maps, place, uv, seconds)
     return found
+
+
+def _side_by_side(targets: list[dict]) -> dict:
+    """Densities and regions of several charts as those of their union."""
+    if not targets[0]:
+        return {}
+    density = positive_density(np.concatenate([t["density"] for t in targets]))
+    regions = [t["region"] for t in targets]
+    return {"density": density, "region": None if regions[0] is None else np.concatenate(regions)}
 
 
 def _of_many(maps: Maps, k: int, uv: np.ndarray, seconds: float) -> ChartMap:
