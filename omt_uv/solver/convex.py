@@ -55,8 +55,6 @@ def opened(
     None where they get their own areas; weights of the area term. Corners that cannot be opened without a fold, or
     without an outline that crosses itself, stay as they are.
     """
-    if not (np.diff(surface.face_start) > 3).any():
-        return {}
     first = np.cumsum([0, *(len(uv) for uv in maps)])
     # In units of the map, so that no area under- or overflows.
     unit = float(np.abs(np.concatenate(maps)).max())

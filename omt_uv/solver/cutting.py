@@ -16,7 +16,7 @@ from .cut_graph import greedy_arcs, path_to, shorten
 from .extremities import log_scale, spread
 from .geometry import face_areas
 from .holes import fill_holes
-from .nets import net
+from .nets import is_long, net
 from .piece import NOISE, SEAM, SHARP, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .repair import Repaired, join, weldable
 from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
@@ -28,6 +28,8 @@ MOST_EXTREMITIES = 8
 # in the mean square over the surface.
 BEARABLE = 0.5**2
 ROOT_TRIALS = 4
+# A net may be so many times as long as another cut, and as long as `nets.is_long` says anyway.
+LONGER = 1.5
 
 
 @dataclass(frozen=True)
@@ -151,15 +153,25 @@ def _cut_parts(
         piece = make_piece(sheets, positions, corner_class, members[k], mine, weight, ease)
         name = fingerprint(piece)
         if name not in known:
-            filled = (sheets.owner[members[k]] < 0).any()
-            unrolled = net(piece) if extremities and not filled else None
-            known[name] = unrolled or open_piece(piece, kind, k, extremities)
+            filled = bool((sheets.owner[members[k]] < 0).any())
+            known[name] = _best_cut(piece, kind, k, extremities, filled)
         chosen, tips = known[name]
         gone[piece.sheet_pair[chosen]] = True
         length = float(piece.length[chosen].sum()) * unit
         figures = int(kind.boundaries[k]), int(kind.handles[k]), bool(kind.one_sided[k])
         report.append(PieceCut(len(piece.triangles), *figures, length, piece.vertex_ids[tips]))
     return gone, report, weldable(surface, sheets, part, kind.is_disk)
+
+
+def _best_cut(piece: Piece, kind: Kind, k: int, extremities: int, filled: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The net of the piece, if it has one that is not much longer than other cuts; else those."""
+    unrolled = net(piece) if extremities and not filled else None
+    if unrolled is not None and not is_long(piece, unrolled[0]):
+        return unrolled
+    other = open_piece(piece, kind, k, extremities)
+    if unrolled is not None and piece.length[unrolled[0]].sum() <= LONGER * piece.length[other[0]].sum():
+        return unrolled
+    return other
 
 
 def ease_of_cuts(surface: Surface, sheets: Sheets) -> np.ndarray:

@@ -26,8 +26,10 @@ ACROSS = 1.5
 
 
 def net(piece: Piece) -> tuple[np.ndarray, np.ndarray] | None:
-    """Edges (e,) bool whose cut unrolls the piece, and the corners (k,) they pass through; None if there are none,
-    or if the seams would be long or pass through vertices to be kept free of them."""
+    """Edges (e,) bool whose cut unrolls the piece, and the corners (k,) they pass through.
+
+    None if there are none, or if seams would pass through vertices to be kept free of them.
+    """
     length = halfedge_lengths(piece.positions, piece.triangles).reshape(-1, 3)
     on_rim = piece.on_rim()
     curvature = np.abs(angle_defects(piece.triangles, angles_from_lengths(length), np.flatnonzero(on_rim), piece.count))
@@ -43,5 +45,10 @@ def net(piece: Piece) -> tuple[np.ndarray, np.ndarray] | None:
     if curved or len(tips) < 3 or (piece.avoid[tips] > 0).any():
         return None
     chosen = greedy_arcs(replace(piece, cost=np.where(folded, piece.cost, ACROSS * piece.cost)), tips)
+    return chosen, tips
+
+
+def is_long(piece: Piece, cut: np.ndarray) -> bool:
+    """Whether a cut (e,) bool is more than what a net should take."""
     area = face_areas(piece.positions, piece.triangles).sum()
-    return (chosen, tips) if piece.length[chosen].sum() <= LONGEST * np.sqrt(area) else None
+    return bool(piece.length[cut].sum() > LONGEST * np.sqrt(area))

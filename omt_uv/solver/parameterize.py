@@ -26,6 +26,7 @@ from .preparation import prepare
 from .progress import Progress, Steps, part_of
 from .refine import BOUNDARIES, Refinement, refine
 from .stages import QUALITIES
+from .starts import unroll
 from .topology import boundary_loops
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
@@ -168,6 +169,8 @@ def with_open_corners(
 
     held: the pins of every chart; the others as for `unwrap`. A map that would lose its areas stays as it is.
     """
+    if not (np.diff(surface.face_start) > 3).any():
+        return maps
     fixed = [_fixed(c, p, boundary) for c, p in zip(charts, held, strict=True)]
     density = [chart_target(target, surface, c).get("density") for c in charts]
     new = list(maps)
@@ -373,7 +376,11 @@ def unwrap_chart(
 def _first_map(
     vertices, triangles, target, loop, corners, domain: Domain, boundary: str, balance: float, log: Log
 ) -> Steps[FirstMap]:
-    """Where the refinement starts; a large chart comes by way of coarser ones."""
+    """Where the refinement starts; a flat chart with a free boundary is unrolled, large ones come by way of coarser."""
+    if boundary == "free":
+        flat = unroll(vertices, triangles, loop)
+        if flat is not None:
+            return FirstMap(None, None, flat)
     if len(vertices) > COARSE_ABOVE:
         try:
             found = yield from coarse_first_map(vertices, triangles, target, loop, corners, boundary, balance, log)

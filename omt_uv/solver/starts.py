@@ -15,7 +15,7 @@ from .embedding import arc_length_parameters, tutte
 from .energy import elements
 from .errors import FoldedUVError
 from .geometry import face_areas, signed_areas
-from .linear import solve_spd
+from .linear import Factor
 from .newton import Free, Motion, OnCircle, OnLines, linear_forms
 from .topology import halfedges, twins
 from .untangle import USABLE, arc_length_rim, circle_rim, count_folds, map_energy, untangle
@@ -24,6 +24,11 @@ SPREAD = "The boundary of the start is not in order; it was spread over the doma
 SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by the length of the boundary"
 # Curvature, summed without sign over the inner vertices, below which a chart may be unrolled at once, in radians.
 NEARLY_FLAT = 0.5
+# Solutions of normal equations have half of the digits, and each further one of what is left has as many more: on a
+# plane with hundreds of slits rounding would let the two sides of some cross.
+POLISH = 3
+# A boundary vertex this near to being the farthest of all is as good as that.
+FARTHEST = 1 - 1e-6
 # Mean energy of a start above which another one may be better.
 RELAXED = 2.0
 # A map whose signed area is a smaller share of its unsigned area has no orientation to speak of.
@@ -170,12 +175,17 @@ def unroll(vertices, triangles, loop) -> np.ndarray | None:
     rows = np.sqrt(area)[:, None] * faces.gradient
     linear = linear_forms(np.vstack([triangles, triangles]), np.vstack([rows, -1j * rows]), n).tocsc()
     first = loop[0]
-    second = loop[np.linalg.norm(vertices[loop] - vertices[first], axis=1).argmax()]
+    far = np.linalg.norm(vertices[loop] - vertices[first], axis=1)
+    # On a symmetric boundary rounding shall not decide between two.
+    second = loop[np.argmax(far >= FARTHEST * far.max())]
     held = np.array([2 * first, 2 * first + 1, 2 * second, 2 * second + 1])
     x = np.zeros(2 * n)
     x[held[2]] = np.linalg.norm(vertices[second] - vertices[first])
     others = np.setdiff1d(np.arange(2 * n), held)
-    x[others] = solve_spd(linear[:, others].T @ linear[:, others], -(linear[:, others].T @ (linear @ x)))
+    free = linear[:, others]
+    factor = Factor(free.T @ free)
+    for _ in range(POLISH):
+        x[others] -= factor.solve(free.T @ (linear @ x))
     uv = x.reshape(n, 2)
     signed = signed_areas(uv, triangles)
     if not (signed > 0).all() or len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
