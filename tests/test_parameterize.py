@@ -188,4 +188,8 @@ def test_models(name):
     assert figures.overlap <= 1e-4
     if chart_map.newton_conformal is not None:
         assert chart_map.newton_conformal <= 12 and chart_map.residual_conformal <= 1e-8
-    assert chart_map.newton_transport <= 25 and chart_map.residual_transport <= 1e-6
+    if name in ("alligator", "maze", "woody"):
+        # Flat: unrolled, without distortion.
+        assert chart_map.newton_transport is None and chart_map.angle_mean <= 1.001
+    else:
+        assert chart_map.newton_transport <= 25 and chart_map.residual_transport <= 1e-6
