@@ -15,9 +15,12 @@ from .preparation import prepare
 from .progress import Steps, part_of
 from .sphere_conformal import ConformalSphere, conformal_sphere
 from .sphere_sampling import sphere_image
+from .tame_charts import ROUNDS, tame_charts
 
 # Where the time of two maps goes, as start and width.
 FIRST, SECOND = (0.0, 0.5), (0.5, 0.5)
+# From so many vertices on a part can have many charts: where they end on boundaries, vertices stay.
+MANY = 500
 
 
 @dataclass(frozen=True)
@@ -45,17 +48,28 @@ class PartMaps:
     def __init__(self, part: Part):
         self.part = part
         self._sphere: ConformalSphere | None = None
-        self._conformal: dict[int, Image] = {}
-        self._latest: dict[int, tuple[np.ndarray, Maps]] = {}
+        self._tame = False
+        self._sets: dict[bool, tuple[list[Chart], list[Image]]] = {}
+        self._latest: dict[tuple[bool, int], tuple[np.ndarray, Maps]] = {}
         # Whether to map it to the sphere: charts end at features.
         self.spherical = part.spherical and len(part.features) == 0
         self.warnings: tuple[str, ...] = ()
 
-    @cached_property
+    @property
     def charts(self) -> list[Chart]:
-        """The part cut into disks."""
+        """The part cut into disks, by `choose_charts` if that was called."""
+        return self._sets[self._tame][0] if self._tame in self._sets else self._few
+
+    @cached_property
+    def _few(self) -> list[Chart]:
         part = self.part
         return prepare(triangle_surface(part.vertices, part.triangles, part.features)).charts
+
+    def choose_charts(self, count: int) -> Steps[None]:
+        """Cut the part into disks that have conformal maps as far as can be, or into few where vertices are few."""
+        self._tame = count >= MANY
+        if self._tame not in self._sets:
+            self._sets[self._tame] = yield from tame_charts(self.part, conformal_image, ROUNDS if self._tame else 0)
 
     def of_sphere(self, density: np.ndarray) -> Steps[Maps | None]:
         """Maps to the sphere; None, and a warning from then on, where there are none in double precision."""
@@ -77,23 +91,20 @@ class PartMaps:
         self.warnings = (f"{cause}; a part was cut open instead of mapped to the sphere",)
 
     def of_chart(self, k: int, density: np.ndarray) -> Steps[Maps]:
-        """Maps of chart number k to the disk, and warnings where they are milder than asked for."""
+        """Maps of chart number k of those chosen to the disk, and warnings where they are milder than asked for."""
         if (known := self._known(k, density)) is not None:
             return known
         chart = self.charts[k]
-        if k not in self._conformal:
-            self._conformal[k] = yield from part_of(conformal_image(chart.vertices, chart.disk), *FIRST)
-        first = self._conformal[k]
-        steps = preserving_image(chart.vertices, chart.disk, first.uv, density[chart.faces])
-        second = yield from part_of(steps, *SECOND)
+        first = self._sets[self._tame][1][k]
+        second = yield from preserving_image(chart.vertices, chart.disk, first.uv, density[chart.faces])
         return self._keep(k, density, Maps(first.uv, second.uv, first.warnings + second.warnings))
 
     def _known(self, k: int, density: np.ndarray) -> Maps | None:
-        latest = self._latest.get(k)
+        latest = self._latest.get((self._tame, k))
         return latest[1] if latest is not None and np.array_equal(latest[0], density) else None
 
     def _keep(self, k: int, density: np.ndarray, maps: Maps) -> Maps:
-        self._latest[k] = (density, maps)
+        self._latest[self._tame, k] = (density, maps)
         return maps
 
 

@@ -89,6 +89,7 @@ def _by_charts(
     maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float
 ) -> Steps[Tessellation]:
     yield Progress("Charts", 0.0)
+    yield from part_of(maps.choose_charts(count if options.count_of == "vertices" else count // 2), 0.0, 0.5)
     part, charts, held = maps.part, maps.charts, _held(maps.part)
     measure, rim = float(part.area @ density), _weighted_length(part.vertices, part.rim, at_vertices)
     vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
@@ -123,7 +124,7 @@ def _by_charts(
     for k, (loop, edge, number) in enumerate(zip(lines.loops, borders, inner, strict=True)):
         share = len(charts[k].triangles) / len(part.triangles)
         steps = _patch(maps, k, loop, edge, int(number), density, options.strategy)
-        patch, said = yield from part_of(steps, done, share)
+        patch, said = yield from part_of(steps, 0.5 + 0.5 * done, 0.5 * share)
         patches.append(patch)
         warnings += said
         done += share
