@@ -73,4 +73,4 @@ def test_lion():
     with counted() as tally:
         (chart_map,) = drain(unwrap(triangle_surface(*meshes.load_model("lion")))).maps
     assert chart_map.newton_refinement <= 10
-    assert tally.factorisations <= 75 and tally.nonzeros <= 35e6
+    assert tally.factorisations <= 50 and tally.nonzeros <= 20e6
