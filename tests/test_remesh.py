@@ -338,3 +338,12 @@ def test_grading_bounds_how_fast_edges_grow():
         step = np.linalg.norm(middle[one] - middle[other], axis=1)
         growth.append(np.percentile(np.abs(size[one] - size[other]) / step, 99))
     assert growth[1] < 0.7 * growth[0]
+
+
+def test_a_surface_too_long_for_one_conformal_map_is_mapped_in_pieces():
+    V, F = meshes.bumpy(161, 5, height=0.0)
+    V = V / np.ptp(V, axis=0).max() * np.array([40.0, 1.0, 1.0])
+    result = run(V, F, 700, rounds=5)
+    assert len(result.vertices) == 700 and topology(result.triangles) == topology(F)
+    assert not [w for w in result.warnings if "conformal" in w]
+    assert angles(result.vertices, result.triangles).min() > 20
