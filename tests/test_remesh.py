@@ -114,14 +114,32 @@ def test_strategies_make_meshes(strategy):
     assert len(result.vertices) == 300 and topology(result.triangles) == (1, 1)
 
 
-@pytest.mark.parametrize("factor", [4, 16])
-def test_density_is_honoured(factor):
-    V, F = meshes.icosphere(4)
-    density = np.where(V[F].mean(axis=1)[:, 2] > 0, float(factor), 1.0)
-    # Enough vertices for one more or less not to matter where they are sparse.
-    z = run(V, F, 2400, density=density, fit=False).vertices[:, 2]
-    # Away from the jump, where sizes cannot change at once.
-    assert (z > 0.3).sum() / (z < -0.3).sum() == pytest.approx(factor, rel=0.05)
+def density_ratio(V, F, dense, result):
+    """Vertices per area where the triangles are `dense` (m,), over those per area elsewhere."""
+    area, inside = face_areas(V, F), dense[result.faces]
+    # The cell of a boundary vertex is half on the surface.
+    weight = np.ones(len(inside))
+    weight[np.concatenate([np.zeros(0, int), *boundary_loops(result.triangles)])] = 0.5
+    return (weight @ inside / area[dense].sum()) / (weight @ ~inside / area[~dense].sum())
+
+
+@pytest.mark.parametrize("name, factor", [("sphere", 16), ("disk", 4), ("disk", 16)])
+def test_density_is_honoured_over_the_whole_region(name, factor):
+    """The rows of vertices along the jump, where sizes cannot change at once, count as well."""
+    V, F = {"sphere": lambda: meshes.icosphere(4), "disk": lambda: meshes.bumpy(48, 48)}[name]()
+    centre = V[F].mean(axis=1)
+    dense = centre[:, 0] > 0.85 if name == "sphere" else np.linalg.norm(centre[:, :2] - 0.5, axis=1) < 0.16
+    result = run(V, F, 3000, density=np.where(dense, float(factor), 1.0))
+    assert density_ratio(V, F, dense, result) == pytest.approx(factor, rel=0.05)
+
+
+def test_rough_regions_have_no_more_vertices_than_smooth_ones():
+    """Triangles cut off what is fine, so that their own area says little of the surface's."""
+    V, F = meshes.grid(80, 80)
+    rough = V[F].mean(axis=1)[:, 0] > 0.5
+    V[:, 2] = np.where(V[:, 0] > 0.5, 0.02 * np.sin(40 * V[:, 0]) * np.sin(40 * V[:, 1]), 0)
+    result = run(V, F, 600, rounds=20)
+    assert density_ratio(V, F, rough, result) == pytest.approx(1, rel=0.05)
 
 
 def test_boundary_corners_stay():

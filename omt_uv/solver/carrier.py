@@ -51,6 +51,19 @@ class Carrier:
         """What of its crests is; see `surface_samples.crest_samples`."""
         return self._shares(self._crests, points, normals)
 
+    @property
+    def measure(self) -> np.ndarray:
+        """Area times density of every sample, (s,)."""
+        return self._samples.area * self.density[self._samples.faces]
+
+    def nearest(self, points: np.ndarray, normals: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """Which of points (k,3) with normals (k,3) is nearest to every sample, (s,), of those of its edge length."""
+        s, w = self._samples, self.index.weight
+        wanted = self.index.spacing / np.sqrt(self.density[s.faces])
+        # A point across a jump of the density may be the nearest, but does not count as one of this side.
+        tree = cKDTree(np.column_stack([points, w * normals, 2 * w * np.log(size)]))
+        return tree.query(np.column_stack([s.points, w * s.normals, 2 * w * np.log(wanted)]))[1].astype(np.int64)
+
     def _shares(self, samples: Samples, points: np.ndarray, normals: np.ndarray) -> Share:
         k, w = len(points), self.index.weight
         tree = cKDTree(np.column_stack([points, w * normals]))

@@ -9,7 +9,6 @@ import numpy as np
 
 from .draft import Draft
 from .embedded_flips import make_delaunay_embedded
-from .geometry import vertex_areas
 from .mesh_edits import LEAST_COSINE, Edit, collapse_edges, independent_splits, interior_edges, split_edges
 from .parts import Part
 from .topology import boundary_loops, halfedges, twins
@@ -31,13 +30,6 @@ ANY_COSINE = -2.0
 # In one round only edges about as short, or as long, as the most wanted ones go.
 SHARE = 0.5
 FLIP_ROUNDS = 5
-# Rebalancing: share of the vertices taken at most, in how many rounds; rounds of averaging; excess of density from
-# which on they are taken; what a missing neighbour adds to it.
-REMOVED = 0.05
-REBALANCING = 5
-SMOOTHING = 3
-CROWDED = 0.05
-VALENCE = 0.05
 
 
 def least_vertices(part: Part) -> int:
@@ -124,7 +116,7 @@ def adjust_count(draft: Draft, count: int, size: Size, anyhow: bool = False) -> 
 def _split(draft: Draft, h: np.ndarray, length: np.ndarray, missing: int) -> Draft:
     wanted = np.argsort(-length, kind="stable")[: max(int(SHARE * missing), 8)]
     chosen = independent_splits(draft.triangles, h[wanted])[:missing]
-    return _settled(draft, split_edges(draft.points, draft.triangles, chosen))
+    return settled(draft, split_edges(draft.points, draft.triangles, chosen))
 
 
 def _collapse(draft: Draft, h: np.ndarray, length: np.ndarray, spare: int, least_cosine: float) -> Draft:
@@ -133,49 +125,15 @@ def _collapse(draft: Draft, h: np.ndarray, length: np.ndarray, spare: int, least
     while True:
         edit = collapse_edges(draft.points, draft.triangles, h[order[:reach]], draft.fixed, spare, least_cosine)
         if len(edit.points) < len(draft.points):
-            return _settled(draft, edit)
+            return settled(draft, edit)
         if reach >= len(order):
             raise StuckError(draft)
         reach *= 4
 
 
-def _settled(draft: Draft, edit: Edit) -> Draft:
+def settled(draft: Draft, edit: Edit) -> Draft:
     """The draft after an edit, Delaunay again."""
     fixed = np.where(edit.origin >= 0, draft.fixed[np.maximum(edit.origin, 0)], False)
     triangles = edit.triangles.copy()
     make_delaunay_embedded(edit.points, triangles, twins(triangles), draft.locked, FLIP_ROUNDS)
     return Draft(edit.points, triangles, fixed, draft.locked)
-
-
-def rebalance(draft: Draft, size: Size) -> Draft:
-    """Take vertices where they are too dense, and put as many where they are too sparse.
-
-    Relaxation evens out neighbours, but takes long to carry vertices across the surface.
-    """
-    n = len(draft.points)
-    for _ in range(REBALANCING):
-        h = interior_edges(draft.triangles, draft.locked)
-        tail, head = halfedges(draft.triangles)
-        valence = np.bincount(tail, minlength=len(draft.points))
-        wanted = _crowding(draft, size) + VALENCE * (6 - valence)
-        wanted = wanted[tail[h]] + wanted[head[h]]
-        order = np.argsort(-wanted, kind="stable")
-        order = order[wanted[order] > 2 * CROWDED]
-        spare = int(REMOVED * n) - (n - len(draft.points))
-        if len(order) == 0 or spare <= 0:
-            break
-        draft = _settled(draft, collapse_edges(draft.points, draft.triangles, h[order], draft.fixed, spare))
-    return adjust_count(draft, n, size)
-
-
-def _crowding(draft: Draft, size: Size) -> np.ndarray:
-    """How much denser than wanted the vertices are around each one, (n,), 0 where they are as dense as they should."""
-    n = len(draft.points)
-    tail, head = halfedges(draft.triangles)
-    share = vertex_areas(draft.points, draft.triangles) / size(draft.points) ** 2 * (2 / np.sqrt(3))
-    # The cell of a boundary vertex is half on the surface.
-    share[np.unique(tail[twins(draft.triangles) < 0])] *= 2
-    valence = np.bincount(tail, minlength=n)
-    for _ in range(SMOOTHING):
-        share = (np.bincount(tail, share[head], n) + 2 * share) / (valence + 2)
-    return 1 / np.maximum(share, 1e-3) - 1

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .balance import balance
 from .carrier import Carrier
 from .closest import ClosestPoint, vertex_normals
-from .counts import StuckError, adjust_count, distribute, least_faces, least_vertices, rebalance
+from .counts import StuckError, adjust_count, distribute, least_faces, least_vertices
 from .errors import CountError, positive_density
 from .fit import fit_to_surface
 from .measure import graded
@@ -219,9 +220,10 @@ def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options
         carrier = Carrier(index, level, start.count)
         draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.0, 0.07)
         draft = adjust_count(draft, start.count, size, anyhow)
+        claim = None
         for k in range(BALANCES):
             draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.07 + 0.057 * k, 0.057)
-            draft = rebalance(draft, size)
+            draft, claim = balance(draft, carrier, size, claim)
         draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.3, 0.27)
     draft = adjust_count(draft, start.count, size, anyhow)
     if options.fit:
