@@ -13,13 +13,13 @@ import numpy as np
 from cases import Table, load_case, timed
 from rivals import make_object, read_uv, remove_object
 
+from omt_uv.solver.chart_map import unwrap_chart
 from omt_uv.solver.charts import split, triangle_surface
 from omt_uv.solver.distortion import measure
 from omt_uv.solver.exact_share import exact_share
 from omt_uv.solver.geometry import face_areas, signed_areas, vertex_areas
 from omt_uv.solver.measure import from_vertices, normalised, share
 from omt_uv.solver.overlap import overlap_share
-from omt_uv.solver.parameterize import unwrap_chart
 from omt_uv.solver.progress import drain
 from omt_uv.solver.scores import distance
 

@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .settings import MagnifySettings
+from .solver.chart_map import unwrap_chart
 from .solver.chart_pins import CornerPins
+from .solver.chart_terms import located
 from .solver.charts import Surface, check_disk, triangle_rows
 from .solver.distortion import measure
 from .solver.errors import EmptyMeshError, MeshError, WeightError
@@ -22,7 +24,6 @@ from .solver.islands import Island, uv_islands
 from .solver.lens import OUTLINES, Lens, aligned_to, magnify_map, refuse_folds
 from .solver.measure import Target, check_weights, from_polygons, from_vertices, normalised, painted, share
 from .solver.overlap import overlap_share
-from .solver.parameterize import located, unwrap_chart
 from .solver.progress import Steps, part_of
 from .solver.warp import warped
 from .unwrapping import Job, Packer, Refusal, lay_out

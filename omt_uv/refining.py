@@ -9,6 +9,7 @@ import numpy as np
 
 from .settings import RefineSettings
 from .solver.chart_pins import ChartPins, CornerPins
+from .solver.chart_terms import located, located_pins
 from .solver.charts import Chart, Surface
 from .solver.distortion import measure
 from .solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
@@ -16,7 +17,6 @@ from .solver.geometry import face_areas, signed_areas
 from .solver.improve import boundary_edges, improve
 from .solver.islands import Island, uv_islands
 from .solver.overlap import overlap_share
-from .solver.parameterize import located, located_pins
 from .solver.progress import Progress, Steps, part_of
 from .solver.refine import Refinement
 from .unwrapping import Packer, Refusal, pack_islands

@@ -93,7 +93,7 @@ class Settings:
         return column, row
 
     def solver_arguments(self) -> dict:
-        """How to map a chart: keyword arguments of `solver.parameterize.unwrap_chart`."""
+        """How to map a chart: keyword arguments of `solver.chart_map.unwrap_chart`."""
         return {"boundary": self.boundary, "quality": self.quality, "balance": self.balance}
 
     def preparation_arguments(self) -> dict:

@@ -11,20 +11,14 @@ from . import packing
 from .segmentation import SegmentationError, chart_seams
 from .settings import Settings
 from .solver.budget import unwrap_within
+from .solver.chart_map import ChartMap, unwrap_chart
 from .solver.chart_pins import CornerPins, chart_pins, clear_of_pins
+from .solver.chart_terms import chart_target, located, located_pins
 from .solver.charts import Chart, Surface
 from .solver.errors import MeshError
 from .solver.measure import Target
-from .solver.parameterize import (
-    ChartMap,
-    SurfaceMap,
-    chart_target,
-    located,
-    located_pins,
-    unwrap,
-    unwrap_chart,
-    with_open_corners,
-)
+from .solver.opening import with_open_corners
+from .solver.parameterize import SurfaceMap, unwrap
 from .solver.progress import Progress, Steps, part_of
 
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.budget import unwrap_within
+from omt_uv.solver.chart_map import unwrap_chart
 from omt_uv.solver.charts import split, triangle_surface
-from omt_uv.solver.parameterize import unwrap_chart
 from omt_uv.solver.preparation import prepare
 from omt_uv.solver.progress import drain
 from omt_uv.solver.slits import slit

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import scores
+from omt_uv.solver.chart_map import unwrap_chart
 from omt_uv.solver.charts import split, triangle_surface
 from omt_uv.solver.errors import EmptyMeshError, FoldedUVError, WeightError
 from omt_uv.solver.exact_share import exact_share
@@ -12,7 +13,7 @@ from omt_uv.solver.geometry import face_areas, signed_areas, vertex_areas
 from omt_uv.solver.lens import magnify_map
 from omt_uv.solver.measure import Target, from_vertices, normalised, share
 from omt_uv.solver.overlap import overlap_share
-from omt_uv.solver.parameterize import unwrap, unwrap_chart
+from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.saliency import saliency
 from omt_uv.solver.warp import warped

@@ -4,13 +4,14 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import parameterize
+from omt_uv.solver import batches
+from omt_uv.solver.batches import MANY
 from omt_uv.solver.charts import triangle_rows, triangle_surface
 from omt_uv.solver.distortion import measure
 from omt_uv.solver.exact_share import exact_share
 from omt_uv.solver.geometry import face_areas, signed_areas
 from omt_uv.solver.measure import Target
-from omt_uv.solver.parameterize import MANY, unwrap
+from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.progress import drain
 
 SHAPES = ["bumpy", "cone", "hemisphere", "random_disk", "comb", "grid", "quad_patch", "spiral_strip"]
@@ -32,7 +33,7 @@ def all_shapes():
 
 def one_by_one(monkeypatch, surface, **options):
     with monkeypatch.context() as patch:
-        patch.setattr(parameterize, "MANY", 1000)
+        patch.setattr(batches, "MANY", 1000)
         return drain(unwrap(surface, **options))
 
 

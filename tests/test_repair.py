@@ -6,10 +6,11 @@ import pytest
 import test_fuzz
 
 from omt_uv.solver import errors, repair
+from omt_uv.solver.chart_map import unwrap_chart
 from omt_uv.solver.charts import degenerate_triangles, triangle_surface
 from omt_uv.solver.cutting import cut
 from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.parameterize import unwrap, unwrap_chart
+from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.preparation import prepare
 from omt_uv.solver.progress import drain
 from omt_uv.solver.sheets import corner_classes

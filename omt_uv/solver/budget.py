@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .chart_map import ChartMap
 from .charts import Chart, Surface
 from .distortion import face_distortion
 from .geometry import face_areas
-from .parameterize import ChartMap
 from .preparation import Prepared, prepare
 from .progress import Steps
 from .slits import slit

@@ -1,0 +1,72 @@
+"""Maps of a surface whose convex polygons stay convex, where that costs no area."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .chart_map import ChartMap, in_unit_box
+from .chart_pins import ChartPins
+from .chart_terms import chart_target
+from .charts import Chart, Surface
+from .convex import opened
+from .distortion import measure
+from .geometry import signed_areas
+from .measure import Target
+from .stages import QUALITIES
+from .topology import boundary_loops
+
+# The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
+AREA_KEPT = 1.25
+
+
+def with_open_corners(
+    surface: Surface,
+    charts: list[Chart],
+    maps: list[ChartMap],
+    held: Sequence[ChartPins | None],
+    boundary: str,
+    quality: str,
+    target: Target | None = None,
+) -> list[ChartMap]:
+    """The maps with polygons that are convex on the surface convex in them, too, as far as may be: `convex.opened`.
+
+    held: the pins of every chart; the others as for `parameterize.unwrap`. A map that would lose its areas stays so.
+    """
+    if not (np.diff(surface.face_start) > 3).any():
+        return maps
+    fixed = [_fixed(c, p, boundary) for c, p in zip(charts, held, strict=True)]
+    density = [chart_target(target, surface, c).get("density") for c in charts]
+    new = list(maps)
+    for k, uv in opened(surface, charts, [m.uv for m in maps], fixed, density, [m.weight for m in maps]).items():
+        chart, old = charts[k], maps[k]
+        (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
+        figures = measure(vertices, chart.triangles, flat[chart.triangles], overlap=False, density=density[k])
+        if figures.area_l1 <= AREA_KEPT * max(old.area_l1, QUALITIES[quality].area_error) and not figures.folds:
+            if not fixed[k].any():
+                uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
+            new[k] = replace(
+                old, uv=uv, area_l1=figures.area_l1, area_sd=figures.area_sd, angle_mean=figures.angle_mean
+            )
+    return new
+
+
+def _fixed(chart: Chart, pins: ChartPins | None, boundary: str) -> np.ndarray:
+    """Vertices (n,) bool of a chart that stay where the refinement left them: pins, and those on a disk or a square."""
+    fixed = np.zeros(len(chart.vertices), bool)
+    if pins is not None:
+        fixed[pins.vertices] = True
+    if boundary != "free":
+        fixed[boundary_loops(chart.disk)[0]] = True
+    return fixed
+
+
+def _as_before(uv: np.ndarray, given: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """A map (n,2) moved, turned and scaled to the place, direction and area of another one of the same triangles."""
+    centre = given.mean(axis=0)
+    w, aim = ((x - x.mean(axis=0)) @ [1, 1j] for x in (uv, given))
+    w = w * np.exp(1j * np.angle(np.vdot(w, aim)))
+    w = w * np.sqrt(signed_areas(given, triangles).sum() / signed_areas(uv, triangles).sum())
+    return np.column_stack([w.real, w.imag]) + centre
