@@ -242,7 +242,7 @@ def test_the_report_has_what_a_bug_needs(package):
 
 def test_the_choices_are_those_of_the_solver_and_of_the_command(package):
     """One list of boundaries and qualities, known to the solver."""
-    settings, solver = package("settings"), package("solver.parameterize")
+    settings, solver = package("settings"), package("solver.refine")
     assert {i.lower() for i, *_ in settings.BOUNDARIES} == set(solver.BOUNDARIES)
     operator = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap").bl_rna.properties
     assert [item.identifier for item in operator["boundary"].enum_items] == [i for i, *_ in settings.BOUNDARIES]
