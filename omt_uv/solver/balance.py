@@ -5,6 +5,8 @@ Relaxation evens out neighbours, but takes long to carry vertices far.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -14,17 +16,21 @@ from .counts import Size, adjust_count, settled
 from .dissection import Dissection
 from .draft import Draft
 from .geometry import laplacian_from_weights
-from .linear import solve_spd
+from .linear import solve_by_gradients
 from .mesh_edits import Edit, collapse_edges, independent_splits, interior_edges, split_edges
 from .topology import halfedges, previous_halfedge, twins
 
 # Surpluses are evened out over this many edges: a few cells are too few to count on.
 REACH = 8.0
+# Relative residual of these means.
+EVEN_ENOUGH = 0.01
+# So often, each time what the last passes have left: together they blur less than one.
+PASSES = 3
 # Where edges shall be twice as long there are this many halvings between neighbours.
 APART = 4
 # Rounds, and the share of all vertices below which a surplus stays.
-ROUNDS = 6
-SETTLED = 0.002
+ROUNDS = 3
+SETTLED = 0.005
 # Share by which a claim changes at the most.
 MOST = 0.1
 # What an edge's length counts next to squares of missing neighbours.
@@ -32,23 +38,37 @@ LENGTH = 3.0
 NONE = np.zeros(0, np.int64)
 
 
-def balance(draft: Draft, carrier: Carrier, size: Size, claim: np.ndarray | None) -> tuple[Draft, np.ndarray]:
+@dataclass(frozen=True)
+class Balanced:
+    """A mesh, what the samples of its carrier claim (s,), and whether it had been in balance before."""
+
+    draft: Draft
+    claim: np.ndarray
+    settled: bool
+
+
+def balance(draft: Draft, carrier: Carrier, size: Size, claim: np.ndarray | None) -> Balanced:
     """The mesh with its vertices where the measure of the surface that is nearest to each asks for them.
 
-    claim (s,): what the samples of the carrier asked for the last time, and what they do now. Where relaxation takes
-    vertices away again, as it does along jumps of the density, they ask for more each time.
+    claim (s,): what the samples asked for the last time. Where relaxation takes vertices away again, as it does along
+    jumps of the density, they ask for more each time.
     """
     n = len(draft.points)
     near = carrier.nearest(draft.points, vertex_normals(draft.points, draft.triangles), size(draft.points))
     surplus = _surplus(draft, np.bincount(near, carrier.measure, n), size)
+    settled = _is_settled(surplus)
     claim = carrier.measure if claim is None else claim * (1 - np.clip(surplus, -MOST, MOST)[near])
     measure = np.bincount(near, claim, n)
-    for _ in range(ROUNDS):
+    for _ in range(0 if settled else ROUNDS):
         surplus = _surplus(draft, measure, size)
-        if np.maximum(surplus, 0).sum() < SETTLED * n:
+        if _is_settled(surplus):
             break
         draft, measure = _carried(draft, measure, surplus)
-    return adjust_count(draft, n, size), claim
+    return Balanced(adjust_count(draft, n, size), claim, settled)
+
+
+def _is_settled(surplus: np.ndarray) -> bool:
+    return np.maximum(surplus, 0).sum() < SETTLED * len(surplus)
 
 
 def _surplus(draft: Draft, measure: np.ndarray, size: Size) -> np.ndarray:
@@ -70,7 +90,11 @@ def _surplus(draft: Draft, measure: np.ndarray, size: Size) -> np.ndarray:
     alike = (np.minimum(a, b) / np.maximum(a, b)) ** APART
     # The graph Laplacian of a regular mesh with edges of length one is 3 / 2 of the Laplacian.
     smoother = laplacian_from_weights(tail[h], head[h], REACH**2 / 1.5 * alike, n)
-    return solve_spd((smoother + sp.identity(n)).tocsc(), surplus)
+    system = (smoother + sp.identity(n)).tocsr()
+    left = surplus
+    for _ in range(PASSES):
+        left = left - solve_by_gradients(system, left, EVEN_ENOUGH)
+    return surplus - left
 
 
 def _carried(draft: Draft, measure: np.ndarray, surplus: np.ndarray) -> tuple[Draft, np.ndarray]:

@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 from .closest import ClosestPoint, Memory
 from .surface_samples import Samples, area_samples, crest_samples
 
-SAMPLES_PER_POINT = 8
+SAMPLES_PER_POINT = 6
 # Rounds after which closest points are searched for again; see `closest.Memory`.
-SEARCH_EVERY = 10
+SEARCH_EVERY = 12
 
 
 @dataclass(frozen=True)

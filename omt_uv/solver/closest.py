@@ -16,6 +16,8 @@ from scipy.spatial import cKDTree
 from .topology import twins
 
 CANDIDATES = 4
+# Points on the faces are this share of the spacing of queries apart.
+PITCH = 0.7
 MOST_SAMPLES = 600_000
 WALK_ROUNDS = 20
 
@@ -58,7 +60,8 @@ def closest_on_triangles(q: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndar
     v, w = np.where(corner, 1, v), np.where(corner, 0, w)
     corner = (d1 <= 0) & (d2 <= 0)
     v, w = np.where(corner, 0, v), np.where(corner, 0, w)
-    v, w = np.clip(np.nan_to_num(v), 0, 1), np.clip(np.nan_to_num(w), 0, 1)
+    # No number, as in a triangle without area, is 0.
+    v, w = np.fmin(np.fmax(v, 0), 1), np.fmin(np.fmax(w, 0), 1)
     return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1)
 
 
@@ -74,16 +77,21 @@ def unit(v: np.ndarray) -> np.ndarray:
 
 def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unit normals (m,3)."""
-    a, b, c = positions[triangles[:, 0]], positions[triangles[:, 1]], positions[triangles[:, 2]]
-    return unit(np.cross(b - a, c - a))
+    return unit(np.stack(_double_areas(positions, triangles), axis=1))
+
+
+def _double_areas(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates (m,) of normals as long as twice the areas."""
+    x, y, z = np.take(positions.T, triangles.T, axis=1)
+    a, b, c = x[1] - x[0], y[1] - y[0], z[1] - z[0]
+    d, e, f = x[2] - x[0], y[2] - y[0], z[2] - z[0]
+    return b * f - c * e, c * d - a * f, a * e - b * d
 
 
 def vertex_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unit normals (n,3), weighted by the areas of the adjacent faces."""
-    a, b, c = positions[triangles[:, 0]], positions[triangles[:, 1]], positions[triangles[:, 2]]
-    normal = np.cross(b - a, c - a)
-    flat = triangles.ravel()
-    total = [np.bincount(flat, np.repeat(normal[:, k], 3), len(positions)) for k in range(3)]
+    flat, n = triangles.ravel(), len(positions)
+    total = [np.bincount(flat, np.repeat(k, 3), n) for k in _double_areas(positions, triangles)]
     return unit(np.stack(total, axis=1))
 
 
@@ -93,7 +101,7 @@ class ClosestPoint:
     def __init__(self, vertices: np.ndarray, triangles: np.ndarray, spacing: float):
         self.vertices, self.triangles = vertices, triangles
         self.normals = face_normals(vertices, triangles)
-        self.corners = tuple(np.ascontiguousarray(vertices[triangles[:, k]]) for k in range(3))
+        self.corners = vertices[triangles].reshape(-1, 9)
         self.neighbour = np.where((t := twins(triangles)) >= 0, t // 3, -1).reshape(-1, 3)
         # A normal to the opposite side counts as far as one spacing.
         self.weight = 0.5 * spacing
@@ -105,19 +113,16 @@ class ClosestPoint:
         k = min(CANDIDATES, len(owner))
         _, index = self._tree.query(np.column_stack([points, self.weight * normals]), k=k)
         faces = owner[index.reshape(len(points), -1)]
-        barycentric, distance = self._distance(points[:, None], faces)
+        _, distance = self._distance(points[:, None], faces)
         # The right side first, then the distance.
-        back = np.einsum("kcj,kj->kc", self.normals[faces], normals) < 0
+        back = np.einsum("kcj,kj->kc", self.normals.take(faces, axis=0), normals) < 0
         distance = distance + np.where(back, 4 * distance.max(initial=1e-300), 0)
-        best = distance.argmin(axis=1)[:, None]
-        face = np.take_along_axis(faces, best, 1)[:, 0]
-        bary = np.take_along_axis(barycentric, best[..., None], 1)[:, 0]
-        return self.walk(points, face, bary)
+        return self.walk(points, faces[np.arange(len(faces)), distance.argmin(axis=1)])
 
     # Walks need no trees, so these come when they are first asked for.
     @cached_property
     def _spread(self) -> tuple[np.ndarray, np.ndarray]:
-        return spread_points(self.vertices, self.triangles, self.spacing / 2)
+        return spread_points(self.vertices, self.triangles, PITCH * self.spacing)
 
     @cached_property
     def _tree(self) -> cKDTree:
@@ -133,40 +138,44 @@ class ClosestPoint:
         """The triangle (k,) of the sample nearest to each of points (k,3): where it is about, for smooth quantities."""
         return self._spread[0][self._plain.query(points)[1]]
 
-    def walk(self, points: np.ndarray, faces: np.ndarray, barycentric: np.ndarray | None = None) -> Located:
+    def walk(self, points: np.ndarray, faces: np.ndarray) -> Located:
         """From starting faces (k,) across edges for as long as that brings nearer to the points (k,3)."""
         faces = faces.copy()
-        if barycentric is None:
-            barycentric = self._distance(points, faces)[0]
-        barycentric = barycentric.copy()
+        barycentric, distance = self._distance(points, faces)
         active = np.arange(len(points))
         for _ in range(WALK_ROUNDS):
             # The edge from corner k to k + 1 is where the coordinate k + 2 is zero.
-            out = barycentric[active][:, [2, 0, 1]] <= 1e-12
-            out &= self.neighbour[faces[active]] >= 0
-            active = active[out.any(axis=1)]
-            if len(active) == 0:
+            beyond = self.neighbour.take(faces[active], axis=0)
+            row, side = np.nonzero((barycentric[active][:, [2, 0, 1]] <= 1e-12) & (beyond >= 0))
+            if len(row) == 0:
                 break
-            around = np.column_stack([faces[active], self.neighbour[faces[active]]])
-            around = np.where(around >= 0, around, around[:, :1])
-            b, d = self._distance(points[active][:, None], around)
-            best = d.argmin(axis=1)
-            better = d[np.arange(len(active)), best] < d[:, 0] * (1 - 1e-12)
-            active, best, b, around = active[better], best[better], b[better], around[better]
-            rows = np.arange(len(active))
-            faces[active], barycentric[active] = around[rows, best], b[rows, best]
+            found = np.full(beyond.shape, -1)
+            found[row, side] = np.arange(len(row))
+            face = beyond[row, side]
+            b, d = self._distance(points.take(active[row], axis=0), face)
+            nearest = np.append(d, np.inf)[found].argmin(axis=1)
+            best = found[np.arange(len(found)), nearest]
+            better = (best >= 0) & (d[best] < distance[active] * (1 - 1e-12))
+            active, best = active[better], best[better]
+            faces[active], barycentric[active], distance[active] = face[best], b[best], d[best]
         return Located(self.at(faces, barycentric), faces, barycentric)
 
     def at(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions (k,3) of points given by face and barycentric coordinates."""
-        return np.einsum("kc,kcj->kj", barycentric, self.vertices[self.triangles[faces]])
+        return _weighted(self.corners.take(faces, axis=0), barycentric)
 
     def _distance(self, points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        a, b, c = (corner[faces] for corner in self.corners)
+        corners = self.corners.take(faces, axis=0)
+        a, b, c = corners[..., :3], corners[..., 3:6], corners[..., 6:]
         barycentric = closest_on_triangles(points, a, b, c)
-        u, v, w = (barycentric[..., k, None] for k in range(3))
-        off = u * a + v * b + w * c - points
+        off = _weighted(corners, barycentric) - points
         return barycentric, _dot(off, off)
+
+
+def _weighted(corners: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+    """Points (..., 3) with barycentric coordinates (..., 3) of triangles, by their corners (..., 9)."""
+    u, v, w = (barycentric[..., k, None] for k in range(3))
+    return u * corners[..., :3] + v * corners[..., 3:6] + w * corners[..., 6:]
 
 
 class Memory:

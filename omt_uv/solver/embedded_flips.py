@@ -23,15 +23,15 @@ def make_delaunay_embedded(
     join two vertices twice, or lean a face over. Returns the number of flips.
     """
     flat = triangles.reshape(-1)
-    known = _Edges(triangles)
+    cotangent = _cotangents(points, triangles)
 
     def violation(h):
-        g = twin[h]
-        i, j, k, far = flat[h], flat[g], flat[previous_halfedge(h)], flat[previous_halfedge(g)]
-        value = _cotangent(points, i, j, k) + _cotangent(points, i, j, far) + TOLERANCE
+        value = cotangent.take(h) + cotangent.take(twin[h]) + TOLERANCE
         bad = np.flatnonzero(value < 0)
-        ok = _allowed(points, i[bad], j[bad], k[bad], far[bad])
-        ok &= ~known.contain(pair_keys(k[bad], far[bad])) & ~_is_in(pair_keys(i[bad], j[bad]), locked)
+        e, g = h[bad], twin[h[bad]]
+        i, j, k, far = flat[e], flat[g], flat[previous_halfedge(e)], flat[previous_halfedge(g)]
+        ok = _allowed(points, i, j, k, far) & ~_joined(triangles, k, far)
+        ok &= ~_is_in(pair_keys(i, j), locked)
         value[bad[~ok]] = 0.0
         return value
 
@@ -39,26 +39,24 @@ def make_delaunay_embedded(
         new = pair_keys(flat[previous_halfedge(h)], flat[previous_halfedge(twin[h])])
         # Two flips at once could make the same edge.
         h = h[np.unique(new, return_index=True)[1]]
+        changed = np.concatenate([h, twin[h]]) // 3
         flip_in_place(triangles, twin, h)
-        known.update(triangles)
+        cotangent[changed] = _cotangents(points, triangles[changed])
 
     flips, _ = flip_until_none(twin, violation, flip, max_rounds)
     return flips
 
 
-class _Edges:
-    """Which vertices are joined."""
-
-    def __init__(self, triangles: np.ndarray):
-        self.update(triangles)
-
-    def update(self, triangles: np.ndarray) -> None:
-        """Take the edges of triangles (m,3) for those that exist."""
-        self.keys = np.sort(pair_keys(*halfedges(triangles)))
-
-    def contain(self, keys: np.ndarray) -> np.ndarray:
-        """Which keys (k,), see `topology.pair_keys`, are those of edges, (k,) bool."""
-        return _is_in(keys, self.keys)
+def _joined(triangles: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Whether edges of triangles (m,3) join the vertices a (k,) and b (k,), (k,) bool."""
+    if len(a) == 0:
+        return np.zeros(0, dtype=bool)
+    asked = np.zeros(int(triangles.max()) + 1, dtype=bool)
+    asked[a] = asked[b] = True
+    at = asked.take(triangles)
+    tail, head = halfedges(triangles)
+    both = np.flatnonzero((at & at[:, [1, 2, 0]]).ravel())
+    return _is_in(pair_keys(a, b), np.sort(pair_keys(tail[both], head[both])))
 
 
 def _is_in(keys: np.ndarray, ordered: np.ndarray) -> np.ndarray:
@@ -67,12 +65,16 @@ def _is_in(keys: np.ndarray, ordered: np.ndarray) -> np.ndarray:
     return ordered[np.minimum(np.searchsorted(ordered, keys), len(ordered) - 1)] == keys
 
 
-def _cotangent(points, i, j, k) -> np.ndarray:
-    """Cotangent of the angle at k of the triangles i, j, k."""
-    a, b = points[i] - points[k], points[j] - points[k]
-    cross = np.cross(a, b)
-    sine = np.sqrt(np.einsum("ij,ij->i", cross, cross))
-    return np.einsum("ij,ij->i", a, b) / np.maximum(sine, 1e-300)
+def _cotangents(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Cotangents (m,3) of the angles opposite to the halfedges."""
+    p = np.take(points.T, triangles.T, axis=1)
+    # Coordinates first, then halfedges: (3,3,m).
+    e = p[:, [1, 2, 0]] - p
+    a, b = e[:, 0], e[:, 1]
+    x, y, z = (a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1)))
+    double = np.maximum(np.sqrt(x * x + y * y + z * z), 1e-300)
+    # The two other sides meet opposite to each, one of them pointing away.
+    return -(np.einsum("ikm,ikm->mk", e[:, [1, 2, 0]], e[:, [2, 0, 1]]) / double[:, None])
 
 
 def _allowed(points, i, j, k, far) -> np.ndarray:

@@ -12,6 +12,7 @@ from .topology import halfedges, pair_keys, previous_halfedge, twins
 
 # A face may turn by this cosine at most when an edge at it collapses.
 LEAST_COSINE = 0.3
+PASSES = 8
 
 
 @dataclass(frozen=True)
@@ -81,10 +82,8 @@ def collapse_edges(
     place = np.where(held[keep][:, None], points[keep], (points[keep] + points[gone]) / 2)
     ok = _possible(points, triangles, h, neighbours, rim)
     keep, gone, place = keep[ok], gone[ok], place[ok]
-    chosen = _apart(neighbours, keep, gone)
+    chosen = _chosen(points, triangles, neighbours, keep, gone, place, most, least_cosine)
     keep, gone, place = keep[chosen], gone[chosen], place[chosen]
-    sound = _unfolded(points, triangles, keep, gone, place, least_cosine)
-    keep, gone, place = keep[sound][:most], gone[sound][:most], place[sound][:most]
     moved, target = points.copy(), np.arange(n)
     moved[keep] = place
     target[gone] = keep
@@ -108,20 +107,43 @@ def _possible(points, triangles, h, neighbours, rim) -> np.ndarray:
     return (common == 2) & thick & (left != right)
 
 
-def _apart(neighbours: csr_matrix, keep: np.ndarray, gone: np.ndarray) -> np.ndarray:
-    """Edges (k,) bool around which no more wanted edge has a vertex."""
-    rank = np.arange(len(keep))
-    first = np.full(neighbours.shape[0], len(keep))
+def _chosen(points, triangles, neighbours, keep, gone, place, most: int, least_cosine: float) -> np.ndarray:
+    """Up to `most` of the collapses (k,), most wanted first, none of which folds, or has neighbours of another one's.
+
+    What folds only shows when it is chosen, and others that it kept away take its place in the next pass.
+    """
+    owner, member = _rings(neighbours, keep, gone)
+    chosen = np.zeros(0, np.int64)
+    open_ = np.ones(len(keep), dtype=bool)
+    for _ in range(PASSES):
+        free = open_[owner]
+        owner, member = owner[free], member[free]
+        first = np.full(len(points), len(keep))
+        np.minimum.at(first, member, owner)
+        apart = open_.copy()
+        apart[owner[first[member] != owner]] = False
+        mine = np.flatnonzero(apart)
+        sound = _unfolded(points, triangles, keep[mine], gone[mine], place[mine], least_cosine)
+        chosen = np.concatenate([chosen, mine[sound]])
+        open_[mine] = False
+        busy = np.zeros(len(points), dtype=bool)
+        taken = np.zeros(len(keep), dtype=bool)
+        taken[mine[sound]] = True
+        busy[member[taken[owner]]] = True
+        open_[owner[busy[member]]] = False
+        if len(chosen) >= most or not open_.any():
+            break
+    return np.sort(chosen)[:most]
+
+
+def _rings(neighbours: csr_matrix, keep: np.ndarray, gone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All pairs (p,), (p,) of an edge (k,) by its number and a vertex around one of its ends."""
     owners, members = [], []
     for end in (keep, gone):
         rows = neighbours[end]
-        owners.append(np.repeat(rank, np.diff(rows.indptr)))
+        owners.append(np.repeat(np.arange(len(end)), np.diff(rows.indptr)))
         members.append(rows.indices)
-    owner, member = np.concatenate(owners), np.concatenate(members)
-    np.minimum.at(first, member, owner)
-    lost = np.zeros(len(keep), dtype=bool)
-    lost[owner[first[member] != owner]] = True
-    return ~lost
+    return np.concatenate(owners), np.concatenate(members)
 
 
 def _unfolded(points, triangles, keep, gone, place, least_cosine: float) -> np.ndarray:

@@ -57,11 +57,8 @@ def relax(draft: Draft, rounds: int, carrier: Carrier) -> Steps[tuple[Draft, flo
         gradient = _tangential(-2 * cells.moment, normal, fixed)
         step = descent.direction(points, gradient, 1 / (2 * np.maximum(cells.mass, 1e-300))[:, None])
         step = _tangential(step, normal, fixed)
-        size = np.sqrt(np.einsum("ij,ij->i", step, step))
-        shortest = _shortest(points, triangles)
-        share = np.minimum(1, REACH * shortest / np.maximum(size, 1e-300))
-        moved = float(np.mean((share * size / shortest)[~fixed])) if not fixed.all() else 0.0
-        trial = points + np.nan_to_num(share[:, None] * step, posinf=0.0, neginf=0.0)
+        step, moved = _within_reach(step, points, triangles)
+        trial = points + step
         normal = vertex_normals(trial, triangles)
         trial, density = carrier.onto(trial, normal)
         # A vertex that found no place stays where it is.
@@ -124,12 +121,16 @@ def _pull(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray, carrie
     )
 
 
-def _shortest(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Length of the shortest edge at every vertex, (n,)."""
-    p = points[triangles]
-    e = p[:, [1, 2, 0]] - p
-    length = np.sqrt(np.einsum("mki,mki->mk", e, e))
-    shortest = np.full(len(points), np.inf)
-    np.minimum.at(shortest, triangles.ravel(), length.ravel())
-    np.minimum.at(shortest, triangles[:, [1, 2, 0]].ravel(), length.ravel())
-    return np.maximum(shortest, 1e-6 * length.mean())
+def _within_reach(step: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, float]:
+    """Steps (n,3), none longer than REACH of the shortest side of a triangle around, and their mean in such sides."""
+    size = np.sqrt(np.einsum("ij,ij->i", step, step))
+    p = np.take(points.T, triangles.T, axis=1)
+    x, y, z = p - p[:, [1, 2, 0]]
+    shortest = np.sqrt(np.minimum.reduce(x * x + y * y + z * z))
+    shortest = np.maximum(shortest, 1e-6 * shortest.mean())
+    share = REACH * shortest / np.maximum(size.take(triangles.T), 1e-300)
+    corner, far = np.nonzero(share < 1)
+    least = np.ones(len(points))
+    np.minimum.at(least, triangles[far, corner], share[corner, far])
+    step = np.nan_to_num(least[:, None] * step, posinf=0.0, neginf=0.0)
+    return step, float(np.mean((least * size).take(triangles.T) / shortest))

@@ -27,8 +27,8 @@ from .tessellation import Options, Tessellation, least_samples, tessellate
 
 # More vertices than this many times the input's tell nothing new about the surface.
 FAR_MORE = 50
-ROUNDS = 30
-FIRST_ROUNDS, BALANCES = 10, 4
+ROUNDS = 24
+FIRST_ROUNDS, BALANCES = 10, 6
 # How often boundaries and features are thinned out to reach a count.
 ATTEMPTS, THINNED = 3, 2.0
 # Mean step of a relaxation that has settled, in edge lengths.
@@ -222,8 +222,11 @@ def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options
         draft = adjust_count(draft, start.count, size, anyhow)
         claim = None
         for k in range(BALANCES):
-            draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.07 + 0.057 * k, 0.057)
-            draft, claim = balance(draft, carrier, size, claim)
+            draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.07 + 0.038 * k, 0.038)
+            balanced = balance(draft, carrier, size, claim)
+            draft, claim = balanced.draft, balanced.claim
+            if balanced.settled:
+                break
         draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.3, 0.27)
     draft = adjust_count(draft, start.count, size, anyhow)
     if options.fit:

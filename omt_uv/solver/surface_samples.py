@@ -16,7 +16,7 @@ from .linear import solve_spd
 BLUR = 0.2
 BLUNT = 0.03
 # Samples of crests are this share of an edge apart.
-PITCH = 0.22
+PITCH = 0.4
 # Length of a vertex's mean normal below which it is a tip, or lies on an edge.
 POINTED = 0.9
 

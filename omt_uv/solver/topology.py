@@ -24,12 +24,13 @@ def pair_keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def pair_up(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the two members of every key that occurs exactly twice, (p,) and (p,)."""
-    order = np.argsort(keys, kind="stable")
+    order = np.argsort(keys)
     ordered = keys[order]
     start = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
     count = np.diff(np.r_[start, len(ordered)])
     twice = start[count == 2]
-    return order[twice], order[twice + 1]
+    # Whichever comes first in the order, which differs between processors, is not first here.
+    return np.minimum(order[twice], order[twice + 1]), np.maximum(order[twice], order[twice + 1])
 
 
 def twins(triangles: np.ndarray) -> np.ndarray:
