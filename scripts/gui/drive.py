@@ -5,6 +5,7 @@ usage: blender --factory-startup --python drive.py -- STORY OUT      (see run.py
 
 from __future__ import annotations
 
+import faulthandler
 import importlib.util
 import json
 import math
@@ -163,6 +164,8 @@ def _head(count):
 def main():
     story_path, out = map(Path, sys.argv[sys.argv.index("--") + 1 :])
     out.mkdir(parents=True, exist_ok=True)
+    # Blender's own handler has no Python of other threads; the file stays open as long as Blender lives.
+    faulthandler.enable((out / "stacks.log").open("w"))
     sys.path.append(os.environ["OMT_UV_SITE"])
     bpy.ops.preferences.addon_enable(module="omt_uv")
     spec = importlib.util.spec_from_file_location("story", story_path)

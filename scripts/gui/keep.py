@@ -12,7 +12,8 @@ from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = {
-    "tour": ("tab", "unwrapped", "area", "shear", "histogram", "redo", "progress"),
+    "tour": ("tab", "unwrapped", "area", "shear", "histogram", "redo"),
+    "escape": ("progress",),
     "sections": ("magnify", "sphere", "remesh"),
     "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear"),
 }

@@ -74,7 +74,10 @@ def play(story: Path, out: Path) -> dict:
             server.terminate()
             server.wait()
     found = out / "facts.json"
-    return json.loads(found.read_text()) if found.exists() else {"error": (out / "blender.log").read_text()[-2000:]}
+    if found.exists():
+        return json.loads(found.read_text())
+    logs = [out / name for name in ("blender.log", "stacks.log")]
+    return {"error": "\n".join(log.read_text()[-4000:] for log in logs if log.exists())}
 
 
 def _display(log):

@@ -15,6 +15,9 @@ ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "gui"
 # Seconds from the key to the end of the run: without a graphics card, drawing alone may take most of one.
 PATIENCE = 3.0
+# On a busy machine a click may come before the panel does, and Debian's Blender, older than those we support, may crash.
+# Every try that failed is told when the last one fails.
+TRIES = 3
 
 
 def load():
@@ -35,12 +38,11 @@ def play():
 
     def once(name):
         story = ROOT / "scripts" / "gui" / "stories" / f"{name}.py"
-        if name not in told:
+        errors = []
+        while "error" in told.get(name, {"error": ""}) and len(errors) < TRIES:
             told[name] = run.play(story, OUT / name)
-            if "error" in told[name]:
-                # On a busy machine a click may come before the panel does.
-                told[name] = run.play(story, OUT / name)
-        assert "error" not in told[name], told[name]["error"]
+            errors.append(told[name].get("error"))
+        assert "error" not in told[name], "\n\n".join(f"try {k + 1}:\n{e}" for k, e in enumerate(errors))
         return told[name]
 
     return once
@@ -66,7 +68,7 @@ def test_colours_come_and_go(play):
 
 
 def test_escape_ends_a_run_and_changes_nothing(play):
-    facts = play("tour")
+    facts = play("escape")
     assert facts["cancelled after"] < PATIENCE
     assert facts["layers after cancel"] == 0
 
@@ -96,6 +98,6 @@ def test_the_sections_work(play):
 
 
 def test_pictures_were_taken(play):
-    for story, least in (("tour", 4), ("uv_editor", 4), ("sections", 3)):
+    for story, least in (("tour", 4), ("escape", 2), ("uv_editor", 4), ("sections", 3)):
         play(story)
         assert len(list((OUT / story).glob("*.png"))) >= least

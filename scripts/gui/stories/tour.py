@@ -1,8 +1,6 @@
-"""What an artist does in the first two minutes: one click, a look, the redo panel, Esc."""
+"""What an artist does in the first two minutes: one click, a look, the redo panel."""
 
 from __future__ import annotations
-
-import time
 
 import bpy
 
@@ -22,8 +20,7 @@ def tell(story):
     yield from story.pause(1)
     yield from first_unwrap(story, obj)
     yield from colours(story)
-    yield from redo(story, obj)
-    yield from cancel(story)
+    yield from redo(story)
 
 
 def first_unwrap(story, obj):
@@ -49,29 +46,10 @@ def colours(story):
     story.facts["colours off"] = [a.name for a in obj.data.color_attributes], shading.color_type
 
 
-def redo(story, obj):
+def redo(story):
     """Unwrap once more, open the redo panel, change a setting there."""
     yield from story.click(*story.place("VIEW_3D", *UNWRAP))
     yield from story.until(lambda: not story.running())
     yield from story.pause(1)
     yield from story.click(REDO[0], 900 - REDO[1])
     yield from story.shoot("redo")
-
-
-def cancel(story):
-    """A run of several seconds, and Esc in the middle of it."""
-    bpy.data.objects.remove(bpy.data.objects["Head"])
-    obj = story.head(200)
-    story.look_at_it(story.area("VIEW_3D"))
-    yield from story.pause(1)
-    yield from story.click(*story.place("VIEW_3D", *UNWRAP))
-    yield from story.until(lambda: story.running() and story.running().seconds > 1.5)
-    yield from story.shoot("progress")
-    story.facts["stage cancelled"] = story.running().stage
-    begin = time.monotonic()
-    yield from story.x("key", "Escape")
-    yield from story.until(lambda: not story.running())
-    story.facts["cancelled after"] = time.monotonic() - begin
-    yield from story.pause(0.5)
-    yield from story.shoot("cancelled")
-    story.facts["layers after cancel"] = len(obj.data.uv_layers)

@@ -1,0 +1,29 @@
+"""A run of several seconds, and Esc in the middle of it."""
+
+from __future__ import annotations
+
+import time
+
+# Places in the 3D View, pixels from its upper right corner.
+TAB, UNWRAP = (10, 213), (127, 105)
+
+
+def tell(story):
+    obj = story.head(200)
+    yield from story.pause(1)
+    view = story.area("VIEW_3D")
+    view.spaces.active.show_region_ui = True
+    story.look_at_it(view)
+    yield from story.pause(1)
+    yield from story.click(*story.place("VIEW_3D", *TAB))
+    yield from story.click(*story.place("VIEW_3D", *UNWRAP))
+    yield from story.until(lambda: story.running() and story.running().seconds > 1.5)
+    yield from story.shoot("progress")
+    story.facts["stage cancelled"] = story.running().stage
+    begin = time.monotonic()
+    yield from story.x("key", "Escape")
+    yield from story.until(lambda: not story.running())
+    story.facts["cancelled after"] = time.monotonic() - begin
+    yield from story.pause(0.5)
+    yield from story.shoot("cancelled")
+    story.facts["layers after cancel"] = len(obj.data.uv_layers)
