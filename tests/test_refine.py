@@ -395,6 +395,18 @@ def test_contact_gradient_is_the_derivative_of_its_energy():
     assert numeric == pytest.approx((gradient.conj() * direction).real.sum(), rel=1e-4)
 
 
+def test_contact_hessian_bounds_how_the_energy_bends():
+    # A spike that nearly touches an edge; the second derivative counts sliding along an edge that turns.
+    spike = np.array([0, 1, 1 + 0.5j, 0.4 + 0.01j, 0.5j])
+    barrier = contact(spike, np.arange(5), 1.0)
+    _, vertices, rows = barrier.derivatives(spike)
+    h = 1e-6
+    for direction in np.random.default_rng(0).normal(size=(200, 5, 2)) @ [1, 1j]:
+        before, here, after = (barrier.energy(spike + k * h * direction) for k in (-1, 0, 1))
+        bound = ((rows * direction[vertices]).sum(1).real ** 2).sum()
+        assert (before - 2 * here + after) / h**2 <= 1.001 * bound
+
+
 def test_no_step_goes_through_an_edge():
     ring, loop = slot()
     barrier = contact(ring, loop, 1.0)
