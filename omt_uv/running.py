@@ -6,6 +6,7 @@ its own (`aside`); whatever touches Blender stays in front.
 
 from __future__ import annotations
 
+import gc
 import queue
 import threading
 import time
@@ -122,11 +123,42 @@ threads = True
 _calls: queue.SimpleQueue = queue.SimpleQueue()
 
 
+# Solvers at work on threads of their own; those of runs that were cancelled end a little later.
+_solving: set = set()
+
+
 def aside(steps):
-    """A solver that knows nothing of Blender, on a thread of its own while a run is on; as it is in a script."""
+    """A solver that knows nothing of Blender, on a thread of its own while a run is on; as it is in a script.
+
+    Garbage is collected in front meanwhile: what is Blender's may be part of it, and must not be freed on a thread.
+    """
     from .solver import progress
 
-    return steps if current is None or not threads else progress.aside(steps)
+    if current is None or not threads:
+        return steps
+    return _collecting(progress.aside(_without_collector(steps)))
+
+
+def _without_collector(steps):
+    token = object()
+    _solving.add(token)
+    gc.disable()
+    try:
+        return (yield from steps)
+    finally:
+        _solving.discard(token)
+        if not _solving:
+            gc.enable()
+
+
+def _collecting(steps):
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        gc.collect(0)
+        yield progress
 
 
 def in_front(function: Callable) -> Callable:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 import types
+from typing import ClassVar
 
 import bpy
 
@@ -64,7 +66,7 @@ def step(operator, count=None):
 @pytest.fixture(autouse=True)
 def short_slices(package, monkeypatch):
     """One step of the solver a slice, and none aside, so that small meshes take many and phases are told apart."""
-    monkeypatch.setattr(package("running"), "aside", lambda steps: steps)
+    monkeypatch.setattr(package("running"), "threads", False)
     monkeypatch.setattr(package("running").Run.advance, "__defaults__", (0.0,))
     yield
     assert package("running").current is None
@@ -183,8 +185,7 @@ def test_the_view_can_be_moved_and_nothing_else_gets_through():
 
 @pytest.fixture
 def threads(package, monkeypatch):
-    progress, running = package("solver.progress"), package("running")
-    monkeypatch.setattr(running, "aside", lambda steps: steps if running.current is None else progress.aside(steps))
+    monkeypatch.setattr(package("running"), "threads", True)
 
 
 @pytest.mark.parametrize("name", OPERATORS)
@@ -207,6 +208,31 @@ def test_a_solver_aside_is_thrown_away_at_once(threads, package):
         if step(operator, slices) == {"RUNNING_MODAL"}:
             assert operator.modal(bpy.context, event("ESC", "PRESS")) == {"CANCELLED"}
             assert scenes.state(obj) == before
+
+
+def test_garbage_is_collected_in_front(threads, package, monkeypatch):
+    """It may hold what is Blender's, which crashes when it is freed while Blender is drawing."""
+
+    class Cycle:
+        freed: ClassVar[list] = []
+
+        def __init__(self):
+            self.me = self
+
+        def __del__(self):
+            self.freed.append(threading.current_thread())
+
+    def solver():
+        for k in range(200):
+            Cycle()
+            assert len([[] for _ in range(2000)]) == 2000
+            yield package("solver.progress").Progress("Making garbage", k / 200)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(package("running"), "current", object())
+        package("solver.progress").drain(package("running").aside(solver()))
+    gc.collect()
+    assert set(Cycle.freed) == {threading.main_thread()} and gc.isenabled()
 
 
 def test_a_solver_aside_complains_as_any_other(threads):
