@@ -26,9 +26,7 @@ class Dissection:
         n = len(points)
         self.depth = max(0, int(np.ceil(np.log2(max(n, 1) / LEAF))))
         # The k-th bit from above: which half of its part at level k.
-        self.part = np.zeros(n, np.int64)
-        for k in range(self.depth):
-            self.part = 2 * self.part + _upper_half(points, self.part, 1 << k)
+        self.part = kd_parts(points, self.depth)
 
     def order(self, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
         """Elimination order (n,), `order[k]` the k-th unknown, of the graph with the edges tail, head (e,)."""
@@ -40,6 +38,14 @@ class Dissection:
         # A separator comes when its part has been eliminated, the smaller ones first.
         below = self.depth - level
         return np.lexsort((below, ((self.part >> below) + 1) << below))
+
+
+def kd_parts(points: np.ndarray, depth: int) -> np.ndarray:
+    """Part (n,) of every point (n,d), of 2^depth parts of the same size, halved across their longest sides."""
+    part = np.zeros(len(points), np.int64)
+    for k in range(depth):
+        part = 2 * part + _upper_half(points, part, 1 << k)
+    return part
 
 
 def mesh_order(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

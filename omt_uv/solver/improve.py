@@ -19,6 +19,7 @@ from .pins import Pins, aligned, drag
 from .progress import Progress, Steps
 from .refine import Refinement
 from .renumbering import renumbered
+from .schwarz import overlapping
 from .stages import QUALITIES, Task, stages
 from .starts import disk_start
 from .topology import boundary_loops, halfedges, twins
@@ -91,7 +92,13 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
     guard = None if meets_itself(start, rim) else rim
     if guard is None and not (pins is not None and np.isin(rim, pins.vertices).all()):
         warnings = (*warnings, UNGUARDED)
-    task = Task(faces, Assembly(triangles, len(given)), Free(np.zeros(len(given), bool)), guard, False)
+    task = Task(
+        faces,
+        Assembly(triangles, len(given), overlapping(vertices, triangles)),
+        Free(np.zeros(len(given), bool)),
+        guard,
+        False,
+    )
     w = start
     if several is not None:
         task, w = yield from drag(task, w, several)

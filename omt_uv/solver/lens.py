@@ -19,6 +19,7 @@ from .newton import Assembly
 from .outline import Outline, centroid, free, recognised
 from .progress import Progress, Steps
 from .renumbering import Renumbered, renumbered
+from .schwarz import overlapping
 from .stages import QUALITIES, Found, Task, stages
 from .topology import boundary_loops
 
@@ -111,7 +112,8 @@ def _magnified(mesh: Renumbered, density, region, boundary: str, settings) -> St
         # Holes are free all the same.
         rim = rim[~np.isin(rim[:, 0], _outer(given, mesh.triangles))]
     guard = rim if len(rim) and not meets_itself(outline.w, rim) else None
-    task = Task(faces, Assembly(mesh.triangles, len(given)), outline.motion, guard, False, outline.kind != "free")
+    assembly = Assembly(mesh.triangles, len(given), overlapping(mesh.vertices, mesh.triangles))
+    task = Task(faces, assembly, outline.motion, guard, False, outline.kind != "free")
     found = yield from stages(task, outline.w, 0.0, settings)
     error = area_error(faces, found.w)
     return replace(found, w=_aligned(found.w, given, outline, faces, region)), outline, error

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from .energy import Elements, energies, local_derivatives, scatter, shortfall, squared
 from .errors import PrecisionError
 from .linear import Factor
+from .schwarz import Overlapping
 
 ARMIJO = 1e-4
 MAX_HALVINGS = 40
@@ -20,6 +21,8 @@ FOLD_SHARE = 0.9
 SHIFT = 1e-10
 # So many times as much where that is not enough.
 SHIFT_GROWTH = 1e3
+# Weight of the area term above which equations are factored at once: steps that are nearly right are too short there.
+STIFF = 5e3
 
 
 class Motion(Protocol):
@@ -111,10 +114,11 @@ class OnLines:
 class Assembly:
     """Scatters 6x6 matrices of faces into one sparse matrix whose pattern never changes.
 
-    Unknown 2 i and 2 i + 1 are the axes of vertex i.
+    Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: of a mesh that is solved in parts, or None.
     """
 
-    def __init__(self, triangles: np.ndarray, n: int):
+    def __init__(self, triangles: np.ndarray, n: int, parts: Overlapping | None = None):
+        self.parts = parts
         rows = np.repeat(triangles, 3, axis=1)
         columns = np.tile(triangles, (1, 3))
         key, block = np.unique(columns.astype(np.int64) * n + rows, return_inverse=True)
@@ -212,16 +216,17 @@ def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarr
     matrix = problem.assembly.matrix(blocks, diagonal.ravel() + SHIFT * scale)
     if problem.extras:
         matrix = matrix + extra
-    step = -_solution(matrix, axes.ravel(), scale)
+    parts = problem.assembly.parts if np.max(problem.weight) <= STIFF else None
+    step = -_solution(matrix, axes.ravel(), scale, parts, w, frame[:, None] * [1, 1j] * free)
     return step.view(complex), float(step @ axes.ravel())
 
 
-def _solution(matrix: sp.spmatrix, b: np.ndarray, scale: float) -> np.ndarray:
+def _solution(matrix: sp.spmatrix, b, scale: float, parts: Overlapping | None, w, axes) -> np.ndarray:
     """Solution x (n,) of matrix x = b, shifted where rounding makes it singular: the step is shorter, and goes down."""
     shift = SHIFT
     while True:
         try:
-            return Factor(matrix, "natural").solve(b)
+            return Factor(matrix, "natural").solve(b) if parts is None else parts.solve(matrix, b, w, axes)
         except PrecisionError:
             if shift > 1:
                 raise

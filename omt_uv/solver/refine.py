@@ -17,6 +17,7 @@ from .newton import Assembly
 from .pins import Pins, drag
 from .progress import Progress, Steps
 from .renumbering import renumbered
+from .schwarz import overlapping
 from .stages import QUALITIES, Task, stages
 from .starts import Start, disk_start, free_start, notched_disk, square_start
 from .topology import boundary_loops
@@ -139,7 +140,7 @@ def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins:
     loop = boundary_loops(triangles)[0]
     start = STARTS[boundary](vertices, triangles, uv, loop)
     faces = elements(vertices, triangles, *target)
-    assembly = Assembly(triangles, len(vertices))
+    assembly = Assembly(triangles, len(vertices), overlapping(vertices, triangles))
     task = _task(faces, assembly, start, loop, boundary)
     w = start.uv[:, 0] + 1j * start.uv[:, 1]
     if pins is not None and len(pins.vertices) > 1:

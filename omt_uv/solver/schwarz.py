@@ -1,0 +1,124 @@
+"""Newton's equations of large meshes by conjugate gradients, preconditioned part by part (two-level additive Schwarz).
+
+The mesh falls into parts of about a thousand vertices that overlap by a few rings. Their equations are factored one by
+one, which takes time and memory in proportion to the size of the mesh, and what is left, how parts move as a whole, by
+the affine maps of every part together (Toselli, Widlund, Domain Decomposition Methods, 2005, section 3). Stiff area
+terms do no harm, as they would to smoothers that see one vertex at a time: the parts know all of their equations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from .dissection import kd_parts, vertex_graph
+from .linear import Factor, minimum_degree
+
+# Meshes of fewer vertices are factored at once.
+LARGE = 50_000
+# Vertices of a part without its overlap, and rings of vertices that it overlaps by.
+SIZE, OVERLAP = 1000, 2
+# The end: so many iterations on, the quadratic model has fallen by less than this share of its fall so far. A step that
+# is not the last needs no more.
+WINDOW, ENOUGH = 3, 0.03
+MOST = 100
+# Added to the diagonal of the coarse equations, relative to its greatest entry: a part may have hardly a free vertex.
+SHIFT = 1e-12
+
+
+class Overlapping:
+    """Parts of a mesh (n,d), (m,3): where they overlap, and in which order their vertices are eliminated.
+
+    Unknown 2 i and 2 i + 1 are those of vertex i.
+    """
+
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, size: int = SIZE):
+        n = len(points)
+        self._part = kd_parts(points, max(0, round(np.log2(n / size))))
+        self._count = int(self._part.max()) + 1
+        graph = vertex_graph(triangles, n).tocsr()
+        member = sp.csr_matrix((np.ones(n), self._part, np.arange(n + 1)), shape=(n, self._count))
+        for _ in range(OVERLAP):
+            member = graph @ member
+        member = member.tocsc()
+        place = np.full(n, -1, np.int64)
+        self._unknowns = []
+        for k in range(self._count):
+            v = np.sort(member.indices[member.indptr[k] : member.indptr[k + 1]])
+            v = v[minimum_degree(_block(graph, v, place))]
+            self._unknowns.append((2 * v[:, None] + np.arange(2)).ravel())
+
+    def solve(self, matrix: sp.spmatrix, b: np.ndarray, w: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """About the solution x (2n,) of matrix x = b, symmetric positive definite; b.x > 0.
+
+        The decrease b.x / 2 that x promises as a Newton step is within some percent of the most there is; where that
+        takes too long, x is the solution. w (n,) complex: the map; axes (n,2) complex: the direction that each unknown
+        of a vertex stands for, 0 for one that stays 0. Raises PrecisionError.
+        """
+        matrix = sp.csr_matrix(matrix)
+        place = np.full(len(b), -1, np.int64)
+        factors = [Factor(_block(matrix, d, place), "natural") for d in self._unknowns]
+        spread = self._affine(w, axes)
+        gather = spread.T.tocsr()
+        coarse = (gather @ (matrix @ spread)).tocsc()
+        coarse = Factor(coarse + SHIFT * coarse.diagonal().max() * sp.identity(coarse.shape[0]))
+
+        def precondition(r):
+            x = spread @ coarse.solve(gather @ r)
+            for d, factor in zip(self._unknowns, factors, strict=True):
+                x[d] += factor.solve(r[d])
+            return x
+
+        x = _by_gradients(matrix, b, precondition)
+        return Factor(matrix, "natural").solve(b) if x is None else x
+
+    def _affine(self, w, axes) -> sp.csr_matrix:
+        """The affine motions of every part, (2n, 6 parts)."""
+        part, count = self._part, self._count
+        size = np.bincount(part, minlength=count)
+        middle = (np.bincount(part, w.real, count) + 1j * np.bincount(part, w.imag, count)) / size
+        z = w - middle[part]
+        z /= np.sqrt(np.bincount(part, np.abs(z) ** 2, count) / size)[part]
+        motions = np.stack([np.ones(len(z)), z, z.conj()], axis=1)
+        motions = np.concatenate([motions, 1j * motions], axis=1)[:, None, :]
+        entries = (axes.conj()[:, :, None] * motions).real
+        columns = 6 * np.repeat(part, 2)[:, None] + np.arange(6)
+        n = len(columns)
+        return sp.csr_matrix((entries.ravel(), columns.ravel(), 6 * np.arange(n + 1)), shape=(n, 6 * count))
+
+
+def overlapping(points: np.ndarray, triangles: np.ndarray) -> Overlapping | None:
+    """Parts of a mesh (n,d), (m,3) that is so large that it should be solved in parts."""
+    return Overlapping(points, triangles) if len(points) >= LARGE else None
+
+
+def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:
+    """matrix[d][:, d] of a symmetric matrix, in time that only depends on the result; place (n,) is and stays -1."""
+    place[d] = np.arange(len(d))
+    rows = matrix[d]
+    column = place[rows.indices]
+    inside = column >= 0
+    start = np.concatenate([[0], np.cumsum(inside)])[rows.indptr]
+    place[d] = -1
+    return sp.csc_matrix((rows.data[inside], column[inside], start), shape=(len(d), len(d)))
+
+
+def _by_gradients(matrix, b, precondition) -> np.ndarray | None:
+    """Conjugate gradients until x.matrix.x / 2 - b.x hardly falls any more; None where that takes too long."""
+    x, residual = np.zeros(len(b)), b.copy()
+    direction, power = 0.0, 1.0
+    fallen = np.zeros(MOST + 1)
+    for k in range(MOST):
+        z = precondition(residual)
+        power, before = residual @ z, power
+        if power <= 0:
+            return x
+        direction = z + (power / before) * direction
+        image = matrix @ direction
+        step = power / (direction @ image)
+        x += step * direction
+        residual -= step * image
+        fallen[k + 1] = fallen[k] + step * power
+        if k + 1 >= WINDOW and fallen[k + 1] - fallen[k + 1 - WINDOW] <= ENOUGH * fallen[k + 1]:
+            return x
+    return None

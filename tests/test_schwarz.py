@@ -1,0 +1,100 @@
+"""Large meshes solved in parts: Newton steps nearly as good as those of a factorisation, and the same maps."""
+
+from dataclasses import replace
+
+import meshes
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from counting import counted
+
+from omt_uv.solver import schwarz
+from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.energy import elements
+from omt_uv.solver.errors import PrecisionError
+from omt_uv.solver.geometry import face_areas
+from omt_uv.solver.newton import Assembly, Free, OnCircle, Problem, newton_direction
+from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.progress import drain
+from omt_uv.solver.schwarz import Overlapping
+from omt_uv.solver.topology import boundary_loops
+
+
+def flattened(kind, weight=500.0):
+    """Newton's problem for a hemisphere, as a whole and in parts, and its map with true meridians."""
+    V, F = meshes.hemisphere(40, 96)
+    direction = V[:, 0] + 1j * V[:, 1]
+    w = np.arctan2(np.abs(direction), V[:, 2]) * np.exp(1j * np.angle(direction))
+    if kind == "free":
+        motion = Free(np.arange(len(w)) % 97 == 0)
+    else:
+        motion = OnCircle(boundary_loops(F)[0], np.pi / 2, len(w))
+    problem = Problem(elements(V, F, face_areas(V, F)), Assembly(F, len(w)), motion, weight)
+    return problem, replace(problem, assembly=Assembly(F, len(w), Overlapping(V, F, 200))), w
+
+
+@pytest.mark.parametrize("kind", ["free", "circle"])
+@pytest.mark.parametrize("weight", [1.0, 500.0])
+def test_steps_promise_nearly_as_much_as_those_of_a_factorisation(kind, weight):
+    whole, parted, w = flattened(kind, weight)
+    _, most = newton_direction(whole, w)
+    step, slope = newton_direction(parted, w)
+    assert most <= slope * (1 - 1e-9) and slope < 0.9 * most
+    axes = step.view(float).reshape(-1, 2)
+    np.testing.assert_array_equal(axes[~parted.motion.free], 0)
+
+
+def test_steps_follow_a_turned_and_enlarged_map():
+    _, parted, w = flattened("free", 30.0)
+    scale = 1000 * np.exp(0.7j)
+    larger = replace(parted, faces=replace(parted.faces, ratio=1e6 * parted.faces.ratio))
+    step, _ = newton_direction(parted, w)
+    turned, _ = newton_direction(larger, scale * w)
+    assert np.abs(turned - scale * step).max() <= 1e-5 * np.abs(scale * step).max()
+
+
+def test_what_takes_too_long_is_factored(monkeypatch):
+    whole, parted, w = flattened("free")
+    monkeypatch.setattr(schwarz, "MOST", 2)
+    exact, _ = newton_direction(whole, w)
+    step, _ = newton_direction(parted, w)
+    np.testing.assert_allclose(step, exact, atol=1e-8 * np.abs(exact).max())
+
+
+def test_stiff_equations_are_factored():
+    _, parted, w = flattened("free", 1e5)
+    with counted() as tally:
+        newton_direction(parted, w)
+    assert tally.factorisations == 1
+
+
+def test_singular_parts_are_named():
+    _, parted, w = flattened("free")
+    matrix = sp.csc_matrix((2 * len(w), 2 * len(w)))
+    with pytest.raises(PrecisionError):
+        parted.assembly.parts.solve(matrix, np.ones(2 * len(w)), w, np.ones((len(w), 2), complex))
+
+
+@pytest.mark.parametrize("boundary", ["free", "disk"])
+def test_maps_are_those_of_whole_charts(boundary, monkeypatch):
+    V, F = meshes.head(70)
+    (whole,) = drain(unwrap(triangle_surface(V, F), boundary=boundary)).maps
+    monkeypatch.setattr(schwarz, "LARGE", 1000)
+    (parted,) = drain(unwrap(triangle_surface(V, F), boundary=boundary)).maps
+    assert parted.folds == 0 and parted.status == "converged"
+    assert parted.area_l1 <= 0.008
+    assert parted.angle_mean == pytest.approx(whole.angle_mean, rel=0.01)
+    assert parted.newton_refinement <= whole.newton_refinement + 3
+
+
+def test_nonzeros_grow_with_the_mesh():
+    counts = []
+    for count in (60, 120):
+        V, F = meshes.bumpy(count, count, height=0.3)
+        w = V[:, 0] + 0.2 * V[:, 1] + 1j * V[:, 1]
+        faces = elements(V, F, face_areas(V, F))
+        problem = Problem(faces, Assembly(F, len(w), Overlapping(V, F, 200)), Free(np.zeros(len(w), bool)), 30.0)
+        with counted() as tally:
+            newton_direction(problem, w)
+        counts.append(tally.nonzeros / len(w))
+    assert counts[1] <= 1.15 * counts[0]
