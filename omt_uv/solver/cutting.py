@@ -241,7 +241,7 @@ def open_piece(piece: Piece, kind: Kind, k: int, extremities: int) -> tuple[np.n
         path = path_to(piece, _cut_vertices(piece, chosen), tips[-1])
         chosen = shorten(piece, chosen | path, tips, around=path)
     chosen = shorten(piece, chosen, tips)
-    if kind.handles[k] == 0 and 2 < len(tips) + kind.boundaries[k] <= MOST_ENDS:
+    if extremities and kind.handles[k] == 0 and 2 < len(tips) + kind.boundaries[k] <= MOST_ENDS:
         chosen = min(chosen, _branching_tree(piece, tips), key=lambda edges: piece.cost[edges].sum())
     return chosen, tips
 

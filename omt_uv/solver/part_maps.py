@@ -8,14 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from .chart_maps import Image, conformal_image, preserving_image
-from .charts import Chart, triangle_surface
+from .charts import Chart
 from .errors import MeshError
 from .parts import Part, Parts, split_parts
-from .preparation import prepare
 from .progress import Steps, part_of
 from .sphere_conformal import ConformalSphere, conformal_sphere
 from .sphere_sampling import sphere_image
-from .tame_charts import ROUNDS, tame_charts
+from .tame_charts import ROUNDS, open_charts, tame_charts
 
 # Where the time of two maps goes, as start and width.
 FIRST, SECOND = (0.0, 0.5), (0.5, 0.5)
@@ -62,14 +61,14 @@ class PartMaps:
 
     @cached_property
     def _few(self) -> list[Chart]:
-        part = self.part
-        return prepare(triangle_surface(part.vertices, part.triangles, part.features)).charts
+        return open_charts(self.part, self.part.features)
 
     def choose_charts(self, count: int) -> Steps[None]:
         """Cut the part into disks that have conformal maps as far as can be, or into few where vertices are few."""
         self._tame = count >= MANY
         if self._tame not in self._sets:
-            self._sets[self._tame] = yield from tame_charts(self.part, conformal_image, ROUNDS if self._tame else 0)
+            rounds = ROUNDS if self._tame else 0
+            self._sets[self._tame] = yield from tame_charts(self.part, self._few, conformal_image, rounds)
 
     def of_sphere(self, density: np.ndarray) -> Steps[Maps | None]:
         """Maps to the sphere; None, and a warning from then on, where there are none in double precision."""

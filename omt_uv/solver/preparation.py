@@ -16,7 +16,7 @@ from .charts import (
     split,
     strict_sheets,
 )
-from .cutting import Cuts, open_sheets
+from .cutting import MOST_EXTREMITIES, Cuts, open_sheets
 from .errors import ZeroAreaFaceError
 from .holes import fill_holes as fill_holes_of
 from .repair import join, with_area
@@ -40,6 +40,7 @@ def prepare(
     seams: str = "auto",
     fill_holes: bool = False,
     avoid: np.ndarray | None = None,
+    extremities: int = MOST_EXTREMITIES,
 ) -> Prepared:
     """Disk charts of the polygons `faces` (f,) bool, all by default.
 
@@ -50,6 +51,7 @@ def prepare(
     fill_holes : fill all boundaries of a part but the longest, for the map only, instead of cutting to them; such
         charts have `patches`
     avoid : (n,) in [0,1], vertices to keep free of seams
+    extremities : tips that a surface is opened through, at most, where "auto" cuts; 0 for the fastest cuts
 
     Raises
     ------
@@ -64,7 +66,7 @@ def prepare(
     if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     repaired = join(surface, faces, triangles, owner)
-    opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes)
+    opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes, extremities=extremities)
     charts, flat = [], 0
     for chart in _checked(assemble(opened.surface, opened.sheets)):
         sound, count = with_area(chart, opened.extent)

@@ -24,16 +24,24 @@ from .topology import twins
 PIECES, ROUNDS, SMALLEST = 4, 3, 100
 
 
+def open_charts(part: Part, lines: np.ndarray) -> list[Chart]:
+    """Disks that a part falls into when it is cut along lines (e,2), and open further where that takes more cuts.
+
+    Cuts leave no trace, so they are those that are found fastest.
+    """
+    return prepare(triangle_surface(part.vertices, part.triangles, lines), extremities=0).charts
+
+
 def tame_charts(
-    part: Part, image_of: Callable[[np.ndarray, np.ndarray], Steps[Image]], rounds: int
+    part: Part, charts: list[Chart], image_of: Callable[[np.ndarray, np.ndarray], Steps[Image]], rounds: int
 ) -> Steps[tuple[list[Chart], list[Image]]]:
-    """Disks that a part falls into, and the image of each, with a warning where it is not conformal after all.
+    """The charts of a part, some of them in pieces, and the image of each, with a warning where it is not conformal.
 
     image_of : see `chart_maps.conformal_image`; rounds : how often charts that have none are cut into pieces
     """
     lines, images = part.features, dict[bytes, Image]()
     for k in range(rounds + 1):
-        charts = prepare(triangle_surface(part.vertices, part.triangles, lines)).charts
+        charts = open_charts(part, lines) if k else charts
         keys = [chart.faces.tobytes() for chart in charts]
         for chart, key in zip(charts, keys, strict=True):
             if key not in images:
