@@ -11,6 +11,7 @@ from .chart_map import ChartMap
 from .charts import Chart, Surface
 from .distortion import face_distortion
 from .geometry import face_areas
+from .holes import MANY
 from .preparation import Prepared, prepare
 from .progress import Steps
 from .slits import slit
@@ -51,7 +52,7 @@ def unwrap_within(
     """
     if not bound > 1:
         raise ValueError(f"no map shears less than 1; the bound must be greater, not {bound}")
-    first = prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
+    first = prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
     cuts = np.zeros((0, 2), np.int64) if first.cuts is None else first.cuts.edges
     slits = np.zeros((0, 2), dtype=np.int64)
     maps: list[ChartMap] = []
@@ -73,7 +74,7 @@ def unwrap_within(
             break
         slits = np.concatenate([slits, *new])
         opened = replace(surface, seams=np.concatenate([surface.seams, cuts, slits]))
-        prepared = prepare(opened, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
+        prepared = prepare(opened, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
     charts, maps, slits, reached = best
     return Budgeted(Prepared(charts, first.cuts, first.warnings), maps, slits, tuple(history), reached)
 

@@ -6,16 +6,18 @@ anyway is cut to the extremities that would be distorted most, or, where its sid
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
+from .apart import parting_pairs
 from .charts import Surface, chosen_triangles, is_seam, is_sharp
 from .cut_graph import greedy_arcs, path_to, shorten
 from .extremities import log_scale, spread
 from .geometry import face_areas
-from .holes import fill_holes
+from .holes import MANY, fill_holes
 from .nets import is_long, net
 from .piece import NOISE, SEAM, SHARP, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .repair import Repaired, join, weldable
@@ -78,6 +80,7 @@ def cut(
     *,
     avoid: np.ndarray | None = None,
     fill: bool = False,
+    sieve: int | None = MANY,
     extremities: int = MOST_EXTREMITIES,
 ) -> Cuts:
     """Edges to mark as seams so that every part of the polygons `faces` (f,) bool is a disk; disks are left alone.
@@ -86,6 +89,8 @@ def cut(
     ----------
     avoid : (n,) in [0,1], vertices to keep free of seams
     fill : take holes for filled, all boundaries but the longest of every part
+    sieve : without `fill`, take holes for filled where a part has more than so many, and take a part with more
+        handles apart along its hard edges; None: nowhere
     extremities : tips that a surface is opened through, at most, where it has no net
 
     Raises
@@ -94,7 +99,7 @@ def cut(
     """
     faces, triangles, owner = chosen_triangles(surface, faces)
     repaired = join(surface, faces, triangles, owner)
-    return open_sheets(surface, repaired, avoid=avoid, fill=fill, extremities=extremities).cuts
+    return open_sheets(surface, repaired, avoid=avoid, fill=fill, sieve=sieve, extremities=extremities).cuts
 
 
 def open_sheets(
@@ -103,6 +108,7 @@ def open_sheets(
     *,
     avoid: np.ndarray | None = None,
     fill: bool = False,
+    sieve: int | None = None,
     extremities: int = MOST_EXTREMITIES,
 ) -> Opened:
     """Repaired sheets cut into disks; see `cut`."""
@@ -111,34 +117,58 @@ def open_sheets(
     sheets, one_sided = _looking_out(repaired.sheets, positions)
     # What has one side only is not told to look to the other.
     turned = sheets.triangles[:, 1] != repaired.sheets.triangles[:, 1]
-    if fill:
-        filled = fill_holes(surface, sheets, one_sided)
-        surface, sheets = filled.surface, filled.sheets
+    sheets, parting = _taken_apart(sheets, positions, one_sided, sieve)
+    apart = positions[parting[:, 0]] - positions[parting[:, 1]]
+    holes, sieves = 0, not fill
+    if fill or sieve is not None:
+        filled = fill_holes(surface, sheets, one_sided, None if fill else sieve)
+        surface, sheets, holes = filled.surface, filled.sheets, filled.holes
         one_sided = np.append(one_sided, np.zeros(len(sheets.triangles) - len(one_sided), dtype=bool))
         positions, unit = _in_unit_box(surface, sheets)
-    weight = np.zeros(len(positions))
+    weight = np.ones(len(positions))
+    weight[:vertex_count] = 0
     if avoid is not None:
         weight[:vertex_count] = np.clip(np.asarray(avoid, float), 0, 1)
-    gone, report, touching = _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities)
+    gone, report, touching = _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities, sieves)
     edges = np.stack(sheets.ends(sheets.first[gone]), axis=1)
     edges = edges[(edges < vertex_count).all(axis=1)]
     # Parts that could not be oriented can be, now that they are open.
     sheets, _ = _looking_out(sheets.without(gone), positions)
-    length = sum(p.length for p in report)
-    edges = np.concatenate([edges, repaired.torn]).astype(np.int64)
-    warnings = list(repaired.warnings)
-    if turned.any():
-        warnings.append(_turned_faces(len(np.unique(repaired.sheets.owner[turned]))))
+    length = sum(p.length for p in report) + unit * float(np.linalg.norm(apart, axis=1).sum())
+    edges = np.concatenate([edges, parting, repaired.torn]).astype(np.int64)
+    backwards = len(np.unique(repaired.sheets.owner[turned]))
+    warnings = (*repaired.warnings, *_said(len(parting), backwards, holes * sieves, touching))
+    return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, warnings), unit)
+
+
+def _taken_apart(sheets: Sheets, positions, one_sided, most: int | None) -> tuple[Sheets, np.ndarray]:
+    """The sheets without the joints of `apart.parting_pairs`, and the edges (k,2) there; as they are for None."""
+    gone = (
+        np.zeros(len(sheets.first), dtype=bool) if most is None else parting_pairs(sheets, positions, one_sided, most)
+    )
+    return sheets.without(gone), np.stack(sheets.ends(sheets.first[gone]), axis=1)
+
+
+def _said(parting: int, backwards: int, sieved: int, touching: int) -> Iterator[str]:
+    """Warnings, from the numbers of edges a part came apart at, faces turned over, holes of sieves, and doubles."""
+    if parting:
+        yield "A part with very many handles was taken apart along its hard edges"
+    if backwards:
+        yield _turned_faces(backwards)
+    if sieved:
+        yield f"{sieved} holes are filled for the map: cuts to them would leave it no shape"
     if touching:
-        warnings.append(f"{touching} boundary vertices lie on one another; Merge by Distance joins the parts there")
-    return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, tuple(warnings)), unit)
+        yield f"{touching} boundary vertices lie on one another; Merge by Distance joins the parts there"
 
 
 def _cut_parts(
-    surface, sheets, one_sided, positions, unit, weight, extremities
+    surface, sheets, one_sided, positions, unit, weight, extremities, sieves
 ) -> tuple[np.ndarray, list[PieceCut], int]:
     """Pairs (p,) bool to cut so that every part is a disk, what was done to those that were none, and how many
-    vertices a weld would join."""
+    vertices a weld would join.
+
+    sieves : what has been filled are sieves, which are cut to extremities as closed parts are, disks too
+    """
     part, corner_class = components(sheets), corner_classes(sheets)
     kind = classify(sheets, corner_class, part, one_sided)
     ease = ease_of_cuts(surface, sheets)
@@ -148,13 +178,14 @@ def _cut_parts(
     report = []
     # A mesh may hold the same part many times: rivets, teeth, leaves.
     known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
-    for k in np.flatnonzero(~kind.is_disk):
+    patched = np.zeros(len(members), dtype=bool)
+    patched[part[sheets.owner < 0]] = True
+    for k in np.flatnonzero(~kind.is_disk | (patched & sieves)):
         mine = order[start[k] : start[k + 1]]
         piece = make_piece(sheets, positions, corner_class, members[k], mine, weight, ease)
         name = fingerprint(piece)
         if name not in known:
-            filled = bool((sheets.owner[members[k]] < 0).any())
-            known[name] = _best_cut(piece, kind, k, extremities, filled)
+            known[name] = _best_cut(piece, kind, k, extremities, bool(patched[k]) and not sieves)
         chosen, tips = known[name]
         gone[piece.sheet_pair[chosen]] = True
         length = float(piece.length[chosen].sum()) * unit

@@ -17,6 +17,10 @@ from .sheets import Sheets, components, corner_classes
 from .topology import halfedges
 
 NO_POLYGON = -1
+# Cuts to more holes than these make a chart of slits, for which there is hardly a map: such a part is a sieve.
+MANY = 32
+# Boundaries of a sieve that are so many times as long as most are no holes, but rims; at most MANY.
+OUTSTANDING = 3.0
 
 
 @dataclass(frozen=True)
@@ -28,8 +32,11 @@ class Filled:
     holes: int
 
 
-def fill_holes(surface: Surface, sheets: Sheets, one_sided: np.ndarray) -> Filled:
-    """Fill all boundaries but the longest of every part of oriented sheets; parts `one_sided` (m,) are left alone."""
+def fill_holes(surface: Surface, sheets: Sheets, one_sided: np.ndarray, sieve: int | None = None) -> Filled:
+    """Fill all boundaries but the longest of every part of oriented sheets; parts `one_sided` (m,) are left alone.
+
+    sieve : fill only where there are more than so many holes, and leave all that are rims rather than holes open
+    """
     tail, head = halfedges(corner_classes(sheets)[sheets.triangles])
     open_ = np.ones(len(tail), dtype=bool)
     open_[sheets.first] = open_[sheets.second] = False
@@ -40,23 +47,27 @@ def fill_holes(surface: Surface, sheets: Sheets, one_sided: np.ndarray) -> Fille
     size = int(max(tail.max(), head.max())) + 1
     loop = connected_components(coo_matrix((np.ones(len(rim)), (tail[rim], head[rim])), shape=(size, size)), False)[1]
     loop = np.unique(loop[tail[rim]], return_inverse=True)[1].ravel()
-    hole = _holes(surface, sheets, rim, loop)
+    hole = _holes(surface, sheets, rim, loop, sieve)
     rim, loop = rim[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
     if len(rim) == 0:
         return Filled(surface, sheets, 0)
     return _fans(surface, sheets, rim, loop, tail, head, size)
 
 
-def _holes(surface: Surface, sheets: Sheets, rim: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Loops (l,) bool that are not the longest of their part."""
+def _holes(surface: Surface, sheets: Sheets, rim: np.ndarray, loop: np.ndarray, sieve: int | None) -> np.ndarray:
+    """Loops (l,) bool that are not the longest of their part, or that are holes of sieves."""
     a, b = sheets.ends(rim)
     # Halves: the difference of two huge numbers may be infinite.
     step = np.linalg.norm(surface.positions[a] / 2 - surface.positions[b] / 2, axis=1)
     length = np.bincount(loop, step)
     part = components(sheets)[rim[np.unique(loop, return_index=True)[1]] // 3]
     order = np.lexsort((-length, part))
+    _, first, place, count = np.unique(part[order], return_index=True, return_inverse=True, return_counts=True)
     hole = np.ones(len(length), dtype=bool)
-    hole[order[np.unique(part[order], return_index=True)[1]]] = False
+    hole[order[first]] = False
+    if sieve is not None:
+        ordinary = length[order[first + np.minimum(count // 2, MANY)]]
+        hole[order] &= (count > sieve + 1)[place] & (length[order] <= OUTSTANDING * ordinary[place])
     return hole
 
 

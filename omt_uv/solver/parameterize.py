@@ -12,6 +12,7 @@ from .chart_pins import CornerPins, clear_of_pins
 from .chart_terms import chart_target, located, located_pins
 from .charts import Chart, Surface
 from .errors import MeshError
+from .holes import MANY
 from .measure import Target
 from .opening import with_open_corners
 from .preparation import prepare
@@ -63,7 +64,7 @@ def unwrap(
     quality : "draft", "standard" or "exact", how small the area error of single faces becomes
     balance : from 0, exact areas, to 1, least shear
     pins : corners that keep their places, with a free boundary
-    seams, fill_holes, avoid : see `preparation.prepare`; cuts avoid pinned vertices, too
+    seams, fill_holes, avoid : see `preparation.prepare`; cuts avoid pinned vertices, too, and sieves are filled anyway
     target : density (m,) of the triangles of the surface, and a region; every triangle its own area by default
 
     Raises
@@ -72,7 +73,7 @@ def unwrap(
     """
     yield Progress("Charts", 0.0)
     avoid = clear_of_pins(surface, pins, avoid)
-    prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, avoid=avoid)
+    prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
     charts = prepared.charts
     held = [located_pins(pins, chart) for chart in charts]
     maps: list[ChartMap] = []

@@ -39,6 +39,7 @@ def prepare(
     *,
     seams: str = "auto",
     fill_holes: bool = False,
+    sieve: int | None = None,
     avoid: np.ndarray | None = None,
     extremities: int = MOST_EXTREMITIES,
 ) -> Prepared:
@@ -50,6 +51,8 @@ def prepare(
         "auto" repairs and cuts, for the map only
     fill_holes : fill all boundaries of a part but the longest, for the map only, instead of cutting to them; such
         charts have `patches`
+    sieve : with "auto", fill the holes of a part that has more than so many, and then cut it to its extremities; a
+        part that has more handles comes apart along its hard edges
     avoid : (n,) in [0,1], vertices to keep free of seams
     extremities : tips that a surface is opened through, at most, where "auto" cuts; 0 for the fastest cuts
 
@@ -66,7 +69,7 @@ def prepare(
     if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     repaired = join(surface, faces, triangles, owner)
-    opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes, extremities=extremities)
+    opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes, sieve=sieve, extremities=extremities)
     charts, flat = [], 0
     for chart in _checked(assemble(opened.surface, opened.sheets)):
         sound, count = with_area(chart, opened.extent)

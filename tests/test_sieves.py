@@ -1,0 +1,145 @@
+"""Bodies full of holes: sheets, tubes and boxes that are sieves, frames, plates with holes right through them."""
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.cutting import cut
+from omt_uv.solver.geometry import face_areas
+from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.preparation import prepare
+from omt_uv.solver.progress import drain
+from omt_uv.solver.topology import boundary_loops
+
+
+def used(V, F):
+    vertices, index = np.unique(F, return_inverse=True)
+    return V[vertices], index.reshape(-1, 3)
+
+
+def punched(n, m, hole, closed=False):
+    """Parameters (k,2) in [0, 1] of a grid of n by m quads, the first one closed or not, without those in a hole."""
+    columns = n if closed else n + 1
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(m), indexing="ij"))
+    i, j = i[~hole(i, j)], j[~hole(i, j)]
+    a, b = i * (m + 1) + j, (i + 1) % columns * (m + 1) + j
+    faces = np.concatenate([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
+    u, v = np.meshgrid(np.arange(columns) / n, np.arange(m + 1) / m, indexing="ij")
+    return used(np.stack([u.ravel(), v.ravel()], 1), faces)
+
+
+def lattice(period, size):
+    """Square holes of some size in every square of a period."""
+    return lambda i, j: (i % period >= 1) & (i % period <= size) & (j % period >= 1) & (j % period <= size)
+
+
+def wavy_sheet(n, hole):
+    p, F = punched(n, n, hole)
+    p = 10 * p
+    return np.column_stack([p, 0.5 * np.sin(p[:, 0]) * np.cos(1.3 * p[:, 1])]), F
+
+
+def tube(n, m, hole, bulge=0.0):
+    p, F = punched(n, m, hole, closed=True)
+    angle, height = 2 * np.pi * p[:, 0], 4 * p[:, 1]
+    radius = 1 + bulge * np.sin(1.7 * height)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height]), F
+
+
+def box(n=12):
+    p, F = punched(n, n, lattice(3, 1))
+    sides = []
+    for axis in range(3):
+        for end in (0, 1):
+            side = (
+                np.insert(p, axis, end, axis=1) if axis != 1 else np.column_stack([p[:, 1], 0 * p[:, 0] + end, p[:, 0]])
+            )
+            sides.append(side[F if end else F[:, ::-1]])
+    corners = np.concatenate(sides).reshape(-1, 3)
+    _, first, index = np.unique(np.round(corners * n).astype(int), axis=0, return_index=True, return_inverse=True)
+    return corners[first], index.reshape(-1, 3)
+
+
+def plate(n, thick=0.3):
+    """A solid plate with holes right through it."""
+    p, F = punched(n, n, lattice(3, 1))
+    k = len(p)
+    V = np.concatenate([np.column_stack([10 * p, np.full(k, thick)]), np.column_stack([10 * p, np.zeros(k)])])
+    rim = np.concatenate([np.column_stack([loop, np.roll(loop, -1)]) for loop in boundary_loops(F)])
+    a, b = rim.T
+    walls = np.concatenate([np.stack([b, a, a + k], 1), np.stack([b, a + k, b + k], 1)])
+    return V, np.concatenate([F, F[:, ::-1] + k, walls])
+
+
+def check(V, F, shear, parts=1):
+    result = drain(unwrap(triangle_surface(V, F)))
+    areas = np.array([face_areas(V, F[c.faces]).sum() for c in result.charts])
+    mean = {n: areas @ [getattr(m, n) for m in result.maps] / areas.sum() for n in ("area_l1", "angle_mean")}
+    assert len(result.charts) == parts and not any(m.folds for m in result.maps)
+    assert mean["area_l1"] <= 0.01 and mean["angle_mean"] <= shear
+    assert sum(len(c.triangles) for c in result.charts) == len(F)
+    return result
+
+
+def test_a_sheet_full_of_holes_is_mapped_whole():
+    V, F = wavy_sheet(25, lattice(3, 1))
+    assert len(boundary_loops(F)) > 33
+    result = check(V, F, 1.2)
+    assert len(result.seams) == 0 and "holes" in result.warnings[0]
+    assert cut(triangle_surface(V, F)).length == 0
+
+
+def test_the_rims_of_a_tube_full_of_holes_stay_open():
+    V, F = tube(32, 24, lattice(4, 2))
+    result = check(V, F, 1.02)
+    cuts = cut(triangle_surface(V, F))
+    assert cuts.pieces[0].boundaries == 2 and cuts.length == pytest.approx(4)
+    assert len(boundary_loops(result.charts[0].disk)) == 1
+
+
+def test_a_tube_that_is_not_flat_is_cut_to_its_extremities():
+    check(*tube(48, 40, lattice(4, 2), bulge=0.5), 1.6)
+
+
+def test_a_box_full_of_holes_has_its_net():
+    V, F = box()
+    result = check(V, F, 1 + 1e-6)
+    assert len(cut(triangle_surface(V, F)).pieces[0].extremities) == 8
+    assert result.maps[0].area_l1 < 1e-6
+
+
+def test_few_holes_are_cut_to():
+    V, F = wavy_sheet(12, lattice(3, 1))
+    (chart,) = prepare(triangle_surface(V, F), sieve=32).charts
+    assert len(chart.patches) == 0
+
+
+def test_a_frame_of_few_holes_is_cut():
+    result = check(*wavy_sheet(44, lattice(11, 9)), 1.3)
+    assert len(result.seams) and not len(result.charts[0].patches)
+
+
+def test_a_plate_with_many_holes_through_it_comes_apart_along_its_edges():
+    V, F = plate(18)
+    result = check(V, F, 1 + 1e-6, parts=36 + 3)
+    assert any("apart" in text for text in result.warnings)
+    assert len(np.unique(np.sort(result.seams, axis=1), axis=0)) == len(result.seams)
+
+
+def test_a_plate_with_few_holes_through_it_stays_in_one_piece():
+    check(*plate(6), 1.2)
+
+
+def test_who_prepares_without_asking_for_it_gets_no_patches():
+    charts = prepare(triangle_surface(*wavy_sheet(25, lattice(3, 1)))).charts
+    assert not any(len(c.patches) for c in charts)
+
+
+def test_marked_seams_are_kept_in_sieves():
+    V, F = wavy_sheet(25, lattice(3, 1))
+    line = np.flatnonzero(np.abs(V[:, 0] - 4.8) < 1e-9)
+    line = line[np.argsort(V[line, 1])]
+    seams = np.column_stack([line[:-1], line[1:]])
+    result = drain(unwrap(triangle_surface(V, F, seams)))
+    assert len(result.charts) == 2
+    assert max(m.area_l1 for m in result.maps) <= 0.01
