@@ -7,7 +7,7 @@ mirror charts, so neither is taken over: islands are turned here and moved by a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -48,7 +48,7 @@ def pack(
     Parameters
     ----------
     islands : (n_i,2) positions in one common unit of length
-    triangles : (m_i,3) vertex indices
+    triangles : (m_i,3) vertex indices; vertices that none uses come to lie in the middle of their island
     margin : least distance between islands and to the border, in pixels
     texture_size : pixels along a side of the unit square
 
@@ -59,6 +59,23 @@ def pack(
     """
     if 2 * margin >= texture_size:
         raise MarginError(f"A margin of {margin:g} pixels fills a texture of {texture_size} pixels. {REMEDY}.")
+    # What no triangle uses, as the centres of filled holes, is not placed.
+    used = [np.unique(t) for t in triangles]
+    points = [p[u] for p, u in zip(islands, used, strict=True)]
+    faces = [np.searchsorted(u, t) for u, t in zip(used, triangles, strict=True)]
+    packing = _pack(points, faces, margin, texture_size)
+    placed = [_spread(p, u, len(whole)) for p, u, whole in zip(packing.islands, used, islands, strict=True)]
+    return replace(packing, islands=placed)
+
+
+def _spread(points: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
+    """Points (k,2) in rows (k,) of (count,2), and their middle in all others."""
+    result = np.tile(points.mean(axis=0), (count, 1))
+    result[rows] = points
+    return result
+
+
+def _pack(islands: list[np.ndarray], triangles: list[np.ndarray], margin: float, texture_size: int) -> Packing:
     turned = [turn_upright(p) for p in islands]
     inner = texture_size - 2 * margin
     if len(islands) == 1:

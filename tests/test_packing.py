@@ -54,6 +54,17 @@ def test_inside_and_apart(count, margin, texture_size):
         assert distance >= border
 
 
+@pytest.mark.parametrize("count", [1, 2, 25])
+def test_vertices_that_no_triangle_uses_take_no_room(count):
+    """Centres of filled holes: the packer leaves them anywhere."""
+    islands = corners(count)
+    plain = pack(islands, [FAN] * count)
+    more = pack([np.concatenate([[[30.0, -20.0]], p]) for p in islands], [FAN + 1] * count)
+    for expected, found in zip(plain.islands, more.islands, strict=True):
+        np.testing.assert_array_equal(found[1:], expected)
+        assert (found[0] >= expected.min(axis=0)).all() and (found[0] <= expected.max(axis=0)).all()
+
+
 def test_one_scale_and_no_mirror_image():
     islands = corners(30)
     result = pack(islands, [FAN] * 30)

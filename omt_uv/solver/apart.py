@@ -26,6 +26,9 @@ def parting_pairs(sheets: Sheets, positions: np.ndarray, one_sided: np.ndarray, 
     hard = crowded & (np.abs(fold_angles(positions, sheets.vertex[sheets.triangles], pair)) > HARD)
     side, kind = _kinds(sheets.without(hard), one_sided)
     gone = hard & (kind.boundaries[side[pair // 3]] > 1).any(axis=1)
+    # What ends inside of a side is a slit, which parts nothing.
+    side = components(sheets.without(gone))[pair // 3]
+    gone &= side[:, 0] != side[:, 1]
     side, left = _kinds(sheets.without(gone), one_sided)
     handles = np.zeros(len(whole.handles), dtype=np.int64)
     np.maximum.at(handles, part, left.handles[side])

@@ -55,6 +55,19 @@ def test_edit_mode_with_everything_selected_equals_object_mode(make):
     assert (scenes.uv_of(obj) == expected).all()
 
 
+def test_a_ball_of_struts(package):
+    """A hundred handles, hard edges that end among soft ones, and two islands full of holes."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    obj = bpy.context.object
+    obj.modifiers.new("Struts", "WIREFRAME").thickness = 0.12
+    obj.modifiers.new("Smooth", "SUBSURF").levels = 1
+    bpy.ops.object.convert(target="MESH")
+    unwrap()
+    found = package("measuring").measure_readings([package("blender_mesh").read(obj)])
+    assert found.folds == 0 and found.overlap == 0 and found.area_l1 < 0.008
+    assert_inside(obj)
+
+
 def test_edit_mode_leaves_faces_that_are_not_selected_to_the_bit():
     obj = scenes.bump()
     rng = np.random.default_rng(1)
