@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 
 from .charts import Chart, Surface
 from .contact import crossings
-from .corners import OPEN, Barrier, Corners, convex_corners
+from .corners import DENTED, OPEN, STRAIGHT, Barrier, Corners, convex_corners
 from .dissection import vertex_graph
 from .energy import elements, energies, gradient
 from .geometry import face_areas, signed_areas
@@ -115,7 +115,7 @@ def _union(charts, first, density, weights, w) -> _Mesh:
 
 def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.ndarray, w: np.ndarray) -> Corners:
     """The corners of convex polygons as vertices of all charts, counter-clockwise in the map."""
-    corner, polygon, share = convex_corners(surface)
+    corner, polygon, share = convex_corners(surface, straight=True)
     vertex = np.full(len(surface.corner_vertex), -1)
     vertex[np.concatenate([c.corners.ravel() for c in charts])] = triangles.ravel()
     a, b, c = w[triangles].T
@@ -123,8 +123,10 @@ def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.nda
     area = np.bincount(owner, 0.5 * ((b - a).conj() * (c - a)).imag, len(surface.face_start) - 1)
     ears = vertex[corner]
     kept = (ears >= 0).all(1) & (area[polygon] > 0)
-    ears, polygon, share = ears[kept], polygon[kept], share[kept]
-    found = Corners(ears, share * area[polygon], area[polygon])
+    ears, polygon = ears[kept], polygon[kept]
+    share, whole = share[kept], area[polygon]
+    wanted = np.maximum(share, STRAIGHT)
+    found = Corners(ears, wanted * whole, whole, np.where(share < STRAIGHT, share - DENTED, OPEN * wanted) * whole)
     # Polygons may have been turned over for the map.
     turned = np.bincount(polygon, found.areas(w), len(area))[polygon] < 0
     return replace(found, triangles=np.where(turned[:, None], ears[:, [0, 2, 1]], ears))
@@ -203,7 +205,7 @@ class _Patches:
         wanted = self.corners.wanted
         slack = np.maximum(LEAST * wanted - self.corners.areas(w), 0) / (1 - LEAST)
         # What is open stays so.
-        return Barrier(self.corners, np.where(self.corners.shut(w), slack, -OPEN * wanted), strength)
+        return Barrier(self.corners, np.where(self.corners.open(w), -OPEN * wanted, slack), strength)
 
     def _shut(self, w):
         return np.bincount(self.of_corner, self.corners.shut(w), self.count)

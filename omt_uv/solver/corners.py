@@ -11,15 +11,20 @@ from .charts import Surface
 # A corner counts where it has the share SHARP of its polygon's area on the surface, and is open where it has more
 # than the share OPEN of that in the map.
 SHARP, OPEN = 1e-3, 0.02
+# Straight ones, and slightly reflex ones, of less than the share STRAIGHT, shall be open as if they had that, but
+# are shut only where they have lost DENTED of the area: straight lines may stay so.
+STRAIGHT, DENTED = 0.02, 0.01
 
 
 @dataclass(frozen=True)
 class Corners:
-    """Corners of polygons: triangles (k,3) of vertices, areas wanted (k,), and those of the polygons, whole (k,)."""
+    """Corners of polygons: triangles (k,3) of vertices, areas wanted (k,), those of the polygons, whole (k,), and
+    least areas (k,) of corners that are not shut."""
 
     triangles: np.ndarray
     wanted: np.ndarray
     whole: np.ndarray
+    least: np.ndarray
 
     def areas(self, w: np.ndarray) -> np.ndarray:
         """Signed areas (k,) in a map w (n,) complex."""
@@ -27,12 +32,16 @@ class Corners:
         return 0.5 * ((b - a).conj() * (c - a)).imag
 
     def shut(self, w: np.ndarray) -> np.ndarray:
-        """Which corners (k,) are not open in a map w (n,) complex."""
-        return ~(self.areas(w) > OPEN * self.wanted)
+        """Which corners (k,) are shut in a map w (n,) complex."""
+        return ~(self.areas(w) > self.least)
+
+    def open(self, w: np.ndarray) -> np.ndarray:
+        """Which corners (k,) are open in a map w (n,) complex; straight ones may be neither open nor shut."""
+        return self.areas(w) > OPEN * self.wanted
 
     def of(self, chosen: np.ndarray, place: np.ndarray) -> Corners:
         """Some of the corners, (k,) bool, with the vertices renumbered, vertex v as place[v]."""
-        return Corners(place[self.triangles[chosen]], self.wanted[chosen], self.whole[chosen])
+        return Corners(place[self.triangles[chosen]], self.wanted[chosen], self.whole[chosen], self.least[chosen])
 
 
 @dataclass(frozen=True)
@@ -71,9 +80,10 @@ class Barrier:
         return (self.corners.areas(w) + self.slack) / (self.corners.wanted + self.slack)
 
 
-def convex_corners(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def convex_corners(surface: Surface, straight: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners of the polygons, of four and more, that have no reflex corner; the straight ones left out.
 
+    straight : these, too, and those of polygons whose reflex corners are nearly straight.
     Triangles (k,3) of a corner of the surface, the next and the one before it; their polygons (k,), and their shares
     (k,) of the polygons' areas.
     """
@@ -94,6 +104,6 @@ def convex_corners(surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray
     normal = np.column_stack([np.bincount(polygon, twice[:, k], len(size)) for k in range(3)])[polygon]
     ear = np.cross(after, before)
     share = (ear * normal).sum(1) / np.maximum((normal**2).sum(1), np.finfo(float).tiny)
-    reflex = np.bincount(polygon, share < -SHARP, len(size)) > 0
-    kept = ~reflex[polygon] & (share > SHARP)
+    reflex = np.bincount(polygon, share < (-STRAIGHT if straight else -SHARP), len(size)) > 0
+    kept = ~reflex[polygon] & (straight | (share > SHARP))
     return corner[kept], polygon[kept], share[kept]
