@@ -24,6 +24,7 @@ from omt_uv.solver.progress import drain
 from omt_uv.solver.remesh import STRATEGIES, remesh, summed_up
 from omt_uv.solver.sphere_sampling import sample_sphere
 from omt_uv.solver.topology import boundary_loops, halfedges, pair_keys, twins
+from omt_uv.solver.touching import opened
 from omt_uv.solver.voronoi import voronoi_cells
 
 CASES = {
@@ -78,6 +79,43 @@ def test_cuts_between_boundaries_leave_no_trace():
     result = run(P, number.ravel()[F], 800)
     assert topology(result.triangles) == (0, 2)
     assert angles(result.vertices, result.triangles).min() > 30
+
+
+def open_pipe():
+    """A sheet rolled up until two sides of it touch, which stay apart."""
+    V, F = meshes.grid(24, 36)
+    P = np.concatenate([np.cos(V[:, :1] * 2 * np.pi), 6 * V[:, 1:2], -np.sin(V[:, :1] * 2 * np.pi)], axis=1)
+    number = np.arange(len(P)).reshape(37, 25)
+    P[number[:, 24]] = P[number[:, 0]]
+    return P, F
+
+
+def along_the_equator(half):
+    """A sphere cut open along the equator, or half of it."""
+    V, F = meshes.icosphere(3)
+    V = V + 1e-3 * V[:, [1, 2, 0]]
+    above = V[F].mean(axis=1)[:, 2] > 0
+    tail, head = halfedges(F)
+    twin = twins(F)
+    border = above[np.arange(len(tail)) // 3] & ~above[twin // 3]
+    if half:
+        border &= (V[tail, 0] > 0) & (V[head, 0] > 0)
+    return opened(V, F, np.sort(pair_keys(tail[border], head[border])))
+
+
+@pytest.mark.parametrize(
+    "make, alone", [(open_pipe, None), (lambda: along_the_equator(False), 0), (lambda: along_the_equator(True), 2)]
+)
+def test_both_sides_of_a_slit_stay_on_one_another(make, alone):
+    V, F = make()
+    result = run(V, F, 500, rounds=10)
+    assert len(result.vertices) == 500 and topology(result.triangles) == topology(F)
+    rim = result.vertices[np.concatenate(boundary_loops(result.triangles))]
+    if alone is None:
+        rim = rim[(rim[:, 1] > 1e-6) & (rim[:, 1] < 6 - 1e-6)]
+        alone = 0
+    count = np.unique(rim, axis=0, return_counts=True)[1]
+    assert len(rim) > 30 and count.max() == 2 and (count == 1).sum() == alone
 
 
 def test_points_of_the_input_under_the_new_vertices():

@@ -45,15 +45,18 @@ class Network:
     sides: list[list[Side]]
 
 
-def network(positions: np.ndarray, charts: list[Chart], held: np.ndarray, size: np.ndarray | None = None) -> Network:
-    """Arcs of the boundaries of charts of one part, positions (n,3); held: sorted keys of the edges to keep.
+def network(
+    positions: np.ndarray, charts: list[Chart], held: np.ndarray, slits: np.ndarray, size: np.ndarray | None = None
+) -> Network:
+    """Arcs of the boundaries of charts of one part, positions (n,3); held: sorted keys of the edges to keep, slits: of
+    those among them that arcs hold alone.
 
     With `size` (n,), the edge length at every vertex, held arcs end at corners too.
     """
     loops = [boundary_loops(chart.disk)[0] for chart in charts]
     ids = [chart.vertex_ids[loop] for chart, loop in zip(charts, loops, strict=True)]
     keys = [pair_keys(i, np.roll(i, -1)) for i in ids]
-    node = _nodes(len(positions), np.unique(np.concatenate(keys)), held)
+    node = _nodes(len(positions), np.unique(np.concatenate(keys)), held, slits)
     rings = [i for i in ids if not node[i].any()]
     for i in rings:
         node[i.min()] = True
@@ -93,12 +96,12 @@ def _network(loops: list[np.ndarray], ids: list[np.ndarray], keys: list[np.ndarr
     return Network(arcs, turned, sides)
 
 
-def _nodes(n: int, keys: np.ndarray, held: np.ndarray) -> np.ndarray:
+def _nodes(n: int, keys: np.ndarray, held: np.ndarray, slits: np.ndarray) -> np.ndarray:
     """Vertices (n,) bool where arcs end: branches, ends, and changes of kind."""
     ends = np.concatenate([keys >> 32, keys & 0xFFFFFFFF])
     degree = np.bincount(ends, minlength=n)
-    kept = np.bincount(ends, np.tile(_among(keys, held), 2), n)
-    return (degree > 0) & ((degree != 2) | (kept == 1))
+    kept, open_ = (np.bincount(ends, np.tile(_among(keys, kind), 2), n) for kind in (held, slits))
+    return (degree > 0) & ((degree != 2) | (kept == 1) | (open_ == 1))
 
 
 def _corners(positions: np.ndarray, vertices: np.ndarray, size: np.ndarray) -> np.ndarray:

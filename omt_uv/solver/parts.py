@@ -12,13 +12,14 @@ from .geometry import face_areas
 from .repair import join
 from .sheets import orientations, turn_over
 from .topology import halfedges, pair_keys, twins
+from .touching import join_touching
 
 
 @dataclass(frozen=True)
 class Part:
     """One part in a unit box: vertices (n,3), triangles (m,3), the input's triangles (m,) and vertices (n,).
 
-    features (e,2): pairs of its vertices that are edges to keep.
+    features (e,2): pairs of its vertices that are edges to keep; slits: sorted keys of those to be opened afterwards.
     """
 
     vertices: np.ndarray
@@ -26,6 +27,7 @@ class Part:
     faces: np.ndarray
     vertex_ids: np.ndarray
     features: np.ndarray
+    slits: np.ndarray
 
     @property
     def area(self) -> np.ndarray:
@@ -62,14 +64,15 @@ class Parts:
 
 
 def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarray) -> Parts:
-    """Parts of a mesh (n,3), (m,3) with edges (e,2) to keep.
+    """Parts of a mesh (n,3), (m,3) with edges (e,2) to keep; what only slits part is one.
 
     Raises
     ------
     EmptyMeshError, NonFiniteError, ZeroAreaFaceError : nothing that could be remeshed
     OrientationError : a part has only one side
     """
-    surface = triangle_surface(vertices, triangles)
+    joined = join_touching(vertices, triangles)
+    surface = triangle_surface(vertices, joined.triangles)
     faces, corners, owner = chosen_triangles(surface, None)
     used = surface.positions[np.unique(surface.corner_vertex)]
     low, high = used.min(axis=0), used.max(axis=0)
@@ -93,17 +96,21 @@ def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarra
     if turned.any():
         warnings.append(f"{int(turned.sum())} triangles looked to the wrong side and were turned over")
     charts = assemble(surface, turn_over(repaired.sheets, turned))
-    kept = np.sort(pair_keys(features[:, 0], features[:, 1]))
-    parts = [_part(chart, boxed, kept) for chart in charts]
+    slits = np.sort(pair_keys(joined.slits[:, 0], joined.slits[:, 1]))
+    features = joined.same[features]
+    kept = np.union1d(pair_keys(features[:, 0], features[:, 1]), slits)
+    parts = [_part(chart, boxed, kept, slits) for chart in charts]
     sound = [p for p in parts if p.area.sum() > 1e-12 * area.sum()]
     if len(sound) < len(parts):
         warnings.append(f"{len(parts) - len(sound)} parts without area were left out")
     return Parts(sound, centre, size, tuple(warnings))
 
 
-def _part(chart: Chart, boxed: np.ndarray, features: np.ndarray) -> Part:
+def _part(chart: Chart, boxed: np.ndarray, features: np.ndarray, slits: np.ndarray) -> Part:
     tail, head = halfedges(chart.triangles)
     key = pair_keys(chart.vertex_ids[tail], chart.vertex_ids[head])
     kept = np.isin(key, features)
     rows = np.unique(np.sort(np.stack([tail[kept], head[kept]], axis=1), axis=1), axis=0)
-    return Part(boxed[chart.vertex_ids], chart.triangles, chart.faces, chart.vertex_ids, rows.reshape(-1, 2))
+    open_ = np.isin(key, slits)
+    mine = np.unique(pair_keys(tail[open_], head[open_]))
+    return Part(boxed[chart.vertex_ids], chart.triangles, chart.faces, chart.vertex_ids, rows.reshape(-1, 2), mine)

@@ -24,6 +24,7 @@ from .progress import Progress, Steps, part_of
 from .relaxation import relax
 from .sampling import STRATEGIES
 from .tessellation import Options, Tessellation, least_samples, tessellate
+from .touching import opened
 
 # More vertices than this many times the input's tell nothing new about the surface.
 FAR_MORE = 50
@@ -207,7 +208,8 @@ def _remesh_part(maps: PartMaps, count: int, density: np.ndarray, options: Optio
             return (yield from part_of(_settle(part, start, level, options, anyhow), 0.3, 0.7))
         except StuckError as error:
             if anyhow:
-                count = len(error.draft.points if options.count_of == "vertices" else error.draft.triangles)
+                draft = error.draft
+                count = len(draft.points) + start.copies if options.count_of == "vertices" else len(draft.triangles)
         stretch = start.stretch * THINNED
 
 
@@ -231,8 +233,9 @@ def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options
     draft = adjust_count(draft, start.count, size, anyhow)
     if options.fit:
         draft = yield from part_of(fit_to_surface(draft, index, level, start.size), 0.57, 0.43)
-    on = index(draft.points, vertex_normals(draft.points, draft.triangles))
-    return _Result(draft.points, draft.triangles, part.faces[on.faces], on.barycentric, moved, start.warnings)
+    points, triangles = opened(draft.points, draft.triangles, start.slits)
+    on = index(points, vertex_normals(points, triangles))
+    return _Result(points, triangles, part.faces[on.faces], on.barycentric, moved, start.warnings)
 
 
 class _Size:

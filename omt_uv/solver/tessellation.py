@@ -20,6 +20,7 @@ from .rims import smooth_rims
 from .sampling import EVEN, Patch, triangulate_chart
 from .sphere_sampling import sample_sphere
 from .topology import pair_keys
+from .touching import copies
 
 # Vertices that every part has at first.
 FEWEST = 100
@@ -43,7 +44,7 @@ class Tessellation:
     """A mesh of a part with about the vertices asked for, samples on boundaries and features fixed, edges there locked.
 
     count: the exact number of vertices to reach; size: edge length at density 1; stretch: that of the samples on
-    boundaries and features next to it.
+    boundaries and features next to it; slits: sorted keys of the edges to open at the end; copies: vertices that adds.
     """
 
     draft: Draft
@@ -51,6 +52,8 @@ class Tessellation:
     size: float
     stretch: float
     warnings: tuple[str, ...]
+    slits: np.ndarray
+    copies: int
 
 
 def tessellate(
@@ -82,7 +85,8 @@ def _by_sphere(maps: PartMaps, count: int, density: np.ndarray, options: Options
         return None
     points = samples.points
     draft = Draft(points, samples.triangles, np.zeros(len(points), dtype=bool), np.zeros(0, np.int64))
-    return Tessellation(draft, vertices, edge_size(float(part.area @ density), 0.0, vertices), 1.0, found.warnings)
+    size = edge_size(float(part.area @ density), 0.0, vertices)
+    return Tessellation(draft, vertices, size, 1.0, found.warnings, part.slits, 0)
 
 
 def _by_charts(
@@ -91,16 +95,19 @@ def _by_charts(
     yield Progress("Charts", 0.0)
     yield from part_of(maps.choose_charts(count if options.count_of == "vertices" else count // 2), 0.0, 0.5)
     part, charts, held = maps.part, maps.charts, _held(maps.part)
-    measure, rim = float(part.area @ density), _weighted_length(part.vertices, part.rim, at_vertices)
+    # A slit is a boundary on both sides.
+    rim = _weighted_length(part.vertices, np.concatenate([part.rim, part.slits, part.slits]), at_vertices)
+    measure = float(part.area @ density)
     vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
-    size = edge_size(measure, rim, vertices)
+    size, total = edge_size(measure, rim, vertices), vertices
     # A few samples make no sound mesh of a surface, so these are taken away only afterwards.
     finer = edge_size(measure, rim, max(vertices, FEWEST)) / size
     lengths = size / np.sqrt(at_vertices)
     first, corners = stretch, options.corners
     while True:
-        lines = network(part.vertices, charts, held, stretch * lengths if corners else None)
+        lines = network(part.vertices, charts, held, part.slits, stretch * lengths if corners else None)
         samples = sample_arcs(part.vertices, lines.arcs, finer * lengths, stretch=stretch / finer)
+        vertices = total - _copies(part, lines, samples)
         if options.count_of == "faces":
             samples, vertices = _for_faces(part, lines, samples, count, finer * lengths, stretch / finer)
         if samples.fixed.sum() <= vertices:
@@ -135,8 +142,10 @@ def _by_charts(
     number = np.empty(len(points), np.int64)
     number[order] = np.arange(len(points))
     fixed = np.arange(len(points)) < samples.fixed.sum()
-    draft = Draft(points[order], number[triangles], fixed, _kept(lines, samples, number))
-    return Tessellation(draft, vertices, size, stretch, tuple(warnings))
+    held_arcs = [k for k, arc in enumerate(lines.arcs) if arc.held]
+    draft = Draft(points[order], number[triangles], fixed, _kept(held_arcs, samples, number))
+    slits = _kept(_slits(part, lines), samples, number)
+    return Tessellation(draft, vertices, size, stretch, tuple(warnings), slits, _copies(part, lines, samples))
 
 
 def _held(part: Part) -> np.ndarray:
@@ -150,8 +159,9 @@ def least_samples(maps: PartMaps, corners: bool) -> int:
     if len(held) == 0:
         return 0
     endless = np.full(len(part.vertices), np.inf)
-    lines = network(part.vertices, maps.charts, held, endless if corners else None)
-    return int(sample_arcs(part.vertices, lines.arcs, endless).fixed.sum())
+    lines = network(part.vertices, maps.charts, held, part.slits, endless if corners else None)
+    samples = sample_arcs(part.vertices, lines.arcs, endless)
+    return int(samples.fixed.sum()) + _copies(part, lines, samples)
 
 
 def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarray) -> float:
@@ -162,7 +172,7 @@ def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarra
 
 def _for_faces(part: Part, lines: Network, samples: ArcSamples, count: int, size, stretch) -> tuple[ArcSamples, int]:
     """Samples whose boundary fits a number of faces, F = 2 V - 2 euler - b, and the number of vertices."""
-    rim = [k for k, arc in enumerate(lines.arcs) if np.isin(pair_keys(*arc.vertices[:2, None]), part.rim)[0]]
+    rim = _on_rim(part, lines)
     b = sum(len(samples.along[k]) - 1 for k in rim)
     if (count + b) % 2 and rim:
         longest = max(rim, key=lambda k: len(samples.along[k]))
@@ -195,8 +205,29 @@ def _patch(
     raise PrecisionError("A chart cannot be triangulated", kind="face", elements=chart.faces)
 
 
-def _kept(lines: Network, samples: ArcSamples, number: np.ndarray) -> np.ndarray:
-    """Sorted keys of the edges between samples on boundaries and features, after renumbering by `number` (s,)."""
-    held = [number[along] for arc, along in zip(lines.arcs, samples.along, strict=True) if arc.held]
+def _kept(arcs: list[int], samples: ArcSamples, number: np.ndarray) -> np.ndarray:
+    """Sorted keys of the edges between the samples on some arcs, after renumbering by `number` (s,)."""
+    held = [number[samples.along[k]] for k in arcs]
     keys = [pair_keys(along[:-1], along[1:]) for along in held]
     return np.sort(np.concatenate(keys)) if keys else np.zeros(0, np.int64)
+
+
+def _slits(part: Part, lines: Network) -> list[int]:
+    """The arcs along slits."""
+    return [k for k, arc in enumerate(lines.arcs) if np.isin(pair_keys(*arc.vertices[:2, None]), part.slits)[0]]
+
+
+def _copies(part: Part, lines: Network, samples: ArcSamples) -> int:
+    """How many samples there are on slits in addition to those given, once they are open."""
+    if len(part.slits) == 0:
+        return 0
+    chains = [samples.along[k] for k in _slits(part, lines)]
+    on_rim = np.zeros(len(samples.points), dtype=bool)
+    for k in _on_rim(part, lines):
+        on_rim[samples.along[k]] = True
+    return copies(np.concatenate([end for chain in chains for end in (chain[:-1], chain[1:])]), on_rim)
+
+
+def _on_rim(part: Part, lines: Network) -> list[int]:
+    """The arcs along boundaries."""
+    return [k for k, arc in enumerate(lines.arcs) if np.isin(pair_keys(*arc.vertices[:2, None]), part.rim)[0]]

@@ -1,0 +1,75 @@
+"""Boundaries that lie on one another, as where a mesh was cut open: joined for remeshing, and opened again afterwards.
+
+Sampled apart, the two sides of a slit would cross each other or gape; joined along a line that is kept they cannot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .sides import cut_open
+from .topology import halfedges, pair_keys, pair_up
+
+
+@dataclass(frozen=True)
+class Joined:
+    """Triangles (m,3) without the slits; same (n,): the vertex that stands for each; slits (s,2): edges joined."""
+
+    triangles: np.ndarray
+    same: np.ndarray
+    slits: np.ndarray
+
+
+def join_touching(positions: np.ndarray, triangles: np.ndarray) -> Joined:
+    """Join boundary edges of a mesh (n,3), (m,3) that lie on exactly one other, run against it and can be joined.
+
+    Where anything else would meet in one edge, nothing is joined.
+    """
+    n, (tail, head) = len(positions), halfedges(triangles)
+    none = Joined(triangles, np.arange(n), np.zeros((0, 2), np.int64))
+    rim = _only_once(pair_keys(tail, head))
+    a, b = tail[rim], head[rim]
+    # Adding zero makes -0.0 and 0.0 the same.
+    place = np.zeros(n, np.int64)
+    used = np.union1d(a, b)
+    place[used] = np.unique(positions[used] + 0.0, axis=0, return_inverse=True)[1].ravel()
+    first, second = pair_up(pair_keys(place[a], place[b]))
+    against = (place[a[first]] == place[b[second]]) & (place[a[first]] != place[b[first]])
+    first, second = first[against], second[against]
+    if len(first) == 0:
+        return none
+    rows, columns = np.concatenate([a[first], b[first]]), np.concatenate([b[second], a[second]])
+    label = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False)[1]
+    same = np.unique(label, return_index=True)[1][label]
+    result = same[triangles]
+    tail, head = halfedges(result)
+    if (np.unique(pair_keys(tail, head), return_counts=True)[1] > 2).any() or (tail == head).any():
+        return none
+    return Joined(result, same, np.stack([same[a[first]], same[b[first]]], axis=1))
+
+
+def opened(points: np.ndarray, triangles: np.ndarray, slits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh (n,3), (m,3) cut open along the edges with the sorted keys `slits` (k,)."""
+    if len(slits) == 0:
+        return points, triangles
+    sides = cut_open(points, triangles, np.stack([slits >> 32, slits & 0xFFFFFFFF], axis=1)).sides
+    return points[triangles.ravel()[np.unique(sides, return_index=True)[1]]], sides
+
+
+def copies(ends: np.ndarray, on_rim: np.ndarray) -> int:
+    """How many vertices an opening adds, of slit edges with the ends (2s,) and vertices (n,) bool on a boundary.
+
+    So many edges of slits as meet inside of the surface part it into as many fans, or on a boundary into one more.
+    """
+    meeting = np.bincount(ends, minlength=len(on_rim))
+    return int(np.maximum(meeting - ~on_rim, 0).sum())
+
+
+def _only_once(keys: np.ndarray) -> np.ndarray:
+    """Positions of the keys that occur once."""
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    return np.sort(first[count == 1])
