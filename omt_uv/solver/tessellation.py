@@ -202,7 +202,13 @@ def _patch(
         patch = triangulate_chart(chart.vertices, chart.disk, loop, found, edge, number, name)
         if patch is not None:
             return patch, found.warnings
-    raise PrecisionError("A chart cannot be triangulated", kind="face", elements=chart.faces)
+    elements = maps.part.faces[chart.faces]
+    raise PrecisionError(
+        f"A piece of {len(elements)} triangles leaves no room for {number} vertices in double precision",
+        "Use Merge by Distance and Degenerate Dissolve on it, or delete it",
+        "face",
+        elements,
+    )
 
 
 def _kept(arcs: list[int], samples: ArcSamples, number: np.ndarray) -> np.ndarray:
