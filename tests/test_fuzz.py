@@ -295,7 +295,7 @@ def test_every_outcome_is_a_map_or_a_named_error(chunk):
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.parametrize("seed", [107536, 110622])
+@pytest.mark.parametrize("seed", [3866, 107536, 110622])
 def test_systems_that_rounding_makes_singular_have_a_map(seed):
     surface, faces, options = broken_mesh(seed)
     check_result(drain(unwrap(surface, faces, **options)), surface, faces)
@@ -329,3 +329,27 @@ def test_the_fuzz_meets_maps_and_every_kind_of_error():
             outcomes.add(type(error).__name__)
     assert outcomes >= {"map", "EmptyMeshError", "NonFiniteError", "ZeroAreaFaceError", "DuplicateFaceError",
                         "NonManifoldEdgeError", "OrientationError", "NotADiskError"}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("seams", ["charts", "existing"])
+def test_every_layout_is_whole_or_refused_by_name(seams):
+    """The path that operator and command line share, with charts by xatlas and with a bound on the shear."""
+    pytest.importorskip("xatlas")
+    from omt_uv import packing
+    from omt_uv.settings import Settings
+    from omt_uv.unwrapping import Job, Refusal, lay_out
+
+    for seed in range(300, 316):
+        surface, faces, _ = broken_mesh(seed)
+        bound = 1.5 if seed % 10 == 0 else 0.0
+        settings = Settings("free", "draft", texture_size=256, seams=seams, max_shear=bound)
+        before = arrays(surface)
+        try:
+            layout = drain(lay_out([Job(surface, faces)], settings, lambda islands, *_: packing.stack(islands)))
+        except Refusal as refusal:
+            check_error(refusal.error, surface)
+        else:
+            check_result(layout.maps[0], surface, faces)
+            assert np.isfinite(layout.uv[0]).all()
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, arrays(surface), strict=True)), seed

@@ -70,11 +70,7 @@ def prepare(
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     repaired = join(surface, faces, triangles, owner)
     opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes, sieve=sieve, extremities=extremities)
-    charts, flat = [], 0
-    for chart in _checked(assemble(opened.surface, opened.sheets)):
-        sound, count = with_area(chart, opened.extent)
-        charts.append(sound)
-        flat += count
+    charts, flat = _sound(assemble(opened.surface, opened.sheets), opened.extent)
     warnings = list(opened.cuts.warnings)
     if flat:
         who = "A triangle has" if flat == 1 else f"{flat} triangles have"
@@ -95,11 +91,16 @@ def _existing(surface: Surface, faces: np.ndarray | None, holes_too: bool) -> li
         return split(surface, faces)
     sheets = strict_sheets(surface, faces)
     filled = fill_holes_of(surface, sheets, np.zeros(len(sheets.triangles), dtype=bool))
-    return _checked(assemble(filled.surface, filled.sheets))
+    positions = surface.positions[surface.corner_vertex[sheets.triangles]] / 2
+    # Faces have areas, but what fills a hole that is a line has none.
+    return _sound(assemble(filled.surface, filled.sheets), 2 * float(np.ptp(positions, axis=(0, 1)).max()))[0]
 
 
-def _checked(charts: list[Chart]) -> list[Chart]:
+def _sound(charts: list[Chart], extent: float) -> tuple[list[Chart], int]:
+    """Charts of a mesh of some extent, checked to be disks, with no triangle without area, and how many had none."""
+    sound = []
     for chart in charts:
         check_edges(chart)
         check_disk(chart)
-    return charts
+        sound.append(with_area(chart, extent))
+    return [chart for chart, _ in sound], sum(count for _, count in sound)

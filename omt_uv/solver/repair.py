@@ -152,7 +152,10 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to its chart's)
     """
     vertices, count = nudged(chart.vertices, chart.disk, extent, len(chart.triangles))
-    return (replace(chart, vertices=vertices) if count else chart), count
+    if not count:
+        return chart, 0
+    # What fills a hole is no triangle of anybody's.
+    return replace(chart, vertices=vertices), int(degenerate_triangles(chart.vertices, chart.triangles, NEEDLE).sum())
 
 
 def nudged(
