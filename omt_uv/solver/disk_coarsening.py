@@ -117,7 +117,7 @@ def _round(V, F, flat, mass, rank):
     removal = Removal(
         vertex, new[np.searchsorted(row[stays], np.arange(len(vertex))), 0], corner, share, row, after, before, faces
     )
-    size = np.linalg.norm(_normal(V, new), axis=1)
+    size = np.sqrt(_squared(_normals(V, new)[0]))
     whole, total = np.bincount(row[stays], size, len(vertex)), np.bincount(row, mass[star], len(vertex))
     others = np.ones(len(F), bool)
     others[star] = False
@@ -139,16 +139,16 @@ def _best_collapses(V, flat, v, after, before, ahead):
     into = after[candidate]
     gone = (after[other] == into) | (before[other] == into)
     new = np.column_stack([into, after[other], before[other]])
-    normal = _normal(V, np.column_stack([v, after, before]))
+    normal, old = _normals(V, np.column_stack([v, after, before]))
+    new_normal, shape = _normals(V, new)
     whole = np.column_stack([np.bincount(row, normal[:, k]) for k in range(3)])
-    turned = (_normal(V, new) * whole[row[candidate]]).sum(1) <= 0
+    turned = (new_normal * whole[row[candidate]]).sum(1) <= 0
     begin = np.searchsorted(candidate, np.arange(len(v)))
-    score = np.minimum.reduceat(np.where(gone, np.inf, _shape(V, new)), begin)
+    score = np.minimum.reduceat(np.where(gone, np.inf, shape), begin)
     bad = np.logical_or.reduceat(~gone & (turned | (_flat_shape(flat, new) < LEAST_FLAT_SHAPE)), begin)
     # Nor does an inner vertex go to the rim: edges across would cut off parts that have no room in a domain.
     bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ((ahead[v] < 0) & (ahead[after] >= 0)) | ~np.isfinite(score)
-    old = np.minimum.reduceat(_shape(V, np.column_stack([v, after, before])), first)[row]
-    bad |= score < np.minimum(LEAST_SHAPE, old / 2)
+    bad |= score < np.minimum(LEAST_SHAPE, np.minimum.reduceat(old, first)[row] / 2)
     # Coarse marks, so that rounding does not choose among equals.
     mark = np.where(bad, -1, np.floor(np.minimum(score, 1) * 20 + 0.37).astype(np.int64))
     best = np.maximum.reduceat(mark * len(v) - np.arange(len(v)), first)
@@ -203,15 +203,21 @@ def _cross(a, b):
     return a.real * b.imag - a.imag * b.real
 
 
-def _normal(V, F):
-    return np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+def _normals(V, F):
+    """Normals (m,3) of triangles, as long as twice their areas, and their shapes (m,): 4 sqrt(3) area over the squared
+    sides, 1 for equilateral triangles, 0 for degenerate ones."""
+    a, b, c = (np.take(V, F[:, k], axis=0) for k in range(3))
+    ab, bc, ca = b - a, c - b, a - c
+    x, y, z = ab.T
+    u, v, w = -ca.T
+    normal = np.column_stack([y * w - z * v, z * u - x * w, x * v - y * u])
+    squares = _squared(ab) + _squared(bc) + _squared(ca)
+    return normal, 2 * np.sqrt(3) * np.sqrt(_squared(normal)) / np.maximum(squares, 1e-300)
 
 
-def _shape(V, F):
-    """4 sqrt(3) area over the squared sides, (m,): 1 for equilateral triangles, 0 for degenerate ones."""
-    sides = [V[F[:, (k + 1) % 3]] - V[F[:, k]] for k in range(3)]
-    squares = sum((s**2).sum(1) for s in sides)
-    return 2 * np.sqrt(3) * np.linalg.norm(_normal(V, F), axis=1) / np.maximum(squares, 1e-300)
+def _squared(vectors):
+    x, y, z = vectors.T
+    return x * x + y * y + z * z
 
 
 def _flat_shape(uv, F):
