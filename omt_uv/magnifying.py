@@ -52,13 +52,12 @@ class Region:
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the region before, as asked and as measured in the result; factor of weight 1 and the law."""
+    """Shares of the region before, as asked and as measured in the result; factor of weight 1 against weight 0."""
 
     before: float
     asked: float
     after: float
     factor: float
-    law: str
 
     def text(self) -> str:
         return (
@@ -135,7 +134,7 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
         settings = replace(settings, boundary="free")
     layout = yield from lay_out(jobs, settings, spare_packer)
     after = [_uv_areas(*x) for x in zip(regions, parts, layout.corners, layout.uv, strict=True)]
-    shares = Shares(found.before, found.asked, share(weights, np.concatenate(after)), found.factor, found.law)
+    shares = Shares(found.before, found.asked, share(weights, np.concatenate(after)), found.factor)
     reports = [m.report() for m in layout.maps]
     warnings = [*layout.warnings, *((-1, text) for text in found.warnings)]
     return Magnified(layout.corners, layout.uv, reports, shares, warnings)
@@ -146,7 +145,7 @@ def wanted(weights: np.ndarray, area: np.ndarray, factor: float, exact: bool) ->
     if exact:
         return exact_share(weights, area, factor)
     density = painted(weights, factor)
-    return ExactShare(density, factor, "linear", share(weights, area), share(weights, area * density))
+    return ExactShare(density, factor, share(weights, area), share(weights, area * density))
 
 
 def _triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -280,7 +279,7 @@ def _overall(pieces: Sequence[_Piece]) -> Shares:
     before = size @ [share(p.region, p.area) for p in pieces]
     asked = size @ [p.found.asked for p in pieces]
     after = size @ [share(p.region, np.abs(signed_areas(p.uv, p.island.chart.triangles))) for p in pieces]
-    return Shares(float(before), float(asked), float(after), pieces[0].found.factor, pieces[0].found.law)
+    return Shares(float(before), float(asked), float(after), pieces[0].found.factor)
 
 
 def _grown_together(pieces: Sequence[_Piece], islands) -> list[tuple[int, str]]:

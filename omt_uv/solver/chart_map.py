@@ -105,12 +105,12 @@ def unwrap_chart(
     area = face_areas(vertices, triangles)
     wanted = None if density is None else area * density
     asked_for = area if wanted is None else wanted
-    way = _first_map(vertices, triangles, asked_for, loop, corners, domain, boundary, balance, log)
+    way = _first_map(vertices, triangles, asked_for, region, loop, corners, domain, boundary, balance, log)
     first = yield from part_of(way, *FIRST)
     with log.timed("refinement"):
         uv, held = facing(first.uv, pins)
         options = {"target": wanted, "region": region, "balance": balance, "quality": quality, "pins": held}
-        options["near"] = first.near and held is None
+        options["near"], options["pull"] = first.near and held is None, first.pull
         refined = yield from part_of(_refined(vertices, triangles, uv, boundary, log, options), *REFINEMENT)
     with log.timed("measure"):
         asked = None if density is None else density[: len(chart.triangles)]
@@ -139,7 +139,7 @@ def unwrap_chart(
 
 
 def _first_map(
-    vertices, triangles, target, loop, corners, domain: Domain, boundary: str, balance: float, log: Log
+    vertices, triangles, target, region, loop, corners, domain: Domain, boundary: str, balance: float, log: Log
 ) -> Steps[FirstMap]:
     """Where the refinement starts; a flat chart with a free boundary is unrolled, large ones come by way of coarser."""
     if boundary == "free":
@@ -148,7 +148,8 @@ def _first_map(
             return FirstMap(None, None, flat)
     if len(vertices) > COARSE_ABOVE:
         try:
-            found = yield from coarse_first_map(vertices, triangles, target, loop, corners, boundary, balance, log)
+            options = (boundary, balance, log, None, region)
+            found = yield from coarse_first_map(vertices, triangles, target, loop, corners, *options)
             if found is not None:
                 return found
         except MeshError as error:
@@ -166,7 +167,7 @@ def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: Log, optio
         log.warnings.append(f"The {boundary} has no room for this chart ({error.cause}); its boundary is free instead")
     loop = boundary_loops(triangles)[0]
     uv = mean_value_sites(vertices, triangles, loop, None, Disk())
-    return (yield from refine(vertices, triangles, uv, boundary="free", **{**options, "near": False}))
+    return (yield from refine(vertices, triangles, uv, boundary="free", **{**options, "near": False, "pull": 0.0}))
 
 
 def _with_patches(density, region, patches: int) -> tuple[np.ndarray | None, np.ndarray | None]:

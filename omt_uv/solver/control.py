@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .stages import (
     SQUEEZED,
     STAGE_STEPS,
     STRICT,
+    STUCK,
     growth,
     weights_of,
 )
@@ -22,10 +24,21 @@ from .stages import (
 Energies = Callable[[np.ndarray], np.ndarray]  # of each chart (c,), by the weights of the area term (c,)
 
 
+@dataclass(frozen=True)
+class Lack:
+    """What the map of every chart lacks (c,): `energy.shortfall`, the same but for the share of its region, and the
+    tilt that this share lacks."""
+
+    error: np.ndarray
+    but_share: np.ndarray
+    tilt: np.ndarray
+
+
 class Control:
     """Weight of the area term, `pressure` of the Hessian, energy and fate of every chart, (c,) each.
 
-    live: on its way; solved: arrived where the quality asks for; steps: Newton steps; residual: see `stages.Stage`.
+    live: on its way; solved: arrived where the quality asks for; steps: Newton steps; residual: see `stages.Stage`;
+    pull: see `stages.Found`.
     """
 
     def __init__(self, count: int, quality: str, balance: float, energies: Energies):
@@ -34,15 +47,16 @@ class Control:
         self.level, self.weight = np.zeros(count, np.int64), np.full(count, self.weights[0])
         squeezed = (energies(self.weight) > SQUEEZED) & (self.weights[0] > 1)
         self.level[squeezed], self.weight[squeezed] = -1, 1.0
+        self.pull, self.error = np.zeros(count), np.full(count, np.inf)
         self.value = energies(self.weight)
         self.live = np.isfinite(self.value)
         self.solved = np.zeros(count, bool)
         self.steps, self.stage_steps = np.zeros_like(self.level), np.zeros_like(self.level)
         self.pressure, self.residual = np.full(count, FIRST_PRESSURE), np.full(count, np.inf)
 
-    def update(self, value, decrement, share, error, energies: Energies) -> None:
-        """After a step: new energies, decreases promised, shares of the step taken, area errors (c,) each."""
-        live, used = self.live, self.pressure
+    def update(self, value, decrement, share, lack: Lack, energies: Energies) -> None:
+        """After a step: new energies, decreases promised, shares of the step taken, (c,) each; what is left to do."""
+        live, used, error = self.live, self.pressure, lack.error
         gain = self.value - value
         self.value = np.where(live, value, self.value)
         self.residual = np.where(live, decrement / np.maximum(value, NO_ENERGY), self.residual)
@@ -58,19 +72,23 @@ class Control:
         spent = self.steps >= self.settings.max_steps
         long = (self.stage_steps >= STAGE_STEPS) & (self.balance == 0)
         self._next_stage(
-            live & (stalled | met | (low & (used <= LEAST_PRESSURE)) | spent | long), stalled | spent, error
+            live & (stalled | met | (low & (used <= LEAST_PRESSURE)) | spent | long), stalled | spent, lack
         )
         self.value = np.where(self.live & (self.stage_steps == 0), energies(self.weight), self.value)
 
-    def _next_stage(self, ended, failed, error) -> None:
+    def _next_stage(self, ended, failed, lack: Lack) -> None:
         settings, last = self.settings, len(self.weights)
         self.level += ended
-        enough = (error <= settings.area_error) | (self.balance > 0) | (self.weight >= settings.greatest_weight)
+        enough = (lack.error <= settings.area_error) | (self.balance > 0) | (self.weight >= settings.greatest_weight)
+        enough |= (lack.error > STUCK * self.error) & (self.stage_steps < STAGE_STEPS)
+        self.error = np.where(ended, lack.error, self.error)
         finished = ended & (failed | (enough & (self.level >= last)))
         self.solved |= finished & ~failed
         self.live = self.live & ~finished
         further = ended & ~finished
-        more = self.weight * growth(error / settings.area_error)
+        if self.balance == 0:
+            self.pull = np.where(further, self.pull + self.weight * lack.tilt, self.pull)
+        more = self.weight * growth(lack.but_share / settings.area_error)
         planned = self.weights[np.clip(self.level, 0, last - 1)]
         self.weight = np.where(further, np.where(self.level < last, planned, more), self.weight)
         self.pressure[further], self.stage_steps[further] = FIRST_PRESSURE, 0

@@ -52,11 +52,13 @@ class Removal:
 
 @dataclass(frozen=True)
 class Coarse:
-    """Vertices kept (c,), triangles (t,3) of them, mass (t,) of the triangles, and the rounds that led there."""
+    """Vertices kept (c,), triangles (t,3) of them, mass (t,) of the triangles and the weights (t,) of a region, if
+    there is one, and the rounds that led there."""
 
     kept: np.ndarray
     triangles: np.ndarray
     mass: np.ndarray
+    region: np.ndarray | None
     rounds: list[Removal]
 
     def prolonged(self, uv: np.ndarray, n: int) -> Steps[np.ndarray]:
@@ -72,12 +74,13 @@ class Coarse:
         return np.column_stack([w.real, w.imag])
 
 
-def coarsened(vertices, triangles, flat, mass, goal: int) -> Steps[Coarse]:
+def coarsened(vertices, triangles, flat, mass, goal: int, region=None) -> Steps[Coarse]:
     """Coarsen a disk (n,3), (m,3) to about `goal` vertices.
 
     flat (n,2): an embedding in the plane with a convex boundary; mass (m,): what the triangles' areas in the final map
-    are to be, handed on.
+    are to be, handed on; region (m,) in [0, 1]: weights of a region, which keeps its share of the mass.
     """
+    mass = np.column_stack([mass] if region is None else [mass, mass * region])
     rounds: list[Removal] = []
     left = count = len(vertices)
     rim = boundary_loops(triangles)[0]
@@ -95,7 +98,8 @@ def coarsened(vertices, triangles, flat, mass, goal: int) -> Steps[Coarse]:
     kept = np.unique(triangles)
     place = np.full(count, -1)
     place[kept] = np.arange(len(kept))
-    return Coarse(kept, place[triangles], mass, rounds)
+    region = None if region is None else mass[:, 1] / mass[:, 0]
+    return Coarse(kept, place[triangles], mass[:, 0], region, rounds)
 
 
 def _round(V, F, flat, mass, rank):
@@ -113,15 +117,16 @@ def _round(V, F, flat, mass, rank):
     stays = (after != into) & (before != into)
     new = np.column_stack([into, after, before])[stays]
     corner, share = _places(V, flat, vertex, row[stays], new, ahead)
-    faces = elements(V, np.column_stack([v, after, before]), mass[star])
+    faces = elements(V, np.column_stack([v, after, before]), mass[star, 0])
     removal = Removal(
         vertex, new[np.searchsorted(row[stays], np.arange(len(vertex))), 0], corner, share, row, after, before, faces
     )
     size = np.sqrt(_squared(_normals(V, new)[0]))
-    whole, total = np.bincount(row[stays], size, len(vertex)), np.bincount(row, mass[star], len(vertex))
+    part = size / np.maximum(np.bincount(row[stays], size, len(vertex)), 1e-300)[row[stays]]
     others = np.ones(len(F), bool)
     others[star] = False
-    handed = size * (total / np.maximum(whole, 1e-300))[row[stays]]
+    total = np.column_stack([np.bincount(row, column[star], len(vertex)) for column in mass.T])
+    handed = part[:, None] * total[row[stays]]
     return np.concatenate([F[others], new]), np.concatenate([mass[others], handed]), removal
 
 

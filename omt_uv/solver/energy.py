@@ -12,13 +12,13 @@ directions i a, i b are eigenvectors and the radial ones form a 2x2 block. No si
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 # Relative errors of a region count as so much area error: where the areas may be off by 0.8 % its share may be by
-# 0.3 %, and single faces of the region, or of the rest, by 1.3 %.
-SHARE, SINGLE = 2.7, 0.6
+# 0.3 %, and single faces of the region, or of the rest, by 1.6 %.
+SHARE, SINGLE = 2.7, 0.5
 
 
 @dataclass(frozen=True)
@@ -193,16 +193,24 @@ def _unit(z):
 
 def area_error(faces: Elements, w: np.ndarray) -> float:
     """Share of the UV area of w (n,) in the wrong place: sum of |share - target share| over the faces."""
-    area, target = faces.areas(w), faces.area * faces.ratio
+    return _area_error(faces, faces.areas(w))
+
+
+def _area_error(faces, area):
+    target = faces.area * faces.ratio
     return float(np.abs(area / area.sum() - target / target.sum()).sum())
 
 
 def region_error(faces: Elements, w: np.ndarray) -> tuple[float, float]:
     """Relative error of the share of the region in a map w (n,), and of single faces, in the region or in the rest,
     whichever is worse; 0 without a region."""
+    return _region_error(faces, faces.areas(w))
+
+
+def _region_error(faces, area):
     if faces.region is None:
         return 0.0, 0.0
-    area, target = faces.areas(w), faces.area * faces.ratio
+    target = faces.area * faces.ratio
     error, target = area / area.sum() - target / target.sum(), target / target.sum()
     whole, single = 0.0, 0.0
     for part in (faces.region, 1 - faces.region):
@@ -212,7 +220,37 @@ def region_error(faces: Elements, w: np.ndarray) -> tuple[float, float]:
     return whole, single
 
 
+def tilted(faces: Elements, tilt: float) -> Elements:
+    """The faces with exp(tilt * weight) times their targets in the region; the targets sum to what they did."""
+    if tilt == 0 or faces.region is None:
+        return faces
+    ratio = faces.ratio * np.exp(tilt * faces.region)
+    return replace(faces, ratio=ratio * ((faces.area @ faces.ratio) / (faces.area @ ratio)))
+
+
+def missing_tilt(faces: Elements, w: np.ndarray) -> float:
+    """The tilt that the areas of a map w (n,) lack to give the region its share, to first order; 0 without a region."""
+    if faces.region is None:
+        return 0.0
+    has, target = (x / x.sum() for x in (faces.areas(w), faces.area * faces.ratio))
+    mean = float(faces.region @ has)
+    spread = float(faces.region**2 @ has) - mean**2
+    return (float(faces.region @ target) - mean) / spread if spread > 0 else 0.0
+
+
 def shortfall(faces: Elements, w: np.ndarray) -> float:
     """What is left to do: the area error of a map (n,), or as much for a region or a rest that are not exact yet."""
-    share, single = region_error(faces, w)
-    return max(area_error(faces, w), SHARE * share, SINGLE * single)
+    return _shortfall(faces, faces.areas(w))
+
+
+def shortfall_but_share(faces: Elements, w: np.ndarray) -> float:
+    """`shortfall` of the areas that a map w (n,) would have with the tilt that is missing."""
+    area = faces.areas(w)
+    if faces.region is not None:
+        area = area * np.exp(missing_tilt(faces, w) * faces.region)
+    return _shortfall(faces, area)
+
+
+def _shortfall(faces, area):
+    share, single = _region_error(faces, area)
+    return max(_area_error(faces, area), SHARE * share, SINGLE * single)

@@ -41,7 +41,7 @@ CENTRED = 1e-3
 COARSE_ABOVE, COARSER, COARSE_ENOUGH = 5000, 8, 0.25
 # Where the target is farther than this from the surface's areas, in relative entropy, coarser meshes say less: they are
 # taken in smaller steps.
-FAR, COARSER_FAR, COARSE_ENOUGH_FAR = 0.5, 5, 0.4
+FAR, COARSER_FAR, COARSE_ENOUGH_FAR = 0.5, 4, 0.4
 # What comes back is smoothed so many times, with these weights of the area term.
 SWEEPS, SMOOTH_WEIGHT, SMOOTH_WEIGHT_FAR = 8, 30.0, 500.0
 
@@ -50,21 +50,23 @@ SWEEPS, SMOOTH_WEIGHT, SMOOTH_WEIGHT_FAR = 8, 30.0, 500.0
 class FirstMap:
     """Coordinates uv (n,2), and the conformal map and the transport they come from, on the coarsest mesh, or None.
 
-    near: the map comes from a refined one, and is smooth.
+    near: the map comes from a refined one, and is smooth; pull: of that, see `stages.Found`.
     """
 
     conformal: ConformalMap | None
     cells: Transport | None
     uv: np.ndarray
     near: bool = False
+    pull: float = 0.0
 
 
 def coarse_first_map(
-    vertices, triangles, target, loop, corners, boundary: str, balance, log: Log, flat=None
+    vertices, triangles, target, loop, corners, boundary: str, balance, log: Log, flat=None, region=None
 ) -> Steps[FirstMap | None]:
     """A first map by way of a coarser mesh; None where the mesh cannot be coarsened, or where that does not pay.
 
-    target (m,): areas of the triangles in the map; flat (n,2): an embedding, a mean value map by default.
+    target (m,): areas of the triangles in the map; flat (n,2): an embedding, a mean value map by default; region (m,):
+    weights of a region whose share is to be exact.
     """
     far = entropy(target, face_areas(vertices, triangles)) > FAR
     if far and boundary != "free":
@@ -73,7 +75,7 @@ def coarse_first_map(
         if flat is None:
             flat = mean_value_sites(vertices, triangles, loop, None, Disk())
         goal = len(vertices) // (COARSER_FAR if far else COARSER)
-        coarse = yield from part_of(coarsened(vertices, triangles, flat, target, goal), *COARSENING)
+        coarse = yield from part_of(coarsened(vertices, triangles, flat, target, goal, region), *COARSENING)
     if len(coarse.kept) > (COARSE_ENOUGH_FAR if far else COARSE_ENOUGH) * len(vertices):
         return None
     points, mesh, mass = vertices[coarse.kept], coarse.triangles, coarse.mass
@@ -83,16 +85,20 @@ def coarse_first_map(
         return None  # what returned to the rim would lie on a chord
     corners = None if corners is None else np.searchsorted(coarse.kept, corners)
     if len(points) > COARSE_ABOVE:
-        steps = coarse_first_map(points, mesh, mass, rim, corners, boundary, balance, log, flat[coarse.kept])
+        steps = coarse_first_map(
+            points, mesh, mass, rim, corners, boundary, balance, log, flat[coarse.kept], coarse.region
+        )
         found = yield from part_of(steps, *COARSE_MAP)
     if found is None:
         domain = Rectangle() if boundary == "square" else Disk()
         direct = first_map(points, mesh, mass, rim, corners, domain, log)
         found = yield from part_of(direct, *COARSE_MAP)
     with log.timed("coarse refinement"):
-        options: dict = {"boundary": boundary, "target": mass, "balance": balance}
+        options: dict = {"boundary": boundary, "target": mass, "balance": balance, "region": coarse.region}
         options["quality"] = "rough" if far else "relaxed"
-        refined = yield from part_of(refine(points, mesh, found.uv, near=found.near, **options), *COARSE_REFINEMENT)
+        refined = yield from part_of(
+            refine(points, mesh, found.uv, near=found.near, pull=found.pull, **options), *COARSE_REFINEMENT
+        )
     log.warnings += refined.warnings
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
@@ -101,7 +107,7 @@ def coarse_first_map(
         sweeps = smoothed(faces, w, SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT, SWEEPS)
         w = yield from part_of(sweeps, *SMOOTHING)
         uv = np.column_stack([w.real, w.imag])
-    return FirstMap(found.conformal, found.cells, uv, far)
+    return FirstMap(found.conformal, found.cells, uv, far, refined.pull)
 
 
 def first_map(vertices, triangles, target, loop, corners, domain: Domain, log: Log) -> Steps[FirstMap]:

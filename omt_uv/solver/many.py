@@ -8,12 +8,12 @@ chart, Newton finds as soon. A chart that needs more, say a barrier for its boun
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .contact import crossings
-from .control import Control
+from .control import Control, Lack
 from .dissection import vertex_graph
 from .embedding import arc_length_parameters, tutte
 from .energy import SHARE, SINGLE, Elements, elements, energies, gradient
@@ -169,9 +169,10 @@ class _Group:
     def step(self, whole: np.ndarray, control: Control) -> None:
         """A Newton step of all charts of the group, every one as far as it may go, in place."""
         w, weight = whole[self.vertices], control.weight[self.of_face]
-        problem = Problem(self.faces, self.assembly, self.motion, weight)
+        faces = self._tilted(control, control.weight)
+        problem = Problem(faces, self.assembly, self.motion, weight)
         step, _ = newton_direction(problem, w, control.pressure[self.of_face])
-        down = (step.conj() * gradient(self.faces, w, weight)).real
+        down = (step.conj() * gradient(faces, w, weight)).real
         slope = np.bincount(self.of_vertex, down, self.count) / self.share
         far = np.full(self.count, 1 / FOLD_SHARE)
         np.minimum.at(far, self.of_face, fold_shares(*self.faces.derivatives(w), *self.faces.derivatives(step)))
@@ -179,7 +180,7 @@ class _Group:
         waiting = control.live.copy()
         for _ in range(MAX_HALVINGS):
             trial = w + share[self.of_vertex] * step
-            value = self._energies(trial, weight)
+            value = self._energies(faces, trial, weight)
             waiting &= ~(value <= control.value + ARMIJO * share * slope)
             if not waiting.any():
                 break
@@ -189,15 +190,38 @@ class _Group:
         whole[self.vertices] = trial
         after = np.where(waiting, control.value, value)
         control.update(
-            after, -slope / 2, share, self._errors(trial), lambda new: self._energies(trial, new[self.of_face])
+            after,
+            -slope / 2,
+            share,
+            self._lack(trial),
+            lambda new: self._energies(self._tilted(control, new), trial, new[self.of_face]),
         )
 
-    def _energies(self, w, weight):
-        return self._sums(energies(self.faces, w, weight)) / self.share
+    def _energies(self, faces, w, weight):
+        return self._sums(energies(faces, w, weight)) / self.share
 
-    def _errors(self, w):
-        """`energy.shortfall` of every chart, (c,)."""
+    def _tilted(self, control: Control, weight) -> Elements:
+        """The faces with the targets that lead to the shares, see `energy.tilted`."""
+        faces = self.faces
+        if faces.region is None:
+            return faces
+        ratio = faces.ratio * np.exp((control.pull / weight)[self.of_face] * faces.region)
+        scale = self._sums(faces.area * faces.ratio) / np.maximum(self._sums(faces.area * ratio), 1e-300)
+        return replace(faces, ratio=ratio * scale[self.of_face])
+
+    def _lack(self, w) -> Lack:
         area, target = self.faces.areas(w), self.faces.area * self.faces.ratio
+        error, region = self._errors(area, target), self.faces.region
+        if region is None:
+            return Lack(error, error, np.zeros(self.count))
+        has, aim = (x / np.maximum(self._sums(x), 1e-300)[self.of_face] for x in (area, target))
+        mean = self._sums(region * has)
+        spread = self._sums(region**2 * has) - mean**2
+        tilt = np.where(spread > 0, self._sums(region * aim) - mean, 0) / np.where(spread > 0, spread, 1)
+        return Lack(error, self._errors(area * np.exp(tilt[self.of_face] * region), target), tilt)
+
+    def _errors(self, area, target):
+        """`energy.shortfall` of every chart, (c,), by the areas that its faces have and are to have."""
         area, target = (x / np.maximum(self._sums(x), 1e-300)[self.of_face] for x in (area, target))
         error = area - target
         worst = self._sums(np.abs(error))

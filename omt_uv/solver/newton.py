@@ -12,6 +12,7 @@ from .energy import Elements, energies, local_derivatives, scatter, shortfall, s
 from .errors import PrecisionError
 from .linear import Factor
 from .schwarz import Overlapping
+from .smoothing import Smoother
 
 ARMIJO = 1e-4
 MAX_HALVINGS = 40
@@ -161,13 +162,18 @@ class Extra(Protocol):
 
 @dataclass(frozen=True)
 class Problem:
-    """What Newton minimises: faces, the weight of their area term, one or (m,), the motion, further energies."""
+    """What Newton minimises: faces, the weight of their area term, one or (m,), the motion, further energies.
+
+    aim: faces with the targets that count, where those minimised lead to them; smoother: what follows every step.
+    """
 
     faces: Elements
     assembly: Assembly
     motion: Motion
     weight: float | np.ndarray
     extras: tuple[Extra, ...] = ()
+    aim: Elements | None = None
+    smoother: Smoother | None = None
 
     def energy(self, w: np.ndarray) -> float:
         """Energy of the faces and of all extras at a map w (n,) complex; infinity where a face is folded."""
@@ -176,11 +182,15 @@ class Problem:
 
     def area_error(self, w: np.ndarray) -> float:
         """What a map w (n,) complex lacks of its areas, see `energy.shortfall`."""
-        return shortfall(self.faces, w)
+        return shortfall(self.faces if self.aim is None else self.aim, w)
 
     def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
         """A Newton step from a map w (n,) complex of energy `value`, see `newton_step`. Raises PrecisionError."""
-        return newton_step(self, w, value, pressure)
+        step = newton_step(self, w, value, pressure)
+        if self.smoother is None:
+            return step
+        smooth = self.smoother.smoothed(self.faces, step.w, float(self.weight))
+        return Step(smooth, self.energy(smooth), step.decrement, step.share)
 
 
 @dataclass(frozen=True)

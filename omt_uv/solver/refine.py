@@ -18,12 +18,15 @@ from .pins import Pins, drag
 from .progress import Progress, Steps
 from .renumbering import renumbered
 from .schwarz import overlapping
+from .smoothing import Smoother
 from .stages import QUALITIES, Task, stages
 from .starts import Start, disk_start, free_start, notched_disk, square_start
 from .topology import boundary_loops
 
 STARTS = {"free": free_start, "disk": disk_start, "square": square_start}
 BOUNDARIES = tuple(STARTS)
+# Below so many vertices Newton's steps take so little time that sweeps between them save none.
+SWEPT_ABOVE = 2000
 # Area error of a disk above which vertices without room may leave the circle.
 NO_ROOM = 0.005
 
@@ -34,7 +37,7 @@ class Refinement:
 
     area_error: share of the UV area in the wrong place; weight: that of the area term; energy at the end;
     status: "converged", "stalled" (no decrease could be found) or "steps" (allowance used up); warnings: what was
-    replaced and why; overlap: the free boundary crosses itself.
+    replaced and why; overlap: the free boundary crosses itself; pull: see `stages.Found`.
     """
 
     uv: np.ndarray
@@ -46,6 +49,7 @@ class Refinement:
     status: str
     overlap: bool
     warnings: tuple[str, ...]
+    pull: float = 0.0
 
 
 def refine(
@@ -60,6 +64,7 @@ def refine(
     quality: str = "standard",
     pins: tuple[np.ndarray, np.ndarray] | None = None,
     near: bool = False,
+    pull: float = 0.0,
 ) -> Steps[Refinement]:
     """Refine a map uv (n,2) of a disk (n,3), (m,3) until every face has its area.
 
@@ -73,6 +78,7 @@ def refine(
     balance : 0 for exact areas to 1 for the least shear
     quality : "draft", "standard" or "exact"; "relaxed" or "rough" for the start of a finer mesh
     near : the map is nearly the one that is looked for, and needs no detour through small weights
+    pull : of a coarser mesh, see `stages.Found`
     pins : vertices (k,) and their places (k,2), in free mode. Two or more fix place, direction and scale, one fixes the
         place; with one, scale and direction are those of `uv`. Without pins the map has the area of the surface, and
         the place and the direction of `uv`.
@@ -108,6 +114,7 @@ def refine(
             QUALITIES[quality],
             mesh.pins,
             near,
+            pull,
         )
     except MeshError as error:
         raise mesh.blame(error) from error
@@ -125,6 +132,7 @@ def refine(
         found.status,
         found.overlap,
         (*start.warnings, *found.warnings),
+        found.pull,
     )
 
 
@@ -135,22 +143,25 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     return target * (area.sum() / target.sum())
 
 
-def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins: Pins | None, near: bool):
+def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins: Pins | None, near: bool, pull):
     """Stages on a renumbered chart: what was found, the start it was found from, and the area error that is left."""
     loop = boundary_loops(triangles)[0]
     start = STARTS[boundary](vertices, triangles, uv, loop)
     faces = elements(vertices, triangles, *target)
     assembly = Assembly(triangles, len(vertices), overlapping(vertices, triangles))
-    task = _task(faces, assembly, start, loop, boundary)
+    # Sweeps know of no springs, and of no balance.
+    swept = faces.region is not None and pins is None and balance == 0 and len(vertices) > SWEPT_ABOVE
+    smoother = Smoother(triangles, len(vertices)) if swept else None
+    task = _task(faces, assembly, start, loop, boundary, smoother)
     w = start.uv[:, 0] + 1j * start.uv[:, 1]
     if pins is not None and len(pins.vertices) > 1:
         task, w = yield from drag(task, w, pins)
-    found = yield from stages(task, w, balance, settings, near)
+    found = yield from stages(task, w, balance, settings, near, pull)
     error = area_error(faces, found.w)
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * settings.area_error):
         notched = notched_disk(start, triangles, loop)
         if notched is not None:
-            again = yield from stages(_task(faces, assembly, notched, loop, boundary), w, balance, settings)
+            again = yield from stages(_task(faces, assembly, notched, loop, boundary, smoother), w, balance, settings)
             if area_error(faces, again.w) < error:
                 found, start, error = again, notched, area_error(faces, again.w)
     if boundary == "free" and (pins is None or len(pins.vertices) == 1):
@@ -158,10 +169,10 @@ def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins:
     return found, start, error
 
 
-def _task(faces: Elements, assembly: Assembly, start: Start, loop, boundary: str) -> Task:
+def _task(faces: Elements, assembly: Assembly, start: Start, loop, boundary: str, smoother) -> Task:
     # A polygon in a circle, or a notched square, has less area than the surface: the targets follow it.
     follows = boundary != "free"
-    return Task(faces, assembly, start.motion, loop if start.may_cross else None, start.guarded, follows)
+    return Task(faces, assembly, start.motion, loop if start.may_cross else None, start.guarded, follows, smoother)
 
 
 def _placed(w: np.ndarray, given: np.ndarray, faces: Elements, pins: Pins | None) -> np.ndarray:

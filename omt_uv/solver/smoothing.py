@@ -17,6 +17,8 @@ from .topology import halfedges, twins
 CONVEX, HALVINGS = 0.01, 5
 # Passes that add to an independent set, and sets that make a sweep; what is in none of them waits for Newton.
 PASSES, SETS = 3, 8
+# Stars with so many times the mean energy are smoothed after a step, with so many sweeps.
+WORST, AFTER_STEP = 2.0, 4
 
 
 def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int) -> Steps[np.ndarray]:
@@ -33,9 +35,40 @@ def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int) -> Step
     return w
 
 
+class Smoother:
+    """Sweeps over the worst vertices of maps of a mesh (m,3) of n vertices, between two steps of Newton's method.
+
+    After a step some faces have little left of their area, and Newton's method takes many steps to give it back, long
+    after it is done with all others. For single vertices it is a small matter.
+    """
+
+    def __init__(self, triangles: np.ndarray, n: int):
+        self._sets = list(_stars(triangles, n))
+
+    def smoothed(self, faces: Elements, w: np.ndarray, weight: float, sweeps: int = AFTER_STEP) -> np.ndarray:
+        """A map w (n,) complex without folds after sweeps over the vertices whose stars have most of the energy."""
+        star = np.bincount(faces.triangles.ravel(), np.repeat(energies(faces, w, weight), 3), len(w))
+        bad = star > WORST * star.mean()
+        sets = []
+        for vertex, row, around, corner in self._sets:
+            kept = bad[vertex]
+            place, rows = np.cumsum(kept) - 1, kept[row]
+            sets.append((vertex[kept], place[row[rows]], part(faces, around[rows], corner[rows])))
+        w = w.copy()
+        for _ in range(sweeps):
+            for vertex, row, around in sets:
+                relax(vertex, row, around, w, weight, 1)
+        return w
+
+
 def _sets(faces: Elements, n: int):
     """Independent sets of inner vertices: vertices (k,), and the rows (s,) and faces of their stars."""
-    F = faces.triangles
+    for vertex, row, star, corner in _stars(faces.triangles, n):
+        yield vertex, row, part(faces, star, corner)
+
+
+def _stars(F: np.ndarray, n: int):
+    """Independent sets of inner vertices: vertices (k,); rows (s,), faces (s,) and corners (s,3) of their stars."""
     random = np.random.default_rng(0)
     inner = np.ones(n, bool)
     tail, head = halfedges(F)
@@ -46,7 +79,7 @@ def _sets(faces: Elements, n: int):
         inner &= ~chosen
         star, corner = stars(F, chosen)
         vertex, row = np.unique(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0], return_inverse=True)
-        yield vertex, row, part(faces, star, corner)
+        yield vertex, row, star, corner
 
 
 def independent(F: np.ndarray, rank: np.ndarray) -> np.ndarray:

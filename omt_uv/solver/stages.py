@@ -9,9 +9,10 @@ from typing import Protocol
 import numpy as np
 
 from .contact import Contact, contact, crossings
-from .energy import Elements, shortfall
+from .energy import Elements, missing_tilt, shortfall, shortfall_but_share, tilted
 from .newton import Assembly, Motion, Problem, Step
 from .progress import Progress, Steps
+from .smoothing import Smoother
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,10 @@ QUALITIES = {
 # A stage that reaches the goal ends when Newton promises less than this share of the energy. One on the way ends sooner
 # where the boundary is free; vertices on a circle or on sides do not make up for it later.
 LOOSE, ON_THE_WAY = 3e-2, 0.05
+# The same where sweeps follow every step: what Newton promises then is in few faces, and sweeps do it for less.
+SWEPT_TOLERANCE, SWEPT_LOOSE, SWEPT_ON_THE_WAY = 0.1, 0.15, 0.1
+# Sweeps before the first step of a stage.
+FIRST_SWEEPS = 8
 # With a balance the weight alone decides, and neighbouring balances must not differ by chance.
 STRICT = 1e-4
 # Weight of the area term at balance 1. Without it the map of least shear has no scale; and much below this the mean
@@ -49,6 +54,9 @@ LEAST_WEIGHT = 1e-2
 SQUEEZED = 50.0
 # Where the error is not reached, the weight grows by at least and at most so much.
 LEAST_GROWTH, MOST_GROWTH = 1.3, 10.0
+# Where a greater weight leaves more than this share of the error, some faces have no room on the outline, and still
+# greater ones would only shear the rest.
+STUCK = 0.98
 # A stage that takes longer gives way to the next, which may find a way around.
 STAGE_STEPS = 40
 # Share of the area term's indefinite Hessian kept: at the start of a stage, and the least before it is dropped.
@@ -62,7 +70,7 @@ CONTACT_STRENGTH = 0.3
 @dataclass(frozen=True)
 class Task:
     """faces, assembly and motion for Newton; loop: a boundary, see `contact.rim_edges`, that may not cross itself, or
-    None; guarded: from the beginning; scale_free: the scale of the targets follows the map."""
+    None; guarded: from the beginning; scale_free: the scale of the targets follows the map; smoother: see `Problem`."""
 
     faces: Elements
     assembly: Assembly
@@ -70,14 +78,18 @@ class Task:
     loop: np.ndarray | None
     guarded: bool
     scale_free: bool = False
+    smoother: Smoother | None = None
 
-    def problem(self, w: np.ndarray, weight: float, guarded: bool) -> Problem:
+    def problem(self, w: np.ndarray, weight: float, guarded: bool, tilt: float = 0.0) -> Problem:
         """What Newton minimises at a weight of the area term; guarded: with the barrier `guard` of the map w (n,).
+
+        tilt: of the targets, see `energy.tilted`.
 
         Raises ValueError where guarded without a loop.
         """
         extras = (self.guard(w),) if guarded else ()
-        return Problem(self.faces, self.assembly, self.motion, weight, extras)
+        faces = tilted(self.faces, tilt)
+        return Problem(faces, self.assembly, self.motion, weight, extras, self.faces, self.smoother)
 
     def guard(self, w: np.ndarray) -> Contact:
         """The barrier that keeps the boundary of the map w (n,) from crossing itself."""
@@ -102,6 +114,8 @@ def rescaled(task: Task, w: np.ndarray) -> Task:
 
 @dataclass(frozen=True)
 class Found:
+    """pull: tilt of the targets times the weight of the area term that gives the region its share."""
+
     w: np.ndarray
     steps: int
     residual: float
@@ -110,6 +124,7 @@ class Found:
     status: str
     overlap: bool
     warnings: tuple[str, ...]
+    pull: float = 0.0
 
 
 def weights_of(balance: float, settings: Quality) -> list[float]:
@@ -130,10 +145,15 @@ def growth(excess: np.ndarray | float) -> np.ndarray | float:
     return np.clip(np.square(excess), LEAST_GROWTH, MOST_GROWTH)
 
 
-def stages(task: Task, w: np.ndarray, balance: float, settings: Quality, near: bool = False) -> Steps[Found]:
+def stages(
+    task: Task, w: np.ndarray, balance: float, settings: Quality, near: bool = False, pull: float = 0.0
+) -> Steps[Found]:
     """Newton in stages of growing weight, until the area error is small enough.
 
     near: the map w (n,) is nearly the one that is looked for; the least weight would lead away from it.
+    pull: that of a coarser map, see `Found`. The shear pulls all faces of a region one way, and a weight at which its
+        share came out all the same would take many more steps. So its targets lead: a method of multipliers
+        (Hestenes 1969), with one for the share.
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
     weights = weights_of(balance, settings)
@@ -141,31 +161,44 @@ def stages(task: Task, w: np.ndarray, balance: float, settings: Quality, near: b
         weights = weights[1:]
     elif task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
-    overlap, guarded, steps, k = task.crosses(w), task.guarded, 0, 0
+    overlap, guarded, steps, k, before = task.crosses(w), task.guarded, 0, 0, np.inf
     warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
     while True:
         weight = weights[k]
         task = rescaled(task, w) if task.scale_free else task
-        problem = task.problem(w, weight, guarded)
+        problem = task.problem(w, weight, guarded, pull / weight)
+        if task.smoother is not None:
+            w = task.smoother.smoothed(problem.faces, w, weight, FIRST_SWEEPS)
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
         watch = None if guarded or overlap else task.crosses
-        tolerance = settings.tolerance if balance == 0 else STRICT
-        loose = ON_THE_WAY if balance == 0 and not task.scale_free and k < len(weights) - 1 else LOOSE
+        tolerance, loose = _ends(task, balance, settings, k < len(weights) - 1)
         stage = yield from minimise(problem, w, goal, allowed, k, watch, tolerance, loose)
         w, steps = stage.w, steps + stage.steps
         if stage.status == "crossed":
             guarded = True
             continue
         k += 1
-        error = shortfall(task.faces, w)
+        error, rest = shortfall(task.faces, w), shortfall_but_share(task.faces, w)
+        pull += weight * missing_tilt(task.faces, w) if balance == 0 else 0.0
         enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
+        enough |= stage.status == "converged" and error > STUCK * before
+        before = error
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
             break
         if k >= len(weights):
-            weights.append(weights[-1] * float(growth(error / settings.area_error)))
-    return Found(w, steps, stage.residual, weight, stage.energy, stage.status, task.crosses(w), warnings)
+            weights.append(weights[-1] * float(growth(rest / settings.area_error)))
+    return Found(w, steps, stage.residual, weight, stage.energy, stage.status, task.crosses(w), warnings, pull)
+
+
+def _ends(task: Task, balance: float, settings: Quality, on_the_way: bool) -> tuple[float, float]:
+    """Tolerance and looseness of a stage, see `minimise`."""
+    if balance > 0:
+        return STRICT, LOOSE
+    if task.smoother is not None:
+        return max(settings.tolerance, SWEPT_TOLERANCE), SWEPT_ON_THE_WAY if on_the_way else SWEPT_LOOSE
+    return settings.tolerance, ON_THE_WAY if on_the_way and not task.scale_free else LOOSE
 
 
 @dataclass(frozen=True)
