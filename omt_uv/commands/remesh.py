@@ -85,12 +85,11 @@ def run(options: argparse.Namespace) -> None:
         raise CommandError(f"{options.input}: the new mesh would replace the input. Give another name.")
     common = _settings(options)
     objects = [obj for obj, _ in read(options.input, files, blender_mesh)]
-    weld = options.input.suffix.lower() == ".glb"
     results = []
     for obj in objects:
         try:
             settings = replace(common, density=source_of(obj, common))
-            request = read_request(obj, settings, weld=weld)
+            request = read_request(obj, settings, weld=_is_split(options.input, obj))
             series = drain_shown(remesh_series(request.job, settings))
         except (SourceError, MeshError) as error:
             raise CommandError(f"{obj.name}: {error}".replace(f"{obj.name}: {obj.name}", obj.name)) from error
@@ -105,6 +104,12 @@ def run(options: argparse.Namespace) -> None:
     except files.FileError as error:
         raise CommandError(str(error)) from error
     warn(objects, told, warnings)
+
+
+def _is_split(path: Path, obj) -> bool:
+    """Whether the file had to split vertices: .glb holds one normal and one UV for each, .ply one UV."""
+    suffix = path.suffix.lower()
+    return suffix == ".glb" or (suffix == ".ply" and len(obj.data.uv_layers) > 0)
 
 
 def _settings(options: argparse.Namespace) -> RemeshSettings:

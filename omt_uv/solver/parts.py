@@ -95,6 +95,9 @@ def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarra
     warnings = [w.replace(", mapped apart", ", remeshed apart").replace(" for the map", "") for w in repaired.warnings]
     if turned.any():
         warnings.append(f"{int(turned.sum())} triangles looked to the wrong side and were turned over")
+    if len(joined.slits):
+        touching = int(np.isin(joined.same, joined.slits).sum())
+        warnings.append(f"{touching} boundary vertices lie on one another and stay apart; Merge by Distance joins them")
     charts = assemble(surface, turn_over(repaired.sheets, turned))
     slits = np.sort(pair_keys(joined.slits[:, 0], joined.slits[:, 1]))
     features = joined.same[features]

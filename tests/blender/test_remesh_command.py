@@ -30,6 +30,16 @@ def test_every_format_holds_the_levels_in_the_coordinates_of_the_input(package, 
         assert np.abs(np.linalg.norm(co - [1, 2, 3], axis=1) - 1).max() < 0.15
 
 
+@pytest.mark.parametrize("suffix", [".ply", ".glb"])
+def test_what_a_format_had_to_split_at_uv_seams_is_whole_again(package, run, tmp_path, suffix):
+    write_ball(tmp_path / "in.obj")
+    assert run("unwrap", tmp_path / "in.obj", "-o", tmp_path / f"split{suffix}")[0] == 0
+    status, _, err = run("remesh", tmp_path / f"split{suffix}", "-o", tmp_path / "out.obj", "--vertices", 160)
+    assert status == 0 and "Merge by Distance" not in err
+    (obj,) = package("files").load(tmp_path / "out.obj")
+    assert len(obj.data.vertices) - len(obj.data.edges) + len(obj.data.polygons) == 2
+
+
 def test_an_attribute_gives_the_density_where_no_group_has_its_name(run, tmp_path):
     obj = ball(rings=24, sectors=40)
     z = np.array([v.co.z for v in obj.data.vertices])
