@@ -28,11 +28,12 @@ EVEN_ENOUGH = 0.01
 PASSES = 3
 # Where edges shall be twice as long there are this many halvings between neighbours.
 APART = 4
-# Rounds, and the share of all vertices below which a surplus stays.
+# Rounds, and the share of all vertices below which a surplus stays; where the density varies, a dense region may have
+# few of all vertices, and shall have its own.
 ROUNDS = 3
-SETTLED = 0.005
-# Share by which a claim changes at the most.
-MOST = 0.1
+SETTLED, SETTLED_UNEVEN = 0.005, 0.001
+# Claims change by so many times the surplus, and by this share at the most.
+GAIN, MOST = 2.0, 0.1
 # What an edge's length counts next to squares of missing neighbours.
 LENGTH = 3.0
 NONE = np.zeros(0, np.int64)
@@ -56,19 +57,20 @@ def balance(draft: Draft, carrier: Carrier, size: Size, claim: np.ndarray | None
     n = len(draft.points)
     near = carrier.nearest(draft.points, vertex_normals(draft.points, draft.triangles), size(draft.points))
     surplus = _surplus(draft, np.bincount(near, carrier.measure, n), size)
-    settled = _is_settled(surplus)
-    claim = carrier.measure if claim is None else claim * (1 - np.clip(surplus, -MOST, MOST)[near])
+    share = SETTLED if np.ptp(carrier.density) == 0 else SETTLED_UNEVEN
+    settled = _is_settled(surplus, share)
+    claim = carrier.measure if claim is None else claim * (1 - np.clip(GAIN * surplus, -MOST, MOST)[near])
     measure = np.bincount(near, claim, n)
     for _ in range(0 if settled else ROUNDS):
         surplus = _surplus(draft, measure, size)
-        if _is_settled(surplus):
+        if _is_settled(surplus, share):
             break
         draft, measure = _carried(draft, measure, surplus)
     return Balanced(adjust_count(draft, n, size), claim, settled)
 
 
-def _is_settled(surplus: np.ndarray) -> bool:
-    return np.maximum(surplus, 0).sum() < SETTLED * len(surplus)
+def _is_settled(surplus: np.ndarray, share: float) -> bool:
+    return np.maximum(surplus, 0).sum() < share * len(surplus)
 
 
 def _surplus(draft: Draft, measure: np.ndarray, size: Size) -> np.ndarray:
