@@ -9,6 +9,7 @@ import pytest
 
 from omt_uv.solver.charts import split
 from omt_uv.solver.convex import opened
+from omt_uv.solver.corner_patches import affordable
 from omt_uv.solver.corners import Barrier, Corners, convex_corners
 from omt_uv.solver.geometry import signed_areas
 from omt_uv.solver.parameterize import unwrap
@@ -72,17 +73,30 @@ def test_darts_open_and_what_is_fixed_stays():
     vertex[chart.corners] = chart.triangles
     assert (signed_areas(uv, vertex[corner]) < 0).sum() >= 2
     for held in (np.zeros(len(uv), bool), chart.vertex_ids == 30):
-        found = opened(surface, [chart], [uv], [held], [None], [500.0])[0]
+        found = opened(surface, [chart], [uv], [held], [None], [500.0], [np.inf])[0]
         area = signed_areas(found, chart.triangles)
         assert (signed_areas(found, vertex[corner]) > 0).all() and (area > 0).all()
         np.testing.assert_array_equal(found[held], uv[held])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_cheapest_patches_that_a_chart_can_spare(seed):
+    rng = np.random.default_rng(seed)
+    gain, cost, chart = rng.integers(-2, 5, 40), rng.normal(size=40), rng.integers(0, 3, 40)
+    spare = np.array([0.0, 1.5, np.inf])
+    good = affordable(gain, cost, chart, spare)
+    paid = np.maximum(cost, 0)
+    assert (np.bincount(chart[good], paid[good], 3) <= spare).all()
+    assert not good[gain <= 0].any() and good[(gain > 0) & (cost <= 0)].all() and good[(gain > 0) & (chart == 2)].all()
+    mine, left = (good & (chart == 1) & (cost > 0)), (~good & (chart == 1) & (gain > 0))
+    assert (paid / np.maximum(gain, 1))[mine].max() <= (paid / np.maximum(gain, 1))[left].min()
 
 
 def test_maps_without_darts_are_left_alone():
     surface = quads(height=0.1)
     (chart,) = split(surface)
     flat = chart.vertices[:, :2]
-    assert opened(surface, [chart], [flat], [np.zeros(len(flat), bool)], [None], [500.0]) == {}
+    assert opened(surface, [chart], [flat], [np.zeros(len(flat), bool)], [None], [500.0], [np.inf]) == {}
 
 
 @pytest.mark.parametrize("scale, shift", [(1, 0), (1e-6, 0), (1e6, 0), (1, 1e5)])
@@ -128,7 +142,7 @@ def test_nearly_straight_corners_are_opened():
     at = np.empty((len(surface.corner_vertex), 2))
     at[chart.corners.ravel()] = uv[chart.triangles.ravel()]
     assert (signed_areas(at, corner) < 0).any()
-    new = opened(surface, [chart], [uv], [np.zeros(len(uv), bool)], [None], [500.0])[0]
+    new = opened(surface, [chart], [uv], [np.zeros(len(uv), bool)], [None], [500.0], [np.inf])[0]
     at[chart.corners.ravel()] = new[chart.triangles.ravel()]
     assert (signed_areas(at, corner) > 0).all() and (signed_areas(new, chart.triangles) > 0).all()
 

@@ -19,7 +19,7 @@ from .stages import QUALITIES
 from .topology import boundary_loops
 
 # The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
-AREA_KEPT = 1.25
+AREA_KEPT = 1.1
 
 
 def with_open_corners(
@@ -39,8 +39,10 @@ def with_open_corners(
         return maps
     fixed = [_fixed(c, p, boundary) for c, p in zip(charts, held, strict=True)]
     density = [chart_target(target, surface, c).get("density") for c in charts]
+    spare = [AREA_KEPT * max(m.area_l1, QUALITIES[quality].area_error) - m.area_l1 for m in maps]
     new = list(maps)
-    for k, uv in opened(surface, charts, [m.uv for m in maps], fixed, density, [m.weight for m in maps]).items():
+    found = opened(surface, charts, [m.uv for m in maps], fixed, density, [m.weight for m in maps], spare)
+    for k, uv in found.items():
         chart, old = charts[k], maps[k]
         (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
         figures = measure(vertices, chart.triangles, flat[chart.triangles], overlap=False, density=density[k])

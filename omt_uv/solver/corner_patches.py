@@ -1,0 +1,131 @@
+"""Patches of a map whose polygons get their corners opened, each for itself: an interior point method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .corners import OPEN, Barrier, Corners
+from .energy import elements, energies, gradient
+from .geometry import face_areas
+from .newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
+from .topology import halfedges
+
+STRENGTH = 30.0
+# Rounds that open and that settle, of so many Newton steps; corners that are shut start a round at this r.
+OPENING, SETTLING, STEPS, LEAST = 6, 4, 3, 0.1
+# A patch whose area error grew by more than GROWTH gets a weight of the area term so many times as large.
+GROWTH, HEAVIER = 1.25, 1.5
+PRESSURE, HALVINGS = 0.3, 12
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Positions (n,3), triangles (m,3), the areas (m,) they shall have, weights (m,) of the area term.
+
+    chart (m,): the chart of each; spare (c,): by how much the areas of a chart may be further off, in sum.
+    """
+
+    positions: np.ndarray
+    triangles: np.ndarray
+    target: np.ndarray
+    weight: np.ndarray
+    chart: np.ndarray
+    spare: np.ndarray
+
+    def of(self, vertices: np.ndarray, faces: np.ndarray, place: np.ndarray) -> Mesh:
+        """Some of the vertices (k,) and faces (m,) bool, vertex v as place[v]."""
+        target, weight, chart = (x[faces] for x in (self.target, self.weight, self.chart))
+        return Mesh(self.positions[vertices], place[self.triangles[faces]], target, weight, chart, self.spare)
+
+
+class Patches:
+    """Patches of a mesh, each of which goes its own way; unknowns in the order of their elimination."""
+
+    def __init__(self, mesh: Mesh, corners: Corners, free: np.ndarray):
+        n, triangles = len(free), mesh.triangles
+        self.faces = elements(mesh.positions, triangles, mesh.target)
+        self.assembly, self.motion = Assembly(triangles, n), Free(~free)
+        self.weight, self.corners = mesh.weight, corners
+        self.strength = STRENGTH * corners.whole / mesh.target.sum()
+        every = np.concatenate([triangles, corners.triangles])
+        tail, head = halfedges(every)
+        joined = free[tail] & free[head]
+        graph = coo_matrix((np.ones(joined.sum()), (tail[joined], head[joined])), shape=(n, n))
+        self.count, self.of_vertex = connected_components(graph, directed=False)
+        moving = np.take_along_axis(every, free[every].argmax(1)[:, None], 1)[:, 0]
+        self.of_face, self.of_corner = np.split(self.of_vertex[moving], [len(triangles)])
+        self.chart = np.zeros(self.count, np.int64)
+        self.chart[self.of_face] = mesh.chart
+        # As `Elements` measures areas.
+        self.spare = mesh.spare / face_areas(mesh.positions, triangles).sum()
+
+    def opened(self, w: np.ndarray) -> np.ndarray:
+        """The map w (n,) with corners opened in those patches where fewer are shut afterwards, and areas kept."""
+        given, strength, weight = w, self.strength, self.weight
+        for _ in range(OPENING):
+            shut = self.corners.shut(w)
+            if not shut.any():
+                break
+            w = self._stepped(w, weight, self._barrier(w, strength))
+            strength = np.where(shut, 2 * strength, strength)
+        for k in range(SETTLING):
+            worse = (self._lack(w) > GROWTH * self._lack(given)) & (k > 1)
+            weight = np.where(worse[self.of_face], HEAVIER * weight, weight)
+            w = self._stepped(w, weight, self._barrier(w, self.strength * 0.1**k))
+        gain, cost = self._shut(given) - self._shut(w), self._lack(w) - self._lack(given)
+        good = affordable(gain, cost, self.chart, self.spare)
+        return np.where(good[self.of_vertex], w, given)
+
+    def _barrier(self, w, strength) -> Barrier:
+        wanted = self.corners.wanted
+        slack = np.maximum(LEAST * wanted - self.corners.areas(w), 0) / (1 - LEAST)
+        # What is open stays so.
+        return Barrier(self.corners, np.where(self.corners.open(w), -OPEN * wanted, slack), strength)
+
+    def _shut(self, w):
+        return np.bincount(self.of_corner, self.corners.shut(w), self.count)
+
+    def _lack(self, w):
+        return np.bincount(self.of_face, np.abs(self.faces.areas(w) - self.faces.area * self.faces.ratio), self.count)
+
+    def _stepped(self, w, weight, barrier: Barrier) -> np.ndarray:
+        """The map after some Newton steps, of which every patch takes as much as it may."""
+        problem = Problem(self.faces, self.assembly, self.motion, weight, (barrier,))
+        value = self._values(w, weight, barrier)
+        for _ in range(STEPS):
+            step, _ = newton_direction(problem, w, PRESSURE)
+            down = gradient(self.faces, w, weight) + barrier.derivatives(w)[0]
+            slope = np.bincount(self.of_vertex, (step.conj() * down).real, self.count)
+            far = np.full(self.count, 1 / FOLD_SHARE)
+            np.minimum.at(far, self.of_face, fold_shares(*self.faces.derivatives(w), *self.faces.derivatives(step)))
+            share = FOLD_SHARE * far
+            for _ in range(HALVINGS):
+                trial = self._values(w + share[self.of_vertex] * step, weight, barrier)
+                waiting = ~(trial <= value + ARMIJO * share * slope)
+                if not waiting.any():
+                    break
+                share[waiting] *= 0.5
+            share[waiting] = 0
+            w, value = w + share[self.of_vertex] * step, np.where(waiting, value, trial)
+        return w
+
+    def _values(self, w, weight, barrier: Barrier) -> np.ndarray:
+        of_faces = np.bincount(self.of_face, energies(self.faces, w, weight), self.count)
+        return of_faces + np.bincount(self.of_corner, barrier.energies(w), self.count)
+
+
+def affordable(gain: np.ndarray, cost: np.ndarray, chart: np.ndarray, spare: np.ndarray) -> np.ndarray:
+    """Patches (p,) bool with a gain: those that cost nothing, and the cheapest others that their charts can spare.
+
+    gain, cost, chart (p,); spare (c,).
+    """
+    good = gain > 0
+    paid = np.where(good, np.maximum(cost, 0), 0)
+    order = np.lexsort((paid / np.maximum(gain, 1e-300), chart))
+    total, first = np.cumsum(paid[order]), np.searchsorted(chart[order], chart[order])
+    good[order] &= total - np.concatenate([[0], total])[first] <= spare[chart[order]]
+    return good
