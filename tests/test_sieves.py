@@ -121,7 +121,7 @@ def test_a_frame_of_few_holes_is_cut():
 
 def test_a_plate_with_many_holes_through_it_comes_apart_along_its_edges():
     V, F = plate(18)
-    result = check(V, F, 1 + 1e-6, parts=36 + 3)
+    result = check(V, F, 1 + 1e-6, parts=36 + 1)
     assert any("apart" in text for text in result.warnings)
     assert len(np.unique(np.sort(result.seams, axis=1), axis=0)) == len(result.seams)
 

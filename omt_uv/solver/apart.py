@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .holes import hole_rims
 from .nets import HARD
 from .piece import Kind, classify, fold_angles
 from .sheets import Sheets, components, corner_classes
@@ -15,8 +16,8 @@ from .sheets import Sheets, components, corner_classes
 def parting_pairs(sheets: Sheets, positions: np.ndarray, one_sided: np.ndarray, most: int) -> np.ndarray:
     """Pairs (p,) bool along which parts with more than `most` handles fall apart; none where that leaves as many.
 
-    These are the hard edges around sides with several boundaries: a plate comes apart into its two faces, its rim, and
-    the walls of its holes, each in one piece. positions (n,3) of the surface; one_sided (m,) bool: `piece.classify`.
+    These are the hard edges around the holes of sides: from a plate come away the walls of the holes through it, each in
+    one piece. positions (n,3) of the surface; one_sided (m,) bool: see `piece.classify`.
     """
     part, whole = _kinds(sheets, one_sided)
     crowded = (whole.handles > most)[part[sheets.first // 3]]
@@ -24,8 +25,9 @@ def parting_pairs(sheets: Sheets, positions: np.ndarray, one_sided: np.ndarray, 
         return crowded
     pair = np.stack([sheets.first, sheets.second], axis=1)
     hard = crowded & (np.abs(fold_angles(positions, sheets.vertex[sheets.triangles], pair)) > HARD)
-    side, kind = _kinds(sheets.without(hard), one_sided)
-    gone = hard & (kind.boundaries[side[pair // 3]] > 1).any(axis=1)
+    around = np.zeros(3 * len(sheets.triangles), dtype=bool)
+    around[hole_rims(positions, sheets.without(hard), one_sided)[0]] = True
+    gone = hard & around[pair].any(axis=1)
     # What ends inside of a side is a slit, which parts nothing.
     side = components(sheets.without(gone))[pair // 3]
     gone &= side[:, 0] != side[:, 1]

@@ -152,7 +152,7 @@ def _taken_apart(sheets: Sheets, positions, one_sided, most: int | None) -> tupl
 def _said(parting: int, backwards: int, sieved: int, touching: int) -> Iterator[str]:
     """Warnings, from the numbers of edges a part came apart at, faces turned over, holes of sieves, and doubles."""
     if parting:
-        yield "A part with very many handles was taken apart along its hard edges"
+        yield "A part with very many handles was taken apart along the hard edges of its holes"
     if backwards:
         yield _turned_faces(backwards)
     if sieved:

@@ -38,27 +38,35 @@ def fill_holes(surface: Surface, sheets: Sheets, one_sided: np.ndarray, sieve: i
     sieve : fill only where there are more than so many holes, and leave all that are rims rather than holes open
     """
     tail, head = halfedges(corner_classes(sheets)[sheets.triangles])
+    rim, loop = hole_rims(surface.positions, sheets, one_sided, sieve)
+    if len(rim) == 0:
+        return Filled(surface, sheets, 0)
+    return _fans(surface, sheets, rim, loop, tail, head, int(max(tail.max(), head.max())) + 1)
+
+
+def hole_rims(
+    positions: np.ndarray, sheets: Sheets, one_sided: np.ndarray, sieve: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The halfedges (r,) around the holes that `fill_holes` fills, and the number (r,) of the hole of each."""
+    tail, head = halfedges(corner_classes(sheets)[sheets.triangles])
     open_ = np.ones(len(tail), dtype=bool)
     open_[sheets.first] = open_[sheets.second] = False
     rim = np.flatnonzero(open_)
     rim = rim[~one_sided[rim // 3]]
     if len(rim) == 0:
-        return Filled(surface, sheets, 0)
+        return rim, rim
     size = int(max(tail.max(), head.max())) + 1
     loop = connected_components(coo_matrix((np.ones(len(rim)), (tail[rim], head[rim])), shape=(size, size)), False)[1]
     loop = np.unique(loop[tail[rim]], return_inverse=True)[1].ravel()
-    hole = _holes(surface, sheets, rim, loop, sieve)
-    rim, loop = rim[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
-    if len(rim) == 0:
-        return Filled(surface, sheets, 0)
-    return _fans(surface, sheets, rim, loop, tail, head, size)
+    hole = _holes(positions, sheets, rim, loop, sieve)
+    return rim[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
 
 
-def _holes(surface: Surface, sheets: Sheets, rim: np.ndarray, loop: np.ndarray, sieve: int | None) -> np.ndarray:
+def _holes(positions: np.ndarray, sheets: Sheets, rim: np.ndarray, loop: np.ndarray, sieve: int | None) -> np.ndarray:
     """Loops (l,) bool that are not the longest of their part, or that are holes of sieves."""
     a, b = sheets.ends(rim)
     # Halves: the difference of two huge numbers may be infinite.
-    step = np.linalg.norm(surface.positions[a] / 2 - surface.positions[b] / 2, axis=1)
+    step = np.linalg.norm(positions[a] / 2 - positions[b] / 2, axis=1)
     length = np.bincount(loop, step)
     part = components(sheets)[rim[np.unique(loop, return_index=True)[1]] // 3]
     order = np.lexsort((-length, part))
