@@ -16,8 +16,8 @@ from .sheets import Sheets, components, corner_classes
 def parting_pairs(sheets: Sheets, positions: np.ndarray, one_sided: np.ndarray, most: int) -> np.ndarray:
     """Pairs (p,) bool along which parts with more than `most` handles fall apart; none where that leaves as many.
 
-    These are the hard edges around the holes of sides: from a plate come away the walls of the holes through it, each in
-    one piece. positions (n,3) of the surface; one_sided (m,) bool: see `piece.classify`.
+    These are the hard edges around the holes of sides: from a plate come away the walls of the holes through it,
+    each in one piece. positions (n,3) of the surface; one_sided (m,) bool: see `piece.classify`.
     """
     part, whole = _kinds(sheets, one_sided)
     crowded = (whole.handles > most)[part[sheets.first // 3]]
