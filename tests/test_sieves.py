@@ -143,3 +143,11 @@ def test_marked_seams_are_kept_in_sieves():
     result = drain(unwrap(triangle_surface(V, F, seams)))
     assert len(result.charts) == 2
     assert max(m.area_l1 for m in result.maps) <= 0.01
+
+
+@pytest.mark.parametrize("change", [lambda V: 1e-6 * V, lambda V: V + 1e3])
+def test_sieves_are_the_same_in_every_unit_and_place(change):
+    V, F = box()
+    result, other = (drain(unwrap(triangle_surface(x, F))) for x in (V, change(V)))
+    np.testing.assert_array_equal(result.seams, other.seams)
+    np.testing.assert_array_equal(result.charts[0].disk, other.charts[0].disk)
