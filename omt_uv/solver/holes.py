@@ -68,9 +68,9 @@ def _holes(positions: np.ndarray, sheets: Sheets, rim: np.ndarray, loop: np.ndar
     a, b = sheets.ends(rim)
     # Halves: the difference of two huge numbers may be infinite.
     step = np.linalg.norm(positions[a] / 2 - positions[b] / 2, axis=1)
-    length = np.bincount(loop, step)
+    around = np.bincount(loop, step)
     # Of many equal holes rounding shall not choose the one that stays open.
-    length *= 1 + NOISE * np.random.default_rng(0).random(len(length))
+    length = around * (1 + NOISE * np.random.default_rng(0).random(len(around)))
     part = components(sheets)[rim[np.unique(loop, return_index=True)[1]] // 3]
     order = np.lexsort((-length, part))
     _, first, place, count = np.unique(part[order], return_index=True, return_inverse=True, return_counts=True)
