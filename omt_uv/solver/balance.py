@@ -31,7 +31,7 @@ APART = 4
 # Rounds, and the share of all vertices below which a surplus stays; where the density varies, a dense region may have
 # few of all vertices, and shall have its own.
 ROUNDS = 3
-SETTLED, SETTLED_UNEVEN = 0.005, 0.001
+SETTLED, SETTLED_UNEVEN = 0.004, 0.001
 # Claims change by so many times the surplus, and by this share at the most.
 GAIN, MOST = 2.0, 0.1
 # What an edge's length counts next to squares of missing neighbours.
@@ -57,9 +57,10 @@ def balance(draft: Draft, carrier: Carrier, size: Size, claim: np.ndarray | None
     n = len(draft.points)
     near = carrier.nearest(draft.points, vertex_normals(draft.points, draft.triangles), size(draft.points))
     surplus = _surplus(draft, np.bincount(near, carrier.measure, n), size)
-    share = SETTLED if np.ptp(carrier.density) == 0 else SETTLED_UNEVEN
+    even = np.ptp(carrier.density) == 0
+    share = SETTLED if even else SETTLED_UNEVEN
     settled = _is_settled(surplus, share)
-    claim = carrier.measure if claim is None else claim * (1 - np.clip(GAIN * surplus, -MOST, MOST)[near])
+    claim = carrier.measure if claim is None or even else claim * (1 - np.clip(GAIN * surplus, -MOST, MOST)[near])
     measure = np.bincount(near, claim, n)
     for _ in range(0 if settled else ROUNDS):
         surplus = _surplus(draft, measure, size)

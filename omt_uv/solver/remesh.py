@@ -28,7 +28,7 @@ from .touching import opened
 
 # More vertices than this many times the input's tell nothing new about the surface.
 FAR_MORE = 50
-ROUNDS = 24
+ROUNDS = 30
 FIRST_ROUNDS, BALANCES = 10, 6
 # How often boundaries and features are thinned out to reach a count.
 ATTEMPTS, THINNED = 3, 2.0
