@@ -16,10 +16,9 @@ from cases import meshes
 from pictures import typeface
 from PIL import Image, ImageDraw
 
-from omt_uv.solver.exact_share import exact_share
 from omt_uv.solver.geometry import signed_areas
-from omt_uv.solver.lens import magnify_map
-from omt_uv.solver.measure import from_vertices, normalised, share
+from omt_uv.solver.lens import magnify_region
+from omt_uv.solver.measure import from_vertices, share
 from omt_uv.solver.progress import drain
 from omt_uv.solver.warp import warped
 
@@ -75,10 +74,9 @@ def magnified():
     V, F = meshes.grid(CELLS, CELLS)
     uv = V[:, :2]
     t = np.clip((1.25 * RADIUS - np.linalg.norm(uv - 0.5, axis=1)) / (0.5 * RADIUS), 0, 1)
-    weights, area = from_vertices(t * t * (3 - 2 * t), F), signed_areas(uv, F)
-    found = exact_share(weights, area, FACTOR)
-    result = drain(magnify_map(uv, F, normalised(found.density, area), region=weights))
-    return uv[F], result.uv[F], found.before, share(weights, signed_areas(result.uv, F))
+    weights = from_vertices(t * t * (3 - 2 * t), F)
+    result = drain(magnify_region(uv, F, weights, FACTOR))
+    return uv[F], result.uv[F], *(share(weights, signed_areas(x, F)) for x in (uv, result.uv))
 
 
 def make(path: Path, pixels=720):

@@ -21,7 +21,7 @@ from .solver.errors import EmptyMeshError, MeshError, WeightError
 from .solver.exact_share import ExactShare, exact_share
 from .solver.geometry import face_areas, signed_areas
 from .solver.islands import Island, uv_islands
-from .solver.lens import OUTLINES, Lens, aligned_to, magnify_map, refuse_folds
+from .solver.lens import OUTLINES, Lens, aligned_to, magnify_map, magnify_region, refuse_folds
 from .solver.measure import Target, check_weights, from_polygons, from_vertices, normalised, painted, share
 from .solver.overlap import overlap_share
 from .solver.progress import Steps, part_of
@@ -245,16 +245,21 @@ def _piece(owner: int, island: Island, weights, settings: MagnifySettings) -> St
     uv, steps, texts, outline = island.uv, 0, list(whole.warnings), ""
     for k in range(settings.cascade):
         now = np.abs(signed_areas(uv, triangles))
-        found = wanted(weights, now, settings.factor, settings.exact)
-        job = _lens(island, uv, triangles, normalised(found.density, now), weights, settings)
+        job = _lens(island, uv, triangles, now, weights, settings)
         lens = yield from part_of(job, k / settings.cascade, 1 / settings.cascade)
         uv, steps, outline = lens.uv, steps + lens.iterations, lens.outline
         texts += [text for text in lens.warnings if text not in texts]
     return _Piece(owner, island, weights, area, whole, uv, outline, steps), tuple(texts)
 
 
-def _lens(island: Island, uv, triangles, density, weights, settings: MagnifySettings) -> Steps[Lens]:
-    if settings.boundary in OUTLINES:
+def _lens(island: Island, uv, triangles, area, weights, settings: MagnifySettings) -> Steps[Lens]:
+    """An island, of UV areas (m,), after one magnification."""
+    inside = settings.boundary in OUTLINES
+    if inside and settings.exact:
+        options = {"boundary": settings.boundary, "quality": settings.quality}
+        return (yield from magnify_region(uv, triangles, weights, settings.factor, **options))
+    density = normalised(wanted(weights, area, settings.factor, settings.exact).density, area)
+    if inside:
         return (
             yield from magnify_map(
                 uv, triangles, density, region=weights, boundary=settings.boundary, quality=settings.quality

@@ -10,7 +10,7 @@ from omt_uv.solver.charts import split, triangle_surface
 from omt_uv.solver.errors import EmptyMeshError, FoldedUVError, WeightError
 from omt_uv.solver.exact_share import exact_share
 from omt_uv.solver.geometry import face_areas, signed_areas, vertex_areas
-from omt_uv.solver.lens import magnify_map
+from omt_uv.solver.lens import magnify_map, magnify_region
 from omt_uv.solver.measure import Target, from_vertices, normalised, share
 from omt_uv.solver.overlap import overlap_share
 from omt_uv.solver.parameterize import unwrap
@@ -78,6 +78,21 @@ def test_twice_by_two_is_once_by_four(boundary):
     twice, _, share_twice = magnified(half.uv, F, weights, 2.0, boundary=boundary)
     assert share_twice == pytest.approx(share_once, rel=0.02)
     assert np.linalg.norm(twice.uv - once.uv, axis=1).max() <= 0.02 * np.ptp(once.uv, axis=0).max()
+
+
+@pytest.mark.parametrize(("first", "second"), [(2.0, 2.0), (2.0, 3.0), (1.5, 2.0)])
+@pytest.mark.parametrize(("make", "boundary"), [(square, "own"), (disk, "own"), (disk, "free")])
+def test_steps_compose(make, boundary, first, second):
+    """The same region magnified twice, and once by the product; on a coarse and irregular mesh, too."""
+    uv, F = make()
+    w = from_vertices(blob(uv, uv.mean(0) + 0.1 * np.ptp(uv), 0.15 * np.ptp(uv)), F)
+    once = drain(magnify_region(uv, F, w, first * second, boundary=boundary))
+    half = drain(magnify_region(uv, F, w, first, boundary=boundary))
+    twice = drain(magnify_region(half.uv, F, w, second, boundary=boundary))
+    shares = [share(w, np.abs(signed_areas(x.uv, F))) for x in (once, twice)]
+    assert shares == pytest.approx([first * second * share(w, np.abs(signed_areas(uv, F)))] * 2, rel=5e-3)
+    assert np.linalg.norm(twice.uv - once.uv, axis=1).max() <= 0.02 * np.ptp(once.uv, axis=0).max()
+    assert (signed_areas(twice.uv, F) > 0).all() and once.area_error <= 0.02
 
 
 def test_place_size_and_mirroring_do_not_matter():

@@ -13,17 +13,21 @@ import numpy as np
 
 from .energy import area_error, elements
 from .errors import FoldedUVError, MeshError
+from .exact_share import exact_share
 from .geometry import face_areas, signed_areas
 from .improve import boundary_edges, meets_itself
+from .measure import normalised, share
 from .newton import Assembly
 from .outline import Outline, centroid, free, recognised
-from .progress import Progress, Steps
+from .progress import Progress, Steps, part_of
 from .renumbering import Renumbered, renumbered
 from .schwarz import overlapping
 from .stages import QUALITIES, Found, Task, stages
 from .topology import boundary_loops
 
 OUTLINES = ("own", "free")
+# Greatest step of a magnification, in the logarithm of the share.
+LARGEST_STEP = np.log(2) / 2
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,43 @@ def magnify_map(
         error,
         found.warnings,
     )
+
+
+def magnify_region(
+    uv: np.ndarray,
+    triangles: np.ndarray,
+    weights: np.ndarray,
+    factor: float,
+    *,
+    boundary: str = "own",
+    quality: str = "standard",
+) -> Steps[Lens]:
+    """Give a region of weights (m,) in [0, 1] `factor` times its share of a map uv (n,2), in steps of at most sqrt(2).
+
+    Each step shears the map before it as little as it can. Small steps are a flow: what it has done twice by 2 is
+    what it does once by 4, and the shear is no more than that of one large step.
+
+    Raises
+    ------
+    FoldedUVError : see `magnify_map`
+    WeightError, ShareError : see `exact_share.exact_share`
+    """
+    refuse_folds(uv, triangles)
+    before = np.abs(signed_areas(uv, triangles))
+    whole = exact_share(weights, before, factor)
+    count = max(1, int(np.ceil(abs(np.log(factor)) / LARGEST_STEP - 1e-9)))
+    done, texts = 0, []
+    for k in range(count):
+        area = np.abs(signed_areas(uv, triangles))
+        # From what the region has to what it is to have: errors do not add up.
+        rest = whole.before * factor ** ((k + 1) / count) / share(weights, area)
+        density = normalised(exact_share(weights, area, rest).density, area)
+        job = magnify_map(uv, triangles, density, region=weights, boundary=boundary, quality=quality)
+        lens = yield from part_of(job, k / count, 1 / count)
+        uv, done = lens.uv, done + lens.iterations
+        texts += [text for text in lens.warnings if text not in texts]
+    has, asked = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
+    return replace(lens, iterations=done, area_error=float(np.abs(has - asked).sum()), warnings=tuple(texts))
 
 
 def refuse_folds(uv: np.ndarray, triangles: np.ndarray) -> None:
