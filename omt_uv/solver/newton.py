@@ -205,11 +205,18 @@ class Step:
 
 def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarray = 1.0) -> tuple[np.ndarray, float]:
     """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
-    n, faces, motion = len(w), problem.faces, problem.motion
+    frame, free = problem.motion.frame(w), problem.motion.free.astype(float)
+    matrix, slopes, scale = _equations(problem, w, pressure, frame, free)
+    parts = problem.assembly.parts if np.max(problem.weight) <= STIFF else None
+    step = -_solution(matrix, slopes, scale, parts, w, frame[:, None] * [1, 1j] * free)
+    return step.view(complex), float(step @ slopes)
+
+
+def _equations(problem: Problem, w: np.ndarray, pressure, frame, free) -> tuple[sp.spmatrix, np.ndarray, float]:
+    """Hessian (2n,2n) and slopes (2n,) along the axes of the frame, and the mean of the Hessian's diagonal."""
+    n, faces = len(w), problem.faces
     local = local_derivatives(faces, w, problem.weight, pressure)
     gradient = scatter(faces, local.gradient, n)
-    frame = motion.frame(w)
-    free = motion.free.astype(float)
     rows = np.ascontiguousarray((local.rows * frame[faces.triangles][:, None, :]).conj()).view(float)
     rows *= free[faces.triangles].reshape(-1, 1, 6)
     blocks = np.matmul(rows.transpose(0, 2, 1), rows)
@@ -222,13 +229,9 @@ def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarr
         extra = extra + linear.T @ linear
     axes = (gradient * frame.conj()).view(float).reshape(n, 2) * free
     diagonal = 1 - free
-    diagonal[:, 0] += np.maximum(motion.bend(w, gradient), 0) * free[:, 0]
+    diagonal[:, 0] += np.maximum(problem.motion.bend(w, gradient), 0) * free[:, 0]
     matrix = problem.assembly.matrix(blocks, diagonal.ravel() + SHIFT * scale)
-    if problem.extras:
-        matrix = matrix + extra
-    parts = problem.assembly.parts if np.max(problem.weight) <= STIFF else None
-    step = -_solution(matrix, axes.ravel(), scale, parts, w, frame[:, None] * [1, 1j] * free)
-    return step.view(complex), float(step @ axes.ravel())
+    return matrix + extra if problem.extras else matrix, axes.ravel(), scale
 
 
 def _solution(matrix: sp.spmatrix, b, scale: float, parts: Overlapping | None, w, axes) -> np.ndarray:
