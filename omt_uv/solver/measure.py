@@ -106,14 +106,6 @@ def attribute(values: np.ndarray) -> np.ndarray:
     return density
 
 
-def combined(*densities: np.ndarray) -> np.ndarray:
-    """The product of densities (m,): each multiplies what the others leave a face."""
-    product = np.ones_like(densities[0])
-    for density in densities:
-        product = product * density
-    return attribute(product)
-
-
 def normalised(density: np.ndarray, area: np.ndarray) -> np.ndarray:
     """The density (m,) scaled so that the target measure sums to the area."""
     return density * (area.sum() / (area @ density))
