@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import smoothing
+from omt_uv.solver.contact import crossings
 from omt_uv.solver.embedding import arc_length_parameters, tutte
 from omt_uv.solver.energy import elements, energies, energy
 from omt_uv.solver.geometry import face_areas
@@ -34,6 +35,25 @@ def test_sweeps_lower_the_energy_and_leave_the_boundary(chart):
         assert after < before
         np.testing.assert_array_equal(smooth[loop], w[loop])
         before = after
+
+
+def test_boundaries_move_and_do_not_come_to_cross_themselves(chart):
+    faces, w, loop = chart
+    smooth = drain(smoothing.smoothed(faces, w, WEIGHT, 8, loop))
+    assert (faces.areas(smooth) > 0).all() and energy(faces, smooth, WEIGHT) < energy(faces, w, WEIGHT)
+    assert (smooth[loop] != w[loop]).mean() > 0.5
+    assert not len(crossings(smooth, loop))
+
+
+def test_what_would_cross_is_taken_back():
+    # Two tips of a square notch that go past each other, and one corner that is in nobody's way.
+    before = np.array([-3, 5, 5 + 1j, 1.2 + 0.9j, 1 + 0.2j, 0.8 + 1.1j, -3 + 1j])
+    after = before + np.array([-0.1, 0, 0, -0.4, 0, 0.4, 0])
+    loop = np.arange(7)
+    assert len(crossings(after, loop))
+    smoothing._uncross(after, before, loop)
+    np.testing.assert_array_equal(after[1:], before[1:])
+    assert after[0] == -3.1
 
 
 def test_sets_are_independent_and_hold_nearly_all_vertices_once(chart):

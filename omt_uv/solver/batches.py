@@ -17,6 +17,7 @@ SMALL, MANY, BATCH = 1000, 8, 50_000
 
 
 def small(chart: Chart) -> bool:
+    """Whether a chart is small enough to be solved together with others, and has no patches over holes."""
     return len(chart.triangles) <= SMALL and not len(chart.patches)
 
 

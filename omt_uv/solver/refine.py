@@ -15,11 +15,11 @@ from .errors import MeshError, positive_density
 from .geometry import face_areas
 from .newton import Assembly
 from .pins import Pins, drag
-from .progress import Progress, Steps
-from .renumbering import renumbered
+from .progress import Progress, Steps, part_of
+from .renumbering import Renumbered, renumbered
 from .schwarz import overlapping
-from .smoothing import Smoother
-from .stages import QUALITIES, Task, stages
+from .smoothing import Smoother, smoothed
+from .stages import QUALITIES, Quality, Task, stages, weights_of
 from .starts import Start, disk_start, free_start, notched_disk, square_start
 from .topology import boundary_loops
 
@@ -29,6 +29,11 @@ BOUNDARIES = tuple(STARTS)
 SWEPT_ABOVE = 2000
 # Area error of a disk above which vertices without room may leave the circle.
 NO_ROOM = 0.005
+# Mean energy, and number of triangles, above which a start with a free boundary is smoothed, in so many sweeps: small
+# charts have the same way whether they are solved alone or together (`batches.SMALL`).
+TENSE, FEW, SWEEPS = 3.0, 1000, 4
+# Where the time goes, roughly, as start and width.
+EASING, STAGES = (0.0, 0.1), (0.1, 0.9)
 
 
 @dataclass(frozen=True)
@@ -94,28 +99,13 @@ def refine(
     Hormann, Greiner 2000 (shear); Degener, Meseth, Klein 2003 (area); Smith, de Goes, Kim 2019 (eigensystem);
     Smith, Schaefer 2015 (barrier against folds).
     """
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
-    if not 0 <= balance <= 1:
-        raise ValueError(f"balance must lie in [0, 1], not {balance}")
-    if pins is not None and boundary != "free":
-        raise ValueError("pins need a free boundary")
+    _check_options(boundary, balance, pins)
     yield Progress("Refinement", 0.0)
     target = _targets(face_areas(vertices, triangles), target)
     mesh = renumbered(vertices, triangles, uv, pins)
+    faces = elements(mesh.vertices, mesh.triangles, target, region)
     try:
-        found, start, area_left = yield from _refined(
-            mesh.vertices,
-            mesh.triangles,
-            mesh.uv,
-            boundary,
-            (target, region),
-            balance,
-            QUALITIES[quality],
-            mesh.pins,
-            near,
-            pull,
-        )
+        found, warnings = yield from _refined(mesh, faces, boundary, balance, QUALITIES[quality], near, pull)
     except MeshError as error:
         raise mesh.blame(error) from error
     yield Progress("Refinement", 1.0)
@@ -126,14 +116,23 @@ def refine(
         refined,
         found.steps,
         found.residual,
-        area_left,
+        area_error(faces, found.w),
         found.weight,
         found.energy,
         found.status,
         found.overlap,
-        (*start.warnings, *found.warnings),
+        (*warnings, *found.warnings),
         found.pull,
     )
+
+
+def _check_options(boundary: str, balance: float, pins) -> None:
+    if boundary not in BOUNDARIES:
+        raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
+    if not 0 <= balance <= 1:
+        raise ValueError(f"balance must lie in [0, 1], not {balance}")
+    if pins is not None and boundary != "free":
+        raise ValueError("pins need a free boundary")
 
 
 def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
@@ -143,30 +142,45 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     return target * (area.sum() / target.sum())
 
 
-def _refined(vertices, triangles, uv, boundary, target, balance, settings, pins: Pins | None, near: bool, pull):
-    """Stages on a renumbered chart: what was found, the start it was found from, and the area error that is left."""
-    loop = boundary_loops(triangles)[0]
-    start = STARTS[boundary](vertices, triangles, uv, loop)
-    faces = elements(vertices, triangles, *target)
-    assembly = Assembly(triangles, len(vertices), overlapping(vertices, triangles))
+def _refined(mesh: Renumbered, faces: Elements, boundary: str, balance, settings: Quality, near: bool, pull: float):
+    """Stages on a renumbered chart: what was found, and the warnings of the start it was found from."""
+    pins, loop, n = mesh.pins, boundary_loops(mesh.triangles)[0], len(mesh.vertices)
+    start = STARTS[boundary](mesh.vertices, mesh.triangles, mesh.uv, loop)
+    assembly = Assembly(mesh.triangles, n, overlapping(mesh.vertices, mesh.triangles))
     # Sweeps know of no springs, and of no balance.
-    swept = faces.region is not None and pins is None and balance == 0 and len(vertices) > SWEPT_ABOVE
-    smoother = Smoother(triangles, len(vertices)) if swept else None
+    swept = faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
+    smoother = Smoother(mesh.triangles, n) if swept else None
     task = _task(faces, assembly, start, loop, boundary, smoother)
-    w = start.uv[:, 0] + 1j * start.uv[:, 1]
+    w, given = start.uv @ [1, 1j], mesh.uv @ [1, 1j]
+    placed = boundary == "free"
     if pins is not None and len(pins.vertices) > 1:
         task, w = yield from drag(task, w, pins)
-    found = yield from stages(task, w, balance, settings, near, pull)
+        placed = False
+    elif boundary == "free":
+        w = yield from part_of(_eased(task, w, weights_of(balance, settings)[0]), *EASING)
+    found = yield from part_of(stages(task, w, balance, settings, near, pull), *STAGES)
     error = area_error(faces, found.w)
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * settings.area_error):
-        notched = notched_disk(start, triangles, loop)
+        notched = notched_disk(start, mesh.triangles, loop)
         if notched is not None:
             again = yield from stages(_task(faces, assembly, notched, loop, boundary, smoother), w, balance, settings)
             if area_error(faces, again.w) < error:
-                found, start, error = again, notched, area_error(faces, again.w)
-    if boundary == "free" and (pins is None or len(pins.vertices) == 1):
-        found = replace(found, w=_placed(found.w, uv[:, 0] + 1j * uv[:, 1], faces, pins))
-    return found, start, error
+                found, start = again, notched
+    if placed:
+        found = replace(found, w=_placed(found.w, given, faces, pins))
+    return found, start.warnings
+
+
+def _eased(task: Task, w: np.ndarray, weight: float) -> Steps[np.ndarray]:
+    """A start w (n,) whose vertices, those of the boundary too, have moved within their stars, if it is tense.
+
+    Triangles of three boundary vertices are slivers in a disk. They hold up Newton's first steps, and have lost the
+    digits that say whither.
+    """
+    tense = len(task.faces.triangles) > FEW and task.problem(w, weight, False).energy(w) > TENSE
+    if tense and not task.crosses(w):
+        w = yield from smoothed(task.faces, w, weight, SWEEPS, task.loop)
+    return w
 
 
 def _task(faces: Elements, assembly: Assembly, start: Start, loop, boundary: str, smoother) -> Task:

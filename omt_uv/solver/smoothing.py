@@ -2,13 +2,14 @@
 
 Vertices without a common face move together, one such set after the other (a coloured Gauss-Seidel sweep, the smoother
 of multigrid methods). A sweep takes a tenth of the time of a Newton step on the whole mesh, which is at its worst with
-such errors: the one face that folds first stops the step of all.
+such errors: the one face that folds first stops the step of all. Boundaries may move, too, as far as nothing crosses.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from .contact import crossings, rim_edges
 from .energy import Elements, energies, squared
 from .progress import Progress, Steps
 from .topology import halfedges, twins
@@ -17,22 +18,39 @@ from .topology import halfedges, twins
 CONVEX, HALVINGS = 0.01, 5
 # Passes that add to an independent set, and sets that make a sweep; what is in none of them waits for Newton.
 PASSES, SETS = 3, 8
+# A boundary vertex moves only where it might go so many times as far before edges cross.
+ROOM = 6.0
 # Stars with so many times the mean energy are smoothed after a step, with so many sweeps.
 WORST, AFTER_STEP = 2.0, 4
 
 
-def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int) -> Steps[np.ndarray]:
-    """A map w (n,) complex without folds after sweeps over all its vertices but those of the boundary, without folds.
+def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int, loop=None) -> Steps[np.ndarray]:
+    """A map w (n,) complex without folds after sweeps over all its vertices, without folds.
 
-    weight: that of the area term.
+    weight: that of the area term; loop: a boundary, see `contact.rim_edges`, that moves, too, and does not come to
+    cross itself. Without it the boundary stays.
     """
     w = w.copy()
-    sets = list(_sets(faces, len(w)))
+    sets = list(_sets(faces, len(w), loop is not None))
     for k in range(sweeps):
         for vertex, row, star in sets:
+            before = w.copy()
             relax(vertex, row, star, w, weight, 1)
+            if loop is not None:
+                _uncross(w, before, loop)
         yield Progress("Smoothing", (k + 1) / sweeps)
     return w
+
+
+def _uncross(w: np.ndarray, before: np.ndarray, loop: np.ndarray) -> None:
+    """Take back, in place, what moved of edges of a boundary that cross, or would soon."""
+    tail, head = rim_edges(loop)
+    while len(pairs := crossings(before + ROOM * (w - before), loop)):
+        ends = np.concatenate([tail[pairs].ravel(), head[pairs].ravel()])
+        if not (w[ends] != before[ends]).any():
+            w[tail] = before[tail]
+            return
+        w[ends] = before[ends]
 
 
 class Smoother:
@@ -61,19 +79,20 @@ class Smoother:
         return w
 
 
-def _sets(faces: Elements, n: int):
-    """Independent sets of inner vertices: vertices (k,), and the rows (s,) and faces of their stars."""
-    for vertex, row, star, corner in _stars(faces.triangles, n):
+def _sets(faces: Elements, n: int, whole=False):
+    """Independent sets of vertices, inner or all: vertices (k,), and the rows (s,) and faces of their stars."""
+    for vertex, row, star, corner in _stars(faces.triangles, n, whole):
         yield vertex, row, part(faces, star, corner)
 
 
-def _stars(F: np.ndarray, n: int):
-    """Independent sets of inner vertices: vertices (k,); rows (s,), faces (s,) and corners (s,3) of their stars."""
+def _stars(F: np.ndarray, n: int, whole=False):
+    """Independent sets of vertices, inner or all: vertices (k,); rows, faces (s,) and corners (s,3) of their stars."""
     random = np.random.default_rng(0)
     inner = np.ones(n, bool)
-    tail, head = halfedges(F)
-    rim = twins(F) < 0
-    inner[tail[rim]] = inner[head[rim]] = False
+    if not whole:
+        tail, head = halfedges(F)
+        rim = twins(F) < 0
+        inner[tail[rim]] = inner[head[rim]] = False
     for _ in range(SETS):
         chosen = independent(F, np.where(inner, random.permutation(n), -1))
         inner &= ~chosen

@@ -14,13 +14,17 @@ from .newton import Assembly, Motion, Problem, Step
 from .progress import Progress, Steps
 from .smoothing import Smoother
 
+# A stage that reaches the goal ends when Newton promises less than this share of the energy. One on the way ends sooner
+# where the boundary is free; vertices on a circle or on sides do not make up for it later.
+LOOSE, ON_THE_WAY = 3e-2, 0.05
+
 
 @dataclass(frozen=True)
 class Quality:
     """Area error to reach (share of area in the wrong place), weights of the area term on the way, steps allowed.
 
     tolerance: where the error is not reached, a weight is left for a greater one when Newton promises less than this
-    share of the energy. A small one costs steps and saves shear.
+    share of the energy. A small one costs steps and saves shear. loose: the same where it is reached, at the end.
     """
 
     area_error: float
@@ -28,19 +32,17 @@ class Quality:
     greatest_weight: float
     max_steps: int
     tolerance: float
+    loose: float = LOOSE
 
 
 QUALITIES = {
     # For the start of a finer mesh: little shear alone, or areas about right, too.
-    "relaxed": Quality(0.1, (30.0,), 1e4, 80, 3e-2),
+    "relaxed": Quality(0.1, (30.0,), 1e4, 80, 3e-2, 1e-2),
     "rough": Quality(0.03, (30.0, 500.0), 1e4, 80, 1e-2),
     "draft": Quality(0.05, (10.0, 100.0), 1e3, 40, 1e-2),
     "standard": Quality(0.008, (30.0, 500.0), 1e6, 150, 3e-2),
     "exact": Quality(0.0003, (30.0, 1000.0, 3e4), 1e8, 300, 1e-2),
 }
-# A stage that reaches the goal ends when Newton promises less than this share of the energy. One on the way ends sooner
-# where the boundary is free; vertices on a circle or on sides do not make up for it later.
-LOOSE, ON_THE_WAY = 3e-2, 0.05
 # The same where sweeps follow every step: what Newton promises then is in few faces, and sweeps do it for less.
 SWEPT_TOLERANCE, SWEPT_LOOSE, SWEPT_ON_THE_WAY = 0.1, 0.15, 0.1
 # Sweeps before the first step of a stage.
@@ -114,7 +116,11 @@ def rescaled(task: Task, w: np.ndarray) -> Task:
 
 @dataclass(frozen=True)
 class Found:
-    """pull: tilt of the targets times the weight of the area term that gives the region its share."""
+    """What all stages found: the map w (n,) complex, Newton steps, last promised decrease over energy, weight of the
+    area term and energy at the end, status as in `refine.Refinement`, whether the boundary crosses itself.
+
+    pull: tilt of the targets times the weight of the area term that gives the region its share.
+    """
 
     w: np.ndarray
     steps: int
@@ -198,11 +204,13 @@ def _ends(task: Task, balance: float, settings: Quality, on_the_way: bool) -> tu
         return STRICT, LOOSE
     if task.smoother is not None:
         return max(settings.tolerance, SWEPT_TOLERANCE), SWEPT_ON_THE_WAY if on_the_way else SWEPT_LOOSE
-    return settings.tolerance, ON_THE_WAY if on_the_way and not task.scale_free else LOOSE
+    return settings.tolerance, ON_THE_WAY if on_the_way and not task.scale_free else settings.loose
 
 
 @dataclass(frozen=True)
 class Stage:
+    """What one stage found, as in `Found`; status "crossed": the next step would let the boundary cross itself."""
+
     w: np.ndarray
     steps: int
     residual: float
