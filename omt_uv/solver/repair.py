@@ -151,7 +151,7 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     ------
     ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to its chart's)
     """
-    vertices, count = nudged(chart.vertices, chart.disk, extent, len(chart.triangles))
+    vertices, count = nudged(chart.vertices, chart.disk, extent, chart.faces)
     if not count:
         return chart, 0
     # What fills a hole is no triangle of anybody's.
@@ -159,11 +159,12 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
 
 
 def nudged(
-    vertices: np.ndarray, triangles: np.ndarray, extent: float, own: int | None = None
+    vertices: np.ndarray, triangles: np.ndarray, extent: float, faces: np.ndarray | None = None
 ) -> tuple[np.ndarray, int]:
     """Positions (n,3) with the vertices of triangles (m,3) without area moved a little, and how many these are.
 
-    The moves are random but always the same. An error blames only the first `own` triangles, all by default.
+    The moves are random but always the same. faces (k,): the names of the first triangles for an error, which blames no
+    others; their own numbers by default.
 
     Raises
     ------
@@ -187,7 +188,8 @@ def nudged(
         reach = _least_height(moving, triangles, bad)
         moved = np.unique(triangles[bad])
         moving[moved] += NUDGE * 4.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
-    raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.flatnonzero(bad[:own]))
+    names = np.arange(len(triangles)) if faces is None else faces
+    raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(names[bad[: len(names)]]))
 
 
 def _least_height(vertices: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> np.ndarray:
