@@ -201,13 +201,9 @@ def _area_error(faces, area):
     return float(np.abs(area / area.sum() - target / target.sum()).sum())
 
 
-def region_error(faces: Elements, w: np.ndarray) -> tuple[float, float]:
-    """Relative error of the share of the region in a map w (n,), and of single faces, in the region or in the rest,
+def _region_error(faces: Elements, area: np.ndarray) -> tuple[float, float]:
+    """Relative error of the share of the region with UV areas (m,), and of single faces, in the region or in the rest,
     whichever is worse; 0 without a region."""
-    return _region_error(faces, faces.areas(w))
-
-
-def _region_error(faces, area):
     if faces.region is None:
         return 0.0, 0.0
     target = faces.area * faces.ratio

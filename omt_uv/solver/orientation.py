@@ -10,7 +10,7 @@ import numpy as np
 from .geometry import face_areas, vertex_areas
 from .spherical import signed_volumes
 
-NORTH, FRONT, EAST = np.array([0.0, 0, 1]), np.array([0.0, -1, 0]), np.array([1.0, 0, 0])
+NORTH = np.array([0.0, 0, 1])
 # Two markers closer than this to each other or to the opposite point give no direction.
 TOO_CLOSE = 1e-6
 

@@ -34,9 +34,9 @@ def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int, loop=No
     sets = list(_sets(faces, len(w), loop is not None))
     for k in range(sweeps):
         for vertex, row, star in sets:
-            before = w.copy()
+            before = None if loop is None else w.copy()
             relax(vertex, row, star, w, weight, 1)
-            if loop is not None:
+            if before is not None:
                 _uncross(w, before, loop)
         yield Progress("Smoothing", (k + 1) / sweeps)
     return w

@@ -144,7 +144,7 @@ def _by_charts(
     fixed = np.arange(len(points)) < samples.fixed.sum()
     held_arcs = [k for k, arc in enumerate(lines.arcs) if arc.held]
     draft = Draft(points[order], number[triangles], fixed, _kept(held_arcs, samples, number))
-    slits = _kept(_slits(part, lines), samples, number)
+    slits = _kept(_along(lines, part.slits), samples, number)
     return Tessellation(draft, vertices, size, stretch, tuple(warnings), slits, _copies(part, lines, samples))
 
 
@@ -172,7 +172,7 @@ def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarra
 
 def _for_faces(part: Part, lines: Network, samples: ArcSamples, count: int, size, stretch) -> tuple[ArcSamples, int]:
     """Samples whose boundary fits a number of faces, F = 2 V - 2 euler - b, and the number of vertices."""
-    rim = _on_rim(part, lines)
+    rim = _along(lines, part.rim)
     b = sum(len(samples.along[k]) - 1 for k in rim)
     if (count + b) % 2 and rim:
         longest = max(rim, key=lambda k: len(samples.along[k]))
@@ -218,22 +218,17 @@ def _kept(arcs: list[int], samples: ArcSamples, number: np.ndarray) -> np.ndarra
     return np.sort(np.concatenate(keys)) if keys else np.zeros(0, np.int64)
 
 
-def _slits(part: Part, lines: Network) -> list[int]:
-    """The arcs along slits."""
-    return [k for k, arc in enumerate(lines.arcs) if np.isin(pair_keys(*arc.vertices[:2, None]), part.slits)[0]]
-
-
 def _copies(part: Part, lines: Network, samples: ArcSamples) -> int:
     """How many samples there are on slits in addition to those given, once they are open."""
     if len(part.slits) == 0:
         return 0
-    chains = [samples.along[k] for k in _slits(part, lines)]
+    chains = [samples.along[k] for k in _along(lines, part.slits)]
     on_rim = np.zeros(len(samples.points), dtype=bool)
-    for k in _on_rim(part, lines):
+    for k in _along(lines, part.rim):
         on_rim[samples.along[k]] = True
     return copies(np.concatenate([end for chain in chains for end in (chain[:-1], chain[1:])]), on_rim)
 
 
-def _on_rim(part: Part, lines: Network) -> list[int]:
-    """The arcs along boundaries."""
-    return [k for k, arc in enumerate(lines.arcs) if np.isin(pair_keys(*arc.vertices[:2, None]), part.rim)[0]]
+def _along(lines: Network, keys: np.ndarray) -> list[int]:
+    """The arcs along edges with the keys (k,), as those of boundaries or of slits."""
+    return [k for k, arc in enumerate(lines.arcs) if np.isin(pair_keys(*arc.vertices[:2, None]), keys)[0]]

@@ -127,6 +127,15 @@ class Story:
             bpy.ops.view3d.view_selected()
             bpy.ops.view3d.view_orbit(type="ORBITUP")
 
+    def open_tab(self, place):
+        """The add-on's tab beside the object that was made, by a click at a place in the 3D View."""
+        yield from self.pause(1)
+        view = self.area("VIEW_3D")
+        view.spaces.active.show_region_ui = True
+        self.look_at_it(view)
+        yield from self.pause(1)
+        yield from self.click(*self.place("VIEW_3D", *place))
+
     def head(self, count):
         """A bust of quads instead of the cube, open at the neck, selected."""
         points, faces = _head(count)

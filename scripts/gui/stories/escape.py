@@ -10,12 +10,7 @@ TAB, UNWRAP = (10, 213), (127, 105)
 
 def tell(story):
     obj = story.head(200)
-    yield from story.pause(1)
-    view = story.area("VIEW_3D")
-    view.spaces.active.show_region_ui = True
-    story.look_at_it(view)
-    yield from story.pause(1)
-    yield from story.click(*story.place("VIEW_3D", *TAB))
+    yield from story.open_tab(TAB)
     yield from story.click(*story.place("VIEW_3D", *UNWRAP))
     yield from story.until(lambda: story.running() and story.running().seconds > 1.5)
     yield from story.shoot("progress")

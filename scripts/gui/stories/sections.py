@@ -18,13 +18,10 @@ def tell(story):
     obj = closed_head(story)
     paint(obj)
     dress(obj)
-    view = story.area("VIEW_3D")
-    view.spaces.active.shading.color_type = "TEXTURE"
-    view.spaces.active.show_region_ui = True
-    view.spaces.active.overlay.show_stats = True
-    story.look_at_it(view)
-    yield from story.pause(1)
-    yield from story.click(*story.place("VIEW_3D", *TAB))
+    space = story.area("VIEW_3D").spaces.active
+    space.shading.color_type = "TEXTURE"
+    space.overlay.show_stats = True
+    yield from story.open_tab(TAB)
     story.facts["magnified"] = yield from run(story, "magnify", *MAGNIFY)
     story.facts["sphere"] = yield from run(story, "sphere", *SPHERE)
     story.facts["remeshed"] = yield from run(story, "remesh", *REMESH)

@@ -13,18 +13,13 @@ REDO = (150, 104)
 
 def tell(story):
     obj = story.head(60)
-    yield from story.pause(1)
-    view = story.area("VIEW_3D")
-    view.spaces.active.show_region_ui = True
-    story.look_at_it(view)
-    yield from story.pause(1)
+    yield from story.open_tab(TAB)
     yield from first_unwrap(story, obj)
     yield from colours(story)
     yield from redo(story)
 
 
 def first_unwrap(story, obj):
-    yield from story.click(*story.place("VIEW_3D", *TAB))
     yield from story.shoot("tab")
     yield from story.click(*story.place("VIEW_3D", *UNWRAP))
     yield from story.until(lambda: not story.running() and obj.data.uv_layers)
