@@ -112,7 +112,7 @@ class ClosestPoint:
         owner, _ = self._spread
         k = min(CANDIDATES, len(owner))
         _, index = self._tree.query(np.column_stack([points, self.weight * normals]), k=k)
-        faces = owner[index.reshape(len(points), -1)]
+        faces = owner[index.reshape(len(points), k)]
         _, distance = self._distance(points[:, None], faces)
         # The right side first, then the distance.
         back = np.einsum("kcj,kj->kc", self.normals.take(faces, axis=0), normals) < 0
@@ -181,21 +181,36 @@ def _weighted(corners: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
 class Memory:
     """Closest points for the same points again and again, while they or the mesh move little by little: from the last
     answer on it is a few steps, but these may end in a nearest point that is not the nearest of all, so that every few
-    calls there is a search."""
+    calls there is a search, for those farther than `far` times the root of the mean square."""
 
-    def __init__(self, search_every: int):
-        self.search_every = search_every
+    def __init__(self, search_every: int, far: float = 0.0):
+        self.search_every, self.far = search_every, far
         self._faces: np.ndarray | None = None
         self._calls = 0
 
     def __call__(self, index: ClosestPoint, points: np.ndarray, normals: np.ndarray) -> Located:
         """As `ClosestPoint.__call__` of an index, whose triangles have the numbers of the last one's."""
-        if self._faces is None or self._calls % self.search_every == 0:
+        again = self._calls % self.search_every == 0
+        if self._faces is None or (again and self.far == 0):
             found = index(points, normals)
         else:
             found = index.walk(points, self._faces)
+            if again:
+                _search_again(index, points, normals, found, self.far)
         self._faces, self._calls = found.faces, self._calls + 1
         return found
+
+
+def _search_again(index: ClosestPoint, points: np.ndarray, normals: np.ndarray, found: Located, far: float) -> None:
+    """Overwrite what was found for points (k,3) that are far from it."""
+    off = found.points - points
+    square = _dot(off, off)
+    mine = np.flatnonzero(square > far**2 * square.sum() / max(len(square), 1))
+    other = index(points[mine], normals[mine])
+    for whole, part in zip(
+        (found.points, found.faces, found.barycentric), (other.points, other.faces, other.barycentric), strict=True
+    ):
+        whole[mine] = part
 
 
 def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:

@@ -7,9 +7,11 @@ outside: `minimum_degree` of the vertices' graph, for any number of unknowns a v
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import cg, splu
+from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from .errors import PrecisionError
 
@@ -74,8 +76,16 @@ def solve_general(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray = "cola
 
 def solve_by_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-6, most: int = 200) -> np.ndarray:
     """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite and close to its diagonal."""
-    inverse = 1 / A.diagonal()
-    x, _ = cg(A, b, rtol=tolerance, maxiter=most, M=sp.diags(inverse))
+    return by_gradients(lambda x: A @ x, b, sp.diags(1 / A.diagonal()), tolerance, most)
+
+
+def by_gradients(
+    times: Callable[[np.ndarray], np.ndarray], b: np.ndarray, inverse: sp.spmatrix, tolerance: float, most: int = 200
+) -> np.ndarray:
+    """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite, given by `times`, x to A x, and close
+    to the matrix with this `inverse`."""
+    A = LinearOperator(shape=inverse.shape, matvec=times, dtype=float)
+    x, _ = cg(A, b, rtol=tolerance, maxiter=most, M=inverse)
     return x
 
 

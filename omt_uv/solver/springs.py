@@ -1,12 +1,15 @@
-"""What keeps triangles in shape while a mesh is fitted: matrices over the displacements (3n,) of its vertices."""
+"""What keeps triangles in shape while a mesh is fitted."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from .closest import face_normals
-from .geometry import angles_from_lengths, halfedge_lengths, laplacian_from_weights
+from .geometry import angles_from_lengths, halfedge_lengths
+from .topology import halfedges
 
 # Where angles fall below the first, springs set in, and are twice as strong as STRENGTH at most where they are smaller
 # than twice the way to the second.
@@ -20,12 +23,22 @@ def smallness(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.clip((SMALL - angle) / (SMALL - SMALLER), 0, 2)
 
 
-def equilateral(points: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> tuple[sp.spmatrix, np.ndarray]:
-    """Springs of triangles, in proportion to `bad` (m,), to the equilateral ones nearest to them.
+@dataclass(frozen=True)
+class Springs:
+    """A matrix of scalars: its diagonal (n,), and what every halfedge adds between its ends, both ways, (3m,); and a
+    force (n,3)."""
 
-    Matrix (3n,3n) and right side (3n,) of the squared differences of their corners from their targets, both about
-    their centroids. With R the rotation by a third about the normal, the target of the first corner is
-    (o_0 + R^-1 o_1 + R o_2) / 3 for the corners' offsets o from the centroid, and the others are R and R^-1 of it.
+    diagonal: np.ndarray
+    between: np.ndarray
+    force: np.ndarray
+
+
+def equilateral(points: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> Springs:
+    """Springs of triangles (m,3), in proportion to `bad` (m,), to the equilateral ones nearest to them.
+
+    The squared differences of their corners from their targets, both about their centroids. With R the rotation by a
+    third about the normal, the target of the first corner is (o_0 + R^-1 o_1 + R o_2) / 3 for the corners' offsets o
+    from the centroid, and the others are R and R^-1 of it.
     """
     n, mine = len(points), np.flatnonzero(bad > 0)
     t, weight = triangles[mine], STRENGTH * bad[mine]
@@ -40,15 +53,27 @@ def equilateral(points: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> t
     pull = weight[:, None, None] * (target - off)
     force = np.stack([np.bincount(t.ravel(), pull[..., k].ravel(), n) for k in range(3)], axis=1)
     # The squares of three offsets from their mean are a third of those of their differences.
-    graph = laplacian_from_weights(t.ravel(), t[:, [1, 2, 0]].ravel(), np.repeat(weight / 3, 3), n)
-    return sp.kron(graph, sp.identity(3), format="csr"), force.ravel()
+    between = np.zeros((len(triangles), 3))
+    between[mine] = -weight[:, None] / 3
+    return Springs(np.bincount(t.ravel(), np.repeat(2 * weight / 3, 3), n), between.ravel(), force)
 
 
-def fairness(triangles: np.ndarray, n: int) -> sp.spmatrix:
-    """Squared difference of every displacement (3n,) from the mean of its neighbours'."""
-    tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
-    graph = sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
-    graph.data[:] = 1
-    degree = np.maximum(np.diff(graph.indptr), 1)
-    difference = sp.identity(n) - sp.diags(1 / degree) @ graph
-    return sp.kron(difference.T @ difference, sp.identity(3))
+class Fairness:
+    """Squared difference of every displacement of a mesh (m,3), (3m,) with n vertices from the mean of its neighbours'.
+
+    diagonal (n,): of the matrix
+    """
+
+    def __init__(self, triangles: np.ndarray, twin: np.ndarray, n: int):
+        tail, head = halfedges(triangles)
+        rim = twin < 0
+        rows, columns = np.concatenate([tail, head[rim]]), np.concatenate([head, tail[rim]])
+        weight = 1 / np.maximum(np.bincount(rows, minlength=n), 1)
+        self._mean = sp.csr_matrix((weight[rows], (rows, columns)), shape=(n, n))
+        self._back = self._mean.T.tocsr()
+        self.diagonal = 1 + np.bincount(columns, weight[rows] ** 2, n)
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Half the gradient (n,3) at displacements (n,3)."""
+        off = x - self._mean @ x
+        return off - self._back @ off

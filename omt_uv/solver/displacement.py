@@ -1,0 +1,128 @@
+"""The linear least squares problem of a fit: distances vanish along the lines between pairs of closest points, while
+vertices stay near the centroids of their cells and triangles in shape.
+
+Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1993; Chen, Medioni 1992.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from .closest import face_normals, vertex_normals
+from .linear import by_gradients
+from .pairs import Pairs
+from .springs import Fairness, equilateral, smallness
+from .topology import halfedges
+
+# Weights next to the distances: of even displacements, of the centroids along the surface, of no displacement at all.
+FAIRNESS = 0.02
+CENTROID = 0.35
+STILL = 1e-3
+# Distances of this many times their mean count double, and up to 1 + FARTHEST^2 times.
+FAR, FARTHEST = 3.0, 3.0
+# The centroid's weight rises by PRESS where angles are small, and falls by half where a point around is EASY times the
+# mean distance away: to come closer to a crest, vertices have to slide onto it.
+PRESS = 3.0
+EASY, EASIEST = 6.0, 0.05
+# Relative residual of the moves.
+TOLERANCE = 1e-6
+# Where the entries of a symmetric matrix (3,3) are in a list of the six that differ.
+SYMMETRIC = ((0, 1, 2), (1, 3, 4), (2, 4, 5))
+
+
+def displacements(
+    points: np.ndarray,
+    triangles: np.ndarray,
+    twin: np.ndarray,
+    fixed: np.ndarray,
+    pairs: Pairs,
+    pull: np.ndarray,
+    close: float,
+    usual: float,
+) -> np.ndarray:
+    """Moves (n,3) of the vertices of a mesh (n,3), (m,3), but for the `fixed` (n,) bool, that bring pairs together.
+
+    pull (n,3): from every vertex to the centroid of its cell; distances below `close` have no direction but the
+        normal's, and those many times the `usual` one weigh more
+    """
+    n, normals = len(points), vertex_normals(points, triangles)
+    along = np.eye(3) - normals[:, :, None] * normals[:, None]
+    bad = smallness(points, triangles)
+    hold = CENTROID * (1 + PRESS * worst_around(triangles, bad, n)) * _ease(triangles, pairs, usual, n)
+    diagonal, between, right = _distances(triangles, n, pairs, face_normals(points, triangles), close, usual)
+    springs = equilateral(points, triangles, bad)
+    # Shapes change along the surface alone.
+    tail, head = halfedges(triangles)
+    tense = np.flatnonzero(springs.between)
+    between = np.stack([between, between])
+    between[:, tense] += springs.between[tense, None, None] * (along[tail[tense]] @ along[head[tense]])
+    diagonal += (hold + springs.diagonal)[:, None, None] * along + STILL * np.eye(3)
+    right += np.einsum("nij,nj->ni", along, hold[:, None] * pull + springs.force)
+    system = _matrix(triangles, twin, diagonal, between)
+    even, free = Fairness(triangles, twin, n), np.repeat(~fixed, 3)
+
+    def times(x):
+        return free * (system @ x + FAIRNESS * even(x.reshape(n, 3)).ravel())
+
+    near = np.linalg.inv(diagonal + FAIRNESS * even.diagonal[:, None, None] * np.eye(3))
+    inverse = sp.bsr_matrix((near, np.arange(n), np.arange(n + 1)))
+    return by_gradients(times, free * right.ravel(), inverse, TOLERANCE).reshape(n, 3)
+
+
+def _distances(
+    triangles: np.ndarray, n: int, pairs: Pairs, normals: np.ndarray, close: float, usual: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of the pairs' squared distances, the blocks (n,3,3) of their matrix on the diagonal and (3m,3,3) at halfedges,
+    and the right side (n,3)."""
+    m, flat = len(triangles), triangles.ravel()
+    direction = pairs.way / np.maximum(pairs.distance, 1e-300)[:, None]
+    near = np.flatnonzero(pairs.distance < close)
+    direction[near] = normals[pairs.faces[near]]
+    weight = pairs.weight * n * (1 + np.minimum(pairs.distance / (FAR * usual), FARTHEST) ** 2)
+    off = weight * np.einsum("ki,ki->k", direction, pairs.way)
+    b, u = np.ascontiguousarray(pairs.barycentric.T), np.ascontiguousarray(direction.T)
+    squares = [weight * u[i] * u[j] for i in range(3) for j in range(i, 3)]
+
+    def blocks(c, d):
+        product = b[c] * b[d]
+        return np.stack([np.bincount(pairs.faces, product * q, m) for q in squares], axis=1)[:, SYMMETRIC]
+
+    corners = np.stack([blocks(c, c) for c in range(3)], axis=1).reshape(-1, 9)
+    between = np.stack([blocks(c, (c + 1) % 3) for c in range(3)], axis=1).reshape(-1, 3, 3)
+    pulls = [np.bincount(pairs.faces, off * b[c] * u[i], m) for c in range(3) for i in range(3)]
+    return _summed(flat, corners, n).reshape(n, 3, 3), between, _summed(flat, np.stack(pulls, 1).reshape(-1, 3), n)
+
+
+def _summed(place: np.ndarray, rows: np.ndarray, n: int) -> np.ndarray:
+    """Sums (n,c) of rows (k,c) by their places (k,)."""
+    return np.stack([np.bincount(place, column, n) for column in rows.T], axis=1)
+
+
+def _matrix(triangles: np.ndarray, twin: np.ndarray, diagonal: np.ndarray, between: np.ndarray) -> sp.bsr_matrix:
+    """The matrix (3n,3n) with blocks (n,3,3) on the diagonal, and between the ends of the edges the sums of those of
+    their halfedges, from tail to head and back (2,3m,3,3)."""
+    n, (tail, head) = len(diagonal), halfedges(triangles)
+    inner, rim = np.flatnonzero(twin >= 0), np.flatnonzero(twin < 0)
+    there = between[0]
+    there[inner] += between[1, twin[inner]]
+    rows = np.concatenate([np.arange(n), tail, head[rim]])
+    columns = np.concatenate([np.arange(n), head, tail[rim]])
+    order = np.argsort(rows, kind="stable")
+    first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
+    blocks = np.concatenate([diagonal, there, between[1, rim]])
+    return sp.bsr_matrix((blocks[order], columns[order], first), shape=(3 * n, 3 * n))
+
+
+def _ease(triangles: np.ndarray, pairs: Pairs, usual: float, n: int) -> np.ndarray:
+    """Share of the centroid's weight that is left at every vertex, (n,)."""
+    farthest = np.zeros(len(triangles))
+    np.maximum.at(farthest, pairs.faces, pairs.distance / usual)
+    return np.maximum(1 / (1 + (worst_around(triangles, farthest, n) / EASY) ** 2), EASIEST)
+
+
+def worst_around(triangles: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
+    """The largest of the values (m,) of the triangles around every vertex, (n,)."""
+    worst = np.zeros(n)
+    np.maximum.at(worst, triangles.ravel(), np.repeat(values, 3))
+    return worst

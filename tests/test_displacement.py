@@ -1,0 +1,51 @@
+"""The moves of a fit solve the least squares problem that its description states."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+
+from omt_uv.solver import displacement
+from omt_uv.solver.closest import face_normals
+from omt_uv.solver.displacement import displacements
+from omt_uv.solver.pairs import Pairs
+from omt_uv.solver.topology import twins
+
+
+def some_pairs(V, F, k=400):
+    rng = np.random.default_rng(4)
+    way, bary = rng.standard_normal((k, 3)), rng.dirichlet(np.ones(3), k)
+    return Pairs(rng.integers(0, len(F), k), bary, way, np.linalg.norm(way, axis=1), np.full(k, 1 / k))
+
+
+def test_moves_are_those_of_the_dense_problem(monkeypatch):
+    """With distances alone, a little stillness and fairness: the same as written out row by row."""
+    V, F = meshes.grid(5, 4)
+    n, pairs = len(V), some_pairs(V, F)
+    monkeypatch.setattr(displacement, "CENTROID", 0.0)
+    monkeypatch.setattr(displacement, "FAIRNESS", 0.0)
+    monkeypatch.setattr(displacement, "smallness", lambda points, triangles: np.zeros(len(triangles)))
+    fixed = np.arange(n) < 3
+    usual = pairs.usual
+    found = displacements(V, F, twins(F), fixed, pairs, np.zeros((n, 3)), 0.1, usual)
+    rows, right = np.zeros((len(pairs.faces), 3 * n)), np.zeros(len(pairs.faces))
+    normals = face_normals(V, F)
+    for k, face in enumerate(pairs.faces):
+        d = pairs.distance[k]
+        u = normals[face] if d < 0.1 else pairs.way[k] / d
+        root = np.sqrt(n * pairs.weight[k] * (1 + min(d / (displacement.FAR * usual), displacement.FARTHEST) ** 2))
+        for c in range(3):
+            rows[k, 3 * F[face, c] + np.arange(3)] += root * pairs.barycentric[k, c] * u
+        right[k] = root * (u @ pairs.way[k])
+    free = np.repeat(~fixed, 3)
+    A, b = (rows.T @ rows + displacement.STILL * np.eye(3 * n)), rows.T @ right
+    expected = np.zeros(3 * n)
+    expected[free] = np.linalg.solve(A[np.ix_(free, free)], b[free])
+    assert np.abs(found.ravel() - expected).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_fixed_vertices_stay():
+    V, F = meshes.grid(5, 4)
+    fixed = np.arange(len(V)) % 3 == 0
+    moves = displacements(V, F, twins(F), fixed, some_pairs(V, F), np.zeros_like(V), 1e-3, 1.0)
+    assert (moves[fixed] == 0).all() and np.abs(moves[~fixed]).min() > 0
