@@ -19,6 +19,8 @@ MAX_RASTER = 2048
 # Wider gaps, in texels, are made by rasterising coarser.
 MAX_GAP = 31
 ATTEMPTS = 8
+# Atlases up to so many times as wide as high are square enough; for others larger scales are tried so often.
+OBLONG, TRIALS = 1.05, 5
 REMEDY = "Lower the margin or raise the texture size"
 
 
@@ -88,17 +90,48 @@ def _pack(islands: list[np.ndarray], triangles: list[np.ndarray], margin: float,
     widest = (2 * padding - 1) * inner / margin if margin > 0 else np.inf
     for _ in range(ATTEMPTS):
         placed, scale = _place(turned, triangles, max(int(raster), 1), padding)
-        low = np.min([p.min(axis=0) for p in placed], axis=0)
-        size = float(np.max([(p - low).max() for p in placed]))
+        size = max(_extent(placed))
         if size <= widest:
             break
         raster *= 0.95 * widest / size
     else:
         raise MarginError(f"No room for {len(islands)} islands with a margin of {margin:g} pixels. {REMEDY}.")
-    fit = inner / size
+    side = int(min(widest, max(size, MAX_RASTER)))
+    placed, scale = _squarer(turned, triangles, placed, scale, side, padding)
+    low = np.min([p.min(axis=0) for p in placed], axis=0)
+    fit = inner / max(_extent(placed))
     origin = margin / texture_size
     result = [(p - low) * (fit / texture_size) + origin for p in placed]
     return Packing(result, scale * fit / texture_size, "xatlas", covered_area(result, triangles))
+
+
+def _extent(islands) -> np.ndarray:
+    """Width and height (2,) of what islands (n_i,2) take together."""
+    return np.max([p.max(axis=0) for p in islands], axis=0) - np.min([p.min(axis=0) for p in islands], axis=0)
+
+
+def _squarer(islands, triangles, placed, scale: float, side: int, padding: int) -> tuple[list[np.ndarray], float]:
+    """Islands placed anew in a square of `side` texels, as large as they fit, if they fit larger than `placed`.
+
+    Left to choose a scale, xatlas fills a rectangle of any shape, at times a tenth of the square around it.
+    """
+    narrow, wide = sorted(_extent(placed))
+    best = placed, scale
+    longest = max(float(np.ptp(p, axis=0).max()) for p in islands)
+    fits = scale * side / wide
+    # What has more room to be moved in also fits a little better.
+    fails = min(1.1 * fits * np.sqrt(wide / narrow), side / longest)
+    for _ in range(TRIALS if wide > OBLONG * narrow else 0):
+        density = np.sqrt(fits * fails)
+        try:
+            found = _place(islands, triangles, side, padding, density)
+        except PackingError:  # they do not fit
+            fails = density
+            continue
+        fits = density
+        if found[1] / max(_extent(found[0])) > best[1] / max(_extent(best[0])):
+            best = found
+    return best
 
 
 def _alone(points: np.ndarray, triangles: np.ndarray, width: float) -> Packing:
@@ -137,8 +170,12 @@ def turn_upright(points: np.ndarray) -> np.ndarray:
     return points @ np.array([[c, -s], [s, c]])
 
 
-def _place(islands, triangles, raster: int, padding: int) -> tuple[list[np.ndarray], float]:
-    """Islands in texels, and texels per unit of length."""
+def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) -> tuple[list[np.ndarray], float]:
+    """Islands in texels, and texels per unit of length.
+
+    density : how many these shall be, in a square of `raster` texels; raises a PackingError where islands do not fit
+        that. By default the atlas is roughly as large as such a square, and of any shape
+    """
     try:
         import xatlas
     except ImportError as error:
@@ -155,6 +192,7 @@ def _place(islands, triangles, raster: int, padding: int) -> tuple[list[np.ndarr
         atlas.add_uv_mesh(uv, index)
     options = xatlas.PackOptions()
     options.resolution, options.padding = raster, padding
+    options.texels_per_unit = density * extent / EXTENT
     options.rotate_charts = options.rotate_charts_to_axis = False
     try:
         atlas.generate(pack_options=options)

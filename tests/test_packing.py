@@ -75,6 +75,16 @@ def test_one_scale_and_no_mirror_image():
     assert 0.25 < result.coverage < 1
 
 
+def test_many_slim_islands_fill_the_square():
+    """Left to choose a scale, xatlas fills a strip of 1 by 0.4, and a twelfth of the square: hair cards."""
+    rng = np.random.default_rng(0)
+    islands = [np.array([[0, 0], [w, 0], [w, h], [0, h]]) for w, h in rng.uniform([0.03, 0.1], [0.05, 0.8], (90, 2))]
+    result = pack(islands, [np.array([[0, 1, 2], [0, 2, 3]])] * 90, 2, 512)
+    assert (np.ptp(np.concatenate(result.islands), axis=0) > 0.9).all()
+    assert least_distance(result.islands) >= 2 / 512
+    assert result.coverage > 0.25
+
+
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_units_do_not_matter(unit):
     plain, scaled = (pack(corners(9, unit=u), [FAN] * 9) for u in (1.0, unit))
