@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import part_maps
+from omt_uv.solver.bisection import bisected
 from omt_uv.solver.errors import (
     CountError,
     DensityError,
@@ -404,3 +405,75 @@ def test_a_surface_too_long_for_one_conformal_map_is_mapped_in_pieces():
     assert len(result.vertices) == 700 and topology(result.triangles) == topology(F)
     assert not [w for w in result.warnings if "conformal" in w]
     assert angles(result.vertices, result.triangles).min() > 20
+
+
+def sliver_cone():
+    """A body of twelve long sides: 24 vertices."""
+    turn = 2 * np.pi * np.arange(12) / 12
+    ring = np.column_stack([np.cos(turn), np.sin(turn)])
+    V = np.concatenate([np.column_stack([r * ring, np.full(12, z)]) for r, z in ((0.1, 0.0), (0.02, 0.6))])
+    a, b = np.arange(12), np.roll(np.arange(12), -1)
+    fan = np.column_stack([np.zeros(10, int), np.arange(1, 11), np.arange(2, 12)])
+    sides = np.concatenate([np.column_stack([a, b, b + 12]), np.column_stack([a, b + 12, a + 12])])
+    return V, np.concatenate([fan[:, ::-1], sides, fan + 12])
+
+
+@pytest.mark.parametrize("count", [60, 400])
+def test_long_faces_are_no_worse_than_many_small_ones(count):
+    V, F = sliver_cone()
+    result = run(V, F, count)
+    assert len(result.vertices) == count and topology(result.triangles) == (2, 0)
+    assert angles(result.vertices, result.triangles).min() > 25
+    normal = np.cross(
+        *(result.vertices[result.triangles[:, k]] - result.vertices[result.triangles[:, 0]] for k in (1, 2))
+    )
+    first, second = np.arange(3 * len(normal)) // 3, twins(result.triangles) // 3
+    assert (np.einsum("ij,ij->i", normal[first], normal[second]) > 0).mean() > 0.9
+    foot = np.einsum("kc,kcj->kj", result.barycentric, V[F[result.faces]])
+    assert np.linalg.norm(foot - result.vertices, axis=1).max() < 0.02
+
+
+def test_faces_without_area_leave_the_mesh_in_its_place():
+    """Maps need a little area there, and what they are made from lies elsewhere."""
+    V, F = meshes.torus()
+    a, b, c = F[0]
+    V = np.concatenate([V + 5, (V[[a]] + V[[b]]) / 2 + 5])
+    F = np.concatenate([F[1:], [[a, len(V) - 1, c], [len(V) - 1, b, c], [a, b, len(V) - 1]]])
+    result = run(V, F, 300, rounds=10)
+    assert topology(result.triangles) == (0, 0)
+    foot = np.einsum("kc,kcj->kj", result.barycentric, V[F[result.faces]])
+    assert np.linalg.norm(foot - result.vertices, axis=1).max() < 0.1
+
+
+def test_halved_edges_are_the_same_surface():
+    V, F = meshes.cube()
+    lines = np.array([[0, 1], [1, 3]])
+    part = split_parts(V, F, lines).parts[0]
+    fine = bisected(part)
+    assert len(fine.vertices) > 300 and fine.euler == part.euler
+    np.testing.assert_allclose(np.bincount(fine.faces, fine.area), part.area)
+    places = np.einsum("mkc,mcj->mkj", fine.within, part.vertices[part.triangles[fine.faces]])
+    np.testing.assert_allclose(fine.vertices[fine.triangles], places, atol=1e-12)
+    lengths = [
+        np.linalg.norm(p.vertices[p.features[:, 0]] - p.vertices[p.features[:, 1]], axis=1) for p in (part, fine)
+    ]
+    assert len(lengths[1]) > len(lengths[0]) and abs(lengths[1].sum() - lengths[0].sum()) < 1e-12
+
+
+def test_many_small_parts_go_together_and_stay_apart():
+    """Also where they lie within one another."""
+    cone, (P, Q) = sliver_cone(), meshes.bumpy(6, 6)
+    bodies = [(cone[0] + [0.03 * k, 0, 0], cone[1]) for k in range(10)] + [
+        (0.2 * P + [0, 0, 0.1 * k], Q) for k in range(4)
+    ]
+    first = np.cumsum([0] + [len(V) for V, _ in bodies])
+    V = np.concatenate([V for V, _ in bodies])
+    F = np.concatenate([F + k for (_, F), k in zip(bodies, first[:-1], strict=True)])
+    original = Original(V, F)
+    result = run(V, F, 700, original=original)
+    assert len(result.vertices) == 700 and topology(result.triangles) == (10 * 2 + 4, 4)
+    owner = np.searchsorted(first, F[result.faces][:, 0], side="right") - 1
+    assert (owner[result.triangles] == owner[result.triangles[:, :1]]).all()
+    assert np.percentile(angles(result.vertices, result.triangles).min(axis=1), 1) > 30
+    (maps,) = original.maps_with_pile(np.ones(14, bool))
+    assert len(maps.part.members) == 14

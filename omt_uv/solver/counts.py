@@ -38,6 +38,8 @@ def least_vertices(part: Part) -> int:
     With a boundary of B edges, 3 for every loop at the least and n at the most, there are 3 (n - euler) - B edges, for
     which there have to be enough pairs of vertices.
     """
+    if part.members:
+        return sum(least_vertices(member) for member in part.members)
     if len(part.rim):
         rings = 3 * len(boundary_loops(part.triangles))
         return max(rings, int(np.ceil((5 + np.sqrt(25 - 24 * part.euler)) / 2 - 1e-9)))

@@ -7,10 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from .bisection import bisected
 from .chart_maps import Image, conformal_image, preserving_image
 from .charts import Chart
 from .errors import MeshError
 from .parts import Part, Parts, split_parts
+from .piles import piled
 from .progress import Steps, part_of
 from .sphere_conformal import ConformalSphere, conformal_sphere
 from .sphere_sampling import sphere_image
@@ -48,16 +50,18 @@ class PartMaps:
         self.part = part
         self._sphere: ConformalSphere | None = None
         self._tame = False
-        self._sets: dict[bool, tuple[list[Chart], list[Image]]] = {}
+        self._pieces: tuple[list[Chart], list[Image]] | None = None
+        # Conformal images of charts that were not cut to have them.
+        self._images: dict[int, Image] = {}
         self._latest: dict[tuple[bool, int], tuple[np.ndarray, Maps]] = {}
         # Whether to map it to the sphere: charts end at features.
-        self.spherical = part.spherical and len(part.features) == 0
+        self.spherical = part.spherical and len(part.features) == 0 and not part.members
         self.warnings: tuple[str, ...] = ()
 
     @property
     def charts(self) -> list[Chart]:
         """The part cut into disks, by `choose_charts` if that was called."""
-        return self._sets[self._tame][0] if self._tame in self._sets else self._few
+        return self._pieces[0] if self._tame and self._pieces else self._few
 
     @cached_property
     def _few(self) -> list[Chart]:
@@ -65,10 +69,9 @@ class PartMaps:
 
     def choose_charts(self, count: int) -> Steps[None]:
         """Cut the part into disks that have conformal maps as far as can be, or into few where vertices are few."""
-        self._tame = count >= MANY
-        if self._tame not in self._sets:
-            rounds = ROUNDS if self._tame else 0
-            self._sets[self._tame] = yield from tame_charts(self.part, self._few, conformal_image, rounds)
+        self._tame = count >= MANY and not self.part.members
+        if self._tame and self._pieces is None:
+            self._pieces = yield from tame_charts(self.part, self._few, conformal_image, ROUNDS)
 
     def of_sphere(self, density: np.ndarray) -> Steps[Maps | None]:
         """Maps to the sphere; None, and a warning from then on, where there are none in double precision."""
@@ -94,7 +97,11 @@ class PartMaps:
         if (known := self._known(k, density)) is not None:
             return known
         chart = self.charts[k]
-        first = self._sets[self._tame][1][k]
+        if self._tame and self._pieces:
+            first = self._pieces[1][k]
+        else:
+            first = self._images.get(k) or (yield from conformal_image(chart.vertices, chart.disk))
+            self._images[k] = first
         second = yield from preserving_image(chart.vertices, chart.disk, first.uv, density[chart.faces])
         return self._keep(k, density, Maps(first.uv, second.uv, first.warnings + second.warnings))
 
@@ -116,6 +123,7 @@ class Original:
         self.triangles = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
         empty = np.zeros((0, 2), np.int64)
         self.features = empty if features is None else np.asarray(features, np.int64).reshape(-1, 2)
+        self._piles: dict[bytes, PartMaps] = {}
 
     @cached_property
     def parts(self) -> Parts:
@@ -125,4 +133,14 @@ class Original:
     @cached_property
     def maps(self) -> list[PartMaps]:
         """The maps of every part."""
-        return [PartMaps(part) for part in self.parts.parts]
+        return [PartMaps(bisected(part)) for part in self.parts.parts]
+
+    def maps_with_pile(self, small: np.ndarray) -> list[PartMaps]:
+        """The maps of every part; where several are `small` (k,) bool, those of their pile instead, at the end."""
+        if small.sum() < 2:
+            return self.maps
+        key = small.tobytes()
+        if key not in self._piles:
+            parts = [part for part, together in zip(self.parts.parts, small, strict=True) if together]
+            self._piles[key] = PartMaps(bisected(piled(parts)))
+        return [maps for maps, together in zip(self.maps, small, strict=True) if not together] + [self._piles[key]]

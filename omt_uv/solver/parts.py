@@ -17,17 +17,21 @@ from .touching import join_touching
 
 @dataclass(frozen=True)
 class Part:
-    """One part in a unit box: vertices (n,3), triangles (m,3), the input's triangles (m,) and vertices (n,).
+    """One part in a unit box: vertices (n,3), triangles (m,3).
 
-    features (e,2): pairs of its vertices that are edges to keep; slits: sorted keys of those to be opened afterwards.
+    faces (m,): the input's triangle in which each lies; within (m,3,3): barycentric coordinates there of its corners;
+    features (e,2): pairs of its vertices that are edges to keep; slits: sorted keys of those to be opened afterwards;
+    shift (m,3): how far each triangle was moved from its place; members: the parts of a pile, see `piles.py`.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     faces: np.ndarray
-    vertex_ids: np.ndarray
+    within: np.ndarray
     features: np.ndarray
     slits: np.ndarray
+    shift: np.ndarray
+    members: tuple[Part, ...] = ()
 
     @property
     def area(self) -> np.ndarray:
@@ -116,4 +120,7 @@ def _part(chart: Chart, boxed: np.ndarray, features: np.ndarray, slits: np.ndarr
     rows = np.unique(np.sort(np.stack([tail[kept], head[kept]], axis=1), axis=1), axis=0)
     open_ = np.isin(key, slits)
     mine = np.unique(pair_keys(tail[open_], head[open_]))
-    return Part(boxed[chart.vertex_ids], chart.triangles, chart.faces, chart.vertex_ids, rows.reshape(-1, 2), mine)
+    m = len(chart.triangles)
+    within, shift = np.tile(np.eye(3), (m, 1, 1)), np.zeros((m, 3))
+    positions = boxed[chart.vertex_ids]
+    return Part(positions, chart.triangles, chart.faces, within, rows.reshape(-1, 2), mine, shift)

@@ -30,6 +30,8 @@ from .touching import opened
 FAR_MORE = 50
 ROUNDS = 30
 FIRST_ROUNDS, BALANCES = 10, 6
+# Parts with fewer vertices than this go together.
+SMALL = 500
 # How often boundaries and features are thinned out to reach a count.
 ATTEMPTS, THINNED = 3, 2.0
 # Mean step of a relaxation that has settled, in edge lengths.
@@ -106,7 +108,8 @@ def remesh(
     if count > FAR_MORE * len(original.vertices if count_of == "vertices" else original.triangles):
         warnings.append(f"{count} {count_of} are more than {FAR_MORE} times the input's; they add no detail")
     options = Options(count_of, strategy, fit, rounds, preserve_boundary)
-    results = yield from _remesh_parts(original.maps, wanted, count, options)
+    maps = original.maps_with_pile(_small(found.parts, wanted, count if count_of == "vertices" else count / 2))
+    results = yield from _remesh_parts(maps, wanted, count, options)
     warnings += summed_up([w for r in results for w in r.warnings])
     made = sum(len(r.triangles) for r in results)
     if count_of == "faces" and made != count:
@@ -131,6 +134,12 @@ def _checked_density(density: np.ndarray | None, m: int) -> np.ndarray:
     if density.shape != (m,):
         raise ValueError(f"density must have one value for each of {m} triangles, not the shape {density.shape}")
     return positive_density(density)
+
+
+def _small(parts: list[Part], density: np.ndarray, vertices: float) -> np.ndarray:
+    """The parts (k,) bool whose share of so many vertices is small."""
+    measure = np.array([float(part.area @ density[part.faces]) for part in parts])
+    return vertices * measure < SMALL * measure.sum()
 
 
 def _remesh_parts(maps: list[PartMaps], density: np.ndarray, count: int, options: Options) -> Steps[list[_Result]]:
@@ -235,7 +244,9 @@ def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options
         draft = yield from part_of(fit_to_surface(draft, index, level, start.size), 0.57, 0.43)
     points, triangles = opened(draft.points, draft.triangles, start.slits)
     on = index(points, vertex_normals(points, triangles))
-    return _Result(points, triangles, part.faces[on.faces], on.barycentric, moved, start.warnings)
+    points = points - part.shift[on.faces]
+    barycentric = np.einsum("kc,kcj->kj", on.barycentric, part.within[on.faces])
+    return _Result(points, triangles, part.faces[on.faces], barycentric, moved, start.warnings)
 
 
 class _Size:

@@ -14,7 +14,6 @@ from .arcs import Border
 from .domain import Disk
 from .embedding import tutte
 from .errors import TransportError
-from .part_maps import Maps
 from .point_location import locate
 from .power_diagram import power_diagram
 from .regular import by_hull
@@ -23,8 +22,6 @@ from .topology import twins
 ROUNDS = 5
 # Strategies name the map to sample on and the map to triangulate on.
 STRATEGIES = ("app-cfp", "app-app", "cfp-cfp", "cfp-app")
-# Where all of them leave double precision: an embedding with the boundary samples at equal angles.
-EVEN = "even-even"
 
 
 @dataclass(frozen=True)
@@ -39,19 +36,15 @@ def triangulate_chart(
     vertices: np.ndarray,
     triangles: np.ndarray,
     loop: np.ndarray,
-    maps: Maps,
+    maps: tuple[np.ndarray, np.ndarray],
     border: Border,
     count: int,
-    strategy: str,
 ) -> Patch | None:
     """A chart (n,3), (m,3) with its boundary samples and about `count` inner ones; None where precision fails.
 
-    strategy : one of STRATEGIES, or EVEN
+    maps : images (n,2) in the unit disk to sample on, and to triangulate on
     """
-    if strategy == EVEN:
-        from_map = to_map = _even_map(vertices, triangles, loop, border)
-    else:
-        from_map, to_map = maps.pair(strategy)
+    from_map, to_map = maps
     spread = spread_samples(_on_circle(from_map, loop, border), count)
     face, bary = locate(from_map, triangles, spread)
     corners = triangles[face]
@@ -74,8 +67,11 @@ def _on_circle(uv: np.ndarray, loop: np.ndarray, border: Border) -> np.ndarray:
     return np.column_stack([np.cos(place), np.sin(place)])
 
 
-def _even_map(vertices, triangles, loop, border: Border) -> np.ndarray:
-    """Mean value embedding (n,2) in the disk, boundary samples about equally far apart."""
+def even_map(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarray, border: Border) -> np.ndarray:
+    """Mean value embedding (n,2) of a chart in the disk, boundary samples about equally far apart.
+
+    It is there where other maps leave double precision, or are not worth their time.
+    """
     b = len(border.samples)
     place = np.append(border.place, len(loop))
     angle = np.interp(np.arange(len(loop)), place, 2 * np.pi * np.arange(b + 1) / b)

@@ -17,13 +17,15 @@ from .part_maps import PartMaps
 from .parts import Part
 from .progress import Progress, Steps, part_of
 from .rims import smooth_rims
-from .sampling import EVEN, Patch, triangulate_chart
+from .sampling import Patch, even_map, triangulate_chart
 from .sphere_sampling import sample_sphere
 from .topology import pair_keys
 from .touching import copies
 
-# Vertices that every part has at first.
-FEWEST = 100
+# Vertices that every part has at first, and parts of a pile in the mean.
+FEWEST, FEWEST_IN_PILE = 100, 24
+# Charts with up to so many inner samples need no maps: what relaxation makes of them is the same.
+FEW = 50
 # Samples on boundaries and features that are too many move apart by this factor, again and again, up to so many edges.
 STRETCH, LONGEST = 1.25, 1e3
 
@@ -100,8 +102,9 @@ def _by_charts(
     measure = float(part.area @ density)
     vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
     size, total = edge_size(measure, rim, vertices), vertices
+    fewest = FEWEST_IN_PILE * len(part.members) if part.members else FEWEST
     # A few samples make no sound mesh of a surface, so these are taken away only afterwards.
-    finer = edge_size(measure, rim, max(vertices, FEWEST)) / size
+    finer = edge_size(measure, rim, max(vertices, fewest)) / size
     lengths = size / np.sqrt(at_vertices)
     first, corners = stretch, options.corners
     while True:
@@ -120,7 +123,7 @@ def _by_charts(
     if not options.corners:
         samples = smooth_rims(part, lines, samples, lengths)
     borders = [border(sides, samples, lines.arcs) for sides in lines.sides]
-    inner = _inner_counts(charts, borders, density, max(vertices, FEWEST) - len(samples.points))
+    inner = _inner_counts(charts, borders, density, max(vertices, fewest) - len(samples.points))
     patches: list[Patch] = []
     warnings = list(maps.warnings)
     if options.corners and not corners:
@@ -130,7 +133,7 @@ def _by_charts(
     done = 0.0
     for k, (loop, edge, number) in enumerate(zip(lines.loops, borders, inner, strict=True)):
         share = len(charts[k].triangles) / len(part.triangles)
-        steps = _patch(maps, k, loop, edge, int(number), density, options.strategy)
+        steps = _patch(maps, k, loop, edge, int(number), density, options)
         patch, said = yield from part_of(steps, 0.5 + 0.5 * done, 0.5 * share)
         patches.append(patch)
         warnings += said
@@ -192,16 +195,22 @@ def _inner_counts(charts: list[Chart], borders: list[Border], density: np.ndarra
 
 
 def _patch(
-    maps: PartMaps, k: int, loop: np.ndarray, edge: Border, number: int, density: np.ndarray, strategy: str
+    maps: PartMaps, k: int, loop: np.ndarray, edge: Border, number: int, density: np.ndarray, options: Options
 ) -> Steps[tuple[Patch, tuple[str, ...]]]:
     if len(edge.samples) == 3 and number == 0:
         return Patch(np.zeros((0, 3)), np.arange(3)[None]), ()
-    found = yield from maps.of_chart(k, density)
     chart = maps.charts[k]
-    for name in (strategy, EVEN):
-        patch = triangulate_chart(chart.vertices, chart.disk, loop, found, edge, number, name)
+    # Charts with triangles that had no area lie a little aside.
+    places = maps.part.vertices[chart.vertex_ids]
+    if number > FEW or not options.rounds:
+        found = yield from maps.of_chart(k, density)
+        patch = triangulate_chart(places, chart.disk, loop, found.pair(options.strategy), edge, number)
         if patch is not None:
             return patch, found.warnings
+    even = even_map(chart.vertices, chart.disk, loop, edge)
+    patch = triangulate_chart(places, chart.disk, loop, (even, even), edge, number)
+    if patch is not None:
+        return patch, ()
     elements = maps.part.faces[chart.faces]
     raise PrecisionError(
         f"A piece of {len(elements)} triangles leaves no room for {number} vertices in double precision",
