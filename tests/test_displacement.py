@@ -49,3 +49,16 @@ def test_fixed_vertices_stay():
     fixed = np.arange(len(V)) % 3 == 0
     moves = displacements(V, F, twins(F), fixed, some_pairs(V, F), np.zeros_like(V), 1e-3, 1.0)
     assert (moves[fixed] == 0).all() and np.abs(moves[~fixed]).min() > 0
+
+
+def test_the_matrix_is_symmetric_where_the_surface_bends(monkeypatch):
+    """Springs act along the surface, which is another plane at every vertex; conjugate gradients need symmetry."""
+    V, F = meshes.bumpy(7, 6)
+    n, rng = len(V), np.random.default_rng(1)
+    asked = []
+    monkeypatch.setattr(displacement, "by_gradients", lambda times, b, *_: asked.append(times) or b)
+    monkeypatch.setattr(displacement, "smallness", lambda points, triangles: rng.random(len(triangles)))
+    displacements(V, F, twins(F), np.zeros(n, bool), some_pairs(V, F), np.zeros((n, 3)), 1e-3, 1.0)
+    matrix = np.stack([asked[0](e) for e in np.eye(3 * n)])
+    assert np.abs(matrix - matrix.T).max() < 1e-14 * np.abs(matrix).max()
+    assert np.linalg.eigvalsh(matrix).min() > 0
