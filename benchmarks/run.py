@@ -11,6 +11,8 @@ counts      Newton steps, factorisations and nonzeros of an unwrap: the same on 
 growth      time of the same surface, subdivided again and again, and the exponent
 islands     a thousand small islands against Minimum Stretch
 magnify     the share that a painted region gets, and Minimum Stretch with the same vertex group
+cascade     existing UVs magnified: shares, twice against once, time
+saliency    its time, and what turning and scaling change
 sphere      closed surfaces to the sphere: area, shear, folds, Newton steps, and time against Minimum Stretch
 remesh      triangles, distances and time beside QuadriFlow and Decimate; the four strategies of B. Gu 2018
 latency     how long Blender waits for a slice of a run and for Esc, wall clock
@@ -295,6 +297,18 @@ def magnify(args):
     return magnify_part(args)
 
 
+def cascade(args):
+    from cascade import cascade_part
+
+    return cascade_part(args)
+
+
+def saliency(args):
+    from saliency import saliency_part
+
+    return saliency_part(args)
+
+
 def speed(name):
     def part(args):
         import speed
@@ -332,6 +346,8 @@ PARTS = {
     "growth": speed("growth"),
     "islands": speed("islands"),
     "magnify": magnify,
+    "cascade": cascade,
+    "saliency": saliency,
     "latency": latency,
     "sphere": sphere,
     "remesh": remesh,

@@ -18,11 +18,11 @@ from .solver.chart_terms import located
 from .solver.charts import Surface, check_disk, triangle_rows
 from .solver.distortion import measure
 from .solver.errors import EmptyMeshError, MeshError, WeightError
-from .solver.exact_share import ExactShare, exact_share
+from .solver.exact_share import ExactShare, wanted
 from .solver.geometry import face_areas, signed_areas
 from .solver.islands import Island, uv_islands
-from .solver.lens import OUTLINES, Lens, aligned_to, magnify_map, magnify_region, refuse_folds
-from .solver.measure import Target, check_weights, from_polygons, from_vertices, normalised, painted, share
+from .solver.lens import OUTLINES, Lens, aligned_to, magnify_region, refuse_folds
+from .solver.measure import Target, check_factor, check_weights, from_polygons, from_vertices, normalised, share
 from .solver.overlap import overlap_share
 from .solver.progress import Steps, part_of
 from .solver.warp import warped
@@ -119,7 +119,7 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
     area = np.concatenate([a for _, a, _ in parts])
     weights = np.concatenate([w for *_, w in parts])
     try:
-        found = wanted(weights, area, settings.factor**settings.cascade, settings.exact)
+        found = wanted(weights, area, whole_factor(settings), settings.exact)
     except MeshError as error:
         raise Refusal(0, error) from error
     density = normalised(found.density, area)
@@ -140,12 +140,11 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
     return Magnified(layout.corners, layout.uv, reports, shares, warnings)
 
 
-def wanted(weights: np.ndarray, area: np.ndarray, factor: float, exact: bool) -> ExactShare:
-    """The density of a region (m,), for its exact share or for exactly the factor between weight 1 and weight 0."""
-    if exact:
-        return exact_share(weights, area, factor)
-    density = painted(weights, factor)
-    return ExactShare(density, factor, share(weights, area), share(weights, area * density))
+def whole_factor(settings: MagnifySettings) -> float:
+    """The factor of all magnifications in a row, infinite where it is too large. Raises ShareError for no factor."""
+    check_factor(settings.factor)
+    with np.errstate(over="ignore"):
+        return float(np.float64(settings.factor) ** settings.cascade)
 
 
 def _triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -237,44 +236,40 @@ def _weights_of(region: Region, island: Island) -> np.ndarray:
 
 
 def _piece(owner: int, island: Island, weights, settings: MagnifySettings) -> Steps[tuple[_Piece, tuple[str, ...]]]:
-    """An island after all its magnifications."""
+    """An island after its magnification, and warnings."""
     triangles = island.chart.triangles
     refuse_folds(island.uv, triangles)
     area = np.abs(signed_areas(island.uv, triangles))
-    whole = wanted(weights, area, settings.factor**settings.cascade, settings.exact)
-    uv, steps, texts, outline = island.uv, 0, list(whole.warnings), ""
-    for k in range(settings.cascade):
-        now = np.abs(signed_areas(uv, triangles))
-        job = _lens(island, uv, triangles, now, weights, settings)
-        lens = yield from part_of(job, k / settings.cascade, 1 / settings.cascade)
-        uv, steps, outline = lens.uv, steps + lens.iterations, lens.outline
-        texts += [text for text in lens.warnings if text not in texts]
-    return _Piece(owner, island, weights, area, whole, uv, outline, steps), tuple(texts)
-
-
-def _lens(island: Island, uv, triangles, area, weights, settings: MagnifySettings) -> Steps[Lens]:
-    """An island, of UV areas (m,), after one magnification."""
-    inside = settings.boundary in OUTLINES
-    if inside and settings.exact:
-        options = {"boundary": settings.boundary, "quality": settings.quality}
-        return (yield from magnify_region(uv, triangles, weights, settings.factor, **options))
-    density = normalised(wanted(weights, area, settings.factor, settings.exact).density, area)
-    if inside:
-        return (
-            yield from magnify_map(
-                uv, triangles, density, region=weights, boundary=settings.boundary, quality=settings.quality
-            )
+    factor = whole_factor(settings)
+    found = wanted(weights, area, factor, settings.exact)
+    if settings.boundary in OUTLINES:
+        lens = yield from magnify_region(
+            island.uv,
+            triangles,
+            weights,
+            factor,
+            exact=settings.exact,
+            boundary=settings.boundary,
+            quality=settings.quality,
         )
-    # Into a disk or a square: the plane is unwrapped like any other surface.
+    else:
+        lens = yield from _into_shape(island, area, found, weights, settings)
+    return _Piece(owner, island, weights, area, found, lens.uv, lens.outline, lens.iterations), lens.warnings
+
+
+def _into_shape(island: Island, area, found: ExactShare, weights, settings: MagnifySettings) -> Steps[Lens]:
+    """An island, of UV areas (m,), in a disk or a square: the plane is unwrapped like any other surface."""
+    uv, triangles = island.uv, island.chart.triangles
     check_disk(island.chart)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
     flat = replace(island.chart, vertices=np.column_stack([uv * mirror, np.zeros(len(uv))]))
+    density = normalised(found.density, area)
     done = yield from unwrap_chart(
         flat, boundary=settings.boundary, quality=settings.quality, density=density, region=weights
     )
     placed = aligned_to(done.uv, uv * mirror, triangles, 1 - weights, quarters=settings.boundary == "square") * mirror
-    iterations = done.newton_refinement
-    return Lens(placed, settings.boundary, iterations, 0.0, done.status, done.area_l1, done.warnings)
+    texts = (*found.warnings, *done.warnings)
+    return Lens(placed, settings.boundary, done.newton_refinement, 0.0, done.status, done.area_l1, texts)
 
 
 def _overall(pieces: Sequence[_Piece]) -> Shares:

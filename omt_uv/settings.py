@@ -168,7 +168,7 @@ class MagnifySettings(Settings):
 
     factor : times its share; exact : of the whole texture, otherwise against what has weight 0
     source : an identifier of SOURCES in lower case; boundary : of BOUNDARIES, or "own" for existing UVs
-    cascade : how often; k times the factor m is m^k, from the mesh at once and from UVs one after the other
+    cascade : how often; k times the factor m is m^k
     """
 
     factor: float = DEFAULT_FACTOR

@@ -53,7 +53,8 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
     exact: BoolProperty(
         name="Exact Share",
         description="The region gets exactly the factor times its share of the whole. "
-        "Otherwise the factor holds between weight 1 and weight 0, and the share follows",
+        "Otherwise the factor holds between weight 1 and weight 0, and the share follows; run again, "
+        "it multiplies there, but soft weights in between get less than at once",
         default=True,
     )
     boundary: EnumProperty(

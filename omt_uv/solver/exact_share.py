@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import ShareError
-from .measure import check_factor, check_weights, share
+from .measure import check_factor, check_weights, painted, share
 
 # A factor so many times what a region with a hard rim would need is said: the rest gets little of the texture.
 MOST_OF_HARD = 4.0
@@ -70,6 +70,19 @@ def exact_share(weights: np.ndarray, area: np.ndarray, factor: float, base: np.n
     soft = abs(np.log(found)) > abs(np.log(hard)) + np.log(MOST_OF_HARD)
     warning = f"The rim of the region is very soft for this factor: densities vary by {max(found, 1 / found):.3g}"
     return ExactShare(found**weights, found, before, asked, (warning,) if soft else ())
+
+
+def wanted(weights: np.ndarray, area: np.ndarray, factor: float, exact: bool) -> ExactShare:
+    """The density of a region (m,) for its exact share, or for exactly the factor between weight 1 and weight 0.
+
+    Raises
+    ------
+    WeightError, ShareError : see `exact_share` and `measure.painted`
+    """
+    if exact:
+        return exact_share(weights, area, factor)
+    density = painted(weights, factor)
+    return ExactShare(density, factor, share(weights, area), share(weights, area * density))
 
 
 def _contrast(weights, measure, asked: float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 
 from .energy import area_error, elements
 from .errors import FoldedUVError, MeshError
-from .exact_share import exact_share
+from .exact_share import exact_share, wanted
 from .geometry import face_areas, signed_areas
 from .improve import boundary_edges, meets_itself
 from .measure import normalised, share
@@ -27,7 +27,7 @@ from .topology import boundary_loops
 
 OUTLINES = ("own", "free")
 # Greatest step of a magnification, in the logarithm of the share.
-LARGEST_STEP = np.log(2) / 2
+LARGEST_STEP = np.log(2)
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,7 @@ def magnify_map(
     region: np.ndarray | None = None,
     boundary: str = "own",
     quality: str = "standard",
+    stricter: float = 1.0,
 ) -> Steps[Lens]:
     """Change the areas of a map uv (n,2), triangles (m,3), by a density (m,), without folds.
 
@@ -60,7 +61,7 @@ def magnify_map(
     region : (m,) in [0, 1], weights of a region whose share is to be exact. What lies outside of it keeps its place,
         as well as it can, where the outline is free
     boundary : "own" keeps a circle and straight sides; "free"
-    quality : "draft", "standard" or "exact"
+    quality : "draft", "standard" or "exact"; stricter: the area error is to be so many times smaller
 
     Raises
     ------
@@ -75,8 +76,10 @@ def magnify_map(
     middle = (area @ uv[triangles].mean(axis=1)) / area.sum()
     flat = (uv - middle) / size
     mesh = renumbered(np.column_stack([flat, np.zeros(len(flat))]), triangles, flat, None)
+    settings = QUALITIES[quality]
+    settings = replace(settings, area_error=settings.area_error / stricter)
     try:
-        found, outline, error = yield from _magnified(mesh, density, region, boundary, QUALITIES[quality])
+        found, outline, error = yield from _magnified(mesh, density, region, boundary, settings)
     except MeshError as problem:
         raise mesh.blame(problem) from problem
     return Lens(
@@ -96,30 +99,35 @@ def magnify_region(
     weights: np.ndarray,
     factor: float,
     *,
+    exact: bool = True,
     boundary: str = "own",
     quality: str = "standard",
 ) -> Steps[Lens]:
-    """Give a region of weights (m,) in [0, 1] `factor` times its share of a map uv (n,2), in steps of at most sqrt(2).
+    """Give a region of weights (m,) in [0, 1] `factor` times its share of a map uv (n,2), in steps of at most 2.
 
-    Each step shears the map before it as little as it can. Small steps are a flow: what it has done twice by 2 is
-    what it does once by 4, and the shear is no more than that of one large step.
+    Each step shears the map before it as little as it can. Steps are a flow: what it has done twice by 2 is what it
+    does once by 4.
+
+    exact : False for the factor between weight 1 and weight 0, see `exact_share.wanted`
 
     Raises
     ------
     FoldedUVError : see `magnify_map`
-    WeightError, ShareError : see `exact_share.exact_share`
+    WeightError, ShareError : see `exact_share.wanted`
     """
     refuse_folds(uv, triangles)
     before = np.abs(signed_areas(uv, triangles))
-    whole = exact_share(weights, before, factor)
+    whole = wanted(weights, before, factor, exact)
     count = max(1, int(np.ceil(abs(np.log(factor)) / LARGEST_STEP - 1e-9)))
-    done, texts = 0, []
+    # The areas of a step follow from those before it, so that their errors add up.
+    options = {"region": weights, "boundary": boundary, "quality": quality, "stricter": max(1.0, np.sqrt(count / 2))}
+    done, texts = 0, list(whole.warnings)
     for k in range(count):
         area = np.abs(signed_areas(uv, triangles))
-        # From what the region has to what it is to have: errors do not add up.
+        # From what the region has to what it is to have: errors of the share do not add up.
         rest = whole.before * factor ** ((k + 1) / count) / share(weights, area)
-        density = normalised(exact_share(weights, area, rest).density, area)
-        job = magnify_map(uv, triangles, density, region=weights, boundary=boundary, quality=quality)
+        density = exact_share(weights, area, rest).density if exact else whole.density ** (1 / count)
+        job = magnify_map(uv, triangles, normalised(density, area), **options)
         lens = yield from part_of(job, k / count, 1 / count)
         uv, done = lens.uv, done + lens.iterations
         texts += [text for text in lens.warnings if text not in texts]

@@ -74,6 +74,19 @@ def test_cascades_from_uvs():
     np.testing.assert_allclose(scenes.uv_of(obj), both, atol=1e-3)
 
 
+@pytest.mark.parametrize("source", ["MESH", "UV"])
+@pytest.mark.parametrize("boundary", ["OWN", "DISK"])
+def test_times_multiply_the_factor_without_an_exact_share(source, boundary):
+    obj = painted()
+    start = scenes.uv_of(obj)
+    found = []
+    for factor, times in ((1.5, 2), (2.25, 1)):
+        scenes.set_uv(obj, start)
+        magnify(factor=factor, cascade=times, exact=False, source=source, boundary=boundary)
+        found.append(scenes.uv_of(obj))
+    np.testing.assert_allclose(*found, atol=1e-6)
+
+
 def test_other_islands_stay_to_the_bit():
     obj = painted()
     far = np.array([p.center.x for p in obj.data.polygons])
@@ -121,6 +134,9 @@ def test_a_warped_image_follows():
         ({"weight_group": "nothing"}, "All weights are zero"),
         ({"factor": -2.0}, "-2 times"),
         ({"factor": 0.0}, "0 times"),
+        ({"factor": -2.0, "cascade": 2}, "-2 times"),
+        ({"factor": -2.0, "cascade": 2, "source": "UV"}, "-2 times"),
+        ({"factor": 1e30, "cascade": 16}, "inf times"),
         ({"factor": float("nan")}, "nan times"),
         ({"factor": 1000.0}, "leaves nothing"),
         ({"factor": 1000.0, "source": "UV"}, "leaves nothing"),
