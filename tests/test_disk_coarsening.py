@@ -113,3 +113,15 @@ def test_what_returns_to_the_boundary_crosses_nothing():
     assert (signed_areas(np.column_stack([w.real, w.imag]), coarse.triangles) > 0).all()
     fine = drain(coarse.prolonged(np.column_stack([w.real, w.imag]), len(V)))
     assert not len(crossings(fine @ [1, 1j], boundary_loops(F)[0]))
+
+
+@pytest.mark.parametrize("make", [lambda: meshes.bumpy(24, 24), meshes.comb, lambda: meshes.random_disk(900)])
+def test_what_returns_to_the_boundary_stays_inside(make):
+    """Also where the faces along its chord have no room: beyond it may be another part of the map."""
+    V, F = make()
+    flat = mean_value_sites(V, F, boundary_loops(F)[0], None, Disk())
+    coarse = drain(coarsened(V, F, flat, face_areas(V, F), len(V) // 8))
+    squeezed = flat[coarse.kept] @ [[1, 0.3], [-0.3, 1]] * [1.0, 1e-3]
+    fine = drain(coarse.prolonged(squeezed, len(V)))
+    assert (signed_areas(fine, F) > 0).all()
+    assert signed_areas(fine, F).sum() <= signed_areas(squeezed, coarse.triangles).sum() * (1 + 1e-9)

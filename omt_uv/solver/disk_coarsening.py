@@ -49,6 +49,11 @@ class Removal:
     before: np.ndarray
     faces: Elements
 
+    @property
+    def on_rim(self) -> np.ndarray:
+        """Which vertices (k,) bool return to a chord of the rim."""
+        return self.corner[:, 1] == self.corner[:, 2]
+
 
 @dataclass(frozen=True)
 class Coarse:
@@ -69,8 +74,7 @@ class Coarse:
             yield Progress("Coarser mesh", k / len(self.rounds))
             w[removal.vertex] = _returned(removal, w)
             # On the rim they stay on the chords: where the coarse boundary does not cross itself, neither does this.
-            rim = removal.corner[:, 1] == removal.corner[:, 2]
-            relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS, rim)
+            relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS, removal.on_rim)
         return np.column_stack([w.real, w.imag])
 
 
@@ -188,8 +192,10 @@ def _returned(removal: Removal, w: np.ndarray) -> np.ndarray:
     row, count, base = removal.row, len(removal.vertex), w[removal.into]
     a, b = w[removal.after], w[removal.before]
     touching = (removal.after == removal.into[row]) | (removal.before == removal.into[row])
-    inward = np.where(touching, 1j * (b - a) / np.maximum(np.abs(b - a), 1e-300), 0)
+    inward = np.where(touching, _left(b - a), 0)
     heading = np.bincount(row, inward.real, count) + 1j * np.bincount(row, inward.imag, count)
+    # On the rim, between the one edge and the chord: beyond the chord may be another part of the map.
+    heading = heading + np.where(removal.on_rim, _left(w[removal.corner[:, 0]] - w[removal.corner[:, 1]]), 0)
     slope, room = _cross(b - a, heading[row]), _cross(a - base[row], b - base[row])
     reach = np.where(touching | (slope >= 0), np.inf, room / np.maximum(-slope, 1e-300))
     nearest = np.full(count, np.inf)
@@ -202,6 +208,11 @@ def _returned(removal: Removal, w: np.ndarray) -> np.ndarray:
     way = np.ones(count)
     np.minimum.at(way, row[short], ((1 - KEPT_AREA) * at_safe / np.maximum(at_safe - at_target, 1e-300))[short])
     return safe + way * (target - safe)
+
+
+def _left(edge):
+    """Unit vectors to the left of edges (k,) complex."""
+    return 1j * edge / np.maximum(np.abs(edge), 1e-300)
 
 
 def _cross(a, b):
