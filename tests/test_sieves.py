@@ -71,6 +71,31 @@ def plate(n, thick=0.3):
     return V, np.concatenate([F, F[:, ::-1] + k, walls])
 
 
+def lattice_body(n):
+    """Round struts between n^3 joints: the surface of cubes of which every second one in a row is a joint, smoothed."""
+    k = 2 * n - 1
+    solid = np.zeros((k + 2,) * 3, bool)
+    i = np.stack(np.meshgrid(*[np.arange(k)] * 3, indexing="ij"))
+    solid[1:-1, 1:-1, 1:-1] = (i % 2).sum(0) <= 1
+    solid = solid.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+    faces = []
+    for axis in range(3):
+        u, v = (np.eye(3, dtype=int)[(axis + s) % 3] for s in (1, 2))
+        for end in (0, 1):
+            out = solid & ~np.roll(solid, 1 - 2 * end, axis)
+            low = np.argwhere(out) + end * np.eye(3, dtype=int)[axis]
+            square = np.stack([low, low + u, low + u + v, low + v], axis=1)
+            faces.append(square if end else square[:, ::-1])
+    points, index = np.unique(np.concatenate(faces).reshape(-1, 3), axis=0, return_inverse=True)
+    quads = index.reshape(-1, 4)
+    V, F = points.astype(float), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+    for _ in range(4):
+        around = np.zeros_like(V)
+        np.add.at(around, quads.ravel(), V[np.roll(quads, 1, axis=1).ravel()] + V[np.roll(quads, -1, axis=1).ravel()])
+        V = around / (2 * np.bincount(quads.ravel()))[:, None]
+    return V, F
+
+
 def check(V, F, shear, parts=1):
     result = drain(unwrap(triangle_surface(V, F)))
     areas = np.array([face_areas(V, F[c.faces]).sum() for c in result.charts])
@@ -124,6 +149,14 @@ def test_a_plate_with_many_holes_through_it_comes_apart_along_its_edges():
     result = check(V, F, 1 + 1e-6, parts=36 + 1)
     assert any("apart" in text for text in result.warnings)
     assert len(np.unique(np.sort(result.seams, axis=1), axis=0)) == len(result.seams)
+
+
+def test_a_lattice_without_sides_falls_into_fragments():
+    """28 handles: cut open into one chart, it is sheared twice as much."""
+    V, F = lattice_body(3)
+    parts = len(drain(unwrap(triangle_surface(V, F))).charts)
+    assert 4 <= parts <= 60
+    check(V, F, 1.5, parts)
 
 
 def test_a_plate_with_few_holes_through_it_stays_in_one_piece():

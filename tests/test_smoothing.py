@@ -56,6 +56,16 @@ def test_what_would_cross_is_taken_back():
     assert after[0] == -3.1
 
 
+def test_what_goes_over_a_narrow_part_is_taken_back():
+    # The tip of a finger swings into a spike from above; six times as far it would be past this again, below.
+    before = np.array([0, 0.1 + 1j, 0.2, 5, 5 + 3j, 0.55 + 3j, 0.5 + 0.9j, 0.45 + 3j, -3 + 3j, -3])
+    after = before + np.eye(10)[1] * 0.4
+    loop = np.arange(10)
+    assert len(crossings(after, loop)) and not len(crossings(before + smoothing.ROOM * (after - before), loop))
+    smoothing._uncross(after, before, loop)
+    np.testing.assert_array_equal(after, before)
+
+
 def test_sets_are_independent_and_hold_nearly_all_vertices_once(chart):
     faces, w, loop = chart
     held = np.concatenate([vertex for vertex, _, _ in smoothing._sets(faces, len(w))])

@@ -1,4 +1,4 @@
-"""Bodies with very many handles, as plates full of holes, taken apart into their sides.
+"""Bodies with many handles, as plates full of holes, taken apart into their sides, or into fragments.
 
 A cut that opens a hundred handles leaves a chart that has no room for the walls between them.
 """
@@ -7,24 +7,38 @@ from __future__ import annotations
 
 import numpy as np
 
+from .fragments import fragment_pairs
 from .holes import hole_rims
 from .nets import HARD
 from .piece import Kind, classify, fold_angles
 from .sheets import Sheets, components, corner_classes
 
+# A part with more handles comes apart.
+MANY_HANDLES = 12
 
-def parting_pairs(sheets: Sheets, positions: np.ndarray, one_sided: np.ndarray, most: int) -> np.ndarray:
-    """Pairs (p,) bool along which parts with more than `most` handles fall apart; none where that leaves as many.
+
+def parting_pairs(sheets: Sheets, positions: np.ndarray, one_sided: np.ndarray) -> np.ndarray:
+    """Pairs (p,) bool along which parts with more than MANY_HANDLES fall apart.
 
     These are the hard edges around the holes of sides: from a plate come away the walls of the holes through it,
-    each in one piece. positions (n,3) of the surface; one_sided (m,) bool: see `piece.classify`.
+    each in one piece. Where that leaves as many handles, a part falls into fragments instead.
+    positions (n,3) of the surface; one_sided (m,) bool: see `piece.classify`.
     """
     part, whole = _kinds(sheets, one_sided)
-    crowded = (whole.handles > most)[part[sheets.first // 3]]
+    crowded = (whole.handles > MANY_HANDLES)[part]
     if not crowded.any():
-        return crowded
+        return np.zeros(len(sheets.first), dtype=bool)
+    gone, settled = _sides(sheets, positions, one_sided, crowded)
+    return gone | fragment_pairs(sheets, positions, one_sided, crowded & ~settled)
+
+
+def _sides(sheets: Sheets, positions, one_sided, crowded) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (p,) bool between the walls of holes and the sides that have these, and the triangles (m,) bool of parts
+    that have few handles without them; others are left alone."""
+    part = components(sheets)
     pair = np.stack([sheets.first, sheets.second], axis=1)
-    hard = crowded & (np.abs(fold_angles(positions, sheets.vertex[sheets.triangles], pair)) > HARD)
+    hard = np.abs(fold_angles(positions, sheets.vertex[sheets.triangles], pair)) > HARD
+    hard &= crowded[sheets.first // 3]
     around = np.zeros(3 * len(sheets.triangles), dtype=bool)
     around[hole_rims(positions, sheets.without(hard), one_sided)[0]] = True
     gone = hard & around[pair].any(axis=1)
@@ -32,9 +46,10 @@ def parting_pairs(sheets: Sheets, positions: np.ndarray, one_sided: np.ndarray, 
     side = components(sheets.without(gone))[pair // 3]
     gone &= side[:, 0] != side[:, 1]
     side, left = _kinds(sheets.without(gone), one_sided)
-    handles = np.zeros(len(whole.handles), dtype=np.int64)
+    handles = np.zeros(int(part.max()) + 1, dtype=np.int64)
     np.maximum.at(handles, part, left.handles[side])
-    return gone & (handles <= most)[part[sheets.first // 3]]
+    settled = (handles <= MANY_HANDLES)[part]
+    return gone & settled[sheets.first // 3], settled
 
 
 def _kinds(sheets: Sheets, one_sided: np.ndarray) -> tuple[np.ndarray, Kind]:

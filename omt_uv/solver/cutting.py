@@ -89,8 +89,8 @@ def cut(
     ----------
     avoid : (n,) in [0,1], vertices to keep free of seams
     fill : take holes for filled, all boundaries but the longest of every part
-    sieve : without `fill`, take holes for filled where a part has more than so many, and take a part with more
-        handles apart along its hard edges; None: nowhere
+    sieve : without `fill`, take holes for filled where a part has more than so many, and take parts with many handles
+        apart, see `apart.parting_pairs`; None: nowhere
     extremities : tips that a surface is opened through, at most, where it has no net
 
     Raises
@@ -117,7 +117,10 @@ def open_sheets(
     sheets, one_sided = _looking_out(repaired.sheets, positions)
     # What has one side only is not told to look to the other.
     turned = sheets.triangles[:, 1] != repaired.sheets.triangles[:, 1]
-    sheets, parting = _taken_apart(sheets, positions, one_sided, sieve)
+    gone = np.zeros(len(sheets.first), dtype=bool)
+    if sieve is not None:
+        gone = parting_pairs(sheets, positions, one_sided)
+    sheets, parting = sheets.without(gone), np.stack(sheets.ends(sheets.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]
     holes, sieves = 0, not fill
     if fill or sieve is not None:
@@ -141,18 +144,10 @@ def open_sheets(
     return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, warnings), unit)
 
 
-def _taken_apart(sheets: Sheets, positions, one_sided, most: int | None) -> tuple[Sheets, np.ndarray]:
-    """The sheets without the joints of `apart.parting_pairs`, and the edges (k,2) there; as they are for None."""
-    gone = (
-        np.zeros(len(sheets.first), dtype=bool) if most is None else parting_pairs(sheets, positions, one_sided, most)
-    )
-    return sheets.without(gone), np.stack(sheets.ends(sheets.first[gone]), axis=1)
-
-
 def _said(parting: int, backwards: int, sieved: int, touching: int) -> Iterator[str]:
     """Warnings, from the numbers of edges a part came apart at, faces turned over, holes of sieves, and doubles."""
     if parting:
-        yield "A part with very many handles was taken apart along the hard edges of its holes"
+        yield "A part with many handles was taken apart, along the hard edges of its holes or into fragments"
     if backwards:
         yield _turned_faces(backwards)
     if sieved:

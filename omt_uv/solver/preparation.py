@@ -52,7 +52,7 @@ def prepare(
     fill_holes : fill all boundaries of a part but the longest, for the map only, instead of cutting to them; such
         charts have `patches`
     sieve : with "auto", fill the holes of a part that has more than so many, and then cut it to its extremities; a
-        part that has more handles comes apart along its hard edges
+        part that has many handles comes apart, see `apart.parting_pairs`
     avoid : (n,) in [0,1], vertices to keep free of seams
     extremities : tips that a surface is opened through, at most, where "auto" cuts; 0 for the fastest cuts
 

@@ -45,7 +45,8 @@ def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int, loop=No
 def _uncross(w: np.ndarray, before: np.ndarray, loop: np.ndarray) -> None:
     """Take back, in place, what moved of edges of a boundary that cross, or would soon."""
     tail, head = rim_edges(loop)
-    while len(pairs := crossings(before + ROOM * (w - before), loop)):
+    # What goes right over a narrow part crosses it now, and farther on no longer.
+    while len(pairs := np.concatenate([crossings(before + k * (w - before), loop) for k in (1, ROOM)])):
         ends = np.concatenate([tail[pairs].ravel(), head[pairs].ravel()])
         if not (w[ends] != before[ends]).any():
             w[tail] = before[tail]
