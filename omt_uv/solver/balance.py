@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from .carrier import Carrier
 from .closest import vertex_normals
 from .counts import Size, adjust_count, settled
-from .dissection import Dissection
 from .draft import Draft
 from .geometry import laplacian_from_weights
 from .linear import solve_by_gradients
@@ -33,7 +33,7 @@ APART = 4
 ROUNDS = 3
 SETTLED, SETTLED_UNEVEN = 0.004, 0.001
 # Claims change by so many times the surplus, and by this share at the most.
-GAIN, MOST = 2.0, 0.1
+GAIN, MOST = 1.5, 0.1
 # What an edge's length counts next to squares of missing neighbours.
 LENGTH = 3.0
 NONE = np.zeros(0, np.int64)
@@ -60,10 +60,12 @@ def balance(draft: Draft, carrier: Carrier, size: Size, claim: np.ndarray | None
     even = np.ptp(carrier.density) == 0
     share = SETTLED if even else SETTLED_UNEVEN
     settled = _is_settled(surplus, share)
-    claim = carrier.measure if claim is None or even else claim * (1 - np.clip(GAIN * surplus, -MOST, MOST)[near])
+    known = claim is None or even
+    claim = carrier.measure if known else claim * (1 - np.clip(GAIN * surplus, -MOST, MOST)[near])
     measure = np.bincount(near, claim, n)
-    for _ in range(0 if settled else ROUNDS):
-        surplus = _surplus(draft, measure, size)
+    for k in range(0 if settled else ROUNDS):
+        if k or not known:
+            surplus = _surplus(draft, measure, size)
         if _is_settled(surplus, share):
             break
         draft, measure = _carried(draft, measure, surplus)
@@ -134,7 +136,7 @@ def _best_edges(draft: Draft, amount: np.ndarray, collapse: bool) -> np.ndarray:
     These are the edges with the best valences afterwards, six everywhere if possible, and the length that comes next
     to it.
     """
-    order = np.argsort(Dissection(draft.points).part, kind="stable")
+    order = cKDTree(draft.points).indices
     group = np.zeros(len(amount), np.int64)
     group[order] = np.floor(np.cumsum(amount[order]))
     h = interior_edges(draft.triangles, draft.locked)

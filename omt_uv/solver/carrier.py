@@ -43,13 +43,11 @@ class Carrier:
         found = self._memory(self.index, points, normals)
         return found.points, self.density[found.faces]
 
-    def around(self, points: np.ndarray, normals: np.ndarray) -> Share:
-        """What of the surface is nearest to each of points (k,3) with normals (k,3), roughly."""
-        return self._shares(self._samples, points, normals)
-
-    def crests_around(self, points: np.ndarray, normals: np.ndarray) -> Share:
-        """What of its crests is; see `surface_samples.crest_samples`."""
-        return self._shares(self._crests, points, normals)
+    def around(self, points: np.ndarray, normals: np.ndarray) -> tuple[Share, Share]:
+        """What of the surface is nearest to each of points (k,3) with normals (k,3), roughly, and what of its crests;
+        see `surface_samples.crest_samples`."""
+        tree = cKDTree(np.column_stack([points, self.index.weight * normals]))
+        return self._share(self._samples, points, tree), self._share(self._crests, points, tree)
 
     @property
     def measure(self) -> np.ndarray:
@@ -64,10 +62,9 @@ class Carrier:
         tree = cKDTree(np.column_stack([points, w * normals, 2 * w * np.log(size)]))
         return tree.query(np.column_stack([s.points, w * s.normals, 2 * w * np.log(wanted)]))[1].astype(np.int64)
 
-    def _shares(self, samples: Samples, points: np.ndarray, normals: np.ndarray) -> Share:
-        k, w = len(points), self.index.weight
-        tree = cKDTree(np.column_stack([points, w * normals]))
-        near = tree.query(np.column_stack([samples.points, w * samples.normals]))[1].astype(np.int64)
+    def _share(self, samples: Samples, points: np.ndarray, tree: cKDTree) -> Share:
+        k = len(points)
+        near = tree.query(np.column_stack([samples.points, self.index.weight * samples.normals]))[1].astype(np.int64)
         mass = samples.area * self.density[samples.faces] ** 2
         off = mass[:, None] * (samples.points - points[near])
         moment = np.stack([np.bincount(near, off[:, j], k) for j in range(3)], axis=1)

@@ -17,6 +17,9 @@ from .topology import boundary_loops
 from .transport import transport
 from .untangle import untangle
 
+# Samples need no exact maps: angle sums of the flat metric may be off by this, in radians, and areas by this share.
+ANGLES, AREAS = 1e-2, 0.1
+
 
 @dataclass(frozen=True)
 class Image:
@@ -29,7 +32,7 @@ class Image:
 def conformal_image(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Image]:
     """Conformal map of a disk (n,3), (m,3); where that leaves double precision a milder one, and a warning."""
     try:
-        uv = (yield from conformal_disk(vertices, triangles)).uv
+        uv = (yield from conformal_disk(vertices, triangles, ANGLES)).uv
         if halfedge_lengths(uv, triangles).min() >= SITE_RESOLUTION:
             return Image(uv, ())
         mild = "A conformal map puts neighbours too close together"
@@ -52,7 +55,7 @@ def preserving_image(
     loop, circle = boundary_loops(triangles)[0], Disk()
     try:
         mass = vertex_areas(vertices, triangles, density)
-        cells = yield from transport(conformal, mass, circle, tolerance=1e-2)
+        cells = yield from transport(conformal, mass, circle, tolerance=AREAS)
         uv = centroid_map(cells, circle, loop, None, warnings)
         uv, _ = untangle(uv, vertices, triangles, loop, uv[loop])
     except TransportError as error:

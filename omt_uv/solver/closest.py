@@ -36,33 +36,54 @@ def closest_on_triangles(q: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndar
 
     By regions of the triangle's plane (Ericson 2005, section 5.1.5).
     """
-    ab, ac, ap = b - a, c - a, q - a
-    d1, d2 = _dot(ab, ap), _dot(ac, ap)
-    e, f, g = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac)
-    d3, d4 = d1 - e, d2 - f
-    d5, d6 = d1 - f, d2 - g
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    ab, ac, ap = (np.moveaxis(x, -1, 0) for x in np.broadcast_arrays(b - a, c - a, q - a))
+    v, w = _in_frame(_product(ab, ap), _product(ac, ap), _product(ab, ab), _product(ab, ac), _product(ac, ac))
+    return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1)
+
+
+def _in_frame(d1: np.ndarray, d2: np.ndarray, e: np.ndarray, f: np.ndarray, g: np.ndarray):
+    """Second and third coordinate of the closest points, from the products of the sides ab, ac with the way to the
+    point, and of ab with itself, with ac, and of ac with itself."""
+    va, vb, vc = _weights(d1, d2, e, f, g)
     with np.errstate(divide="ignore", invalid="ignore"):
         total = va + vb + vc
         v, w = vb / total, vc / total
+    beside = ~((va > 0) & (vb > 0) & (vc > 0))
+    v[beside], w[beside] = _on_rim(d1[beside], d2[beside], e[beside], f[beside], g[beside])
+    return v, w
+
+
+def _weights(d1, d2, e, f, g):
+    """Barycentric coordinates of the foot in the plane, times the square of twice the area."""
+    d3, d4, d5, d6 = d1 - e, d2 - f, d1 - f, d2 - g
+    return d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+
+
+def _on_rim(d1, d2, e, f, g):
+    """As `_in_frame`, for points whose foot is not inside."""
+    va, vb, vc = _weights(d1, d2, e, f, g)
+    d3, d4, d5, d6 = d1 - e, d2 - f, d1 - f, d2 - g
+    with np.errstate(divide="ignore", invalid="ignore"):
         on_bc = (d4 - d3) / ((d4 - d3) + (d5 - d6))
         on_ac, on_ab = d2 / g, d1 / e
     # Later rules overrule earlier ones: edges the inside, corners the edges.
-    edge = (va <= 0) & (d4 >= d3) & (d5 >= d6)
-    v, w = np.where(edge, 1 - on_bc, v), np.where(edge, on_bc, w)
-    edge = (vb <= 0) & (d2 >= 0) & (d6 <= 0)
-    v, w = np.where(edge, 0, v), np.where(edge, on_ac, w)
-    edge = (vc <= 0) & (d1 >= 0) & (d3 <= 0)
-    v, w = np.where(edge, on_ab, v), np.where(edge, 0, w)
-    corner = (d6 >= 0) & (d5 <= d6)
-    v, w = np.where(corner, 0, v), np.where(corner, 1, w)
-    corner = (d3 >= 0) & (d4 <= d3)
-    v, w = np.where(corner, 1, v), np.where(corner, 0, w)
-    corner = (d1 <= 0) & (d2 <= 0)
-    v, w = np.where(corner, 0, v), np.where(corner, 0, w)
+    v, w = np.full(d1.shape, np.nan), np.full(d1.shape, np.nan)
+    for rule, second, third in (
+        ((va <= 0) & (d4 >= d3) & (d5 >= d6), 1 - on_bc, on_bc),
+        ((vb <= 0) & (d2 >= 0) & (d6 <= 0), 0.0, on_ac),
+        ((vc <= 0) & (d1 >= 0) & (d3 <= 0), on_ab, 0.0),
+        ((d6 >= 0) & (d5 <= d6), 0.0, 1.0),
+        ((d3 >= 0) & (d4 <= d3), 1.0, 0.0),
+        ((d1 <= 0) & (d2 <= 0), 0.0, 0.0),
+    ):
+        v, w = np.where(rule, second, v), np.where(rule, third, w)
     # No number, as in a triangle without area, is 0.
-    v, w = np.fmin(np.fmax(v, 0), 1), np.fmin(np.fmax(w, 0), 1)
-    return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1)
+    return np.fmin(np.fmax(v, 0), 1), np.fmin(np.fmax(w, 0), 1)
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar products (...) of vectors (3, ...), coordinates apart from each other."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -101,7 +122,10 @@ class ClosestPoint:
     def __init__(self, vertices: np.ndarray, triangles: np.ndarray, spacing: float):
         self.vertices, self.triangles = vertices, triangles
         self.normals = face_normals(vertices, triangles)
-        self.corners = vertices[triangles].reshape(-1, 9)
+        a, b, c = (vertices.T.take(corner, axis=1) for corner in triangles.T)
+        self._a, self._ab, self._ac = a, b - a, c - a
+        ab, ac = self._ab, self._ac
+        self._products = np.stack([_product(ab, ab), _product(ab, ac), _product(ac, ac)])
         self.neighbour = np.where((t := twins(triangles)) >= 0, t // 3, -1).reshape(-1, 3)
         # A normal to the opposite side counts as far as one spacing.
         self.weight = 0.5 * spacing
@@ -113,7 +137,7 @@ class ClosestPoint:
         k = min(CANDIDATES, len(owner))
         _, index = self._tree.query(np.column_stack([points, self.weight * normals]), k=k)
         faces = owner[index.reshape(len(points), k)]
-        _, distance = self._distance(points[:, None], faces)
+        _, distance = self._distance(points, faces)
         # The right side first, then the distance.
         back = np.einsum("kcj,kj->kc", self.normals.take(faces, axis=0), normals) < 0
         distance = distance + np.where(back, 4 * distance.max(initial=1e-300), 0)
@@ -162,20 +186,19 @@ class ClosestPoint:
 
     def at(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions (k,3) of points given by face and barycentric coordinates."""
-        return _weighted(self.corners.take(faces, axis=0), barycentric)
+        v, w = barycentric[:, 1], barycentric[:, 2]
+        a, ab, ac = (x.take(faces, axis=1) for x in (self._a, self._ab, self._ac))
+        return (a + v * ab + w * ac).T
 
     def _distance(self, points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        corners = self.corners.take(faces, axis=0)
-        a, b, c = corners[..., :3], corners[..., 3:6], corners[..., 6:]
-        barycentric = closest_on_triangles(points, a, b, c)
-        off = _weighted(corners, barycentric) - points
-        return barycentric, _dot(off, off)
-
-
-def _weighted(corners: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
-    """Points (..., 3) with barycentric coordinates (..., 3) of triangles, by their corners (..., 9)."""
-    u, v, w = (barycentric[..., k, None] for k in range(3))
-    return u * corners[..., :3] + v * corners[..., 3:6] + w * corners[..., 6:]
+        """Barycentric coordinates (k,3), or (k,c,3), of the closest points to points (k,3) on faces (k,) or (k,c), and
+        squared distances."""
+        p = points.T if faces.ndim == 1 else points.T[:, :, None]
+        ab, ac = self._ab.take(faces, axis=1), self._ac.take(faces, axis=1)
+        ap = p - self._a.take(faces, axis=1)
+        v, w = _in_frame(_product(ab, ap), _product(ac, ap), *self._products.take(faces, axis=1))
+        off = ap - v * ab - w * ac
+        return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1), _product(off, off)
 
 
 class Memory:

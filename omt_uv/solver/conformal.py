@@ -22,7 +22,7 @@ from .linear import solve_spd
 from .progress import Steps
 from .topology import boundary_loops, halfedges
 from .untangle import count_folds, untangle
-from .yamabe import YamabeFlow, yamabe_flow
+from .yamabe import TOLERANCE, YamabeFlow, yamabe_flow
 
 # Below this distance of two neighbours in the unit disk, rounding decides where they lie.
 RESOLUTION = 1e-12
@@ -52,13 +52,14 @@ class ConformalMap:
     straightened: int = 0
 
 
-def conformal_disk(vertices: np.ndarray, triangles: np.ndarray) -> Steps[ConformalMap]:
+def conformal_disk(vertices: np.ndarray, triangles: np.ndarray, tolerance: float = TOLERANCE) -> Steps[ConformalMap]:
     """Conformal map of a disk mesh (n,3), (m,3) to the unit disk, boundary vertices exactly on the circle.
 
-    The area-weighted mean of the image is at 0. Raises PrecisionError where the map leaves double precision.
+    tolerance : largest error of an angle sum of the flat metric, in radians. The area-weighted mean of the image is at
+        0. Raises PrecisionError where the map leaves double precision.
     """
     loop = boundary_loops(triangles)[0]
-    result = yield from _rectangle(vertices, triangles, loop, quarter_points(vertices, loop))
+    result = yield from _rectangle(vertices, triangles, loop, quarter_points(vertices, loop), tolerance)
     disk = rectangle_to_disk(result.uv, result.aspect)
     disk = centre_in_disk(disk, vertex_areas(vertices, triangles))
     disk[loop] /= np.linalg.norm(disk[loop], axis=1)[:, None]
@@ -118,7 +119,7 @@ def sharpest_corners(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarr
     return loop[np.sort(chosen)]
 
 
-def _rectangle(vertices, triangles, loop, corners) -> Steps[ConformalMap]:
+def _rectangle(vertices, triangles, loop, corners, tolerance=TOLERANCE) -> Steps[ConformalMap]:
     n = len(vertices)
     loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
     scale = np.sqrt(vertex_areas(vertices, triangles).sum())
@@ -134,7 +135,7 @@ def _rectangle(vertices, triangles, loop, corners) -> Steps[ConformalMap]:
     cone_angle = np.full(count, 4 * np.pi)
     cone_angle[loop] = 2 * np.pi
     cone_angle[corners] = np.pi
-    flow = yield from yamabe_flow(doubled, owner, cone_angle)
+    flow = yield from yamabe_flow(doubled, owner, cone_angle, tolerance)
     uv, aspect = _layout(flow, owner, loop, corners, count)
     return ConformalMap(
         uv[:n],

@@ -25,7 +25,7 @@ from .voronoi import Cells, voronoi_cells
 # No vertex moves farther in one step, in shares of its shortest edge's length.
 REACH = 0.4
 # Rounds after which the surface is looked at again.
-LOOK_EVERY = 10
+LOOK_EVERY = 15
 # Area of the surface over area of the mesh from which, and at which fully, samples of the surface are trusted.
 UNSEEN = (1.1, 1.3)
 # Weight of crests.
@@ -104,7 +104,7 @@ def _pull(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray, carrie
     A tip or a ridge that the triangles cut off weighs too little in their cells, and would lose its vertices more and
     more. The samples are too few for exact cells, but enough to find these places, and to pull there.
     """
-    seen, crest = carrier.around(points, normals), carrier.crests_around(points, normals)
+    seen, crest = carrier.around(points, normals)
     n = len(points)
     covered = vertex_areas(points, triangles)
     tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()

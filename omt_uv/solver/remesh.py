@@ -238,7 +238,11 @@ def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options
             draft, claim = balanced.draft, balanced.claim
             if balanced.settled:
                 break
-        draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.3, 0.27)
+        draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.3, 0.2)
+        if not balanced.settled:
+            # Along jumps of the density that took vertices away again.
+            draft = balance(draft, carrier, size, claim).draft
+            draft, moved = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.5, 0.07)
     draft = adjust_count(draft, start.count, size, anyhow)
     if options.fit:
         draft = yield from part_of(fit_to_surface(draft, index, level, start.size), 0.57, 0.43)

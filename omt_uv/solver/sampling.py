@@ -19,7 +19,7 @@ from .power_diagram import power_diagram
 from .regular import by_hull
 from .topology import twins
 
-ROUNDS = 5
+ROUNDS = 2
 # Strategies name the map to sample on and the map to triangulate on.
 STRATEGIES = ("app-cfp", "app-app", "cfp-cfp", "cfp-app")
 

@@ -21,6 +21,8 @@ from .regular import by_flips
 TOLERANCE = 5e-7
 MAX_STEPS = 100
 MAX_HALVINGS = 30
+# The first step tried has bisectors of neighbours move at most this many times as far as to the nearer of the two.
+BOLD = 256.0
 # Directions are solved for to so many digits of the residual; with fewer there are more Newton steps.
 ENOUGH = 1e-3
 
@@ -74,7 +76,7 @@ def transport(
         raise TransportError("Sites coincide or lie outside the domain", kind="vertex", elements=np.sort(order[hidden]))
     floor = 0.5 * min(cells.area.min(), mass.min())
     first = max(_residual(cells, mass), tolerance)
-    step = 1.0
+    step = 0.0
     for iteration in range(MAX_STEPS):
         residual = _residual(cells, mass)
         done = 1 - np.log(max(residual, tolerance) / tolerance) / np.log(1 + first / tolerance)
@@ -89,7 +91,7 @@ def transport(
                 return Transport(w[place], cells.renumbered(order), residual, cost, iteration, *diagrams.counts())
         direction = _newton_direction(sites, cells, mass, laplacians)
         error = float(np.linalg.norm(cells.area - mass))
-        step = min(1.0, 4 * step)
+        step = min(1.0, 4 * step) if iteration else _first_step(sites, cells, direction)
         for _ in range(MAX_HALVINGS):
             trial_w = w + step * direction
             trial = diagrams.next(trial_w, cells)
@@ -100,6 +102,15 @@ def transport(
             raise TransportError(f"The transport is stuck at a residual of {residual:.1e}")
         w, cells = trial_w, trial
     raise TransportError(f"The transport did not converge in {MAX_STEPS} steps")
+
+
+def _first_step(sites: np.ndarray, cells: PowerDiagram, direction: np.ndarray) -> float:
+    """A power of a half: from cells of very different sizes a whole step hides so many sites that even to find one of
+    them takes long, and so does half of it, and a quarter."""
+    i, j = cells.edges.T
+    apart = ((sites[i] - sites[j]) ** 2).sum(axis=1)
+    reach = (apart / np.maximum(np.abs(direction[i] - direction[j]), 1e-300)).min()
+    return float(np.exp2(np.floor(np.log2(np.clip(BOLD * reach, 0.5**MAX_HALVINGS, 1.0)))))
 
 
 class _Diagrams:

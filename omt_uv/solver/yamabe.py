@@ -36,7 +36,9 @@ class YamabeFlow:
     flips: int
 
 
-def yamabe_flow(tri: IntrinsicTriangulation, owner: np.ndarray, cone_angle: np.ndarray) -> Steps[YamabeFlow]:
+def yamabe_flow(
+    tri: IntrinsicTriangulation, owner: np.ndarray, cone_angle: np.ndarray, tolerance: float = TOLERANCE
+) -> Steps[YamabeFlow]:
     """Scale a closed triangulation conformally until its cone angles are the prescribed ones.
 
     Parameters
@@ -44,6 +46,7 @@ def yamabe_flow(tri: IntrinsicTriangulation, owner: np.ndarray, cone_angle: np.n
     tri : closed and Delaunay, with vertices 0 ... k-1
     owner : (k,) unknown that scales each vertex; vertices that mirror each other share one
     cone_angle : (n,) radians, sum of the angles around all vertices of each unknown; Gauss-Bonnet must hold
+    tolerance : largest error of an angle sum, in radians
 
     Raises
     ------
@@ -53,12 +56,12 @@ def yamabe_flow(tri: IntrinsicTriangulation, owner: np.ndarray, cone_angle: np.n
     u = np.zeros(n)
     length, gradient = _metric(tri, owner, u, cone_angle)
     total_flips = 0
-    first = max(np.abs(gradient).max(), TOLERANCE)
+    first = max(np.abs(gradient).max(), tolerance)
     for iteration in range(MAX_STEPS):
         residual = float(np.abs(gradient).max())
-        done = 1 - np.log(max(residual, TOLERANCE) / TOLERANCE) / np.log(1 + first / TOLERANCE)
+        done = 1 - np.log(max(residual, tolerance) / tolerance) / np.log(1 + first / tolerance)
         yield Progress("Conformal map", float(np.clip(done, 0, 1)))
-        if residual <= TOLERANCE:
+        if residual <= tolerance:
             return YamabeFlow(tri, u, length, residual, iteration, total_flips)
         direction = _newton_direction(tri, owner, length, gradient)
         slope = gradient @ direction
