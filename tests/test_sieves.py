@@ -5,6 +5,7 @@ import pytest
 
 from omt_uv.solver.charts import triangle_surface
 from omt_uv.solver.cutting import cut
+from omt_uv.solver.errors import NotADiskError
 from omt_uv.solver.geometry import face_areas
 from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.preparation import prepare
@@ -154,13 +155,31 @@ def test_a_plate_with_many_holes_through_it_comes_apart_along_its_edges():
 def test_a_lattice_without_sides_falls_into_fragments():
     """28 handles: cut open into one chart, it is sheared twice as much."""
     V, F = lattice_body(3)
-    parts = len(drain(unwrap(triangle_surface(V, F))).charts)
+    assert len(V) - len(F) // 2 == 2 - 2 * 28
+    parts = len(prepare(triangle_surface(V, F), sieve=32).charts)
     assert 4 <= parts <= 60
     check(V, F, 1.5, parts)
 
 
 def test_a_plate_with_few_holes_through_it_stays_in_one_piece():
     check(*plate(6), 1.2)
+
+
+@pytest.mark.parametrize("body", [(tube, 32, 24, lattice(4, 2)), (box,), (plate, 18), (lattice_body, 3)])
+def test_the_marked_seams_of_a_sieve_are_enough(body):
+    """What Seams marks, Unwrap with existing seams takes; it fills the same holes but those that seams open."""
+    V, F = body[0](*body[1:])
+    marked = triangle_surface(V, F, cut(triangle_surface(V, F)).edges)
+    charts = prepare(marked, seams="existing", sieve=32).charts
+    own = prepare(triangle_surface(V, F), sieve=32).charts
+    assert len(charts) == len(own) and max(len(c.patches) for c in charts) >= 0.9 * max(len(c.patches) for c in own)
+    assert sum(len(c.triangles) for c in charts) == len(F)
+
+
+def test_seams_of_a_sieve_that_leave_a_tube_are_refused():
+    V, F = tube(32, 24, lattice(4, 2))
+    with pytest.raises(NotADiskError):
+        prepare(triangle_surface(V, F), seams="existing", sieve=32)
 
 
 def test_who_prepares_without_asking_for_it_gets_no_patches():

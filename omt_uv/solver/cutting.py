@@ -144,14 +144,19 @@ def open_sheets(
     return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, warnings), unit)
 
 
-def _said(parting: int, backwards: int, sieved: int, touching: int) -> Iterator[str]:
+def sieved(holes: int) -> str:
+    """The warning that so many holes of sieves are filled."""
+    return f"{holes} holes are filled for the map: cuts to them would leave it no shape"
+
+
+def _said(parting: int, backwards: int, holes: int, touching: int) -> Iterator[str]:
     """Warnings, from the numbers of edges a part came apart at, faces turned over, holes of sieves, and doubles."""
     if parting:
         yield "A part with many handles was taken apart, along the hard edges of its holes or into fragments"
     if backwards:
         yield _turned_faces(backwards)
-    if sieved:
-        yield f"{sieved} holes are filled for the map: cuts to them would leave it no shape"
+    if holes:
+        yield sieved(holes)
     if touching:
         yield f"{touching} boundary vertices lie on one another; Merge by Distance joins the parts there"
 

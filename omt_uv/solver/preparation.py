@@ -16,7 +16,7 @@ from .charts import (
     split,
     strict_sheets,
 )
-from .cutting import MOST_EXTREMITIES, Cuts, open_sheets
+from .cutting import MOST_EXTREMITIES, Cuts, open_sheets, sieved
 from .errors import ZeroAreaFaceError
 from .holes import fill_holes as fill_holes_of
 from .repair import join, with_area
@@ -51,7 +51,7 @@ def prepare(
         "auto" repairs and cuts, for the map only
     fill_holes : fill all boundaries of a part but the longest, for the map only, instead of cutting to them; such
         charts have `patches`
-    sieve : with "auto", fill the holes of a part that has more than so many, and then cut it to its extremities; a
+    sieve : fill the holes of a part that has more than so many; with "auto" it is then cut to its extremities, and a
         part that has many handles comes apart, see `apart.parting_pairs`
     avoid : (n,) in [0,1], vertices to keep free of seams
     extremities : tips that a surface is opened through, at most, where "auto" cuts; 0 for the fastest cuts
@@ -64,7 +64,7 @@ def prepare(
     if seams not in SEAMS:
         raise ValueError(f"seams must be one of {', '.join(SEAMS)}, not {seams!r}")
     if seams == "existing":
-        return Prepared(_existing(surface, faces, fill_holes), None, ())
+        return _existing(surface, faces, fill_holes, sieve)
     faces, triangles, owner = chosen_triangles(surface, faces)
     if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
@@ -86,14 +86,17 @@ def _all_lines(points: np.ndarray) -> bool:
     return not (np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1) > 0).any()
 
 
-def _existing(surface: Surface, faces: np.ndarray | None, holes_too: bool) -> list[Chart]:
-    if not holes_too:
-        return split(surface, faces)
+def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int | None) -> Prepared:
+    if not fill and sieve is None:
+        return Prepared(split(surface, faces), None, ())
     sheets = strict_sheets(surface, faces)
-    filled = fill_holes_of(surface, sheets, np.zeros(len(sheets.triangles), dtype=bool))
+    filled = fill_holes_of(surface, sheets, np.zeros(len(sheets.triangles), dtype=bool), None if fill else sieve)
+    if not fill and not filled.holes:
+        return Prepared(split(surface, faces), None, ())
     positions = surface.positions[surface.corner_vertex[sheets.triangles]] / 2
     # Faces have areas, but what fills a hole that is a line has none.
-    return _sound(assemble(filled.surface, filled.sheets), 2 * float(np.ptp(positions, axis=(0, 1)).max()))[0]
+    charts, _ = _sound(assemble(filled.surface, filled.sheets), 2 * float(np.ptp(positions, axis=(0, 1)).max()))
+    return Prepared(charts, None, () if fill else (sieved(filled.holes),))
 
 
 def _sound(charts: list[Chart], extent: float) -> tuple[list[Chart], int]:
