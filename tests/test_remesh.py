@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import part_maps
-from omt_uv.solver.bisection import bisected
+from omt_uv.solver.bisection import fine_enough
 from omt_uv.solver.errors import (
     CountError,
     DensityError,
@@ -449,7 +449,7 @@ def test_halved_edges_are_the_same_surface():
     V, F = meshes.cube()
     lines = np.array([[0, 1], [1, 3]])
     part = split_parts(V, F, lines).parts[0]
-    fine = bisected(part)
+    fine = fine_enough(part)
     assert len(fine.vertices) > 300 and fine.euler == part.euler
     np.testing.assert_allclose(np.bincount(fine.faces, fine.area), part.area)
     places = np.einsum("mkc,mcj->mkj", fine.within, part.vertices[part.triangles[fine.faces]])
@@ -475,5 +475,19 @@ def test_many_small_parts_go_together_and_stay_apart():
     owner = np.searchsorted(first, F[result.faces][:, 0], side="right") - 1
     assert (owner[result.triangles] == owner[result.triangles[:, :1]]).all()
     assert np.percentile(angles(result.vertices, result.triangles).min(axis=1), 1) > 30
-    (maps,) = original.maps_with_pile(np.ones(14, bool))
-    assert len(maps.part.members) == 14
+    closed, open_ = original.maps_with_pile(np.ones(14, bool))
+    assert len(closed.part.members) == 10 and len(open_.part.members) == 4
+
+
+def test_closed_bodies_with_handles_need_no_maps(monkeypatch):
+    """And get the density that they are asked for."""
+    monkeypatch.delattr(part_maps, "conformal_image")
+    V, F = meshes.torus()
+    dense = V[F].mean(axis=1)[:, 0] > 0
+    result = run(V, F, 1200, density=np.where(dense, 9.0, 1.0))
+    assert len(result.vertices) == 1200 and topology(result.triangles) == (0, 0)
+    assert np.percentile(angles(result.vertices, result.triangles).min(axis=1), 1) > 35
+    area = face_areas(result.vertices, result.triangles)
+    there = result.vertices[result.triangles].mean(axis=1)[:, 0] > 0.05
+    here = result.vertices[result.triangles].mean(axis=1)[:, 0] < -0.05
+    assert abs(area[here].mean() / area[there].mean() / 9 - 1) < 0.1

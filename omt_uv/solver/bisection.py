@@ -20,18 +20,26 @@ LONGEST, VERTICES = 2.5, 1000
 MOST_ROUNDS = 60
 
 
-def bisected(part: Part) -> Part:
-    """The part with the longest edges halved until none is long, by the longest first; the surface is the same."""
+def fine_enough(part: Part) -> Part:
+    """The part with its long edges halved, so that its maps are not too coarse; the surface is the same."""
     longest = LONGEST * edge_size(float(part.area.sum()), 0.0, VERTICES)
+    return bisected(part, np.full(len(part.vertices), longest))
+
+
+def bisected(part: Part, longest: np.ndarray) -> Part:
+    """The part with edges halved, the longest first, until none is longer than `longest` (n,) at its ends."""
     for _ in range(MOST_ROUNDS):
         tail, head = halfedges(part.triangles)
         length = np.linalg.norm(part.vertices[tail] - part.vertices[head], axis=1)
+        length /= (longest[tail] + longest[head]) / 2
         twin = twins(part.triangles)
-        long = np.flatnonzero((length > longest) & (twin < np.arange(len(twin))))
+        long = np.flatnonzero((length > 1) & (twin < np.arange(len(twin))))
         if not len(long):
             break
         order = np.argsort(-length[long], kind="stable")
-        part = _split(part, independent_splits(part.triangles, long[order]))
+        chosen = independent_splits(part.triangles, long[order])
+        longest = np.concatenate([longest, (longest[tail[chosen]] + longest[head[chosen]]) / 2])
+        part = _split(part, chosen)
     return part
 
 

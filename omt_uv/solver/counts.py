@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from .closest import ClosestPoint
 from .draft import Draft
 from .embedded_flips import make_delaunay_embedded
 from .mesh_edits import LEAST_COSINE, Edit, collapse_edges, independent_splits, interior_edges, split_edges
@@ -25,11 +26,25 @@ class StuckError(Exception):
 # Edge lengths (k,) wanted at points (k,3).
 Size: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
+
 MOST_ROUNDS = 500
 ANY_COSINE = -2.0
 # In one round only edges about as short, or as long, as the most wanted ones go.
 SHARE = 0.5
 FLIP_ROUNDS = 5
+
+
+class EdgeSize:
+    """The edge length wanted at points: `unit` over the square root of the density (m,)."""
+
+    def __init__(self, index: ClosestPoint, density: np.ndarray, unit: float):
+        self.index, self.density, self.unit = index, density, unit
+        self.even = np.ptp(density) == 0
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        if self.even:
+            return np.full(len(points), self.unit)
+        return self.unit / np.sqrt(self.density[self.index.nearest_face(points)])
 
 
 def least_vertices(part: Part) -> int:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .bisection import bisected
+from .bisection import fine_enough
 from .chart_maps import Image, conformal_image, preserving_image
 from .charts import Chart
 from .errors import MeshError
@@ -55,7 +55,7 @@ class PartMaps:
         self._images: dict[int, Image] = {}
         self._latest: dict[tuple[bool, int], tuple[np.ndarray, Maps]] = {}
         # Whether to map it to the sphere: charts end at features.
-        self.spherical = part.spherical and len(part.features) == 0 and not part.members
+        self.spherical = part.spherical and not part.lined and not part.members
         self.warnings: tuple[str, ...] = ()
 
     @property
@@ -88,9 +88,9 @@ class PartMaps:
         return self._keep(-1, density, Maps(self._sphere.positions, preserving, ()))
 
     def give_up(self, cause: str) -> None:
-        """From now on, cut the part open."""
+        """From now on, do without the sphere."""
         self.spherical = False
-        self.warnings = (f"{cause}; a part was cut open instead of mapped to the sphere",)
+        self.warnings = (f"{cause}; a part was remeshed without a map to the sphere",)
 
     def of_chart(self, k: int, density: np.ndarray) -> Steps[Maps]:
         """Maps of chart number k of those chosen to the disk, and warnings where they are milder than asked for."""
@@ -133,14 +133,19 @@ class Original:
     @cached_property
     def maps(self) -> list[PartMaps]:
         """The maps of every part."""
-        return [PartMaps(bisected(part)) for part in self.parts.parts]
+        return [PartMaps(fine_enough(part)) for part in self.parts.parts]
 
     def maps_with_pile(self, small: np.ndarray) -> list[PartMaps]:
-        """The maps of every part; where several are `small` (k,) bool, those of their pile instead, at the end."""
-        if small.sum() < 2:
-            return self.maps
-        key = small.tobytes()
-        if key not in self._piles:
-            parts = [part for part, together in zip(self.parts.parts, small, strict=True) if together]
-            self._piles[key] = PartMaps(bisected(piled(parts)))
-        return [maps for maps, together in zip(self.maps, small, strict=True) if not together] + [self._piles[key]]
+        """The maps of every part; where several are `small` (k,) bool, those of piles instead, at the end.
+
+        There is one pile of the parts that have lines to keep, and one of those that have none.
+        """
+        parts = self.parts.parts
+        lined = np.array([part.lined for part in parts])
+        piles = [kind for kind in (small & ~lined, small & lined) if kind.sum() > 1]
+        for kind in piles:
+            if kind.tobytes() not in self._piles:
+                pile = piled([parts[k] for k in np.flatnonzero(kind)])
+                self._piles[kind.tobytes()] = PartMaps(fine_enough(pile))
+        alone = ~np.logical_or.reduce(piles, initial=False) & np.ones(len(parts), bool)
+        return [self.maps[k] for k in np.flatnonzero(alone)] + [self._piles[kind.tobytes()] for kind in piles]

@@ -52,6 +52,11 @@ class Part:
         return len(self.vertices) - edges + len(self.triangles)
 
     @property
+    def lined(self) -> bool:
+        """Whether it has boundaries or features."""
+        return len(self.rim) > 0 or len(self.features) > 0
+
+    @property
     def spherical(self) -> bool:
         """Whether it is closed and has no handle."""
         return len(self.rim) == 0 and self.euler == 2

@@ -14,7 +14,7 @@ import numpy as np
 from .balance import balance
 from .carrier import Carrier
 from .closest import ClosestPoint, vertex_normals
-from .counts import StuckError, adjust_count, distribute, least_faces, least_vertices
+from .counts import EdgeSize, StuckError, adjust_count, distribute, least_faces, least_vertices
 from .errors import CountError, positive_density
 from .fit import fit_to_surface
 from .measure import graded
@@ -225,7 +225,7 @@ def _remesh_part(maps: PartMaps, count: int, density: np.ndarray, options: Optio
 def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options, anyhow: bool) -> Steps[_Result]:
     """Relax, count and fit a first mesh."""
     index = ClosestPoint(part.vertices, part.triangles, start.size)
-    size = _Size(index, level, start.size)
+    size = EdgeSize(index, level, start.size)
     draft, moved = start.draft, 0.0
     if options.rounds:
         carrier = Carrier(index, level, start.count)
@@ -251,19 +251,6 @@ def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options
     points = points - part.shift[on.faces]
     barycentric = np.einsum("kc,kcj->kj", on.barycentric, part.within[on.faces])
     return _Result(points, triangles, part.faces[on.faces], barycentric, moved, start.warnings)
-
-
-class _Size:
-    """The edge length wanted at points: `unit` over the square root of the density (m,)."""
-
-    def __init__(self, index: ClosestPoint, density: np.ndarray, unit: float):
-        self.index, self.density, self.unit = index, density, unit
-        self.even = np.ptp(density) == 0
-
-    def __call__(self, points: np.ndarray) -> np.ndarray:
-        if self.even:
-            return np.full(len(points), self.unit)
-        return self.unit / np.sqrt(self.density[self.index.nearest_face(points)])
 
 
 def _at_vertices(part: Part, density: np.ndarray) -> np.ndarray:

@@ -26,6 +26,8 @@ from .topology import twins
 ROUNDS = 5
 # Areas of cells may be off by this share: the relaxation on the surface makes up for more.
 TOLERANCE = 1e-2
+# Transport that takes more steps than this takes longer than doing without.
+MOST_STEPS = 40
 # Share of the samples that may lie too close together for the hull, in so many attempts without them.
 LOST, ATTEMPTS = 0.05, 5
 
@@ -49,7 +51,7 @@ def sphere_image(
     mass = vertex_areas(sound.vertices, triangles, density)
     hull = Hull(conformal.triangles, twins(conformal.triangles))
     # Half of a mass that is gathered on one side has no transport; Moebius maps keep the hull's triangles.
-    found = yield from sphere_transport(centred(conformal.sites, mass), mass, TOLERANCE, hull)
+    found = yield from sphere_transport(centred(conformal.sites, mass), mass, TOLERANCE, hull, MOST_STEPS)
     return found.cells.centroids()
 
 

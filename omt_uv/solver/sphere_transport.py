@@ -44,7 +44,11 @@ class SphereTransport:
 
 
 def sphere_transport(
-    sites: np.ndarray, mass: np.ndarray, tolerance: float = TOLERANCE, hull: Hull | None = None
+    sites: np.ndarray,
+    mass: np.ndarray,
+    tolerance: float = TOLERANCE,
+    hull: Hull | None = None,
+    most: int = MAX_STEPS,
 ) -> Steps[SphereTransport]:
     """Transport the uniform measure of the sphere to unit vectors (n,3) with mass (n,) > 0, scaled to sum to 4 pi.
 
@@ -68,7 +72,7 @@ def sphere_transport(
     step, diagrams, newton = 0.0, 1, _Newton(sites)
     floor = 0.5 * min(cells.area.min(), mass.min())
     first = max(_residual(cells, mass), tolerance)
-    for iteration in range(MAX_STEPS):
+    for iteration in range(most):
         residual = _residual(cells, mass)
         done = 1 - np.log(max(residual, tolerance) / tolerance) / np.log(1 + first / tolerance)
         yield Progress("Optimal transport", float(np.clip(done, 0, 1)))
@@ -88,7 +92,7 @@ def sphere_transport(
         else:
             raise TransportError(f"The transport is stuck at a residual of {residual:.1e}")
         h, cells = h + step * direction, trial
-    raise TransportError(f"The transport did not converge in {MAX_STEPS} steps")
+    raise TransportError(f"The transport did not converge in {most} steps")
 
 
 def _first_step(sites: np.ndarray, cells: SphericalCells, direction: np.ndarray) -> float:

@@ -17,7 +17,8 @@ from .part_maps import PartMaps
 from .parts import Part
 from .progress import Progress, Steps, part_of
 from .rims import smooth_rims
-from .sampling import Patch, even_map, triangulate_chart
+from .sampling import STRATEGIES, Patch, even_map, triangulate_chart
+from .simplified import simplified
 from .sphere_sampling import sample_sphere
 from .topology import pair_keys
 from .touching import copies
@@ -63,13 +64,18 @@ def tessellate(
 ) -> Steps[Tessellation]:
     """Samples of a part with density (m,), and at_vertices (n,), of mean 1, triangulated by the strategy.
 
-    Closed parts of genus 0 without features go by way of the sphere, all others, or where that fails, by way of charts.
+    Closed parts of genus 0 without features go by way of the sphere, other closed ones without features, or where that
+    fails, by collapses of their own edges, and all others by way of charts.
     On boundaries and features samples are `stretch` edges apart, or more where there would be too many.
 
     There may be more than asked for, where boundaries and features take as many. Raises PrecisionError where a chart
     cannot be triangulated.
     """
     found = (yield from _by_sphere(maps, count, density, options)) if maps.spherical else None
+    # Who asks for two maps in particular, or for what they make of a part, gets charts.
+    if found is None and options.rounds and options.strategy == STRATEGIES[0] and not maps.part.lined:
+        yield Progress("Samples", 0.0)
+        return _without_maps(maps, count, density, at_vertices, options)
     return found or (yield from _by_charts(maps, count, density, at_vertices, options, stretch))
 
 
@@ -91,6 +97,20 @@ def _by_sphere(maps: PartMaps, count: int, density: np.ndarray, options: Options
     return Tessellation(draft, vertices, size, 1.0, found.warnings, part.slits, 0)
 
 
+def _without_maps(
+    maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options
+) -> Tessellation:
+    part = maps.part
+    vertices = count if options.count_of == "vertices" else count // 2 + part.euler
+    size, finer = (edge_size(float(part.area @ density), 0.0, n) for n in (vertices, max(vertices, _fewest(part))))
+    draft = simplified(part, max(vertices, _fewest(part)), density, at_vertices, finer)
+    return Tessellation(draft, vertices, size, 1.0, maps.warnings, part.slits, 0)
+
+
+def _fewest(part: Part) -> int:
+    return FEWEST_IN_PILE * len(part.members) if part.members else FEWEST
+
+
 def _by_charts(
     maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float
 ) -> Steps[Tessellation]:
@@ -102,7 +122,7 @@ def _by_charts(
     measure = float(part.area @ density)
     vertices = count if options.count_of == "vertices" else max(count // 2 + part.euler, 3)
     size, total = edge_size(measure, rim, vertices), vertices
-    fewest = FEWEST_IN_PILE * len(part.members) if part.members else FEWEST
+    fewest = _fewest(part)
     # A few samples make no sound mesh of a surface, so these are taken away only afterwards.
     finer = edge_size(measure, rim, max(vertices, fewest)) / size
     lengths = size / np.sqrt(at_vertices)
