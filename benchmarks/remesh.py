@@ -11,24 +11,20 @@ import numpy as np
 from cases import Table, load_case, timed
 from rivals import make_object, remove_object
 
-from omt_uv.solver.carrier import Carrier
 from omt_uv.solver.charts import triangle_surface
 from omt_uv.solver.closest import ClosestPoint, spread_points
-from omt_uv.solver.draft import Draft
 from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths
 from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.part_maps import Original
 from omt_uv.solver.progress import drain
-from omt_uv.solver.relaxation import relax
 from omt_uv.solver.remesh import remesh
 from omt_uv.solver.sampling import STRATEGIES
-from omt_uv.solver.topology import halfedges, pair_keys, twins
+from omt_uv.solver.topology import halfedges, pair_keys
 
 MODELS = ["lion", "face", "max_planck", "rocker_arm"]
 COUNT = 5000
 # What our meshes should reach.
 ANGLE_GOAL, THIN_GOAL, EDGE_GOAL, TIME_GOAL = 39.0, 0.1, 0.10, 3.0
-# Rounds of relaxation on the surface that every strategy gets in the second half of its table.
-SAME_ROUNDS = 10
 
 
 def shape(V, F):
@@ -132,28 +128,31 @@ def _missed(row):
 
 
 def _strategies(args):
-    """Sampled on one map, triangulated on another: alone, and after the same few rounds on the surface."""
+    """Sampled on one map, triangulated on another: alone, and relaxed and fitted as the strategy has it."""
     columns = ["angle_p1", "edge_cv", "area_cv"]
     table = Table(
-        f"Strategies: sampled on the first map, triangulated on the second; then {SAME_ROUNDS} rounds for all alike",
-        {"model": 15, "strategy": 15} | {f"{c} {when}": 16 for when in ("raw", "relaxed") for c in columns},
+        "Strategies: sampled on the first map, triangulated on the second; then relaxed and fitted",
+        {"model": 15, "strategy": 15}
+        | {f"{c} {when}": 16 for when in ("raw", "relaxed") for c in columns}
+        | {"best": 6},
     )
-    for name in args.models or MODELS[:2]:
-        V, F = _model(name)
-        for strategy in STRATEGIES:
-            raw = drain(remesh(V, F, COUNT, strategy=strategy, rounds=0, fit=False))
-            relaxed = _relaxed(V, F, raw)
-            row = {}
-            for when, (W, G) in {"raw": (raw.vertices, raw.triangles), "relaxed": relaxed}.items():
-                row |= {f"{c} {when}": v for c, v in shape(W, G).items() if c in columns}
-            table.add(model=name, strategy=strategy, **row)
+    for name in args.models or MODELS:
+        original = Original(*_model(name))
+        rows = {strategy: _strategy(original, strategy, columns) for strategy in STRATEGIES}
+        for strategy, row in rows.items():
+            others = [other for key, other in rows.items() if key != strategy]
+            best = all(row["angle_p1 relaxed"] > other["angle_p1 relaxed"] for other in others)
+            for spread in ("edge_cv relaxed", "area_cv relaxed"):
+                best &= all(row[spread] < other[spread] for other in others)
+            table.add(model=name, strategy=strategy, **row, best="in all" if best else "")
     table.write(args.out / "strategies.tsv")
 
 
-def _relaxed(V, F, raw):
-    rim = np.unique(raw.triangles.ravel()[twins(raw.triangles) < 0])
-    fixed = np.isin(np.arange(COUNT), rim)
-    index = ClosestPoint(V, F, np.sqrt(face_areas(V, F).sum() / COUNT * 2 / np.sqrt(3)))
-    draft = Draft(raw.vertices, raw.triangles, fixed, np.zeros(0, np.int64))
-    found, _ = drain(relax(draft, SAME_ROUNDS, Carrier(index, np.ones(len(F)), COUNT)))
-    return found.points, found.triangles
+def _strategy(original, strategy, columns):
+    row = {}
+    for when, options in {"raw": {"rounds": 0, "fit": False}, "relaxed": {}}.items():
+        found = drain(
+            remesh(original.vertices, original.triangles, COUNT, strategy=strategy, original=original, **options)
+        )
+        row |= {f"{c} {when}": v for c, v in shape(found.vertices, found.triangles).items() if c in columns}
+    return row

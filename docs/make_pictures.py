@@ -30,8 +30,10 @@ from omt_uv.solver.distortion import face_distortion, measure
 from omt_uv.solver.globe import polygons_of, unfold
 from omt_uv.solver.measure import mean_curvature
 from omt_uv.solver.orientation import along_axes
+from omt_uv.solver.part_maps import Original
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remesh import remesh
+from omt_uv.solver.sampling import STRATEGIES
 
 CELLS = {"lilium": 120}  # how many checker cells cover the model
 CIRCLES = {"max_planck": 260}  # likewise, in squares as large as those of the checker
@@ -175,6 +177,20 @@ def _remeshed(V, F, density):
     return found.vertices, found.triangles
 
 
+def strategies_sheet(name, out, scratch, pixels):
+    """Wireframes of the four pairs of maps to sample and to triangulate on (B. Gu 2018, figure 5)."""
+    V, F = meshes.load_model(name)
+    original, renders, captions = Original(V, F), [], []
+    for strategy in STRATEGIES:
+        found = drain(remesh(V, F, REMESHED_COUNT, strategy=strategy, original=original))
+        renders.append(scratch / f"{name}_{strategy}.png")
+        pictures.render_wires(found.vertices, found.triangles, view_of(name), renders[-1], pixels)
+        figures = shape(found.vertices, found.triangles)
+        captions.append(f"angle_p1 {figures['angle_p1']:.1f}, edges vary by {figures['edge_cv']:.2f}")
+    titles = [strategy.upper() for strategy in STRATEGIES]
+    pictures.sheet(out / "strategies.png", titles, [("", renders, captions, None)])
+
+
 def caption(case, uv):
     figures = measure(case.V, case.F, uv)
     return f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}"
@@ -207,6 +223,7 @@ def main():
         remeshed = [n for n in args.remeshed if meshes.model_path(n)]
         if remeshed:
             remesh_sheet(remeshed, args.out, Path(scratch), 5 * args.pixels // 4)
+            strategies_sheet(remeshed[0], args.out, Path(scratch), 5 * args.pixels // 4)
         favourite = "lion" if "lion" in args.models else next(iter(args.models), "")
         if favourite:
             balance_sheet(favourite, args.out, Path(scratch), 3 * args.pixels // 4)

@@ -56,9 +56,9 @@ DENSITIES = (
 )
 STRATEGIES = (
     ("APP-CFP", "APP, CFP", "Sample on the area-preserving map, triangulate on the conformal map"),
-    ("APP-APP", "APP, APP", "Sample and triangulate on the area-preserving map"),
-    ("CFP-CFP", "CFP, CFP", "Sample and triangulate on the conformal map"),
-    ("CFP-APP", "CFP, APP", "Sample on the conformal map, triangulate on the area-preserving map"),
+    ("APP-APP", "APP, APP", "For comparison: sample and triangulate on the area-preserving map"),
+    ("CFP-CFP", "CFP, CFP", "For comparison: sample and triangulate on the conformal map"),
+    ("CFP-APP", "CFP, APP", "For comparison: sample on the conformal map, triangulate on the area-preserving one"),
 )
 DEFAULT_STRATEGY = "APP-CFP"
 

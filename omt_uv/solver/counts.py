@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -149,8 +150,9 @@ def _collapse(draft: Draft, h: np.ndarray, length: np.ndarray, spare: int, least
 
 
 def settled(draft: Draft, edit: Edit) -> Draft:
-    """The draft after an edit, Delaunay again."""
+    """The draft after an edit, Delaunay again if it is to be."""
     fixed = np.where(edit.origin >= 0, draft.fixed[np.maximum(edit.origin, 0)], False)
     triangles = edit.triangles.copy()
-    make_delaunay_embedded(edit.points, triangles, twins(triangles), draft.locked, FLIP_ROUNDS)
-    return Draft(edit.points, triangles, fixed, draft.locked)
+    if draft.delaunay:
+        make_delaunay_embedded(edit.points, triangles, twins(triangles), draft.locked, FLIP_ROUNDS)
+    return replace(draft, points=edit.points, triangles=triangles, fixed=fixed)

@@ -10,9 +10,10 @@ import numpy as np
 @dataclass(frozen=True)
 class Draft:
     """points (n,3), triangles (m,3), fixed (n,) bool: vertices that stay, which come first; locked: sorted keys
-    (`topology.pair_keys`) of edges that stay."""
+    (`topology.pair_keys`) of edges that stay; delaunay: whether edges flip to Delaunay as vertices move."""
 
     points: np.ndarray
     triangles: np.ndarray
     fixed: np.ndarray
     locked: np.ndarray
+    delaunay: bool = True

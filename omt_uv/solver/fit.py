@@ -41,7 +41,7 @@ def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray, spaci
     on = home(index, points, vertex_normals(points, triangles))
     for k in range(ROUNDS):
         pairs = pairing(points, triangles, on.points)
-        cells = voronoi_cells(points, triangles, density[on.faces] ** 2)
+        cells = voronoi_cells(points, triangles, density[on.faces] ** 2, draft.delaunay)
         pull = cells.moment / np.maximum(cells.mass, 1e-300)[:, None]
         off = displacements(points, triangles, twin, draft.fixed, pairs, pull, CLOSE * spacing, pairs.usual)
         moved = points + off
@@ -50,7 +50,8 @@ def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray, spaci
         points = moved
         on = home(index, points, vertex_normals(points, triangles))
         points = _tethered(points, on.points, TETHER * spacing)
-        make_delaunay_embedded(points, triangles, twin, draft.locked)
+        if draft.delaunay:
+            make_delaunay_embedded(points, triangles, twin, draft.locked)
         yield Progress("Fit", (k + 1) / ROUNDS)
     return replace(draft, points=points, triangles=triangles)
 

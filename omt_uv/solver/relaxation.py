@@ -46,11 +46,12 @@ def relax(draft: Draft, rounds: int, carrier: Carrier) -> Steps[tuple[Draft, flo
     points, density = carrier.onto(draft.points, normal)
     points[fixed] = draft.points[fixed]
     for k in range(rounds):
-        make_delaunay_embedded(points, triangles, twin, draft.locked)
+        if draft.delaunay:
+            make_delaunay_embedded(points, triangles, twin, draft.locked)
         if k % LOOK_EVERY == 0:
             pull = _pull(points, triangles, normal, carrier)
             descent.reset()
-        cells = pull.correct(points, voronoi_cells(points, triangles, density**2))
+        cells = pull.correct(points, voronoi_cells(points, triangles, density**2, draft.delaunay))
         if cells.energy > best * (1 + 1e-6):
             descent.reset()
         best = cells.energy
@@ -65,7 +66,8 @@ def relax(draft: Draft, rounds: int, carrier: Carrier) -> Steps[tuple[Draft, flo
         found = ~fixed & np.isfinite(trial).all(axis=1)
         points = np.where(found[:, None], trial, points)
         yield Progress("Relaxation", (k + 1) / rounds)
-    make_delaunay_embedded(points, triangles, twin, draft.locked)
+    if draft.delaunay:
+        make_delaunay_embedded(points, triangles, twin, draft.locked)
     return replace(draft, points=points, triangles=triangles), moved
 
 

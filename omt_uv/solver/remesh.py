@@ -81,7 +81,9 @@ def remesh(
     features : (e,2) pairs of input vertices, edges to keep as lines of the new mesh
     preserve_boundary : keep vertices on boundaries and on their corners; without, a boundary still is one, but its
         vertices slide until they are evenly apart, and it is smoothed as far as the new edges are too long to show it
-    strategy : map to sample on and map to triangulate on, each the measure-preserving ("app") or the conformal ("cfp")
+    strategy : map to sample on and map to triangulate on, each the measure-preserving ("app") or the conformal ("cfp").
+        What follows keeps to it: after samples on the conformal map no vertices are carried to where the measure asks
+        for them, after triangles of the measure-preserving one no edges flip to Delaunay on the surface
     fit : move vertices off the surface to halve the distance of the triangles to it
     rounds : of relaxation on the surface; 0 leaves the strategy's mesh as it is
     grading : most that edges grow by per length, see `measure.graded`; 0 for as fast as the density has it
@@ -231,15 +233,17 @@ def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options
         carrier = Carrier(index, level, start.count)
         draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.0, 0.07)
         draft = adjust_count(draft, start.count, size, anyhow)
-        claim = None
+        claim, at_rest = None, True
         for k in range(BALANCES):
             draft, _ = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.07 + 0.038 * k, 0.038)
+            if not options.by_measure:
+                break
             balanced = balance(draft, carrier, size, claim)
-            draft, claim = balanced.draft, balanced.claim
-            if balanced.settled:
+            draft, claim, at_rest = balanced.draft, balanced.claim, balanced.settled
+            if at_rest:
                 break
         draft, moved = yield from part_of(relax(draft, options.rounds, carrier), 0.3, 0.2)
-        if not balanced.settled:
+        if not at_rest:
             # Along jumps of the density that took vertices away again.
             draft = balance(draft, carrier, size, claim).draft
             draft, moved = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.5, 0.07)

@@ -41,6 +41,16 @@ class Options:
     rounds: int
     corners: bool
 
+    @property
+    def by_measure(self) -> bool:
+        """Whether vertices are where the measure of the surface asks for them, or where a conformal map puts them."""
+        return self.strategy.startswith("app")
+
+    @property
+    def delaunay(self) -> bool:
+        """Whether triangles are Delaunay on the surface, as in a conformal map, or in a measure-preserving one."""
+        return self.strategy.endswith("cfp")
+
 
 @dataclass(frozen=True)
 class Tessellation:
@@ -92,7 +102,7 @@ def _by_sphere(maps: PartMaps, count: int, density: np.ndarray, options: Options
         maps.give_up(error.cause)
         return None
     points = samples.points
-    draft = Draft(points, samples.triangles, np.zeros(len(points), dtype=bool), np.zeros(0, np.int64))
+    draft = Draft(points, samples.triangles, np.zeros(len(points), dtype=bool), np.zeros(0, np.int64), options.delaunay)
     size = edge_size(float(part.area @ density), 0.0, vertices)
     return Tessellation(draft, vertices, size, 1.0, found.warnings, part.slits, 0)
 
@@ -166,7 +176,7 @@ def _by_charts(
     number[order] = np.arange(len(points))
     fixed = np.arange(len(points)) < samples.fixed.sum()
     held_arcs = [k for k, arc in enumerate(lines.arcs) if arc.held]
-    draft = Draft(points[order], number[triangles], fixed, _kept(held_arcs, samples, number))
+    draft = Draft(points[order], number[triangles], fixed, _kept(held_arcs, samples, number), options.delaunay)
     slits = _kept(_along(lines, part.slits), samples, number)
     return Tessellation(draft, vertices, size, stretch, tuple(warnings), slits, _copies(part, lines, samples))
 

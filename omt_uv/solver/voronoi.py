@@ -19,11 +19,12 @@ class Cells:
     energy: float
 
 
-def voronoi_cells(points: np.ndarray, triangles: np.ndarray, density: np.ndarray) -> Cells:
+def voronoi_cells(points: np.ndarray, triangles: np.ndarray, density: np.ndarray, delaunay: bool = True) -> Cells:
     """Cells of a Delaunay mesh (n,3), (m,3) with density (n,) at the vertices, geometric means in between.
 
     Every triangle is parted by the lines from its circumcentre to the middles of its sides, with signs where the
-    circumcentre lies outside: each end of a side has half of the side's triangle with the circumcentre.
+    circumcentre lies outside: each end of a side has half of the side's triangle with the circumcentre. Where the mesh
+    is not `delaunay` these are no cells, and the centroid takes the place of the circumcentre.
     """
     n, corner = len(points), triangles.T
     # Coordinates apart from each other, and corners: (3,3,m). Many small arrays of threes would take twice the time.
@@ -31,7 +32,7 @@ def voronoi_cells(points: np.ndarray, triangles: np.ndarray, density: np.ndarray
     side = p[[2, 0, 1]] - p[[1, 2, 0]]
     square = _dot(side, side)
     double = np.sqrt(_cross_square(side[0], side[1]))
-    w = _circumcentre(square)
+    w = _circumcentre(square) if delaunay else np.full(square.shape, 1 / 3)
     centre = sum(w[k] * p[k] for k in range(3))
     rho = density.take(corner)
     # Geometric means: where a long edge leads from many small cells to a few large ones, the arithmetic mean
