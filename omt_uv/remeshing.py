@@ -185,6 +185,10 @@ def _curvature(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.
     return measure.mean_curvature(job.surface.positions, triangles, settings.amount)
 
 
+def _gaussian(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    return measure.gaussian_curvature(job.surface.positions, triangles, settings.amount)
+
+
 def _saliency(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     positions = job.surface.positions
     weights = soft_weights(score("saliency", positions, triangles), areas(positions, triangles))
@@ -207,6 +211,7 @@ def _values(job: Job) -> np.ndarray:
 
 _DENSITIES: dict[str, Callable[[Job, np.ndarray, RemeshSettings], np.ndarray]] = {
     "curvature": _curvature,
+    "gaussian": _gaussian,
     "saliency": _saliency,
     "weights": _painted,
     "attribute": _attribute,

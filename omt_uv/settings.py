@@ -50,6 +50,7 @@ COUNTS = (
 DENSITIES = (
     ("UNIFORM", "Uniform", "Triangles of one size everywhere"),
     ("CURVATURE", "Curvature", "Smaller triangles where the surface curves"),
+    ("GAUSSIAN", "Gaussian Curvature", "Smaller triangles at tips, dents and saddles, and not where it bends one way"),
     ("SALIENCY", "Saliency", "Smaller triangles where the shape draws attention"),
     ("WEIGHTS", "Vertex Group", "Smaller triangles where the weights of a vertex group are large"),
     ("ATTRIBUTE", "Attribute", "Vertices per area in proportion to an attribute of floats, on vertices or faces"),

@@ -11,7 +11,7 @@ from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
 from .common import CommandError, blender, check_output, drain_shown, read, warn
 from .options import add_files, names
 
-KINDS = ("uniform", "curvature", "saliency")
+KINDS = ("uniform", "curvature", "gaussian", "saliency")
 
 
 def add(commands) -> None:

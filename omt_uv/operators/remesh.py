@@ -250,7 +250,7 @@ def _draw_density(layout: bpy.types.UILayout, properties) -> None:
         choose_attribute(layout, properties, "density_attribute")
     if properties.density in ("WEIGHTS", "SALIENCY"):
         layout.prop(properties, "weight_factor")
-    if properties.density == "CURVATURE":
+    if properties.density in ("CURVATURE", "GAUSSIAN"):
         layout.prop(properties, "amount")
     if properties.density != "UNIFORM":
         layout.prop(properties, "grading")

@@ -265,6 +265,7 @@ def test_a_painted_group_is_denser():
 
 @pytest.mark.parametrize("arguments", [
     {"density": "CURVATURE", "amount": 2},
+    {"density": "GAUSSIAN", "amount": 2},
     {"density": "SALIENCY", "weight_factor": 4},
     {"density": "ATTRIBUTE", "density_attribute": "fine"},
     {"density": "ATTRIBUTE", "density_attribute": "fine", "grading": 0.2},
