@@ -28,6 +28,8 @@ from .solver.progress import Steps, part_of
 from .solver.warp import warped
 from .unwrapping import Job, Packer, Refusal, lay_out
 
+# Shares that are off by more than this, relatively, are said.
+OFF = 5e-3
 # More overlap than this, as a share of the UV area, is said.
 OVERLAP = 1e-4
 
@@ -64,6 +66,12 @@ class Shares:
             f"The region went from {100 * self.before:.4g} % to {100 * self.after:.4g} % of the texture "
             f"({100 * self.asked:.4g} % asked)"
         )
+
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be said where the region has not got what was asked."""
+        if abs(self.after / self.asked - 1) <= OFF:
+            return ()
+        return (f"The region has {100 * self.after:.4g} % of the texture instead of {100 * self.asked:.4g} %",)
 
 
 @dataclass(frozen=True)
@@ -136,7 +144,7 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
     after = [_uv_areas(*x) for x in zip(regions, parts, layout.corners, layout.uv, strict=True)]
     shares = Shares(found.before, found.asked, share(weights, np.concatenate(after)), found.factor)
     reports = [m.report() for m in layout.maps]
-    warnings = [*layout.warnings, *((-1, text) for text in found.warnings)]
+    warnings = [*layout.warnings, *((-1, text) for text in (*found.warnings, *shares.warnings()))]
     return Magnified(layout.corners, layout.uv, reports, shares, warnings)
 
 
@@ -199,7 +207,9 @@ def _from_uv(regions, settings: MagnifySettings) -> Steps[Magnified]:
     warnings += _grown_together(pieces, islands)
     corners, uv = _scatter(regions, pieces)
     reports = [[_report(p) for p in pieces if p.owner == index] for index in range(len(regions))]
-    return Magnified(corners, uv, reports, _overall(pieces), warnings)
+    shares = _overall(pieces)
+    warnings += ((-1, text) for text in shares.warnings())
+    return Magnified(corners, uv, reports, shares, warnings)
 
 
 def _islands(regions) -> tuple[list[tuple[int, Island]], list[tuple[int, str]]]:
@@ -328,8 +338,13 @@ def _report(piece: _Piece) -> dict:
     }
 
 
-def warped_picture(picture: np.ndarray, regions: Sequence[Region], result: Magnified, margin: float) -> np.ndarray:
-    """A picture (h,w,c) of the UVs there were as one of those that the result has, islands continued by the margin."""
+def warped_picture(
+    picture: np.ndarray, regions: Sequence[Region], result: Magnified, margin: float, straight: bool = False
+) -> np.ndarray:
+    """A picture (h,w,c) of the UVs there were as one of those that the result has, islands continued by the margin.
+
+    straight : see `solver.warp.warped`
+    """
     old, new = [], []
     for region, corners, uv in zip(regions, result.corners, result.uv, strict=True):
         before = np.asarray(region.pins.uv, float) if region.pins is not None else np.zeros((0, 2))
@@ -339,4 +354,4 @@ def warped_picture(picture: np.ndarray, regions: Sequence[Region], result: Magni
         triangles = region.surface.triangles[moved]
         old.append(before[triangles])
         new.append(after[triangles])
-    return warped(picture, np.concatenate(old), np.concatenate(new), int(margin))
+    return warped(picture, np.concatenate(old), np.concatenate(new), int(margin), straight)

@@ -222,3 +222,34 @@ def test_weights_of_nothing():
         scores.score("distance", V, F, np.zeros(len(V), bool))
     cube = scores.soft_weights(np.where(np.arange(100) < 95, 0.0, 1.0), np.ones(100))
     assert cube.sum() == 5
+
+
+def test_transparent_pixels_do_not_darken_what_is_beside_them():
+    picture = np.zeros((32, 32, 4))
+    picture[:, 16:] = [0.8, 0.6, 0.4, 1.0]
+    uv, F = square(8)
+    after = warped(picture, uv[F], 0.93 * uv[F] + 0.03, straight=True)
+    seen = after[..., 3] > 0
+    assert (after[..., 3][seen] < 1).any()
+    np.testing.assert_allclose(after[seen][:, :3], np.tile([0.8, 0.6, 0.4], (seen.sum(), 1)), atol=1e-12)
+
+
+def test_areas_that_cannot_be_are_said():
+    V, F = meshes.bumpy(16, 16)
+    uv = V[:, :2].copy()
+    rough = from_vertices(np.random.default_rng(0).integers(0, 2, len(V)).astype(float), F)
+    soft = from_vertices(blob(uv, uv.mean(0), 0.2), F)
+    for weights, factor, said in ((rough, 1.9, True), (soft, 2.0, False)):
+        found = exact_share(weights, area := face_areas(V, F), factor)
+        (chart,) = split(triangle_surface(V, F))
+        options = {"density": normalised(found.density, area), "region": weights}
+        result = drain(unwrap_chart(chart, **options))
+        assert any("Areas are" in text for text in result.warnings) == said == (result.area_l1 > 0.016)
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "mean"])
+def test_planes_have_no_curvature_in_single_precision(kind):
+    V, F = meshes.grid(60, 60)
+    q, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
+    assert not scores.score(kind, (V @ q + 5).astype(np.float32).astype(float), F).any()
+    assert scores.score(kind, *meshes.bumpy(60, 60, height=0.02)).any()

@@ -58,8 +58,13 @@ def add(commands) -> None:
     )
     command.add_argument("--texture-size", type=texture_size, default=DEFAULT_TEXTURE_SIZE, metavar="PX")
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to use; default: the active one")
-    command.add_argument("--image", type=Path, metavar="PNG", help="picture of the old UVs that shall follow them")
-    command.add_argument("--image-output", type=Path, metavar="PNG", help="where to write the picture of the new UVs")
+    command.add_argument("--image", type=Path, metavar="FILE", help="picture of the old UVs that shall follow them")
+    command.add_argument(
+        "--image-output",
+        type=Path,
+        metavar="FILE",
+        help="picture of the new UVs, .png .exr .tif .jpg",
+    )
     add_report(command, "island")
 
 
@@ -99,7 +104,7 @@ def run(options: argparse.Namespace) -> None:
         result = replace(result, warnings=[*told, *result.warnings])
         warnings = write_layers(options, objects, result)
     if picture is not None:
-        _write_picture(options.image_output, warped_picture(picture, regions, result, options.margin))
+        _write_picture(options, warped_picture(picture[0], regions, result, options.margin, picture[1]))
     print(result.shares.text())
     if options.report:
         more = {"weights": options.weights, "factor": options.factor, "exact": options.exact, "source": options.source}
@@ -108,37 +113,43 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _picture(options: argparse.Namespace):
-    """Pixels (h,w,4) of the picture that shall follow, or None."""
+    """Pixels (h,w,4) of the picture that shall follow, and whether its alpha is straight; or None."""
     if options.image is None and options.image_output is None:
         return None
     if options.image is None or options.image_output is None:
         raise CommandError("A picture needs both --image and --image-output.")
     if options.source != "uv":
         raise CommandError("A picture can only follow UVs that exist. Use --source uv.")
-    import bpy
+    from ..blender_pictures import FORMATS, ImageError, picture_of, straight_alpha
 
-    from ..blender_pictures import ImageError, picture_of
-    from ..quiet import silence
-
+    if options.image_output.suffix.lower() not in FORMATS:
+        raise CommandError(f"{options.image_output}: unknown format. Use one of {' '.join(FORMATS)}.")
+    if not options.image_output.resolve().parent.is_dir():
+        raise CommandError(f"{options.image_output}: there is no such folder")
     try:
-        with silence():
-            image = bpy.data.images.load(str(options.image.resolve()))
-        return picture_of(image.name)
+        name = _load(options.image)
+        return picture_of(name), straight_alpha(name)
     except (RuntimeError, ImageError) as error:
         raise CommandError(f"{options.image}: cannot be read as a picture") from error
 
 
-def _write_picture(path: Path, picture) -> None:
+def _load(path: Path) -> str:
     import bpy
 
     from ..quiet import silence
 
-    height, width = picture.shape[:2]
-    image = bpy.data.images.new(path.stem, width, height, alpha=True)
-    image.pixels.foreach_set(picture.ravel())
-    image.filepath_raw, image.file_format = str(path.resolve()), "PNG"
+    with silence():
+        return bpy.data.images.load(str(path.resolve())).name
+
+
+def _write_picture(options: argparse.Namespace, picture) -> None:
+    from ..blender_pictures import save_copy
+    from ..quiet import silence
+
+    # Reading the mesh has closed the file that it was in.
+    name = _load(options.image)
     try:
         with silence():
-            image.save()
+            save_copy(name, picture, options.image_output)
     except RuntimeError as error:
-        raise CommandError(f"{path}: cannot be written") from error
+        raise CommandError(f"{options.image_output}: cannot be written") from error

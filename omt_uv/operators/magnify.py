@@ -98,7 +98,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context):
         from .. import blender_mesh, blender_pack, packing, running
-        from ..blender_pictures import ImageError, picture_of
+        from ..blender_pictures import ImageError, picture_of, straight_alpha
         from ..blender_seams import GroupError
         from ..blender_weights import ScoreError
         from ..magnifying import Region, magnify, warped_picture
@@ -126,7 +126,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         except packing.PackingError as error:
             raise Complaint(str(error)) from error
         if picture is not None:
-            picture = warped_picture(picture, regions, result, self.margin)
+            picture = warped_picture(picture, regions, result, self.margin, straight_alpha(self.image))
         result = replace(result, warnings=[*warnings, *result.warnings])
         return [obj for obj, _ in pairs], result, picture
 

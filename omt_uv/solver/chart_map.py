@@ -17,8 +17,10 @@ from .domain import Disk, Domain, Rectangle
 from .errors import FoldedUVError, MeshError, positive_density
 from .first_map import COARSE_ABOVE, FirstMap, Log, coarse_first_map, first_map, mean_value_sites
 from .geometry import face_areas, signed_areas
+from .measure import not_reached
 from .progress import Steps, part_of
 from .refine import BOUNDARIES, Refinement, refine
+from .stages import QUALITIES
 from .starts import unroll
 from .topology import boundary_loops
 
@@ -115,6 +117,8 @@ def unwrap_chart(
     with log.timed("measure"):
         asked = None if density is None else density[: len(chart.triangles)]
         figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
+    if density is not None and balance == 0:
+        log.warnings += not_reached(figures.area_l1, QUALITIES[quality].area_error)
     if figures.folds:
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
     free = boundary == "free"

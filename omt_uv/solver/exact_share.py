@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import ShareError
-from .measure import check_factor, check_weights, painted, share
+from .measure import CONTRAST, check_factor, check_weights, painted, share
 
 # A factor so many times what a region with a hard rim would need is said: the rest gets little of the texture.
 MOST_OF_HARD = 4.0
@@ -66,10 +66,20 @@ def exact_share(weights: np.ndarray, area: np.ndarray, factor: float, base: np.n
             "Paint the region with weight 1 and the rest with 0",
         )
     found = _contrast(weights, measure, asked)
+    if not 1 / CONTRAST <= found <= CONTRAST:
+        raise _too_far(factor, found)
     hard = asked / (1 - asked) * (1 - before) / before
     soft = abs(np.log(found)) > abs(np.log(hard)) + np.log(MOST_OF_HARD)
     warning = f"The rim of the region is very soft for this factor: densities vary by {max(found, 1 / found):.3g}"
     return ExactShare(found**weights, found, before, asked, (warning,) if soft else ())
+
+
+def _too_far(factor: float, contrast: float) -> ShareError:
+    return ShareError(
+        f"For {factor:g} times the share densities would vary by {max(contrast, 1 / contrast):.3g}; "
+        f"no map shows more than {CONTRAST:g}",
+        "Choose a factor nearer to 1, or paint the region with a harder rim",
+    )
 
 
 def wanted(weights: np.ndarray, area: np.ndarray, factor: float, exact: bool) -> ExactShare:
@@ -82,6 +92,8 @@ def wanted(weights: np.ndarray, area: np.ndarray, factor: float, exact: bool) ->
     if exact:
         return exact_share(weights, area, factor)
     density = painted(weights, factor)
+    if not 1 / CONTRAST <= factor <= CONTRAST:
+        raise _too_far(factor, factor)
     return ExactShare(density, factor, share(weights, area), share(weights, area * density))
 
 

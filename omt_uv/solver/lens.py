@@ -16,7 +16,7 @@ from .errors import FoldedUVError, MeshError
 from .exact_share import exact_share, wanted
 from .geometry import face_areas, signed_areas
 from .improve import boundary_edges, meets_itself
-from .measure import normalised, share
+from .measure import normalised, not_reached, share
 from .newton import Assembly
 from .outline import Outline, centroid, free, recognised
 from .progress import Progress, Steps, part_of
@@ -132,7 +132,9 @@ def magnify_region(
         uv, done = lens.uv, done + lens.iterations
         texts += [text for text in lens.warnings if text not in texts]
     has, asked = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
-    return replace(lens, iterations=done, area_error=float(np.abs(has - asked).sum()), warnings=tuple(texts))
+    error = float(np.abs(has - asked).sum())
+    texts += not_reached(error, count * QUALITIES[quality].area_error)
+    return replace(lens, iterations=done, area_error=error, warnings=tuple(texts))
 
 
 def refuse_folds(uv: np.ndarray, triangles: np.ndarray) -> None:

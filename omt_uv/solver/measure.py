@@ -19,6 +19,8 @@ from .topology import halfedges
 
 # A density may not vary more than this over a surface: faces with less would have no place in double precision.
 CONTRAST = 1e6
+# Area errors so many times the goal are said.
+INEXACT = 2.0
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,17 @@ def normalised(density: np.ndarray, area: np.ndarray) -> np.ndarray:
 def share(weights: np.ndarray, measure: np.ndarray) -> float:
     """Share sum(w a) / sum(a) of a softly painted region (m,) in a measure (m,): areas in space, or in a UV map."""
     return float(weights @ measure / measure.sum())
+
+
+def not_reached(error: float, goal: float) -> tuple[str, ...]:
+    """A warning where the area error of a map against its density is much above the goal, as it is where the density
+    varies more from face to face than shear can make up for."""
+    if error <= INEXACT * goal:
+        return ()
+    return (
+        f"Areas are {100 * error:.2g} % of the texture off: the density varies more than these faces can show. "
+        "Soften the region, or choose a smaller factor",
+    )
 
 
 def entropy(target: np.ndarray, area: np.ndarray) -> float:

@@ -16,6 +16,9 @@ from .topology import halfedges, pair_keys, pair_up, previous_halfedge
 KINDS = ("saliency", "gaussian", "mean", "sharpness", "distance")
 # Curvature is averaged over so much of the diagonal: single vertices are noise.
 SMOOTH = 3 * EPSILON
+# Densities of curvature, on a surface of unit size, below which there is none: planes have so much by the rounding of
+# single precision. Round spheres have 12 and 3.5.
+NO_CURVATURE = {"gaussian": 1e-3, "mean": 0.03}
 # Scores that differ by less than this share of the largest are the same.
 SAME = 1e-6
 
@@ -41,7 +44,8 @@ def score(kind: str, positions: np.ndarray, triangles: np.ndarray, selected: np.
         return -distance(positions, triangles, np.flatnonzero(selected))
     positions = unit_size(positions, triangles)
     amount = {"gaussian": curvature.gaussian, "mean": curvature.mean}[kind](positions, triangles)
-    return Surroundings(positions, triangles, SMOOTH).means(np.abs(amount), np.array([SMOOTH]))[0]
+    found = Surroundings(positions, triangles, SMOOTH).means(np.abs(amount), np.array([SMOOTH]))[0]
+    return found if found.max() > NO_CURVATURE[kind] else np.zeros(len(positions))
 
 
 def soft_weights(

@@ -10,6 +10,7 @@ import numpy as np
 
 from .contact import Contact, contact, crossings
 from .energy import Elements, missing_tilt, shortfall, shortfall_but_share, tilted
+from .measure import INEXACT
 from .newton import Assembly, Motion, Problem, Step
 from .progress import Progress, Steps
 from .smoothing import Smoother
@@ -59,6 +60,10 @@ LEAST_GROWTH, MOST_GROWTH = 1.3, 10.0
 # Where a greater weight leaves more than this share of the error, some faces have no room on the outline, and still
 # greater ones would only shear the rest.
 STUCK = 0.98
+# The same for magnified regions that are still far from the goal, by the power of the weight's growth that the error is
+# to fall with, where it has grown by so much: a density that varies more from face to face than the mesh can show has
+# no exact areas, only shear.
+SLUGGISH, GROWN = 0.25, 3.0
 # A stage that takes longer gives way to the next, which may find a way around.
 STAGE_STEPS = 40
 # Share of the area term's indefinite Hessian kept: at the start of a stage, and the least before it is dropped.
@@ -167,7 +172,7 @@ def stages(
         weights = weights[1:]
     elif task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
-    overlap, guarded, steps, k, before = task.crosses(w), task.guarded, 0, 0, np.inf
+    overlap, guarded, steps, k, before, last = task.crosses(w), task.guarded, 0, 0, np.inf, weights[0]
     warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
     while True:
         weight = weights[k]
@@ -189,13 +194,21 @@ def stages(
         error, rest = shortfall(task.faces, w), shortfall_but_share(task.faces, w)
         pull += weight * missing_tilt(task.faces, w) if balance == 0 else 0.0
         enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
-        enough |= stage.status == "converged" and error > STUCK * before
-        before = error
+        enough |= (
+            stage.status == "converged" and error > _stuck(task, weight / last, error / settings.area_error) * before
+        )
+        before, last = error, weight
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
             break
         if k >= len(weights):
             weights.append(weights[-1] * float(growth(rest / settings.area_error)))
     return Found(w, steps, stage.residual, weight, stage.energy, stage.status, task.crosses(w), warnings, pull)
+
+
+def _stuck(task: Task, grown: float, excess: float) -> float:
+    """Share of the error before above which a weight so many times greater was of no use; excess: error over goal."""
+    far = task.faces.region is not None and grown >= GROWN and excess > INEXACT
+    return min(STUCK, grown**-SLUGGISH) if far else STUCK
 
 
 def _ends(task: Task, balance: float, settings: Quality, on_the_way: bool) -> tuple[float, float]:

@@ -11,17 +11,20 @@ from .geometry import cross2
 ROWS = 64
 
 
-def warped(picture: np.ndarray, old: np.ndarray, new: np.ndarray, margin: int = 4) -> np.ndarray:
+def warped(
+    picture: np.ndarray, old: np.ndarray, new: np.ndarray, margin: int = 4, straight: bool = False
+) -> np.ndarray:
     """The picture (h,w,c) of the layout `old` as a picture of the same size for the layout `new`, (m,3,2) each.
 
     UVs count from the lower left corner of the first row of pixels, as in Blender; beyond [0,1] it repeats.
     Sampled bilinearly. Islands are continued by `margin` pixels; what lies farther outside stays as it is.
+    straight : the last channel is alpha, and colours are not multiplied by it: what is transparent has no part in means
     """
     height, width = picture.shape[:2]
     place, covered = _places(old, new, height, width)
     place, known = _padded(place, covered, margin)
     result = np.array(picture, dtype=float, copy=True)
-    result[known] = _bilinear(picture, place[known])
+    result[known] = _by_alpha(picture, place[known]) if straight else _bilinear(picture, place[known])
     if np.issubdtype(picture.dtype, np.floating):
         return result.astype(picture.dtype)
     return _rounded(result, picture.dtype)
@@ -85,6 +88,15 @@ def _padded(place: np.ndarray, covered: np.ndarray, margin: int) -> tuple[np.nda
     distance, nearest = distance_transform_edt(~covered, return_indices=True)
     near = distance <= margin
     return place[nearest[0], nearest[1]], near
+
+
+def _by_alpha(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Samples (k,c) of a picture (h,w,c) at UVs (k,2), colours weighed by the last channel, where there is any."""
+    plain = _bilinear(picture, uv)
+    alpha = picture[..., -1:].astype(float)
+    weighed, weight = _bilinear(picture * alpha, uv), plain[:, -1:]
+    colours = np.where(weight > 0, weighed / np.where(weight > 0, weight, 1), plain)
+    return np.column_stack([colours[:, :-1], plain[:, -1]])
 
 
 def _bilinear(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:

@@ -6,9 +6,11 @@ import json
 
 import bpy
 
+import bmesh
 import numpy as np
 import pytest
 from blender import scenes
+from mathutils import Euler
 
 
 def painted(name="Bump", radius=0.35, group="region", **options):
@@ -137,6 +139,9 @@ def test_a_warped_image_follows():
         ({"factor": -2.0, "cascade": 2}, "-2 times"),
         ({"factor": -2.0, "cascade": 2, "source": "UV"}, "-2 times"),
         ({"factor": 1e30, "cascade": 16}, "inf times"),
+        ({"factor": 1e-7}, "would vary"),
+        ({"factor": 1e-7, "source": "UV"}, "would vary"),
+        ({"factor": 1e-7, "source": "UV", "exact": False}, "would vary"),
         ({"factor": float("nan")}, "nan times"),
         ({"factor": 1000.0}, "leaves nothing"),
         ({"factor": 1000.0, "source": "UV"}, "leaves nothing"),
@@ -386,3 +391,91 @@ def test_command_says_where_a_name_is_both(run, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     status, _, err = run("magnify", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "heat")
     assert status == 0 and "a vertex group and an attribute" in err
+
+
+def picture_file(path, kind, depth, is_float):
+    """A file of one colour, (0.5, 0.25, 0.1) and, as far as it can, an alpha of 0.8."""
+    image = bpy.data.images.new("made", 16, 8, alpha=True, float_buffer=is_float)
+    image.pixels.foreach_set(np.tile(np.array([0.5, 0.25, 0.1, 0.8], np.float32), 128))
+    settings = bpy.context.scene.render.image_settings
+    settings.file_format, settings.color_depth = kind, depth
+    settings.color_mode = "RGB" if kind == "JPEG" else "RGBA"
+    image.save_render(str(path), scene=bpy.context.scene)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "kind", "depth"),
+    [(".png", "PNG", "8"), (".png", "PNG", "16"), (".exr", "OPEN_EXR", "32"), (".jpg", "JPEG", "8")],
+)
+def test_pictures_keep_their_colours_whatever_their_depth(run, tmp_path, suffix, kind, depth):
+    painted()
+    picture_file(tmp_path / f"map{suffix}", kind, depth, depth != "8")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    files = (tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "region", "--factor", 2)
+    pictures = ("--image", tmp_path / f"map{suffix}", "--image-output", tmp_path / f"new{suffix}")
+    status, _, err = run("magnify", *files, "--source", "uv", *pictures)
+    assert status == 0, err
+    before, after = (bpy.data.images.load(str(tmp_path / f"{name}{suffix}")) for name in ("map", "new"))
+    assert tuple(after.size) == tuple(before.size) and after.alpha_mode == before.alpha_mode
+    assert after.pixels[:] == pytest.approx(before.pixels[:], abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["new.xyz", "nowhere/new.png"])
+def test_pictures_that_cannot_be_written_are_refused_first(run, tmp_path, name):
+    painted()
+    picture_file(tmp_path / "map.png", "PNG", "8", False)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    files = (tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "region", "--factor", 2)
+    pictures = ("--image", tmp_path / "map.png", "--image-output", tmp_path / name)
+    status, _, err = run("magnify", *files, "--source", "uv", *pictures)
+    assert status == 1 and len(err.splitlines()) == 1 and not (tmp_path / "out.blend").exists()
+
+
+def test_hidden_faces_stay_and_several_objects_share():
+    objects = [painted(name) for name in "AB"]
+    scenes.edit(*objects)
+    for obj in objects:
+        edit = bmesh.from_edit_mesh(obj.data)
+        edit.faces.ensure_lookup_table()
+        for face in edit.faces[:8]:
+            face.hide_set(True)
+    before = [scenes.uv_of(obj) for obj in objects]
+    for source in ("MESH", "UV"):
+        magnify(factor=1.5, source=source)
+        for obj, uv in zip(objects, before, strict=True):
+            assert scenes.uv_of(obj)[:32].tobytes() == uv[:32].tobytes()
+            assert scenes.uv_of(obj)[32:].tobytes() != uv[32:].tobytes()
+    scenes.leave_edit()
+
+
+def test_linked_meshes_are_refused(tmp_path):
+    painted()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Bump"]
+    bpy.context.collection.objects.link(wanted.objects[0])
+    scenes.select([wanted.objects[0]])
+    for operator in (bpy.ops.uv.omt_magnify, bpy.ops.object.omt_weights):
+        assert "linked from a library" in scenes.error_of(operator)
+
+
+def test_flat_meshes_have_no_curvature_to_magnify():
+    obj = scenes.bump(height=0.0)
+    obj.data.transform(Euler((0.3, 0.5, 0.7)).to_matrix().to_4x4())
+    before = scenes.state(obj)
+    for name in ("curvature", "saliency"):
+        assert "same everywhere" in scenes.error_of(bpy.ops.uv.omt_magnify, weight_group=name)
+    assert scenes.state(obj) == before
+
+
+@pytest.mark.parametrize(("suffix", "kind", "depth"), [(".png", "PNG", "16"), (".exr", "OPEN_EXR", "32")])
+def test_packed_copies_of_deep_images_keep_their_colours(tmp_path, suffix, kind, depth):
+    painted()
+    picture_file(tmp_path / f"map{suffix}", kind, depth, True)
+    image = bpy.data.images.load(str(tmp_path / f"map{suffix}"))
+    magnify(factor=2.0, source="UV", image=image.name)
+    copy = bpy.data.images[f"{image.name} warped"]
+    # From what was packed, as a saved file has it.
+    copy.reload()
+    assert copy.pixels[:] == pytest.approx(image.pixels[:], abs=2e-3)
