@@ -171,10 +171,21 @@ def check_target(mesh: bpy.types.Mesh, name: str) -> None:
     if len(name.encode()) > UV_LAYER_NAME_BYTES:
         raise TargetError(f"The UV layer name {name!r} is too long. Use at most {UV_LAYER_NAME_BYTES} bytes.")
     missing = name not in mesh.uv_layers if name else len(mesh.uv_layers) == 0
-    if missing and name in mesh.attributes:
+    if missing and name in _attribute_names(mesh):
         raise TargetError(f"{mesh.name} has an attribute {name!r} that is no UV layer. Choose another name.")
     if missing and len(mesh.uv_layers) >= 8:
         raise TargetError(f"{mesh.name} has 8 UV layers, the most a mesh can hold. Remove one first.")
+
+
+def _attribute_names(mesh: bpy.types.Mesh) -> set[str]:
+    """Names of all attributes; Edit Mode hides those that every mesh has, as positions."""
+    if not mesh.is_editmode:
+        return set(mesh.attributes.keys())
+    copy = mesh.copy()
+    try:
+        return {*mesh.attributes.keys(), *copy.attributes.keys()}
+    finally:
+        bpy.data.meshes.remove(copy)
 
 
 def target_layer(mesh: bpy.types.Mesh, name: str) -> str:

@@ -12,6 +12,8 @@ import numpy as np
 from . import blender_mesh
 from .refining import found_islands
 from .running import Disturbed
+from .solver.chart_terms import located
+from .solver.errors import MeshError
 from .solver.follow import Follower
 from .unwrapping import Refusal
 
@@ -65,7 +67,10 @@ class Session:
             order = np.argsort(at[0])
             at = (at[0][order], at[1][order])
         free = ~np.isin(vertices, pinned)
-        follower = Follower(chart.vertices, chart.triangles, island.uv, at)
+        try:
+            follower = Follower(chart.vertices, chart.triangles, island.uv, at)
+        except MeshError as error:
+            raise Refusal(owner, located(error, chart)) from error
         return _Piece(owner, corners[free], vertices[free], pin_corners, follower)
 
     def follow(self, balance: float, seconds: float = SLICE) -> bool:

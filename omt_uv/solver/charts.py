@@ -119,13 +119,14 @@ def chosen_triangles(surface: Surface, faces: np.ndarray | None) -> tuple[np.nda
     triangles, owner = surface.triangles[chosen], surface.triangle_face[chosen]
     if len(triangles) == 0:
         raise EmptyMeshError("There are no faces to unwrap")
-    _check_positions(surface, triangles)
+    check_finite(surface.positions, surface.corner_vertex[triangles])
     return faces, triangles, owner
 
 
-def _check_positions(surface: Surface, triangles: np.ndarray) -> None:
-    used = np.unique(surface.corner_vertex[triangles])
-    wrong = used[~np.isfinite(surface.positions[used]).all(axis=1)]
+def check_finite(positions: np.ndarray, triangles: np.ndarray) -> None:
+    """Raise NonFiniteError unless the vertices of triangles (m,3) are somewhere."""
+    used = np.unique(triangles)
+    wrong = used[~np.isfinite(positions[used]).all(axis=1)]
     if len(wrong):
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
 

@@ -54,7 +54,9 @@ def unit_size(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     area = face_areas(moved, triangles)
     centre = moved[triangles].mean(axis=1)
     middle = area @ centre / area.sum()
-    spread = np.sqrt(area @ ((centre - middle) ** 2).sum(axis=1) / area.sum())
+    # With what is spread within the triangles: a single one has a size, too.
+    within = ((moved[triangles] - centre[:, None]) ** 2).sum(axis=(1, 2)) / 12
+    spread = np.sqrt(area @ (((centre - middle) ** 2).sum(axis=1) + within) / area.sum())
     return (moved - middle) / (2 * np.sqrt(3) * spread)
 
 

@@ -7,6 +7,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from . import curvature
+from .charts import check_finite
 from .diffusion import Surroundings
 from .errors import EmptyMeshError, WeightError
 from .geometry import vertex_areas
@@ -29,11 +30,13 @@ def score(kind: str, positions: np.ndarray, triangles: np.ndarray, selected: np.
     Raises
     ------
     EmptyMeshError : no triangles, or nothing selected to be near to
+    NonFiniteError : a vertex of a triangle is nowhere
     """
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
     if not len(triangles):
         raise EmptyMeshError("There are no faces to weigh", "Add some faces")
+    check_finite(positions, triangles)
     if kind == "saliency":
         return saliency(positions, triangles)
     if kind == "sharpness":

@@ -245,6 +245,14 @@ def test_layer_name_that_is_another_attribute():
     assert scenes.state(obj) == before
 
 
+def test_edit_mode_hides_attributes_that_layers_must_not_replace():
+    obj = scenes.bump()
+    scenes.edit(obj)
+    before = scenes.state(obj)
+    assert "no UV layer" in scenes.error_of(bpy.ops.uv.omt_unwrap, uv_layer="position")
+    assert scenes.state(obj) == before
+
+
 def test_measure_without_uvs():
     scenes.bump()
     assert "no UVs" in scenes.error_of(bpy.ops.uv.omt_measure)

@@ -123,3 +123,10 @@ def test_a_mesh_that_changes_ends_it(kind, slider):
 def test_without_uvs_it_says_so(slider):
     scenes.bump()
     assert "Unwrap the mesh first" in scenes.error_of(bpy.ops.uv.omt_live)
+
+
+def test_uvs_without_area_are_refused(slider):
+    obj = scenes.bump()
+    obj.data.uv_layers.new()
+    obj.data.uv_layers[0].uv.foreach_set("vector", [0.0] * (2 * len(obj.data.loops)))
+    assert "no area" in scenes.error_of(bpy.ops.uv.omt_live)
