@@ -19,6 +19,8 @@ MAX_RASTER = 2048
 # Wider gaps, in texels, are made by rasterising coarser.
 MAX_GAP = 31
 ATTEMPTS = 8
+# Rectangles whose areas differ by this share are equally large.
+EQUAL = 1e-6
 # Atlases up to so many times as wide as high are square enough; for others larger scales are tried so often.
 OBLONG, TRIALS = 1.05, 5
 REMEDY = "Lower the margin or raise the texture size"
@@ -153,7 +155,10 @@ def stack(islands: Sequence[np.ndarray]) -> Packing:
 
 
 def turn_upright(points: np.ndarray) -> np.ndarray:
-    """Points (n,2) turned so that their smallest enclosing rectangle is upright, its long side along v."""
+    """Points (n,2) turned so that their smallest enclosing rectangle is upright, its long side along v.
+
+    Of several as small it is the one whose long side is the shortest.
+    """
     try:
         hull = points[ConvexHull(points).vertices]
     except QhullError:
@@ -163,7 +168,10 @@ def turn_upright(points: np.ndarray) -> np.ndarray:
     direction = edge / np.linalg.norm(edge, axis=1)[:, None]
     along = hull @ direction.T
     across = hull @ np.stack([-direction[:, 1], direction[:, 0]])
-    best = np.argmin(np.ptp(along, axis=0) * np.ptp(across, axis=0))
+    sides = np.ptp(along, axis=0), np.ptp(across, axis=0)
+    # All three rectangles of a triangle have the same area: rounding shall not choose, and the shortest fits best.
+    equal = sides[0] * sides[1] <= (1 + EQUAL) * (sides[0] * sides[1]).min()
+    best = np.argmin(np.where(equal, np.maximum(*sides), np.inf))
     c, s = direction[best]
     if np.ptp(along[:, best]) > np.ptp(across[:, best]):
         c, s = -s, c

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from . import packing
 from .segmentation import SegmentationError, chart_seams
@@ -20,6 +22,7 @@ from .solver.measure import Target
 from .solver.opening import with_open_corners
 from .solver.parameterize import SurfaceMap, unwrap
 from .solver.progress import Progress, Steps, part_of
+from .solver.topology import twins
 
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
 
@@ -90,7 +93,7 @@ def lay_out(
     if len(free) < len(charts):
         warnings.append((-1, _in_place(len(charts) - len(free), len(free))))
     islands = [uv for _, uv in free]
-    packed, complaint = pack_islands(islands, [chart.triangles for chart, _ in free], settings, spare_packer)
+    packed, complaint = pack_islands(islands, [_in_one_piece(chart) for chart, _ in free], settings, spare_packer)
     if complaint:
         warnings.append((-1, complaint))
     placed = iter(packed.islands)
@@ -136,6 +139,18 @@ def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
             f"not below {settings.max_shear:.3g}; the least that was found is kept"
         )
     return SurfaceMap(charts, maps, cuts, tuple(warnings))
+
+
+def _in_one_piece(chart: Chart) -> np.ndarray:
+    """Triangles (m,3) to pack a chart by: with those that fill its holes where it falls apart without, or hangs by a
+    vertex. The packer would scatter such pieces."""
+    if not len(chart.patches):
+        return chart.triangles
+    twin = twins(chart.triangles)
+    inner = np.flatnonzero(twin >= 0)
+    m = len(chart.triangles)
+    pairs = coo_matrix((np.ones(len(inner)), (inner // 3, twin[inner] // 3)), shape=(m, m))
+    return chart.triangles if connected_components(pairs, directed=False)[0] == 1 else chart.disk
 
 
 def _in_place(pinned: int, others: int) -> str:

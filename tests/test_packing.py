@@ -76,13 +76,15 @@ def test_one_scale_and_no_mirror_image():
 
 
 def test_many_slim_islands_fill_the_square():
-    """Left to choose a scale, xatlas fills a strip of 1 by 0.4, and a twelfth of the square: hair cards."""
+    """Left to choose a scale, xatlas fills a strip of the square, and a twelfth of it: hair cards."""
     rng = np.random.default_rng(0)
-    islands = [np.array([[0, 0], [w, 0], [w, h], [0, h]]) for w, h in rng.uniform([0.03, 0.1], [0.05, 0.8], (90, 2))]
-    result = pack(islands, [np.array([[0, 1, 2], [0, 2, 3]])] * 90, 2, 512)
-    assert (np.ptp(np.concatenate(result.islands), axis=0) > 0.9).all()
-    assert least_distance(result.islands) >= 2 / 512
+    sizes = rng.uniform([0.03, 0.1], [0.05, 0.8], (500, 2))
+    islands = [np.array([[0, 0], [w, 0], [w, h], [0, h]]) for w, h in sizes]
+    result = pack(islands, [np.array([[0, 1, 2], [0, 2, 3]])] * 500)
     assert result.coverage > 0.25
+    low, high = (np.array([f(p, axis=0) for p in result.islands]) for f in (np.min, np.max))
+    gap = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
+    assert gap[~np.eye(500, dtype=bool)].min() >= 4 / 1024
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
@@ -120,6 +122,12 @@ def test_smallest_rectangle():
     best = min(np.prod(np.ptp(points @ rotation(a).T, axis=0)) for a in np.linspace(0, np.pi, 2000))
     assert np.prod(size) <= best * (1 + 1e-9)
     assert turn_upright(np.zeros((3, 2))).shape == (3, 2)
+
+
+@pytest.mark.parametrize("turn", np.linspace(0, 6, 5))
+def test_of_rectangles_of_one_area_the_shortest(turn):
+    upright = turn_upright(np.array([[0, 0], [4, 0], [1, 2.0]]) @ rotation(turn).T)
+    np.testing.assert_allclose(np.ptp(upright, axis=0), [5**0.5, 8 / 5**0.5])
 
 
 def test_stack_centres_at_one_scale():

@@ -1,5 +1,7 @@
 """Bodies full of holes: sheets, tubes and boxes that are sieves, frames, plates with holes right through them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from omt_uv.solver.parameterize import unwrap
 from omt_uv.solver.preparation import prepare
 from omt_uv.solver.progress import drain
 from omt_uv.solver.topology import boundary_loops
+from omt_uv.unwrapping import _in_one_piece
 
 
 def used(V, F):
@@ -195,6 +198,15 @@ def test_marked_seams_are_kept_in_sieves():
     result = drain(unwrap(triangle_surface(V, F, seams)))
     assert len(result.charts) == 2
     assert max(m.area_l1 for m in result.maps) <= 0.01
+
+
+def test_what_hangs_by_a_vertex_is_packed_with_what_fills_its_holes():
+    chart = prepare(triangle_surface(*wavy_sheet(25, lattice(3, 1))), sieve=32).charts[0]
+    assert _in_one_piece(chart) is chart.triangles
+    half = len(chart.triangles) // 2
+    quad, two = (replace(chart, triangles=chart.triangles[[0, k]]) for k in (half, half - 1))
+    assert len(_in_one_piece(quad)) == 2
+    assert len(_in_one_piece(two)) == len(two.disk)
 
 
 @pytest.mark.parametrize("change", [lambda V: 1e-6 * V, lambda V: V + 1e3])
