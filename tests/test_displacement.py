@@ -15,7 +15,7 @@ from omt_uv.solver.topology import twins
 def some_pairs(V, F, k=400):
     rng = np.random.default_rng(4)
     way, bary = rng.standard_normal((k, 3)), rng.dirichlet(np.ones(3), k)
-    return Pairs(rng.integers(0, len(F), k), bary, way, np.linalg.norm(way, axis=1), np.full(k, 1 / k))
+    return Pairs(rng.integers(0, len(F), k), bary, way, np.linalg.norm(way, axis=1), np.full(k, len(V) / k), (k, 0, 0))
 
 
 def test_moves_are_those_of_the_dense_problem(monkeypatch):
@@ -33,7 +33,7 @@ def test_moves_are_those_of_the_dense_problem(monkeypatch):
     for k, face in enumerate(pairs.faces):
         d = pairs.distance[k]
         u = normals[face] if d < 0.1 else pairs.way[k] / d
-        root = np.sqrt(n * pairs.weight[k] * (1 + min(d / (displacement.FAR * usual), displacement.FARTHEST) ** 2))
+        root = np.sqrt(pairs.weight[k] * (1 + min(d / (displacement.FAR * usual), displacement.FARTHEST) ** 2))
         for c in range(3):
             rows[k, 3 * F[face, c] + np.arange(3)] += root * pairs.barycentric[k, c] * u
         right[k] = root * (u @ pairs.way[k])

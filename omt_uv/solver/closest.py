@@ -16,6 +16,8 @@ from scipy.spatial import cKDTree
 from .topology import twins
 
 CANDIDATES = 4
+# Of nearest points whichever way the surface looks, but for those that look the opposite way by this cosine.
+MORE_CANDIDATES, OPPOSITE = 8, -0.5
 # Points on the faces are this share of the spacing of queries apart.
 PITCH = 0.7
 MOST_SAMPLES = 600_000
@@ -90,6 +92,10 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("...i,...i->...", a, b)
 
 
+def _square(a: np.ndarray) -> np.ndarray:
+    return _dot(a, a)
+
+
 def unit(v: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) of length one; 0 stays 0."""
     length = np.sqrt(_dot(v, v))[..., None]
@@ -137,7 +143,7 @@ class ClosestPoint:
         k = min(CANDIDATES, len(owner))
         _, index = self._tree.query(np.column_stack([points, self.weight * normals]), k=k)
         faces = owner[index.reshape(len(points), k)]
-        _, distance = self._distance(points, faces)
+        _, distance = self.distance(points, faces)
         # The right side first, then the distance.
         back = np.einsum("kcj,kj->kc", self.normals.take(faces, axis=0), normals) < 0
         distance = distance + np.where(back, 4 * distance.max(initial=1e-300), 0)
@@ -158,6 +164,21 @@ class ClosestPoint:
         """The samples without their normals."""
         return cKDTree(self._spread[1])
 
+    def closer(self, points: np.ndarray, normals: np.ndarray, found: Located) -> Located:
+        """What was found for points (k,3) with normals (k,3), or the nearest by position where that is nearer, and does
+        not look the opposite way."""
+        owner = self._spread[0]
+        k = min(MORE_CANDIDATES, len(owner))
+        faces = owner[self._plain.query(points, k=k)[1].reshape(len(points), k)]
+        _, distance = self.distance(points, faces)
+        back = np.einsum("kcj,kj->kc", self.normals.take(faces, axis=0), normals) < OPPOSITE
+        distance = np.where(back, np.inf, distance)
+        best = distance.argmin(axis=1)
+        other = self.walk(points, faces[np.arange(len(faces)), best])
+        nearer = np.isfinite(distance.min(axis=1)) & (_square(other.points - points) < _square(found.points - points))
+        parts = zip(vars(found).values(), vars(other).values(), strict=True)
+        return Located(*(np.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in parts))
+
     def nearest_face(self, points: np.ndarray) -> np.ndarray:
         """The triangle (k,) of the sample nearest to each of points (k,3): where it is about, for smooth quantities."""
         return self._spread[0][self._plain.query(points)[1]]
@@ -165,7 +186,7 @@ class ClosestPoint:
     def walk(self, points: np.ndarray, faces: np.ndarray) -> Located:
         """From starting faces (k,) across edges for as long as that brings nearer to the points (k,3)."""
         faces = faces.copy()
-        barycentric, distance = self._distance(points, faces)
+        barycentric, distance = self.distance(points, faces)
         active = np.arange(len(points))
         for _ in range(WALK_ROUNDS):
             # The edge from corner k to k + 1 is where the coordinate k + 2 is zero.
@@ -176,7 +197,7 @@ class ClosestPoint:
             found = np.full(beyond.shape, -1)
             found[row, side] = np.arange(len(row))
             face = beyond[row, side]
-            b, d = self._distance(points.take(active[row], axis=0), face)
+            b, d = self.distance(points.take(active[row], axis=0), face)
             nearest = np.append(d, np.inf)[found].argmin(axis=1)
             best = found[np.arange(len(found)), nearest]
             better = (best >= 0) & (d[best] < distance[active] * (1 - 1e-12))
@@ -190,7 +211,7 @@ class ClosestPoint:
         a, ab, ac = (x.take(faces, axis=1) for x in (self._a, self._ab, self._ac))
         return (a + v * ab + w * ac).T
 
-    def _distance(self, points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def distance(self, points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Barycentric coordinates (k,3), or (k,c,3), of the closest points to points (k,3) on faces (k,) or (k,c), and
         squared distances."""
         p = points.T if faces.ndim == 1 else points.T[:, :, None]
@@ -206,33 +227,31 @@ class Memory:
     answer on it is a few steps, but these may end in a nearest point that is not the nearest of all, so that every few
     calls there is a search, for those farther than `far` times the root of the mean square."""
 
-    def __init__(self, search_every: int, far: float = 0.0):
+    def __init__(self, search_every: int, far: float = 0.0, start: np.ndarray | None = None):
+        """With the triangles (k,) of a `start` there is no search at first."""
         self.search_every, self.far = search_every, far
-        self._faces: np.ndarray | None = None
-        self._calls = 0
+        self.faces = start
+        self._calls = 0 if start is None else 1
 
     def __call__(self, index: ClosestPoint, points: np.ndarray, normals: np.ndarray) -> Located:
         """As `ClosestPoint.__call__` of an index, whose triangles have the numbers of the last one's."""
         again = self._calls % self.search_every == 0
-        if self._faces is None or (again and self.far == 0):
+        if self.faces is None or (again and self.far == 0):
             found = index(points, normals)
         else:
-            found = index.walk(points, self._faces)
+            found = index.walk(points, self.faces)
             if again:
                 _search_again(index, points, normals, found, self.far)
-        self._faces, self._calls = found.faces, self._calls + 1
+        self.faces, self._calls = found.faces, self._calls + 1
         return found
 
 
 def _search_again(index: ClosestPoint, points: np.ndarray, normals: np.ndarray, found: Located, far: float) -> None:
-    """Overwrite what was found for points (k,3) that are far from it."""
-    off = found.points - points
-    square = _dot(off, off)
+    """Overwrite what was found for points (k,3) that are far from it, where something is nearer."""
+    square = _square(found.points - points)
     mine = np.flatnonzero(square > far**2 * square.sum() / max(len(square), 1))
-    other = index(points[mine], normals[mine])
-    for whole, part in zip(
-        (found.points, found.faces, found.barycentric), (other.points, other.faces, other.barycentric), strict=True
-    ):
+    other = index.closer(points[mine], normals[mine], Located(*(part[mine] for part in vars(found).values())))
+    for whole, part in zip(vars(found).values(), vars(other).values(), strict=True):
         whole[mine] = part
 
 

@@ -40,16 +40,19 @@ def displacements(
     pull: np.ndarray,
     close: float,
     usual: float,
+    firm: bool = False,
 ) -> np.ndarray:
     """Moves (n,3) of the vertices of a mesh (n,3), (m,3), but for the `fixed` (n,) bool, that bring pairs together.
 
     pull (n,3): from every vertex to the centroid of its cell; distances below `close` have no direction but the
-        normal's, and those many times the `usual` one weigh more
+        normal's, and those many times the `usual` one weigh more; firm: centroids count whatever the distances are
     """
     n, normals = len(points), vertex_normals(points, triangles)
     along = np.eye(3) - normals[:, :, None] * normals[:, None]
     bad = smallness(points, triangles)
-    hold = CENTROID * (1 + PRESS * worst_around(triangles, bad, n)) * _ease(triangles, pairs, usual, n)
+    hold = CENTROID * (1 + PRESS * _worst_around(triangles, bad, n))
+    if not firm:
+        hold *= _ease(triangles, pairs, usual, n)
     diagonal, between, right = _distances(triangles, n, pairs, face_normals(points, triangles), close, usual)
     springs = equilateral(points, triangles, bad)
     # Shapes change along the surface alone.
@@ -80,7 +83,7 @@ def _distances(
     direction = pairs.way / np.maximum(pairs.distance, 1e-300)[:, None]
     near = np.flatnonzero(pairs.distance < close)
     direction[near] = normals[pairs.faces[near]]
-    weight = pairs.weight * n * (1 + np.minimum(pairs.distance / (FAR * usual), FARTHEST) ** 2)
+    weight = pairs.weight * (1 + np.minimum(pairs.distance / (FAR * usual), FARTHEST) ** 2)
     off = weight * np.einsum("ki,ki->k", direction, pairs.way)
     b, u = np.ascontiguousarray(pairs.barycentric.T), np.ascontiguousarray(direction.T)
     squares = [weight * u[i] * u[j] for i in range(3) for j in range(i, 3)]
@@ -117,12 +120,11 @@ def _matrix(triangles: np.ndarray, twin: np.ndarray, diagonal: np.ndarray, betwe
 
 def _ease(triangles: np.ndarray, pairs: Pairs, usual: float, n: int) -> np.ndarray:
     """Share of the centroid's weight that is left at every vertex, (n,)."""
-    farthest = np.zeros(len(triangles))
-    np.maximum.at(farthest, pairs.faces, pairs.distance / usual)
-    return np.maximum(1 / (1 + (worst_around(triangles, farthest, n) / EASY) ** 2), EASIEST)
+    farthest = _worst_around(triangles, pairs.worst(len(triangles)), n) / usual
+    return np.maximum(1 / (1 + (farthest / EASY) ** 2), EASIEST)
 
 
-def worst_around(triangles: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
+def _worst_around(triangles: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
     """The largest of the values (m,) of the triangles around every vertex, (n,)."""
     worst = np.zeros(n)
     np.maximum.at(worst, triangles.ravel(), np.repeat(values, 3))

@@ -6,7 +6,7 @@ import numpy as np
 
 from .closest import unit
 from .flips import flip_in_place, flip_until_none
-from .topology import halfedges, pair_keys, previous_halfedge
+from .topology import halfedges, pair_keys, previous_halfedge, twins
 
 # The new faces of a flip may lean against the old ones by this cosine at most.
 LEAST_COSINE = 0.5
@@ -15,12 +15,17 @@ TOLERANCE = 1e-9
 
 
 def make_delaunay_embedded(
-    points: np.ndarray, triangles: np.ndarray, twin: np.ndarray, locked: np.ndarray, max_rounds: int = MAX_ROUNDS
+    points: np.ndarray,
+    triangles: np.ndarray,
+    twin: np.ndarray,
+    locked: np.ndarray,
+    max_rounds: int = MAX_ROUNDS,
+    outer: np.ndarray | None = None,
 ) -> int:
     """Flip edges whose opposite angles exceed pi together, overwriting triangles (m,3) and twin (3m,).
 
     points (n,3); locked: sorted keys (`topology.pair_keys`) of edges to keep. An edge also stays where its flip would
-    join two vertices twice, or lean a face over. Returns the number of flips.
+    join two vertices twice, or two of the `outer` ones (n,) bool, or lean a face over. Returns the number of flips.
     """
     flat = triangles.reshape(-1)
     cotangent = _cotangents(points, triangles)
@@ -30,8 +35,9 @@ def make_delaunay_embedded(
         bad = np.flatnonzero(value < 0)
         e, g = h[bad], twin[h[bad]]
         i, j, k, far = flat[e], flat[g], flat[previous_halfedge(e)], flat[previous_halfedge(g)]
-        ok = _allowed(points, i, j, k, far) & ~_joined(triangles, k, far)
-        ok &= ~_is_in(pair_keys(i, j), locked)
+        ok = _allowed(points, i, j, k, far) & ~_joined(triangles, k, far) & ~_is_in(pair_keys(i, j), locked)
+        if outer is not None:
+            ok &= ~(outer[k] & outer[far])
         value[bad[~ok]] = 0.0
         return value
 
@@ -45,6 +51,23 @@ def make_delaunay_embedded(
 
     flips, _ = flip_until_none(twin, violation, flip, max_rounds)
     return flips
+
+
+def flip_where_sound(
+    points: np.ndarray, triangles: np.ndarray, h: np.ndarray, keep: np.ndarray, outer: np.ndarray
+) -> np.ndarray:
+    """Flip interior halfedges h (k,), no two of which share a triangle, overwriting triangles (m,3).
+
+    Not those of `keep` (3m,) bool, nor where a face would turn over, or vertices be joined that are so already, or that
+    both are `outer` (n,) bool.
+    Returns the sorted keys of the new edges.
+    """
+    twin, flat = twins(triangles), triangles.reshape(-1)
+    h = h[(twin[h] >= 0) & ~keep[h]]
+    i, j, k, far = flat[h], flat[twin[h]], flat[previous_halfedge(h)], flat[previous_halfedge(twin[h])]
+    ok = _allowed(points, i, j, k, far) & ~_joined(triangles, k, far) & ~(outer[k] & outer[far])
+    flip_in_place(triangles, twin, h[ok])
+    return np.sort(pair_keys(k[ok], far[ok]))
 
 
 def _joined(triangles: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,66 +1,38 @@
 """Vertices moved so that the triangles between them come closer to the surface.
 
 A round takes the closest points of samples of both the surface and the mesh, and moves the vertices so that the
-distances along the lines between them vanish in the least squares sense (Hoppe, DeRose, Duchamp, McDonald, Stuetzle
-1993; Chen, Medioni 1992), while vertices stay near the centroids of their cells.
+distances along the lines between them vanish in the least squares sense (see `displacement.py`), while vertices stay
+near the centroids of their cells. What is the farthest then is looked at piece by piece (see `peaks.py`).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from .closest import ClosestPoint, Memory, vertex_normals
-from .displacement import displacements
+from .closest import ClosestPoint, Memory
 from .draft import Draft
-from .embedded_flips import make_delaunay_embedded
+from .fitting import Fitting
 from .pairs import Pairing
-from .progress import Progress, Steps
+from .peaks import lower_peaks
+from .progress import Progress, Steps, part_of
 from .surface_samples import area_samples, joined, tip_samples
-from .topology import twins
-from .voronoi import voronoi_cells
 
-ROUNDS = 7
+ROUNDS = 5
 # Samples of the surface per vertex.
 SAMPLES = 6
-# Vertices stay within this share of an edge of the surface.
-TETHER = 0.15
-# Distances below this share of an edge have no direction but the normal's.
-CLOSE = 1e-3
 
 
-def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray, spacing: float) -> Steps[Draft]:
-    """A mesh near a surface, edges about `spacing` long, with less squared distance between the two.
+def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray) -> Steps[Draft]:
+    """A mesh near a surface with less distance between the two: the mean square first, then the largest.
 
     density (m,) of the surface's triangles, for the cells.
     """
-    points, triangles = draft.points, draft.triangles.copy()
-    samples = joined(area_samples(index, SAMPLES * len(points), density), tip_samples(index, len(points)))
-    twin, pairing, home = twins(triangles), Pairing(index, samples), Memory(ROUNDS + 1)
-    on = home(index, points, vertex_normals(points, triangles))
+    n = len(draft.points)
+    samples = joined(area_samples(index, SAMPLES * n, density), tip_samples(index, n))
+    fitting = Fitting(draft, Pairing(index, samples), density, Memory(ROUNDS + 1))
     for k in range(ROUNDS):
-        pairs = pairing(points, triangles, on.points)
-        cells = voronoi_cells(points, triangles, density[on.faces] ** 2, draft.delaunay)
-        pull = cells.moment / np.maximum(cells.mass, 1e-300)[:, None]
-        off = displacements(points, triangles, twin, draft.fixed, pairs, pull, CLOSE * spacing, pairs.usual)
-        moved = points + off
-        if not np.isfinite(moved).all():
+        if not fitting.step():
             break
-        points = moved
-        on = home(index, points, vertex_normals(points, triangles))
-        points = _tethered(points, on.points, TETHER * spacing)
-        if draft.delaunay:
-            make_delaunay_embedded(points, triangles, twin, draft.locked)
-        yield Progress("Fit", (k + 1) / ROUNDS)
-    return replace(draft, points=points, triangles=triangles)
-
-
-def _tethered(points: np.ndarray, on: np.ndarray, longest: float) -> np.ndarray:
-    """Points (n,3) no farther than that from their closest ones on the surface (n,3).
-
-    Few distances see a vertex at a tip, and what they say in a straight line may lead far out.
-    """
-    way = points - on
-    distance = np.sqrt(np.einsum("ni,ni->n", way, way))
-    return on + way * np.minimum(1, longest / np.maximum(distance, 1e-300))[:, None]
+        yield Progress("Fit", 0.6 * (k + 1) / ROUNDS)
+    # Peaks are lowered by flips as well.
+    return (yield from part_of(lower_peaks(fitting), 0.6, 0.4)) if draft.delaunay else fitting.draft

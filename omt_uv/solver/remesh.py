@@ -249,7 +249,7 @@ def _settle(part: Part, start: Tessellation, level: np.ndarray, options: Options
             draft, moved = yield from part_of(relax(draft, FIRST_ROUNDS, carrier), 0.5, 0.07)
     draft = adjust_count(draft, start.count, size, anyhow)
     if options.fit:
-        draft = yield from part_of(fit_to_surface(draft, index, level, start.size), 0.57, 0.43)
+        draft = yield from part_of(fit_to_surface(draft, index, level), 0.57, 0.43)
     points, triangles = opened(draft.points, draft.triangles, start.slits)
     on = index(points, vertex_normals(points, triangles))
     points = points - part.shift[on.faces]

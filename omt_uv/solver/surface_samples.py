@@ -70,6 +70,11 @@ def joined(a: Samples, b: Samples) -> Samples:
     return Samples(*(np.concatenate([getattr(a, f.name), getattr(b, f.name)]) for f in fields(Samples)))
 
 
+def picked(samples: Samples, number: np.ndarray) -> Samples:
+    """Those with these numbers (k,)."""
+    return Samples(*(getattr(samples, f.name)[number] for f in fields(Samples)))
+
+
 def sharpness(index: ClosestPoint) -> np.ndarray:
     """How much the normals around every vertex cancel, (n,) in [0,1]: 1 - |normal after a little diffusion|.
 

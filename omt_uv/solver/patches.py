@@ -1,0 +1,81 @@
+"""Small pieces cut out of a mesh, several copies of each, to try something else on every one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Disjoint pieces of a mesh, the vertices within some edges of a face in the middle of each.
+
+    vertices (v,) and faces (f,) of the mesh; triangles (f,3) of the pieces' own vertices; outer (v,) bool: the last
+    ring of vertices; of_vertex (v,), of_face (f,): which piece; middle (p,): the face of every piece in the middle.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    triangles: np.ndarray
+    outer: np.ndarray
+    of_vertex: np.ndarray
+    of_face: np.ndarray
+    middle: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.middle)
+
+
+def cut_out(triangles: np.ndarray, middle: np.ndarray, n: int, rings: int) -> Patches:
+    """Pieces of a mesh (m,3) with n vertices around faces (p,) that are more than 2 `rings` + 2 edges apart."""
+    label = np.full(n, -1)
+    label[triangles[middle].ravel()] = np.repeat(np.arange(len(middle)), 3)
+    for _ in range(rings):
+        label = _spread(triangles, label)
+    inner = label
+    label = _spread(triangles, label)
+    faces = np.flatnonzero((inner[triangles] >= 0).any(axis=1))
+    vertices, own = np.unique(triangles[faces], return_inverse=True)
+    number = np.zeros(len(triangles), np.int64)
+    number[faces] = np.arange(len(faces))
+    of_face = label[triangles[faces, 0]]
+    return Patches(vertices, faces, own.reshape(-1, 3), inner[vertices] < 0, label[vertices], of_face, number[middle])
+
+
+def grown(triangles: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
+    """Vertices (n,) bool within so many edges of those of a mask (n,)."""
+    return _grown(triangles, np.where(mask, 0, -1), rings) >= 0
+
+
+def _grown(triangles: np.ndarray, label: np.ndarray, rings: int) -> np.ndarray:
+    for _ in range(rings):
+        label = _spread(triangles, label)
+    return label
+
+
+def _spread(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Labels (n,) of vertices, -1 for none, on all neighbours as well."""
+    around = label[triangles].max(axis=1)
+    mine = np.flatnonzero(around >= 0)
+    label = label.copy()
+    np.maximum.at(label, triangles[mine].ravel(), np.repeat(around[mine], 3))
+    return label
+
+
+def apart(triangles: np.ndarray, faces: np.ndarray, n: int, rings: int, most: int) -> np.ndarray:
+    """Those of the faces (k,), most wanted first, with no more wanted one within so many edges; up to `most`."""
+    chosen = np.zeros(0, np.int64)
+    while len(faces) and len(chosen) < most:
+        rank = np.full(n, len(faces))
+        np.minimum.at(rank, triangles[faces].ravel(), np.repeat(np.arange(len(faces)), 3))
+        for _ in range(rings):
+            np.minimum.at(rank, triangles.ravel(), np.repeat(rank[triangles].min(axis=1), 3))
+        first = faces[(rank[triangles[faces]] == np.arange(len(faces))[:, None]).all(axis=1)]
+        chosen = np.concatenate([chosen, first])
+        label = np.full(n, -1)
+        label[triangles[first].ravel()] = 0
+        for _ in range(rings):
+            label = _spread(triangles, label)
+        faces = faces[(label[triangles[faces]] < 0).all(axis=1)]
+    return chosen[:most]

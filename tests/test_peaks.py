@@ -1,0 +1,104 @@
+"""The farther from the surface, the more is tried there; distances and errors of curvature fall as vertices come in."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver import peaks
+from omt_uv.solver.closest import ClosestPoint, vertex_normals
+from omt_uv.solver.geometry import angle_defects, angles_from_lengths, halfedge_lengths
+from omt_uv.solver.patches import apart, cut_out, grown
+from omt_uv.solver.progress import drain
+from omt_uv.solver.remesh import remesh
+from omt_uv.solver.topology import boundary_loops, twins
+
+
+def farthest(V, F, result) -> float:
+    """The largest distance of a surface's vertices to a mesh, by position and by where it looks, whichever is less."""
+    mesh = ClosestPoint(result.vertices, result.triangles, 0.02 * np.ptp(V, axis=0).max())
+    normals = vertex_normals(V, F)
+    found = mesh.closer(V, normals, mesh(V, normals))
+    return float(np.linalg.norm(found.points - V, axis=1).max())
+
+
+def curvature_in(V, F, centres, radius):
+    """Measure of the angle defects around every centre, (c,)."""
+    rim = np.concatenate([np.zeros(0, np.int64), *boundary_loops(F)])
+    defect = angle_defects(F, angles_from_lengths(halfedge_lengths(V, F).reshape(-1, 3)), rim, len(V))
+    defect[rim] = 0
+    distance = np.linalg.norm(centres[:, None] - V, axis=2) / radius
+    return np.maximum(1 - distance**2, 0) ** 2 @ defect
+
+
+def errors(V, F, counts):
+    """Largest distances, and differences of curvature measures, of meshes with these numbers of vertices."""
+    centres, radius = V[:: max(len(V) // 100, 1)], 0.25 * np.ptp(V, axis=0).max()
+    of_surface = curvature_in(V, F, centres, radius)
+    distances, curvatures = [], []
+    for count in counts:
+        result = drain(remesh(V, F, count))
+        assert len(result.vertices) == count
+        distances.append(farthest(V, F, result))
+        of_mesh = curvature_in(result.vertices, result.triangles, centres, radius)
+        curvatures.append(np.abs(of_mesh - of_surface).sum() / np.abs(of_surface).sum())
+    return np.array(distances), np.array(curvatures)
+
+
+def test_on_a_smooth_surface_distances_fall_like_one_over_n():
+    counts = [250, 500, 1000, 2000]
+    distances, curvatures = errors(*meshes.torus(144, 72), counts)
+    assert -1.15 < np.polyfit(np.log(counts), np.log(distances), 1)[0] < -0.85
+    assert (np.diff(curvatures) < 0).all()
+
+
+def test_errors_fall_on_a_real_model():
+    counts = [600, 1200, 2400]
+    distances, curvatures = errors(*meshes.load_model("max_planck"), counts)
+    assert np.polyfit(np.log(counts), np.log(distances), 1)[0] < -0.6
+    assert (np.diff(curvatures) < 0).all()
+
+
+def groove():
+    V, F = meshes.grid(80, 80)
+    V[:, 2] = -0.08 * np.exp(-(((V[:, 0] - 0.5 - 0.1 * np.sin(4 * V[:, 1])) / 0.015) ** 2))
+    return V, F
+
+
+def test_grooves_narrower_than_an_edge_are_reached(monkeypatch):
+    """With as many vertices, and triangles as good, the mesh comes nearer to the bottom."""
+    V, F = groove()
+    result = {}
+    for passes in (0, peaks.PASSES):
+        monkeypatch.setattr(peaks, "PASSES", passes)
+        result[passes] = drain(remesh(V, F, 900, rounds=5))
+    without, lowered = result[0], result[peaks.PASSES]
+    assert len(lowered.vertices) == 900 and len(boundary_loops(lowered.triangles)) == 1
+    assert farthest(V, F, lowered) < 0.85 * farthest(V, F, without)
+    least = [
+        np.percentile(angles_from_lengths(halfedge_lengths(r.vertices, r.triangles).reshape(-1, 3)).min(axis=1), 1)
+        for r in (without, lowered)
+    ]
+    assert least[1] > least[0] - np.radians(2)
+
+
+@pytest.mark.parametrize("rings", [1, 2])
+def test_patches_are_disjoint_and_know_their_ring(rings):
+    V, F = meshes.icosphere(4)
+    n = len(V)
+    middle = apart(F, np.random.default_rng(1).permutation(len(F)), n, 2 * rings + 2, 50)
+    patches = cut_out(F, middle, n, rings)
+    assert len(patches) > 3 and (patches.faces[patches.middle] == middle).all()
+    assert (patches.vertices[patches.triangles] == F[patches.faces]).all()
+    # No vertex is of two pieces, and what is not on the outer ring has all its triangles in its own.
+    assert len(np.unique(patches.vertices)) == len(patches.vertices)
+    assert (patches.of_vertex[patches.triangles] == patches.of_face[:, None]).all()
+    inside = np.bincount(patches.triangles.ravel(), minlength=len(patches.vertices))
+    whole = np.bincount(F.ravel(), minlength=n)[patches.vertices]
+    assert ((inside == whole) == ~patches.outer).all()
+    core = np.zeros(n, dtype=bool)
+    core[F[middle]] = True
+    assert set(patches.vertices[~patches.outer]) == set(np.flatnonzero(grown(F, core, rings)))
+    open_ = twins(patches.triangles) < 0
+    assert patches.outer[patches.triangles.ravel()[open_]].all()
