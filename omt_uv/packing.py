@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-# xatlas drops faces of meshes with small units.
-EXTENT = 100.0
+# xatlas drops faces of meshes with small units, and islands smaller than about this share of the largest.
+EXTENT, SPECK = 100.0, 1e-4
 # Rasterising finer than this costs more than the space it saves.
 MAX_RASTER = 2048
 # Wider gaps, in texels, are made by rasterising coarser.
@@ -190,9 +190,11 @@ def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) 
         raise PackingError(f"xatlas cannot be imported: {error}") from error
 
     extent = max(float(np.ptp(p, axis=0).max()) for p in islands)
+    own = np.array([np.ptp(p, axis=0) for p in islands])
+    own *= np.maximum(1, SPECK * extent / own.max(axis=1))[:, None]
     meshes = [
-        (np.ascontiguousarray((p - p.min(axis=0)) * (EXTENT / extent), np.float32), np.ascontiguousarray(t, np.uint32))
-        for p, t in zip(islands, triangles, strict=True)
+        (_enlarged(p, float(size.max()) * EXTENT / extent), np.ascontiguousarray(t, np.uint32))
+        for p, size, t in zip(islands, own, triangles, strict=True)
     ]
     atlas = xatlas.Atlas()
     # xatlas keeps pointers to these arrays until generate(); `meshes` keeps them alive.
@@ -213,7 +215,6 @@ def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) 
     for k in range(len(islands)):
         texel = atlas.get_mesh(k)[2] * [atlas.width, atlas.height]
         low[k], size[k] = texel.min(axis=0), np.ptp(texel, axis=0)
-    own = np.array([np.ptp(p, axis=0) for p in islands])
     if not (np.isfinite(low).all() and (size > 0).all()):
         raise PackingError("xatlas left an island unplaced")
     scale = float((size / own).min())
@@ -221,6 +222,12 @@ def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) 
     return [
         (p - 0.5 * (p.min(axis=0) + p.max(axis=0))) * scale + c for p, c in zip(islands, centre, strict=True)
     ], scale
+
+
+def _enlarged(points: np.ndarray, extent: float) -> np.ndarray:
+    """Points (n,2) from 0 to the extent, for xatlas."""
+    points = points - points.min(axis=0)
+    return np.ascontiguousarray(points * (extent / points.max()), np.float32)
 
 
 def covered_area(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> float:

@@ -101,6 +101,14 @@ def test_very_different_sizes():
     assert np.ptp(result.islands[0], axis=0).max() == pytest.approx(100 * result.scale)
 
 
+def test_specks_do_not_make_the_others_smaller():
+    """xatlas drops them, and what it says about their size stands for nothing."""
+    islands = corners(20)
+    plain, more = pack(islands, [FAN] * 20), pack([*islands, *corners(5, 1, 1e-7)], [FAN] * 25)
+    assert more.scale > 0.8 * plain.scale
+    assert least_distance(more.islands) >= 4 / 1024
+
+
 def test_a_folded_island_is_placed_all_the_same():
     points = corner(2, 3)
     points[3] = [5, 5]
