@@ -46,6 +46,19 @@ def test_no_face_folds_on_the_way_back(name):
     np.testing.assert_array_equal(uv[coarse.kept], flat[coarse.kept])
 
 
+@pytest.mark.parametrize("name", ["head", "random_disk", "grid"])
+def test_vertices_are_left_where_they_are_wanted(name):
+    """Of a part that is to have eight times as many vertices for its area a greater share stays than of the rest."""
+    V, F, flat, mass, _ = coarse_of(name)
+    inside = np.linalg.norm(V - V[np.argmax(V @ [1.0, 0.6, 0.3])], axis=1) < 0.35 * np.ptp(V, axis=0).max()
+    coarse = drain(coarsened(V, F, flat, mass, len(V) // 5, density=np.where(inside, 8.0, 1.0)))
+    kept = np.zeros(len(V), bool)
+    kept[coarse.kept] = True
+    assert kept[inside].mean() > 2 * kept[~inside].mean()
+    assert (signed_areas(flat[coarse.kept], coarse.triangles) > 0).all()
+    assert (signed_areas(drain(coarse.prolonged(flat[coarse.kept], len(V))), F) > 0).all()
+
+
 def test_places_are_found_even_in_stars_without_room():
     V, F, flat, _, coarse = coarse_of("head")
     squeezed = flat[coarse.kept] * [1.0, 1e-3]

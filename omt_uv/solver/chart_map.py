@@ -135,7 +135,7 @@ def unwrap_chart(
         figures.area_sd,
         figures.angle_mean,
         figures.folds,
-        tuple(log.warnings) + refined.warnings,
+        tuple(dict.fromkeys((*log.warnings, *refined.warnings))),
         log.seconds,
         pins is not None,
         refined.weight,

@@ -14,7 +14,7 @@ import numpy as np
 
 from .contact import expand
 from .energy import Elements, elements
-from .geometry import cross2, dot2
+from .geometry import cross2, dot2, face_areas
 from .progress import Progress, Steps
 from .smoothing import independent, relax, stars
 from .topology import boundary_loops, halfedges, twins
@@ -25,6 +25,8 @@ MOST_FACES = 9
 LEAST_SHAPE, LEAST_FLAT_SHAPE = 0.15, 1e-7
 # Rounds end when one removes a smaller share of the vertices.
 LEAST_PROGRESS = 0.03
+# Vertices whose stars hold so many times the mean of what is to be spread evenly stay, too.
+HEAVY = 1.0
 # Vertices of the boundary stay while they are at most this share of those that are left.
 RIM_SHARE = 0.25
 # Share of the area at a safe place that every returning face keeps.
@@ -78,11 +80,12 @@ class Coarse:
         return np.column_stack([w.real, w.imag])
 
 
-def coarsened(vertices, triangles, flat, mass, goal: int, region=None) -> Steps[Coarse]:
+def coarsened(vertices, triangles, flat, mass, goal: int, region=None, density=None) -> Steps[Coarse]:
     """Coarsen a disk (n,3), (m,3) to about `goal` vertices.
 
     flat (n,2): an embedding in the plane with a convex boundary; mass (m,): what the triangles' areas in the final map
-    are to be, handed on; region (m,) in [0, 1]: weights of a region, which keeps its share of the mass.
+    are to be, handed on; region (m,) in [0, 1]: weights of a region, which keeps its share of the mass; density (n,):
+    how many vertices are to be left there for an area, relative to elsewhere; by default that is left to chance.
     """
     mass = np.column_stack([mass] if region is None else [mass, mass * region])
     rounds: list[Removal] = []
@@ -93,6 +96,8 @@ def coarsened(vertices, triangles, flat, mass, goal: int, region=None) -> Steps[
         rank = np.random.default_rng(len(rounds)).permutation(count)
         if len(rim) <= RIM_SHARE * left:
             rank[rim] = -1
+        if density is not None:
+            rank[_heavy(vertices, triangles, density)] = -1
         triangles, mass, removal = _round(vertices, triangles, flat, mass, rank)
         rounds.append(removal)
         left -= len(removal.vertex)
@@ -104,6 +109,12 @@ def coarsened(vertices, triangles, flat, mass, goal: int, region=None) -> Steps[
     place[kept] = np.arange(len(kept))
     region = None if region is None else mass[:, 1] / mass[:, 0]
     return Coarse(kept, place[triangles], mass[:, 0], region, rounds)
+
+
+def _heavy(V, F, density):
+    """Vertices (n,) bool whose stars hold more than others of the surface with this density (n,)."""
+    weight = density * np.bincount(F.ravel(), np.repeat(face_areas(V, F), 3), len(V))
+    return weight > HEAVY * weight[weight > 0].mean()
 
 
 def _round(V, F, flat, mass, rank):

@@ -21,10 +21,11 @@ from .embedding import arc_length_parameters, tutte
 from .energy import elements
 from .errors import PrecisionError, TransportError
 from .geometry import face_areas, halfedge_lengths
-from .measure import entropy
+from .measure import graded
 from .progress import Steps, part_of
 from .refine import refine
 from .smoothing import smoothed
+from .starts import is_far
 from .topology import boundary_loops
 from .transport import Transport, transport
 
@@ -39,9 +40,14 @@ SITE_RESOLUTION = 1e-7
 CENTRED = 1e-3
 # Charts with more vertices than this come by way of one with an eighth of their vertices, or at most a quarter.
 COARSE_ABOVE, COARSER, COARSE_ENOUGH = 5000, 8, 0.25
-# Where the target is farther than this from the surface's areas, in relative entropy, coarser meshes say less: they are
-# taken in smaller steps.
-FAR, COARSER_FAR, COARSE_ENOUGH_FAR = 0.5, 4, 0.4
+# Where the target is far from the surface's areas, coarser meshes say less: they are taken in smaller steps, and mapped
+# at once up to a larger size.
+COARSER_FAR, COARSE_ENOUGH_FAR, DIRECT_FAR = 5, 0.4, 20000
+# Their edges grow by at most the root of this over the number of vertices for a length: as they do around a disk that
+# gets most of the map, and meets its ring with as many edges as the ring has around it.
+AROUND = 4.0
+# Vertices are at most so much denser in one place than in another.
+LEAST_DENSITY = 1e-4
 # What comes back is smoothed so many times, with these weights of the area term.
 SWEEPS, SMOOTH_WEIGHT, SMOOTH_WEIGHT_FAR = 8, 30.0, 500.0
 
@@ -68,14 +74,14 @@ def coarse_first_map(
     target (m,): areas of the triangles in the map; flat (n,2): an embedding, a mean value map by default; region (m,):
     weights of a region whose share is to be exact.
     """
-    far = entropy(target, face_areas(vertices, triangles)) > FAR
-    if far and boundary != "free":
-        return None  # the transport of all vertices to a domain leaves less shear than that of few
+    far = is_far(target, face_areas(vertices, triangles))
     with log.timed("coarsening"):
         if flat is None:
             flat = mean_value_sites(vertices, triangles, loop, None, Disk())
         goal = len(vertices) // (COARSER_FAR if far else COARSER)
-        coarse = yield from part_of(coarsened(vertices, triangles, flat, target, goal, region), *COARSENING)
+        density = _density(vertices, triangles, target, goal) if far else None
+        steps = coarsened(vertices, triangles, flat, target, goal, region, density)
+        coarse = yield from part_of(steps, *COARSENING)
     if len(coarse.kept) > (COARSE_ENOUGH_FAR if far else COARSE_ENOUGH) * len(vertices):
         return None
     points, mesh, mass = vertices[coarse.kept], coarse.triangles, coarse.mass
@@ -84,20 +90,18 @@ def coarse_first_map(
     if boundary != "free" and len(rim) < len(loop):
         return None  # what returned to the rim would lie on a chord
     corners = None if corners is None else np.searchsorted(coarse.kept, corners)
-    if len(points) > COARSE_ABOVE:
-        steps = coarse_first_map(
-            points, mesh, mass, rim, corners, boundary, balance, log, flat[coarse.kept], coarse.region
-        )
-        found = yield from part_of(steps, *COARSE_MAP)
+    if len(points) > (DIRECT_FAR if far else COARSE_ABOVE):
+        options = (boundary, balance, log, flat[coarse.kept], coarse.region)
+        found = yield from part_of(coarse_first_map(points, mesh, mass, rim, corners, *options), *COARSE_MAP)
     if found is None:
         domain = Rectangle() if boundary == "square" else Disk()
         direct = first_map(points, mesh, mass, rim, corners, domain, log)
         found = yield from part_of(direct, *COARSE_MAP)
     with log.timed("coarse refinement"):
-        options: dict = {"boundary": boundary, "target": mass, "balance": balance, "region": coarse.region}
-        options["quality"] = "rough" if far else "relaxed"
+        settings: dict = {"boundary": boundary, "target": mass, "balance": balance, "region": coarse.region}
+        settings["quality"] = "rough" if far else "relaxed"
         refined = yield from part_of(
-            refine(points, mesh, found.uv, near=found.near, pull=found.pull, **options), *COARSE_REFINEMENT
+            refine(points, mesh, found.uv, near=found.near, pull=found.pull, **settings), *COARSE_REFINEMENT
         )
     log.warnings += refined.warnings
     with log.timed("coarsening"):
@@ -108,6 +112,16 @@ def coarse_first_map(
         w = yield from part_of(sweeps, *SMOOTHING)
         uv = np.column_stack([w.real, w.imag])
     return FirstMap(found.conformal, found.cells, uv, far, refined.pull)
+
+
+def _density(vertices, triangles, target, goal: int) -> np.ndarray:
+    """Density (n,) of the vertices of a coarse mesh: as the map stretches what is to get the areas target (m,)."""
+    area = face_areas(vertices, triangles)
+    wanted = target / area
+    wanted = np.maximum(wanted, LEAST_DENSITY * wanted.max())
+    density = area * graded(wanted, vertices, triangles, np.sqrt(AROUND / goal), goal)
+    has, all_of_it = (np.bincount(triangles.ravel(), np.repeat(x, 3), len(vertices)) for x in (density, area))
+    return has / all_of_it
 
 
 def first_map(vertices, triangles, target, loop, corners, domain: Domain, log: Log) -> Steps[FirstMap]:

@@ -20,7 +20,7 @@ from .renumbering import Renumbered, renumbered
 from .schwarz import overlapping
 from .smoothing import Smoother, smoothed
 from .stages import QUALITIES, Quality, Task, stages, weights_of
-from .starts import Start, disk_start, free_start, notched_disk, square_start
+from .starts import Start, disk_start, free_start, is_far, notched_disk, square_start
 from .topology import boundary_loops
 
 STARTS = {"free": free_start, "disk": disk_start, "square": square_start}
@@ -145,7 +145,9 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
 def _refined(mesh: Renumbered, faces: Elements, boundary: str, balance, settings: Quality, near: bool, pull: float):
     """Stages on a renumbered chart: what was found, and the warnings of the start it was found from."""
     pins, loop, n = mesh.pins, boundary_loops(mesh.triangles)[0], len(mesh.vertices)
-    start = STARTS[boundary](mesh.vertices, mesh.triangles, mesh.uv, loop)
+    # A map to areas far from the surface's is sheared by right.
+    far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
+    start = STARTS[boundary](mesh.vertices, mesh.triangles, mesh.uv, loop, **({"relaxed": np.inf} if far else {}))
     assembly = Assembly(mesh.triangles, n, overlapping(mesh.vertices, mesh.triangles))
     # Sweeps know of no springs, and of no balance.
     swept = faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
