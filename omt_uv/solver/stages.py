@@ -57,6 +57,8 @@ LEAST_WEIGHT = 1e-2
 SQUEEZED = 50.0
 # Where the error is not reached, the weight grows by at least and at most so much.
 LEAST_GROWTH, MOST_GROWTH = 1.3, 10.0
+# The same for weights of a start that has nearly its areas, of a target that will need more than the first ones.
+NEAR = 2.0
 # Where a greater weight leaves more than this share of the error, some faces have no room on the outline, and still
 # greater ones would only shear the rest.
 STUCK = 0.98
@@ -169,7 +171,7 @@ def stages(
     """
     weights = weights_of(balance, settings)
     if near and len(weights) > 1:
-        weights = weights[1:]
+        weights = [NEAR * weight for weight in weights[1:]]
     elif task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
     overlap, guarded, steps, k, before, last = task.crosses(w), task.guarded, 0, 0, np.inf, weights[0]
