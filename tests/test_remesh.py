@@ -507,3 +507,31 @@ def test_closed_bodies_with_handles_need_no_maps(monkeypatch):
     there = result.vertices[result.triangles].mean(axis=1)[:, 0] > 0.05
     here = result.vertices[result.triangles].mean(axis=1)[:, 0] < -0.05
     assert abs(area[here].mean() / area[there].mean() / 9 - 1) < 0.1
+
+
+def test_features_and_boundaries_hold_without_maps(monkeypatch):
+    """Samples on lines are where they would be between charts, exactly, and edges join them."""
+    monkeypatch.delattr(part_maps, "conformal_image")
+    V, F = meshes.annulus()
+    E = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    straight = E[(np.abs(V[E][:, :, 1]) < 1e-9).all(axis=1)]
+    result = run(V, F, 400, features=straight)
+    assert len(result.vertices) == 400 and topology(result.triangles) == topology(F)
+    W, T = result.vertices, result.triangles
+    edges = np.concatenate([T[:, [0, 1]], T[:, [1, 2]], T[:, [2, 0]]])
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
+    on = edges[(np.abs(W[edges][:, :, 1]) < 1e-12).all(axis=1)]
+    whole = np.linalg.norm(V[straight[:, 0]] - V[straight[:, 1]], axis=1)
+    whole = whole.sum() * len(np.unique(np.sort(straight, axis=1), axis=0)) / len(straight)
+    assert abs(np.linalg.norm(W[on[:, 0]] - W[on[:, 1]], axis=1).sum() - whole) < 1e-9
+    assert angles(W, T).min() > 25
+
+
+def test_a_sieve_keeps_its_holes():
+    V, F = meshes.grid(30, 30)
+    hole = ((np.arange(900) % 30) % 3 == 1) & ((np.arange(900) // 30) % 3 == 1)
+    quad = np.floor(V[F].mean(axis=1)[:, :2] * 30).astype(int)
+    F = F[~hole[quad[:, 0] + 30 * quad[:, 1]]]
+    result = run(V, F, 1500, rounds=10)
+    assert len(result.vertices) == 1500 and topology(result.triangles) == topology(F)
+    assert abs(face_areas(result.vertices, result.triangles).sum() - face_areas(V, F).sum()) < 1e-9

@@ -16,6 +16,8 @@ from .topology import halfedges, next_halfedge, pair_keys, previous_halfedge, tw
 
 # No edge is longer than so many times that of as many equilateral triangles as so many vertices have.
 LONGEST, VERTICES = 2.5, 1000
+# Needles may take many halvings: no more than so many times as many.
+MOST = 4
 # Rounds: a needle is halved in each of them.
 MOST_ROUNDS = 60
 
@@ -23,27 +25,29 @@ MOST_ROUNDS = 60
 def fine_enough(part: Part) -> Part:
     """The part with its long edges halved, so that its maps are not too coarse; the surface is the same."""
     longest = LONGEST * edge_size(float(part.area.sum()), 0.0, VERTICES)
-    return bisected(part, np.full(len(part.vertices), longest))
+    return bisected(part, np.full(len(part.vertices), longest), MOST * VERTICES)
 
 
-def bisected(part: Part, longest: np.ndarray) -> Part:
-    """The part with edges halved, the longest first, until none is longer than `longest` (n,) at its ends."""
+def bisected(part: Part, longest: np.ndarray, most: float = np.inf) -> Part:
+    """The part with edges halved, the longest first, until none is longer than `longest` (n,) at its ends, or there
+    are `most` new vertices or more."""
+    first = len(part.vertices)
     for _ in range(MOST_ROUNDS):
         tail, head = halfedges(part.triangles)
         length = np.linalg.norm(part.vertices[tail] - part.vertices[head], axis=1)
         length /= (longest[tail] + longest[head]) / 2
         twin = twins(part.triangles)
         long = np.flatnonzero((length > 1) & (twin < np.arange(len(twin))))
-        if not len(long):
+        if not len(long) or len(part.vertices) - first >= most:
             break
         order = np.argsort(-length[long], kind="stable")
         chosen = independent_splits(part.triangles, long[order])
         longest = np.concatenate([longest, (longest[tail[chosen]] + longest[head[chosen]]) / 2])
-        part = _split(part, chosen)
+        part = split_part(part, chosen)
     return part
 
 
-def _split(part: Part, h: np.ndarray) -> Part:
+def split_part(part: Part, h: np.ndarray) -> Part:
     """The part with a vertex in the middle of the edges of halfedges h (k,), no two of which share a triangle."""
     edit = split_edges(part.vertices, part.triangles, h)
     both = np.concatenate([h, twins(part.triangles)[h]])

@@ -11,7 +11,7 @@ import numpy as np
 from .closest import ClosestPoint
 from .draft import Draft
 from .embedded_flips import make_delaunay_embedded
-from .mesh_edits import LEAST_COSINE, Edit, collapse_edges, independent_splits, interior_edges, split_edges
+from .mesh_edits import ANY_COSINE, LEAST_COSINE, Edit, collapse_edges, independent_splits, interior_edges, split_edges
 from .parts import Part
 from .topology import boundary_loops, halfedges, twins
 
@@ -29,7 +29,6 @@ Size: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 MOST_ROUNDS = 500
-ANY_COSINE = -2.0
 # In one round only edges about as short, or as long, as the most wanted ones go.
 SHARE = 0.5
 FLIP_ROUNDS = 5

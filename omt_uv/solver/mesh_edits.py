@@ -11,19 +11,21 @@ from .closest import unit
 from .topology import halfedges, pair_keys, previous_halfedge, twins
 
 # A face may turn by this cosine at most when an edge at it collapses.
-LEAST_COSINE = 0.3
+LEAST_COSINE, ANY_COSINE = 0.3, -2.0
 PASSES = 8
 
 
 @dataclass(frozen=True)
 class Edit:
     """A mesh after an edit, points (n,3) and triangles (m,3); origin (n,): the vertex each one was, -1 for new ones;
-    between (k,2): the old ends of the edges at whose middles the new vertices are."""
+    between (k,2): the old ends of the edges at whose middles the new vertices are; became (old,): the vertex that each
+    old one is now."""
 
     points: np.ndarray
     triangles: np.ndarray
     origin: np.ndarray
     between: np.ndarray
+    became: np.ndarray
 
 
 def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray) -> Edit:
@@ -41,7 +43,7 @@ def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray) -> Edi
     result[t] = np.stack([a, vertex, c], axis=1)
     middle = (points[tail[h]] + points[head[h]]) / 2
     origin = np.concatenate([np.arange(n), np.full(k, -1)])
-    return Edit(np.concatenate([points, middle]), result, origin, np.stack([tail[h], head[h]], axis=1))
+    return Edit(np.concatenate([points, middle]), result, origin, np.stack([tail[h], head[h]], axis=1), np.arange(n))
 
 
 def independent_splits(triangles: np.ndarray, h: np.ndarray) -> np.ndarray:
@@ -62,24 +64,25 @@ def collapse_edges(
     fixed: np.ndarray,
     most: int,
     least_cosine: float = LEAST_COSINE,
+    along: bool = False,
 ) -> Edit:
     """Collapse up to `most` of the edges of interior halfedges h (k,), most wanted first; see `_possible`.
 
-    The two ends meet in the middle, or where the one is that is `fixed` (n,) bool. No face turns by more than
-    `least_cosine`.
+    The two ends meet in the middle, or where the one is that is `fixed` (n,) bool or on a boundary. No face turns by
+    more than `least_cosine`. Edges `along` lines may be on boundaries, and their ends meet in one of them.
     """
     n = len(points)
     tail, head = halfedges(triangles)
     rim = np.zeros(n, dtype=bool)
     rim[tail[twins(triangles) < 0]] = True
-    held = fixed | rim
+    held = fixed if along else fixed | rim
     h = h[~(held[tail[h]] & held[head[h]])]
     keep, gone = np.where(held[tail[h]], tail[h], head[h]), np.where(held[tail[h]], head[h], tail[h])
     neighbours = csr_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n)) + csr_matrix(
         (np.ones(len(tail)), (head, tail)), shape=(n, n)
     )
     neighbours.data[:] = 1
-    place = np.where(held[keep][:, None], points[keep], (points[keep] + points[gone]) / 2)
+    place = np.where(held[keep][:, None] | along, points[keep], (points[keep] + points[gone]) / 2)
     ok = _possible(points, triangles, h, neighbours, rim)
     keep, gone, place = keep[ok], gone[ok], place[ok]
     chosen = _chosen(points, triangles, neighbours, keep, gone, place, most, least_cosine)
@@ -93,7 +96,7 @@ def collapse_edges(
     stay = np.ones(n, dtype=bool)
     stay[gone] = False
     number = np.cumsum(stay) - 1
-    return Edit(moved[stay], number[result], np.flatnonzero(stay), np.zeros((0, 2), np.int64))
+    return Edit(moved[stay], number[result], np.flatnonzero(stay), np.zeros((0, 2), np.int64), number[target])
 
 
 def _possible(points, triangles, h, neighbours, rim) -> np.ndarray:
@@ -102,9 +105,13 @@ def _possible(points, triangles, h, neighbours, rim) -> np.ndarray:
     common = np.asarray(neighbours[tail[h]].multiply(neighbours[head[h]]).sum(axis=1)).ravel()
     valence = np.diff(neighbours.indptr)
     twin = twins(triangles)
-    left, right = tail[previous_halfedge(h)], tail[previous_halfedge(twin[h])]
+    open_ = twin[h] < 0
+    left = tail[previous_halfedge(h)]
+    right = np.where(open_, left, tail[previous_halfedge(twin[h])])
     thick = (valence[left] > 3 + ~rim[left] - 1) & (valence[right] > 3 + ~rim[right] - 1)
-    return (common == 2) & thick & (left != right)
+    # Between two boundaries, or two places of one, a collapse would pinch the surface.
+    across = ~open_ & rim[tail[h]] & rim[head[h]]
+    return (common == 2 - open_) & thick & (open_ | (left != right)) & ~across
 
 
 def _chosen(points, triangles, neighbours, keep, gone, place, most: int, least_cosine: float) -> np.ndarray:

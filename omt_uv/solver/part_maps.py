@@ -9,19 +9,17 @@ import numpy as np
 
 from .bisection import fine_enough
 from .chart_maps import Image, conformal_image, preserving_image
-from .charts import Chart
+from .charts import Chart, triangle_surface
 from .errors import MeshError
 from .parts import Part, Parts, split_parts
 from .piles import piled
+from .preparation import prepare
 from .progress import Steps, part_of
 from .sphere_conformal import ConformalSphere, conformal_sphere
 from .sphere_sampling import sphere_image
-from .tame_charts import ROUNDS, open_charts, tame_charts
 
 # Where the time of two maps goes, as start and width.
 FIRST, SECOND = (0.0, 0.5), (0.5, 0.5)
-# From so many vertices on a part can have many charts: where they end on boundaries, vertices stay.
-MANY = 500
 
 
 @dataclass(frozen=True)
@@ -49,29 +47,18 @@ class PartMaps:
     def __init__(self, part: Part):
         self.part = part
         self._sphere: ConformalSphere | None = None
-        self._tame = False
-        self._pieces: tuple[list[Chart], list[Image]] | None = None
-        # Conformal images of charts that were not cut to have them.
         self._images: dict[int, Image] = {}
-        self._latest: dict[tuple[bool, int], tuple[np.ndarray, Maps]] = {}
+        self._latest: dict[int, tuple[np.ndarray, Maps]] = {}
         # Whether to map it to the sphere: charts end at features.
         self.spherical = part.spherical and not part.lined and not part.members
         self.warnings: tuple[str, ...] = ()
 
-    @property
-    def charts(self) -> list[Chart]:
-        """The part cut into disks, by `choose_charts` if that was called."""
-        return self._pieces[0] if self._tame and self._pieces else self._few
-
     @cached_property
-    def _few(self) -> list[Chart]:
-        return open_charts(self.part, self.part.features)
-
-    def choose_charts(self, count: int) -> Steps[None]:
-        """Cut the part into disks that have conformal maps as far as can be, or into few where vertices are few."""
-        self._tame = count >= MANY and not self.part.members
-        if self._tame and self._pieces is None:
-            self._pieces = yield from tame_charts(self.part, self._few, conformal_image, ROUNDS)
+    def charts(self) -> list[Chart]:
+        """The part cut into disks along its features, and further where that takes more cuts: the fastest ones, since
+        they leave no trace."""
+        surface = triangle_surface(self.part.vertices, self.part.triangles, self.part.features)
+        return prepare(surface, extremities=0).charts
 
     def of_sphere(self, density: np.ndarray) -> Steps[Maps | None]:
         """Maps to the sphere; None, and a warning from then on, where there are none in double precision."""
@@ -97,20 +84,17 @@ class PartMaps:
         if (known := self._known(k, density)) is not None:
             return known
         chart = self.charts[k]
-        if self._tame and self._pieces:
-            first = self._pieces[1][k]
-        else:
-            first = self._images.get(k) or (yield from conformal_image(chart.vertices, chart.disk))
-            self._images[k] = first
+        first = self._images.get(k) or (yield from conformal_image(chart.vertices, chart.disk))
+        self._images[k] = first
         second = yield from preserving_image(chart.vertices, chart.disk, first.uv, density[chart.faces])
         return self._keep(k, density, Maps(first.uv, second.uv, first.warnings + second.warnings))
 
     def _known(self, k: int, density: np.ndarray) -> Maps | None:
-        latest = self._latest.get((self._tame, k))
+        latest = self._latest.get(k)
         return latest[1] if latest is not None and np.array_equal(latest[0], density) else None
 
     def _keep(self, k: int, density: np.ndarray, maps: Maps) -> Maps:
-        self._latest[self._tame, k] = (density, maps)
+        self._latest[k] = (density, maps)
         return maps
 
 

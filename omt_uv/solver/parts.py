@@ -57,6 +57,11 @@ class Part:
         return len(self.rim) > 0 or len(self.features) > 0
 
     @property
+    def disk(self) -> bool:
+        """Whether it has one boundary, no handle and no features."""
+        return self.euler == 1 and len(self.rim) > 0 and len(self.features) == 0 and not self.members
+
+    @property
     def spherical(self) -> bool:
         """Whether it is closed and has no handle."""
         return len(self.rim) == 0 and self.euler == 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from .parts import Part
 from .progress import Progress, Steps, part_of
 from .rims import smooth_rims
 from .sampling import STRATEGIES, Patch, even_map, triangulate_chart
-from .simplified import simplified
+from .simplified import simplified, simplified_between
 from .sphere_sampling import sample_sphere
 from .topology import pair_keys
 from .touching import copies
@@ -27,6 +27,7 @@ from .touching import copies
 FEWEST, FEWEST_IN_PILE = 100, 24
 # Charts with up to so many inner samples need no maps: what relaxation makes of them is the same.
 FEW = 50
+NO_MAPS = "A part has no maps to the disk in double precision and was remeshed without"
 # Samples on boundaries and features that are too many move apart by this factor, again and again, up to so many edges.
 STRETCH, LONGEST = 1.25, 1e3
 
@@ -74,19 +75,23 @@ def tessellate(
 ) -> Steps[Tessellation]:
     """Samples of a part with density (m,), and at_vertices (n,), of mean 1, triangulated by the strategy.
 
-    Closed parts of genus 0 without features go by way of the sphere, other closed ones without features, or where that
-    fails, by collapses of their own edges, and all others by way of charts.
+    Closed parts of genus 0 without features go by way of the sphere, disks without features by way of a chart, and all
+    others, or where that fails, by collapses of their own edges.
     On boundaries and features samples are `stretch` edges apart, or more where there would be too many.
 
     There may be more than asked for, where boundaries and features take as many. Raises PrecisionError where a chart
     cannot be triangulated.
     """
     found = (yield from _by_sphere(maps, count, density, options)) if maps.spherical else None
-    # Who asks for two maps in particular, or for what they make of a part, gets charts.
-    if found is None and options.rounds and options.strategy == STRATEGIES[0] and not maps.part.lined:
+    if found is None and _any_mesh_will_do(options) and not maps.part.lined:
         yield Progress("Samples", 0.0)
-        return _without_maps(maps, count, density, at_vertices, options)
+        return _without_maps(maps, count, density, options)
     return found or (yield from _by_charts(maps, count, density, at_vertices, options, stretch))
+
+
+def _any_mesh_will_do(options: Options) -> bool:
+    """Whether nobody asks for two maps in particular, or for what they make of a part before it is relaxed."""
+    return options.rounds > 0 and options.strategy == STRATEGIES[0]
 
 
 def _by_sphere(maps: PartMaps, count: int, density: np.ndarray, options: Options) -> Steps[Tessellation | None]:
@@ -107,13 +112,11 @@ def _by_sphere(maps: PartMaps, count: int, density: np.ndarray, options: Options
     return Tessellation(draft, vertices, size, 1.0, found.warnings, part.slits, 0)
 
 
-def _without_maps(
-    maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options
-) -> Tessellation:
+def _without_maps(maps: PartMaps, count: int, density: np.ndarray, options: Options) -> Tessellation:
     part = maps.part
     vertices = count if options.count_of == "vertices" else count // 2 + part.euler
     size, finer = (edge_size(float(part.area @ density), 0.0, n) for n in (vertices, max(vertices, _fewest(part))))
-    draft = simplified(part, max(vertices, _fewest(part)), density, at_vertices, finer)
+    draft = simplified(part, max(vertices, _fewest(part)), density, finer)
     return Tessellation(draft, vertices, size, 1.0, maps.warnings, part.slits, 0)
 
 
@@ -121,11 +124,53 @@ def _fewest(part: Part) -> int:
     return FEWEST_IN_PILE * len(part.members) if part.members else FEWEST
 
 
+@dataclass(frozen=True)
+class _Plan:
+    """Arcs of a part and samples on them, and how many vertices there are to be; see `Tessellation`.
+
+    fewest: vertices to begin with; finer: edge length with those next to `size`
+    """
+
+    lines: Network
+    samples: ArcSamples
+    vertices: int
+    fewest: int
+    size: float
+    finer: float
+    stretch: float
+    warnings: tuple[str, ...]
+
+
 def _by_charts(
     maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float
 ) -> Steps[Tessellation]:
+    """The part by way of charts; by its own triangles where some of them have no maps, and relaxation follows."""
     yield Progress("Charts", 0.0)
-    yield from part_of(maps.choose_charts(count if options.count_of == "vertices" else count // 2), 0.0, 0.5)
+    plan = _planned(maps, count, density, at_vertices, options, stretch)
+    lines, part = plan.lines, maps.part
+    if _any_mesh_will_do(options) and not part.disk:
+        return _between_lines(maps, plan, density)
+    borders = [border(sides, plan.samples, lines.arcs) for sides in lines.sides]
+    inner = _inner_counts(maps.charts, borders, density, max(plan.vertices, plan.fewest) - len(plan.samples.points))
+    patches: list[Patch] = []
+    done = 0.0
+    said: tuple[str, ...] = ()
+    for k, (loop, edge, number) in enumerate(zip(lines.loops, borders, inner, strict=True)):
+        share = len(maps.charts[k].triangles) / len(part.triangles)
+        steps = _patch(maps, k, loop, edge, int(number), density, options)
+        patch, warnings = yield from part_of(steps, done, share)
+        if patch is None or (warnings and _any_mesh_will_do(options)):
+            return _between_lines(maps, replace(plan, warnings=(*plan.warnings, NO_MAPS)), density)
+        patches.append(patch)
+        said += warnings
+        done += share
+    points, triangles = glue(plan.samples.points, borders, patches)
+    return _glued(part, plan, points, triangles, maps.warnings + plan.warnings + said, options.delaunay)
+
+
+def _planned(
+    maps: PartMaps, count: int, density: np.ndarray, at_vertices: np.ndarray, options: Options, stretch: float
+) -> _Plan:
     part, charts, held = maps.part, maps.charts, _held(maps.part)
     # A slit is a boundary on both sides.
     rim = _weighted_length(part.vertices, np.concatenate([part.rim, part.slits, part.slits]), at_vertices)
@@ -152,23 +197,23 @@ def _by_charts(
             stretch, corners = first, False
     if not options.corners:
         samples = smooth_rims(part, lines, samples, lengths)
-    borders = [border(sides, samples, lines.arcs) for sides in lines.sides]
-    inner = _inner_counts(charts, borders, density, max(vertices, fewest) - len(samples.points))
-    patches: list[Patch] = []
-    warnings = list(maps.warnings)
-    if options.corners and not corners:
-        warnings.append(
-            f"{vertices} vertices for a part are too few to keep the corners of its boundaries and features"
-        )
-    done = 0.0
-    for k, (loop, edge, number) in enumerate(zip(lines.loops, borders, inner, strict=True)):
-        share = len(charts[k].triangles) / len(part.triangles)
-        steps = _patch(maps, k, loop, edge, int(number), density, options)
-        patch, said = yield from part_of(steps, 0.5 + 0.5 * done, 0.5 * share)
-        patches.append(patch)
-        warnings += said
-        done += share
-    points, triangles = glue(samples.points, borders, patches)
+    lost = f"{vertices} vertices for a part are too few to keep the corners of its boundaries and features"
+    warnings = (lost,) if options.corners and not corners else ()
+    return _Plan(lines, samples, vertices, fewest, size, finer, stretch, warnings)
+
+
+def _between_lines(maps: PartMaps, plan: _Plan, density: np.ndarray) -> Tessellation:
+    """The part by its own triangles, between the samples on its boundaries and features."""
+    part, count = maps.part, max(plan.vertices, plan.fewest)
+    found = simplified_between(part, plan.lines.arcs, plan.samples, count, density, plan.finer * plan.size)
+    warnings, more = maps.warnings + plan.warnings, _copies(part, plan.lines, plan.samples)
+    return Tessellation(found[0], plan.vertices, plan.size, plan.stretch, warnings, found[1], more)
+
+
+def _glued(
+    part: Part, plan: _Plan, points: np.ndarray, triangles: np.ndarray, warnings: tuple[str, ...], delaunay: bool
+) -> Tessellation:
+    lines, samples = plan.lines, plan.samples
     # Those that stay come first, so that their numbers stay as well.
     rank = np.arange(len(points)) + len(points) * ~np.pad(samples.fixed, (0, len(points) - len(samples.fixed)))
     order = np.argsort(rank, kind="stable")
@@ -176,9 +221,10 @@ def _by_charts(
     number[order] = np.arange(len(points))
     fixed = np.arange(len(points)) < samples.fixed.sum()
     held_arcs = [k for k, arc in enumerate(lines.arcs) if arc.held]
-    draft = Draft(points[order], number[triangles], fixed, _kept(held_arcs, samples, number), options.delaunay)
+    draft = Draft(points[order], number[triangles], fixed, _kept(held_arcs, samples, number), delaunay)
     slits = _kept(_along(lines, part.slits), samples, number)
-    return Tessellation(draft, vertices, size, stretch, tuple(warnings), slits, _copies(part, lines, samples))
+    more = _copies(part, lines, samples)
+    return Tessellation(draft, plan.vertices, plan.size, plan.stretch, warnings, slits, more)
 
 
 def _held(part: Part) -> np.ndarray:
@@ -226,7 +272,8 @@ def _inner_counts(charts: list[Chart], borders: list[Border], density: np.ndarra
 
 def _patch(
     maps: PartMaps, k: int, loop: np.ndarray, edge: Border, number: int, density: np.ndarray, options: Options
-) -> Steps[tuple[Patch, tuple[str, ...]]]:
+) -> Steps[tuple[Patch | None, tuple[str, ...]]]:
+    """A chart triangulated, and warnings; None where that fails and relaxation would make up for another way."""
     if len(edge.samples) == 3 and number == 0:
         return Patch(np.zeros((0, 3)), np.arange(3)[None]), ()
     chart = maps.charts[k]
@@ -241,6 +288,8 @@ def _patch(
     patch = triangulate_chart(places, chart.disk, loop, (even, even), edge, number)
     if patch is not None:
         return patch, ()
+    if options.rounds:
+        return None, ()
     elements = maps.part.faces[chart.faces]
     raise PrecisionError(
         f"A piece of {len(elements)} triangles leaves no room for {number} vertices in double precision",
