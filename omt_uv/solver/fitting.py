@@ -54,6 +54,11 @@ class Fitting:
         """Closest points of mesh and surface."""
         return self.pairing(self.points, self.triangles, self.on.points)
 
+    def place(self, points: np.ndarray) -> None:
+        """Put the vertices at points (n,3)."""
+        self.points = points
+        self._look()
+
     def step(self, usual: float | None = None, held: np.ndarray | None = None, firm: bool = False) -> bool:
         """Bring pairs together by moves of all vertices but the fixed ones, or those `held` (n,) bool; edges flip to
         Delaunay. See `displacement.displacements`.

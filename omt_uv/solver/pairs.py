@@ -20,9 +20,10 @@ NEVER = 1 << 30
 
 
 PLACES = subdivision_centroids(PATTERN)
-# The middles of the sides besides, drawn in a little; and which of the former are next to them all.
-DENSE = np.concatenate([PLACES, 0.02 / 3 + 0.98 * np.array([[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])])
-NEXT = np.linalg.norm(DENSE[:, None] - PLACES, axis=2).argmin(axis=1)
+# The middles of the sides besides, drawn in a little; and more inside.
+_SIDES = 0.02 / 3 + 0.98 * np.array([[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]])
+DENSE = np.concatenate([PLACES, _SIDES])
+DENSER = np.concatenate([subdivision_centroids(PATTERN + 1), _SIDES])
 
 
 @dataclass(frozen=True)
@@ -53,12 +54,14 @@ class Pairs:
 @dataclass(frozen=True)
 class Start:
     """Triangles to begin the walk to closest points at: of the mesh for the samples (s,), of the surface for the points
-    of the mesh's triangles (m r,); the area of samples, and of triangles, for one vertex; and of a mesh in pieces that
-    may lie on one another, the piece (m,) of every triangle: its samples stay with it."""
+    of the mesh's triangles (m r,); the area of samples, and of triangles, for one vertex; barycentric coordinates (r,3)
+    of the triangles' points; and of a mesh in pieces that may lie on one another, the piece (m,) of every triangle: its
+    samples stay with it."""
 
     there: np.ndarray
     back: np.ndarray
     per_vertex: tuple[float, float] | None
+    places: np.ndarray
     piece: np.ndarray | None = None
 
 
@@ -70,7 +73,7 @@ class Pairing:
         self._there, self._back = Memory(SEARCH_EVERY, FAR), Memory(SEARCH_EVERY, FAR)
         self.per_vertex: tuple[float, float] | None = None
         self._piece: np.ndarray | None = None
-        self.places = DENSE if start else PLACES
+        self.places = start.places if start else PLACES
         if start:
             self._piece = start.piece
             # Only walks stay on a piece.
@@ -87,10 +90,10 @@ class Pairing:
         """Triangles (m q,) of the surface that were the closest to the points of the mesh's triangles."""
         return np.asarray(self._back.faces)
 
-    @property
-    def back_of_dense(self) -> np.ndarray:
-        """About the triangles (m r,) of the surface that are the closest to more points, as pairs with a start have."""
-        return self.back.reshape(-1, len(PLACES))[:, NEXT].ravel()
+    def back_of(self, places: np.ndarray) -> np.ndarray:
+        """About the triangles (m r,) of the surface that are the closest to these places (r,3) of the mesh's."""
+        nearest = np.linalg.norm(places[:, None] - self.places, axis=2).argmin(axis=1)
+        return self.back.reshape(-1, len(self.places))[:, nearest].ravel()
 
     def put_back(self, pairs: Pairs, faces: np.ndarray, other: Pairing, others: np.ndarray) -> None:
         """Go on from these pairs, and at triangles (k,) of the mesh from where another's (k,) are."""

@@ -14,9 +14,10 @@ from .closest import ClosestPoint, vertex_normals
 from .draft import Draft
 from .fitting import Fitting
 from .geometry import face_areas
-from .pairs import Pairing, Pairs, Start
+from .pairs import DENSE, DENSER, Pairing, Pairs, Start
 from .patches import Patches, apart, cut_out, grown
 from .progress import Progress, Steps
+from .search import search
 from .surface_samples import Samples, joined
 from .trials import TRIALS, Batch, norms, peaks_of, put_back, shapes, sound
 
@@ -27,16 +28,23 @@ RINGS = 1
 PASSES, MOST = 4, 0.002
 # The norm of a patch's distances has to fall by this share.
 GAIN = 0.03
+# What is left above so many times the usual distance is searched by random moves.
+HIGH = 10.0
+# How often: peaks not below this share of the highest, so many next to the vertices; one that stays counts as this much
+# lower.
+SEARCHES, SHARE, MOST_SEARCHED, TIRED = 60, 0.8, 0.004, 0.95
 # Where distances are so many times the usual one all vertices of the surface are samples, this many times as far around
 # as the next sample is, or so many rings; next to the weight of a sample, theirs is small.
 LOOK, SPREAD, MOST_RINGS, WEIGHT = 3.0, 2.0, 8, 0.03
+# The same for random moves, which find every place that no sample sees.
+LOOK_AGAIN, MORE_RINGS = 1.5, 16
 
 
 def lower_peaks(fitting: Fitting) -> Steps[Draft]:
     """The mesh of a fit with smaller largest distances to the surface, as many vertices, and the angles and lengths of
     edges not much worse."""
     usual, n = fitting.recent.usual, len(fitting.points)
-    look_closer(fitting)
+    look_closer(fitting, fitting.recent.distance, LOOK * usual, MOST_RINGS, DENSE)
     pairs = fitting.pairs()
     stuck = np.zeros(len(fitting.triangles), dtype=bool)
     for k in range(PASSES):
@@ -48,26 +56,47 @@ def lower_peaks(fitting: Fitting) -> Steps[Draft]:
             break
         better = _lowered(fitting, pairs, cut_out(fitting.triangles, middle, n, RINGS), usual)
         stuck[middle[~better]] = True
-        yield Progress("Fit", (k + 1) / PASSES)
+        yield Progress("Fit", 0.5 * (k + 1) / PASSES)
+    yield from _search(fitting, pairs, usual)
     return fitting.draft
 
 
-def look_closer(fitting: Fitting) -> None:
-    """Add the vertices of the surface around samples that are far from the mesh to the samples."""
+def _search(fitting: Fitting, pairs: Pairs, usual: float) -> Steps[None]:
+    """Move the corners of the highest peaks at random, and look closer before, or peaks move to where no sample is."""
+    random, m, n = np.random.default_rng(0), len(fitting.triangles), len(fitting.points)
+    if pairs.distance.max() <= HIGH * usual:
+        return
+    look_closer(fitting, pairs.distance, LOOK_AGAIN * usual, MORE_RINGS, DENSER)
+    pairs, tired = fitting.pairs(), np.ones(m)
+    for k in range(SEARCHES):
+        worst = pairs.worst(m) * tired
+        high = np.flatnonzero(worst > max(HIGH * usual, SHARE * worst.max()))
+        high = high[np.argsort(-worst[high], kind="stable")]
+        middle = apart(fitting.triangles, high, n, 2, int(np.ceil(MOST_SEARCHED * n)))
+        if len(middle) == 0:
+            break
+        better = search(fitting, pairs, cut_out(fitting.triangles, middle, n, 0), HIGH * usual, random)
+        tired[middle[~better]] *= TIRED
+        yield Progress("Fit", 0.5 + 0.5 * (k + 1) / SEARCHES)
+
+
+def look_closer(fitting: Fitting, distance: np.ndarray, far: float, most_rings: int, places: np.ndarray) -> None:
+    """Add the vertices of the surface to the samples around those whose distances (s,) to the mesh are far,
+    and look at these places (r,3) of its triangles."""
     pairing, index = fitting.pairing, fitting.index
-    samples, recent = pairing.samples, fitting.recent
+    samples = pairing.samples
     s, V, T = len(samples.points), index.vertices, index.triangles
     near = np.zeros(len(V), dtype=bool)
-    near[T[samples.faces[recent.distance[:s] > LOOK * recent.usual]]] = True
+    near[T[samples.faces[distance[:s] > far]]] = True
     pitch, edge = np.sqrt(samples.area.sum() / s), np.sqrt(face_areas(V, T).sum() / len(T))
-    near = grown(T, near, min(int(np.ceil(SPREAD * pitch / edge)), MOST_RINGS))
+    near = grown(T, near, min(int(np.ceil(SPREAD * pitch / edge)), most_rings))
     at, corner = np.flatnonzero(near), np.zeros(len(V), np.int64)
     corner[T.ravel()] = np.arange(T.size)
     normals = vertex_normals(V, T)[at]
     extra = Samples(V[at], normals, np.full(len(at), WEIGHT * samples.area.sum() / s), corner[at] // 3)
     mesh = ClosestPoint(fitting.points, fitting.triangles, index.spacing)
     there = np.append(pairing.there, mesh(extra.points, normals).faces)
-    start = Start(there, pairing.back_of_dense, pairing.per_vertex)
+    start = Start(there, pairing.back_of(places), pairing.per_vertex, places)
     fitting.pairing = Pairing(index, joined(samples, extra), start)
 
 

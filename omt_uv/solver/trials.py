@@ -63,24 +63,25 @@ class Batch:
     piece (c f,): of every triangle, which of the c p patches it is of
     """
 
-    def __init__(self, fitting: Fitting, peaks: Peaks):
+    def __init__(self, fitting: Fitting, peaks: Peaks, copies: int = TRIALS):
         patches = peaks.patches
-        self.whole, self.peaks, self.patches = fitting, peaks, patches
+        self.whole, self.peaks, self.patches, self.copies = fitting, peaks, patches, copies
         v, f, p = len(patches.vertices), len(patches.faces), len(patches)
-        copy = np.arange(TRIALS)[:, None]
-        self.points = np.tile(fitting.points[patches.vertices], (TRIALS, 1))
+        copy = np.arange(copies)[:, None]
+        self.points = np.tile(fitting.points[patches.vertices], (copies, 1))
         self.triangles = (patches.triangles + v * copy[:, :, None]).reshape(-1, 3)
         self.piece = (patches.of_face + p * copy).ravel()
-        self.fixed = np.tile(patches.outer | fitting.start.fixed[patches.vertices], TRIALS)
-        self.outer, self.held = np.tile(patches.outer, TRIALS), self.fixed.copy()
+        self.fixed = np.tile(patches.outer | fitting.start.fixed[patches.vertices], copies)
+        self.outer, self.held = np.tile(patches.outer, copies), self.fixed.copy()
         tail, head = halfedges(self.triangles)
-        whole = np.tile(patches.vertices, TRIALS)
+        whole = np.tile(patches.vertices, copies)
         self.keep = np.isin(pair_keys(whole[tail], whole[head]), fitting.start.locked)
         self.locked = np.unique(pair_keys(tail[self.keep], head[self.keep]))
         self._start = Start(
             (peaks.there + f * copy).ravel(),
-            np.tile(fitting.pairing.back.reshape(len(fitting.triangles), -1)[patches.faces].ravel(), TRIALS),
+            np.tile(fitting.pairing.back.reshape(len(fitting.triangles), -1)[patches.faces].ravel(), copies),
             fitting.pairing.per_vertex,
+            fitting.pairing.places,
             self.piece,
         )
 
@@ -98,13 +99,17 @@ class Batch:
             new = flip_where_sound(self.points, self.triangles, h, self.keep, self.outer)
             self.locked = np.union1d(self.locked, new)
 
+    def mesh(self) -> Fitting:
+        """The mesh of all copies as they are now."""
+        whole = self.whole
+        samples = picked(whole.pairing.samples, np.tile(self.peaks.samples, self.copies))
+        home = Memory(NEVER, start=np.tile(whole.on.faces[self.patches.vertices], self.copies))
+        draft = Draft(self.points, self.triangles, self.fixed, self.locked)
+        return Fitting(draft, Pairing(whole.index, samples, self._start), whole.density, home, self.outer)
+
     def run(self, usual: float) -> Fitting:
         """The mesh of all copies after some steps."""
-        whole = self.whole
-        samples = picked(whole.pairing.samples, np.tile(self.peaks.samples, TRIALS))
-        home = Memory(NEVER, start=np.tile(whole.on.faces[self.patches.vertices], TRIALS))
-        draft = Draft(self.points, self.triangles, self.fixed, self.locked)
-        trial = Fitting(draft, Pairing(whole.index, samples, self._start), whole.density, home, self.outer)
+        trial = self.mesh()
         trial.flip()
         for k in range(HELD_STEPS + STEPS):
             held = self.held if k < HELD_STEPS else self.fixed
