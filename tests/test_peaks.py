@@ -83,6 +83,19 @@ def test_grooves_narrower_than_an_edge_are_reached(monkeypatch):
     assert least[1] > least[0] - np.radians(2)
 
 
+def test_random_moves_go_on_where_steps_end(monkeypatch):
+    """Alone, they bring the mesh nearer, too, at fixed topology and in one way each time."""
+    V, F = groove()
+    monkeypatch.setattr(peaks, "PASSES", 0)
+    monkeypatch.setattr(peaks, "HIGH", 5.0)
+    first, again = (drain(remesh(V, F, 600, rounds=5)) for _ in range(2))
+    np.testing.assert_array_equal(first.vertices, again.vertices)
+    monkeypatch.setattr(peaks, "SEARCHES", 0)
+    without = drain(remesh(V, F, 600, rounds=5))
+    np.testing.assert_array_equal(first.triangles, without.triangles)
+    assert farthest(V, F, first) < 0.7 * farthest(V, F, without)
+
+
 @pytest.mark.parametrize("rings", [1, 2])
 def test_patches_are_disjoint_and_know_their_ring(rings):
     V, F = meshes.icosphere(4)

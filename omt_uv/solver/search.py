@@ -21,7 +21,7 @@ from .trials import Batch, norms, peaks_of, put_back, shapes, sound
 
 # Copies of every patch, the first of which stays as it is, are at least so many, and of all patches about so many
 # together; how often these are made.
-COPIES, TOGETHER, ROUNDS = 16, 100, 12
+COPIES, TOGETHER, ROUNDS = 16, 32, 12
 # Lengths of moves, in edges, evenly over their logarithms; along the normal this share of them; and how many of the
 # corners move.
 SHORTEST, LONGEST, ALONG_NORMAL, MOVING = 0.02, 0.15, 0.5, 0.6
