@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from cases import Table, load_case
-from magnify import AREA_GOAL, FACTORS, MODELS, OVERLAP_GOAL, SHARE_GOAL, TIME_GOAL, fastest
+from magnify import FACTORS, MODELS, fastest, missed
 from regions import areas, ball, figures
 
 from omt_uv.solver.chart_map import unwrap_chart
@@ -13,9 +13,6 @@ from omt_uv.solver.exact_share import exact_share
 from omt_uv.solver.lens import magnify_region
 from omt_uv.solver.measure import from_vertices, share
 from omt_uv.solver.progress import drain
-
-# Twice by 2 against once by 4: share, and distance of corresponding points over the domain's width.
-CASCADE_GOAL = 0.02
 
 
 def cascade_part(args):
@@ -42,14 +39,6 @@ def _lens(table, name, boundary, uv, F, w, factor, plain):
     has = figures(flat, F, once.uv[F], found.density, w)
     twice = _twice(uv, F, w, once.uv) if factor == 4 else {}
     off = has.share / found.asked - 1
-    missed = {
-        "share": abs(off) > SHARE_GOAL,
-        "area": max(has.area_l1, has.region, has.context) > AREA_GOAL,
-        "folds": has.folds,
-        "overlap": has.overlap > OVERLAP_GOAL,
-        "cascade": max(map(abs, twice.values()), default=0) > CASCADE_GOAL,
-        "time": seconds > TIME_GOAL * plain,
-    }
     table.add(
         model=name,
         method=f"UVs {factor:g} x {boundary}",
@@ -59,7 +48,7 @@ def _lens(table, name, boundary, uv, F, w, factor, plain):
         **twice,
         time=seconds,
         ratio=seconds / plain,
-        **{"missed goals": ", ".join(goal for goal, wrong in missed.items() if wrong)},
+        **{"missed goals": missed(has, off, seconds / plain, max(map(abs, twice.values()), default=0))},
     )
 
 

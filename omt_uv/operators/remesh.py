@@ -196,10 +196,9 @@ def _figures(levels: list) -> tuple[tuple[str, str], ...]:
     """Rows for the panel about the finest mesh of every object: size and the smallest angles of its triangles."""
     import numpy as np
 
-    from ..solver.geometry import angles_from_lengths, halfedge_lengths
+    from ..solver.geometry import least_angles
 
-    lengths = [halfedge_lengths(level.positions, level.triangles).reshape(-1, 3) for level in levels]
-    least = np.degrees(angles_from_lengths(np.concatenate(lengths)).min(axis=1))
+    least = np.degrees(np.concatenate([least_angles(level.positions, level.triangles) for level in levels]))
     return (
         ("Vertices", f"{sum(len(level.positions) for level in levels)}"),
         ("Triangles", f"{len(least)}"),

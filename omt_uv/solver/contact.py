@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .topology import expand
+
 # Reach of the barrier, relative to the shorter of the boundary edges involved.
 REACH = 0.5
 # A step goes at most this share of the way to the first contact.
@@ -181,12 +183,6 @@ def _rasterise(low, high, size, cells):
     span = np.clip((high / size).astype(np.int64), 0, cells - 1) - first + 1
     box, k = expand(span.prod(1))
     return box, (first[box, 0] + k % span[box, 0]) * cells + first[box, 1] + k // span[box, 0]
-
-
-def expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For rows of `counts` (k,) entries: the row of every entry, and its place within the row."""
-    row = np.repeat(np.arange(len(counts)), counts)
-    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _box(points):

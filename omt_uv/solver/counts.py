@@ -27,7 +27,6 @@ class StuckError(Exception):
 # Edge lengths (k,) wanted at points (k,3).
 Size: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
-
 MOST_ROUNDS = 500
 # In one round only edges about as short, or as long, as the most wanted ones go.
 SHARE = 0.5

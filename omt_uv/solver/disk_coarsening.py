@@ -12,12 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .contact import expand
 from .energy import Elements, elements
 from .geometry import cross2, dot2, face_areas
 from .progress import Progress, Steps
 from .smoothing import independent, relax, stars
-from .topology import boundary_loops, halfedges, twins
+from .topology import boundary_loops, expand, halfedges, twins
 
 # A vertex with more faces stays: comparing all its collapses costs the square of their number.
 MOST_FACES = 9

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 
 from .linear import minimum_degree
-from .topology import halfedges
+from .topology import expand, halfedges
 
 # From this many vertices on dissection is the better order of the two; on fewer, minimum degree has less fill.
 LARGE = 100_000
@@ -72,5 +72,5 @@ def _upper_half(points, part, count) -> np.ndarray:
     along = points[np.arange(len(points)), extent.argmax(axis=1)[part]]
     order = np.lexsort((along, part))
     rank = np.empty(len(points), np.int64)
-    rank[order] = np.arange(len(points)) - np.repeat(np.cumsum(size) - size, size)
+    rank[order] = expand(size)[1]
     return rank >= (size // 2)[part]

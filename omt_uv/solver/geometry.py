@@ -77,6 +77,11 @@ def angles_from_lengths(length: np.ndarray) -> np.ndarray:
     return 2 * np.arctan2(numerator, np.sqrt(total * d))
 
 
+def least_angles(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The least angle of every triangle, (m,)."""
+    return angles_from_lengths(halfedge_lengths(positions, triangles).reshape(-1, 3)).min(axis=1)
+
+
 def cotangents_from_lengths(length: np.ndarray) -> np.ndarray:
     """Cotangent of the angle opposite to halfedge k, (m,3); zero where the triangle is degenerate."""
     a, b, c = length.T

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .geometry import cross2
+from .topology import expand
 
 SAMPLES = 200_000
 CHUNK = 2_000_000  # pairs of a sample and a face tested at once, for memory
@@ -55,7 +56,7 @@ class _Grid:
         while self.side > 1 and span.prod(1).sum() > ENTRIES_PER_FACE * len(tri):
             self.side //= 2
             first, span = self._boxes(low, high)
-        owner, k = _expand(span.prod(1))
+        owner, k = expand(span.prod(1))
         column = first[owner, 0] + k % span[owner, 0]
         row = first[owner, 1] + k // span[owner, 0]
         cell = column * self.side + row
@@ -83,16 +84,10 @@ class _Grid:
         """In how many triangles each point (k,2) lies."""
         cell = self._cell(points)
         begin = self.start[cell]
-        query, k = _expand(self.start[cell + 1] - begin)
+        query, k = expand(self.start[cell + 1] - begin)
         t = self.tri[self.owner[begin[query] + k]]
         x = points[query]
         sides = np.stack([cross2(t[:, (i + 1) % 3] - t[:, i], x - t[:, i]) for i in range(3)])
         limit = INSIDE * self.extent**2
         inside = (sides.min(0) > limit) | (sides.max(0) < -limit)
         return np.bincount(query[inside], minlength=len(points))
-
-
-def _expand(counts):
-    """For rows of `counts` entries: the row of every entry, and its place within the row."""
-    row = np.repeat(np.arange(len(counts)), counts)
-    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -9,6 +9,7 @@ import numpy as np
 from .closest import ClosestPoint, Located, Memory, face_normals, subdivision_centroids
 from .geometry import face_areas
 from .surface_samples import Samples
+from .topology import expand
 
 # Samples of every triangle are this squared; what the vertices weigh next to them.
 PATTERN = 2
@@ -17,7 +18,6 @@ VERTICES = 0.5
 # farther than FAR times the root of the mean square.
 SEARCH_EVERY, FAR = 4, 3.0
 NEVER = 1 << 30
-
 
 PLACES = subdivision_centroids(PATTERN)
 # The middles of the sides besides, drawn in a little; and more inside.
@@ -140,8 +140,7 @@ class Pairing:
         far = np.flatnonzero(square > FAR**2 * square.sum() / max(len(square), 1))
         order, size = np.argsort(piece, kind="stable"), np.bincount(piece)
         first, mine = np.cumsum(size) - size, piece[near.faces[far]]
-        row = np.repeat(np.arange(len(far)), size[mine])
-        rank = np.arange(len(row)) - np.repeat(np.cumsum(size[mine]) - size[mine], size[mine])
+        row, rank = expand(size[mine])
         face = order[rank + first[mine][row]]
         bary, distance = mesh.distance(self.samples.points[far[row]], face)
         best = np.lexsort((distance, row))

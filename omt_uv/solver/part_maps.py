@@ -127,9 +127,10 @@ class Original:
         parts = self.parts.parts
         lined = np.array([part.lined for part in parts])
         piles = [kind for kind in (small & ~lined, small & lined) if kind.sum() > 1]
+        alone = np.ones(len(parts), dtype=bool)
         for kind in piles:
+            alone &= ~kind
             if kind.tobytes() not in self._piles:
                 pile = piled([parts[k] for k in np.flatnonzero(kind)])
                 self._piles[kind.tobytes()] = PartMaps(fine_enough(pile))
-        alone = ~np.logical_or.reduce(piles, initial=False) & np.ones(len(parts), bool)
         return [self.maps[k] for k in np.flatnonzero(alone)] + [self._piles[kind.tobytes()] for kind in piles]

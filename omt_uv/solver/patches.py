@@ -31,10 +31,8 @@ def cut_out(triangles: np.ndarray, middle: np.ndarray, n: int, rings: int) -> Pa
     """Pieces of a mesh (m,3) with n vertices around faces (p,) that are more than 2 `rings` + 2 edges apart."""
     label = np.full(n, -1)
     label[triangles[middle].ravel()] = np.repeat(np.arange(len(middle)), 3)
-    for _ in range(rings):
-        label = _spread(triangles, label)
-    inner = label
-    label = _spread(triangles, label)
+    inner = _grown(triangles, label, rings)
+    label = _spread(triangles, inner)
     faces = np.flatnonzero((inner[triangles] >= 0).any(axis=1))
     vertices, own = np.unique(triangles[faces], return_inverse=True)
     number = np.zeros(len(triangles), np.int64)
@@ -73,9 +71,8 @@ def apart(triangles: np.ndarray, faces: np.ndarray, n: int, rings: int, most: in
             np.minimum.at(rank, triangles.ravel(), np.repeat(rank[triangles].min(axis=1), 3))
         first = faces[(rank[triangles[faces]] == np.arange(len(faces))[:, None]).all(axis=1)]
         chosen = np.concatenate([chosen, first])
-        label = np.full(n, -1)
-        label[triangles[first].ravel()] = 0
-        for _ in range(rings):
-            label = _spread(triangles, label)
-        faces = faces[(label[triangles[faces]] < 0).all(axis=1)]
+        near = np.zeros(n, dtype=bool)
+        near[triangles[first]] = True
+        near = grown(triangles, near, rings)
+        faces = faces[~near[triangles[faces]].any(axis=1)]
     return chosen[:most]

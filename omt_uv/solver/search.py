@@ -12,7 +12,7 @@ import numpy as np
 
 from .closest import face_normals
 from .fitting import Fitting
-from .geometry import angles_from_lengths, halfedge_lengths
+from .geometry import least_angles
 from .pairs import Pairs
 from .patches import Patches
 from .springs import smallness
@@ -60,11 +60,6 @@ def search(fitting: Fitting, pairs: Pairs, patches: Patches, enough: float, rand
         better |= best > 0
     put_back(batch, trial, after, pairs, np.where(better, best, -1))
     return better
-
-
-def least_angles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The least angle of every triangle, (m,)."""
-    return angles_from_lengths(halfedge_lengths(points, triangles).reshape(-1, 3)).min(axis=1)
 
 
 def _held(fitting: Fitting, batch: Batch) -> np.ndarray:

@@ -13,7 +13,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from .closest import closest_on_triangles
-from .topology import halfedges, next_halfedge, pair_keys, pair_up, twins
+from .topology import expand, halfedges, next_halfedge, pair_keys, pair_up, twins
 
 MOST_ROUNDS = 200
 MOST_CELLS = 5_000_000
@@ -63,8 +63,8 @@ def seam_points(mesh: CutMesh, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     h = np.flatnonzero(mesh.seam)
     a, b = mesh.positions[tail[h]], mesh.positions[head[h]]
     count = np.clip(np.ceil(np.linalg.norm(b - a, axis=1) / spacing), 1, 1000).astype(np.int64)
-    which = np.repeat(np.arange(len(h)), count)
-    t = (np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[which]
+    which, place = expand(count)
+    t = (place + 0.5) / count[which]
     return a[which] + t[:, None] * (b - a)[which], h[which]
 
 
@@ -134,9 +134,8 @@ def _stars(mesh: CutMesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """All triangles that share a vertex with each of `faces` (k,): pairs of index into `faces` and triangle."""
     rows = mesh.sides[faces].ravel()
     begin, size = mesh.star.indptr[rows].astype(np.int64), np.diff(mesh.star.indptr)[rows].astype(np.int64)
-    offset = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
-    around = mesh.star.indices[np.repeat(begin, size) + offset].astype(np.int64)
-    return np.repeat(np.repeat(np.arange(len(faces)), 3), size), around
+    row, place = expand(size)
+    return row // 3, mesh.star.indices[begin[row] + place].astype(np.int64)
 
 
 def _distance(mesh: CutMesh, points: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from .closest import face_normals
-from .geometry import angles_from_lengths, halfedge_lengths
+from .geometry import least_angles
 from .topology import halfedges
 
 # Where angles fall below the first, springs set in, and are twice as strong as STRENGTH at most where they are smaller
@@ -19,8 +19,7 @@ STRENGTH = 0.5
 
 def smallness(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """How small the least angle of every triangle is, (m,) in [0,2]: 0 from SMALL on, 1 at SMALLER."""
-    angle = angles_from_lengths(halfedge_lengths(points, triangles).reshape(-1, 3)).min(axis=1)
-    return np.clip((SMALL - angle) / (SMALL - SMALLER), 0, 2)
+    return np.clip((SMALL - least_angles(points, triangles)) / (SMALL - SMALLER), 0, 2)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .contact import crossings, expand
+from .contact import crossings
 from .embedding import arc_length_parameters, tutte
 from .energy import elements
 from .errors import FoldedUVError
@@ -18,7 +18,7 @@ from .geometry import face_areas, signed_areas
 from .linear import Factor
 from .measure import entropy
 from .newton import Free, Motion, OnCircle, OnLines, linear_forms
-from .topology import halfedges, twins
+from .topology import expand, halfedges, twins
 from .untangle import USABLE, arc_length_rim, circle_rim, count_folds, map_energy, untangle
 
 SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"

@@ -52,6 +52,12 @@ def previous_halfedge(h: np.ndarray) -> np.ndarray:
     return h - 1 + 3 * (h % 3 == 0)
 
 
+def expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For rows of `counts` (k,) entries: the row of every entry, and its place within the row."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
 def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
     """Vertices of every boundary loop in order, surface on the left; longest loop first.
 

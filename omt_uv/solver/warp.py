@@ -6,6 +6,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from .geometry import cross2
+from .topology import expand
 
 # Pixels at a time, for memory.
 ROWS = 64
@@ -48,7 +49,7 @@ def _places(old, new, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
     count = span.prod(axis=1)
     place, covered = np.zeros((height, width, 2)), np.zeros((height, width), bool)
     for part in np.split(np.arange(len(new)), _cuts(count, ROWS * max(width, 256))):
-        face, k = _expand(count[part])
+        face, k = expand(count[part])
         face = part[face]
         x = low[face, 0] + k % np.maximum(span[face, 0], 1)
         y = low[face, 1] + k // np.maximum(span[face, 0], 1)
@@ -64,11 +65,6 @@ def _cuts(count: np.ndarray, most: int) -> np.ndarray:
     """Where to split so that the counts (m,) of a part sum to about `most`."""
     total = np.cumsum(count)
     return np.unique(np.searchsorted(total, np.arange(most, int(total[-1]) if len(total) else 0, most)))
-
-
-def _expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    row = np.repeat(np.arange(len(counts)), counts)
-    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _barycentric(corner: np.ndarray, point: np.ndarray) -> np.ndarray:
