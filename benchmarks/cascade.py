@@ -7,11 +7,11 @@ from cases import Table, load_case
 from magnify import FACTORS, MODELS, fastest, missed
 from regions import areas, ball, figures
 
-from omt_uv.solver.chart_map import unwrap_chart
-from omt_uv.solver.charts import split, triangle_surface
-from omt_uv.solver.exact_share import exact_share
-from omt_uv.solver.lens import magnify_region
-from omt_uv.solver.measure import from_vertices, share
+from omt_uv.solver.analysis.density import from_vertices, share
+from omt_uv.solver.analysis.region_density import exact_share
+from omt_uv.solver.editing.magnify import magnify_region
+from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.progress import drain
 
 

@@ -10,14 +10,14 @@ from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # processor time is only comparable when one thread does the work
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 import meshes
 import numpy as np
 from seams import cut_seams
 
-from omt_uv.solver.charts import triangle_surface
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
 CUT_MODELS = ["max_planck", "spot", "homer", "bunny", "stanford_bunny", "armadillo"]

@@ -20,18 +20,18 @@ from scipy.sparse import csr_matrix, vstack
 from scipy.sparse.csgraph import dijkstra
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support"), str(ROOT / "benchmarks")]
 
 import meshes
 from cases import Table
 
-from omt_uv.solver.charts import chosen_triangles, triangle_surface
-from omt_uv.solver.cut_graph import greedy_arcs
-from omt_uv.solver.cutting import cut
-from omt_uv.solver.piece import make_piece
-from omt_uv.solver.repair import join
-from omt_uv.solver.sheets import corner_classes
-from omt_uv.solver.topology import boundary_loops
+from omt_uv.solver.cutting.component import make_piece
+from omt_uv.solver.cutting.cut_graph import greedy_arcs
+from omt_uv.solver.cutting.cuts import cut
+from omt_uv.solver.mesh.charts import chosen_triangles, triangle_surface
+from omt_uv.solver.mesh.gluing import corner_classes
+from omt_uv.solver.mesh.repair import join
+from omt_uv.solver.mesh.topology import boundary_loops
 
 MODELS = ["max_planck", "bunny_small", "spot", "homer", "cow", "bunny", "david", "armadillo", "stanford_bunny",
           "beetle", "rocker_arm", "three_holes", "fertility"]  # fmt: skip

@@ -16,7 +16,7 @@ from cases import ROOT, Table, load_case, meshes, our_uv, timed
 from pictures import VIEWS, View, area_colours, checker, checker_material, equal_density, render_checker, render_colours
 from rivals import METHODS, make_object, unwrap, write_uv
 
-from omt_uv.solver.distortion import face_distortion, measure
+from omt_uv.solver.maps.distortion import face_distortion, measure
 
 OURS = {
     "OMT UV free": ("free", "standard"),

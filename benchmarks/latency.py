@@ -42,7 +42,7 @@ def latency_part(args):
 
 
 def _add(table, size, mode, name):
-    from blender import scenes
+    import scenes
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     V, F = meshes.head(size)
@@ -80,9 +80,10 @@ def _add(table, size, mode, name):
 
 def _add_live(table, size, mode):
     """The slider dragged from area to angle in steps of a twentieth: the longest wait for the UVs to follow one."""
-    from blender import scenes
+    import scenes
 
-    from omt_uv import following, operators
+    from omt_uv import operators
+    from omt_uv.session import live as following
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = scenes.add(*meshes.head(size))
@@ -113,7 +114,7 @@ def _add_live(table, size, mode):
 
 def _slices(operator):
     """Wall-clock milliseconds, those of the main thread, and the stage, of every slice."""
-    from omt_uv import running
+    from omt_uv.session import run as running
 
     found, state = [], {"RUNNING_MODAL"}
     while "RUNNING_MODAL" in state:

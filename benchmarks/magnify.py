@@ -14,11 +14,11 @@ from cases import Table, load_case, timed
 from regions import areas, ball, figures
 from rivals import make_object, read_uv, remove_object
 
-from omt_uv.solver.chart_map import unwrap_chart
-from omt_uv.solver.charts import split, triangle_surface
-from omt_uv.solver.exact_share import exact_share
-from omt_uv.solver.geometry import face_areas
-from omt_uv.solver.measure import from_vertices, share
+from omt_uv.solver.analysis.density import from_vertices, share
+from omt_uv.solver.analysis.region_density import exact_share
+from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.progress import drain
 
 MODELS = ["lion", "max_planck", "face"]

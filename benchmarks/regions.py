@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omt_uv.solver.distortion import measure
-from omt_uv.solver.geometry import vertex_areas
-from omt_uv.solver.scores import distance
+from omt_uv.solver.analysis.vertex_scores import distance
+from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.mesh.geometry import vertex_areas
 
 SHARE, RIM = 0.05, 0.25
 

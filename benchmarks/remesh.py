@@ -11,15 +11,15 @@ import numpy as np
 from cases import Table, load_case, timed
 from rivals import make_object, remove_object
 
-from omt_uv.solver.charts import triangle_surface
-from omt_uv.solver.closest import ClosestPoint, spread_points
-from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths
-from omt_uv.solver.parameterize import unwrap
-from omt_uv.solver.part_maps import Original
+from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.closest_point import ClosestPoint, spread_points
+from omt_uv.solver.mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths
+from omt_uv.solver.mesh.topology import halfedges, pair_keys
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remesh import remesh
-from omt_uv.solver.sampling import STRATEGIES
-from omt_uv.solver.topology import halfedges, pair_keys
+from omt_uv.solver.remeshing.initial.component_maps import Original
+from omt_uv.solver.remeshing.initial.disk_samples import STRATEGIES
+from omt_uv.solver.remeshing.remesh import remesh
 
 MODELS = ["lion", "face", "max_planck", "rocker_arm"]
 COUNT = 5000

@@ -35,15 +35,15 @@ from cases import ROOT, Table, available, load_case, our_uv, timed  # first: it 
 from counting import counted
 from scipy.spatial import ConvexHull
 
-from omt_uv.solver.charts import split, triangle_surface
-from omt_uv.solver.conformal import conformal_disk
-from omt_uv.solver.distortion import measure
-from omt_uv.solver.domain import Disk
+from omt_uv.solver.conformal.disk_map import conformal_disk
 from omt_uv.solver.errors import MeshError
-from omt_uv.solver.geometry import vertex_areas
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.geometry import vertex_areas
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.transport import transport
+from omt_uv.solver.transport.convex_domain import Disk
+from omt_uv.solver.transport.semidiscrete import transport
 
 PRESETS = ["draft", "standard", "exact"]
 BOUNDARIES = ["free", "disk", "square"]

@@ -6,7 +6,7 @@ import meshes
 import numpy as np
 from cases import Table, timed
 
-from omt_uv.solver.saliency import saliency
+from omt_uv.solver.analysis.saliency import saliency
 
 SIZES = (50_000, 200_000)
 TIME_GOAL, INVARIANCE_GOAL = 2.0, 1e-6  # at 50,000 vertices; relative to the greatest saliency

@@ -9,7 +9,7 @@ from cases import Case, Table, available, load_case, our_uv, timed  # first: it 
 from counting import counted
 from meshes import bumpy, subdivide
 
-from omt_uv.solver.distortion import measure
+from omt_uv.solver.maps.distortion import measure
 
 GROWTH_GOAL, ISLANDS_GOAL, ISLANDS = 1.25, 2.0, 1000
 COUNTS = ("newton_conformal", "newton_transport", "newton_refinement")

@@ -6,17 +6,17 @@ import meshes
 import numpy as np
 from cases import Table, load_case, timed  # first: it finds the modules below
 
-from omt_uv.solver.closed import closed_surface
-from omt_uv.solver.distortion import shear_of
-from omt_uv.solver.geometry import face_areas, vertex_areas
+from omt_uv.solver.maps.distortion import shear_of
+from omt_uv.solver.mesh.closed_surface import closed_surface
+from omt_uv.solver.mesh.geometry import face_areas, vertex_areas
+from omt_uv.solver.mesh.spherical_geometry import spherical_areas
+from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.progress import drain
-from omt_uv.solver.sphere import sphere_map
-from omt_uv.solver.sphere_conformal import conformal_sphere
-from omt_uv.solver.sphere_flow import flow_map
-from omt_uv.solver.sphere_transport import sphere_transport
-from omt_uv.solver.spherical import spherical_areas
-from omt_uv.solver.spherical_power import Hull
-from omt_uv.solver.topology import twins
+from omt_uv.solver.sphere.conformal import conformal_sphere
+from omt_uv.solver.sphere.dominitz_tannenbaum import flow_map
+from omt_uv.solver.sphere.sphere_map import sphere_map
+from omt_uv.solver.transport.semidiscrete_sphere import sphere_transport
+from omt_uv.solver.transport.spherical_power_diagram import Hull
 
 MODELS = ["max_planck", "spot", "homer", "bunny_small", "bunny", "david", "armadillo"]
 UNREFINED = "flow only"

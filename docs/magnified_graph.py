@@ -16,11 +16,11 @@ from cases import meshes
 from pictures import typeface
 from PIL import Image, ImageDraw
 
-from omt_uv.solver.geometry import signed_areas
-from omt_uv.solver.lens import magnify_region
-from omt_uv.solver.measure import from_vertices, share
+from omt_uv.solver.analysis.density import from_vertices, share
+from omt_uv.solver.editing.image_warp import warped
+from omt_uv.solver.editing.magnify import magnify_region
+from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.progress import drain
-from omt_uv.solver.warp import warped
 
 CELLS = 100  # of the grid along one side: 101 * 101 vertices
 FACTOR, RADIUS = 4.0, 0.15

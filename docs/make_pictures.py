@@ -23,17 +23,17 @@ from cases import load_case, meshes, our_uv
 from remesh import quadriflow, shape
 from sphere import sphere_figures
 
-from omt_uv.projecting import GlobeJob, project
+from omt_uv.pipelines.globe import GlobeJob, project
 from omt_uv.settings import GlobeSettings
-from omt_uv.solver.charts import triangle_surface
-from omt_uv.solver.distortion import face_distortion, measure
-from omt_uv.solver.globe import polygons_of, unfold
-from omt_uv.solver.measure import mean_curvature
-from omt_uv.solver.orientation import along_axes
-from omt_uv.solver.part_maps import Original
+from omt_uv.solver.analysis.density import mean_curvature
+from omt_uv.solver.globe.rotation import along_axes
+from omt_uv.solver.globe.unfolding import polygons_of, unfold
+from omt_uv.solver.maps.distortion import face_distortion, measure
+from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remesh import remesh
-from omt_uv.solver.sampling import STRATEGIES
+from omt_uv.solver.remeshing.initial.component_maps import Original
+from omt_uv.solver.remeshing.initial.disk_samples import STRATEGIES
+from omt_uv.solver.remeshing.remesh import remesh
 
 CELLS = {"lilium": 120}  # how many checker cells cover the model
 CIRCLES = {"max_planck": 260}  # likewise, in squares as large as those of the checker

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from . import overlay
-from .blender_versions import register_command, unregister_command
-from .operators.density import UV_OT_omt_density_get, UV_OT_omt_density_set
+from .blender.versions import register_command, unregister_command
+from .display import overlay
+from .operators.distortion import UV_OT_omt_measure
 from .operators.live import UV_OT_omt_live
 from .operators.magnify import UV_OT_omt_magnify
-from .operators.measure import UV_OT_omt_measure
 from .operators.overlay import UV_OT_omt_histogram, UV_OT_omt_overlay
 from .operators.preset import UV_OT_omt_preset
 from .operators.refine import UV_OT_omt_refine
@@ -17,12 +16,13 @@ from .operators.remesh import OBJECT_OT_omt_remesh
 from .operators.report import WM_OT_omt_copy_report
 from .operators.seams import UV_OT_omt_seams
 from .operators.sphere import UV_OT_omt_sphere
+from .operators.texel_density import UV_OT_omt_density_get, UV_OT_omt_density_set
 from .operators.unwrap import UV_OT_omt_unwrap
 from .operators.weights import OBJECT_OT_omt_weights
 from .panels.menus import draw_remesh, draw_unwrap, draw_weights, menus, remesh_menus, weights_menus
+from .panels.preferences import OMTUVPreferences, apply_soon
 from .panels.sidebar import PANELS
-from .preferences import OMTUVPreferences, apply_soon
-from .preset_files import register_folder, unregister_folder
+from .session.presets import register_folder, unregister_folder
 
 CLASSES = (
     UV_OT_omt_unwrap,

@@ -25,6 +25,8 @@ VERSIONS = {
     "5.0": ("3.11", "5.0.1", "1.26.4"),
     "5.2": ("3.13", "5.2.3", "2.3.4"),
 }
+FOLDERS = ("blender", "commands", "display", "extension", "operators", "panels", "session")
+BLENDER_TESTS = [f"tests/{name}" for name in FOLDERS]
 PYTEST = "pytest==9.2.0"
 
 
@@ -48,7 +50,7 @@ def run(python: Path, archive: Path) -> tuple[int, float]:
     with tempfile.TemporaryDirectory(prefix="omt_uv_matrix_") as folder:
         variables = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
         variables |= {"BLENDER_USER_RESOURCES": folder, "OMT_UV_ZIP": str(archive)}
-        done = subprocess.run([python, "-m", "pytest", "-q", "tests/blender"], cwd=ROOT, env=variables)
+        done = subprocess.run([python, "-m", "pytest", "-q", *BLENDER_TESTS], cwd=ROOT, env=variables)
     return done.returncode, time.perf_counter() - begin
 
 

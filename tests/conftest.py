@@ -1,7 +1,7 @@
-"""One Blender session for all tests, with OMT UV registered from the sources, or installed from a zip.
+"""One Blender session for all folders that need one, with OMT UV registered from the sources, or installed from a zip.
 
 With OMT_UV_ZIP=path the extension is installed from that zip into an empty user folder and runs with its own
-wheels; that is how scripts/matrix.py tests every Blender version.
+wheels; that is how scripts/release/matrix.py tests every Blender version.
 """
 
 from __future__ import annotations
@@ -9,18 +9,24 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+from pathlib import Path
 
 import pytest
 
-bpy = pytest.importorskip("bpy", reason="bpy is not installed")
-
 ADDON = "bl_ext.user_default.omt_uv"
+FOLDERS = ("blender", "commands", "display", "extension", "operators", "panels", "session")
 STATUS = pytest.StashKey[int]()
 
 
-@pytest.fixture(scope="session", autouse=True)
+def needs_blender(path: Path) -> bool:
+    return path.relative_to(Path(__file__).parent).parts[0] in FOLDERS
+
+
+@pytest.fixture(scope="session")
 def package():
     """Import a module of the package that is registered: `package("cli")`."""
+    import bpy
+
     archive = os.environ.get("OMT_UV_ZIP")
     if archive:
         root = f"{ADDON}.omt_uv"
@@ -39,9 +45,21 @@ def package():
     assert not hasattr(bpy.types, "VIEW3D_PT_omt_uv")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def registered(request):
+    """OMT UV is registered wherever Blender is tested, and only there."""
+    if needs_blender(request.path):
+        request.getfixturevalue("package")
+
+
 @pytest.fixture(autouse=True)
-def empty_scene():
-    """Every test starts from an empty scene; this keeps add-ons enabled."""
+def empty_scene(request):
+    """Every test of Blender starts from an empty scene; this keeps add-ons enabled."""
+    if not needs_blender(request.path):
+        yield
+        return
+    import bpy
+
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     yield
     if bpy.context.mode != "OBJECT":
@@ -51,7 +69,8 @@ def empty_scene():
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config):
     """Blender 4.2 as a Python module crashes at exit once anything was exported to glTF, OMT UV or not."""
-    if bpy.app.version < (4, 5, 0):
+    bpy = sys.modules.get("bpy")
+    if bpy is not None and bpy.app.version < (4, 5, 0):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(config.stash.get(STATUS, 1))

@@ -8,7 +8,7 @@ import bpy
 
 import numpy as np
 
-from .attribute_types import TYPES
+from ..pipelines.attribute_types import TYPES
 
 # Blender's own caches, made and dropped as it likes.
 _DERIVED = (".select_", ".uv_select_", ".hide_")

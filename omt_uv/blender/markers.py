@@ -9,11 +9,11 @@ import bpy
 import bmesh
 import numpy as np
 
-from .blender_seams import GroupError, group_weights
-from .blender_weights import region_weights
-from .projecting import Markers
-from .solver import measure
-from .solver.orientation import MarkerError
+from ..pipelines.globe import Markers
+from ..solver.analysis import density as measure
+from ..solver.globe.rotation import MarkerError
+from .seams import GroupError, group_weights
+from .weights import region_weights
 
 PICKED = 3
 

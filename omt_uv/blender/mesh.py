@@ -13,10 +13,10 @@ import bpy
 import bmesh
 import numpy as np
 
-from .blender_versions import uv_values
-from .solver.chart_pins import CornerPins
-from .solver.charts import Surface
-from .solver.errors import MeshError, NonFiniteError
+from ..solver.errors import MeshError, NonFiniteError
+from ..solver.mesh.charts import Surface
+from ..solver.parameterization.chart_pins import CornerPins
+from .versions import uv_values
 
 UV_LAYER_NAME = "UVMap"
 UV_LAYER_NAME_BYTES = 63

@@ -10,17 +10,17 @@ import bpy
 
 import numpy as np
 
-from . import blender_mesh
-from .attributes import Attributes, followed, marked_sharp, material_borders, uv_seams
-from .blender_read_attributes import group_weights, read_attributes
-from .blender_write_attributes import write_attributes
-from .carrying import carry
-from .remeshing import Job, Level, Series, oriented
-from .settings import RemeshSettings
-from .solver.charts import Surface
-from .solver.errors import EmptyMeshError, MeshError
-from .solver.features import all_edges, sharp_edges
-from .solver.measure import from_polygons, from_vertices
+from ..pipelines.attributes import Attributes, followed, marked_sharp, material_borders, uv_seams
+from ..pipelines.carry_attributes import carry
+from ..pipelines.remesh import Job, Level, Series, oriented
+from ..settings import RemeshSettings
+from ..solver.analysis.density import from_polygons, from_vertices
+from ..solver.analysis.feature_edges import all_edges, sharp_edges
+from ..solver.errors import EmptyMeshError, MeshError
+from ..solver.mesh.charts import Surface
+from . import mesh as blender_mesh
+from .read_attributes import group_weights, read_attributes
+from .write_attributes import write_attributes
 
 # Modifiers that keep data for the very vertices of a mesh and are of no use on another.
 BOUND = {

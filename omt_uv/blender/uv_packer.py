@@ -9,7 +9,7 @@ import bpy
 
 import numpy as np
 
-from .packing import MarginError, Packing, PackingError, covered_area
+from ..xatlas.packing import MarginError, Packing, PackingError, covered_area
 
 
 def pack(

@@ -10,10 +10,10 @@ import bpy
 import bmesh
 import numpy as np
 
-from .blender_mesh import Reading
-from .blender_seams import GroupError, group_weights
-from .solver.errors import MeshError
-from .solver.scores import areas, score, soft_weights
+from ..solver.analysis.vertex_scores import areas, score, soft_weights
+from ..solver.errors import MeshError
+from .mesh import Reading
+from .seams import GroupError, group_weights
 
 # Regions that need no vertex group, and the score they are made from.
 COMPUTED = {"saliency": "saliency", "curvature": "gaussian"}

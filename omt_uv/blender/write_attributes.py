@@ -8,10 +8,10 @@ import bpy
 
 import numpy as np
 
-from .attribute_types import TYPES
-from .attributes import Attributes, Layer, Marks, is_uv
-from .blender_read_attributes import get
-from .solver.topology import pair_keys
+from ..pipelines.attribute_types import TYPES
+from ..pipelines.attributes import Attributes, Layer, Marks, is_uv
+from ..solver.mesh.topology import pair_keys
+from .read_attributes import get
 
 
 def write_attributes(obj: bpy.types.Object, attributes: Attributes) -> None:

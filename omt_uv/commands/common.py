@@ -18,11 +18,13 @@ class CommandError(Exception):
 
 def blender():
     """The modules that need Blender, which the help and a misspelt option do not; says what is missing."""
-    from ..quiet import silence
+    from ..files.silence import silence
 
     try:
         with silence():
-            from .. import blender_mesh, blender_pack, files
+            from ..blender import mesh as blender_mesh
+            from ..blender import uv_packer as blender_pack
+            from ..files import meshes as files
     except ModuleNotFoundError as error:
         raise CommandError(f"{error}. Install bpy, numpy, scipy and xatlas, or run inside Blender.") from error
     return files, blender_mesh, blender_pack

@@ -77,10 +77,10 @@ def times(text: str) -> int:
 
 def run(options: argparse.Namespace) -> None:
     _, _, blender_pack = blender()
-    from ..blender_seams import GroupError
-    from ..blender_weights import ScoreError, named_weights
-    from ..magnifying import Region, magnify, warped_picture
-    from ..packing import PackingError
+    from ..blender.seams import GroupError
+    from ..blender.weights import ScoreError, named_weights
+    from ..pipelines.magnify import Region, magnify, warped_picture
+    from ..xatlas.packing import PackingError
 
     picture = _picture(options)
     settings = MagnifySettings(
@@ -120,7 +120,7 @@ def _picture(options: argparse.Namespace):
         raise CommandError("A picture needs both --image and --image-output.")
     if options.source != "uv":
         raise CommandError("A picture can only follow UVs that exist. Use --source uv.")
-    from ..blender_pictures import FORMATS, ImageError, picture_of, straight_alpha
+    from ..files.images import FORMATS, ImageError, picture_of, straight_alpha
 
     if options.image_output.suffix.lower() not in FORMATS:
         raise CommandError(f"{options.image_output}: unknown format. Use one of {' '.join(FORMATS)}.")
@@ -136,15 +136,15 @@ def _picture(options: argparse.Namespace):
 def _load(path: Path) -> str:
     import bpy
 
-    from ..quiet import silence
+    from ..files.silence import silence
 
     with silence():
         return bpy.data.images.load(str(path.resolve())).name
 
 
 def _write_picture(options: argparse.Namespace, picture) -> None:
-    from ..blender_pictures import save_copy
-    from ..quiet import silence
+    from ..files.images import save_copy
+    from ..files.silence import silence
 
     # Reading the mesh has closed the file that it was in.
     name = _load(options.image)

@@ -23,7 +23,7 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     files, blender_mesh, _ = blender()
-    from ..measuring import measure_readings, summary
+    from ..pipelines.distortion import measure_readings, summary
     from ..solver.errors import MeshError
 
     try:
@@ -37,9 +37,9 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _draw(path: Path, readings: list) -> None:
-    from ..blender_images import save
-    from ..histogram import histogram
-    from ..quiet import silence
+    from ..display.canvas import save
+    from ..display.histogram import histogram
+    from ..files.silence import silence
 
     if path.suffix.lower() != ".png":
         raise CommandError(f"{path}: a histogram is a picture. Name a .png file.")

@@ -22,7 +22,7 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     blender()
-    from ..refining import refine_islands
+    from ..pipelines.refine import refine_islands
 
     pairs = read_layers(options)
     objects = [obj for obj, _ in pairs]

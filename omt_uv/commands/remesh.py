@@ -76,8 +76,8 @@ def _ratio(text: str) -> float:
 
 def run(options: argparse.Namespace) -> None:
     files, blender_mesh, _ = blender()
-    from ..blender_remesh import SourceError, carried_attributes, lost, new_objects, read_request, source_of
-    from ..remeshing import remesh_series
+    from ..blender.remesh_objects import SourceError, carried_attributes, lost, new_objects, read_request, source_of
+    from ..pipelines.remesh import remesh_series
     from ..solver.errors import MeshError
 
     check_output(options.output, files)

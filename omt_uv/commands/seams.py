@@ -17,10 +17,10 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     files, blender_mesh, _ = blender()
-    from ..blender_seams import GroupError, avoided, mark_seams
-    from ..solver.chart_pins import clear_of_pins
-    from ..solver.cutting import cut
+    from ..blender.seams import GroupError, avoided, mark_seams
+    from ..solver.cutting.cuts import cut
     from ..solver.errors import MeshError
+    from ..solver.parameterization.chart_pins import clear_of_pins
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")

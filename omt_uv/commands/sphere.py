@@ -5,13 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..settings import (
-    DEFAULT_PROJECTION,
-    DEFAULT_SPHERE_METHOD,
-    PROJECTIONS,
-    SPHERE_METHODS,
-    GlobeSettings,
-)
+from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
 from .common import CommandError, blender, drain_shown, write_report
 from .layers import read_layers, refusals, write_layers
 from .options import add_area_options, add_files, add_report, names
@@ -45,13 +39,13 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     blender()
-    from ..blender_markers import globe_densities, group_markers
-    from ..blender_panorama import ImageError
-    from ..blender_seams import GroupError
-    from ..blender_weights import ScoreError
-    from ..projecting import globe_jobs, project
+    from ..blender.markers import globe_densities, group_markers
+    from ..blender.seams import GroupError
+    from ..blender.weights import ScoreError
+    from ..files.panorama import ImageError
+    from ..pipelines.globe import globe_jobs, project
     from ..solver.errors import MeshError
-    from ..solver.orientation import MarkerError
+    from ..solver.globe.rotation import MarkerError
 
     _check_image(options)
     settings = GlobeSettings(options.projection, options.quality, options.balance, options.method)
@@ -74,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _check_image(options: argparse.Namespace) -> None:
     """Refuse what cannot be written before the long work."""
-    from ..blender_panorama import ImageError, check_target
+    from ..files.panorama import ImageError, check_target
 
     if (options.image is None) != (options.image_out is None):
         raise CommandError("--image and --image-out go together. Give both.")
@@ -90,8 +84,8 @@ def _check_image(options: argparse.Namespace) -> None:
 
 def _redrawn(options: argparse.Namespace):
     """Pixels of the redrawn image and the image they come from; None without one."""
-    from ..blender_panorama import load, pixels_of
-    from ..images import redraw
+    from ..files.panorama import load, pixels_of
+    from ..pipelines.panorama_redraw import redraw
 
     if options.image is None:
         return None
@@ -100,6 +94,6 @@ def _redrawn(options: argparse.Namespace):
 
 
 def _write_image(options: argparse.Namespace, pixels, source) -> None:
-    from ..blender_panorama import save
+    from ..files.panorama import save
 
     save(options.image_out, pixels, source)

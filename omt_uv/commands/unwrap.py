@@ -48,9 +48,9 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     _, _, blender_pack = blender()
-    from ..blender_seams import GroupError, avoided
-    from ..packing import PackingError
-    from ..unwrapping import Job, lay_out
+    from ..blender.seams import GroupError, avoided
+    from ..pipelines.unwrap import Job, lay_out
+    from ..xatlas.packing import PackingError
 
     settings = Settings(
         boundary=options.boundary,

@@ -22,8 +22,8 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     files, blender_mesh, _ = blender()
-    from ..blender_seams import GroupError
-    from ..blender_weights import ScoreError, check_group_target, computed_weights, selected_vertices, write_group
+    from ..blender.seams import GroupError
+    from ..blender.weights import ScoreError, check_group_target, computed_weights, selected_vertices, write_group
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep vertex groups. Write one of these.")

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from .blender_images import write
-from .blender_mesh import Reading
-from .colours import AREA_OCTAVES, SHEAR_TOP, area_colours, shear_colours
-from .measuring import triangles_of
-from .solver.distortion import face_distortion, measure
-from .solver.geometry import face_areas
+from ..blender.mesh import Reading
+from ..pipelines.distortion import triangles_of
+from ..solver.maps.distortion import face_distortion, measure
+from ..solver.mesh.geometry import face_areas
+from .canvas import write
+from .colormaps import AREA_OCTAVES, SHEAR_TOP, area_colours, shear_colours
 
 WIDTH, HEIGHT = 1200, 420
 BINS = 41

@@ -39,10 +39,10 @@ def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
     """
     import numpy as np
 
-    from . import blender_colours
-    from .colours import area_colours, shear_colours
-    from .measuring import triangles_of
-    from .solver.distortion import face_distortion
+    from ..blender import colour_attributes as blender_colours
+    from ..pipelines.distortion import triangles_of
+    from ..solver.maps.distortion import face_distortion
+    from .colormaps import area_colours, shear_colours
 
     V, F, uv = triangles_of([reading for _, reading in pairs])
     octaves, shear = face_distortion(V, F, uv)
@@ -67,7 +67,7 @@ def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
 
 def hide(context: bpy.types.Context) -> None:
     """Take everything back: attributes, shading, drawing."""
-    from . import blender_colours
+    from ..blender import colour_attributes as blender_colours
 
     for obj in bpy.data.objects:
         if obj.type == "MESH" and obj.data.library is None and blender_colours.has_colours(obj.data):
@@ -103,7 +103,7 @@ def _handlers() -> list:
 
 def _after_undo(*_) -> None:
     """Where undo took the attribute away, shading and drawing go with it."""
-    from .blender_colours import has_colours
+    from ..blender.colour_attributes import has_colours
 
     if not any(map(has_colours, bpy.data.meshes)):
         hide(bpy.context)
@@ -138,7 +138,7 @@ def _draw() -> None:
     import gpu
     from gpu_extras.batch import batch_for_shader
 
-    from .blender_versions import SMOOTH_COLOUR_SHADER
+    from ..blender.versions import SMOOTH_COLOUR_SHADER
 
     space = bpy.context.space_data
     if space is None or not getattr(space, "show_uvedit", True):

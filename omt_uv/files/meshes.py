@@ -12,9 +12,9 @@ import bpy
 import bmesh
 import numpy as np
 
-from . import obj_text
-from .blender_mesh import new_mesh
-from .quiet import silence
+from ..blender.mesh import new_mesh
+from . import obj_precision as obj_text
+from .silence import silence
 
 READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx", ".off")
 WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx")

@@ -8,7 +8,7 @@ import bpy
 
 import numpy as np
 
-from .quiet import silence
+from .silence import silence
 
 # What can be written, by the ending of the file.
 FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".exr": "OPEN_EXR", ".hdr": "HDR", ".tif": "TIFF"}

@@ -10,7 +10,9 @@ from collections import Counter
 
 import bpy
 
-from .. import last_run, overlay, running
+from ..display import overlay
+from ..session import run as running
+from ..session import summary as last_run
 from ..settings import DEFAULT_TEXTURE_SIZE
 
 
@@ -47,7 +49,7 @@ def read_objects(context: bpy.types.Context, layer: str = "") -> list:
     ------
     Complaint : no object has any
     """
-    from .. import blender_mesh
+    from ..blender import mesh as blender_mesh
     from ..solver.errors import MeshError
 
     pairs = []
@@ -68,7 +70,7 @@ def read_objects(context: bpy.types.Context, layer: str = "") -> list:
 def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Complaint) -> set[str]:
     """Select what is wrong, report it, and cancel."""
     if complaint.error is not None:
-        from ..blender_mesh import select_culprits
+        from ..blender.mesh import select_culprits
 
         select_culprits(context, complaint.obj, complaint.error)
     last_run.state.error = str(complaint)

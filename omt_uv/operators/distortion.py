@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from .. import last_run
+from ..session import summary as last_run
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .common import Complaint, read_objects, ready, tell
+from .base import Complaint, read_objects, ready, tell
 
 
 class UV_OT_omt_measure(bpy.types.Operator):
@@ -21,7 +21,7 @@ class UV_OT_omt_measure(bpy.types.Operator):
         return ready(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from ..measuring import measure_readings, summary
+        from ..pipelines.distortion import measure_readings, summary
         from ..solver.errors import MeshError
 
         try:

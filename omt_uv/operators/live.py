@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from .. import last_run, overlay, running
+from ..display import overlay
+from ..session import run as running
+from ..session import summary as last_run
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .common import Complaint, read_objects, ready, tell
+from .base import Complaint, read_objects, ready, tell
 
 if TYPE_CHECKING:
-    from ..following import Session
+    from ..session.live import Session
 
 # The session that is on; the panel shows its button pressed.
 current: Session | None = None
@@ -54,7 +56,7 @@ class UV_OT_omt_live(bpy.types.Operator):
 
     def start(self, context: bpy.types.Context) -> set[str]:
         global current
-        from ..following import Refusal, Session
+        from ..session.live import Refusal, Session
 
         try:
             pairs = read_objects(context)

@@ -19,7 +19,7 @@ from ..settings import (
     SOURCES,
     MagnifySettings,
 )
-from .common import Complaint, SolverOperator, read_objects, warn
+from .base import Complaint, SolverOperator, read_objects, warn
 from .properties import MarginSettings, choose_attribute, choose_group, draw_margin
 
 
@@ -97,12 +97,15 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         )
 
     def steps(self, context: bpy.types.Context):
-        from .. import blender_mesh, blender_pack, packing, running
-        from ..blender_pictures import ImageError, picture_of, straight_alpha
-        from ..blender_seams import GroupError
-        from ..blender_weights import ScoreError
-        from ..magnifying import Region, magnify, warped_picture
-        from ..unwrapping import Refusal
+        from ..blender import mesh as blender_mesh
+        from ..blender import uv_packer as blender_pack
+        from ..blender.seams import GroupError
+        from ..blender.weights import ScoreError
+        from ..files.images import ImageError, picture_of, straight_alpha
+        from ..pipelines.magnify import Region, magnify, warped_picture
+        from ..pipelines.unwrap import Refusal
+        from ..session import run as running
+        from ..xatlas import packing
 
         pairs = read_objects(context)
         try:
@@ -132,15 +135,15 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
 
     def _weights(self, context: bpy.types.Context, pairs):
         """Weights of each object, and warnings. Raises GroupError, ScoreError."""
-        from ..blender_weights import Weights, attribute_weights, region_weights
+        from ..blender.weights import Weights, attribute_weights, region_weights
 
         if self.region == "ATTRIBUTE":
             return attribute_weights(pairs, self.attribute)
         return [Weights(w) for w in region_weights(pairs, self.weight_group or _active_group(context))], []
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from .. import blender_mesh
-        from ..blender_pictures import write_copy
+        from ..blender import mesh as blender_mesh
+        from ..files.images import write_copy
 
         objects, magnified, picture = result
         for obj, corners, uv in zip(objects, magnified.corners, magnified.uv, strict=True):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty
 
-from .. import overlay
-from .common import Complaint, read_objects, ready, tell
+from ..display import overlay
+from .base import Complaint, read_objects, ready, tell
 
 KINDS = (
     ("NONE", "Off", "No colours; attributes and shading are as before", "X", 0),
@@ -60,8 +60,8 @@ class UV_OT_omt_histogram(bpy.types.Operator):
         return ready(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from ..blender_images import set_preview, show
-        from ..histogram import histogram, thumbnail
+        from ..display.canvas import set_preview, show
+        from ..display.histogram import histogram, thumbnail
         from ..solver.errors import MeshError
 
         try:

@@ -19,7 +19,7 @@ class UV_OT_omt_preset(bpy.types.Operator):
     filepath: StringProperty(name="File", description="File of the preset", subtype="FILE_PATH")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from .. import preset_files
+        from ..session import presets as preset_files
 
         path = Path(self.filepath)
         try:

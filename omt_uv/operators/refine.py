@@ -5,10 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty
 
-from ..settings import (
-    RefineSettings,
-)
-from .common import Complaint, SolverOperator, read_objects, warn
+from ..settings import RefineSettings
+from .base import Complaint, SolverOperator, read_objects, warn
 from .properties import AreaSettings, MarginSettings, draw_balance, draw_margin
 
 
@@ -44,9 +42,12 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from .. import blender_mesh, blender_pack, packing, running
-        from ..refining import refine_islands
-        from ..unwrapping import Refusal
+        from ..blender import mesh as blender_mesh
+        from ..blender import uv_packer as blender_pack
+        from ..pipelines.refine import refine_islands
+        from ..pipelines.unwrap import Refusal
+        from ..session import run as running
+        from ..xatlas import packing
 
         pairs = read_objects(context)
         try:
@@ -66,7 +67,7 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         return [obj for obj, _ in pairs], refined
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from .. import blender_mesh
+        from ..blender import mesh as blender_mesh
 
         objects, refined = result
         for obj, corners, uv in zip(objects, refined.corners, refined.uv, strict=True):

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..settings import COUNTS, DEFAULT_STRATEGY, DENSITIES, STRATEGIES, RemeshSettings
-from .common import Complaint, SolverOperator, mesh_objects, ready, warn
+from .base import Complaint, SolverOperator, mesh_objects, ready, warn
 from .properties import choose_attribute, choose_group
 
 
@@ -147,10 +147,10 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         )
 
     def steps(self, context: bpy.types.Context):
-        from .. import running
-        from ..blender_remesh import SourceError, alike, read_request
+        from ..blender.remesh_objects import SourceError, alike, read_request
+        from ..pipelines.unwrap import Refusal
+        from ..session import run as running
         from ..solver.errors import MeshError
-        from ..unwrapping import Refusal
 
         groups = alike(mesh_objects(context, shared=True), self.use_modifiers)
         objects = [group[0] for group in groups]
@@ -173,7 +173,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         return Complaint(f"{obj.name}: {error}", obj, None if self.use_modifiers else error)
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender_remesh import lost, new_objects
+        from ..blender.remesh_objects import lost, new_objects
 
         names, warnings = [], []
         for k, (group, request, series, carried) in enumerate(result):
@@ -196,7 +196,7 @@ def _figures(levels: list) -> tuple[tuple[str, str], ...]:
     """Rows for the panel about the finest mesh of every object: size and the smallest angles of its triangles."""
     import numpy as np
 
-    from ..solver.geometry import least_angles
+    from ..solver.mesh.geometry import least_angles
 
     least = np.degrees(np.concatenate([least_angles(level.positions, level.triangles) for level in levels]))
     return (
@@ -208,11 +208,11 @@ def _figures(levels: list) -> tuple[tuple[str, str], ...]:
 
 def _remesh_all(requests: list, settings: RemeshSettings):
     """The series of every request and what its meshes carry; Refusal says which one has none."""
-    from ..blender_remesh import carried_attributes
-    from ..remeshing import remesh_series
+    from ..blender.remesh_objects import carried_attributes
+    from ..pipelines.remesh import remesh_series
+    from ..pipelines.unwrap import Refusal
     from ..solver.errors import MeshError
     from ..solver.progress import part_of
-    from ..unwrapping import Refusal
 
     results = []
     for k, request in enumerate(requests):

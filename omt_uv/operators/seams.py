@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from .common import Complaint, SolverOperator, read_objects, warn
+from .base import Complaint, SolverOperator, read_objects, warn
 from .properties import choose_group
 
 
@@ -37,9 +37,9 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
         draw_settings(self.layout, self)
 
     def steps(self, context: bpy.types.Context):
-        from .. import running
-        from ..blender_seams import GroupError, avoided
-        from ..unwrapping import Refusal
+        from ..blender.seams import GroupError, avoided
+        from ..pipelines.unwrap import Refusal
+        from ..session import run as running
 
         pairs = read_objects(context)
         try:
@@ -56,7 +56,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
         return [(obj, found) for (obj, _), found in zip(pairs, cuts, strict=True)]
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender_seams import mark_seams
+        from ..blender.seams import mark_seams
 
         new = [mark_seams(obj, cuts.edges) for obj, cuts in result]
         warn(self, [obj for obj, _ in result], [(k, text) for k, (_, c) in enumerate(result) for text in c.warnings])
@@ -69,11 +69,11 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
 
 def _cut_all(readings: list, free: list, options: dict):
     """The cuts of every surface; Refusal says which one has none."""
-    from ..solver.chart_pins import clear_of_pins
-    from ..solver.cutting import cut
+    from ..pipelines.unwrap import Refusal
+    from ..solver.cutting.cuts import cut
     from ..solver.errors import MeshError
+    from ..solver.parameterization.chart_pins import clear_of_pins
     from ..solver.progress import Progress
-    from ..unwrapping import Refusal
 
     found = []
     for k, (reading, avoid) in enumerate(zip(readings, free, strict=True)):

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
-from .common import Complaint, SolverOperator, read_objects, warn
+from .base import Complaint, SolverOperator, read_objects, warn
 from .properties import AreaSettings, choose_group, choose_layer, draw_balance
 
 ORIENTATIONS = (
@@ -69,15 +69,16 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         )
 
     def steps(self, context: bpy.types.Context):
-        from .. import blender_mesh, running
-        from ..blender_markers import globe_densities
-        from ..blender_seams import GroupError
-        from ..blender_weights import ScoreError
-        from ..images import redraw
-        from ..projecting import globe_jobs, project
+        from ..blender import mesh as blender_mesh
+        from ..blender.markers import globe_densities
+        from ..blender.seams import GroupError
+        from ..blender.weights import ScoreError
+        from ..pipelines.globe import globe_jobs, project
+        from ..pipelines.panorama_redraw import redraw
+        from ..pipelines.unwrap import Refusal
+        from ..session import run as running
         from ..solver.errors import MeshError
-        from ..solver.orientation import MarkerError
-        from ..unwrapping import Refusal
+        from ..solver.globe.rotation import MarkerError
 
         pairs = read_objects(context, self.uv_layer)
         try:
@@ -99,7 +100,7 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
 
     def _pixels(self):
         """The pixels of the image to redraw, None without one."""
-        from .. import blender_panorama
+        from ..files import panorama as blender_panorama
 
         if not self.image:
             return None
@@ -109,8 +110,8 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
             raise Complaint(str(error)) from error
 
     def _markers(self, context: bpy.types.Context, objects: list) -> list:
-        from ..blender_markers import group_markers, picked_markers
-        from ..solver.orientation import MarkerError
+        from ..blender.markers import group_markers, picked_markers
+        from ..solver.globe.rotation import MarkerError
 
         if self.orientation == "AXES":
             return [None] * len(objects)
@@ -122,7 +123,8 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         return [picked_markers(obj) if obj == active else None for obj in objects]
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from .. import blender_mesh, blender_panorama
+        from ..blender import mesh as blender_mesh
+        from ..files import panorama as blender_panorama
 
         objects, globes, pixels = result
         # A layout of the whole globe cannot keep areas; the map to the sphere does.

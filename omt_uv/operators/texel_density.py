@@ -6,7 +6,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .common import Complaint, read_objects, ready, tell
+from .base import Complaint, read_objects, ready, tell
 
 SCOPES = (
     ("ISLANDS", "Every Island", "Every island gets this density, about its own middle"),
@@ -34,7 +34,7 @@ class TextureSize:
         return ready(cls, context)
 
     def texels(self, context: bpy.types.Context):
-        from ..texel_density import Texels
+        from ..pipelines.texel_density import Texels
 
         return Texels(self.texture_size, context.scene.unit_settings.scale_length)
 
@@ -47,8 +47,8 @@ class UV_OT_omt_density_get(TextureSize, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        from ..pipelines.texel_density import density
         from ..solver.errors import MeshError
-        from ..texel_density import density
 
         try:
             found = density([reading for _, reading in read_objects(context)], self.texels(context))
@@ -83,9 +83,9 @@ class UV_OT_omt_density_set(TextureSize, bpy.types.Operator):
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from .. import blender_mesh
+        from ..blender import mesh as blender_mesh
+        from ..pipelines.texel_density import with_density
         from ..solver.errors import MeshError
-        from ..texel_density import with_density
 
         try:
             pairs = read_objects(context)

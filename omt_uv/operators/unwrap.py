@@ -5,14 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..settings import (
-    BOUNDARIES,
-    DEFAULT_BOUNDARY,
-    DEFAULT_SEAMS,
-    SEAMS,
-    Settings,
-)
-from .common import Complaint, SolverOperator, read_objects, warn
+from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_SEAMS, SEAMS, Settings
+from .base import Complaint, SolverOperator, read_objects, warn
 from .properties import AreaSettings, MarginSettings, choose_group, choose_layer, draw_balance, draw_margin
 
 
@@ -73,9 +67,12 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from .. import blender_mesh, blender_pack, packing, running
-        from ..blender_seams import GroupError, avoided
-        from ..unwrapping import Job, Refusal, lay_out
+        from ..blender import mesh as blender_mesh
+        from ..blender import uv_packer as blender_pack
+        from ..blender.seams import GroupError, avoided
+        from ..pipelines.unwrap import Job, Refusal, lay_out
+        from ..session import run as running
+        from ..xatlas import packing
 
         pairs = read_objects(context, self.uv_layer)
         try:
@@ -96,7 +93,7 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         return [obj for obj, _ in pairs], layout
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from .. import blender_mesh
+        from ..blender import mesh as blender_mesh
 
         objects, layout = result
         for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):

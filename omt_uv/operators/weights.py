@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
-from .common import Complaint, SolverOperator, mesh_objects, ready
+from .base import Complaint, SolverOperator, mesh_objects, ready
 from .properties import choose_group
 
 
@@ -49,9 +49,10 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         draw_settings(self.layout, self)
 
     def steps(self, context: bpy.types.Context):
-        from .. import blender_mesh, running
-        from ..blender_seams import GroupError
-        from ..blender_weights import ScoreError, check_group_target, selected_vertices
+        from ..blender import mesh as blender_mesh
+        from ..blender.seams import GroupError
+        from ..blender.weights import ScoreError, check_group_target, selected_vertices
+        from ..session import run as running
         from ..solver.errors import MeshError
 
         objects = [context.object] if context.mode == "PAINT_WEIGHT" else mesh_objects(context)
@@ -73,7 +74,7 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         return list(zip(objects, weights, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender_weights import write_group
+        from ..blender.weights import write_group
 
         for obj, weights in result:
             write_group(obj, self.weight_group, weights)
@@ -82,7 +83,7 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
 
 def _weigh_all(jobs: list, kind: str, options: dict):
     """Weights (n,) for every object, reading and selection; the object is for messages alone."""
-    from ..blender_weights import computed_weights
+    from ..blender.weights import computed_weights
     from ..solver.progress import Progress
 
     found = []

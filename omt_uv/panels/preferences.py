@@ -5,11 +5,12 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from . import running
-from .settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, QUALITIES
+from ..session import run as running
+from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, QUALITIES
 
 # The package that Blender knows as the add-on contains this one.
-ADDON = __package__.rpartition(".")[0] or __package__
+PACKAGE = __package__.rpartition(".")[0]
+ADDON = PACKAGE.rpartition(".")[0] or PACKAGE
 DEFAULTS = ("boundary", "quality", "keep_free", "texture_size")
 OPERATORS = ("UV_OT_omt_unwrap", "UV_OT_omt_refine", "UV_OT_omt_magnify", "UV_OT_omt_seams", "UV_OT_omt_density_set")
 

@@ -10,11 +10,13 @@ from dataclasses import dataclass
 
 import bpy
 
-from .. import last_run, overlay, running
-from ..blender_versions import progress_bar
+from ..blender.versions import progress_bar
+from ..display import overlay
 from ..operators import live
 from ..operators.overlay import HISTOGRAM, KINDS
 from ..operators.unwrap import draw_main, draw_more
+from ..session import run as running
+from ..session import summary as last_run
 
 TAB = "OMT"
 WITH_PRESETS = ("uv.omt_unwrap", "uv.omt_sphere", "uv.omt_magnify", "object.omt_remesh")
@@ -184,7 +186,7 @@ class UV_MT_omt_presets(bpy.types.Menu):
     bl_label = "OMT Presets"
 
     def draw(self, _context: bpy.types.Context) -> None:
-        from ..preset_files import files
+        from ..session.presets import files
 
         for operator in filter(class_of, WITH_PRESETS):
             for path in files(operator):

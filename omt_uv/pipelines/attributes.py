@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .solver.charts import Surface
-from .solver.features import all_edges, region_borders, value_jumps
-from .solver.topology import pair_keys
+from ..solver.analysis.feature_edges import all_edges, region_borders, value_jumps
+from ..solver.mesh.charts import Surface
+from ..solver.mesh.topology import pair_keys
 
 # UVs nearer than this share of their extent are the same.
 SAME_UV = 1e-5

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..solver.maps.local_untangle import straightened
+from ..solver.mesh.charts import Surface
+from ..solver.mesh.geometry import signed_areas
+from ..solver.mesh.topology import pair_keys
+from ..solver.transfer import interpolate as transfer
+from ..solver.transfer.correspondence import Footprint
 from .attribute_types import TYPES
 from .attributes import Attributes, Layer, Marks, is_uv
-from .solver import transfer
-from .solver.charts import Surface
-from .solver.footprint import Footprint
-from .solver.geometry import signed_areas
-from .solver.topology import pair_keys
-from .solver.unfold import straightened
 
 
 def carry(attributes: Attributes, surface: Surface, at: Footprint) -> Attributes:

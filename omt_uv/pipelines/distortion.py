@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .blender_mesh import Reading
-from .solver.distortion import Distortion, measure
-from .solver.errors import EmptyMeshError
+from ..blender.mesh import Reading
+from ..solver.errors import EmptyMeshError
+from ..solver.maps.distortion import Distortion, measure
 
 
 def triangles_of(readings: Sequence[Reading]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

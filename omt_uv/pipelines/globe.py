@@ -9,19 +9,19 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .settings import GlobeSettings
-from .solver.charts import Surface, chosen_triangles
-from .solver.errors import MeshError
-from .solver.geometry import face_areas
-from .solver.globe import Polygons, polygons_of, unfold
-from .solver.globe_areas import equirectangular_areas, plane_areas, with_areas
-from .solver.orientation import MarkerError, along_axes, by_markers
-from .solver.progress import Progress, Steps, part_of
-from .solver.projections import EQUIRECT
-from .solver.sheets import groups
-from .solver.sphere import SphereMap, sphere_map
-from .solver.spherical import spherical_areas
-from .unwrapping import Refusal
+from ..settings import GlobeSettings
+from ..solver.errors import MeshError
+from ..solver.globe.exact_areas import equirectangular_areas, plane_areas, with_areas
+from ..solver.globe.projections import EQUIRECT
+from ..solver.globe.rotation import MarkerError, along_axes, by_markers
+from ..solver.globe.unfolding import Polygons, polygons_of, unfold
+from ..solver.mesh.charts import Surface, chosen_triangles
+from ..solver.mesh.geometry import face_areas
+from ..solver.mesh.gluing import groups
+from ..solver.mesh.spherical_geometry import spherical_areas
+from ..solver.progress import Progress, Steps, part_of
+from ..solver.sphere.sphere_map import SphereMap, sphere_map
+from .unwrap import Refusal
 
 # Of the work on one part, what its map to the sphere takes.
 MAPPING = 0.9

@@ -11,22 +11,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .settings import MagnifySettings
-from .solver.chart_map import unwrap_chart
-from .solver.chart_pins import CornerPins
-from .solver.chart_terms import located
-from .solver.charts import Surface, check_disk, triangle_rows
-from .solver.distortion import measure
-from .solver.errors import EmptyMeshError, MeshError, WeightError
-from .solver.exact_share import ExactShare, wanted
-from .solver.geometry import face_areas, signed_areas
-from .solver.islands import Island, uv_islands
-from .solver.lens import OUTLINES, Lens, aligned_to, magnify_region, refuse_folds
-from .solver.measure import Target, check_factor, check_weights, from_polygons, from_vertices, normalised, share
-from .solver.overlap import overlap_share
-from .solver.progress import Steps, part_of
-from .solver.warp import warped
-from .unwrapping import Job, Packer, Refusal, lay_out
+from ..settings import MagnifySettings
+from ..solver.analysis.density import (
+    Target,
+    check_factor,
+    check_weights,
+    from_polygons,
+    from_vertices,
+    normalised,
+    share,
+)
+from ..solver.analysis.region_density import ExactShare, wanted
+from ..solver.editing.image_warp import warped
+from ..solver.editing.magnify import OUTLINES, Lens, aligned_to, magnify_region, refuse_folds
+from ..solver.editing.uv_islands import Island, uv_islands
+from ..solver.errors import EmptyMeshError, MeshError, WeightError
+from ..solver.maps.distortion import measure
+from ..solver.maps.overlap import overlap_share
+from ..solver.mesh.charts import Surface, check_disk, triangle_rows
+from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.parameterization.chart_indices import located
+from ..solver.parameterization.chart_map import unwrap_chart
+from ..solver.parameterization.chart_pins import CornerPins
+from ..solver.progress import Steps, part_of
+from .unwrap import Job, Packer, Refusal, lay_out
 
 # Shares that are off by more than this, relatively, are said.
 OFF = 5e-3

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .solver.progress import Progress, Steps
-from .solver.projections import OCTAHEDRAL, check_projection, is_cylindrical, to_plane, to_sphere
+from ..solver.globe.projections import OCTAHEDRAL, check_projection, is_cylindrical, to_plane, to_sphere
+from ..solver.progress import Progress, Steps
 
 # Samples along each side of a pixel: enough where a row at a pole covers a dozen rows of the source.
 SAMPLES = 4

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .settings import RefineSettings
-from .solver.chart_pins import ChartPins, CornerPins
-from .solver.chart_terms import located, located_pins
-from .solver.charts import Chart, Surface
-from .solver.distortion import measure
-from .solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
-from .solver.geometry import face_areas, signed_areas
-from .solver.improve import boundary_edges, improve
-from .solver.islands import Island, uv_islands
-from .solver.overlap import overlap_share
-from .solver.progress import Progress, Steps, part_of
-from .solver.refine import Refinement
-from .unwrapping import Packer, Refusal, pack_islands
+from ..settings import RefineSettings
+from ..solver.editing.refine_island import boundary_edges, improve
+from ..solver.editing.uv_islands import Island, uv_islands
+from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
+from ..solver.maps.distortion import measure
+from ..solver.maps.overlap import overlap_share
+from ..solver.mesh.charts import Chart, Surface
+from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.parameterization.chart_indices import located, located_pins
+from ..solver.parameterization.chart_pins import ChartPins, CornerPins
+from ..solver.progress import Progress, Steps, part_of
+from ..solver.refinement.refine import Refinement
+from .unwrap import Packer, Refusal, pack_islands
 
 # More overlap than this, as a share of the UV area, is said.
 OVERLAP = 1e-4

@@ -8,20 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .settings import RemeshSettings
-from .solver import measure
-from .solver.charts import Surface, chosen_triangles
-from .solver.errors import CountError, DensityError, MeshError
-from .solver.features import all_edges, within_resolution
-from .solver.footprint import Footprint, footprint
-from .solver.geometry import face_areas
-from .solver.part_maps import Original
-from .solver.progress import Progress, Steps, part_of
-from .solver.remesh import Remesh, remesh
-from .solver.repair import join
-from .solver.scores import areas, score, soft_weights
-from .solver.sheets import orientations
-from .solver.topology import halfedges
+from ..settings import RemeshSettings
+from ..solver.analysis import density as measure
+from ..solver.analysis.feature_edges import all_edges, within_resolution
+from ..solver.analysis.vertex_scores import areas, score, soft_weights
+from ..solver.errors import CountError, DensityError, MeshError
+from ..solver.mesh.charts import Surface, chosen_triangles
+from ..solver.mesh.geometry import face_areas
+from ..solver.mesh.gluing import orientations
+from ..solver.mesh.repair import join
+from ..solver.mesh.topology import halfedges
+from ..solver.progress import Progress, Steps, part_of
+from ..solver.remeshing.initial.component_maps import Original
+from ..solver.remeshing.remesh import Remesh, remesh
+from ..solver.transfer.correspondence import Footprint, footprint
 
 
 @dataclass(frozen=True)

@@ -9,20 +9,20 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from . import packing
-from .segmentation import SegmentationError, chart_seams
-from .settings import Settings
-from .solver.budget import unwrap_within
-from .solver.chart_map import ChartMap, unwrap_chart
-from .solver.chart_pins import CornerPins, chart_pins, clear_of_pins
-from .solver.chart_terms import chart_target, located, located_pins
-from .solver.charts import Chart, Surface
-from .solver.errors import MeshError
-from .solver.measure import Target
-from .solver.opening import with_open_corners
-from .solver.parameterize import SurfaceMap, unwrap
-from .solver.progress import Progress, Steps, part_of
-from .solver.topology import twins
+from ..settings import Settings
+from ..solver.analysis.density import Target
+from ..solver.errors import MeshError
+from ..solver.mesh.charts import Chart, Surface
+from ..solver.mesh.topology import twins
+from ..solver.parameterization.chart_indices import chart_target, located, located_pins
+from ..solver.parameterization.chart_map import ChartMap, unwrap_chart
+from ..solver.parameterization.chart_pins import CornerPins, chart_pins, clear_of_pins
+from ..solver.parameterization.convex_maps import with_open_corners
+from ..solver.parameterization.shear_bound import unwrap_within
+from ..solver.parameterization.unwrap import SurfaceMap, unwrap
+from ..solver.progress import Progress, Steps, part_of
+from ..xatlas import packing
+from ..xatlas.segmentation import SegmentationError, chart_seams
 
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
 

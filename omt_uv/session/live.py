@@ -9,13 +9,13 @@ import bpy
 
 import numpy as np
 
-from . import blender_mesh
-from .refining import found_islands
-from .running import Disturbed
-from .solver.chart_terms import located
-from .solver.errors import MeshError
-from .solver.follow import Follower
-from .unwrapping import Refusal
+from ..blender import mesh as blender_mesh
+from ..pipelines.refine import found_islands
+from ..pipelines.unwrap import Refusal
+from ..solver.editing.live_map import Follower
+from ..solver.errors import MeshError
+from ..solver.parameterization.chart_indices import located
+from .run import Disturbed
 
 # Seconds of work between two looks at the mouse.
 SLICE = 0.1

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[1]
 
 
 def register_folder() -> None:

@@ -43,7 +43,7 @@ class Run:
         ------
         Disturbed : the mesh or the mode has changed, so the result would be of no use
         """
-        from .solver.progress import Elsewhere
+        from ..solver.progress import Elsewhere
 
         begin = time.monotonic()
         self._watch.check()
@@ -106,7 +106,7 @@ class Watch:
         self._suspect = False
 
     def _fingerprints(self) -> list[bytes]:
-        from .blender_state import fingerprint
+        from ..blender.fingerprint import fingerprint
 
         return [fingerprint(obj) for obj, _ in self._objects]
 
@@ -132,7 +132,7 @@ def aside(steps):
 
     Garbage is collected in front meanwhile: what is Blender's may be part of it, and must not be freed on a thread.
     """
-    from .solver import progress
+    from ..solver import progress
 
     if current is None or not threads:
         return steps

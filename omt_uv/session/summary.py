@@ -26,9 +26,9 @@ state = State()
 
 def figures(readings, texture_size: float, metres: float) -> tuple[tuple[str, str], ...]:
     """Rows about the active UVs of readings; none where there is nothing to measure."""
-    from .measuring import measure_readings
-    from .solver.errors import MeshError
-    from .texel_density import Texels, density
+    from ..pipelines.distortion import measure_readings
+    from ..pipelines.texel_density import Texels, density
+    from ..solver.errors import MeshError
 
     try:
         found = measure_readings(readings, overlap=False)

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .solver.charts import Surface, chosen_triangles
-from .solver.topology import halfedges, pair_keys, pair_up
+from ..solver.mesh.charts import Surface, chosen_triangles
+from ..solver.mesh.topology import halfedges, pair_keys, pair_up
 
 # xatlas drops faces of meshes with small units.
 EXTENT = 100.0

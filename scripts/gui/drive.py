@@ -85,25 +85,26 @@ class Story:
         yield from self.pause(0.1)
 
     def running(self):
-        from omt_uv.omt_uv import running
+        from omt_uv.omt_uv.session import run
 
-        return running.current
+        return run.current
 
     def said(self):
         """What the panel says about the last run: title and rows, None before the first."""
-        from omt_uv.omt_uv import last_run
+        from omt_uv.omt_uv.session import summary as last_run
 
         summary = last_run.state.summary
         return None if summary is None else [summary.title, *summary.rows]
 
     def forget(self):
-        from omt_uv.omt_uv import last_run
+        from omt_uv.omt_uv.session import summary as last_run
 
         last_run.state.summary = None
 
     def figures(self, obj):
         """Area error, shear and folds of the active UVs, by the add-on's own measure."""
-        from omt_uv.omt_uv import blender_mesh, measuring
+        from omt_uv.omt_uv.blender import mesh as blender_mesh
+        from omt_uv.omt_uv.pipelines import distortion as measuring
 
         found = measuring.measure_readings([blender_mesh.read(obj)])
         return {name: getattr(found, name) for name in ("area_l1", "angle_mean", "folds", "overlap")}

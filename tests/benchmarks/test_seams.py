@@ -8,7 +8,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.charts import split, triangle_surface
+from omt_uv.solver.mesh.charts import split, triangle_surface
 
 sys.path.insert(0, str(meshes.ROOT / "benchmarks"))
 

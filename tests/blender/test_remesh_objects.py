@@ -6,8 +6,8 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
-from blender.test_remesh import arrays, ball, dressed, fill, made, remesh, values
+import scenes
+from remesh_scenes import arrays, ball, dressed, fill, made, remesh, values
 
 
 def cube_with_marks():

@@ -12,7 +12,7 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 ROOT = Path(__file__).resolve().parents[2]
 FORMATS = [".blend", ".obj", ".ply", ".stl", ".glb", ".fbx"]
@@ -83,7 +83,7 @@ def write(path, points, faces):
 
 def read(package, path):
     """Positions (n,3), faces, UVs (c,2) or None, of the only mesh of a file."""
-    (obj,) = package("files").load(path)
+    (obj,) = package("files.meshes").load(path)
     mesh = obj.data
     points = np.zeros(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", points)
@@ -173,7 +173,7 @@ def test_blend_with_several_objects_shares_one_density(package, run, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     status, _, _ = run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--uv-layer", "Baked")
     assert status == 0
-    objects = package("files").load(tmp_path / "out.blend")
+    objects = package("files.meshes").load(tmp_path / "out.blend")
     assert [obj.data.uv_layers.active.name for obj in objects] == ["Baked", "Baked"]
     densities = [scenes.areas(obj)[1].sum() / scenes.areas(obj)[0].sum() for obj in objects]
     assert densities[0] == pytest.approx(densities[1], rel=1e-4)

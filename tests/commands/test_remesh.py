@@ -6,10 +6,8 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
-from blender.test_remesh import arrays, ball, fill, read_points, run, write_ball
-
-__all__ = ["run"]
+import scenes
+from remesh_scenes import arrays, ball, fill, read_points, write_ball
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".glb", ".fbx"])
@@ -24,7 +22,7 @@ def test_every_format_holds_the_levels_in_the_coordinates_of_the_input(package, 
     assert (tmp_path / "in.obj").read_bytes() == before
     assert {p.name for p in tmp_path.iterdir()} == {"in.obj", f"o_LOD0{suffix}", f"o_LOD1{suffix}"}
     for level, count in enumerate((160, 80)):
-        (obj,) = package("files").load(tmp_path / f"o_LOD{level}{suffix}")
+        (obj,) = package("files.meshes").load(tmp_path / f"o_LOD{level}{suffix}")
         co, _ = arrays(obj)
         assert len(co) == count
         assert np.abs(np.linalg.norm(co - [1, 2, 3], axis=1) - 1).max() < 0.15
@@ -36,7 +34,7 @@ def test_what_a_format_had_to_split_at_uv_seams_is_whole_again(package, run, tmp
     assert run("unwrap", tmp_path / "in.obj", "-o", tmp_path / f"split{suffix}")[0] == 0
     status, _, err = run("remesh", tmp_path / f"split{suffix}", "-o", tmp_path / "out.obj", "--vertices", 160)
     assert status == 0 and "Merge by Distance" not in err
-    (obj,) = package("files").load(tmp_path / "out.obj")
+    (obj,) = package("files.meshes").load(tmp_path / "out.obj")
     assert len(obj.data.vertices) - len(obj.data.edges) + len(obj.data.polygons) == 2
 
 
@@ -87,3 +85,61 @@ def test_a_blend_keeps_the_old_object_as_it_was(run, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
     assert {obj.name for obj in bpy.data.objects} == {"Ball", "Ball_LOD0", "Ball_LOD1"}
     assert scenes.state(bpy.data.objects["Ball"]) == before
+
+
+def test_command_writes_the_new_mesh_alone_in_the_coordinates_of_the_input(run, tmp_path):
+    write_ball(tmp_path / "in.obj")
+    status, _, err = run("remesh", tmp_path / "in.obj", "-o", tmp_path / "out.obj", "--vertices", 200)
+    assert (status, err) == (0, "")
+    points = read_points(tmp_path / "out.obj")
+    assert len(points) == 200
+    assert np.abs(np.linalg.norm(points - [1, 2, 3], axis=1) - 1).max() < 0.1
+
+
+def test_command_writes_a_file_for_every_level(run, tmp_path):
+    write_ball(tmp_path / "in.obj")
+    status, _, err = run(
+        "remesh", tmp_path / "in.obj", "-o", tmp_path / "o.obj", "--faces", 400, "--levels", 3, "--ratio", 0.5
+    )
+    assert (status, err) == (0, "")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["in.obj", "o_LOD0.obj", "o_LOD1.obj", "o_LOD2.obj"]
+    # A closed surface has two vertices more than half of its triangles.
+    assert [len(read_points(tmp_path / f"o_LOD{k}.obj")) for k in range(3)] == [202, 102, 52]
+
+
+def test_command_writes_both_objects_to_a_blend_file(run, tmp_path):
+    write_ball(tmp_path / "in.obj")
+    status, _, _ = run("remesh", tmp_path / "in.obj", "-o", tmp_path / "out.blend", "--edge", 0.3)
+    assert status == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    assert {obj.name for obj in bpy.data.objects} == {"in", "in_remesh"}
+
+
+@pytest.mark.parametrize("arguments, words", [
+    ([], "--vertices --faces --edge"),
+    (["--vertices", 100, "--faces", 200], "not allowed with"),
+    (["--vertices", 0], "a number above 0"),
+    (["--vertices", 3], "at least"),
+    (["--edge", "nan"], "a number above 0"),
+    (["--vertices", 100, "--density", "nowhere"], "no vertex group 'nowhere'"),
+    (["--vertices", 100, "--levels", 2, "--ratio", 1.5], "between 0 and 1"),
+])  # fmt: skip
+def test_command_says_what_is_wrong_with_its_arguments(run, tmp_path, arguments, words):
+    write_ball(tmp_path / "in.obj")
+    status, _, err = run("remesh", tmp_path / "in.obj", "-o", tmp_path / "out.obj", *arguments)
+    assert status != 0
+    assert words in err
+    assert not (tmp_path / "out.obj").exists()
+
+
+def test_glb_is_joined_where_the_format_had_to_split_it(run, tmp_path):
+    """A file of this format has a vertex for every UV; the new mesh must not come apart along the seams."""
+    obj = scenes.cube()
+    bpy.ops.uv.omt_unwrap()
+    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "in.glb"), export_format="GLB", use_selection=True)
+    assert obj.name == "Cube"
+    status, _, _ = run("remesh", tmp_path / "in.glb", "-o", tmp_path / "out.blend", "--vertices", 300, "--sharp")
+    assert status == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    mesh = bpy.data.objects["Cube_remesh"].data
+    assert len(mesh.vertices) - len(mesh.edges) + len(mesh.polygons) == 2

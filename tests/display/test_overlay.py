@@ -6,7 +6,7 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 ATTRIBUTE = "OMT UV Distortion"
 
@@ -39,11 +39,11 @@ def test_both_modes_show_the_same(patch, kind):
 
 
 def test_blue_has_too_little_and_red_too_much(package):
-    rgb = package("colours").area_colours(np.array([-2.0, -1, 0, 1, 2]))
+    rgb = package("display.colormaps").area_colours(np.array([-2.0, -1, 0, 1, 2]))
     assert (rgb[:2, 2] > rgb[:2, 0]).all()
     assert (rgb[3:, 0] > rgb[3:, 2]).all()
     assert rgb[2].min() > 0.9
-    light = package("colours").shear_colours(np.array([1, 1.5, 2, 3, 4, 9.0])) @ [0.2126, 0.7152, 0.0722]
+    light = package("display.colormaps").shear_colours(np.array([1, 1.5, 2, 3, 4, 9.0])) @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(light)[:-1] > 0).all()  # viridis grows lighter, also in print
 
 
@@ -76,27 +76,27 @@ def test_colours_follow_the_uvs(patch, package):
 def test_undo_takes_the_colours_away(patch, package):
     bpy.ops.ed.undo_push(message="before")
     bpy.ops.uv.omt_overlay("EXEC_DEFAULT", True, show="AREA")
-    assert package("overlay").kind() == "AREA"
+    assert package("display.overlay").kind() == "AREA"
     bpy.ops.ed.undo()
-    assert package("overlay").kind() == "NONE"
+    assert package("display.overlay").kind() == "NONE"
     assert ATTRIBUTE not in bpy.data.objects["Bump"].data.color_attributes
 
 
 def test_another_file_starts_without_colours(patch, package):
     bpy.ops.uv.omt_overlay(show="AREA")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert package("overlay").kind() == "NONE"
+    assert package("display.overlay").kind() == "NONE"
     assert not [f for f in bpy.app.handlers.undo_post if "omt" in f.__module__]
 
 
 def test_unregistering_stops_the_drawing(patch, package):
     bpy.ops.uv.omt_overlay(show="AREA")
-    package("overlay").forget()
-    assert package("overlay").kind() == "NONE"
+    package("display.overlay").forget()
+    assert package("display.overlay").kind() == "NONE"
 
 
 def test_the_histogram_counts_all_of_the_surface(patch, package):
-    picture = package("histogram").histogram([package("blender_mesh").read(patch)])
+    picture = package("display.histogram").histogram([package("blender.mesh").read(patch)])
     assert picture.min() >= 0 and picture.max() <= 1
     assert bpy.ops.uv.omt_histogram() == {"FINISHED"}
     image = bpy.data.images["OMT UV Histogram"]
@@ -106,7 +106,7 @@ def test_the_histogram_counts_all_of_the_surface(patch, package):
 
 
 def test_text_is_drawn_where_it_is_asked_for(package):
-    images = package("blender_images")
+    images = package("display.canvas")
     paper = np.ones((40, 200, 3))
     images.write(paper, "Area 12", 100, 30, 20, align="middle")
     rows, columns = np.nonzero(paper[..., 0] < 0.5)

@@ -9,7 +9,7 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 
 def patch(extra_points=(), extra_faces=(), name="Bad"):

@@ -12,7 +12,7 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 JUDGE = Path(os.environ.get("OMT_UV_JUDGE", SHARED / "tools" / "judge_uv.py"))
@@ -20,8 +20,8 @@ JUDGE = Path(os.environ.get("OMT_UV_JUDGE", SHARED / "tools" / "judge_uv.py"))
 
 def measured(package, objects):
     """Distortion of objects in Object Mode."""
-    read = package("blender_mesh").read
-    return package("measuring").measure_readings([read(obj) for obj in objects])
+    read = package("blender.mesh").read
+    return package("pipelines.distortion").measure_readings([read(obj) for obj in objects])
 
 
 def test_by_hand(package):

@@ -9,7 +9,7 @@ import bpy
 import bmesh
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 
 @pytest.fixture

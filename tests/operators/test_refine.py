@@ -11,7 +11,7 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 JUDGE = Path(os.environ.get("OMT_UV_JUDGE", SHARED / "tools" / "judge_uv.py"))
@@ -108,7 +108,7 @@ def test_a_selected_face_refines_its_whole_island_and_no_other():
 def test_islands_stay_islands(package):
     obj, _ = two_islands()
     refine()
-    figures = package("measuring").measure_readings([package("blender_mesh").read(obj)])
+    figures = package("pipelines.distortion").measure_readings([package("blender.mesh").read(obj)])
     assert figures.charts == 2
     assert figures.folds == 0
     assert figures.area_l1 < 0.01
@@ -396,7 +396,7 @@ def test_command_keeps_what_is_pinned_and_names_layers(package, run, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
     for command in ("refine", "unwrap"):
         assert run(command, tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--uv-layer", "UVMap")[0] == 0
-        (obj,) = package("files").load(tmp_path / "out.blend")
+        (obj,) = package("files.meshes").load(tmp_path / "out.blend")
         assert scenes.uv_of(obj)[pinned].tobytes() == before[pinned].tobytes()
     status, _, err = run("refine", tmp_path / "in.blend", "-o", tmp_path / "no.blend", "--uv-layer", "None")
     assert status == 1

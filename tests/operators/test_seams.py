@@ -6,7 +6,7 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 
 def seams_of(obj):

@@ -6,7 +6,7 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 
 def unwrap(**arguments):
@@ -63,7 +63,7 @@ def test_a_ball_of_struts(package):
     obj.modifiers.new("Smooth", "SUBSURF").levels = 1
     bpy.ops.object.convert(target="MESH")
     unwrap()
-    found = package("measuring").measure_readings([package("blender_mesh").read(obj)])
+    found = package("pipelines.distortion").measure_readings([package("blender.mesh").read(obj)])
     assert found.folds == 0 and found.overlap == 0 and found.area_l1 < 0.008
     assert_inside(obj)
 
@@ -354,7 +354,7 @@ def test_modifiers_do_not_matter():
 
 
 def test_where_xatlas_fails_blender_packs_and_says_so(package, monkeypatch):
-    packing = package("packing")
+    packing = package("xatlas.packing")
 
     def fail(*_):
         raise packing.PackingError("xatlas failed: on purpose")

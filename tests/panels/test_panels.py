@@ -7,7 +7,7 @@ import types
 import bpy
 
 import pytest
-from blender import scenes
+import scenes
 
 
 class Layout:
@@ -150,7 +150,7 @@ def test_the_result_of_the_last_run_is_shown(package):
 def test_a_run_shows_its_progress(package):
     scenes.bump(20, 20)
     operator = scenes.stand_in("uv.omt_unwrap")
-    running = package("running")
+    running = package("session.run")
     (main,) = (p for p in our_classes(package, bpy.types.Panel) if p.bl_idname == "VIEW3D_PT_omt_uv")
     assert operator.start(bpy.context) == {"RUNNING_MODAL"} or running.current is None
     if running.current is not None:
@@ -201,7 +201,7 @@ def test_wrong_modes_grey_the_buttons(package, mode):
     ("operator", "names"), [("uv.omt_unwrap", {"Character", "Scan", "Lightmap"}), ("uv.omt_sphere", {"Globe"})]
 )
 def test_presets_name_what_the_operator_has(package, operator, names):
-    presets = package("preset_files")
+    presets = package("session.presets")
     files = presets.files(operator)
     assert names <= {path.stem for path in files}
     assert "PRESET" in scenes.class_of(operator).bl_options
@@ -242,7 +242,7 @@ def test_the_report_has_what_a_bug_needs(package):
 
 def test_the_choices_are_those_of_the_solver_and_of_the_command(package):
     """One list of boundaries and qualities, known to the solver."""
-    settings, solver = package("settings"), package("solver.refine")
+    settings, solver = package("settings"), package("solver.refinement.refine")
     assert {i.lower() for i, *_ in settings.BOUNDARIES} == set(solver.BOUNDARIES)
     operator = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap").bl_rna.properties
     assert [item.identifier for item in operator["boundary"].enum_items] == [i for i, *_ in settings.BOUNDARIES]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from omt_uv.images import redraw
+from omt_uv.pipelines.panorama_redraw import redraw
+from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
 from omt_uv.solver.progress import drain
-from omt_uv.solver.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
 
 
 def picture(layout, rows=64, columns=128):

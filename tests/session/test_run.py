@@ -11,7 +11,7 @@ import bpy
 
 import numpy as np
 import pytest
-from blender import scenes
+import scenes
 
 # Every operator that changes a mesh, and the settings that make it change this one. New ones are added here.
 OPERATORS = {
@@ -66,14 +66,14 @@ def step(operator, count=None):
 @pytest.fixture(autouse=True)
 def short_slices(package, monkeypatch):
     """One step of the solver a slice, and none aside, so that small meshes take many and phases are told apart."""
-    monkeypatch.setattr(package("running"), "threads", False)
-    monkeypatch.setattr(package("running").Run.advance, "__defaults__", (0.0,))
+    monkeypatch.setattr(package("session.run"), "threads", False)
+    monkeypatch.setattr(package("session.run").Run.advance, "__defaults__", (0.0,))
     yield
-    assert package("running").current is None
+    assert package("session.run").current is None
 
 
 def test_every_operator_on_meshes_is_listed(package):
-    base = package("operators.common").SolverOperator
+    base = package("operators.base").SolverOperator
     names = {scenes.name_of(c) for c in package("registration").CLASSES if issubclass(c, base)}
     assert names == set(OPERATORS)
 
@@ -185,7 +185,7 @@ def test_the_view_can_be_moved_and_nothing_else_gets_through():
 
 @pytest.fixture
 def threads(package, monkeypatch):
-    monkeypatch.setattr(package("running"), "threads", True)
+    monkeypatch.setattr(package("session.run"), "threads", True)
 
 
 @pytest.mark.parametrize("name", OPERATORS)
@@ -229,8 +229,8 @@ def test_garbage_is_collected_in_front(threads, package, monkeypatch):
             yield package("solver.progress").Progress("Making garbage", k / 200)
 
     with monkeypatch.context() as patch:
-        patch.setattr(package("running"), "current", object())
-        package("solver.progress").drain(package("running").aside(solver()))
+        patch.setattr(package("session.run"), "current", object())
+        package("solver.progress").drain(package("session.run").aside(solver()))
     gc.collect()
     assert set(Cycle.freed) == {threading.main_thread()} and gc.isenabled()
 
@@ -244,7 +244,7 @@ def test_a_solver_aside_complains_as_any_other(threads):
 
 def test_the_spare_packer_is_called_in_front(threads, package, monkeypatch):
     """Blender's own packer must not run on another thread."""
-    packing, spare = package("packing"), package("blender_pack")
+    packing, spare = package("xatlas.packing"), package("blender.uv_packer")
     seen, own = [], spare.pack
 
     def broken(*_, **__):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from omt_uv.solver import linear
-from omt_uv.solver.multigrid import Multigrid
+from omt_uv.solver.linalg import sparse as linear
+from omt_uv.solver.linalg.multigrid import Multigrid
 
 
 @dataclass

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 DISK_MODELS = ["snail", "lilium", "camel_b", "face", "lion", "alligator", "woody", "hemisphere", "maze"]
 CLOSED_MODELS = ["max_planck", "bunny_small", "spot", "homer", "bunny", "david", "armadillo"]
 
@@ -212,7 +212,7 @@ def torus(major=24, minor=12, radius=0.4):
 
 def polygon_surface(V, polygons, seams=()):
     """The `Surface` of a polygon mesh, polygons (lists of vertices) cut into fans of triangles."""
-    from omt_uv.solver.charts import Surface
+    from omt_uv.solver.mesh.charts import Surface
 
     sizes = np.array([len(p) for p in polygons], dtype=np.int64)
     start = np.concatenate([[0], np.cumsum(sizes)])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from omt_uv import packing
-from omt_uv.packing import MarginError, pack, stack, turn_upright
+from omt_uv.xatlas import packing
+from omt_uv.xatlas.packing import MarginError, pack, stack, turn_upright
 
 FAN = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])
 

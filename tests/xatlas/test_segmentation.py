@@ -6,10 +6,10 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.segmentation import chart_seams
-from omt_uv.solver.charts import triangle_surface
+from omt_uv.solver.cutting.disk_charts import prepare
 from omt_uv.solver.errors import EmptyMeshError
-from omt_uv.solver.preparation import prepare
+from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.xatlas.segmentation import chart_seams
 
 pytest.importorskip("xatlas")
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import angles_from_lengths, cotangent_laplacian, halfedge_lengths
-from .topology import halfedges, pair_keys, pair_up
+from ..mesh.geometry import angles_from_lengths, cotangent_laplacian, halfedge_lengths
+from ..mesh.topology import halfedges, pair_keys, pair_up
 
 
 def gaussian(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from ..errors import DensityError, ShareError, WeightError, positive_density
+from ..mesh.geometry import face_areas, vertex_areas
+from ..mesh.topology import halfedges
 from . import curvature
-from .errors import DensityError, ShareError, WeightError, positive_density
-from .geometry import face_areas, vertex_areas
-from .topology import halfedges
 
 # A density may not vary more than this over a surface: faces with less would have no place in double precision.
 CONTRAST = 1e6

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .closest import face_normals
-from .geometry import face_areas, halfedge_lengths
-from .topology import halfedges, pair_keys, pair_up, twins
+from ..mesh.closest_point import face_normals
+from ..mesh.geometry import face_areas, halfedge_lengths
+from ..mesh.topology import halfedges, pair_keys, pair_up, twins
 
 NO_EDGES = np.zeros((0, 2), np.int64)
 # A region of fewer new triangles than this, or narrower than this share of a new edge, has no shape of its own.

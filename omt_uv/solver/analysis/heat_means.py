@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from .geometry import cotangents_from_lengths, halfedge_lengths, laplacian_from_weights, vertex_areas
-from .linear import Factor
-from .topology import halfedges
+from ..linalg.sparse import Factor
+from ..mesh.geometry import cotangents_from_lengths, halfedge_lengths, laplacian_from_weights, vertex_areas
+from ..mesh.topology import halfedges
 
 # Dimension of the Krylov space, enough for 1e-4 over a range of times of 1 : 36.
 DIMENSION = 24

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import ShareError
-from .measure import CONTRAST, check_factor, check_weights, painted, share
+from ..errors import ShareError
+from .density import CONTRAST, check_factor, check_weights, painted, share
 
 # A factor so many times what a region with a hard rim would need is said: the rest gets little of the texture.
 MOST_OF_HARD = 4.0

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..mesh.geometry import face_areas
+from ..mesh.topology import halfedges
 from .curvature import mean
-from .diffusion import Surroundings
-from .geometry import face_areas
-from .topology import halfedges
+from .heat_means import Surroundings
 
 # Scales, in multiples of EPSILON times the diagonal (section 3.1 and 4: epsilon is 0.3 % of it).
 SCALES = np.array([2.0, 3.0, 4.0, 5.0, 6.0])

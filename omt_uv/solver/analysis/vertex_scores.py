@@ -6,13 +6,13 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from ..errors import EmptyMeshError, WeightError
+from ..mesh.charts import check_finite
+from ..mesh.geometry import vertex_areas
+from ..mesh.topology import halfedges, pair_keys, pair_up, previous_halfedge
 from . import curvature
-from .charts import check_finite
-from .diffusion import Surroundings
-from .errors import EmptyMeshError, WeightError
-from .geometry import vertex_areas
+from .heat_means import Surroundings
 from .saliency import EPSILON, saliency, unit_size
-from .topology import halfedges, pair_keys, pair_up, previous_halfedge
 
 KINDS = ("saliency", "gaussian", "mean", "sharpness", "distance")
 # Curvature is averaged over so much of the diagonal: single vertices are noise.

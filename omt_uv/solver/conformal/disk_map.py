@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from .doubling import crossed_segment, double
-from .elliptic import centre_in_disk, rectangle_to_disk
-from .errors import PrecisionError
-from .geometry import angles_from_lengths, cotangents_from_lengths, halfedge_lengths, vertex_areas
-from .intrinsic import euclidean_diagonal, from_mesh, make_delaunay, split_boundary_edge
-from .linear import solve_spd
-from .progress import Steps
-from .topology import boundary_loops, halfedges
-from .untangle import count_folds, untangle
-from .yamabe import TOLERANCE, YamabeFlow, yamabe_flow
+from ..errors import PrecisionError
+from ..linalg.sparse import solve_spd
+from ..maps.untangle import count_folds, untangle
+from ..mesh.geometry import angles_from_lengths, cotangents_from_lengths, halfedge_lengths, vertex_areas
+from ..mesh.topology import boundary_loops, halfedges
+from ..progress import Steps
+from .double_cover import crossed_segment, double
+from .intrinsic_triangulation import euclidean_diagonal, from_mesh, make_delaunay, split_boundary_edge
+from .rectangle_to_disk import centre_in_disk, rectangle_to_disk
+from .yamabe_flow import TOLERANCE, YamabeFlow, yamabe_flow
 
 # Below this distance of two neighbours in the unit disk, rounding decides where they lie.
 RESOLUTION = 1e-12

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .intrinsic import IntrinsicTriangulation
-from .topology import halfedges
+from ..mesh.topology import halfedges
+from .intrinsic_triangulation import IntrinsicTriangulation
 
 # The mirrored triangle (b, a, c) of (a, b, c) runs through its halfedges in this order.
 MIRRORED = np.array([0, 2, 1])

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import PrecisionError
-from .flips import flip_in_place, flip_until_none
-from .geometry import halfedge_lengths
-from .topology import next_halfedge, previous_halfedge, twins
+from ..errors import PrecisionError
+from ..mesh.edge_flips import flip_in_place, flip_until_none
+from ..mesh.geometry import halfedge_lengths
+from ..mesh.topology import next_halfedge, previous_halfedge, twins
 
 Diagonal = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .errors import PrecisionError
+from ..errors import PrecisionError
 
 MAX_STEPS = 60
 

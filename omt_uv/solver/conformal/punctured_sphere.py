@@ -15,13 +15,13 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from .errors import PrecisionError
-from .flips import flip_until_none
-from .geometry import angles_from_lengths, cotangents_from_lengths, laplacian_from_weights
-from .intrinsic import IntrinsicTriangulation, edge_cosines, flip_metric_in_place, ptolemy_diagonal
-from .linear import solve_spd
-from .progress import Progress, Steps
-from .topology import boundary_loops, halfedges, next_halfedge, pair_keys, previous_halfedge
+from ..errors import PrecisionError
+from ..linalg.sparse import solve_spd
+from ..mesh.edge_flips import flip_until_none
+from ..mesh.geometry import angles_from_lengths, cotangents_from_lengths, laplacian_from_weights
+from ..mesh.topology import boundary_loops, halfedges, next_halfedge, pair_keys, previous_halfedge
+from ..progress import Progress, Steps
+from .intrinsic_triangulation import IntrinsicTriangulation, edge_cosines, flip_metric_in_place, ptolemy_diagonal
 
 TOLERANCE = 1e-10
 MAX_STEPS = 60

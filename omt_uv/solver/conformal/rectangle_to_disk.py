@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .errors import PrecisionError
+from ..errors import PrecisionError
 
 # The image of a longer rectangle has its ends squeezed below double precision.
 MAX_ASPECT = 8.0

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import PrecisionError
-from .geometry import angles_from_lengths, cotangents_from_lengths, laplacian_from_weights
-from .intrinsic import IntrinsicTriangulation, make_delaunay, ptolemy_diagonal
-from .linear import solve_spd
-from .progress import Progress, Steps
-from .topology import halfedges
+from ..errors import PrecisionError
+from ..linalg.sparse import solve_spd
+from ..mesh.geometry import angles_from_lengths, cotangents_from_lengths, laplacian_from_weights
+from ..mesh.topology import halfedges
+from ..progress import Progress, Steps
+from .intrinsic_triangulation import IntrinsicTriangulation, make_delaunay, ptolemy_diagonal
 
 TOLERANCE = 1e-10
 MAX_STEPS = 40

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .sheets import Sheets, groups
-from .topology import halfedges
+from ..mesh.gluing import Sheets, groups
+from ..mesh.topology import halfedges
 
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
 # angle counts as this share of its length. Shares near 1 keep cuts short: their length is bounded by them.

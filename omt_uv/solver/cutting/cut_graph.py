@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
-from .piece import Piece, edge_graph
-from .topology import halfedges
+from ..mesh.topology import halfedges
+from .component import Piece, edge_graph
 
 SWEEPS = 3
 # Where there are many holes only so many of the most expensive stretches are tried again.

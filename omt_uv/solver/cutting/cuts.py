@@ -12,18 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from .apart import parting_pairs
-from .charts import Surface, chosen_triangles, is_seam, is_sharp
+from ..mesh.charts import Surface, chosen_triangles, is_seam, is_sharp
+from ..mesh.geometry import face_areas
+from ..mesh.gluing import Sheets, components, corner_classes, groups, orientations, turn_over
+from ..mesh.repair import Repaired, join, weldable
+from ..mesh.topology import pair_keys
+from .component import NOISE, SEAM, SHARP, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .cut_graph import greedy_arcs, path_to, shorten
-from .extremities import log_scale, spread
-from .geometry import face_areas
-from .holes import MANY, fill_holes
-from .nets import is_long, net
-from .piece import NOISE, SEAM, SHARP, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
-from .repair import Repaired, join, weldable
-from .sheets import Sheets, components, corner_classes, groups, orientations, turn_over
-from .steiner import MOST_ENDS, meeting_points
-from .topology import pair_keys
+from .developable_nets import is_long, net
+from .handle_partition import parting_pairs
+from .hole_filling import MANY, fill_holes
+from .protrusions import log_scale, spread
+from .steiner_points import MOST_ENDS, meeting_points
 
 MOST_EXTREMITIES = 8
 # A further cut does not pay where the lengths of a flat map are predicted to be off by a factor of e^0.5 at most,

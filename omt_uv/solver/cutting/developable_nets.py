@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..mesh.geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
+from .component import Piece, fold_angles
 from .cut_graph import greedy_arcs
-from .geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
-from .piece import Piece, fold_angles
 
 # An edge at which the normal turns by more is hard. Prisms with 4, 5, 6 and 8 sides are clear of it.
 HARD = np.radians(52)

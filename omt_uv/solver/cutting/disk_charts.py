@@ -6,20 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import (
-    Chart,
-    Surface,
-    assemble,
-    check_disk,
-    check_edges,
-    chosen_triangles,
-    split,
-    strict_sheets,
-)
-from .cutting import MOST_EXTREMITIES, Cuts, open_sheets, sieved
-from .errors import ZeroAreaFaceError
-from .holes import fill_holes as fill_holes_of
-from .repair import join, with_area
+from ..errors import ZeroAreaFaceError
+from ..mesh.charts import Chart, Surface, assemble, check_disk, check_edges, chosen_triangles, split, strict_sheets
+from ..mesh.repair import join, with_area
+from .cuts import MOST_EXTREMITIES, Cuts, open_sheets, sieved
+from .hole_filling import fill_holes as fill_holes_of
 
 SEAMS = ("existing", "auto")
 

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from .piece import SMOOTH, classify, fold_angles
-from .sheets import Sheets, components, corner_classes
+from ..mesh.gluing import Sheets, components, corner_classes
+from .component import SMOOTH, classify, fold_angles
 
 # A part falls into so many fragments, and those with more handles than FEW again, so often at most.
 PIECES, FEW, ROUNDS = 4, 1, 12

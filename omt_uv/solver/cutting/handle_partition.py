@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .fragments import fragment_pairs
-from .holes import hole_rims
-from .nets import HARD
-from .piece import Kind, classify, fold_angles
-from .sheets import Sheets, components, corner_classes
+from ..mesh.gluing import Sheets, components, corner_classes
+from .component import Kind, classify, fold_angles
+from .developable_nets import HARD
+from .geodesic_clusters import fragment_pairs
+from .hole_filling import hole_rims
 
 # A part with more handles comes apart.
 MANY_HANDLES = 12

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .charts import Surface
-from .piece import NOISE
-from .sheets import Sheets, components, corner_classes
-from .topology import halfedges
+from ..mesh.charts import Surface
+from ..mesh.gluing import Sheets, components, corner_classes
+from ..mesh.topology import halfedges
+from .component import NOISE
 
 NO_POLYGON = -1
 # Cuts to more holes than these make a chart of slits, for which there is hardly a map: such a part is a sieve.

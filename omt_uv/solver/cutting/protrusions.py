@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .cut_graph import open_classes, open_rim
-from .geometry import (
+from ..linalg.sparse import solve_spd
+from ..mesh.geometry import (
     angle_defects,
     angles_from_lengths,
     cotangents_from_lengths,
@@ -18,9 +18,9 @@ from .geometry import (
     laplacian_from_weights,
     vertex_areas,
 )
-from .linear import solve_spd
-from .piece import Piece
-from .topology import halfedges
+from ..mesh.topology import halfedges
+from .component import Piece
+from .cut_graph import open_classes, open_rim
 
 
 def log_scale(piece: Piece, cut: np.ndarray) -> np.ndarray:

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from .charts import Chart, Surface, is_sharp
-from .geometry import face_areas
-from .piece import AVOIDED, NOISE, SHARP
-from .sheets import polygon_sides
-from .topology import boundary_loops, halfedges, pair_keys, twins
+from ..mesh.charts import Chart, Surface, is_sharp
+from ..mesh.geometry import face_areas
+from ..mesh.gluing import polygon_sides
+from ..mesh.topology import boundary_loops, halfedges, pair_keys, twins
+from .component import AVOIDED, NOISE, SHARP
 
 
 def slit(surface: Surface, chart: Chart, shear: np.ndarray, avoid: np.ndarray | None = None) -> np.ndarray:

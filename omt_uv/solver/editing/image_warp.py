@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from .geometry import cross2
-from .topology import expand
+from ..mesh.geometry import cross2
+from ..mesh.topology import expand
 
 # Pixels at a time, for memory.
 ROWS = 64

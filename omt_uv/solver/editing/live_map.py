@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from .energy import elements
-from .geometry import face_areas
-from .improve import boundary_edges, island_start, meets_itself, placed
-from .newton import Assembly, Free, Problem, newton_step
-from .pins import Pins, Springs
-from .renumbering import renumbered
-from .stages import FIRST_PRESSURE, NO_ENERGY, QUALITIES, Task, final_weight, rescaled
+from ..maps.energy import elements
+from ..mesh.geometry import face_areas
+from ..refinement.continuation import FIRST_PRESSURE, NO_ENERGY, QUALITIES, Task, final_weight, rescaled
+from ..refinement.elimination_order import renumbered
+from ..refinement.pins import Pins, Springs
+from ..refinement.projected_newton import Assembly, Free, Problem, newton_step
+from .refine_island import boundary_edges, island_start, meets_itself, placed
 
 # Of the springs between pins and where they are dragged to: stiff, as the barrier against folds must only just win.
 STIFFNESS = 1e6

@@ -11,19 +11,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .energy import area_error, elements
-from .errors import FoldedUVError, MeshError
-from .exact_share import exact_share, wanted
-from .geometry import face_areas, signed_areas
-from .improve import boundary_edges, meets_itself
-from .measure import normalised, not_reached, share
-from .newton import Assembly
+from ..analysis.density import normalised, not_reached, share
+from ..analysis.region_density import exact_share, wanted
+from ..errors import FoldedUVError, MeshError
+from ..linalg.additive_schwarz import overlapping
+from ..maps.energy import area_error, elements
+from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.topology import boundary_loops
+from ..progress import Progress, Steps, part_of
+from ..refinement.continuation import QUALITIES, Found, Task, stages
+from ..refinement.elimination_order import Renumbered, renumbered
+from ..refinement.projected_newton import Assembly
 from .outline import Outline, centroid, free, recognised
-from .progress import Progress, Steps, part_of
-from .renumbering import Renumbered, renumbered
-from .schwarz import overlapping
-from .stages import QUALITIES, Found, Task, stages
-from .topology import boundary_loops
+from .refine_island import boundary_edges, meets_itself
 
 OUTLINES = ("own", "free")
 # Greatest step of a magnification, in the logarithm of the share.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .newton import Free, Motion, OnCircle, OnLines
+from ..refinement.projected_newton import Free, Motion, OnCircle, OnLines
 
 # Distances of the outline from a circle, relative to its radius, and fewest vertices that make one.
 ROUND, FEWEST = 2e-3, 12

@@ -10,20 +10,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from .contact import contact, crossings
-from .energy import area_error, elements
-from .errors import FoldedUVError, MeshError
-from .geometry import face_areas, signed_areas
-from .newton import Assembly, Free
-from .pins import Pins, aligned, drag
-from .progress import Progress, Steps
-from .refine import Refinement
-from .renumbering import renumbered
-from .schwarz import overlapping
-from .stages import QUALITIES, Task, stages
-from .starts import disk_start
-from .topology import boundary_loops, halfedges, twins
-from .untangle import count_folds
+from ..errors import FoldedUVError, MeshError
+from ..linalg.additive_schwarz import overlapping
+from ..maps.energy import area_error, elements
+from ..maps.untangle import count_folds
+from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.topology import boundary_loops, halfedges, twins
+from ..progress import Progress, Steps
+from ..refinement.boundary_barrier import contact, crossings
+from ..refinement.continuation import QUALITIES, Task, stages
+from ..refinement.elimination_order import renumbered
+from ..refinement.initial_maps import disk_start
+from ..refinement.pins import Pins, aligned, drag
+from ..refinement.projected_newton import Assembly, Free
+from ..refinement.refine import Refinement
 
 STRAIGHTENED = "The UVs were folded, or met themselves; the refinement started from a straightened map"
 UNGUARDED = "The outline of an island meets itself; it is not kept apart"

@@ -11,13 +11,13 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .charts import Chart, Surface, assemble, chosen_triangles
-from .distortion import WELD
-from .errors import FoldedUVError, NonManifoldEdgeError, OrientationError
-from .geometry import face_areas
-from .repair import join, with_area
-from .sheets import orientations, turn_over
-from .topology import pair_keys
+from ..errors import FoldedUVError, NonManifoldEdgeError, OrientationError
+from ..maps.distortion import WELD
+from ..mesh.charts import Chart, Surface, assemble, chosen_triangles
+from ..mesh.geometry import face_areas
+from ..mesh.gluing import orientations, turn_over
+from ..mesh.repair import join, with_area
+from ..mesh.topology import pair_keys
 
 
 @dataclass(frozen=True)

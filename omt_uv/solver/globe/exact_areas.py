@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .geometry import cross2
-from .globe import Polygons, Unfolding, brought_back, moved
-from .linear import minimum_degree, solve_spd
-from .progress import Progress, Steps
+from ..linalg.sparse import minimum_degree, solve_spd
+from ..mesh.geometry import cross2
+from ..mesh.spherical_geometry import spherical_areas
+from ..progress import Progress, Steps
 from .projections import EQUIRECT, is_cylindrical
-from .spherical import spherical_areas
+from .unfolding import Polygons, Unfolding, brought_back, moved
 
 ROUNDS = 14
 TOLERANCE = 1e-4

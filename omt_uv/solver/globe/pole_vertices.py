@@ -11,10 +11,10 @@ from itertools import product
 
 import numpy as np
 
-from .progress import drain
+from ..mesh.spherical_geometry import signed_volumes, spherical_areas
+from ..progress import drain
+from ..sphere.untangle import around, straightened
 from .projections import is_cylindrical
-from .sphere_untangle import around, straightened
-from .spherical import signed_volumes, spherical_areas
 
 POLES = np.array([[0.0, 0, 1], [0, 0, -1]])
 # Where the octahedral layout has only half a turn of angle: midpoints of the sides of its square.

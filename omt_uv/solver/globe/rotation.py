@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import face_areas, vertex_areas
-from .spherical import signed_volumes
+from ..mesh.geometry import face_areas, vertex_areas
+from ..mesh.spherical_geometry import signed_volumes
 
 NORTH = np.array([0.0, 0, 1])
 # Two markers closer than this to each other or to the opposite point give no direction.

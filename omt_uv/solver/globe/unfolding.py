@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .globe_poles import on_vertices, singular_points
+from .pole_vertices import on_vertices, singular_points
 from .projections import OCTAHEDRAL, check_projection, octahedral_to_plane, to_plane
 
 # A corner this far left of the seam, by rounding, still counts as on it.

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from .dissection import kd_parts, vertex_graph
-from .linear import Factor, minimum_degree
+from .nested_dissection import kd_parts, vertex_graph
+from .sparse import Factor, minimum_degree
 
 # Meshes of fewer vertices are factored at once.
 LARGE = 50_000

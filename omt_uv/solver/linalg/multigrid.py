@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from .linear import Factor, solve_spd
+from .sparse import Factor, solve_spd
 
 BLOCK = 8
 # Up to this many unknowns are factored.

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .linear import minimum_degree
-from .topology import expand, halfedges
+from ..mesh.topology import expand, halfedges
+from .sparse import minimum_degree
 
 # From this many vertices on dissection is the better order of the two; on fewer, minimum degree has less fill.
 LARGE = 100_000

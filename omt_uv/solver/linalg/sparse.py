@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
-from .errors import PrecisionError
+from ..errors import PrecisionError
 
 # Below this many unknowns minimum degree is the faster order of the two.
 SMALL = 50_000

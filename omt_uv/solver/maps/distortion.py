@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from .geometry import cross2, face_areas
+from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
+from ..mesh.geometry import cross2, face_areas
 from .overlap import overlap_share
 
 SHEAR_CAP = 1e6  # a face squashed onto a line must not drown the mean of all others

@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_matrix, identity
 
-from .embedding import mean_value_weights
-from .errors import PrecisionError
-from .geometry import halfedge_lengths, signed_areas
-from .linear import solve_general
-from .topology import halfedges, pair_keys, pair_up
+from ..errors import PrecisionError
+from ..linalg.sparse import solve_general
+from ..mesh.geometry import halfedge_lengths, signed_areas
+from ..mesh.topology import halfedges, pair_keys, pair_up
+from .tutte import mean_value_weights
 
 MOST_RINGS = 6
 # A face with less area than this share of the square of its longest side is as good as folded.

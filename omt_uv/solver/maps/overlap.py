@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import cross2
-from .topology import expand
+from ..mesh.geometry import cross2
+from ..mesh.topology import expand
 
 SAMPLES = 200_000
 CHUNK = 2_000_000  # pairs of a sample and a face tested at once, for memory

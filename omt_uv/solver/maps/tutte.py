@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from .dissection import LARGE, Dissection
-from .geometry import angles_from_lengths, halfedge_lengths
-from .linear import solve_general
-from .topology import halfedges
+from ..linalg.nested_dissection import LARGE, Dissection
+from ..linalg.sparse import solve_general
+from ..mesh.geometry import angles_from_lengths, halfedge_lengths
+from ..mesh.topology import halfedges
 
 
 def mean_value_weights(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .embedding import arc_length_parameters, tutte
+from ..mesh.geometry import face_areas, signed_areas
 from .energy import elements, energy
-from .geometry import face_areas, signed_areas
+from .tutte import arc_length_parameters, tutte
 
 # Mean energy above which an untangled map is no better than a fresh one: Newton would spend itself on single faces.
 USABLE = 100.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .errors import (
+from ..errors import (
     DuplicateFaceError,
     EmptyMeshError,
     NonFiniteError,
@@ -19,7 +19,7 @@ from .errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
-from .sheets import Sheets, components, corner_classes, diagonal_pairs, groups, polygon_sides
+from .gluing import Sheets, components, corner_classes, diagonal_pairs, groups, polygon_sides
 from .topology import boundary_loops, halfedges, pair_keys, pair_up
 
 # A triangle whose area is below this share of its longest side squared is a line.

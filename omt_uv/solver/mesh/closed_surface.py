@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .errors import (
+from ..errors import (
     DuplicateFaceError,
     EmptyMeshError,
     NonFiniteError,

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from .closest import closest_on_triangles
+from .closest_point import closest_on_triangles
 from .topology import expand, halfedges, next_halfedge, pair_keys, pair_up, twins
 
 MOST_ROUNDS = 200

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..analysis.density import Target
+from ..errors import MeshError
+from ..mesh.charts import Chart, Surface, triangle_rows
 from .chart_pins import ChartPins, CornerPins, chart_pins
-from .charts import Chart, Surface, triangle_rows
-from .errors import MeshError
-from .measure import Target
 
 
 def chart_target(target: Target | None, surface: Surface, chart: Chart) -> dict:

@@ -9,20 +9,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..analysis.density import not_reached
+from ..conformal.disk_map import sharpest_corners
+from ..errors import FoldedUVError, MeshError, positive_density
+from ..maps.distortion import measure
+from ..mesh.charts import Chart
+from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.topology import boundary_loops
+from ..progress import Steps, part_of
+from ..refinement.continuation import QUALITIES
+from ..refinement.initial_maps import unroll
+from ..refinement.refine import BOUNDARIES, Refinement, refine
+from ..transport.convex_domain import Disk, Domain, Rectangle
 from .chart_pins import ChartPins, anchored, facing, refuse_outline
-from .charts import Chart
-from .conformal import sharpest_corners
-from .distortion import measure
-from .domain import Disk, Domain, Rectangle
-from .errors import FoldedUVError, MeshError, positive_density
-from .first_map import COARSE_ABOVE, FirstMap, Log, coarse_first_map, first_map, mean_value_sites
-from .geometry import face_areas, signed_areas
-from .measure import not_reached
-from .progress import Steps, part_of
-from .refine import BOUNDARIES, Refinement, refine
-from .stages import QUALITIES
-from .starts import unroll
-from .topology import boundary_loops
+from .initial_map import COARSE_ABOVE, FirstMap, Log, coarse_first_map, first_map, mean_value_sites
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 FIRST, REFINEMENT = (0.0, 0.4), (0.4, 0.6)

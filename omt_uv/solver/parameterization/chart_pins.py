@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import Chart, Surface
-from .errors import PinError
-from .pins import Pins, aligned, check_pins
+from ..errors import PinError
+from ..mesh.charts import Chart, Surface
+from ..refinement.pins import Pins, aligned, check_pins
 
 
 @dataclass(frozen=True)

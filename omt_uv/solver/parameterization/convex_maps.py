@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..analysis.density import Target
+from ..maps.distortion import measure
+from ..mesh.charts import Chart, Surface
+from ..mesh.geometry import signed_areas
+from ..mesh.topology import boundary_loops
+from ..refinement.continuation import QUALITIES
+from .chart_indices import chart_target
 from .chart_map import ChartMap, in_unit_box
 from .chart_pins import ChartPins
-from .chart_terms import chart_target
-from .charts import Chart, Surface
-from .convex import opened
-from .distortion import measure
-from .geometry import signed_areas
-from .measure import Target
-from .stages import QUALITIES
-from .topology import boundary_loops
+from .convexity import opened
 
 # The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
 AREA_KEPT = 1.1

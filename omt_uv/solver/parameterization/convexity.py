@@ -19,14 +19,14 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .charts import Chart, Surface
-from .contact import crossings
-from .corner_patches import Mesh, Patches
-from .corners import DENTED, OPEN, STRAIGHT, Corners, convex_corners
-from .dissection import vertex_graph
-from .geometry import face_areas, signed_areas
-from .linear import minimum_degree
-from .topology import boundary_loops
+from ..linalg.nested_dissection import vertex_graph
+from ..linalg.sparse import minimum_degree
+from ..mesh.charts import Chart, Surface
+from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.topology import boundary_loops
+from ..refinement.boundary_barrier import crossings
+from .corner_solver import Mesh, Patches
+from .polygon_corners import DENTED, OPEN, STRAIGHT, Corners, convex_corners
 
 # Rings of faces around that may move, at most, how many vertices are enough for a corner, and the most of one patch:
 # a large one goes as far as the worst of its corners lets it.

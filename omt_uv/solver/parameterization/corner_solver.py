@@ -8,11 +8,11 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .corners import OPEN, Barrier, Corners
-from .energy import elements, energies, gradient
-from .geometry import face_areas
-from .newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
-from .topology import halfedges
+from ..maps.energy import elements, energies, gradient
+from ..mesh.geometry import face_areas
+from ..mesh.topology import halfedges
+from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
+from .polygon_corners import OPEN, Barrier, Corners
 
 STRENGTH = 30.0
 # Rounds that open and that settle, of so many Newton steps; corners that are shut start a round at this r.

@@ -13,21 +13,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .conformal import ConformalMap, conformal_disk, conformal_rectangle
-from .disk_coarsening import coarsened
-from .domain import Disk, Domain, Rectangle
-from .elliptic import centre_in_disk
-from .embedding import arc_length_parameters, tutte
-from .energy import elements
-from .errors import PrecisionError, TransportError
-from .geometry import face_areas, halfedge_lengths
-from .measure import graded
-from .progress import Steps, part_of
-from .refine import refine
-from .smoothing import smoothed
-from .starts import is_far
-from .topology import boundary_loops
-from .transport import Transport, transport
+from ..analysis.density import graded
+from ..conformal.disk_map import ConformalMap, conformal_disk, conformal_rectangle
+from ..conformal.rectangle_to_disk import centre_in_disk
+from ..errors import PrecisionError, TransportError
+from ..maps.energy import elements
+from ..maps.tutte import arc_length_parameters, tutte
+from ..mesh.geometry import face_areas, halfedge_lengths
+from ..mesh.topology import boundary_loops
+from ..progress import Steps, part_of
+from ..refinement.initial_maps import is_far
+from ..refinement.mesh_hierarchy import coarsened
+from ..refinement.refine import refine
+from ..refinement.vertex_sweeps import smoothed
+from ..transport.convex_domain import Disk, Domain, Rectangle
+from ..transport.semidiscrete import Transport, transport
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 CONFORMAL, TRANSPORT = (0.0, 0.4), (0.4, 0.6)

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..cutting.disk_charts import Prepared, prepare
+from ..cutting.hole_filling import MANY
+from ..cutting.shear_slit import slit
+from ..maps.distortion import face_distortion
+from ..mesh.charts import Chart, Surface
+from ..mesh.geometry import face_areas
+from ..progress import Steps
 from .chart_map import ChartMap
-from .charts import Chart, Surface
-from .distortion import face_distortion
-from .geometry import face_areas
-from .holes import MANY
-from .preparation import Prepared, prepare
-from .progress import Steps
-from .slits import slit
 
 MOST_ROUNDS = 12
 

@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 
+from ..errors import MeshError, positive_density
+from ..mesh.charts import Chart
+from ..progress import Steps, part_of
+from ..refinement.batch_refine import Maps, solve_many
 from .chart_map import ChartMap, in_place, in_unit_box
-from .charts import Chart
-from .errors import MeshError, positive_density
-from .many import Maps, solve_many
-from .progress import Steps, part_of
 
 # Charts of at most SMALL triangles are solved together where there are at least MANY, about BATCH triangles at a time.
 SMALL, MANY, BATCH = 1000, 8, 50_000

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .batches import small, together
+from ..analysis.density import Target
+from ..cutting.disk_charts import prepare
+from ..cutting.hole_filling import MANY
+from ..errors import MeshError
+from ..mesh.charts import Chart, Surface
+from ..progress import Progress, Steps, part_of
+from .chart_indices import chart_target, located, located_pins
 from .chart_map import ChartMap, unwrap_chart
 from .chart_pins import CornerPins, clear_of_pins
-from .chart_terms import chart_target, located, located_pins
-from .charts import Chart, Surface
-from .errors import MeshError
-from .holes import MANY
-from .measure import Target
-from .opening import with_open_corners
-from .preparation import prepare
-from .progress import Progress, Steps, part_of
+from .convex_maps import with_open_corners
+from .small_charts import small, together
 
 
 @dataclass(frozen=True)

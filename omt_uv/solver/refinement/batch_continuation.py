@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .stages import (
+from .continuation import (
     FIRST_PRESSURE,
     LEAST_PRESSURE,
     LOOSE,

@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .contact import crossings
-from .control import Control, Lack
-from .dissection import vertex_graph
-from .embedding import arc_length_parameters, tutte
-from .energy import SHARE, SINGLE, Elements, elements, energies, gradient
-from .geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
-from .linear import minimum_degree
-from .newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
-from .progress import Progress, Steps
-from .starts import NEARLY_FLAT, unroll
-from .topology import boundary_loops
+from ..linalg.nested_dissection import vertex_graph
+from ..linalg.sparse import minimum_degree
+from ..maps.energy import SHARE, SINGLE, Elements, elements, energies, gradient
+from ..maps.tutte import arc_length_parameters, tutte
+from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
+from ..mesh.topology import boundary_loops
+from ..progress import Progress, Steps
+from .batch_continuation import Control, Lack
+from .boundary_barrier import crossings
+from .initial_maps import NEARLY_FLAT, unroll
+from .projected_newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
 
 # Halvings of a step before it counts as none.
 MAX_HALVINGS = 12

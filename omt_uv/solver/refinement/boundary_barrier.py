@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .topology import expand
+from ..mesh.topology import expand
 
 # Reach of the barrier, relative to the shorter of the boundary edges involved.
 REACH = 0.5

@@ -8,12 +8,12 @@ from typing import Protocol
 
 import numpy as np
 
-from .contact import Contact, contact, crossings
-from .energy import Elements, missing_tilt, shortfall, shortfall_but_share, tilted
-from .measure import INEXACT
-from .newton import Assembly, Motion, Problem, Step
-from .progress import Progress, Steps
-from .smoothing import Smoother
+from ..analysis.density import INEXACT
+from ..maps.energy import Elements, missing_tilt, shortfall, shortfall_but_share, tilted
+from ..progress import Progress, Steps
+from .boundary_barrier import Contact, contact, crossings
+from .projected_newton import Assembly, Motion, Problem, Step
+from .vertex_sweeps import Smoother
 
 # A stage that reaches the goal ends when Newton promises less than this share of the energy. One on the way ends sooner
 # where the boundary is free; vertices on a circle or on sides do not make up for it later.

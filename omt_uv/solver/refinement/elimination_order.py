@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .dissection import mesh_order
-from .errors import MeshError
-from .geometry import signed_areas
+from ..errors import MeshError
+from ..linalg.nested_dissection import mesh_order
+from ..mesh.geometry import signed_areas
+from .initial_maps import check_start
 from .pins import Pins, check_pins
-from .starts import check_start
 
 
 @dataclass(frozen=True)

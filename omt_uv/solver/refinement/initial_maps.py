@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .contact import crossings
-from .embedding import arc_length_parameters, tutte
-from .energy import elements
-from .errors import FoldedUVError
-from .geometry import face_areas, signed_areas
-from .linear import Factor
-from .measure import entropy
-from .newton import Free, Motion, OnCircle, OnLines, linear_forms
-from .topology import expand, halfedges, twins
-from .untangle import USABLE, arc_length_rim, circle_rim, count_folds, map_energy, untangle
+from ..analysis.density import entropy
+from ..errors import FoldedUVError
+from ..linalg.sparse import Factor
+from ..maps.energy import elements
+from ..maps.tutte import arc_length_parameters, tutte
+from ..maps.untangle import USABLE, arc_length_rim, circle_rim, count_folds, map_energy, untangle
+from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.topology import expand, halfedges, twins
+from .boundary_barrier import crossings
+from .projected_newton import Free, Motion, OnCircle, OnLines, linear_forms
 
 SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"
 SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by the length of the boundary"

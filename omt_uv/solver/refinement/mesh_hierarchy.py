@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .energy import Elements, elements
-from .geometry import cross2, dot2, face_areas
-from .progress import Progress, Steps
-from .smoothing import independent, relax, stars
-from .topology import boundary_loops, expand, halfedges, twins
+from ..maps.energy import Elements, elements
+from ..mesh.geometry import cross2, dot2, face_areas
+from ..mesh.topology import boundary_loops, expand, halfedges, twins
+from ..progress import Progress, Steps
+from .vertex_sweeps import independent, relax, stars
 
 # A vertex with more faces stays: comparing all its collapses costs the square of their number.
 MOST_FACES = 9

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .energy import squared
-from .errors import PinError
-from .newton import Free, Problem
-from .progress import Progress, Steps
-from .stages import Task, rescaled
-from .stages import minimise as minimise_energy
+from ..errors import PinError
+from ..maps.energy import squared
+from ..progress import Progress, Steps
+from .continuation import Task, rescaled
+from .continuation import minimise as minimise_energy
+from .projected_newton import Free, Problem
 
 # Weight of the area term while pins are dragged, and stiffness of the springs that drag them: from soft to hard.
 DRAG_WEIGHT = 10.0

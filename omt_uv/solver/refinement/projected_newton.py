@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from .energy import Elements, energies, local_derivatives, scatter, shortfall, squared
-from .errors import PrecisionError
-from .linear import Factor
-from .schwarz import Overlapping
-from .smoothing import Smoother
+from ..errors import PrecisionError
+from ..linalg.additive_schwarz import Overlapping
+from ..linalg.sparse import Factor
+from ..maps.energy import Elements, energies, local_derivatives, scatter, shortfall, squared
+from .vertex_sweeps import Smoother
 
 ARMIJO = 1e-4
 MAX_HALVINGS = 40

@@ -10,18 +10,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .energy import Elements, area_error, elements
-from .errors import MeshError, positive_density
-from .geometry import face_areas
-from .newton import Assembly
+from ..errors import MeshError, positive_density
+from ..linalg.additive_schwarz import overlapping
+from ..maps.energy import Elements, area_error, elements
+from ..mesh.geometry import face_areas
+from ..mesh.topology import boundary_loops
+from ..progress import Progress, Steps, part_of
+from .continuation import QUALITIES, Quality, Task, stages, weights_of
+from .elimination_order import Renumbered, renumbered
+from .initial_maps import Start, disk_start, free_start, is_far, notched_disk, square_start
 from .pins import Pins, drag
-from .progress import Progress, Steps, part_of
-from .renumbering import Renumbered, renumbered
-from .schwarz import overlapping
-from .smoothing import Smoother, smoothed
-from .stages import QUALITIES, Quality, Task, stages, weights_of
-from .starts import Start, disk_start, free_start, is_far, notched_disk, square_start
-from .topology import boundary_loops
+from .projected_newton import Assembly
+from .vertex_sweeps import Smoother, smoothed
 
 STARTS = {"free": free_start, "disk": disk_start, "square": square_start}
 BOUNDARIES = tuple(STARTS)

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .contact import crossings, rim_edges
-from .energy import Elements, energies, squared
-from .progress import Progress, Steps
-from .topology import halfedges, twins
+from ..maps.energy import Elements, energies, squared
+from ..mesh.topology import halfedges, twins
+from ..progress import Progress, Steps
+from .boundary_barrier import crossings, rim_edges
 
 # Least eigenvalue of a vertex's Hessian over the greatest, halvings of a step.
 CONVEX, HALVINGS = 0.01, 5

@@ -11,20 +11,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .balance import balance
-from .carrier import Carrier
-from .closest import ClosestPoint, vertex_normals
-from .counts import EdgeSize, StuckError, adjust_count, distribute, least_faces, least_vertices
-from .errors import CountError, positive_density
-from .fit import fit_to_surface
-from .measure import graded
-from .part_maps import Original, PartMaps
-from .parts import Part
-from .progress import Progress, Steps, part_of
-from .relaxation import relax
-from .sampling import STRATEGIES
-from .tessellation import Options, Tessellation, least_samples, tessellate
-from .touching import opened
+from ..analysis.density import graded
+from ..errors import CountError, positive_density
+from ..mesh.closest_point import ClosestPoint, vertex_normals
+from ..progress import Progress, Steps, part_of
+from .components.coincident_boundaries import opened
+from .components.components import Part
+from .edits.vertex_count import EdgeSize, StuckError, adjust_count, distribute, least_faces, least_vertices
+from .fitting.fit import fit_to_surface
+from .initial.component_maps import Original, PartMaps
+from .initial.disk_samples import STRATEGIES
+from .initial.initial_mesh import Options, Tessellation, least_samples, tessellate
+from .relaxation.cvt import relax
+from .relaxation.surface_carrier import Carrier
+from .relaxation.vertex_balance import balance
 
 # More vertices than this many times the input's tell nothing new about the surface.
 FAR_MORE = 50

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from .errors import MeshError
-from .geometry import face_areas
-from .topology import halfedges, next_halfedge
+from ..errors import MeshError
+from ..mesh.geometry import face_areas
+from ..mesh.topology import halfedges, next_halfedge
 
 # A level ends when this share of its vertices is left.
 SHRINK = 0.45

@@ -6,9 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .closed import closed_surface
-from .errors import PrecisionError
-from .geometry import (
+from ..conformal.intrinsic_triangulation import IntrinsicTriangulation, euclidean_diagonal, from_mesh, make_delaunay
+from ..conformal.moebius import centred, to_sphere
+from ..conformal.punctured_sphere import FlatPolygon, flatten_to_infinity
+from ..conformal.yamabe_flow import yamabe_flow
+from ..errors import PrecisionError
+from ..linalg.sparse import solve_spd
+from ..mesh.closed_surface import closed_surface
+from ..mesh.geometry import (
     angle_defects,
     angles_from_lengths,
     cotangents_from_lengths,
@@ -16,15 +21,10 @@ from .geometry import (
     laplacian_from_weights,
     vertex_areas,
 )
-from .infinity import FlatPolygon, flatten_to_infinity
-from .intrinsic import IntrinsicTriangulation, euclidean_diagonal, from_mesh, make_delaunay
-from .linear import solve_spd
-from .moebius import centred, to_sphere
-from .progress import Steps
-from .sphere_untangle import locally_untangled
-from .spherical import signed_volumes
-from .topology import halfedges
-from .yamabe import yamabe_flow
+from ..mesh.spherical_geometry import signed_volumes
+from ..mesh.topology import halfedges
+from ..progress import Steps
+from .untangle import locally_untangled
 
 # Among this share of the vertices, those whose surroundings the map magnifies most, the best fan goes to infinity.
 CANDIDATES = 0.02

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .moser import moser_map
-from .progress import Progress, Steps, part_of
-from .spherical import signed_volumes, spherical_areas
-from .stream import Level, Pairs, allowance, best_flow, level, pairs, transported, velocity
+from ..mesh.spherical_geometry import signed_volumes, spherical_areas
+from ..progress import Progress, Steps, part_of
+from .moser_flow import moser_map
+from .stream_functions import Level, Pairs, allowance, best_flow, level, pairs, transported, velocity
 
 # Moser's map is made in so many parts, each a share of the way in the logarithm of the density: much milder than one.
 STAGES = 8

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .linear import solve_spd
-from .progress import Progress, Steps
-from .spherical import spherical_areas
-from .topology import next_halfedge, previous_halfedge, twins
+from ..linalg.sparse import solve_spd
+from ..mesh.spherical_geometry import spherical_areas
+from ..mesh.topology import next_halfedge, previous_halfedge, twins
+from ..progress import Progress, Steps
 
 # Barycentric coordinate, by its corner, of the centre of the share of a face that belongs to the corner.
 CORNER = 22 / 36

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .coarsening import Level, Round, coarsened
-from .errors import PrecisionError
-from .progress import Progress, Steps
-from .sphere_newton import seen
-from .sphere_refine import relax
-from .spherical import normalized, signed_volumes, triple_products
+from ..errors import PrecisionError
+from ..mesh.spherical_geometry import normalized, signed_volumes, triple_products
+from ..progress import Progress, Steps
+from .coarsen import Level, Round, coarsened
+from .newton import seen
+from .refine import relax
 
 # Distances from the neighbour, in widths of the hole, at which a vertex that comes back tries to settle.
 TRIES = 2.0 ** -np.concatenate([np.arange(0, 5, 0.5), np.arange(5, 24, 2)])

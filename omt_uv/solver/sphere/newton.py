@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .energy import Elements, Local, derivatives_of, energy_of, squared
-from .linear import Factor
-from .newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, Step, fold_share
-from .spherical import normalized, signed_volumes, spherical_areas
+from ..linalg.sparse import Factor
+from ..maps.energy import Elements, Local, derivatives_of, energy_of, squared
+from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
+from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, Step, fold_share
 
 
 @dataclass(frozen=True)

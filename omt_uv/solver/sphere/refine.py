@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .dissection import mesh_order
-from .energy import Elements, elements, squared
-from .errors import FoldedUVError
-from .newton import Assembly
-from .progress import Progress, Steps
-from .sphere_newton import SphereProblem, derivatives, seen
-from .sphere_untangle import untangle_on_sphere
-from .spherical import signed_volumes, spherical_areas
-from .stages import LOOSE, QUALITIES, SQUEEZED, STAGE_STEPS, STRICT, Quality, minimise, weights_of
+from ..errors import FoldedUVError
+from ..linalg.nested_dissection import mesh_order
+from ..maps.energy import Elements, elements, squared
+from ..mesh.spherical_geometry import signed_volumes, spherical_areas
+from ..progress import Progress, Steps
+from ..refinement.continuation import LOOSE, QUALITIES, SQUEEZED, STAGE_STEPS, STRICT, Quality, minimise, weights_of
+from ..refinement.projected_newton import Assembly
+from .newton import SphereProblem, derivatives, seen
+from .untangle import untangle_on_sphere
 
 # Where the area error is not reached, a weight is left for a greater one when Newton promises less than this.
 TOLERANCE = 1e-2

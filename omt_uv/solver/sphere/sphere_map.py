@@ -10,19 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .closed import ClosedSurface, closed_surface
-from .errors import FoldedUVError, PrecisionError, TransportError, positive_density
-from .geometry import face_areas, vertex_areas
-from .progress import Steps, part_of
-from .sphere_conformal import ConformalSphere, conformal_sphere
-from .sphere_flow import flow_map
-from .sphere_multilevel import multilevel_start
-from .sphere_refine import SphereRefinement, sphere_refine
-from .sphere_transport import sphere_transport
-from .spherical import spherical_areas
-from .spherical_power import Hull
-from .stages import QUALITIES
-from .topology import twins
+from ..errors import FoldedUVError, PrecisionError, TransportError, positive_density
+from ..mesh.closed_surface import ClosedSurface, closed_surface
+from ..mesh.geometry import face_areas, vertex_areas
+from ..mesh.spherical_geometry import spherical_areas
+from ..mesh.topology import twins
+from ..progress import Steps, part_of
+from ..refinement.continuation import QUALITIES
+from ..transport.semidiscrete_sphere import sphere_transport
+from ..transport.spherical_power_diagram import Hull
+from .conformal import ConformalSphere, conformal_sphere
+from .dominitz_tannenbaum import flow_map
+from .multilevel import multilevel_start
+from .refine import SphereRefinement, sphere_refine
 
 NEWTON, FLOW = METHODS = ("newton", "flow")
 # Where the time goes, roughly, as start and width.

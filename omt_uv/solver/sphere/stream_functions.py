@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from .linear import solve_spd
+from ..linalg.sparse import solve_spd
 
 # Radius of a bump in units of the distance between the centres, and how much farther points are looked for, so that
 # the same pairs serve while they move.

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from .energy import Elements, Local, elements, local_of, squared
-from .newton import ARMIJO, Assembly
-from .progress import Progress, Steps
-from .sphere_newton import derivatives, moved, newton_direction, seen, tangents
-from .spherical import signed_volumes, spherical_areas
+from ..maps.energy import Elements, Local, elements, local_of, squared
+from ..mesh.spherical_geometry import signed_volumes, spherical_areas
+from ..progress import Progress, Steps
+from ..refinement.projected_newton import ARMIJO, Assembly
+from .newton import derivatives, moved, newton_direction, seen, tangents
 
 MAX_STEPS = 40
 MAX_HALVINGS = 12

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .closest import ClosestPoint, face_normals
-from .corner_sides import corners_of, homes, unite, witnesses
-from .sides import CutMesh, cut_open, on_seam, seam_points
-from .topology import halfedges, pair_keys, pair_up, twins
+from ..mesh.closest_point import ClosestPoint, face_normals
+from ..mesh.cut_mesh import CutMesh, cut_open, on_seam, seam_points
+from ..mesh.topology import halfedges, pair_keys, pair_up, twins
+from .seam_sides import corners_of, homes, unite, witnesses
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .footprint import Footprint
+from .correspondence import Footprint
 
 
 def to_vertices(at: Footprint, triangles: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .sides import ON_EDGE, CutMesh, apart, descend, seam_points
-from .topology import halfedges
+from ..mesh.cut_mesh import ON_EDGE, CutMesh, apart, descend, seam_points
+from ..mesh.topology import halfedges
 
 # Nearer than this share of the extent is the same point.
 SAME_POINT = 1e-7

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .geometry import cross2, dot2
+from ..mesh.geometry import cross2, dot2
 
 
 def segment_integrals(p: np.ndarray, q: np.ndarray) -> np.ndarray:

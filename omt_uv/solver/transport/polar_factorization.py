@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .domain import Domain
+from ..progress import Steps
+from .convex_domain import Domain
 from .power_diagram import power_diagram
-from .progress import Steps
-from .transport import transport
+from .semidiscrete import transport
 
 
 @dataclass(frozen=True)

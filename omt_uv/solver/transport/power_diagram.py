@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .domain import Domain, segment_integrals
-from .geometry import as_complex, as_points, dot2, in_parts
-from .regular import Regular, by_hull, power_centres
-from .topology import next_halfedge
+from ..mesh.geometry import as_complex, as_points, dot2, in_parts
+from ..mesh.topology import next_halfedge
+from .convex_domain import Domain, segment_integrals
+from .regular_triangulation import Regular, by_hull, power_centres
 
 
 @dataclass(frozen=True)

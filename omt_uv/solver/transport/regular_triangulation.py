@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from .errors import TransportError
-from .flips import flip_in_place, flip_until_none
-from .geometry import as_complex, dot2, in_parts
-from .topology import previous_halfedge, twins
+from ..errors import TransportError
+from ..mesh.edge_flips import flip_in_place, flip_until_none
+from ..mesh.geometry import as_complex, dot2, in_parts
+from ..mesh.topology import previous_halfedge, twins
 
 # A facet this steep stands on the rim of the hull; its power centre is far out of any domain.
 STEEP = 1e-9

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .domain import Domain
-from .errors import TransportError
-from .geometry import as_complex, laplacian_from_weights
-from .multigrid import Laplacians
+from ..errors import TransportError
+from ..linalg.multigrid import Laplacians
+from ..mesh.geometry import as_complex, laplacian_from_weights
+from ..progress import Progress, Steps
+from .convex_domain import Domain
 from .power_diagram import PowerDiagram, power_diagram
-from .progress import Progress, Steps
-from .regular import by_flips
+from .regular_triangulation import by_flips
 
 TOLERANCE = 5e-7
 MAX_STEPS = 100

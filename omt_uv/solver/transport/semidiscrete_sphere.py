@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .errors import TransportError
-from .geometry import laplacian_from_weights
-from .multigrid import Laplacians
-from .progress import Progress, Steps
-from .spherical_power import Hull, SphericalCells, by_flips, by_hull, spherical_cells
+from ..errors import TransportError
+from ..linalg.multigrid import Laplacians
+from ..mesh.geometry import laplacian_from_weights
+from ..progress import Progress, Steps
+from .spherical_power_diagram import Hull, SphericalCells, by_flips, by_hull, spherical_cells
 
 TOLERANCE = 5e-7
 MAX_STEPS = 100

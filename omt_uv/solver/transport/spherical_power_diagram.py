@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from .errors import TransportError
-from .flips import flip_in_place, flip_until_none
-from .spherical import normalized, triangle_areas, triple_products
-from .topology import halfedges, previous_halfedge, twins
+from ..errors import TransportError
+from ..mesh.edge_flips import flip_in_place, flip_until_none
+from ..mesh.spherical_geometry import normalized, triangle_areas, triple_products
+from ..mesh.topology import halfedges, previous_halfedge, twins
 
 # Edges flip only where the hull is hollow by more than rounding can explain.
 ROUNDING = 1e-13

@@ -4,10 +4,11 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import curvature, measure
+from omt_uv.solver.analysis import curvature
+from omt_uv.solver.analysis import density as measure
+from omt_uv.solver.analysis.region_density import exact_share
 from omt_uv.solver.errors import DensityError, ShareError, WeightError
-from omt_uv.solver.exact_share import exact_share
-from omt_uv.solver.geometry import face_areas
+from omt_uv.solver.mesh.geometry import face_areas
 
 FACTORS = [0.25, 0.5, 1.0, 2.0, 4.0, 16.0]
 

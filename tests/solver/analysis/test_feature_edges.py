@@ -6,10 +6,10 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.features import region_borders, sharp_edges, within_resolution
+from omt_uv.solver.analysis.feature_edges import region_borders, sharp_edges, within_resolution
+from omt_uv.solver.mesh.topology import pair_keys
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remesh import remesh
-from omt_uv.solver.topology import pair_keys
+from omt_uv.solver.remeshing.remesh import remesh
 
 
 def gear(teeth=8):

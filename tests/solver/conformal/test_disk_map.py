@@ -6,10 +6,12 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 from omt_uv.solver import errors
-from omt_uv.solver.conformal import conformal_disk, conformal_rectangle, quarter_points, sharpest_corners
-from omt_uv.solver.doubling import double
-from omt_uv.solver.elliptic import centre_in_disk, rectangle_to_disk
-from omt_uv.solver.geometry import (
+from omt_uv.solver.conformal.disk_map import conformal_disk, conformal_rectangle, quarter_points, sharpest_corners
+from omt_uv.solver.conformal.double_cover import double
+from omt_uv.solver.conformal.intrinsic_triangulation import euclidean_diagonal, from_mesh, make_delaunay
+from omt_uv.solver.conformal.rectangle_to_disk import centre_in_disk, rectangle_to_disk
+from omt_uv.solver.conformal.yamabe_flow import yamabe_flow
+from omt_uv.solver.mesh.geometry import (
     angle_defects,
     angles_from_lengths,
     cotangent_laplacian,
@@ -18,10 +20,8 @@ from omt_uv.solver.geometry import (
     signed_areas,
     vertex_areas,
 )
-from omt_uv.solver.intrinsic import euclidean_diagonal, from_mesh, make_delaunay
+from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
-from omt_uv.solver.topology import boundary_loops
-from omt_uv.solver.yamabe import yamabe_flow
 
 SHAPES = {
     "grid": meshes.grid(12, 9),

@@ -4,8 +4,8 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import intrinsic
-from omt_uv.solver.topology import boundary_loops, next_halfedge, previous_halfedge, twins
+from omt_uv.solver.conformal import intrinsic_triangulation as intrinsic
+from omt_uv.solver.mesh.topology import boundary_loops, next_halfedge, previous_halfedge, twins
 
 
 def heron(log_length):

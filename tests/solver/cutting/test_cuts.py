@@ -9,11 +9,11 @@ import pytest
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from omt_uv.solver.chart_pins import CornerPins
-from omt_uv.solver.charts import split, triangle_surface
-from omt_uv.solver.cutting import cut
-from omt_uv.solver.parameterize import unwrap
-from omt_uv.solver.preparation import prepare
+from omt_uv.solver.cutting.cuts import cut
+from omt_uv.solver.cutting.disk_charts import prepare
+from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.parameterization.chart_pins import CornerPins
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
 sys.path.insert(0, str(meshes.ROOT / "benchmarks"))
@@ -241,7 +241,7 @@ def test_names_of_vertices_hardly_matter():
 
 
 def _fan(F):
-    from omt_uv.solver.topology import boundary_loops
+    from omt_uv.solver.mesh.topology import boundary_loops
 
     loop = boundary_loops(F)[0][::-1]
     return np.array([[loop[0], loop[k], loop[k + 1]] for k in range(1, len(loop) - 1)])
@@ -259,7 +259,7 @@ def test_holes_are_filled_and_the_longest_boundary_stays():
 
 
 def _loop(triangles):
-    from omt_uv.solver.topology import boundary_loops
+    from omt_uv.solver.mesh.topology import boundary_loops
 
     return boundary_loops(triangles)[0]
 
@@ -285,7 +285,7 @@ def test_a_path_is_really_shortest():
 
 
 def boundary(F):
-    from omt_uv.solver.topology import boundary_loops
+    from omt_uv.solver.mesh.topology import boundary_loops
 
     return boundary_loops(F)
 

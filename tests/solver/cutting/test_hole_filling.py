@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from omt_uv.solver.charts import triangle_surface
-from omt_uv.solver.cutting import cut
+from omt_uv.pipelines.unwrap import _in_one_piece
+from omt_uv.solver.cutting.cuts import cut
+from omt_uv.solver.cutting.disk_charts import prepare
 from omt_uv.solver.errors import NotADiskError
-from omt_uv.solver.geometry import face_areas
-from omt_uv.solver.parameterize import unwrap
-from omt_uv.solver.preparation import prepare
+from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.topology import boundary_loops
-from omt_uv.unwrapping import _in_one_piece
 
 
 def used(V, F):

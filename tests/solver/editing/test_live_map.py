@@ -6,10 +6,10 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.distortion import measure
-from omt_uv.solver.follow import Follower
-from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.improve import improve
+from omt_uv.solver.editing.live_map import Follower
+from omt_uv.solver.editing.refine_island import improve
+from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.progress import drain
 
 

@@ -4,19 +4,19 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import scores
-from omt_uv.solver.chart_map import unwrap_chart
-from omt_uv.solver.charts import split, triangle_surface
+from omt_uv.solver.analysis import vertex_scores as scores
+from omt_uv.solver.analysis.density import Target, from_vertices, normalised, share
+from omt_uv.solver.analysis.region_density import exact_share
+from omt_uv.solver.analysis.saliency import saliency
+from omt_uv.solver.editing.image_warp import warped
+from omt_uv.solver.editing.magnify import magnify_map, magnify_region
 from omt_uv.solver.errors import EmptyMeshError, FoldedUVError, WeightError
-from omt_uv.solver.exact_share import exact_share
-from omt_uv.solver.geometry import face_areas, signed_areas, vertex_areas
-from omt_uv.solver.lens import magnify_map, magnify_region
-from omt_uv.solver.measure import Target, from_vertices, normalised, share
-from omt_uv.solver.overlap import overlap_share
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.maps.overlap import overlap_share
+from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas, vertex_areas
+from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.saliency import saliency
-from omt_uv.solver.warp import warped
 
 
 def blob(points, centre, radius):

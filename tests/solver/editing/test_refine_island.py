@@ -4,22 +4,22 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.refining import refine_islands
+from omt_uv.pipelines.refine import refine_islands
+from omt_uv.pipelines.unwrap import Refusal
 from omt_uv.settings import RefineSettings
-from omt_uv.solver.chart_pins import CornerPins
-from omt_uv.solver.charts import triangle_surface
-from omt_uv.solver.contact import contact, crossings
-from omt_uv.solver.distortion import measure
-from omt_uv.solver.embedding import tutte
+from omt_uv.solver.editing.refine_island import STRAIGHTENED, boundary_edges, improve
+from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, PinError
-from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.improve import STRAIGHTENED, boundary_edges, improve
-from omt_uv.solver.islands import uv_islands
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.maps.tutte import tutte
+from omt_uv.solver.maps.untangle import arc_length_rim
+from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.chart_pins import CornerPins
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.topology import boundary_loops
-from omt_uv.solver.untangle import arc_length_rim
-from omt_uv.unwrapping import Refusal
+from omt_uv.solver.refinement.boundary_barrier import contact, crossings
 
 
 def head(count=16):

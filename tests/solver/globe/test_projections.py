@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from meshes import cube, head, icosphere
 
-from omt_uv.solver.orientation import MarkerError, along_axes, by_markers
-from omt_uv.solver.projections import (
+from omt_uv.solver.globe.projections import (
     EQUIRECT,
     LAMBERT,
     OCTAHEDRAL,
@@ -17,6 +16,7 @@ from omt_uv.solver.projections import (
     to_sphere,
     wrap_octahedral,
 )
+from omt_uv.solver.globe.rotation import MarkerError, along_axes, by_markers
 
 
 def random_points(count=4000, seed=0):

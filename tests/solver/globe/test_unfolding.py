@@ -7,12 +7,12 @@ import pytest
 from meshes import icosphere, polygon_surface
 from scipy.spatial import ConvexHull
 
-from omt_uv.solver.globe import Polygons, polygons_of, unfold
-from omt_uv.solver.globe_areas import equirectangular_areas, plane_areas, with_areas
-from omt_uv.solver.globe_poles import CONES, POLES, on_vertices, push
+from omt_uv.solver.globe.exact_areas import equirectangular_areas, plane_areas, with_areas
+from omt_uv.solver.globe.pole_vertices import CONES, POLES, on_vertices, push
+from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
+from omt_uv.solver.globe.unfolding import Polygons, polygons_of, unfold
+from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
-from omt_uv.solver.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
-from omt_uv.solver.spherical import signed_volumes, spherical_areas
 
 
 def random_sphere(count=400, seed=0, towards=(0.0, 0, 0)):

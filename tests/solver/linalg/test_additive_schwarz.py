@@ -8,16 +8,16 @@ import pytest
 import scipy.sparse as sp
 from counting import counted
 
-from omt_uv.solver import schwarz
-from omt_uv.solver.charts import triangle_surface
-from omt_uv.solver.energy import elements
 from omt_uv.solver.errors import PrecisionError
-from omt_uv.solver.geometry import face_areas
-from omt_uv.solver.newton import Assembly, Free, OnCircle, Problem, newton_direction
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.linalg import additive_schwarz as schwarz
+from omt_uv.solver.linalg.additive_schwarz import Overlapping
+from omt_uv.solver.maps.energy import elements
+from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.schwarz import Overlapping
-from omt_uv.solver.topology import boundary_loops
+from omt_uv.solver.refinement.projected_newton import Assembly, Free, OnCircle, Problem, newton_direction
 
 
 def flattened(kind, weight=500.0):

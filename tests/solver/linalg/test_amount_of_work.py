@@ -6,15 +6,15 @@ import pytest
 from counting import counted
 from scipy.sparse import csc_matrix, diags
 
-from omt_uv.solver.charts import triangle_surface
-from omt_uv.solver.dissection import Dissection
-from omt_uv.solver.domain import Disk
-from omt_uv.solver.linear import Factor, minimum_degree
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.linalg.nested_dissection import Dissection
+from omt_uv.solver.linalg.sparse import Factor, minimum_degree
+from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.topology import halfedges
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.regular import by_hull
-from omt_uv.solver.topology import halfedges
-from omt_uv.solver.transport import transport
+from omt_uv.solver.transport.convex_domain import Disk
+from omt_uv.solver.transport.regular_triangulation import by_hull
+from omt_uv.solver.transport.semidiscrete import transport
 
 
 def random_sites(count):
@@ -34,7 +34,8 @@ def test_transport_of_random_sites():
 
 
 def test_the_order_of_large_meshes_gives_the_same_maps(monkeypatch):
-    from omt_uv.solver import dissection, embedding
+    from omt_uv.solver.linalg import nested_dissection as dissection
+    from omt_uv.solver.maps import tutte as embedding
 
     V, F = meshes.head(40)
     (reference,) = drain(unwrap(triangle_surface(V, F))).maps

@@ -5,10 +5,10 @@ import pytest
 from counting import counted
 from scipy.spatial import Delaunay, cKDTree
 
-from omt_uv.solver import multigrid
-from omt_uv.solver.geometry import laplacian_from_weights
-from omt_uv.solver.linear import solve_spd
-from omt_uv.solver.multigrid import Laplacians, Multigrid
+from omt_uv.solver.linalg import multigrid
+from omt_uv.solver.linalg.multigrid import Laplacians, Multigrid
+from omt_uv.solver.linalg.sparse import solve_spd
+from omt_uv.solver.mesh.geometry import laplacian_from_weights
 
 
 def graph(count, stretch=1.0):

@@ -6,8 +6,8 @@ import pytest
 import scipy.sparse as sp
 
 from omt_uv.solver.errors import PrecisionError
-from omt_uv.solver.geometry import cotangent_laplacian
-from omt_uv.solver.linear import Factor, minimum_degree, solve_general, solve_spd
+from omt_uv.solver.linalg.sparse import Factor, minimum_degree, solve_general, solve_spd
+from omt_uv.solver.mesh.geometry import cotangent_laplacian
 
 
 def system():

@@ -11,9 +11,9 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.distortion import RATIO_FLOOR, face_distortion, measure
 from omt_uv.solver.errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from omt_uv.solver.overlap import overlap_share
+from omt_uv.solver.maps.distortion import RATIO_FLOOR, face_distortion, measure
+from omt_uv.solver.maps.overlap import overlap_share
 
 JUDGE = Path(os.environ.get("OMT_UV_JUDGE") or meshes.ROOT.parent / "shared" / "tools" / "judge_uv.py")
 needs_judge = pytest.mark.skipif(not JUDGE.is_file(), reason=f"no judge at {JUDGE}: set OMT_UV_JUDGE to judge_uv.py")

@@ -6,9 +6,9 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.geometry import signed_areas
-from omt_uv.solver.topology import boundary_loops
-from omt_uv.solver.unfold import straightened
+from omt_uv.solver.maps.local_untangle import straightened
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
 
 
 def flat(columns=12, rows=10):

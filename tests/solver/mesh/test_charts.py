@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import errors
-from omt_uv.solver.charts import split, triangle_surface
-from omt_uv.solver.topology import boundary_loops
+from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.topology import boundary_loops
 
 
 def surface(V, F, seams=()):

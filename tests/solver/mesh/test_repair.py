@@ -3,17 +3,18 @@
 import meshes
 import numpy as np
 import pytest
-import test_fuzz
+from broken_meshes import broken_mesh
 
-from omt_uv.solver import errors, repair
-from omt_uv.solver.chart_map import unwrap_chart
-from omt_uv.solver.charts import degenerate_triangles, triangle_surface
-from omt_uv.solver.cutting import cut
-from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.parameterize import unwrap
-from omt_uv.solver.preparation import prepare
+from omt_uv.solver import errors
+from omt_uv.solver.cutting.cuts import cut
+from omt_uv.solver.cutting.disk_charts import prepare
+from omt_uv.solver.mesh import repair
+from omt_uv.solver.mesh.charts import degenerate_triangles, triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.gluing import corner_classes
+from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.sheets import corner_classes
 
 
 def prepared(V, F, seams=(), **options):
@@ -294,7 +295,7 @@ def test_a_diagonal_between_two_corners_on_one_vertex():
 def test_every_mesh_becomes_disks_or_has_a_named_fault(chunk):
     """`prepare` checks every chart itself; only what has no numbers, no faces or no area at all may stop it."""
     for seed in range(100 * chunk, 100 * (chunk + 1)):
-        surface, faces, _ = test_fuzz.broken_mesh(seed)
+        surface, faces, _ = broken_mesh(seed)
         try:
             result = prepare(surface, faces, fill_holes=seed % 3 == 0)
         except (errors.EmptyMeshError, errors.NonFiniteError):

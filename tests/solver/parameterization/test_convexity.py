@@ -7,12 +7,12 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.charts import split
-from omt_uv.solver.convex import opened
-from omt_uv.solver.corner_patches import affordable
-from omt_uv.solver.corners import Barrier, Corners, convex_corners
-from omt_uv.solver.geometry import signed_areas
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.mesh.charts import split
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.parameterization.convexity import opened
+from omt_uv.solver.parameterization.corner_solver import affordable
+from omt_uv.solver.parameterization.polygon_corners import Barrier, Corners, convex_corners
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
 

@@ -4,12 +4,12 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.budget import unwrap_within
-from omt_uv.solver.chart_map import unwrap_chart
-from omt_uv.solver.charts import split, triangle_surface
-from omt_uv.solver.preparation import prepare
+from omt_uv.solver.cutting.disk_charts import prepare
+from omt_uv.solver.cutting.shear_slit import slit
+from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.shear_bound import unwrap_within
 from omt_uv.solver.progress import drain
-from omt_uv.solver.slits import slit
 
 
 def draft(chart):

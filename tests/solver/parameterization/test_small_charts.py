@@ -4,14 +4,14 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import batches
-from omt_uv.solver.batches import MANY
-from omt_uv.solver.charts import triangle_rows, triangle_surface
-from omt_uv.solver.distortion import measure
-from omt_uv.solver.exact_share import exact_share
-from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.measure import Target
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.analysis.region_density import exact_share
+from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.mesh.charts import triangle_rows, triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.parameterization import small_charts as batches
+from omt_uv.solver.parameterization.small_charts import MANY
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
 SHAPES = ["bumpy", "cone", "hemisphere", "random_disk", "comb", "grid", "quad_patch", "spiral_strip"]

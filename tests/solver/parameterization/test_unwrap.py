@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import errors
-from omt_uv.solver.chart_map import unwrap_chart
-from omt_uv.solver.charts import split, triangle_surface
-from omt_uv.solver.distortion import measure
-from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import Progress, drain
-from omt_uv.solver.topology import boundary_loops
 
 BOUNDARIES = ["free", "disk", "square"]
 

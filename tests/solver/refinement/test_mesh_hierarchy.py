@@ -4,19 +4,19 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.charts import split, triangle_rows, triangle_surface
-from omt_uv.solver.contact import crossings
-from omt_uv.solver.disk_coarsening import coarsened
-from omt_uv.solver.domain import Disk
-from omt_uv.solver.energy import elements, energy
-from omt_uv.solver.exact_share import exact_share
-from omt_uv.solver.first_map import COARSE_ABOVE, mean_value_sites
-from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.measure import Target, share
-from omt_uv.solver.parameterize import unwrap
+from omt_uv.solver.analysis.density import Target, share
+from omt_uv.solver.analysis.region_density import exact_share
+from omt_uv.solver.maps.energy import elements, energy
+from omt_uv.solver.mesh.charts import split, triangle_rows, triangle_surface
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops, twins
+from omt_uv.solver.parameterization.initial_map import COARSE_ABOVE, mean_value_sites
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.smoothing import smoothed
-from omt_uv.solver.topology import boundary_loops, twins
+from omt_uv.solver.refinement.boundary_barrier import crossings
+from omt_uv.solver.refinement.mesh_hierarchy import coarsened
+from omt_uv.solver.refinement.vertex_sweeps import smoothed
+from omt_uv.solver.transport.convex_domain import Disk
 
 SHAPES = ["head", "random_disk", "cap", "bumpy", "grid"]
 

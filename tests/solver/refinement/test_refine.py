@@ -4,18 +4,26 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import energy as E
-from omt_uv.solver.contact import box_pairs, contact, crossings
-from omt_uv.solver.embedding import tutte
 from omt_uv.solver.errors import DensityError, FoldedUVError, PinError
-from omt_uv.solver.geometry import face_areas, signed_areas
-from omt_uv.solver.newton import Assembly, Free, OnCircle, Problem, first_fold, newton_direction, newton_step
-from omt_uv.solver.overlap import overlap_share
+from omt_uv.solver.maps import energy as E
+from omt_uv.solver.maps.overlap import overlap_share
+from omt_uv.solver.maps.tutte import tutte
+from omt_uv.solver.maps.untangle import arc_length_rim, count_folds, untangle
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import Progress, drain
-from omt_uv.solver.refine import BOUNDARIES, refine
-from omt_uv.solver.stages import QUALITIES
-from omt_uv.solver.topology import boundary_loops
-from omt_uv.solver.untangle import arc_length_rim, count_folds, untangle
+from omt_uv.solver.refinement.boundary_barrier import box_pairs, contact, crossings
+from omt_uv.solver.refinement.continuation import QUALITIES
+from omt_uv.solver.refinement.projected_newton import (
+    Assembly,
+    Free,
+    OnCircle,
+    Problem,
+    first_fold,
+    newton_direction,
+    newton_step,
+)
+from omt_uv.solver.refinement.refine import BOUNDARIES, refine
 
 STANDARD = QUALITIES["standard"].area_error
 

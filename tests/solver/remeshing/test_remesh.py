@@ -8,8 +8,6 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import part_maps
-from omt_uv.solver.bisection import fine_enough
 from omt_uv.solver.errors import (
     CountError,
     DensityError,
@@ -18,15 +16,17 @@ from omt_uv.solver.errors import (
     OrientationError,
     PrecisionError,
 )
-from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
-from omt_uv.solver.part_maps import Original, PartMaps
-from omt_uv.solver.parts import split_parts
+from omt_uv.solver.mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
+from omt_uv.solver.mesh.topology import boundary_loops, halfedges, pair_keys, twins
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remesh import STRATEGIES, remesh, summed_up
-from omt_uv.solver.sphere_sampling import sample_sphere
-from omt_uv.solver.topology import boundary_loops, halfedges, pair_keys, twins
-from omt_uv.solver.touching import opened
-from omt_uv.solver.voronoi import voronoi_cells
+from omt_uv.solver.remeshing.components.coincident_boundaries import opened
+from omt_uv.solver.remeshing.components.components import split_parts
+from omt_uv.solver.remeshing.edits.long_edges import fine_enough
+from omt_uv.solver.remeshing.initial import component_maps as part_maps
+from omt_uv.solver.remeshing.initial.component_maps import Original, PartMaps
+from omt_uv.solver.remeshing.initial.sphere_samples import sample_sphere
+from omt_uv.solver.remeshing.relaxation.voronoi_cells import voronoi_cells
+from omt_uv.solver.remeshing.remesh import STRATEGIES, remesh, summed_up
 
 CASES = {
     "disk": lambda: meshes.bumpy(24, 24),

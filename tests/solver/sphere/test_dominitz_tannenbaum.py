@@ -7,12 +7,12 @@ import pytest
 from meshes import icosphere
 from scipy.spatial import ConvexHull
 
-from omt_uv.solver.moser import carried, edge_fluxes, moser_map
+from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
+from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.progress import drain
-from omt_uv.solver.sphere_flow import descent, flow_map
-from omt_uv.solver.spherical import signed_volumes, spherical_areas
-from omt_uv.solver.stream import best_flow, level, pairs, transported, velocity
-from omt_uv.solver.topology import twins
+from omt_uv.solver.sphere.dominitz_tannenbaum import descent, flow_map
+from omt_uv.solver.sphere.moser_flow import carried, edge_fluxes, moser_map
+from omt_uv.solver.sphere.stream_functions import best_flow, level, pairs, transported, velocity
 
 
 def random_sphere(count=500, seed=0):

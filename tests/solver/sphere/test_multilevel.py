@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from omt_uv.solver.geometry import face_areas
-from omt_uv.solver.globe_poles import CONES, POLES, on_vertices
+from omt_uv.solver.globe.pole_vertices import CONES, POLES, on_vertices
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
-from omt_uv.solver.sphere import sphere_map
-from omt_uv.solver.sphere_multilevel import multilevel_start
-from omt_uv.solver.sphere_newton import seen
-from omt_uv.solver.spherical import signed_volumes, spherical_areas
+from omt_uv.solver.sphere.multilevel import multilevel_start
+from omt_uv.solver.sphere.newton import seen
+from omt_uv.solver.sphere.sphere_map import sphere_map
 
 
 def creature(body=3, length=12, width=1, limbs=6):

@@ -5,21 +5,21 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import errors
-from omt_uv.solver.coarsening import coarsened
-from omt_uv.solver.energy import derivatives_of, elements
-from omt_uv.solver.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
-from omt_uv.solver.moebius import boost, centred, to_plane, to_sphere
-from omt_uv.solver.newton import Assembly
+from omt_uv.solver.conformal.moebius import boost, centred, to_plane, to_sphere
+from omt_uv.solver.maps.energy import derivatives_of, elements
+from omt_uv.solver.mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
+from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
+from omt_uv.solver.mesh.topology import halfedges, twins
 from omt_uv.solver.progress import drain
-from omt_uv.solver.sphere import sphere_map
-from omt_uv.solver.sphere_conformal import conformal_sphere
-from omt_uv.solver.sphere_multilevel import multilevel_start
-from omt_uv.solver.sphere_newton import SphereProblem, derivatives, moved, newton_direction, seen, tangents
-from omt_uv.solver.sphere_refine import sphere_refine
-from omt_uv.solver.sphere_transport import sphere_transport
-from omt_uv.solver.spherical import normalized, signed_volumes, spherical_areas
-from omt_uv.solver.spherical_power import Hull, by_flips, by_hull, spherical_cells
-from omt_uv.solver.topology import halfedges, twins
+from omt_uv.solver.refinement.projected_newton import Assembly
+from omt_uv.solver.sphere.coarsen import coarsened
+from omt_uv.solver.sphere.conformal import conformal_sphere
+from omt_uv.solver.sphere.multilevel import multilevel_start
+from omt_uv.solver.sphere.newton import SphereProblem, derivatives, moved, newton_direction, seen, tangents
+from omt_uv.solver.sphere.refine import sphere_refine
+from omt_uv.solver.sphere.sphere_map import sphere_map
+from omt_uv.solver.transport.semidiscrete_sphere import sphere_transport
+from omt_uv.solver.transport.spherical_power_diagram import Hull, by_flips, by_hull, spherical_cells
 
 TETRAHEDRON = (
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]),

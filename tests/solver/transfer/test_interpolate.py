@@ -6,12 +6,12 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import transfer
-from omt_uv.solver.closest import ClosestPoint, vertex_normals
-from omt_uv.solver.features import region_borders, sharp_edges, value_jumps
-from omt_uv.solver.footprint import footprint
-from omt_uv.solver.sides import cut_open
-from omt_uv.solver.topology import halfedges, pair_keys
+from omt_uv.solver.analysis.feature_edges import region_borders, sharp_edges, value_jumps
+from omt_uv.solver.mesh.closest_point import ClosestPoint, vertex_normals
+from omt_uv.solver.mesh.cut_mesh import cut_open
+from omt_uv.solver.mesh.topology import halfedges, pair_keys
+from omt_uv.solver.transfer import interpolate as transfer
+from omt_uv.solver.transfer.correspondence import footprint
 
 
 def fine_and_coarse(turn=0.0, subdivisions=2):

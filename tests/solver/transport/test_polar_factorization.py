@@ -4,12 +4,12 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.conformal import conformal_disk
-from omt_uv.solver.domain import Disk, Rectangle
+from omt_uv.solver.conformal.disk_map import conformal_disk
 from omt_uv.solver.errors import TransportError
-from omt_uv.solver.geometry import vertex_areas
-from omt_uv.solver.polar import polar_factorisation
+from omt_uv.solver.mesh.geometry import vertex_areas
 from omt_uv.solver.progress import drain
+from omt_uv.solver.transport.convex_domain import Disk, Rectangle
+from omt_uv.solver.transport.polar_factorization import polar_factorisation
 
 BALANCES = (0.0, 0.25, 0.5, 0.75, 1.0)
 

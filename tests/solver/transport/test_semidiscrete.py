@@ -7,13 +7,13 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import Delaunay
 
 from omt_uv.solver import errors
-from omt_uv.solver.conformal import conformal_disk
-from omt_uv.solver.domain import ConvexPolygon, Disk, Rectangle, segment_integrals
-from omt_uv.solver.geometry import vertex_areas
-from omt_uv.solver.power_diagram import power_diagram
+from omt_uv.solver.conformal.disk_map import conformal_disk
+from omt_uv.solver.mesh.geometry import vertex_areas
 from omt_uv.solver.progress import drain
-from omt_uv.solver.regular import by_flips, by_hull
-from omt_uv.solver.transport import transport
+from omt_uv.solver.transport.convex_domain import ConvexPolygon, Disk, Rectangle, segment_integrals
+from omt_uv.solver.transport.power_diagram import power_diagram
+from omt_uv.solver.transport.regular_triangulation import by_flips, by_hull
+from omt_uv.solver.transport.semidiscrete import transport
 
 DOMAINS = {
     "disk": Disk(),

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .sides import cut_open
-from .topology import halfedges, pair_keys, pair_up
+from ...mesh.cut_mesh import cut_open
+from ...mesh.topology import halfedges, pair_keys, pair_up
 
 
 @dataclass(frozen=True)

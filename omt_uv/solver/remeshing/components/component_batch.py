@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .parts import Part
+from .components import Part
 
 # Boxes of the parts lie on a grid with so many times the extent of the largest from one to the next: farther apart than
 # what is opposite to a vertex on its own part.

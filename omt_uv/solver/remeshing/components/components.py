@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import Chart, assemble, chosen_triangles, triangle_surface
-from .errors import OrientationError, ZeroAreaFaceError
-from .geometry import face_areas
-from .repair import join
-from .sheets import orientations, turn_over
-from .topology import halfedges, pair_keys, twins
-from .touching import join_touching
+from ...errors import OrientationError, ZeroAreaFaceError
+from ...mesh.charts import Chart, assemble, chosen_triangles, triangle_surface
+from ...mesh.geometry import face_areas
+from ...mesh.gluing import orientations, turn_over
+from ...mesh.repair import join
+from ...mesh.topology import halfedges, pair_keys, twins
+from .coincident_boundaries import join_touching
 
 
 @dataclass(frozen=True)

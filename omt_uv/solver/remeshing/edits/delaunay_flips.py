@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .closest import unit
-from .flips import flip_in_place, flip_until_none
-from .topology import halfedges, pair_keys, previous_halfedge, twins
+from ...mesh.closest_point import unit
+from ...mesh.edge_flips import flip_in_place, flip_until_none
+from ...mesh.topology import halfedges, pair_keys, previous_halfedge, twins
 
 # The new faces of a flip may lean against the old ones by this cosine at most.
 LEAST_COSINE = 0.5

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from .counts import edge_size
-from .mesh_edits import independent_splits, split_edges
-from .parts import Part
-from .topology import halfedges, next_halfedge, pair_keys, previous_halfedge, twins
+from ...mesh.topology import halfedges, next_halfedge, pair_keys, previous_halfedge, twins
+from ..components.components import Part
+from .split_collapse import independent_splits, split_edges
+from .vertex_count import edge_size
 
 # No edge is longer than so many times that of as many equilateral triangles as so many vertices have.
 LONGEST, VERTICES = 2.5, 1000

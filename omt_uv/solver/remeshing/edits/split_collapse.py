@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from .closest import unit
-from .topology import halfedges, pair_keys, previous_halfedge, twins
+from ...mesh.closest_point import unit
+from ...mesh.topology import halfedges, pair_keys, previous_halfedge, twins
 
 # A face may turn by this cosine at most when an edge at it collapses.
 LEAST_COSINE, ANY_COSINE = 0.3, -2.0

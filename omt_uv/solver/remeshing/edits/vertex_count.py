@@ -8,12 +8,20 @@ from typing import TypeAlias
 
 import numpy as np
 
-from .closest import ClosestPoint
-from .draft import Draft
-from .embedded_flips import make_delaunay_embedded
-from .mesh_edits import ANY_COSINE, LEAST_COSINE, Edit, collapse_edges, independent_splits, interior_edges, split_edges
-from .parts import Part
-from .topology import boundary_loops, halfedges, twins
+from ...mesh.closest_point import ClosestPoint
+from ...mesh.topology import boundary_loops, halfedges, twins
+from ..components.components import Part
+from .delaunay_flips import make_delaunay_embedded
+from .split_collapse import (
+    ANY_COSINE,
+    LEAST_COSINE,
+    Edit,
+    collapse_edges,
+    independent_splits,
+    interior_edges,
+    split_edges,
+)
+from .working_mesh import Draft
 
 
 class StuckError(Exception):

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .closest import ClosestPoint, Located, Memory, face_normals, subdivision_centroids
-from .geometry import face_areas
-from .surface_samples import Samples
-from .topology import expand
+from ...mesh.closest_point import ClosestPoint, Located, Memory, face_normals, subdivision_centroids
+from ...mesh.geometry import face_areas
+from ...mesh.topology import expand
+from ..relaxation.surface_samples import Samples
 
 # Samples of every triangle are this squared; what the vertices weigh next to them.
 PATTERN = 2

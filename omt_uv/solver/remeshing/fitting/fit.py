@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .closest import ClosestPoint, Memory
-from .draft import Draft
-from .fitting import Fitting
-from .pairs import Pairing
-from .peaks import lower_peaks
-from .progress import Progress, Steps, part_of
-from .surface_samples import area_samples, joined, tip_samples
+from ...mesh.closest_point import ClosestPoint, Memory
+from ...progress import Progress, Steps, part_of
+from ..edits.working_mesh import Draft
+from ..relaxation.surface_samples import area_samples, joined, tip_samples
+from .closest_pairs import Pairing
+from .fit_state import Fitting
+from .hausdorff_peaks import lower_peaks
 
 ROUNDS = 5
 # Samples of the surface per vertex.

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from .closest import Memory, vertex_normals
-from .displacement import displacements
-from .draft import Draft
-from .embedded_flips import make_delaunay_embedded
-from .pairs import Pairing, Pairs
-from .topology import twins
-from .voronoi import voronoi_cells
+from ...mesh.closest_point import Memory, vertex_normals
+from ...mesh.topology import twins
+from ..edits.delaunay_flips import make_delaunay_embedded
+from ..edits.working_mesh import Draft
+from ..relaxation.voronoi_cells import voronoi_cells
+from .closest_pairs import Pairing, Pairs
+from .least_squares import displacements
 
 # Vertices stay within this share of an edge of the surface.
 TETHER = 0.15

@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from .closest import ClosestPoint, vertex_normals
-from .draft import Draft
-from .fitting import Fitting
-from .geometry import face_areas
-from .pairs import DENSE, DENSER, Pairing, Pairs, Start
-from .patches import Patches, apart, cut_out, grown
-from .progress import Progress, Steps
-from .search import search
-from .surface_samples import Samples, joined
-from .trials import TRIALS, Batch, norms, peaks_of, put_back, shapes, sound
+from ...mesh.closest_point import ClosestPoint, vertex_normals
+from ...mesh.geometry import face_areas
+from ...progress import Progress, Steps
+from ..edits.working_mesh import Draft
+from ..relaxation.surface_samples import Samples, joined
+from .closest_pairs import DENSE, DENSER, Pairing, Pairs, Start
+from .fit_state import Fitting
+from .local_trials import TRIALS, Batch, norms, peaks_of, put_back, shapes, sound
+from .random_search import search
+from .ring_patches import Patches, apart, cut_out, grown
 
 # Distances of so many times the usual one are peaks.
 PEAK = 8.0

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from .closest import face_normals, vertex_normals
-from .linear import by_gradients
-from .pairs import Pairs
-from .springs import Fairness, equilateral, smallness
-from .topology import halfedges
+from ...linalg.sparse import by_gradients
+from ...mesh.closest_point import face_normals, vertex_normals
+from ...mesh.topology import halfedges
+from .closest_pairs import Pairs
+from .shape_terms import Fairness, equilateral, smallness
 
 # Weights next to the distances: of even displacements, of the centroids along the surface, of no displacement at all.
 FAIRNESS = 0.02

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .closest import Memory, face_normals
-from .draft import Draft
-from .embedded_flips import flip_where_sound
-from .fitting import Fitting
-from .geometry import angles_from_lengths, halfedge_lengths
-from .pairs import NEVER, Pairing, Pairs, Start
-from .patches import Patches
-from .surface_samples import picked
-from .topology import halfedges, pair_keys, twins
+from ...mesh.closest_point import Memory, face_normals
+from ...mesh.geometry import angles_from_lengths, halfedge_lengths
+from ...mesh.topology import halfedges, pair_keys, twins
+from ..edits.delaunay_flips import flip_where_sound
+from ..edits.working_mesh import Draft
+from ..relaxation.surface_samples import picked
+from .closest_pairs import NEVER, Pairing, Pairs, Start
+from .fit_state import Fitting
+from .ring_patches import Patches
 
 # Nothing but the steps, one of three vertices put on the peak first, or one of three edges flipped first.
 TRIALS = 7

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .closest import face_normals
-from .fitting import Fitting
-from .geometry import least_angles
-from .pairs import Pairs
-from .patches import Patches
-from .springs import smallness
-from .topology import halfedges
-from .trials import Batch, norms, peaks_of, put_back, shapes, sound
+from ...mesh.closest_point import face_normals
+from ...mesh.geometry import least_angles
+from ...mesh.topology import halfedges
+from .closest_pairs import Pairs
+from .fit_state import Fitting
+from .local_trials import Batch, norms, peaks_of, put_back, shapes, sound
+from .ring_patches import Patches
+from .shape_terms import smallness
 
 # Copies of every patch, the first of which stays as it is, are at least so many, and of all patches about so many
 # together; how often these are made.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .closest import face_normals
-from .geometry import least_angles
-from .topology import halfedges
+from ...mesh.closest_point import face_normals
+from ...mesh.geometry import least_angles
+from ...mesh.topology import halfedges
 
 # Where angles fall below the first, springs set in, and are twice as strong as STRENGTH at most where they are smaller
 # than twice the way to the second.

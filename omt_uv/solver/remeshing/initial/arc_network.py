@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import Chart
-from .topology import boundary_loops, pair_keys
+from ...mesh.charts import Chart
+from ...mesh.topology import boundary_loops, pair_keys
 
 # A boundary or a feature that turns by more than this, radians, has a corner there.
 CORNER = np.radians(50.0)

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .arcs import ArcSamples, Network
-from .parts import Part
-from .topology import boundary_loops, pair_keys
+from ...mesh.topology import boundary_loops, pair_keys
+from ..components.components import Part
+from .arc_network import ArcSamples, Network
 
 # A sample is the mean of its part of the boundary, at so many points, those near to it weighing more: frays that the
 # new edges are too long to show vanish, and what they can show stays.

@@ -7,16 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from .bisection import fine_enough
-from .chart_maps import Image, conformal_image, preserving_image
-from .charts import Chart, triangle_surface
-from .errors import MeshError
-from .parts import Part, Parts, split_parts
-from .piles import piled
-from .preparation import prepare
-from .progress import Steps, part_of
-from .sphere_conformal import ConformalSphere, conformal_sphere
-from .sphere_sampling import sphere_image
+from ...cutting.disk_charts import prepare
+from ...errors import MeshError
+from ...mesh.charts import Chart, triangle_surface
+from ...progress import Steps, part_of
+from ...sphere.conformal import ConformalSphere, conformal_sphere
+from ..components.component_batch import piled
+from ..components.components import Part, Parts, split_parts
+from ..edits.long_edges import fine_enough
+from .disk_images import Image, conformal_image, preserving_image
+from .sphere_samples import sphere_image
 
 # Where the time of two maps goes, as start and width.
 FIRST, SECOND = (0.0, 0.5), (0.5, 0.5)

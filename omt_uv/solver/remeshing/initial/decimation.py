@@ -9,15 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from .arcs import Arc, ArcSamples
-from .bisection import bisected
-from .closest import ClosestPoint
-from .counts import EdgeSize, StuckError, adjust_count
-from .draft import Draft
-from .embedded_flips import make_delaunay_embedded
-from .lines import Lined, only_between, with_samples, without_short
-from .parts import Part
-from .topology import pair_keys, twins
+from ...mesh.closest_point import ClosestPoint
+from ...mesh.topology import pair_keys, twins
+from ..components.components import Part
+from ..edits.delaunay_flips import make_delaunay_embedded
+from ..edits.long_edges import bisected
+from ..edits.vertex_count import EdgeSize, StuckError, adjust_count
+from ..edits.working_mesh import Draft
+from .arc_network import Arc, ArcSamples
+from .feature_lines import Lined, only_between, with_samples, without_short
 
 # Edges up to so many times as long as wanted need not be halved, and shorter ones than so many collapse before.
 LONGEST, SHORTEST = 1.3, 0.3

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .conformal import conformal_disk
-from .domain import Disk
-from .embedding import arc_length_parameters, tutte
-from .errors import PrecisionError, TransportError
-from .first_map import SITE_RESOLUTION, centroid_map
-from .geometry import halfedge_lengths, vertex_areas
-from .progress import Steps
-from .topology import boundary_loops
-from .transport import transport
-from .untangle import untangle
+from ...conformal.disk_map import conformal_disk
+from ...errors import PrecisionError, TransportError
+from ...maps.tutte import arc_length_parameters, tutte
+from ...maps.untangle import untangle
+from ...mesh.geometry import halfedge_lengths, vertex_areas
+from ...mesh.topology import boundary_loops
+from ...parameterization.initial_map import SITE_RESOLUTION, centroid_map
+from ...progress import Steps
+from ...transport.convex_domain import Disk
+from ...transport.semidiscrete import transport
 
 # Samples need no exact maps: angle sums of the flat metric may be off by this, in radians, and areas by this share.
 ANGLES, AREAS = 1e-2, 0.1

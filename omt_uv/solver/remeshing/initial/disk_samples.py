@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arcs import Border
-from .domain import Disk
-from .embedding import tutte
-from .errors import TransportError
-from .point_location import locate
-from .power_diagram import power_diagram
-from .regular import by_hull
-from .topology import twins
+from ...errors import TransportError
+from ...maps.tutte import tutte
+from ...mesh.point_location import locate
+from ...mesh.topology import twins
+from ...transport.convex_domain import Disk
+from ...transport.power_diagram import power_diagram
+from ...transport.regular_triangulation import by_hull
+from .arc_network import Border
 
 ROUNDS = 2
 # Strategies name the map to sample on and the map to triangulate on.

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arcs import Arc, ArcSamples
-from .bisection import split_part
-from .mesh_edits import ANY_COSINE, LEAST_COSINE, collapse_edges, independent_splits, interior_edges
-from .parts import Part
-from .topology import halfedges, pair_keys
+from ...mesh.topology import halfedges, pair_keys
+from ..components.components import Part
+from ..edits.long_edges import split_part
+from ..edits.split_collapse import ANY_COSINE, LEAST_COSINE, collapse_edges, independent_splits, interior_edges
+from .arc_network import Arc, ArcSamples
 
 # Samples nearer than this share of an edge to its end are there.
 AT_END = 1e-9

@@ -6,22 +6,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arcs import ArcSamples, Border, Network, border, network, sample_arcs
-from .assembly import glue
-from .charts import Chart
-from .counts import edge_size
-from .draft import Draft
-from .errors import PrecisionError
-from .geometry import face_areas
-from .part_maps import PartMaps
-from .parts import Part
-from .progress import Progress, Steps, part_of
-from .rims import smooth_rims
-from .sampling import STRATEGIES, Patch, even_map, triangulate_chart
-from .simplified import simplified, simplified_between
-from .sphere_sampling import sample_sphere
-from .topology import pair_keys
-from .touching import copies
+from ...errors import PrecisionError
+from ...mesh.charts import Chart
+from ...mesh.geometry import face_areas
+from ...mesh.topology import pair_keys
+from ...progress import Progress, Steps, part_of
+from ..components.coincident_boundaries import copies
+from ..components.components import Part
+from ..edits.vertex_count import edge_size
+from ..edits.working_mesh import Draft
+from .arc_network import ArcSamples, Border, Network, border, network, sample_arcs
+from .boundary_samples import smooth_rims
+from .component_maps import PartMaps
+from .decimation import simplified, simplified_between
+from .disk_samples import STRATEGIES, Patch, even_map, triangulate_chart
+from .sphere_samples import sample_sphere
+from .stitching import glue
 
 # Vertices that every part has at first, and parts of a pile in the mean.
 FEWEST, FEWEST_IN_PILE = 100, 24

@@ -10,17 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .closed import closed_surface
-from .errors import PrecisionError, TransportError
-from .geometry import vertex_areas
-from .moebius import centred
-from .point_location import locate
-from .progress import Steps
-from .sphere_conformal import ConformalSphere
-from .sphere_transport import sphere_transport
-from .spherical import normalized
-from .spherical_power import Hull, by_hull, spherical_cells
-from .topology import twins
+from ...conformal.moebius import centred
+from ...errors import PrecisionError, TransportError
+from ...mesh.closed_surface import closed_surface
+from ...mesh.geometry import vertex_areas
+from ...mesh.point_location import locate
+from ...mesh.spherical_geometry import normalized
+from ...mesh.topology import twins
+from ...progress import Steps
+from ...sphere.conformal import ConformalSphere
+from ...transport.semidiscrete_sphere import sphere_transport
+from ...transport.spherical_power_diagram import Hull, by_hull, spherical_cells
 
 # Rounds of moving samples to the centroids of their cells.
 ROUNDS = 5

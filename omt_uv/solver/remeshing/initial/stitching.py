@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arcs import Border
-from .mesh_edits import independent_splits, split_edges
-from .sampling import Patch
-from .topology import halfedges, pair_keys, twins
+from ...mesh.topology import halfedges, pair_keys, twins
+from ..edits.split_collapse import independent_splits, split_edges
+from .arc_network import Border
+from .disk_samples import Patch
 
 MOST_ROUNDS = 50
 

@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .carrier import Carrier
-from .closest import vertex_normals
-from .descent import Descent
-from .draft import Draft
-from .embedded_flips import make_delaunay_embedded
-from .geometry import vertex_areas
-from .progress import Progress, Steps
-from .topology import twins
-from .voronoi import Cells, voronoi_cells
+from ...linalg.lbfgs import Descent
+from ...mesh.closest_point import vertex_normals
+from ...mesh.geometry import vertex_areas
+from ...mesh.topology import twins
+from ...progress import Progress, Steps
+from ..edits.delaunay_flips import make_delaunay_embedded
+from ..edits.working_mesh import Draft
+from .surface_carrier import Carrier
+from .voronoi_cells import Cells, voronoi_cells
 
 # No vertex moves farther in one step, in shares of its shortest edge's length.
 REACH = 0.4

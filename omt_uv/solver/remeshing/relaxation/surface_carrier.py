@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .closest import ClosestPoint, Memory
+from ...mesh.closest_point import ClosestPoint, Memory
 from .surface_samples import Samples, area_samples, crest_samples
 
 SAMPLES_PER_POINT = 6

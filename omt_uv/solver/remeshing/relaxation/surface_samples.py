@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 import scipy.sparse as sp
 
-from .closest import ClosestPoint, closest_on_triangles, spread_points
-from .geometry import cotangent_laplacian, face_areas
-from .linear import solve_spd
+from ...linalg.sparse import solve_spd
+from ...mesh.closest_point import ClosestPoint, closest_on_triangles, spread_points
+from ...mesh.geometry import cotangent_laplacian, face_areas
 
 # Normals are smoothed over this share of an edge of the new mesh; where they then cancel by more than BLUNT there is
 # a crest or a hollow that is sharp at this scale.

@@ -11,14 +11,14 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from .carrier import Carrier
-from .closest import vertex_normals
-from .counts import Size, adjust_count, settled
-from .draft import Draft
-from .geometry import laplacian_from_weights
-from .linear import solve_by_gradients
-from .mesh_edits import Edit, collapse_edges, independent_splits, interior_edges, split_edges
-from .topology import halfedges, previous_halfedge, twins
+from ...linalg.sparse import solve_by_gradients
+from ...mesh.closest_point import vertex_normals
+from ...mesh.geometry import laplacian_from_weights
+from ...mesh.topology import halfedges, previous_halfedge, twins
+from ..edits.split_collapse import Edit, collapse_edges, independent_splits, interior_edges, split_edges
+from ..edits.vertex_count import Size, adjust_count, settled
+from ..edits.working_mesh import Draft
+from .surface_carrier import Carrier
 
 # Surpluses are evened out over this many edges: a few cells are too few to count on.
 REACH = 8.0

@@ -6,13 +6,13 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver import peaks
-from omt_uv.solver.closest import ClosestPoint, vertex_normals
-from omt_uv.solver.geometry import angle_defects, angles_from_lengths, halfedge_lengths
-from omt_uv.solver.patches import apart, cut_out, grown
+from omt_uv.solver.mesh.closest_point import ClosestPoint, vertex_normals
+from omt_uv.solver.mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
+from omt_uv.solver.mesh.topology import boundary_loops, twins
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remesh import remesh
-from omt_uv.solver.topology import boundary_loops, twins
+from omt_uv.solver.remeshing.fitting import hausdorff_peaks as peaks
+from omt_uv.solver.remeshing.fitting.ring_patches import apart, cut_out, grown
+from omt_uv.solver.remeshing.remesh import remesh
 
 
 def farthest(V, F, result) -> float:

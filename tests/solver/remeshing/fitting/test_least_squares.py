@@ -5,11 +5,11 @@ from __future__ import annotations
 import meshes
 import numpy as np
 
-from omt_uv.solver import displacement
-from omt_uv.solver.closest import face_normals
-from omt_uv.solver.displacement import displacements
-from omt_uv.solver.pairs import Pairs
-from omt_uv.solver.topology import twins
+from omt_uv.solver.mesh.closest_point import face_normals
+from omt_uv.solver.mesh.topology import twins
+from omt_uv.solver.remeshing.fitting import least_squares as displacement
+from omt_uv.solver.remeshing.fitting.closest_pairs import Pairs
+from omt_uv.solver.remeshing.fitting.least_squares import displacements
 
 
 def some_pairs(V, F, k=400):

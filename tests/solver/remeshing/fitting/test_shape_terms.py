@@ -5,9 +5,9 @@ from __future__ import annotations
 import meshes
 import numpy as np
 
-from omt_uv.solver.geometry import halfedge_lengths, laplacian_from_weights
-from omt_uv.solver.springs import SMALL, Fairness, equilateral, smallness
-from omt_uv.solver.topology import halfedges, twins
+from omt_uv.solver.mesh.geometry import halfedge_lengths, laplacian_from_weights
+from omt_uv.solver.mesh.topology import halfedges, twins
+from omt_uv.solver.remeshing.fitting.shape_terms import SMALL, Fairness, equilateral, smallness
 
 ONE = np.array([[0, 1, 2]])
 
