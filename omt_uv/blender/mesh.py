@@ -6,16 +6,16 @@ but the corners it is told to.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 
 import bmesh
 import numpy as np
 
+from ..pipelines.reading import Reading
 from ..solver.errors import MeshError, NonFiniteError
 from ..solver.mesh.charts import Surface
-from ..solver.parameterization.chart_pins import CornerPins
 from .versions import uv_values
 
 UV_LAYER_NAME = "UVMap"
@@ -24,30 +24,6 @@ UV_LAYER_NAME_BYTES = 63
 
 class TargetError(ValueError):
     """The UVs cannot be written where the user wants them."""
-
-
-@dataclass(frozen=True)
-class Reading:
-    """A surface, the polygons to work on (f,) bool, and of a UV layer, if there is one, the UVs (c,2) float32 and
-    which of them are pinned (c,) bool."""
-
-    surface: Surface
-    faces: np.ndarray
-    uv: np.ndarray | None
-    pinned: np.ndarray | None
-
-    @property
-    def all_pins(self) -> CornerPins | None:
-        """UVs and pins of the whole mesh, None if it has no UVs."""
-        return None if self.uv is None or self.pinned is None else CornerPins(self.pinned, self.uv)
-
-    @property
-    def pins(self) -> CornerPins | None:
-        """Pins of the polygons to work on, None if they have none."""
-        if self.uv is None or self.pinned is None:
-            return None
-        pinned = self.pinned & np.repeat(self.faces, np.diff(self.surface.face_start))
-        return CornerPins(pinned, self.uv) if pinned.any() else None
 
 
 def read(obj: bpy.types.Object, layer: str = "") -> Reading:

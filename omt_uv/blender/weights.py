@@ -10,9 +10,9 @@ import bpy
 import bmesh
 import numpy as np
 
+from ..pipelines.reading import Reading
 from ..solver.analysis.vertex_scores import areas, score, soft_weights
 from ..solver.errors import MeshError
-from .mesh import Reading
 from .seams import GroupError, group_weights
 
 # Regions that need no vertex group, and the score they are made from.

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..blender.mesh import Reading
 from ..pipelines.distortion import triangles_of
+from ..pipelines.reading import Reading
 from ..solver.maps.distortion import face_distortion, measure
 from ..solver.mesh.geometry import face_areas
 from .canvas import write

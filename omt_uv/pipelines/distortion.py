@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..blender.mesh import Reading
 from ..solver.errors import EmptyMeshError
 from ..solver.maps.distortion import Distortion, measure
+from .reading import Reading
 
 
 def triangles_of(readings: Sequence[Reading]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..blender.mesh import Reading
 from ..solver.errors import EmptyMeshError, ZeroAreaFaceError
 from ..solver.maps.distortion import uv_charts
 from ..solver.mesh.geometry import face_areas, signed_areas
+from .reading import Reading
 
 
 @dataclass(frozen=True)
