@@ -19,6 +19,7 @@ MOST_MODULES, MOST_LINES, MOST_FUNCTION_LINES, MOST_PARAMETERS = 14, 450, 60, 8
 # From the ground up: a folder imports from those named behind it alone, and these stand above it in this list.
 ARROWS: dict[str, str] = {
     "settings": "",
+    "errors": "",
     "solver": "",
     "solver.mesh": "solver",
     "solver.linalg": "solver solver.mesh",
@@ -42,18 +43,19 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.sphere solver.remeshing.components solver.remeshing.edits",
     "solver.remeshing": "solver solver.mesh solver.analysis solver.remeshing.components solver.remeshing.edits "
     "solver.remeshing.relaxation solver.remeshing.fitting solver.remeshing.initial",
-    "xatlas": "solver solver.mesh",
-    "pipelines": "settings solver solver.mesh solver.analysis solver.maps solver.transfer solver.refinement "
+    "xatlas": "errors solver solver.mesh",
+    "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.transfer solver.refinement "
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing solver.remeshing.initial "
     "xatlas",
-    "blender": "settings solver solver.mesh solver.analysis solver.globe solver.parameterization xatlas pipelines",
-    "files": "solver blender",
+    "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization xatlas "
+    "pipelines",
+    "files": "errors solver blender",
     "display": "solver solver.mesh solver.maps pipelines blender",
-    "session": "settings solver solver.editing solver.parameterization pipelines blender",
-    "commands": "settings solver solver.cutting solver.globe solver.parameterization xatlas pipelines blender files "
-    "display",
-    "operators": "settings solver solver.mesh solver.cutting solver.globe solver.parameterization xatlas pipelines "
-    "blender files display session",
+    "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
+    "commands": "errors settings solver solver.cutting solver.globe solver.parameterization xatlas pipelines blender "
+    "files display",
+    "operators": "errors settings solver solver.mesh solver.cutting solver.globe solver.parameterization xatlas "
+    "pipelines blender files display session",
     "panels": "settings blender display session operators",
 }
 SOLVER_LIBRARIES = {"numpy", "scipy"}

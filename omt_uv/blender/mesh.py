@@ -13,6 +13,7 @@ import bpy
 import bmesh
 import numpy as np
 
+from ..errors import UserError
 from ..pipelines.reading import Reading
 from ..solver.errors import MeshError, NonFiniteError
 from ..solver.mesh.charts import Surface
@@ -22,7 +23,7 @@ UV_LAYER_NAME = "UVMap"
 UV_LAYER_NAME_BYTES = 63
 
 
-class TargetError(ValueError):
+class TargetError(UserError):
     """The UVs cannot be written where the user wants them."""
 
 

@@ -10,6 +10,7 @@ import bpy
 
 import numpy as np
 
+from ..errors import UserError
 from ..pipelines.attributes import Attributes, followed, marked_sharp, material_borders, uv_seams
 from ..pipelines.carry_attributes import carry
 from ..pipelines.remesh import Job, Level, Series, oriented
@@ -35,7 +36,7 @@ BOUND = {
 }
 
 
-class SourceError(ValueError):
+class SourceError(UserError):
     """The vertex group or attribute that should give the density is missing or of no use."""
 
 

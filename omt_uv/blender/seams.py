@@ -7,6 +7,8 @@ import bpy
 import bmesh
 import numpy as np
 
+from ..errors import UserError
+
 
 def mark_seams(obj: bpy.types.Object, edges: np.ndarray) -> int:
     """Mark the edges between vertices (k,2) as seams, and leave all others as they are; how many are new."""
@@ -37,7 +39,7 @@ def _mark_bmesh(mesh: bpy.types.Mesh, edges: np.ndarray) -> int:
     return len(new)
 
 
-class GroupError(ValueError):
+class GroupError(UserError):
     """No object has a vertex group of this name."""
 
 

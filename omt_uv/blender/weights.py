@@ -10,6 +10,7 @@ import bpy
 import bmesh
 import numpy as np
 
+from ..errors import UserError
 from ..pipelines.reading import Reading
 from ..solver.analysis.vertex_scores import areas, score, soft_weights
 from ..solver.errors import MeshError
@@ -27,7 +28,7 @@ class Weights:
     kind: str = "vertex"
 
 
-class ScoreError(Exception):
+class ScoreError(UserError):
     """A mesh that has no such score: the object and the MeshError."""
 
     def __init__(self, obj: bpy.types.Object, error: MeshError):

@@ -8,11 +8,12 @@ import sys
 from pathlib import Path
 
 from .. import __version__
+from ..errors import UserError
 
 PROGRAM = "omt_uv"
 
 
-class CommandError(Exception):
+class CommandError(UserError):
     """Told on one line, with a status that is not zero."""
 
 

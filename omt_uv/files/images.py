@@ -8,6 +8,8 @@ import bpy
 
 import numpy as np
 
+from ..errors import UserError
+
 # File formats by suffix.
 FORMATS = {
     ".png": "PNG",
@@ -24,7 +26,7 @@ WITH_ALPHA = {"PNG", "OPEN_EXR", "TIFF", "TARGA"}
 DEPTHS = {"PNG": "16", "TIFF": "16", "OPEN_EXR": "32"}
 
 
-class ImageError(ValueError):
+class ImageError(UserError):
     """There is no such image, or it has no pixels."""
 
 

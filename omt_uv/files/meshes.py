@@ -13,6 +13,7 @@ import bmesh
 import numpy as np
 
 from ..blender.mesh import new_mesh
+from ..errors import UserError
 from . import obj_precision as obj_text
 from .silence import silence
 
@@ -22,7 +23,7 @@ WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx")
 AXES = {"forward_axis": "Y", "up_axis": "Z"}
 
 
-class FileError(Exception):
+class FileError(UserError):
     """A file that cannot be read or written."""
 
 
@@ -110,16 +111,16 @@ def _read_off(path: str) -> None:
     lines = [line.split("#")[0].split() for line in Path(path).read_text().splitlines()]
     lines = [line for line in lines if line]
     if not lines or lines[0][0] not in {"OFF", "COFF"}:
-        raise FileError(f"{path}: the first word is not OFF")
+        raise ValueError("the first word is not OFF")
     lines[0] = lines[0][1:]
     lines = [line for line in lines if line]
     n, f = int(lines[0][0]), int(lines[0][1])
     if len(lines) < 1 + n + f:
-        raise FileError(f"{path}: the file ends too early")
+        raise ValueError("the file ends too early")
     positions = [tuple(map(float, line[:3])) for line in lines[1 : 1 + n]]
     faces = [tuple(map(int, line[1 : 1 + int(line[0])])) for line in lines[1 + n : 1 + n + f]]
     if faces and not 0 <= min(map(min, faces)) <= max(map(max, faces)) < n:
-        raise FileError(f"{path}: a face has a vertex that does not exist")
+        raise ValueError("a face has a vertex that does not exist")
     name = Path(path).stem
     mesh = new_mesh(name, positions, faces)
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))

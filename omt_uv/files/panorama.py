@@ -8,13 +8,14 @@ import bpy
 
 import numpy as np
 
+from ..errors import UserError
 from .silence import silence
 
 # What can be written, by the ending of the file.
 FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".exr": "OPEN_EXR", ".hdr": "HDR", ".tif": "TIFF"}
 
 
-class ImageError(Exception):
+class ImageError(UserError):
     """An image that cannot be read or written."""
 
 

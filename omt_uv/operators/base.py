@@ -11,12 +11,13 @@ from collections import Counter
 import bpy
 
 from ..display import overlay
+from ..errors import UserError
 from ..session import run as running
 from ..session import summary as last_run
 from ..settings import DEFAULT_TEXTURE_SIZE
 
 
-class Complaint(Exception):
+class Complaint(UserError):
     """What the user is told instead of a result, and the object and MeshError it is about, if any."""
 
     def __init__(self, message: str, obj=None, error=None):

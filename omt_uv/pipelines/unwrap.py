@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..errors import UserError
 from ..settings import Settings
 from ..solver.analysis.density import Target
 from ..solver.errors import MeshError
@@ -27,7 +28,7 @@ from ..xatlas.segmentation import SegmentationError, chart_seams
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
 
 
-class Refusal(Exception):
+class Refusal(UserError):
     """A surface that cannot be unwrapped: its index and the error."""
 
     def __init__(self, index: int, error: MeshError):

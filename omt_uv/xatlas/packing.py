@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from ..errors import UserError
+
 # xatlas drops faces of meshes with small units, and islands smaller than about this share of the largest.
 EXTENT, SPECK = 100.0, 1e-4
 # Rasterising finer than this costs more than the space it saves.
@@ -26,7 +28,7 @@ OBLONG, TRIALS = 1.05, 5
 REMEDY = "Lower the margin or raise the texture size"
 
 
-class PackingError(RuntimeError):
+class PackingError(UserError):
     """The packer cannot be loaded or failed."""
 
 

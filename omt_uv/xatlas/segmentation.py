@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..errors import UserError
 from ..solver.mesh.charts import Surface, chosen_triangles
 from ..solver.mesh.topology import halfedges, pair_keys, pair_up
 
@@ -13,7 +14,7 @@ from ..solver.mesh.topology import halfedges, pair_keys, pair_up
 EXTENT = 100.0
 
 
-class SegmentationError(RuntimeError):
+class SegmentationError(UserError):
     """xatlas cannot be loaded or failed."""
 
 

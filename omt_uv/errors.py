@@ -1,0 +1,10 @@
+"""Name what a user can mend, for every front end (the solver has errors of its own, `solver.errors`).
+
+An operator reports the text, a command prints it and ends; both catch `UserError` and need not know which one it is.
+"""
+
+from __future__ import annotations
+
+
+class UserError(ValueError):
+    """What a user can mend: the text says what is wrong, where, and what to do about it."""
