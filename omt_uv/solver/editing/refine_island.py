@@ -75,7 +75,15 @@ def improve(
     if pins is not None:
         improved[pins[0]] = pins[1]
     return Refinement(
-        improved, found.steps, found.residual, error, found.weight, found.energy, found.status, found.overlap, warnings
+        uv=improved,
+        iterations=found.steps,
+        residual=found.residual,
+        area_error=error,
+        area_weight=found.area_weight,
+        energy=found.energy,
+        status=found.status,
+        overlap=found.overlap,
+        warnings=warnings,
     )
 
 

@@ -19,7 +19,7 @@ from ..mesh.topology import boundary_loops
 from ..progress import Steps, part_of
 from ..refinement.continuation import QUALITIES
 from ..refinement.initial_maps import unroll
-from ..refinement.refine import BOUNDARIES, Refinement, refine
+from ..refinement.refine import BOUNDARIES, Refinement, RefinementOptions, refine
 from ..transport.convex_domain import Disk, Domain, Rectangle
 from .chart_pins import ChartPins, anchored, facing, refuse_outline
 from .initial_map import COARSE_ABOVE, FirstMap, Log, coarse_first_map, first_map, mean_value_sites
@@ -111,9 +111,9 @@ def unwrap_chart(
     first = yield from part_of(way, *FIRST)
     with log.timed("refinement"):
         uv, held = facing(first.uv, pins)
-        options = {"target": wanted, "region": region, "balance": balance, "quality": quality, "pins": held}
-        options["near"], options["pull"] = first.near and held is None, first.pull
-        refined = yield from part_of(_refined(vertices, triangles, uv, boundary, log, options), *REFINEMENT)
+        options = RefinementOptions(boundary, balance, quality, first.near and held is None, first.pull)
+        target = {"target": wanted, "region": region, "pins": held}
+        refined = yield from part_of(_refined(vertices, triangles, uv, options, target, log), *REFINEMENT)
     with log.timed("measure"):
         asked = None if density is None else density[: len(chart.triangles)]
         figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
@@ -138,7 +138,7 @@ def unwrap_chart(
         tuple(dict.fromkeys((*log.warnings, *refined.warnings))),
         log.seconds,
         pins is not None,
-        refined.weight,
+        refined.area_weight,
     )
 
 
@@ -161,17 +161,22 @@ def _first_map(
     return (yield from first_map(vertices, triangles, target, loop, corners, domain, log))
 
 
-def _refined(vertices, triangles, uv: np.ndarray, boundary: str, log: Log, options: dict) -> Steps[Refinement]:
-    """The refined map, with a free boundary where the domain asked for leaves faces folded."""
+def _refined(vertices, triangles, uv, options: RefinementOptions, target: dict, log: Log) -> Steps[Refinement]:
+    """The refined map, with a free boundary where the domain asked for leaves faces folded.
+
+    target: target, region and pins of `refine`
+    """
     try:
-        return (yield from refine(vertices, triangles, uv, boundary=boundary, **options))
+        return (yield from refine(vertices, triangles, uv, options, **target))
     except FoldedUVError as error:
-        if boundary == "free":
+        domain = options.boundary
+        if domain == "free":
             raise
-        log.warnings.append(f"The {boundary} has no room for this chart ({error.cause}); its boundary is free instead")
+        log.warnings.append(f"The {domain} has no room for this chart ({error.cause}); its boundary is free instead")
     loop = boundary_loops(triangles)[0]
     uv = mean_value_sites(vertices, triangles, loop, None, Disk())
-    return (yield from refine(vertices, triangles, uv, boundary="free", **{**options, "near": False, "pull": 0.0}))
+    free = RefinementOptions(balance=options.balance, quality=options.quality)
+    return (yield from refine(vertices, triangles, uv, free, **target))
 
 
 def _with_patches(density, region, patches: int) -> tuple[np.ndarray | None, np.ndarray | None]:

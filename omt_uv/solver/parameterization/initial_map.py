@@ -24,7 +24,7 @@ from ..mesh.topology import boundary_loops
 from ..progress import Steps, part_of
 from ..refinement.initial_maps import is_far
 from ..refinement.mesh_hierarchy import coarsened
-from ..refinement.refine import refine
+from ..refinement.refine import RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed
 from ..transport.convex_domain import Disk, Domain, Rectangle
 from ..transport.semidiscrete import Transport, transport
@@ -56,7 +56,7 @@ SWEEPS, SMOOTH_WEIGHT, SMOOTH_WEIGHT_FAR = 8, 30.0, 500.0
 class FirstMap:
     """Coordinates uv (n,2), and the conformal map and the transport they come from, on the coarsest mesh, or None.
 
-    near: the map comes from a refined one, and is smooth; pull: of that, see `stages.Found`.
+    near: the map comes from a refined one, and is smooth; pull: its multiplier, see `refine.Refinement`.
     """
 
     conformal: ConformalMap | None
@@ -91,18 +91,22 @@ def coarse_first_map(
         return None  # what returned to the rim would lie on a chord
     corners = None if corners is None else np.searchsorted(coarse.kept, corners)
     if len(points) > (DIRECT_FAR if far else COARSE_ABOVE):
-        options = (boundary, balance, log, flat[coarse.kept], coarse.region)
-        found = yield from part_of(coarse_first_map(points, mesh, mass, rim, corners, *options), *COARSE_MAP)
+        rest = (boundary, balance, log, flat[coarse.kept], coarse.region)
+        found = yield from part_of(coarse_first_map(points, mesh, mass, rim, corners, *rest), *COARSE_MAP)
     if found is None:
         domain = Rectangle() if boundary == "square" else Disk()
         direct = first_map(points, mesh, mass, rim, corners, domain, log)
         found = yield from part_of(direct, *COARSE_MAP)
     with log.timed("coarse refinement"):
-        settings: dict = {"boundary": boundary, "target": mass, "balance": balance, "region": coarse.region}
-        settings["quality"] = "rough" if far else "relaxed"
-        refined = yield from part_of(
-            refine(points, mesh, found.uv, near=found.near, pull=found.pull, **settings), *COARSE_REFINEMENT
+        options = RefinementOptions(
+            boundary=boundary,
+            balance=balance,
+            quality="rough" if far else "relaxed",
+            warm_start=found.near,
+            multiplier=found.pull,
         )
+        way = refine(points, mesh, found.uv, options, target=mass, region=coarse.region)
+        refined = yield from part_of(way, *COARSE_REFINEMENT)
     log.warnings += refined.warnings
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
@@ -111,7 +115,7 @@ def coarse_first_map(
         sweeps = smoothed(faces, w, SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT, SWEEPS)
         w = yield from part_of(sweeps, *SMOOTHING)
         uv = np.column_stack([w.real, w.imag])
-    return FirstMap(found.conformal, found.cells, uv, far, refined.pull)
+    return FirstMap(found.conformal, found.cells, uv, far, refined.multiplier)
 
 
 def _density(vertices, triangles, target, goal: int) -> np.ndarray:

@@ -38,7 +38,7 @@ class Control:
     """Weight of the area term, `pressure` of the Hessian, energy and fate of every chart, (c,) each.
 
     live: on its way; solved: arrived where the quality asks for; steps: Newton steps; residual: see `stages.Stage`;
-    pull: see `stages.Found`.
+    multiplier: see `continuation.Found`.
     """
 
     def __init__(self, count: int, quality: str, balance: float, energies: Energies):
@@ -47,7 +47,7 @@ class Control:
         self.level, self.weight = np.zeros(count, np.int64), np.full(count, self.weights[0])
         squeezed = (energies(self.weight) > SQUEEZED) & (self.weights[0] > 1)
         self.level[squeezed], self.weight[squeezed] = -1, 1.0
-        self.pull, self.error = np.zeros(count), np.full(count, np.inf)
+        self.multiplier, self.error = np.zeros(count), np.full(count, np.inf)
         self.value = energies(self.weight)
         self.live = np.isfinite(self.value)
         self.solved = np.zeros(count, bool)
@@ -87,7 +87,7 @@ class Control:
         self.live = self.live & ~finished
         further = ended & ~finished
         if self.balance == 0:
-            self.pull = np.where(further, self.pull + self.weight * lack.tilt, self.pull)
+            self.multiplier = np.where(further, self.multiplier + self.weight * lack.tilt, self.multiplier)
         more = self.weight * growth(lack.but_share / settings.area_error)
         planned = self.weights[np.clip(self.level, 0, last - 1)]
         self.weight = np.where(further, np.where(self.level < last, planned, more), self.weight)

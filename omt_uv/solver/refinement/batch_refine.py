@@ -205,7 +205,7 @@ class _Group:
         faces = self.faces
         if faces.region is None:
             return faces
-        ratio = faces.ratio * np.exp((control.pull / weight)[self.of_face] * faces.region)
+        ratio = faces.ratio * np.exp((control.multiplier / weight)[self.of_face] * faces.region)
         scale = self._sums(faces.area * faces.ratio) / np.maximum(self._sums(faces.area * ratio), 1e-300)
         return replace(faces, ratio=ratio * scale[self.of_face])
 

@@ -123,21 +123,28 @@ def rescaled(task: Task, w: np.ndarray) -> Task:
 
 @dataclass(frozen=True)
 class Found:
-    """What all stages found: the map w (n,) complex, Newton steps, last promised decrease over energy, weight of the
-    area term and energy at the end, status as in `refine.Refinement`, whether the boundary crosses itself.
+    """What all stages found.
 
-    pull: tilt of the targets times the weight of the area term that gives the region its share.
+    Attributes
+    ----------
+    w : (n,) complex map
+    steps : Newton steps
+    residual : last promised decrease over energy
+    area_weight, energy : at the end
+    status : as in `refine.Refinement`
+    overlap : the boundary crosses itself
+    multiplier : tilt of the targets times the area weight that gives the region its share
     """
 
     w: np.ndarray
     steps: int
     residual: float
-    weight: float
+    area_weight: float
     energy: float
     status: str
     overlap: bool
     warnings: tuple[str, ...]
-    pull: float = 0.0
+    multiplier: float = 0.0
 
 
 def weights_of(balance: float, settings: Quality) -> list[float]:
@@ -159,18 +166,18 @@ def growth(excess: np.ndarray | float) -> np.ndarray | float:
 
 
 def stages(
-    task: Task, w: np.ndarray, balance: float, settings: Quality, near: bool = False, pull: float = 0.0
+    task: Task, w: np.ndarray, balance: float, settings: Quality, warm_start: bool = False, multiplier: float = 0.0
 ) -> Steps[Found]:
     """Newton in stages of growing weight, until the area error is small enough.
 
-    near: the map w (n,) is nearly the one that is looked for; the least weight would lead away from it.
-    pull: that of a coarser map, see `Found`. The shear pulls all faces of a region one way, and a weight at which its
-        share came out all the same would take many more steps. So its targets lead: a method of multipliers
+    warm_start: the map w (n,) is nearly the one that is looked for; the least weight would lead away from it.
+    multiplier: that of a coarser map, see `Found`. The shear pulls all faces of a region one way, and a weight at which
+        its share came out all the same would take many more steps. So its targets lead: a method of multipliers
         (Hestenes 1969), with one for the share.
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
     weights = weights_of(balance, settings)
-    if near and len(weights) > 1:
+    if warm_start and len(weights) > 1:
         weights = [NEAR * weight for weight in weights[1:]]
     elif task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
@@ -179,7 +186,7 @@ def stages(
     while True:
         weight = weights[k]
         task = rescaled(task, w) if task.scale_free else task
-        problem = task.problem(w, weight, guarded, pull / weight)
+        problem = task.problem(w, weight, guarded, multiplier / weight)
         if task.smoother is not None:
             w = task.smoother.smoothed(problem.faces, w, weight, FIRST_SWEEPS)
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
@@ -194,7 +201,7 @@ def stages(
             continue
         k += 1
         error, rest = shortfall(task.faces, w), shortfall_but_share(task.faces, w)
-        pull += weight * missing_tilt(task.faces, w) if balance == 0 else 0.0
+        multiplier += weight * missing_tilt(task.faces, w) if balance == 0 else 0.0
         enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
         enough |= (
             stage.status == "converged" and error > _stuck(task, weight / last, error / settings.area_error) * before
@@ -204,7 +211,17 @@ def stages(
             break
         if k >= len(weights):
             weights.append(weights[-1] * float(growth(rest / settings.area_error)))
-    return Found(w, steps, stage.residual, weight, stage.energy, stage.status, task.crosses(w), warnings, pull)
+    return Found(
+        w=w,
+        steps=steps,
+        residual=stage.residual,
+        area_weight=weight,
+        energy=stage.energy,
+        status=stage.status,
+        overlap=task.crosses(w),
+        warnings=warnings,
+        multiplier=multiplier,
+    )
 
 
 def _stuck(task: Task, grown: float, excess: float) -> float:

@@ -16,7 +16,7 @@ from ..maps.energy import Elements, area_error, elements
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps, part_of
-from .continuation import QUALITIES, Quality, Task, stages, weights_of
+from .continuation import QUALITIES, Found, Task, stages, weights_of
 from .elimination_order import Renumbered, renumbered
 from .initial_maps import Start, disk_start, free_start, is_far, notched_disk, square_start
 from .pins import Pins, drag
@@ -37,53 +37,83 @@ EASING, STAGES = (0.0, 0.1), (0.1, 0.9)
 
 
 @dataclass(frozen=True)
-class Refinement:
-    """uv (n,2) without folds; iterations: Newton steps; residual: last predicted decrease over energy.
+class RefinementOptions:
+    """How a map of a disk is refined.
 
-    area_error: share of the UV area in the wrong place; weight: that of the area term; energy at the end;
-    status: "converged", "stalled" (no decrease could be found) or "steps" (allowance used up); warnings: what was
-    replaced and why; overlap: the free boundary crosses itself; pull: see `stages.Found`.
+    Attributes
+    ----------
+    boundary : "free"; "disk", sliding on the circle about 0 of the target's area; "square", sliding on the sides of
+        the square about 0 of the target's area, corners fixed
+    balance : 0 for exact areas to 1 for the least shear
+    quality : "draft", "standard" or "exact"; "relaxed" or "rough" for the initial map of a finer mesh
+    warm_start : the initial map is nearly the one that is looked for, and needs no detour through small area weights
+    multiplier : of a coarser mesh, see `Refinement`
+
+    Raises
+    ------
+    ValueError : a boundary that is none of these, a balance outside of [0, 1]
+    """
+
+    boundary: str = "free"
+    balance: float = 0.0
+    quality: str = "standard"
+    warm_start: bool = False
+    multiplier: float = 0.0
+
+    def __post_init__(self):
+        if self.boundary not in BOUNDARIES:
+            raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {self.boundary!r}")
+        if not 0 <= self.balance <= 1:
+            raise ValueError(f"balance must lie in [0, 1], not {self.balance}")
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A refined map, and how it came about.
+
+    Attributes
+    ----------
+    uv : (n,2) without folds
+    iterations : Newton steps
+    residual : last predicted decrease over energy
+    area_error : share of the UV area in the wrong place
+    area_weight : weight of the area term at the end
+    energy : at the end
+    status : "converged", "stalled" (no decrease could be found) or "steps" (allowance used up)
+    overlap : the free boundary crosses itself
+    warnings : what was replaced and why
+    multiplier : Lagrange multiplier of the region's share, see `continuation.Found`
     """
 
     uv: np.ndarray
     iterations: int
     residual: float
     area_error: float
-    weight: float
+    area_weight: float
     energy: float
     status: str
     overlap: bool
     warnings: tuple[str, ...]
-    pull: float = 0.0
+    multiplier: float = 0.0
 
 
 def refine(
     vertices: np.ndarray,
     triangles: np.ndarray,
     uv: np.ndarray,
+    options: RefinementOptions | None = None,
     *,
-    boundary: str = "free",
     target: np.ndarray | None = None,
     region: np.ndarray | None = None,
-    balance: float = 0.0,
-    quality: str = "standard",
     pins: tuple[np.ndarray, np.ndarray] | None = None,
-    near: bool = False,
-    pull: float = 0.0,
 ) -> Steps[Refinement]:
     """Refine a map uv (n,2) of a disk (n,3), (m,3) until every face has its area.
 
     Parameters
     ----------
-    boundary : "free"; "disk", sliding on the circle about 0 of the target's area; "square", sliding on the sides of
-        the square about 0 of the target's area, corners fixed
     target : (m,) area that every face shall have relative to the others; the surface's areas by default. They are
         scaled to sum to the area of the surface.
     region : (m,) in [0, 1], weights of a region whose share of the target's area is to be exact
-    balance : 0 for exact areas to 1 for the least shear
-    quality : "draft", "standard" or "exact"; "relaxed" or "rough" for the start of a finer mesh
-    near : the map is nearly the one that is looked for, and needs no detour through small weights
-    pull : of a coarser mesh, see `stages.Found`
     pins : vertices (k,) and their places (k,2), in free mode. Two or more fix place, direction and scale, one fixes the
         place; with one, scale and direction are those of `uv`. Without pins the map has the area of the surface, and
         the place and the direction of `uv`.
@@ -92,20 +122,22 @@ def refine(
     ------
     DensityError : a target that is not positive and finite
     PinError : pins that contradict each other or force a fold
-    FoldedUVError : a start without area, or a fold that no embedding could remove
+    FoldedUVError : an initial map without area, or a fold that no embedding could remove
 
     References
     ----------
     Hormann, Greiner 2000 (shear); Degener, Meseth, Klein 2003 (area); Smith, de Goes, Kim 2019 (eigensystem);
     Smith, Schaefer 2015 (barrier against folds).
     """
-    _check_options(boundary, balance, pins)
+    options = options or RefinementOptions()
+    if pins is not None and options.boundary != "free":
+        raise ValueError("pins need a free boundary")
     yield Progress("Refinement", 0.0)
     target = _targets(face_areas(vertices, triangles), target)
     mesh = renumbered(vertices, triangles, uv, pins)
     faces = elements(mesh.vertices, mesh.triangles, target, region)
     try:
-        found, warnings = yield from _refined(mesh, faces, boundary, balance, QUALITIES[quality], near, pull)
+        found, warnings = yield from _refined(mesh, faces, options)
     except MeshError as error:
         raise mesh.blame(error) from error
     yield Progress("Refinement", 1.0)
@@ -113,26 +145,17 @@ def refine(
     if pins is not None and mesh.pins is not None:
         refined[pins[0]] = pins[1]
     return Refinement(
-        refined,
-        found.steps,
-        found.residual,
-        area_error(faces, found.w),
-        found.weight,
-        found.energy,
-        found.status,
-        found.overlap,
-        (*warnings, *found.warnings),
-        found.pull,
+        uv=refined,
+        iterations=found.steps,
+        residual=found.residual,
+        area_error=area_error(faces, found.w),
+        area_weight=found.area_weight,
+        energy=found.energy,
+        status=found.status,
+        overlap=found.overlap,
+        warnings=(*warnings, *found.warnings),
+        multiplier=found.multiplier,
     )
-
-
-def _check_options(boundary: str, balance: float, pins) -> None:
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
-    if not 0 <= balance <= 1:
-        raise ValueError(f"balance must lie in [0, 1], not {balance}")
-    if pins is not None and boundary != "free":
-        raise ValueError("pins need a free boundary")
 
 
 def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
@@ -142,8 +165,9 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     return target * (area.sum() / target.sum())
 
 
-def _refined(mesh: Renumbered, faces: Elements, boundary: str, balance, settings: Quality, near: bool, pull: float):
+def _refined(mesh: Renumbered, faces: Elements, options: RefinementOptions) -> Steps[tuple[Found, tuple[str, ...]]]:
     """Stages on a renumbered chart: what was found, and the warnings of the start it was found from."""
+    boundary, balance, quality = options.boundary, options.balance, QUALITIES[options.quality]
     pins, loop, n = mesh.pins, boundary_loops(mesh.triangles)[0], len(mesh.vertices)
     # A map to areas far from the surface's is sheared by right.
     far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
@@ -159,13 +183,14 @@ def _refined(mesh: Renumbered, faces: Elements, boundary: str, balance, settings
         task, w = yield from drag(task, w, pins)
         placed = False
     elif boundary == "free":
-        w = yield from part_of(_eased(task, w, weights_of(balance, settings)[0]), *EASING)
-    found = yield from part_of(stages(task, w, balance, settings, near, pull), *STAGES)
+        w = yield from part_of(_eased(task, w, weights_of(balance, quality)[0]), *EASING)
+    way = stages(task, w, balance, quality, options.warm_start, options.multiplier)
+    found = yield from part_of(way, *STAGES)
     error = area_error(faces, found.w)
-    if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * settings.area_error):
+    if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):
         notched = notched_disk(start, mesh.triangles, loop)
         if notched is not None:
-            again = yield from stages(_task(faces, assembly, notched, loop, boundary, smoother), w, balance, settings)
+            again = yield from stages(_task(faces, assembly, notched, loop, boundary, smoother), w, balance, quality)
             if area_error(faces, again.w) < error:
                 found, start = again, notched
     if placed:

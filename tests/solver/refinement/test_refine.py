@@ -23,7 +23,7 @@ from omt_uv.solver.refinement.projected_newton import (
     newton_direction,
     newton_step,
 )
-from omt_uv.solver.refinement.refine import BOUNDARIES, refine
+from omt_uv.solver.refinement.refine import BOUNDARIES, RefinementOptions, refine
 
 STANDARD = QUALITIES["standard"].area_error
 
@@ -37,9 +37,10 @@ def start(V, F, domain="disk"):
     return tutte(V, F, loop, rim)
 
 
-def run(V, F, uv=None, **options):
+def run(V, F, uv=None, target=None, pins=None, **options):
     domain = "square" if options.get("boundary") == "square" else "disk"
-    return drain(refine(V, F, start(V, F, domain) if uv is None else uv, **options))
+    uv = start(V, F, domain) if uv is None else uv
+    return drain(refine(V, F, uv, RefinementOptions(**options), target=target, pins=pins))
 
 
 def area_l1(V, F, uv, target=None):
