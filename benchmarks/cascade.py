@@ -7,10 +7,10 @@ from cases import Table, load_case
 from magnify import FACTORS, MODELS, fastest, missed
 from regions import areas, ball, figures
 
-from omt_uv.solver.analysis.density import from_vertices, share
-from omt_uv.solver.analysis.region_density import exact_share
+from omt_uv.solver.analysis.density import from_vertices, region_share
+from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.editing.magnify import magnify_region
-from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.progress import drain
 
@@ -23,7 +23,7 @@ def cascade_part(args):
     )
     for name in args.models or MODELS:
         case = load_case(name)
-        (chart,) = split(triangle_surface(case.V, case.F, case.seams))
+        (chart,) = strict_charts(triangle_surface(case.V, case.F, case.seams))
         w = from_vertices(ball(case.V, case.F)[chart.vertex_ids], chart.triangles)
         for boundary in args.boundaries:
             plain, seconds = fastest(lambda b=boundary, c=chart: drain(unwrap_chart(c, boundary=b)))
@@ -33,16 +33,16 @@ def cascade_part(args):
 
 
 def _lens(table, name, boundary, uv, F, w, factor, plain):
-    found = exact_share(w, areas(uv[F]), factor)
+    found = exact_density(w, areas(uv[F]), factor)
     once, seconds = fastest(lambda: drain(magnify_region(uv, F, w, factor)))
     flat = np.column_stack([uv, 0 * uv[:, 0]])
     has = figures(flat, F, once.uv[F], found.density, w)
     twice = _twice(uv, F, w, once.uv) if factor == 4 else {}
-    off = has.share / found.asked - 1
+    off = has.share / found.target_share - 1
     table.add(
         model=name,
         method=f"UVs {factor:g} x {boundary}",
-        asked=found.asked,
+        asked=found.target_share,
         error=off,
         **vars(has),
         **twice,
@@ -56,6 +56,6 @@ def _twice(uv, F, w, once):
     """Difference of 2 x twice from 4 x once: share, relative, and greatest distance over the width."""
     half = drain(magnify_region(uv, F, w, 2.0)).uv
     twice = drain(magnify_region(half, F, w, 2.0)).uv
-    shares = [share(w, areas(x[F])) for x in (twice, once)]
+    shares = [region_share(w, areas(x[F])) for x in (twice, once)]
     moved = np.linalg.norm(twice - once, axis=1).max() / np.ptp(once, axis=0).max()
     return {"twice share": shares[0] / shares[1] - 1, "twice place": float(moved)}

@@ -30,7 +30,7 @@ from omt_uv.solver.cutting.cut_graph import greedy_arcs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.charts import chosen_triangles, triangle_surface
 from omt_uv.solver.mesh.gluing import corner_classes
-from omt_uv.solver.mesh.repair import join
+from omt_uv.solver.mesh.repair import repaired_gluing
 from omt_uv.solver.mesh.topology import boundary_loops
 
 MODELS = ["max_planck", "bunny_small", "spot", "homer", "cow", "bunny", "david", "armadillo", "stanford_bunny",
@@ -88,10 +88,10 @@ def cotree_length(V, F):
     """Length of the tree-cotree cut with geodesic lengths from vertex 0, or from the boundaries."""
     surface = triangle_surface(V, F)
     faces, triangles, owner = chosen_triangles(surface, None)
-    sheets = join(surface, faces, triangles, owner).sheets
-    ease = np.ones(len(sheets.first))
+    gluing = repaired_gluing(surface, faces, triangles, owner).gluing
+    ease = np.ones(len(gluing.first))
     everything = np.arange(len(F)), np.arange(len(ease))
-    piece = make_piece(sheets, V, corner_classes(sheets), *everything, np.zeros(len(V)), ease)
+    piece = make_piece(gluing, V, corner_classes(gluing), *everything, np.zeros(len(V)), ease)
     piece.cost[:] = piece.length
     root = np.array([0] if len(piece.rim) == 0 else [], np.int64)
     return float(piece.length[greedy_arcs(piece, root)].sum())

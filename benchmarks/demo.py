@@ -16,7 +16,7 @@ from cases import ROOT, Table, load_case, meshes, our_uv, timed
 from pictures import VIEWS, View, area_colours, checker, checker_material, equal_density, render_checker, render_colours
 from rivals import METHODS, make_object, unwrap, write_uv
 
-from omt_uv.solver.maps.distortion import face_distortion, measure
+from omt_uv.solver.maps.distortion import distortion, face_distortion
 
 OURS = {
     "OMT UV free": ("free", "standard"),
@@ -74,7 +74,7 @@ def main():
     table = Table(f"{case.name}, {len(case.F)} triangles: distortion of one chart", {"method": 28} | COLUMNS)
     maps = {}
     for name, uv, seconds in all_maps(case):
-        figures = measure(case.V, case.F, uv)
+        figures = distortion(case.V, case.F, uv)
         table.add(method=name, seconds=seconds, **{c: getattr(figures, c) for c in COLUMNS if c != "seconds"})
         maps[name] = uv
     print("area_l1: share of texture in the wrong place, 0 is exact; angle_mean: shear s1/s2, 1 is conformal")

@@ -14,9 +14,9 @@ from cases import Table, load_case, timed
 from regions import areas, ball, figures
 from rivals import make_object, read_uv, remove_object
 
-from omt_uv.solver.analysis.density import from_vertices, share
-from omt_uv.solver.analysis.region_density import exact_share
-from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.analysis.density import from_vertices, region_share
+from omt_uv.solver.analysis.region_density import exact_density
+from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.progress import drain
@@ -42,7 +42,7 @@ def magnify_part(args):
         weights = ball(case.V, case.F)
         for factor in RIVAL_FACTORS:
             _rival(table, case, weights, factor)
-        (chart,) = split(triangle_surface(case.V, case.F, case.seams))
+        (chart,) = strict_charts(triangle_surface(case.V, case.F, case.seams))
         for boundary in args.boundaries:
             _, plain = fastest(lambda b=boundary, c=chart: drain(unwrap_chart(c, boundary=b)))
             for factor in FACTORS:
@@ -59,16 +59,16 @@ def fastest(work):
 def _ours(table, name, chart, weights, factor, boundary, plain):
     F = chart.triangles
     area, w = face_areas(chart.vertices, F), from_vertices(weights, F)
-    found = exact_share(w, area, factor)
+    found = exact_density(w, area, factor)
     options = {"boundary": boundary, "density": found.density * (area.sum() / (area @ found.density)), "region": w}
     result, seconds = fastest(lambda: drain(unwrap_chart(chart, **options)))
     has = figures(chart.vertices, F, result.uv[F], found.density, w)
-    off = has.share / found.asked - 1
+    off = has.share / found.target_share - 1
     table.add(
         model=name,
         method=f"ours {factor:g} x {boundary}",
-        before=found.before,
-        asked=found.asked,
+        before=found.share_before,
+        asked=found.target_share,
         error=off,
         **vars(has),
         shear=result.angle_mean,
@@ -121,7 +121,7 @@ def _rival(table, case, weights, factor):
     table.add(
         model=case.name,
         method=f"Minimum Stretch {factor:g}",
-        before=share(w, area),
+        before=region_share(w, area),
         share=has.share,
         folds=has.folds,
         overlap=has.overlap,

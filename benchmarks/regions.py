@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omt_uv.solver.analysis.vertex_scores import distance
-from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.mesh.geometry import vertex_areas
 
 SHARE, RIM = 0.05, 0.25
@@ -58,7 +58,7 @@ def figures(V, F, uv, density, weights) -> Figures:
     region, context = (float(error[part].sum() / target[part].sum()) for part in (weights > 0.5, weights <= 0.5))
     judge = _judge()
     if judge is None:
-        told = measure(V, F, uv, density=density)
+        told = distortion(V, F, uv, density=density)
         return Figures(float(weights @ has), told.area_l1, region, context, told.folds, told.overlap)
     told = judge(V, F, uv)
     # It knows no densities: every face alone, and as large as it is meant to be.

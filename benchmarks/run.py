@@ -37,8 +37,8 @@ from scipy.spatial import ConvexHull
 
 from omt_uv.solver.conformal.disk_map import conformal_disk
 from omt_uv.solver.errors import MeshError
-from omt_uv.solver.maps.distortion import measure
-from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.maps.distortion import distortion
+from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
 from omt_uv.solver.mesh.geometry import vertex_areas
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -181,7 +181,7 @@ def _head(case, method):
 
 
 def _add(table, case, method, uv, seconds, reference, fast, boundary=None, preset=None):
-    d = measure(case.V, case.F, uv)
+    d = distortion(case.V, case.F, uv)
     ratio, faster = seconds / reference, seconds / fast
     figures = {k: getattr(d, k) for k in ("area_l1", "area_sd", "angle_mean", "folds", "overlap")}
     missed = ", ".join(_missed(case, d, ratio, faster, boundary, preset)) if preset in TIME_GOALS else ""
@@ -213,7 +213,7 @@ def _missed(case, d, ratio, faster, boundary, preset):
 def lion_part(args):
     """The first two stages alone, on the model that has most to move."""
     case = load_case(available(["lion"] if not args.models else args.models[:1])[0])
-    chart = split(triangle_surface(case.V, case.F, case.seams))[0]
+    chart = strict_charts(triangle_surface(case.V, case.F, case.seams))[0]
     mass = vertex_areas(chart.vertices, chart.triangles)
 
     def ours():

@@ -48,8 +48,8 @@ def _edge_graph(V, F):
     graph = csr_matrix((np.tile(length, 2), (np.concatenate([i, j]), np.concatenate([j, i]))), shape=(len(V),) * 2)
     rim = edges[uses == 1]
     _, label = connected_components(csr_matrix((np.ones(len(rim)), rim.T), shape=(len(V),) * 2), directed=False)
-    on_rim = np.unique(rim)
-    return graph, [on_rim[label[on_rim] == k] for k in np.unique(label[on_rim])]
+    on_boundary = np.unique(rim)
+    return graph, [on_boundary[label[on_boundary] == k] for k in np.unique(label[on_boundary])]
 
 
 def _farthest_points(graph, used, count):

@@ -9,7 +9,7 @@ from cases import Case, Table, available, load_case, our_uv, timed  # first: it 
 from counting import counted
 from meshes import bumpy, subdivide
 
-from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.maps.distortion import distortion
 
 GROWTH_GOAL, ISLANDS_GOAL, ISLANDS = 1.25, 2.0, 1000
 COUNTS = ("newton_conformal", "newton_transport", "newton_refinement")
@@ -43,7 +43,7 @@ def growth_part(args) -> Table:
         case, sizes, times = load_case(name), [], []
         while len(case.F) <= args.faces:
             (uv, result), seconds = timed(lambda c=case: our_uv(c, "free", "standard"))
-            d, report = measure(case.V, case.F, uv, overlap=False), result.report()[0]
+            d, report = distortion(case.V, case.F, uv, overlap=False), result.report()[0]
             sizes.append(np.log(len(case.V)))
             times.append(np.log(seconds))
             exponent = np.polyfit(sizes, times, 1)[0] if len(sizes) > 1 else ""
@@ -90,7 +90,7 @@ def islands_part(args) -> Table:
     rows = [(m, r.uv, r.processor_seconds) for m, r in found.items()]
     (ours, _), time = timed(lambda: our_uv(case, "free", "standard"))
     for method, uv, seconds in [*rows, ("ours standard free", ours, time)]:
-        d = measure(case.V, case.F, uv, overlap=False)
+        d = distortion(case.V, case.F, uv, overlap=False)
         ratio = seconds / rows[0][2]
         missed = "time" if method.startswith("ours") and ratio > ISLANDS_GOAL else ""
         figures = {"area_l1": d.area_l1, "angle_mean": d.angle_mean, "folds": d.folds, "time": seconds, "ratio": ratio}

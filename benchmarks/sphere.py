@@ -28,7 +28,7 @@ SEED_AREA_GOAL = 0.0005
 
 
 def sphere_figures(V, F, positions) -> dict[str, float]:
-    """The figures of `distortion.measure` for a map to the sphere: areas of spherical triangles, shear of chords."""
+    """`maps.distortion.distortion` for a map to the sphere: areas of spherical triangles, chords' shear."""
     surface = face_areas(V, F)
     share = surface / surface.sum()
     ratio = spherical_areas(positions, F) / (4 * np.pi) / share

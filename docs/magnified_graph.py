@@ -16,7 +16,7 @@ from cases import meshes
 from pictures import typeface
 from PIL import Image, ImageDraw
 
-from omt_uv.solver.analysis.density import from_vertices, share
+from omt_uv.solver.analysis.density import from_vertices, region_share
 from omt_uv.solver.editing.image_warp import warped
 from omt_uv.solver.editing.magnify import magnify_region
 from omt_uv.solver.mesh.geometry import signed_areas
@@ -76,7 +76,7 @@ def magnified():
     t = np.clip((1.25 * RADIUS - np.linalg.norm(uv - 0.5, axis=1)) / (0.5 * RADIUS), 0, 1)
     weights = from_vertices(t * t * (3 - 2 * t), F)
     result = drain(magnify_region(uv, F, weights, FACTOR))
-    return uv[F], result.uv[F], *(share(weights, signed_areas(x, F)) for x in (uv, result.uv))
+    return uv[F], result.uv[F], *(region_share(weights, signed_areas(x, F)) for x in (uv, result.uv))
 
 
 def make(path: Path, pixels=720):

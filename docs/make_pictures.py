@@ -25,10 +25,10 @@ from sphere import sphere_figures
 
 from omt_uv.pipelines.globe import GlobeJob, project
 from omt_uv.settings import GlobeSettings
-from omt_uv.solver.analysis.density import mean_curvature
+from omt_uv.solver.analysis.density import mean_curvature_density
 from omt_uv.solver.globe.rotation import along_axes
 from omt_uv.solver.globe.unfolding import polygons_of, unfold
-from omt_uv.solver.maps.distortion import face_distortion, measure
+from omt_uv.solver.maps.distortion import distortion, face_distortion
 from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing.initial.component_maps import Original
@@ -160,7 +160,11 @@ def remesh_sheet(names, out, scratch, pixels):
     rows = []
     for name in names:
         V, F = meshes.load_model(name)
-        found = [quadriflow(V, F, REMESHED_COUNT)[0], _remeshed(V, F, None), _remeshed(V, F, mean_curvature(V, F, 2.0))]
+        found = [
+            quadriflow(V, F, REMESHED_COUNT)[0],
+            _remeshed(V, F, None),
+            _remeshed(V, F, mean_curvature_density(V, F, 2.0)),
+        ]
         renders, captions = [], []
         for k, (W, G) in enumerate([(V, F), *found]):
             renders.append(scratch / f"{name}_wires_{k}.png")
@@ -192,7 +196,7 @@ def strategies_sheet(name, out, scratch, pixels):
 
 
 def caption(case, uv):
-    figures = measure(case.V, case.F, uv)
+    figures = distortion(case.V, case.F, uv)
     return f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}"
 
 

@@ -10,7 +10,7 @@ import bmesh
 import numpy as np
 
 from ..pipelines.globe import Markers
-from ..solver.analysis import density as measure
+from ..solver.analysis.density import from_vertices, painted_density
 from ..solver.globe.rotation import MarkerError
 from .seams import GroupError, group_weights
 from .weights import region_weights
@@ -74,6 +74,6 @@ def globe_densities(pairs: Sequence, name: str, factor: float) -> list[np.ndarra
     weights = region_weights(pairs, name)
     surfaces = [reading.surface for _, reading in pairs]
     return [
-        measure.painted(measure.from_vertices(w, s.corner_vertex[s.triangles]), factor)
+        painted_density(from_vertices(w, s.corner_vertex[s.triangles]), factor)
         for w, s in zip(weights, surfaces, strict=True)
     ]

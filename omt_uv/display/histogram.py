@@ -8,7 +8,7 @@ import numpy as np
 
 from ..pipelines.distortion import triangles_of
 from ..pipelines.reading import Reading
-from ..solver.maps.distortion import face_distortion, measure
+from ..solver.maps.distortion import distortion, face_distortion
 from ..solver.mesh.geometry import face_areas
 from .canvas import write
 from .colormaps import AREA_OCTAVES, SHEAR_TOP, area_colours, shear_colours
@@ -28,7 +28,7 @@ def histogram(readings: Sequence[Reading]) -> np.ndarray:
 
     Raises
     ------
-    EmptyMeshError, NonFiniteError, ZeroAreaFaceError : see `solver.distortion.measure`
+    EmptyMeshError, NonFiniteError, ZeroAreaFaceError : see `solver.maps.distortion.distortion`
     """
     octaves, shear, share, figures = _values(readings)
     picture = np.ones((HEIGHT, WIDTH, 3)) * PAPER
@@ -70,7 +70,7 @@ def _values(readings: Sequence[Reading]):
     V, F, uv = triangles_of(readings)
     octaves, shear = face_distortion(V, F, uv)
     weight = face_areas(V, F)
-    return octaves, shear, 100 * weight / weight.sum(), measure(V, F, uv, overlap=False)
+    return octaves, shear, 100 * weight / weight.sum(), distortion(V, F, uv, overlap=False)
 
 
 def _area_place(octaves):

@@ -35,7 +35,7 @@ def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
 
     Raises
     ------
-    MeshError : see `solver.distortion.measure`
+    MeshError : see `solver.maps.distortion.distortion`
     """
     import numpy as np
 

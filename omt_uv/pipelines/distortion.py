@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..solver.errors import EmptyMeshError
-from ..solver.maps.distortion import Distortion, measure
+from ..solver.maps.distortion import Distortion, distortion
 from .reading import Reading
 
 
@@ -41,9 +41,9 @@ def measure_readings(readings: Sequence[Reading], overlap: bool = True) -> Disto
     Raises
     ------
     EmptyMeshError : no polygon is chosen, or a mesh with chosen polygons has no UVs
-    NonFiniteError, ZeroAreaFaceError : see `solver.distortion.measure`
+    NonFiniteError, ZeroAreaFaceError : see `solver.maps.distortion.distortion`
     """
-    return measure(*triangles_of(readings), overlap=overlap)
+    return distortion(*triangles_of(readings), overlap=overlap)
 
 
 def summary(figures: Distortion) -> str:

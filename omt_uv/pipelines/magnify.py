@@ -15,18 +15,18 @@ from ..settings import MagnifySettings
 from ..solver.analysis.density import (
     Target,
     check_factor,
-    check_weights,
+    check_region,
     from_polygons,
     from_vertices,
-    normalised,
-    share,
+    normalised_density,
+    region_share,
 )
-from ..solver.analysis.region_density import ExactShare, wanted
+from ..solver.analysis.region_density import RegionDensity, target_density
 from ..solver.editing.image_warp import warped
 from ..solver.editing.magnify import OUTLINES, Lens, aligned_to, magnify_region, refuse_folds
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, MeshError, WeightError
-from ..solver.maps.distortion import measure
+from ..solver.maps.distortion import distortion
 from ..solver.maps.overlap import overlap_share
 from ..solver.mesh.charts import Surface, check_disk, triangle_rows
 from ..solver.mesh.geometry import face_areas, signed_areas
@@ -135,10 +135,10 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
     area = np.concatenate([a for _, a, _ in parts])
     weights = np.concatenate([w for *_, w in parts])
     try:
-        found = wanted(weights, area, whole_factor(settings), settings.exact)
+        found = target_density(weights, area, whole_factor(settings), settings.exact)
     except MeshError as error:
         raise Refusal(0, error) from error
-    density = normalised(found.density, area)
+    density = normalised_density(found.density, area)
     jobs, start = [], 0
     for region, (rows, a, w) in zip(regions, parts, strict=True):
         full, inside = np.ones(len(region.surface.triangles)), np.zeros(len(region.surface.triangles))
@@ -150,7 +150,9 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
         settings = replace(settings, boundary="free")
     layout = yield from lay_out(jobs, settings, spare_packer)
     after = [_uv_areas(*x) for x in zip(regions, parts, layout.corners, layout.uv, strict=True)]
-    shares = Shares(found.before, found.asked, share(weights, np.concatenate(after)), found.factor)
+    shares = Shares(
+        found.share_before, found.target_share, region_share(weights, np.concatenate(after)), found.contrast
+    )
     reports = [m.report() for m in layout.maps]
     warnings = [*layout.warnings, *((-1, text) for text in (*found.warnings, *shares.warnings()))]
     return Magnified(layout.corners, layout.uv, reports, shares, warnings)
@@ -190,7 +192,7 @@ class _Piece:
     island: Island
     region: np.ndarray
     area: np.ndarray
-    found: ExactShare
+    found: RegionDensity
     uv: np.ndarray
     outline: str
     iterations: int
@@ -239,7 +241,7 @@ def _islands(regions) -> tuple[list[tuple[int, Island]], list[tuple[int, str]]]:
                 constant += 1
     if not found:
         try:
-            check_weights(np.concatenate([r.weights for r in regions]), regions[0].kind)
+            check_region(np.concatenate([r.weights for r in regions]), regions[0].kind)
             raise WeightError("No island has both a part of the region and a rest", "Paint a part of an island")
         except MeshError as error:
             raise Refusal(0, error) from error
@@ -259,7 +261,7 @@ def _piece(owner: int, island: Island, weights, settings: MagnifySettings) -> St
     refuse_folds(island.uv, triangles)
     area = np.abs(signed_areas(island.uv, triangles))
     factor = whole_factor(settings)
-    found = wanted(weights, area, factor, settings.exact)
+    found = target_density(weights, area, factor, settings.exact)
     if settings.boundary in OUTLINES:
         lens = yield from magnify_region(
             island.uv,
@@ -275,13 +277,13 @@ def _piece(owner: int, island: Island, weights, settings: MagnifySettings) -> St
     return _Piece(owner, island, weights, area, found, lens.uv, lens.outline, lens.iterations), lens.warnings
 
 
-def _into_shape(island: Island, area, found: ExactShare, weights, settings: MagnifySettings) -> Steps[Lens]:
+def _into_shape(island: Island, area, found: RegionDensity, weights, settings: MagnifySettings) -> Steps[Lens]:
     """An island, of UV areas (m,), in a disk or a square: the plane is unwrapped like any other surface."""
     uv, triangles = island.uv, island.chart.triangles
     check_disk(island.chart)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
     flat = replace(island.chart, vertices=np.column_stack([uv * mirror, np.zeros(len(uv))]))
-    density = normalised(found.density, area)
+    density = normalised_density(found.density, area)
     done = yield from unwrap_chart(
         flat, boundary=settings.boundary, quality=settings.quality, density=density, region=weights
     )
@@ -294,10 +296,10 @@ def _overall(pieces: Sequence[_Piece]) -> Shares:
     """Shares of the region in all islands that it touches, by their UV area."""
     size = np.array([piece.area.sum() for piece in pieces])
     size = size / size.sum()
-    before = size @ [share(p.region, p.area) for p in pieces]
-    asked = size @ [p.found.asked for p in pieces]
-    after = size @ [share(p.region, np.abs(signed_areas(p.uv, p.island.chart.triangles))) for p in pieces]
-    return Shares(float(before), float(asked), float(after), pieces[0].found.factor)
+    before = size @ [region_share(p.region, p.area) for p in pieces]
+    asked = size @ [p.found.target_share for p in pieces]
+    after = size @ [region_share(p.region, np.abs(signed_areas(p.uv, p.island.chart.triangles))) for p in pieces]
+    return Shares(float(before), float(asked), float(after), pieces[0].found.contrast)
 
 
 def _grown_together(pieces: Sequence[_Piece], islands) -> list[tuple[int, str]]:
@@ -328,16 +330,16 @@ def _scatter(regions, pieces: Sequence[_Piece]) -> tuple[list[np.ndarray], list[
 def _report(piece: _Piece) -> dict:
     chart = piece.island.chart
     flat = np.column_stack([piece.island.uv, np.zeros(len(piece.uv))])
-    figures = measure(flat, chart.triangles, piece.uv[chart.triangles], density=piece.found.density)
+    figures = distortion(flat, chart.triangles, piece.uv[chart.triangles], density=piece.found.density)
     now = np.abs(signed_areas(piece.uv, chart.triangles))
     return {
         "vertices": len(chart.vertices),
         "triangles": len(chart.triangles),
         "outline": piece.outline,
         "newton_refinement": piece.iterations,
-        "share_before": share(piece.region, piece.area),
-        "share_asked": piece.found.asked,
-        "share_after": share(piece.region, now),
+        "share_before": region_share(piece.region, piece.area),
+        "share_asked": piece.found.target_share,
+        "share_after": region_share(piece.region, now),
         "area_l1": figures.area_l1,
         "angle_mean": figures.angle_mean,
         "folds": figures.folds,

@@ -11,7 +11,7 @@ from ..settings import RefineSettings
 from ..solver.editing.refine_island import boundary_edges, improve
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
-from ..solver.maps.distortion import measure
+from ..solver.maps.distortion import distortion
 from ..solver.maps.overlap import overlap_share
 from ..solver.mesh.charts import Chart, Surface
 from ..solver.mesh.geometry import face_areas, signed_areas
@@ -218,7 +218,7 @@ def _scatter(surfaces, pieces, placed) -> tuple[list[np.ndarray], list[np.ndarra
 def _report(piece: _Piece, uv: np.ndarray) -> dict:
     chart, done = piece.island.chart, piece.refinement
     before, after = (
-        measure(chart.vertices, chart.triangles, x[chart.triangles], overlap=False) for x in (piece.island.uv, uv)
+        distortion(chart.vertices, chart.triangles, x[chart.triangles], overlap=False) for x in (piece.island.uv, uv)
     )
     return {
         "vertices": len(chart.vertices),

@@ -9,14 +9,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..settings import RemeshSettings
-from ..solver.analysis import density as measure
+from ..solver.analysis.density import (
+    checked_density,
+    from_vertices,
+    gaussian_curvature_density,
+    mean_curvature_density,
+    painted_density,
+)
 from ..solver.analysis.feature_edges import all_edges, within_resolution
 from ..solver.analysis.vertex_scores import areas, score, soft_weights
 from ..solver.errors import CountError, DensityError, MeshError
 from ..solver.mesh.charts import Surface, chosen_triangles
 from ..solver.mesh.geometry import face_areas
 from ..solver.mesh.gluing import orientations
-from ..solver.mesh.repair import join
+from ..solver.mesh.repair import repaired_gluing
 from ..solver.mesh.topology import halfedges
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.remeshing.initial.component_maps import Original
@@ -166,8 +172,8 @@ def oriented(surface: Surface) -> tuple[Surface, tuple[str, ...]]:
     if len(np.unique(tail * len(surface.positions) + head)) == len(tail):
         return surface, ()
     faces = np.ones(len(surface.face_start) - 1, dtype=bool)
-    sheets = join(surface, faces, surface.triangles, surface.triangle_face).sheets
-    turned, _ = orientations(sheets, face_areas(surface.positions, surface.corner_vertex[surface.triangles]))
+    gluing = repaired_gluing(surface, faces, surface.triangles, surface.triangle_face).gluing
+    turned, _ = orientations(gluing, face_areas(surface.positions, surface.corner_vertex[surface.triangles]))
     if not turned.any():
         return surface, ()
     triangles = np.where(turned[:, None], surface.triangles[:, [0, 2, 1]], surface.triangles)
@@ -182,25 +188,25 @@ def density_of(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.
 
 
 def _curvature(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
-    return measure.mean_curvature(job.surface.positions, triangles, settings.amount)
+    return mean_curvature_density(job.surface.positions, triangles, settings.amount)
 
 
 def _gaussian(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
-    return measure.gaussian_curvature(job.surface.positions, triangles, settings.amount)
+    return gaussian_curvature_density(job.surface.positions, triangles, settings.amount)
 
 
 def _saliency(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     positions = job.surface.positions
     weights = soft_weights(score("saliency", positions, triangles), areas(positions, triangles))
-    return measure.painted(measure.from_vertices(weights, triangles), settings.factor)
+    return painted_density(from_vertices(weights, triangles), settings.factor)
 
 
 def _painted(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
-    return measure.painted(_values(job), settings.factor)
+    return painted_density(_values(job), settings.factor)
 
 
 def _attribute(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
-    return measure.attribute(_values(job))
+    return checked_density(_values(job))
 
 
 def _values(job: Job) -> np.ndarray:

@@ -43,7 +43,7 @@ class Run:
         ------
         Disturbed : the mesh or the mode has changed, so the result would be of no use
         """
-        from ..solver.progress import Elsewhere
+        from ..solver.progress import ThreadProgress
 
         begin = time.monotonic()
         self._watch.check()
@@ -57,7 +57,7 @@ class Run:
                 self._watch.check(thoroughly=True)
                 return True
             self.stage, self.fraction = progress.stage, progress.fraction
-            more = time.monotonic() - begin < seconds and not isinstance(progress, Elsewhere)
+            more = time.monotonic() - begin < seconds and not isinstance(progress, ThreadProgress)
         return False
 
     def text(self) -> str:

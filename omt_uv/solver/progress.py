@@ -22,7 +22,7 @@ class Progress:
     fraction: float
 
 
-class Elsewhere(Progress):
+class ThreadProgress(Progress):
     """Progress of a solver that works on a thread of its own: there is nothing to gain by asking again at once."""
 
 
@@ -76,7 +76,7 @@ def aside(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
     threading.Thread(target=work, name="omt_uv solver", daemon=True).start()
     try:
         while not done.wait(patience):
-            yield Elsewhere(latest[0].stage, latest[0].fraction)
+            yield ThreadProgress(latest[0].stage, latest[0].fraction)
     finally:
         closed.set()
     if errors:

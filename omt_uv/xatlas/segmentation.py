@@ -26,7 +26,7 @@ def chart_seams(surface: Surface, faces: np.ndarray | None = None) -> np.ndarray
 
     Raises
     ------
-    EmptyMeshError, NonFiniteError : see `charts.split`
+    EmptyMeshError, NonFiniteError : see `charts.strict_charts`
     SegmentationError : xatlas is missing or fails
     """
     _, triangles, owner = chosen_triangles(surface, faces)

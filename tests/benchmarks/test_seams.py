@@ -8,7 +8,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
 
 sys.path.insert(0, str(meshes.ROOT / "benchmarks"))
 
@@ -29,7 +29,7 @@ SURFACES = {"sphere": meshes.icosphere, "cube": meshes.cube, "annulus": meshes.a
 def test_seams_open_a_surface_into_one_disk(name):
     V, F = SURFACES[name]()
     seams = cut_seams(V, F)
-    charts = split(triangle_surface(V, F, seams))  # refuses anything that is no disk
+    charts = strict_charts(triangle_surface(V, F, seams))  # refuses anything that is no disk
     assert len(charts) == 1 and len(charts[0].triangles) == len(F)
     assert np.array_equal(seams, cut_seams(V, F))
 
@@ -53,4 +53,4 @@ def test_the_seam_ends_at_extremities(count):
 @pytest.mark.parametrize("name", ["max_planck", "spot", "homer", "stanford_bunny"])
 def test_models_become_one_disk(name):
     V, F = meshes.load_model(name)
-    assert len(split(triangle_surface(V, F, cut_seams(V, F)))) == 1
+    assert len(strict_charts(triangle_surface(V, F, cut_seams(V, F)))) == 1

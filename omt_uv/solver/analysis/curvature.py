@@ -20,7 +20,7 @@ def gaussian(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     angle = angles_from_lengths(halfedge_lengths(positions, triangles).reshape(-1, 3))
     # The angle opposite to halfedge k lies at vertex k + 2.
     around = np.bincount(triangles[:, [2, 0, 1]].ravel(), angle.ravel(), len(positions))
-    return np.where(on_rim(triangles, len(positions)), 0.0, 2 * np.pi - around)
+    return np.where(on_boundary(triangles, len(positions)), 0.0, 2 * np.pi - around)
 
 
 def mean(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -31,7 +31,7 @@ def mean(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     n = len(positions)
     turn = cotangent_laplacian(positions, triangles) @ (positions - positions[triangles].mean(axis=(0, 1)))
     along = 0.5 * (turn * vertex_normals(positions, triangles)).sum(axis=1)
-    return np.where(on_rim(triangles, n), 0.0, along)
+    return np.where(on_boundary(triangles, n), 0.0, along)
 
 
 def sharpness(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -61,7 +61,7 @@ def vertex_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return _unit(total)
 
 
-def on_rim(triangles: np.ndarray, n: int) -> np.ndarray:
+def on_boundary(triangles: np.ndarray, n: int) -> np.ndarray:
     """Vertices (n,) bool at an edge that does not have two faces."""
     tail, head = halfedges(triangles)
     _, index, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)

@@ -36,20 +36,15 @@ class Target:
         return Target(self.density[rows], None if self.region is None else self.region[rows])
 
 
-def uniform(area: np.ndarray) -> np.ndarray:
-    """Every face its own area: (m,) of ones."""
-    return np.ones(len(area))
-
-
-def painted(weights: np.ndarray, factor: float) -> np.ndarray:
+def painted_density(weights: np.ndarray, factor: float) -> np.ndarray:
     """Density 1 + (factor - 1) w (m,) of weights (m,) in [0, 1]: what has weight 1 gets `factor` times what has 0.
 
     Raises
     ------
-    WeightError, ShareError : see `check_weights` and `check_factor`
+    WeightError, ShareError : see `check_region` and `check_factor`
     """
     check_factor(factor)
-    return 1 + (factor - 1) * check_weights(weights)
+    return 1 + (factor - 1) * check_region(weights)
 
 
 def curved(area: np.ndarray, triangles: np.ndarray, curvature_at: np.ndarray, c: float, whole: float) -> np.ndarray:
@@ -65,7 +60,7 @@ def curved(area: np.ndarray, triangles: np.ndarray, curvature_at: np.ndarray, c:
     return 1 + c * from_vertices(amount / np.where(at > 0, at, 1), triangles)
 
 
-def gaussian_curvature(positions: np.ndarray, triangles: np.ndarray, c: float = 1.0) -> np.ndarray:
+def gaussian_curvature_density(positions: np.ndarray, triangles: np.ndarray, c: float = 1.0) -> np.ndarray:
     """Density (m,) of area + c |K| with K the Gaussian curvature; with c = 1 half of a sphere's measure is curvature.
 
     positions (n,3), triangles (m,3)
@@ -74,7 +69,7 @@ def gaussian_curvature(positions: np.ndarray, triangles: np.ndarray, c: float = 
     return curved(area, triangles, curvature.gaussian(positions, triangles), c, 4 * np.pi)
 
 
-def mean_curvature(positions: np.ndarray, triangles: np.ndarray, c: float = 1.0) -> np.ndarray:
+def mean_curvature_density(positions: np.ndarray, triangles: np.ndarray, c: float = 1.0) -> np.ndarray:
     """Density (m,) of area + c |H| with H the mean curvature; with c = 1 half of a sphere's measure is curvature.
 
     Mean curvature is one over a length: the surface is measured by the radius of the sphere that has its area.
@@ -94,7 +89,7 @@ def from_polygons(values: np.ndarray, triangle_face: np.ndarray) -> np.ndarray:
     return np.asarray(values, float)[triangle_face]
 
 
-def attribute(values: np.ndarray) -> np.ndarray:
+def checked_density(values: np.ndarray) -> np.ndarray:
     """Any positive numbers (m,) as a density.
 
     Raises
@@ -108,17 +103,17 @@ def attribute(values: np.ndarray) -> np.ndarray:
     return density
 
 
-def normalised(density: np.ndarray, area: np.ndarray) -> np.ndarray:
+def normalised_density(density: np.ndarray, area: np.ndarray) -> np.ndarray:
     """The density (m,) scaled so that the target measure sums to the area."""
     return density * (area.sum() / (area @ density))
 
 
-def share(weights: np.ndarray, measure: np.ndarray) -> float:
+def region_share(weights: np.ndarray, measure: np.ndarray) -> float:
     """Share sum(w a) / sum(a) of a softly painted region (m,) in a measure (m,): areas in space, or in a UV map."""
     return float(weights @ measure / measure.sum())
 
 
-def not_reached(error: float, goal: float) -> tuple[str, ...]:
+def area_error_warnings(error: float, goal: float) -> tuple[str, ...]:
     """A warning where the area error of a map against its density is much above the goal, as it is where the density
     varies more from face to face than shear can make up for."""
     if error <= INEXACT * goal:
@@ -129,14 +124,16 @@ def not_reached(error: float, goal: float) -> tuple[str, ...]:
     )
 
 
-def entropy(target: np.ndarray, area: np.ndarray) -> float:
+def relative_entropy(target: np.ndarray, area: np.ndarray) -> float:
     """Relative entropy sum(p log(p / q)) of a target measure (m,) against the areas (m,): 0 if all densities are 1."""
     p, q = target / target.sum(), area / area.sum()
     held = (p > 0) & (q > 0)
     return float(p[held] @ np.log(p[held] / q[held]))
 
 
-def graded(density: np.ndarray, positions: np.ndarray, triangles: np.ndarray, limit: float, samples: int) -> np.ndarray:
+def graded_density(
+    density: np.ndarray, positions: np.ndarray, triangles: np.ndarray, limit: float, samples: int
+) -> np.ndarray:
     """The least density (m,) above the given one (m,) whose spacing of samples grows by at most `limit` per length.
 
     With `samples` points the spacing is h = sqrt(area / (samples density)), and the result obeys
@@ -145,11 +142,11 @@ def graded(density: np.ndarray, positions: np.ndarray, triangles: np.ndarray, li
 
     Raises
     ------
-    DensityError : see `attribute`; a limit that is not positive
+    DensityError : see `checked_density`; a limit that is not positive
     """
     if not limit > 0:
         raise DensityError(f"A spacing cannot grow by {limit}", remedy="Give a positive limit")
-    density = normalised(attribute(density), area := face_areas(positions, triangles))
+    density = normalised_density(checked_density(density), area := face_areas(positions, triangles))
     n, at = len(positions), vertex_areas(positions, triangles)
     mean = vertex_areas(positions, triangles, density) / np.where(at > 0, at, 1)
     spacing = np.sqrt(area.sum() / (samples * np.where(at > 0, mean, 1)))
@@ -166,7 +163,7 @@ def graded(density: np.ndarray, positions: np.ndarray, triangles: np.ndarray, li
     return density * from_vertices(finer, triangles)
 
 
-def check_weights(weights: np.ndarray, kind: str = "face") -> np.ndarray:
+def check_region(weights: np.ndarray, kind: str = "face") -> np.ndarray:
     """Weights as float64, all of them in [0, 1] and not the same everywhere.
 
     Raises

@@ -15,7 +15,7 @@ DIMENSION = 24
 COMPLETE = 1e-12
 
 
-class Surroundings:
+class HeatMeans:
     """Gaussian means on the surface (n,3), (m,3), for sigmas about `sigma`."""
 
     def __init__(self, positions: np.ndarray, triangles: np.ndarray, sigma: float):

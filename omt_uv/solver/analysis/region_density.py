@@ -1,8 +1,8 @@
 """The density that gives a painted region exactly the share asked of the domain, whatever its rim and its rest.
 
-The share of a region with weights w is sum(w a) / sum(a), a soft count of the areas a: see `measure.share`. Of all
-measures in which the region has a given share, M^w times the present one is the nearest in relative entropy (Csiszar
-1975). These densities form a group: magnified twice by 2 the region has just the density of once by 4.
+The share of a region with weights w is sum(w a) / sum(a), a soft count of the areas a: see `density.region_share`. Of
+all measures in which the region has a given share, M^w times the present one is the nearest in relative entropy
+(Csiszar 1975). These densities form a group: magnified twice by 2 the region has just the density of once by 4.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ShareError
-from .density import CONTRAST, check_factor, check_weights, painted, share
+from .density import CONTRAST, check_factor, check_region, painted_density, region_share
 
 # A factor so many times what a region with a hard rim would need is said: the rest gets little of the texture.
 MOST_OF_HARD = 4.0
@@ -20,18 +20,24 @@ BISECTIONS = 60
 
 
 @dataclass(frozen=True)
-class ExactShare:
-    """density (m,), before it is normalised; factor of weight 1 against weight 0 in it; shares before and asked;
-    warnings."""
+class RegionDensity:
+    """What a painted region is to get.
+
+    density : (m,) of the faces, before it is normalised
+    contrast : density of weight 1 over that of weight 0
+    share_before, target_share : shares of the area that the region has, and that it gets
+    """
 
     density: np.ndarray
-    factor: float
-    before: float
-    asked: float
+    contrast: float
+    share_before: float
+    target_share: float
     warnings: tuple[str, ...] = ()
 
 
-def exact_share(weights: np.ndarray, area: np.ndarray, factor: float, base: np.ndarray | None = None) -> ExactShare:
+def exact_density(
+    weights: np.ndarray, area: np.ndarray, factor: float, base: np.ndarray | None = None
+) -> RegionDensity:
     """Density that gives a region with weights (m,) in [0, 1] `factor` times its share.
 
     The density is M^w. It has every share between the smallest and the largest weight, and varies as smoothly as the
@@ -47,9 +53,9 @@ def exact_share(weights: np.ndarray, area: np.ndarray, factor: float, base: np.n
     WeightError, ShareError : weights that mark nothing; a factor or a share that no map has
     """
     check_factor(factor)
-    weights = check_weights(weights)
+    weights = check_region(weights)
     measure = area if base is None else area * base
-    before = share(weights, measure)
+    before = region_share(weights, measure)
     asked = factor * before
     if not before > 0:
         raise ShareError("The region has no area", "Paint a region with area")
@@ -71,7 +77,7 @@ def exact_share(weights: np.ndarray, area: np.ndarray, factor: float, base: np.n
     hard = asked / (1 - asked) * (1 - before) / before
     soft = abs(np.log(found)) > abs(np.log(hard)) + np.log(MOST_OF_HARD)
     warning = f"The rim of the region is very soft for this factor: densities vary by {max(found, 1 / found):.3g}"
-    return ExactShare(found**weights, found, before, asked, (warning,) if soft else ())
+    return RegionDensity(found**weights, found, before, asked, (warning,) if soft else ())
 
 
 def _too_far(factor: float, contrast: float) -> ShareError:
@@ -82,19 +88,19 @@ def _too_far(factor: float, contrast: float) -> ShareError:
     )
 
 
-def wanted(weights: np.ndarray, area: np.ndarray, factor: float, exact: bool) -> ExactShare:
+def target_density(weights: np.ndarray, area: np.ndarray, factor: float, exact: bool) -> RegionDensity:
     """The density of a region (m,) for its exact share, or for exactly the factor between weight 1 and weight 0.
 
     Raises
     ------
-    WeightError, ShareError : see `exact_share` and `measure.painted`
+    WeightError, ShareError : see `exact_density` and `density.painted_density`
     """
     if exact:
-        return exact_share(weights, area, factor)
-    density = painted(weights, factor)
+        return exact_density(weights, area, factor)
+    density = painted_density(weights, factor)
     if not 1 / CONTRAST <= factor <= CONTRAST:
         raise _too_far(factor, factor)
-    return ExactShare(density, factor, share(weights, area), share(weights, area * density))
+    return RegionDensity(density, factor, region_share(weights, area), region_share(weights, area * density))
 
 
 def _contrast(weights, measure, asked: float) -> float:
@@ -103,7 +109,7 @@ def _contrast(weights, measure, asked: float) -> float:
     def error(log: float) -> float:
         # Taking off the largest exponent keeps the powers finite.
         power = np.exp(log * weights - max(log, 0.0) * weights.max())
-        return share(weights, power * measure) - asked
+        return region_share(weights, power * measure) - asked
 
     low = high = 0.0
     step = 1.0

@@ -12,7 +12,7 @@ import numpy as np
 from ..mesh.geometry import face_areas
 from ..mesh.topology import halfedges
 from .curvature import mean
-from .heat_means import Surroundings
+from .heat_means import HeatMeans
 
 # Scales, in multiples of EPSILON times the diagonal (section 3.1 and 4: epsilon is 0.3 % of it).
 SCALES = np.array([2.0, 3.0, 4.0, 5.0, 6.0])
@@ -32,7 +32,7 @@ def saliency(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     with G the Gaussian mean and H the mean curvature. Zero on planes and round spheres.
     """
     positions = unit_size(positions, triangles)
-    around = Surroundings(positions, triangles, 6 * EPSILON)
+    around = HeatMeans(positions, triangles, 6 * EPSILON)
     sigmas = np.unique(np.concatenate([SCALES, 2 * SCALES]))
     means = around.means(mean(positions, triangles), EPSILON * sigmas)
     at = {s: means[k] for k, s in enumerate(sigmas.tolist())}

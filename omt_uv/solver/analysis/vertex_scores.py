@@ -11,7 +11,7 @@ from ..mesh.charts import check_finite
 from ..mesh.geometry import vertex_areas
 from ..mesh.topology import halfedges, pair_keys, pair_up, previous_halfedge
 from . import curvature
-from .heat_means import Surroundings
+from .heat_means import HeatMeans
 from .saliency import EPSILON, saliency, unit_size
 
 KINDS = ("saliency", "gaussian", "mean", "sharpness", "distance")
@@ -47,7 +47,7 @@ def score(kind: str, positions: np.ndarray, triangles: np.ndarray, selected: np.
         return -distance(positions, triangles, np.flatnonzero(selected))
     positions = unit_size(positions, triangles)
     amount = {"gaussian": curvature.gaussian, "mean": curvature.mean}[kind](positions, triangles)
-    found = Surroundings(positions, triangles, SMOOTH).means(np.abs(amount), np.array([SMOOTH]))[0]
+    found = HeatMeans(positions, triangles, SMOOTH).means(np.abs(amount), np.array([SMOOTH]))[0]
     return found if found.max() > NO_CURVATURE[kind] else np.zeros(len(positions))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..mesh.gluing import Sheets, groups
+from ..mesh.gluing import Gluing, groups
 from ..mesh.topology import halfedges
 
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
@@ -57,12 +57,12 @@ class Piece:
         """Factor (n,) > 0 by which a cut would rather end at a vertex: small where cuts are to be avoided."""
         return 1 - 0.999 * self.avoid
 
-    def on_rim(self) -> np.ndarray:
+    def on_boundary(self) -> np.ndarray:
         """Boundary vertices (n,) bool."""
         tail, head = halfedges(self.triangles)
-        on_rim = np.zeros(self.count, dtype=bool)
-        on_rim[tail[self.rim]] = on_rim[head[self.rim]] = True
-        return on_rim
+        on_boundary = np.zeros(self.count, dtype=bool)
+        on_boundary[tail[self.rim]] = on_boundary[head[self.rim]] = True
+        return on_boundary
 
 
 @dataclass(frozen=True)
@@ -82,12 +82,12 @@ class Kind:
         return (self.boundaries == 1) & (self.handles == 0)
 
 
-def classify(sheets: Sheets, corner_class: np.ndarray, part: np.ndarray, one_sided: np.ndarray) -> Kind:
+def classify(gluing: Gluing, corner_class: np.ndarray, part: np.ndarray, one_sided: np.ndarray) -> Kind:
     """Kind of every part, from the classes of corners (c,), the parts (m,) and whether each triangle is one-sided."""
     k = int(part.max()) + 1
-    tail, head = halfedges(corner_class[sheets.triangles])
-    rim = _open_halfedges(len(tail), sheets.first, sheets.second)
-    vertices, where = np.unique(corner_class[sheets.triangles], return_index=True)
+    tail, head = halfedges(corner_class[gluing.triangles])
+    rim = _open_halfedges(len(tail), gluing.first, gluing.second)
+    vertices, where = np.unique(corner_class[gluing.triangles], return_index=True)
     n = np.bincount(part[where // 3], minlength=k)
     m = np.bincount(part, minlength=k)
     b = np.bincount(part[rim // 3], minlength=k)
@@ -110,7 +110,7 @@ def _open_halfedges(count: int, first: np.ndarray, second: np.ndarray) -> np.nda
 
 
 def make_piece(
-    sheets: Sheets,
+    gluing: Gluing,
     positions: np.ndarray,
     corner_class: np.ndarray,
     members: np.ndarray,
@@ -126,13 +126,13 @@ def make_piece(
     weight : (n,) in [0,1] keeps vertices of the surface free of cuts
     ease : (p,) factor by which each pair is cheaper to cut, see `cutting.ease_of_cuts`
     """  # fmt: skip
-    corners = sheets.triangles[members]
+    corners = gluing.triangles[members]
     _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
     triangles = inverse.reshape(-1, 3).astype(np.int64)
-    vertex_ids = sheets.vertex[corners.ravel()[index]]
-    pair = np.stack([sheets.first[mine], sheets.second[mine]], axis=1)
-    patch = (sheets.owner[pair // 3] < 0).any(axis=1)
-    diagonal = ~sheets.side[pair[:, 0]] & ~patch
+    vertex_ids = gluing.vertex[corners.ravel()[index]]
+    pair = np.stack([gluing.first[mine], gluing.second[mine]], axis=1)
+    patch = (gluing.owner[pair // 3] < 0).any(axis=1)
+    diagonal = ~gluing.side[pair[:, 0]] & ~patch
     pair = 3 * np.searchsorted(members, pair // 3) + pair % 3
     tail, head = halfedges(triangles)
     ends = np.stack([tail[pair[:, 0]], head[pair[:, 0]]], axis=1)

@@ -26,7 +26,7 @@ def greedy_arcs(piece: Piece, roots: np.ndarray) -> np.ndarray:
     first what would be long cuts; each edge in neither closes an arc (Eppstein 2003; Erickson, Whittlesey 2005,
     "Greedy optimal homotopy and homology generators", section 3).
     """
-    start = piece.on_rim()
+    start = piece.on_boundary()
     start[roots] = True
     everything = np.arange(len(piece.pair))
     distance, before, _ = dijkstra(
@@ -117,7 +117,7 @@ def stretches(piece: Piece, cut: np.ndarray, tips: np.ndarray) -> list[np.ndarra
         return []
     ends = piece.ends[edges]
     node = np.bincount(ends.ravel(), minlength=piece.count) != 2
-    node |= piece.on_rim()
+    node |= piece.on_boundary()
     node[tips] = True
     # Edges are joined through vertices that are no nodes; every edge has a place of its own for its ends at nodes.
     k = len(edges)
@@ -161,14 +161,14 @@ def _shortest_bridge(piece: Piece, cut: np.ndarray, tips: np.ndarray) -> np.ndar
     rim = open_rim(piece, cut)
     graph = coo_matrix((np.ones(len(rim)), (tail[rim], head[rim])), shape=(n, n))
     label = connected_components(graph, directed=False)[1]
-    on_rim = np.zeros(n, dtype=bool)
-    on_rim[tail[rim]] = on_rim[head[rim]] = True
+    on_boundary = np.zeros(n, dtype=bool)
+    on_boundary[tail[rim]] = on_boundary[head[rim]] = True
     # A tip that the rest does not touch is a boundary of one point.
-    on_rim[opened.ravel()[np.isin(piece.triangles.ravel(), tips)]] = True
-    boundaries = np.unique(label[on_rim])
+    on_boundary[opened.ravel()[np.isin(piece.triangles.ravel(), tips)]] = True
+    boundaries = np.unique(label[on_boundary])
     if len(boundaries) != 2:
         return None
-    one, other = (on_rim & (label == c) for c in boundaries)
+    one, other = (on_boundary & (label == c) for c in boundaries)
     inner = np.flatnonzero(~cut)
     ends = np.stack([tail[piece.pair[inner, 0]], head[piece.pair[inner, 0]]], axis=1)
     distance, before, _ = dijkstra(

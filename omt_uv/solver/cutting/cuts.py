@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.charts import Surface, chosen_triangles, is_seam, is_sharp
 from ..mesh.geometry import face_areas
-from ..mesh.gluing import Sheets, components, corner_classes, groups, orientations, turn_over
-from ..mesh.repair import Repaired, join, weldable
+from ..mesh.gluing import Gluing, components, corner_classes, groups, orientations, turn_over
+from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluing
 from ..mesh.topology import pair_keys
 from .component import NOISE, SEAM, SHARP, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .cut_graph import greedy_arcs, path_to, shorten
@@ -69,7 +69,7 @@ class Opened:
     """
 
     surface: Surface
-    sheets: Sheets
+    gluing: Gluing
     cuts: Cuts
     extent: float
 
@@ -95,10 +95,10 @@ def cut(
 
     Raises
     ------
-    EmptyMeshError, NonFiniteError : see `charts.split`; everything else is repaired and said in the warnings
+    EmptyMeshError, NonFiniteError : see `charts.strict_charts`; everything else is repaired and said in the warnings
     """
     faces, triangles, owner = chosen_triangles(surface, faces)
-    repaired = join(surface, faces, triangles, owner)
+    repaired = repaired_gluing(surface, faces, triangles, owner)
     return open_sheets(surface, repaired, avoid=avoid, fill=fill, sieve=sieve, extremities=extremities).cuts
 
 
@@ -113,35 +113,35 @@ def open_sheets(
 ) -> Opened:
     """Repaired sheets cut into disks; see `cut`."""
     vertex_count = len(surface.positions)
-    positions, unit = _in_unit_box(surface, repaired.sheets)
-    sheets, one_sided = _looking_out(repaired.sheets, positions)
+    positions, unit = _in_unit_box(surface, repaired.gluing)
+    gluing, one_sided = _looking_out(repaired.gluing, positions)
     # What has one side only is not told to look to the other.
-    turned = sheets.triangles[:, 1] != repaired.sheets.triangles[:, 1]
-    gone = np.zeros(len(sheets.first), dtype=bool)
+    turned = gluing.triangles[:, 1] != repaired.gluing.triangles[:, 1]
+    gone = np.zeros(len(gluing.first), dtype=bool)
     if sieve is not None:
-        gone = parting_pairs(sheets, positions, one_sided)
-    sheets, parting = sheets.without(gone), np.stack(sheets.ends(sheets.first[gone]), axis=1)
+        gone = parting_pairs(gluing, positions, one_sided)
+    gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]
     holes, sieves = 0, not fill
     if fill or sieve is not None:
-        filled = fill_holes(surface, sheets, one_sided, None if fill else sieve)
-        surface, sheets, holes = filled.surface, filled.sheets, filled.holes
-        one_sided = np.append(one_sided, np.zeros(len(sheets.triangles) - len(one_sided), dtype=bool))
-        positions, unit = _in_unit_box(surface, sheets)
+        filled = fill_holes(surface, gluing, one_sided, None if fill else sieve)
+        surface, gluing, holes = filled.surface, filled.gluing, filled.holes
+        one_sided = np.append(one_sided, np.zeros(len(gluing.triangles) - len(one_sided), dtype=bool))
+        positions, unit = _in_unit_box(surface, gluing)
     weight = np.ones(len(positions))
     weight[:vertex_count] = 0
     if avoid is not None:
         weight[:vertex_count] = np.clip(np.asarray(avoid, float), 0, 1)
-    gone, report, touching = _cut_parts(surface, sheets, one_sided, positions, unit, weight, extremities, sieves)
-    edges = np.stack(sheets.ends(sheets.first[gone]), axis=1)
+    gone, report, touching = _cut_parts(surface, gluing, one_sided, positions, unit, weight, extremities, sieves)
+    edges = np.stack(gluing.ends(gluing.first[gone]), axis=1)
     edges = edges[(edges < vertex_count).all(axis=1)]
     # Parts that could not be oriented can be, now that they are open.
-    sheets, _ = _looking_out(sheets.without(gone), positions)
+    gluing, _ = _looking_out(gluing.without(gone), positions)
     length = sum(p.length for p in report) + unit * float(np.linalg.norm(apart, axis=1).sum())
     edges = np.concatenate([edges, parting, repaired.torn]).astype(np.int64)
-    backwards = len(np.unique(repaired.sheets.owner[turned]))
+    backwards = len(np.unique(repaired.gluing.owner[turned]))
     warnings = (*repaired.warnings, *_said(len(parting), backwards, holes * sieves, touching))
-    return Opened(surface, sheets, Cuts(edges, length, tuple(report), repaired.torn, warnings), unit)
+    return Opened(surface, gluing, Cuts(edges, length, tuple(report), repaired.torn, warnings), unit)
 
 
 def sieved(holes: int) -> str:
@@ -162,27 +162,27 @@ def _said(parting: int, backwards: int, holes: int, touching: int) -> Iterator[s
 
 
 def _cut_parts(
-    surface, sheets, one_sided, positions, unit, weight, extremities, sieves
+    surface, gluing, one_sided, positions, unit, weight, extremities, sieves
 ) -> tuple[np.ndarray, list[PieceCut], int]:
     """Pairs (p,) bool to cut so that every part is a disk, what was done to those that were none, and how many
     vertices a weld would join.
 
     sieves : what has been filled are sieves, which are cut to extremities as closed parts are, disks too
     """
-    part, corner_class = components(sheets), corner_classes(sheets)
-    kind = classify(sheets, corner_class, part, one_sided)
-    ease = ease_of_cuts(surface, sheets)
-    gone = np.zeros(len(sheets.first), dtype=bool)
+    part, corner_class = components(gluing), corner_classes(gluing)
+    kind = classify(gluing, corner_class, part, one_sided)
+    ease = ease_of_cuts(surface, gluing)
+    gone = np.zeros(len(gluing.first), dtype=bool)
     members = groups(part)
-    order, start = _by_part(part[sheets.first // 3], len(members))
+    order, start = _by_part(part[gluing.first // 3], len(members))
     report = []
     # A mesh may hold the same part many times: rivets, teeth, leaves.
     known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
     patched = np.zeros(len(members), dtype=bool)
-    patched[part[sheets.owner < 0]] = True
+    patched[part[gluing.owner < 0]] = True
     for k in np.flatnonzero(~kind.is_disk | (patched & sieves)):
         mine = order[start[k] : start[k + 1]]
-        piece = make_piece(sheets, positions, corner_class, members[k], mine, weight, ease)
+        piece = make_piece(gluing, positions, corner_class, members[k], mine, weight, ease)
         name = fingerprint(piece)
         if name not in known:
             known[name] = _best_cut(piece, kind, k, extremities, bool(patched[k]) and not sieves)
@@ -191,7 +191,7 @@ def _cut_parts(
         length = float(piece.length[chosen].sum()) * unit
         figures = int(kind.boundaries[k]), int(kind.handles[k]), bool(kind.one_sided[k])
         report.append(PieceCut(len(piece.triangles), *figures, length, piece.vertex_ids[tips]))
-    return gone, report, weldable(surface, sheets, part, kind.is_disk)
+    return gone, report, coincident_boundary_vertices(surface, gluing, part, kind.is_disk)
 
 
 def _best_cut(piece: Piece, kind: Kind, k: int, extremities: int, filled: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -205,13 +205,13 @@ def _best_cut(piece: Piece, kind: Kind, k: int, extremities: int, filled: bool) 
     return other
 
 
-def ease_of_cuts(surface: Surface, sheets: Sheets) -> np.ndarray:
+def ease_of_cuts(surface: Surface, gluing: Gluing) -> np.ndarray:
     """Factor (p,) on the cost of cutting each pair: less where the artist marked a seam or a sharp edge.
 
     What cannot be oriented is rather opened where its faces look to opposite sides: then none has to be turned over.
     """
-    key = pair_keys(*sheets.ends(sheets.first))
-    ease = np.where(is_sharp(surface, key) | sheets.parallel(), SHARP, 1.0)
+    key = pair_keys(*gluing.ends(gluing.first))
+    ease = np.where(is_sharp(surface, key) | gluing.parallel(), SHARP, 1.0)
     ease[is_seam(surface, key)] = SEAM
     return ease
 
@@ -230,16 +230,16 @@ def _by_part(part: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     return order, np.searchsorted(part[order], np.arange(count + 1))
 
 
-def _looking_out(sheets: Sheets, positions: np.ndarray) -> tuple[Sheets, np.ndarray]:
-    """Sheets in which neighbours look to the same side, and the triangles (m,) bool of parts where they cannot."""
-    area = face_areas(positions, sheets.vertex[sheets.triangles])
-    turned, one_sided = orientations(sheets, area)
-    return turn_over(sheets, turned), one_sided
+def _looking_out(gluing: Gluing, positions: np.ndarray) -> tuple[Gluing, np.ndarray]:
+    """Gluing in which neighbours look to the same side, and the triangles (m,) bool of parts where they cannot."""
+    area = face_areas(positions, gluing.vertex[gluing.triangles])
+    turned, one_sided = orientations(gluing, area)
+    return turn_over(gluing, turned), one_sided
 
 
-def _in_unit_box(surface: Surface, sheets: Sheets) -> tuple[np.ndarray, float]:
+def _in_unit_box(surface: Surface, gluing: Gluing) -> tuple[np.ndarray, float]:
     """Positions (n,3) of the surface such that the triangles lie in a unit box, and its size; 0 where unused."""
-    used = np.unique(sheets.vertex[sheets.triangles])
+    used = np.unique(gluing.vertex[gluing.triangles])
     p = surface.positions[used]
     low, high = p.min(axis=0), p.max(axis=0)
     # Halves first: the difference of two huge numbers may be infinite.
@@ -307,7 +307,7 @@ def _peak(value: np.ndarray) -> int:
 
 
 def _cut_vertices(piece: Piece, chosen: np.ndarray) -> np.ndarray:
-    start = piece.on_rim()
+    start = piece.on_boundary()
     start[piece.ends[chosen].ravel()] = True
     return np.flatnonzero(start)
 

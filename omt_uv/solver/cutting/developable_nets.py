@@ -31,9 +31,11 @@ def net(piece: Piece) -> tuple[np.ndarray, np.ndarray] | None:
     None if there are none, or if seams would pass through vertices to be kept free of them.
     """
     length = halfedge_lengths(piece.positions, piece.triangles).reshape(-1, 3)
-    on_rim = piece.on_rim()
-    curvature = np.abs(angle_defects(piece.triangles, angles_from_lengths(length), np.flatnonzero(on_rim), piece.count))
-    curvature[on_rim] = 0
+    on_boundary = piece.on_boundary()
+    curvature = np.abs(
+        angle_defects(piece.triangles, angles_from_lengths(length), np.flatnonzero(on_boundary), piece.count)
+    )
+    curvature[on_boundary] = 0
     folded = np.abs(fold_angles(piece.positions, piece.triangles, piece.pair)) > HARD
     hard = np.zeros(piece.count, dtype=bool)
     hard[piece.ends[folded]] = True

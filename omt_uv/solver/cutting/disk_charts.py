@@ -7,8 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ZeroAreaFaceError
-from ..mesh.charts import Chart, Surface, assemble, check_disk, check_edges, chosen_triangles, split, strict_sheets
-from ..mesh.repair import join, with_area
+from ..mesh.charts import (
+    Chart,
+    Surface,
+    charts_of,
+    check_disk,
+    check_edges,
+    chosen_triangles,
+    strict_charts,
+    strict_gluing,
+)
+from ..mesh.repair import repaired_gluing, with_area
 from .cuts import MOST_EXTREMITIES, Cuts, open_sheets, sieved
 from .hole_filling import fill_holes as fill_holes_of
 
@@ -49,7 +58,7 @@ def prepare(
 
     Raises
     ------
-    MeshError : see `charts.split`; with "auto" only EmptyMeshError, NonFiniteError, and ZeroAreaFaceError or
+    MeshError : see `charts.strict_charts`; with "auto" only EmptyMeshError, NonFiniteError, and ZeroAreaFaceError or
         NonManifoldEdgeError where no repair helps
     """
     if seams not in SEAMS:
@@ -59,9 +68,9 @@ def prepare(
     faces, triangles, owner = chosen_triangles(surface, faces)
     if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
-    repaired = join(surface, faces, triangles, owner)
+    repaired = repaired_gluing(surface, faces, triangles, owner)
     opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes, sieve=sieve, extremities=extremities)
-    charts, flat = _sound(assemble(opened.surface, opened.sheets), opened.extent)
+    charts, flat = _sound(charts_of(opened.surface, opened.gluing), opened.extent)
     warnings = list(opened.cuts.warnings)
     if flat:
         who = "A triangle has" if flat == 1 else f"{flat} triangles have"
@@ -79,14 +88,14 @@ def _all_lines(points: np.ndarray) -> bool:
 
 def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int | None) -> Prepared:
     if not fill and sieve is None:
-        return Prepared(split(surface, faces), None, ())
-    sheets = strict_sheets(surface, faces)
-    filled = fill_holes_of(surface, sheets, np.zeros(len(sheets.triangles), dtype=bool), None if fill else sieve)
+        return Prepared(strict_charts(surface, faces), None, ())
+    gluing = strict_gluing(surface, faces)
+    filled = fill_holes_of(surface, gluing, np.zeros(len(gluing.triangles), dtype=bool), None if fill else sieve)
     if not fill and not filled.holes:
-        return Prepared(split(surface, faces), None, ())
-    positions = surface.positions[surface.corner_vertex[sheets.triangles]] / 2
+        return Prepared(strict_charts(surface, faces), None, ())
+    positions = surface.positions[surface.corner_vertex[gluing.triangles]] / 2
     # Faces have areas, but what fills a hole that is a line has none.
-    charts, _ = _sound(assemble(filled.surface, filled.sheets), 2 * float(np.ptp(positions, axis=(0, 1)).max()))
+    charts, _ = _sound(charts_of(filled.surface, filled.gluing), 2 * float(np.ptp(positions, axis=(0, 1)).max()))
     return Prepared(charts, None, () if fill else (sieved(filled.holes),))
 
 

@@ -13,7 +13,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..mesh.charts import Surface
-from ..mesh.gluing import Sheets, components, corner_classes
+from ..mesh.gluing import Gluing, components, corner_classes
 from ..mesh.topology import halfedges
 from .component import NOISE
 
@@ -29,29 +29,29 @@ class Filled:
     """The surface with a vertex in the middle of every hole, the sheets with the fans, and the number of holes."""
 
     surface: Surface
-    sheets: Sheets
+    gluing: Gluing
     holes: int
 
 
-def fill_holes(surface: Surface, sheets: Sheets, one_sided: np.ndarray, sieve: int | None = None) -> Filled:
+def fill_holes(surface: Surface, gluing: Gluing, one_sided: np.ndarray, sieve: int | None = None) -> Filled:
     """Fill all boundaries but the longest of every part of oriented sheets; parts `one_sided` (m,) are left alone.
 
     sieve : fill only where there are more than so many holes, and leave all that are rims rather than holes open
     """
-    tail, head = halfedges(corner_classes(sheets)[sheets.triangles])
-    rim, loop = hole_rims(surface.positions, sheets, one_sided, sieve)
+    tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
+    rim, loop = hole_rims(surface.positions, gluing, one_sided, sieve)
     if len(rim) == 0:
-        return Filled(surface, sheets, 0)
-    return _fans(surface, sheets, rim, loop, tail, head, int(max(tail.max(), head.max())) + 1)
+        return Filled(surface, gluing, 0)
+    return _fans(surface, gluing, rim, loop, tail, head, int(max(tail.max(), head.max())) + 1)
 
 
 def hole_rims(
-    positions: np.ndarray, sheets: Sheets, one_sided: np.ndarray, sieve: int | None = None
+    positions: np.ndarray, gluing: Gluing, one_sided: np.ndarray, sieve: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The halfedges (r,) around the holes that `fill_holes` fills, and the number (r,) of the hole of each."""
-    tail, head = halfedges(corner_classes(sheets)[sheets.triangles])
+    tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
     open_ = np.ones(len(tail), dtype=bool)
-    open_[sheets.first] = open_[sheets.second] = False
+    open_[gluing.first] = open_[gluing.second] = False
     rim = np.flatnonzero(open_)
     rim = rim[~one_sided[rim // 3]]
     if len(rim) == 0:
@@ -59,19 +59,19 @@ def hole_rims(
     size = int(max(tail.max(), head.max())) + 1
     loop = connected_components(coo_matrix((np.ones(len(rim)), (tail[rim], head[rim])), shape=(size, size)), False)[1]
     loop = np.unique(loop[tail[rim]], return_inverse=True)[1].ravel()
-    hole = _holes(positions, sheets, rim, loop, sieve)
+    hole = _holes(positions, gluing, rim, loop, sieve)
     return rim[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
 
 
-def _holes(positions: np.ndarray, sheets: Sheets, rim: np.ndarray, loop: np.ndarray, sieve: int | None) -> np.ndarray:
+def _holes(positions: np.ndarray, gluing: Gluing, rim: np.ndarray, loop: np.ndarray, sieve: int | None) -> np.ndarray:
     """Loops (l,) bool that are not the longest of their part, or that are holes of sieves."""
-    a, b = sheets.ends(rim)
+    a, b = gluing.ends(rim)
     # Halves: the difference of two huge numbers may be infinite.
     step = np.linalg.norm(positions[a] / 2 - positions[b] / 2, axis=1)
     around = np.bincount(loop, step)
     # Of many equal holes rounding shall not choose the one that stays open.
     length = around * (1 + NOISE * np.random.default_rng(0).random(len(around)))
-    part = components(sheets)[rim[np.unique(loop, return_index=True)[1]] // 3]
+    part = components(gluing)[rim[np.unique(loop, return_index=True)[1]] // 3]
     order = np.lexsort((-length, part))
     _, first, place, count = np.unique(part[order], return_index=True, return_inverse=True, return_counts=True)
     hole = np.ones(len(length), dtype=bool)
@@ -82,10 +82,10 @@ def _holes(positions: np.ndarray, sheets: Sheets, rim: np.ndarray, loop: np.ndar
     return hole
 
 
-def _fans(surface, sheets, rim, loop, tail, head, size) -> Filled:
+def _fans(surface, gluing, rim, loop, tail, head, size) -> Filled:
     """A triangle (head, tail, centre of the hole) on every rim halfedge (k,), joined to it and to its neighbours."""
-    a, b = sheets.ends(rim)
-    n, c, m, k = len(surface.positions), len(sheets.vertex), len(sheets.triangles), len(rim)
+    a, b = gluing.ends(rim)
+    n, c, m, k = len(surface.positions), len(gluing.vertex), len(gluing.triangles), len(rim)
     count = np.bincount(loop)
     centre = np.stack([np.bincount(loop, x / count[loop]) for x in surface.positions[a].T], axis=1)
     successor = np.full(size, -1, dtype=np.int64)
@@ -93,13 +93,13 @@ def _fans(surface, sheets, rim, loop, tail, head, size) -> Filled:
     following = successor[head[rim]]
     mine = 3 * (m + np.arange(k))
     extended = replace(
-        sheets,
-        triangles=np.concatenate([sheets.triangles, c + np.arange(3 * k).reshape(k, 3)]),
-        owner=np.concatenate([sheets.owner, np.full(k, NO_POLYGON)]),
-        vertex=np.concatenate([sheets.vertex, np.stack([b, a, n + loop], axis=1).ravel()]),
-        side=np.concatenate([sheets.side, np.tile([True, False, False], k)]),
-        first=np.concatenate([sheets.first, rim, mine + 2]),
-        second=np.concatenate([sheets.second, mine, mine[following] + 1]),
+        gluing,
+        triangles=np.concatenate([gluing.triangles, c + np.arange(3 * k).reshape(k, 3)]),
+        owner=np.concatenate([gluing.owner, np.full(k, NO_POLYGON)]),
+        vertex=np.concatenate([gluing.vertex, np.stack([b, a, n + loop], axis=1).ravel()]),
+        side=np.concatenate([gluing.side, np.tile([True, False, False], k)]),
+        first=np.concatenate([gluing.first, rim, mine + 2]),
+        second=np.concatenate([gluing.second, mine, mine[following] + 1]),
     )
     positions = np.concatenate([surface.positions, centre])
     return Filled(replace(surface, positions=positions, corner_vertex=extended.vertex), extended, len(count))

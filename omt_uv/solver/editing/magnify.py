@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..analysis.density import normalised, not_reached, share
-from ..analysis.region_density import exact_share, wanted
+from ..analysis.density import area_error_warnings, normalised_density, region_share
+from ..analysis.region_density import exact_density, target_density
 from ..errors import FoldedUVError, MeshError
-from ..linalg.additive_schwarz import overlapping
+from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import area_error, elements
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_loops
@@ -108,16 +108,16 @@ def magnify_region(
     Each step shears the map before it as little as it can. Steps are a flow: what it has done twice by 2 is what it
     does once by 4.
 
-    exact : False for the factor between weight 1 and weight 0, see `exact_share.wanted`
+    exact : False for the factor between weight 1 and weight 0, see `region_density.target_density`
 
     Raises
     ------
     FoldedUVError : see `magnify_map`
-    WeightError, ShareError : see `exact_share.wanted`
+    WeightError, ShareError : see `region_density.target_density`
     """
     refuse_folds(uv, triangles)
     before = np.abs(signed_areas(uv, triangles))
-    whole = wanted(weights, before, factor, exact)
+    whole = target_density(weights, before, factor, exact)
     count = max(1, int(np.ceil(abs(np.log(factor)) / LARGEST_STEP - 1e-9)))
     # The areas of a step follow from those before it, so that their errors add up.
     options = {"region": weights, "boundary": boundary, "quality": quality, "stricter": max(1.0, np.sqrt(count / 2))}
@@ -125,15 +125,15 @@ def magnify_region(
     for k in range(count):
         area = np.abs(signed_areas(uv, triangles))
         # From what the region has to what it is to have: errors of the share do not add up.
-        rest = whole.before * factor ** ((k + 1) / count) / share(weights, area)
-        density = exact_share(weights, area, rest).density if exact else whole.density ** (1 / count)
-        job = magnify_map(uv, triangles, normalised(density, area), **options)
+        rest = whole.share_before * factor ** ((k + 1) / count) / region_share(weights, area)
+        density = exact_density(weights, area, rest).density if exact else whole.density ** (1 / count)
+        job = magnify_map(uv, triangles, normalised_density(density, area), **options)
         lens = yield from part_of(job, k / count, 1 / count)
         uv, done = lens.uv, done + lens.iterations
         texts += [text for text in lens.warnings if text not in texts]
     has, asked = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
     error = float(np.abs(has - asked).sum())
-    texts += not_reached(error, count * QUALITIES[quality].area_error)
+    texts += area_error_warnings(error, count * QUALITIES[quality].area_error)
     return replace(lens, iterations=done, area_error=error, warnings=tuple(texts))
 
 
@@ -163,7 +163,7 @@ def _magnified(mesh: Renumbered, density, region, boundary: str, settings) -> St
         # Holes are free all the same.
         rim = rim[~np.isin(rim[:, 0], _outer(given, mesh.triangles))]
     guard = rim if len(rim) and not meets_itself(outline.w, rim) else None
-    assembly = Assembly(mesh.triangles, len(given), overlapping(mesh.vertices, mesh.triangles))
+    assembly = Assembly(mesh.triangles, len(given), schwarz_solver(mesh.vertices, mesh.triangles))
     task = Task(faces, assembly, outline.motion, guard, False, outline.kind != "free")
     found = yield from stages(task, outline.w, 0.0, settings)
     error = area_error(faces, found.w)

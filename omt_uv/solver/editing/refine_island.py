@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import FoldedUVError, MeshError
-from ..linalg.additive_schwarz import overlapping
+from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import area_error, elements
 from ..maps.untangle import count_folds
 from ..mesh.geometry import face_areas, signed_areas
@@ -102,7 +102,7 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
         warnings = (*warnings, UNGUARDED)
     task = Task(
         faces,
-        Assembly(triangles, len(given), overlapping(vertices, triangles)),
+        Assembly(triangles, len(given), schwarz_solver(vertices, triangles)),
         Free(np.zeros(len(given), bool)),
         guard,
         False,

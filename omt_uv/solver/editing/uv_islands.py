@@ -13,10 +13,10 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import FoldedUVError, NonManifoldEdgeError, OrientationError
 from ..maps.distortion import WELD
-from ..mesh.charts import Chart, Surface, assemble, chosen_triangles
+from ..mesh.charts import Chart, Surface, charts_of, chosen_triangles
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import orientations, turn_over
-from ..mesh.repair import join, with_area
+from ..mesh.repair import repaired_gluing, with_area
 from ..mesh.topology import pair_keys
 
 
@@ -55,7 +55,7 @@ def uv_islands(surface: Surface, uv: np.ndarray, faces: np.ndarray | None = None
     wrong = np.unique(owner[~np.isfinite(uv[triangles]).all((1, 2))])
     if len(wrong):
         raise FoldedUVError("The UVs to refine are not finite", kind="face", elements=wrong)
-    repaired = join(welded, faces, triangles, owner)
+    repaired = repaired_gluing(welded, faces, triangles, owner)
     if len(repaired.torn):
         raise NonManifoldEdgeError(
             "More than two faces of an island meet at an edge",
@@ -63,8 +63,8 @@ def uv_islands(surface: Surface, uv: np.ndarray, faces: np.ndarray | None = None
             kind="edge",
             elements=origin[repaired.torn],
         )
-    sheets = repaired.sheets
-    turned, one_sided = orientations(sheets, face_areas(surface.positions, surface.corner_vertex[triangles]))
+    gluing = repaired.gluing
+    turned, one_sided = orientations(gluing, face_areas(surface.positions, surface.corner_vertex[triangles]))
     if one_sided.any():
         raise OrientationError(
             "An island has only one side",
@@ -74,7 +74,7 @@ def uv_islands(surface: Surface, uv: np.ndarray, faces: np.ndarray | None = None
         )
     extent = float(np.ptp(surface.positions, axis=0).max())
     islands = []
-    for chart in assemble(welded, turn_over(sheets, turned)):
+    for chart in charts_of(welded, turn_over(gluing, turned)):
         sound, _ = with_area(replace(chart, vertex_ids=origin[chart.vertex_ids]), extent)
         place = np.empty((len(chart.vertices), 2))
         place[chart.triangles] = uv[chart.corners]

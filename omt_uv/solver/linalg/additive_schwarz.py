@@ -26,7 +26,7 @@ MOST = 100
 SHIFT = 1e-12
 
 
-class Overlapping:
+class AdditiveSchwarz:
     """Parts of a mesh (n,d), (m,3): where they overlap, and in which order their vertices are eliminated.
 
     Unknown 2 i and 2 i + 1 are those of vertex i.
@@ -87,9 +87,9 @@ class Overlapping:
         return sp.csr_matrix((entries.ravel(), columns.ravel(), 6 * np.arange(n + 1)), shape=(n, 6 * count))
 
 
-def overlapping(points: np.ndarray, triangles: np.ndarray) -> Overlapping | None:
+def schwarz_solver(points: np.ndarray, triangles: np.ndarray) -> AdditiveSchwarz | None:
     """Parts of a mesh (n,d), (m,3) that is so large that it should be solved in parts."""
-    return Overlapping(points, triangles) if len(points) >= LARGE else None
+    return AdditiveSchwarz(points, triangles) if len(points) >= LARGE else None
 
 
 def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:

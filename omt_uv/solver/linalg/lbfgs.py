@@ -9,7 +9,7 @@ import numpy as np
 MEMORY = 7
 
 
-class Descent:
+class LBFGS:
     """Remembers steps and changes of the gradient; `reset` where these no longer tell anything."""
 
     def __init__(self):

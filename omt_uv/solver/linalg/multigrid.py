@@ -52,7 +52,7 @@ class Multigrid:
         return x + smoother * (b - A @ x)
 
 
-class Laplacians:
+class LaplacianSolver:
     """Solves with one Laplacian after the other, each a little different: a hierarchy serves until it is slow."""
 
     def __init__(self):

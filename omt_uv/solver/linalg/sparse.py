@@ -74,7 +74,7 @@ def solve_general(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray = "cola
     return Factor(A, order, spd=False).solve(b)
 
 
-def solve_by_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-6, most: int = 200) -> np.ndarray:
+def solve_conjugate_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-6, most: int = 200) -> np.ndarray:
     """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite and close to its diagonal."""
     return by_gradients(lambda x: A @ x, b, sp.diags(1 / A.diagonal()), tolerance, most)
 

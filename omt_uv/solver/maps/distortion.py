@@ -73,7 +73,7 @@ class _Faces:
         return self.ratio <= 0
 
 
-def measure(V, F, uv, *, overlap: bool = True, density=None) -> Distortion:
+def distortion(V, F, uv, *, overlap: bool = True, density=None) -> Distortion:
     """Area error, shear, folds and overlap of a UV map.
 
     Parameters
@@ -121,7 +121,7 @@ def measure(V, F, uv, *, overlap: bool = True, density=None) -> Distortion:
 
 
 def face_distortion(V, F, uv) -> tuple[np.ndarray, np.ndarray]:
-    """Signed octaves (m,) and shear s1/s2 (m,) of every face, for colours; arguments and errors as for `measure`.
+    """Signed octaves (m,) and shear s1/s2 (m,) of every face, for colours; arguments and errors as for `distortion`.
 
     Octaves are log2 of UV share over surface share: positive where the face has too much texture. A folded face has
     log2 of RATIO_FLOOR (about -40), a face without area in 3D has 0 and shear 1.

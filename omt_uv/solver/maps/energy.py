@@ -98,7 +98,7 @@ def _energies(faces, a, b, balance):
 
 def gradient(faces: Elements, w: np.ndarray, balance: float | np.ndarray) -> np.ndarray:
     """Gradient (n,) complex: real part by u, imaginary part by v."""
-    return scatter(faces, local_derivatives(faces, w, balance).gradient, len(w))
+    return scatter(faces, face_derivatives(faces, w, balance).gradient, len(w))
 
 
 def scatter(faces: Elements, corner: np.ndarray, n: int) -> np.ndarray:
@@ -108,7 +108,7 @@ def scatter(faces: Elements, corner: np.ndarray, n: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Local:
+class FaceDerivatives:
     """Per face: gradient (m,3) complex by its corners; the Hessian is the sum of squares of its rows (m,4,3) complex.
 
     A row stands for the linear form dw -> Re(row . dw).
@@ -118,9 +118,9 @@ class Local:
     rows: np.ndarray
 
 
-def local_derivatives(
+def face_derivatives(
     faces: Elements, w: np.ndarray, balance: float | np.ndarray, pressure: float | np.ndarray = 1.0
-) -> Local:
+) -> FaceDerivatives:
     """Gradients and projected Hessians of all faces of a map w (n,) complex without folds.
 
     The area term bends the energy in two ways: by how fast its slope grows with the area, and by its slope times the
@@ -133,12 +133,12 @@ def local_derivatives(
 
 def derivatives_of(
     faces: Elements, a: np.ndarray, b: np.ndarray, balance: float | np.ndarray, pressure: float | np.ndarray
-) -> Local:
-    """As `local_derivatives`, from the derivatives a, b (m,) complex of the map."""
-    return local_of(faces, a, b, *_by_squares(faces, a, b, balance, pressure))
+) -> FaceDerivatives:
+    """As `face_derivatives`, from the derivatives a, b (m,) complex of the map."""
+    return face_derivatives_of(faces, a, b, *_by_squares(faces, a, b, balance, pressure))
 
 
-def local_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, kept, block) -> Local:
+def face_derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, kept, block) -> FaceDerivatives:
     """Gradients and projected Hessians of an energy of |a|^2 and |b|^2.
 
     first: its derivatives by both, (m,) each; kept: those that the Hessian along the phases sees; block: the Hessian's
@@ -155,7 +155,7 @@ def local_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, kept, block) 
     (c1, s1, v1), (c2, s2, v2) = _split(*block)
     radial1 = np.sqrt(v1)[:, None] * (c1[:, None] * along_a + s1[:, None] * along_b)
     radial2 = np.sqrt(v2)[:, None] * (c2[:, None] * along_a + s2[:, None] * along_b)
-    return Local(corner, np.stack([turn_a, turn_b, radial1, radial2], axis=1))
+    return FaceDerivatives(corner, np.stack([turn_a, turn_b, radial1, radial2], axis=1))
 
 
 def _by_squares(faces, a, b, balance, pressure):
@@ -234,13 +234,13 @@ def missing_tilt(faces: Elements, w: np.ndarray) -> float:
     return (float(faces.region @ target) - mean) / spread if spread > 0 else 0.0
 
 
-def shortfall(faces: Elements, w: np.ndarray) -> float:
+def target_error(faces: Elements, w: np.ndarray) -> float:
     """What is left to do: the area error of a map (n,), or as much for a region or a rest that are not exact yet."""
     return _shortfall(faces, faces.areas(w))
 
 
-def shortfall_but_share(faces: Elements, w: np.ndarray) -> float:
-    """`shortfall` of the areas that a map w (n,) would have with the tilt that is missing."""
+def target_error_but_share(faces: Elements, w: np.ndarray) -> float:
+    """`target_error` of the areas that a map w (n,) would have with the tilt that is missing."""
     area = faces.areas(w)
     if faces.region is not None:
         area = area * np.exp(missing_tilt(faces, w) * faces.region)

@@ -45,7 +45,7 @@ def map_energy(uv: np.ndarray, positions: np.ndarray, triangles: np.ndarray) -> 
     return energy(elements(positions, triangles, area), scale * (uv[:, 0] + 1j * uv[:, 1]), 1.0)
 
 
-def circle_rim(uv: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarray | None:
+def circle_boundary(uv: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarray | None:
     """Boundary of uv (n,2) pushed radially on to the circle about 0, (b,2); None unless that keeps its order."""
     w = uv[loop, 0] + 1j * uv[loop, 1]
     if not (np.abs(w) > 0).all():
@@ -56,7 +56,7 @@ def circle_rim(uv: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarray | 
     return uv[loop] * (radius / np.abs(w))[:, None]
 
 
-def arc_length_rim(positions: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarray:
+def arc_length_boundary(positions: np.ndarray, loop: np.ndarray, radius: float) -> np.ndarray:
     """The boundary loop (b,) of a surface spread over the circle by its length, (b,2)."""
     angle = 2 * np.pi * arc_length_parameters(positions, loop)
     return radius * np.column_stack([np.cos(angle), np.sin(angle)])

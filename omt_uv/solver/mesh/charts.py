@@ -19,7 +19,7 @@ from ..errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
-from .gluing import Sheets, components, corner_classes, diagonal_pairs, groups, polygon_sides
+from .gluing import Gluing, components, corner_classes, diagonal_pairs, groups, polygon_sides
 from .topology import boundary_loops, halfedges, pair_keys, pair_up
 
 # A triangle whose area is below this share of its longest side squared is a line.
@@ -76,7 +76,7 @@ def triangle_surface(positions: np.ndarray, triangles: np.ndarray, seams=()) -> 
     )
 
 
-def split(surface: Surface, faces: np.ndarray | None = None) -> list[Chart]:
+def strict_charts(surface: Surface, faces: np.ndarray | None = None) -> list[Chart]:
     """Charts of the polygons `faces` (f,) bool (all by default), each a topological disk.
 
     Nothing is repaired: see `preparation.prepare` for meshes that need it.
@@ -86,15 +86,15 @@ def split(surface: Surface, faces: np.ndarray | None = None) -> list[Chart]:
     EmptyMeshError, NonFiniteError, ZeroAreaFaceError, DuplicateFaceError, NonManifoldEdgeError,
     OrientationError, NotADiskError : with the indices of the offending elements of the surface
     """
-    charts = assemble(surface, strict_sheets(surface, faces))
+    charts = charts_of(surface, strict_gluing(surface, faces))
     for chart in charts:
         check_edges(chart)
         check_disk(chart)
     return charts
 
 
-def strict_sheets(surface: Surface, faces: np.ndarray | None = None) -> Sheets:
-    """The triangles of sound polygons, joined across every edge that is no seam; raises what `split` raises."""
+def strict_gluing(surface: Surface, faces: np.ndarray | None = None) -> Gluing:
+    """The triangles of sound polygons, joined across every edge that is no seam; raises what `strict_charts` raises."""
     faces, triangles, owner = chosen_triangles(surface, faces)
     _check_areas(surface, triangles, owner)
     duplicates = duplicate_faces(surface, faces)
@@ -170,12 +170,12 @@ def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
     return np.concatenate(rows)
 
 
-def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Sheets:
+def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Gluing:
     """Triangles joined across every edge that is no seam; what cannot be joined is an error."""
     side = polygon_sides(len(surface.corner_vertex), surface.face_start, triangles)
-    sheets = Sheets(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
+    gluing = Gluing(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
     sides = np.flatnonzero(side)
-    a, b = sheets.ends(sides)
+    a, b = gluing.ends(sides)
     key = pair_keys(a, b)
     keep = ~is_seam(surface, key)
     sides, key, a, b = sides[keep], key[keep], a[keep], b[keep]
@@ -192,9 +192,9 @@ def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Sheet
             "Neighbouring faces point to opposite sides", kind="edge", elements=np.stack([a[wrong], b[wrong]], axis=1)
         )
     return replace(
-        sheets,
-        first=np.concatenate([sheets.first, sides[first]]),
-        second=np.concatenate([sheets.second, sides[second]]),
+        gluing,
+        first=np.concatenate([gluing.first, sides[first]]),
+        second=np.concatenate([gluing.second, sides[second]]),
     )
 
 
@@ -208,16 +208,16 @@ def is_sharp(surface: Surface, key: np.ndarray) -> np.ndarray:
     return np.isin(key, pair_keys(surface.sharp[:, 0], surface.sharp[:, 1]))
 
 
-def assemble(surface: Surface, sheets: Sheets) -> list[Chart]:
+def charts_of(surface: Surface, gluing: Gluing) -> list[Chart]:
     """One chart per connected part of the sheets, in the order of their first triangles."""
-    corner_class = corner_classes(sheets)
-    return [_make(surface, c, sheets, corner_class) for c in groups(components(sheets))]
+    corner_class = corner_classes(gluing)
+    return [_make(surface, c, gluing, corner_class) for c in groups(components(gluing))]
 
 
-def _make(surface: Surface, members: np.ndarray, sheets: Sheets, corner_class: np.ndarray) -> Chart:
-    corners, owner = sheets.triangles[members], sheets.owner[members]
+def _make(surface: Surface, members: np.ndarray, gluing: Gluing, corner_class: np.ndarray) -> Chart:
+    corners, owner = gluing.triangles[members], gluing.owner[members]
     _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
-    vertex_ids = sheets.vertex[corners.ravel()[index]]
+    vertex_ids = gluing.vertex[corners.ravel()[index]]
     local = inverse.reshape(-1, 3).astype(np.int64)
     # Triangles of no polygon fill holes, see `holes.py`; vertices that only they use are no vertices of the mesh.
     real = owner >= 0

@@ -16,7 +16,7 @@ from ..errors import (
     NotASphereError,
     OrientationError,
 )
-from .repair import nudged
+from .repair import perturbed
 from .topology import halfedges, pair_keys
 
 
@@ -52,7 +52,7 @@ def closed_surface(vertices: np.ndarray, triangles: np.ndarray) -> ClosedSurface
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     # Halves first: the difference of two huge numbers may be infinite.
     extent = 2 * float((high / 2 - low / 2).max()) or 1.0
-    sound, count = nudged((vertices - (low / 2 + high / 2)) / extent, triangles, 1.0)
+    sound, count = perturbed((vertices - (low / 2 + high / 2)) / extent, triangles, 1.0)
     warnings: tuple[str, ...] = ()
     if count:
         who = "A triangle has" if count == 1 else f"{count} triangles have"

@@ -25,7 +25,7 @@ WALK_ROUNDS = 20
 
 
 @dataclass(frozen=True)
-class Located:
+class SurfacePoints:
     """Points (k,3) on the surface, the triangle (k,) of each and its barycentric coordinates (k,3)."""
 
     points: np.ndarray
@@ -51,7 +51,7 @@ def _in_frame(d1: np.ndarray, d2: np.ndarray, e: np.ndarray, f: np.ndarray, g: n
         total = va + vb + vc
         v, w = vb / total, vc / total
     beside = ~((va > 0) & (vb > 0) & (vc > 0))
-    v[beside], w[beside] = _on_rim(d1[beside], d2[beside], e[beside], f[beside], g[beside])
+    v[beside], w[beside] = _on_triangle_boundary(d1[beside], d2[beside], e[beside], f[beside], g[beside])
     return v, w
 
 
@@ -61,7 +61,7 @@ def _weights(d1, d2, e, f, g):
     return d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
 
 
-def _on_rim(d1, d2, e, f, g):
+def _on_triangle_boundary(d1, d2, e, f, g):
     """As `_in_frame`, for points whose foot is not inside."""
     va, vb, vc = _weights(d1, d2, e, f, g)
     d3, d4, d5, d6 = d1 - e, d2 - f, d1 - f, d2 - g
@@ -137,7 +137,7 @@ class ClosestPoint:
         self.weight = 0.5 * spacing
         self.spacing = spacing
 
-    def __call__(self, points: np.ndarray, normals: np.ndarray) -> Located:
+    def __call__(self, points: np.ndarray, normals: np.ndarray) -> SurfacePoints:
         """Closest points to points (k,3) where the surface looks about the way of normals (k,3)."""
         owner, _ = self._spread
         k = min(CANDIDATES, len(owner))
@@ -164,7 +164,7 @@ class ClosestPoint:
         """The samples without their normals."""
         return cKDTree(self._spread[1])
 
-    def closer(self, points: np.ndarray, normals: np.ndarray, found: Located) -> Located:
+    def closer(self, points: np.ndarray, normals: np.ndarray, found: SurfacePoints) -> SurfacePoints:
         """What was found for points (k,3) with normals (k,3), or the nearest by position where that is nearer, and does
         not look the opposite way."""
         owner = self._spread[0]
@@ -177,13 +177,13 @@ class ClosestPoint:
         other = self.walk(points, faces[np.arange(len(faces)), best])
         nearer = np.isfinite(distance.min(axis=1)) & (_square(other.points - points) < _square(found.points - points))
         parts = zip(vars(found).values(), vars(other).values(), strict=True)
-        return Located(*(np.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in parts))
+        return SurfacePoints(*(np.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in parts))
 
     def nearest_face(self, points: np.ndarray) -> np.ndarray:
         """The triangle (k,) of the sample nearest to each of points (k,3): where it is about, for smooth quantities."""
         return self._spread[0][self._plain.query(points)[1]]
 
-    def walk(self, points: np.ndarray, faces: np.ndarray) -> Located:
+    def walk(self, points: np.ndarray, faces: np.ndarray) -> SurfacePoints:
         """From starting faces (k,) across edges for as long as that brings nearer to the points (k,3)."""
         faces = faces.copy()
         barycentric, distance = self.distance(points, faces)
@@ -203,7 +203,7 @@ class ClosestPoint:
             better = (best >= 0) & (d[best] < distance[active] * (1 - 1e-12))
             active, best = active[better], best[better]
             faces[active], barycentric[active], distance[active] = face[best], b[best], d[best]
-        return Located(self.at(faces, barycentric), faces, barycentric)
+        return SurfacePoints(self.at(faces, barycentric), faces, barycentric)
 
     def at(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
         """Positions (k,3) of points given by face and barycentric coordinates."""
@@ -222,7 +222,7 @@ class ClosestPoint:
         return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1), _product(off, off)
 
 
-class Memory:
+class ClosestPointTracker:
     """Closest points for the same points again and again, while they or the mesh move little by little: from the last
     answer on it is a few steps, but these may end in a nearest point that is not the nearest of all, so that every few
     calls there is a search, for those farther than `far` times the root of the mean square."""
@@ -233,7 +233,7 @@ class Memory:
         self.faces = start
         self._calls = 0 if start is None else 1
 
-    def __call__(self, index: ClosestPoint, points: np.ndarray, normals: np.ndarray) -> Located:
+    def __call__(self, index: ClosestPoint, points: np.ndarray, normals: np.ndarray) -> SurfacePoints:
         """As `ClosestPoint.__call__` of an index, whose triangles have the numbers of the last one's."""
         again = self._calls % self.search_every == 0
         if self.faces is None or (again and self.far == 0):
@@ -246,11 +246,13 @@ class Memory:
         return found
 
 
-def _search_again(index: ClosestPoint, points: np.ndarray, normals: np.ndarray, found: Located, far: float) -> None:
+def _search_again(
+    index: ClosestPoint, points: np.ndarray, normals: np.ndarray, found: SurfacePoints, far: float
+) -> None:
     """Overwrite what was found for points (k,3) that are far from it, where something is nearer."""
     square = _square(found.points - points)
     mine = np.flatnonzero(square > far**2 * square.sum() / max(len(square), 1))
-    other = index.closer(points[mine], normals[mine], Located(*(part[mine] for part in vars(found).values())))
+    other = index.closer(points[mine], normals[mine], SurfacePoints(*(part[mine] for part in vars(found).values())))
     for whole, part in zip(vars(found).values(), vars(other).values(), strict=True):
         whole[mine] = part
 

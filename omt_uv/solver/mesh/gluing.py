@@ -17,7 +17,7 @@ from .topology import halfedges, pair_keys, pair_up
 
 
 @dataclass(frozen=True)
-class Sheets:
+class Gluing:
     """Triangles (m,3) of corners with the polygon (m,) of each, and pairs of joined halfedges first, second (p,).
 
     vertex (c,) of every corner; side (3m,): the halfedge is a side of its polygon, not a diagonal.
@@ -42,7 +42,7 @@ class Sheets:
         opposite = (tail[self.first] == head[self.second]) & (head[self.first] == tail[self.second])
         return (self.vertex[tail[self.first]] == self.vertex[tail[self.second]]) & ~opposite
 
-    def without(self, gone: np.ndarray) -> Sheets:
+    def without(self, gone: np.ndarray) -> Gluing:
         """The same triangles with the pairs `gone` (p,) bool cut open."""
         return replace(self, first=self.first[~gone], second=self.second[~gone])
 
@@ -65,34 +65,34 @@ def diagonal_pairs(triangles: np.ndarray, side: np.ndarray) -> tuple[np.ndarray,
     return diagonal[first], diagonal[second]
 
 
-def corner_classes(sheets: Sheets) -> np.ndarray:
+def corner_classes(gluing: Gluing) -> np.ndarray:
     """Class (c,) of every corner: corners around one vertex that joined halfedges lead from one to the next."""
-    tail, head = halfedges(sheets.triangles)
-    same = sheets.parallel()
-    f, s = sheets.first, sheets.second
+    tail, head = halfedges(gluing.triangles)
+    same = gluing.parallel()
+    f, s = gluing.first, gluing.second
     rows = np.concatenate([tail[f], head[f]])
     columns = np.concatenate([np.where(same, tail[s], head[s]), np.where(same, head[s], tail[s])])
-    c = len(sheets.vertex)
+    c = len(gluing.vertex)
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(c, c))
     return connected_components(graph, directed=False)[1]
 
 
-def components(sheets: Sheets) -> np.ndarray:
+def components(gluing: Gluing) -> np.ndarray:
     """Connected part (m,) of every triangle."""
-    m = len(sheets.triangles)
-    graph = coo_matrix((np.ones(len(sheets.first)), (sheets.first // 3, sheets.second // 3)), shape=(m, m))
+    m = len(gluing.triangles)
+    graph = coo_matrix((np.ones(len(gluing.first)), (gluing.first // 3, gluing.second // 3)), shape=(m, m))
     return connected_components(graph, directed=False)[1]
 
 
-def orientations(sheets: Sheets, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def orientations(gluing: Gluing, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (m,) bool to turn over so that neighbours agree, and those (m,) of parts where no choice does.
 
     Every triangle has two sides; joining those that look the same way leaves two components for a part that can be
     oriented and one for a part that cannot. The winding of most of the `area` (m,) is kept.
     """
-    m = len(sheets.triangles)
-    t, s = sheets.first // 3, sheets.second // 3
-    shift = m * sheets.parallel()
+    m = len(gluing.triangles)
+    t, s = gluing.first // 3, gluing.second // 3
+    shift = m * gluing.parallel()
     rows, columns = np.concatenate([t, t + m]), np.concatenate([s + shift, s + m - shift])
     graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * m, 2 * m))
     label = connected_components(graph, directed=False)[1]
@@ -103,17 +103,17 @@ def orientations(sheets: Sheets, area: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return turned & ~one_sided, one_sided
 
 
-def turn_over(sheets: Sheets, turned: np.ndarray) -> Sheets:
+def turn_over(gluing: Gluing, turned: np.ndarray) -> Gluing:
     """The same sheets with the corners of the triangles `turned` (m,) bool in reverse order."""
     if not turned.any():
-        return sheets
-    triangles = np.where(turned[:, None], sheets.triangles[:, [0, 2, 1]], sheets.triangles)
+        return gluing
+    triangles = np.where(turned[:, None], gluing.triangles[:, [0, 2, 1]], gluing.triangles)
 
     def renamed(h: np.ndarray) -> np.ndarray:
         return np.where(turned[h // 3], 3 * (h // 3) + 2 - h % 3, h)
 
-    side = sheets.side[renamed(np.arange(3 * len(triangles)))]
-    return replace(sheets, triangles=triangles, side=side, first=renamed(sheets.first), second=renamed(sheets.second))
+    side = gluing.side[renamed(np.arange(3 * len(triangles)))]
+    return replace(gluing, triangles=triangles, side=side, first=renamed(gluing.first), second=renamed(gluing.second))
 
 
 def groups(label: np.ndarray) -> list[np.ndarray]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import ZeroAreaFaceError
 from .charts import Chart, Surface, degenerate_triangles, duplicate_faces, is_seam
-from .gluing import Sheets, corner_classes, diagonal_pairs, polygon_sides
+from .gluing import Gluing, corner_classes, diagonal_pairs, polygon_sides
 from .topology import halfedges, pair_keys, pair_up
 
 # Vertices of a triangle without area move by this share of the height of the flattest sound triangle around them:
@@ -28,26 +28,26 @@ SPECK = 1e-5
 
 @dataclass(frozen=True)
 class Repaired:
-    """Sheets in which at most two faces meet at every edge, the edges (k,2) that were torn, and what was done."""
+    """Gluing in which at most two faces meet at every edge, the edges (k,2) that were torn, and what was done."""
 
-    sheets: Sheets
+    gluing: Gluing
     torn: np.ndarray
     warnings: tuple[str, ...]
 
 
-def join(surface: Surface, faces: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> Repaired:
+def repaired_gluing(surface: Surface, faces: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> Repaired:
     """Join triangles (m,3) of corners of the polygons `faces` (f,) bool across every edge where two of them meet.
 
     Faces are joined whichever way they look: see `sheets.orientations`. Raises nothing: what cannot be joined is
     cut open, and said.
     """
     side = polygon_sides(len(surface.corner_vertex), surface.face_start, triangles)
-    sheets = Sheets(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
+    gluing = Gluing(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
     layer, warnings = _layers(surface, faces)
-    joined, torn = _pair_sides(surface, sheets, layer)
+    joined, torn = _pair_sides(surface, gluing, layer)
     while len(folded := _folded_faces(joined, layer)):
         layer[folded] = -1
-        joined, torn = _pair_sides(surface, sheets, layer)
+        joined, torn = _pair_sides(surface, gluing, layer)
         warnings.append(
             f"{_count(len(folded), 'face')} sharing several edges in a row with another, mapped apart; "
             "dissolve the vertex that only the two share"
@@ -88,12 +88,12 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
     return layer, warnings
 
 
-def _pair_sides(surface: Surface, sheets: Sheets, layer: np.ndarray) -> tuple[Sheets, np.ndarray]:
+def _pair_sides(surface: Surface, gluing: Gluing, layer: np.ndarray) -> tuple[Gluing, np.ndarray]:
     """Join the sides of polygons of one layer, and the vertex pairs (k,2) where more than two of them meet."""
-    sides = np.flatnonzero(sheets.side)
-    a, b = sheets.ends(sides)
+    sides = np.flatnonzero(gluing.side)
+    a, b = gluing.ends(sides)
     edge = pair_keys(a, b)
-    floor = layer[sheets.owner[sides // 3]]
+    floor = layer[gluing.owner[sides // 3]]
     keep = (floor >= 0) & ~is_seam(surface, edge)
     sides, a, b, edge, floor = sides[keep], a[keep], b[keep], edge[keep], floor[keep]
     number = np.unique(edge, return_inverse=True)[1].ravel()
@@ -102,43 +102,43 @@ def _pair_sides(surface: Surface, sheets: Sheets, layer: np.ndarray) -> tuple[Sh
     h = index[count > 2]
     torn = np.unique(np.stack([np.minimum(a[h], b[h]), np.maximum(a[h], b[h])], axis=1), axis=0)
     first, second = pair_up(key)
-    first = np.concatenate([sheets.first, sides[first]])
-    second = np.concatenate([sheets.second, sides[second]])
-    return replace(sheets, first=first, second=second), torn
+    first = np.concatenate([gluing.first, sides[first]])
+    second = np.concatenate([gluing.second, sides[second]])
+    return replace(gluing, first=first, second=second), torn
 
 
-def _folded_faces(sheets: Sheets, layer: np.ndarray) -> np.ndarray:
+def _folded_faces(gluing: Gluing, layer: np.ndarray) -> np.ndarray:
     """One polygon for every diagonal that has the same two ends as another edge: no plane map keeps them apart.
 
     Polygons of layer (f,) -1 are apart already.
     """
-    tail, head = halfedges(sheets.triangles)
-    corner_class = corner_classes(sheets)
+    tail, head = halfedges(gluing.triangles)
+    corner_class = corner_classes(gluing)
     key = pair_keys(corner_class[tail], corner_class[head])
     _, number, count = np.unique(key, return_inverse=True, return_counts=True)
     number = number.ravel()
-    h = np.flatnonzero((count[number] > 2) & ~sheets.side)
-    polygon = sheets.owner[h // 3]
+    h = np.flatnonzero((count[number] > 2) & ~gluing.side)
+    polygon = gluing.owner[h // 3]
     last = np.zeros(len(count), dtype=np.int64)
     np.maximum.at(last, number[h], polygon)
     folded = np.unique(last[number[h]])
     return folded[layer[folded] >= 0]
 
 
-def _healed(sheets: Sheets) -> Sheets:
+def _healed(gluing: Gluing) -> Gluing:
     """A slit of a single edge has no inside: its two sides are joined again."""
-    tail, head = halfedges(sheets.triangles)
-    corner_class = corner_classes(sheets)
+    tail, head = halfedges(gluing.triangles)
+    corner_class = corner_classes(gluing)
     open_ = np.ones(len(tail), dtype=bool)
-    open_[sheets.first] = open_[sheets.second] = False
+    open_[gluing.first] = open_[gluing.second] = False
     h = np.flatnonzero(open_)
     first, second = pair_up(pair_keys(corner_class[tail[h]], corner_class[head[h]]))
     first, second = h[first], h[second]
     slit = first // 3 != second // 3
     return replace(
-        sheets,
-        first=np.concatenate([sheets.first, first[slit]]),
-        second=np.concatenate([sheets.second, second[slit]]),
+        gluing,
+        first=np.concatenate([gluing.first, first[slit]]),
+        second=np.concatenate([gluing.second, second[slit]]),
     )
 
 
@@ -151,14 +151,14 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     ------
     ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to its chart's)
     """
-    vertices, count = nudged(chart.vertices, chart.disk, extent, chart.faces)
+    vertices, count = perturbed(chart.vertices, chart.disk, extent, chart.faces)
     if not count:
         return chart, 0
     # What fills a hole is no triangle of anybody's.
     return replace(chart, vertices=vertices), int(degenerate_triangles(chart.vertices, chart.triangles, NEEDLE).sum())
 
 
-def nudged(
+def perturbed(
     vertices: np.ndarray, triangles: np.ndarray, extent: float, faces: np.ndarray | None = None
 ) -> tuple[np.ndarray, int]:
     """Positions (n,3) with the vertices of triangles (m,3) without area moved a little, and how many these are.
@@ -205,15 +205,15 @@ def _least_height(vertices: np.ndarray, triangles: np.ndarray, bad: np.ndarray) 
     return np.where(np.isfinite(reach), reach, usual)
 
 
-def weldable(surface: Surface, sheets: Sheets, part: np.ndarray, is_disk: np.ndarray) -> int:
+def coincident_boundary_vertices(surface: Surface, gluing: Gluing, part: np.ndarray, is_disk: np.ndarray) -> int:
     """Boundary vertices that lie exactly on one of another part, or of the same part (m,) where it is no disk (k,).
 
     A disk that touches itself was meant to be open there.
     """
-    open_ = np.ones(3 * len(sheets.triangles), dtype=bool)
-    open_[sheets.first] = open_[sheets.second] = False
+    open_ = np.ones(3 * len(gluing.triangles), dtype=bool)
+    open_[gluing.first] = open_[gluing.second] = False
     rim = np.flatnonzero(open_)
-    rows = np.unique(np.stack([sheets.ends(rim)[0], part[rim // 3]], axis=1), axis=0)
+    rows = np.unique(np.stack([gluing.ends(rim)[0], part[rim // 3]], axis=1), axis=0)
     vertex, piece = rows.T
     # Adding zero makes -0.0 and 0.0 the same.
     place = np.unique(surface.positions[vertex] + 0.0, axis=0, return_inverse=True)[1].ravel()

@@ -61,7 +61,7 @@ def expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
     """Vertices of every boundary loop in order, surface on the left; longest loop first.
 
-    The mesh must be an oriented manifold with one fan per vertex (`charts.split` guarantees it).
+    The mesh must be an oriented manifold with one fan per vertex (`charts.strict_charts` guarantees it).
     """
     tail, head = halfedges(triangles)
     rim = np.flatnonzero(twins(triangles) < 0)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.density import not_reached
+from ..analysis.density import area_error_warnings
 from ..conformal.disk_map import sharpest_corners
 from ..errors import FoldedUVError, MeshError, positive_density
-from ..maps.distortion import measure
+from ..maps.distortion import distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_loops
@@ -116,9 +116,9 @@ def unwrap_chart(
         refined = yield from part_of(_refined(vertices, triangles, uv, options, target, log), *REFINEMENT)
     with log.timed("measure"):
         asked = None if density is None else density[: len(chart.triangles)]
-        figures = measure(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
+        figures = distortion(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
     if density is not None and balance == 0:
-        log.warnings += not_reached(figures.area_l1, QUALITIES[quality].area_error)
+        log.warnings += area_error_warnings(figures.area_l1, QUALITIES[quality].area_error)
     if figures.folds:
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
     free = boundary == "free"

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..analysis.density import Target
-from ..maps.distortion import measure
+from ..maps.distortion import distortion
 from ..mesh.charts import Chart, Surface
 from ..mesh.geometry import signed_areas
 from ..mesh.topology import boundary_loops
@@ -45,7 +45,7 @@ def with_open_corners(
     for k, uv in found.items():
         chart, old = charts[k], maps[k]
         (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
-        figures = measure(vertices, chart.triangles, flat[chart.triangles], overlap=False, density=density[k])
+        figures = distortion(vertices, chart.triangles, flat[chart.triangles], overlap=False, density=density[k])
         if figures.area_l1 <= AREA_KEPT * max(old.area_l1, QUALITIES[quality].area_error) and not figures.folds:
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit

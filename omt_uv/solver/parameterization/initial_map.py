@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.density import graded
+from ..analysis.density import graded_density
 from ..conformal.disk_map import ConformalMap, conformal_disk, conformal_rectangle
 from ..conformal.rectangle_to_disk import centre_in_disk
 from ..errors import PrecisionError, TransportError
@@ -123,7 +123,7 @@ def _density(vertices, triangles, target, goal: int) -> np.ndarray:
     area = face_areas(vertices, triangles)
     wanted = target / area
     wanted = np.maximum(wanted, LEAST_DENSITY * wanted.max())
-    density = area * graded(wanted, vertices, triangles, np.sqrt(AROUND / goal), goal)
+    density = area * graded_density(wanted, vertices, triangles, np.sqrt(AROUND / goal), goal)
     has, all_of_it = (np.bincount(triangles.ravel(), np.repeat(x, 3), len(vertices)) for x in (density, area))
     return has / all_of_it
 

@@ -26,7 +26,7 @@ Energies = Callable[[np.ndarray], np.ndarray]  # of each chart (c,), by the weig
 
 @dataclass(frozen=True)
 class Lack:
-    """What the map of every chart lacks (c,): `energy.shortfall`, the same but for the share of its region, and the
+    """What the map of every chart lacks (c,): `energy.target_error`, the same but for the share of its region, and the
     tilt that this share lacks."""
 
     error: np.ndarray

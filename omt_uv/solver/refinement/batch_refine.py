@@ -221,7 +221,7 @@ class _Group:
         return Lack(error, self._errors(area * np.exp(tilt[self.of_face] * region), target), tilt)
 
     def _errors(self, area, target):
-        """`energy.shortfall` of every chart, (c,), by the areas that its faces have and are to have."""
+        """`energy.target_error` of every chart, (c,), by the areas that its faces have and are to have."""
         area, target = (x / np.maximum(self._sums(x), 1e-300)[self.of_face] for x in (area, target))
         error = area - target
         worst = self._sums(np.abs(error))

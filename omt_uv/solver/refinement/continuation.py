@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from ..analysis.density import INEXACT
-from ..maps.energy import Elements, missing_tilt, shortfall, shortfall_but_share, tilted
+from ..maps.energy import Elements, missing_tilt, target_error, target_error_but_share, tilted
 from ..progress import Progress, Steps
 from .boundary_barrier import Contact, contact, crossings
 from .projected_newton import Assembly, Motion, Problem, Step
@@ -200,7 +200,7 @@ def stages(
             guarded = True
             continue
         k += 1
-        error, rest = shortfall(task.faces, w), shortfall_but_share(task.faces, w)
+        error, rest = target_error(task.faces, w), target_error_but_share(task.faces, w)
         multiplier += weight * missing_tilt(task.faces, w) if balance == 0 else 0.0
         enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
         enough |= (
@@ -260,7 +260,7 @@ class Minimised(Protocol):
         """What a map lacks of its areas: 0 where every face has its own."""
 
     def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
-        """A line-searched step from a map of energy `value`; pressure: see `energy.local_derivatives`."""
+        """A line-searched step from a map of energy `value`; pressure: see `energy.face_derivatives`."""
 
 
 def minimise(

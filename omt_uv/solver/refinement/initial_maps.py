@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.density import entropy
+from ..analysis.density import relative_entropy
 from ..errors import FoldedUVError
 from ..linalg.sparse import Factor
 from ..maps.energy import elements
 from ..maps.tutte import arc_length_parameters, tutte
-from ..maps.untangle import USABLE, arc_length_rim, circle_rim, count_folds, map_energy, untangle
+from ..maps.untangle import USABLE, arc_length_boundary, circle_boundary, count_folds, map_energy, untangle
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import expand, halfedges, twins
 from .boundary_barrier import crossings
@@ -55,7 +55,7 @@ class Start:
 
 def is_far(target: np.ndarray, area: np.ndarray) -> bool:
     """Whether areas (m,) asked for are far from those that there are, so that any map to them is sheared."""
-    return entropy(target, area) > FAR
+    return relative_entropy(target, area) > FAR
 
 
 def disk_start(vertices, triangles, uv, loop) -> Start:
@@ -63,10 +63,10 @@ def disk_start(vertices, triangles, uv, loop) -> Start:
     radius = np.sqrt(face_areas(vertices, triangles).sum() / np.pi)
     warnings = []
     uv = uv * (radius / np.linalg.norm(uv[loop], axis=1).mean())
-    rim = circle_rim(uv, loop, radius)
+    rim = circle_boundary(uv, loop, radius)
     if rim is None:
         warnings.append(SPREAD)
-        rim = arc_length_rim(vertices, loop, radius)
+        rim = arc_length_boundary(vertices, loop, radius)
     straight = _straighten(uv, vertices, triangles, loop, rim, warnings)
     return Start(straight, OnCircle(loop, radius, len(vertices)), tuple(warnings))
 
@@ -103,7 +103,7 @@ def free_start(vertices, triangles, uv, loop, relaxed: float = RELAXED) -> Start
     start = disk_start(vertices, triangles, uv - _middle(uv[loop]), loop)
     least = map_energy(start.uv, vertices, triangles)
     if least > relaxed:
-        fresh = tutte(vertices, triangles, loop, arc_length_rim(vertices, loop, np.sqrt(area / np.pi)))
+        fresh = tutte(vertices, triangles, loop, arc_length_boundary(vertices, loop, np.sqrt(area / np.pi)))
         if map_energy(fresh, vertices, triangles) < least:
             return Start(fresh, motion, (), True)
     return Start(start.uv, motion, start.warnings, True)

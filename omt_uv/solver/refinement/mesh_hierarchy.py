@@ -51,7 +51,7 @@ class Removal:
     faces: Elements
 
     @property
-    def on_rim(self) -> np.ndarray:
+    def on_boundary(self) -> np.ndarray:
         """Which vertices (k,) bool return to a chord of the rim."""
         return self.corner[:, 1] == self.corner[:, 2]
 
@@ -75,7 +75,7 @@ class Coarse:
             yield Progress("Coarser mesh", k / len(self.rounds))
             w[removal.vertex] = _returned(removal, w)
             # On the rim they stay on the chords: where the coarse boundary does not cross itself, neither does this.
-            relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS, removal.on_rim)
+            relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS, removal.on_boundary)
         return np.column_stack([w.real, w.imag])
 
 
@@ -187,12 +187,12 @@ def _places(V, flat, vertex, row, new, ahead):
     back = np.full(len(V), -1)
     rim = np.flatnonzero(ahead >= 0)
     back[ahead[rim]] = rim
-    on_rim = np.flatnonzero(ahead[vertex] >= 0)
-    v = vertex[on_rim]
+    on_boundary = np.flatnonzero(ahead[vertex] >= 0)
+    v = vertex[on_boundary]
     forth, past = (np.linalg.norm(V[v] - V[x[v]], axis=1) for x in (ahead, back))
     part = past / np.maximum(forth + past, 1e-300)
-    corner[on_rim] = np.column_stack([ahead[v], back[v], back[v]])
-    share[on_rim] = np.column_stack([part, 1 - part, np.zeros(len(v))])
+    corner[on_boundary] = np.column_stack([ahead[v], back[v], back[v]])
+    share[on_boundary] = np.column_stack([part, 1 - part, np.zeros(len(v))])
     return corner, share
 
 
@@ -205,7 +205,7 @@ def _returned(removal: Removal, w: np.ndarray) -> np.ndarray:
     inward = np.where(touching, _left(b - a), 0)
     heading = np.bincount(row, inward.real, count) + 1j * np.bincount(row, inward.imag, count)
     # On the rim, between the one edge and the chord: beyond the chord may be another part of the map.
-    heading = heading + np.where(removal.on_rim, _left(w[removal.corner[:, 0]] - w[removal.corner[:, 1]]), 0)
+    heading = heading + np.where(removal.on_boundary, _left(w[removal.corner[:, 0]] - w[removal.corner[:, 1]]), 0)
     slope, room = _cross(b - a, heading[row]), _cross(a - base[row], b - base[row])
     reach = np.where(touching | (slope >= 0), np.inf, room / np.maximum(-slope, 1e-300))
     nearest = np.full(count, np.inf)

@@ -9,9 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import PrecisionError
-from ..linalg.additive_schwarz import Overlapping
+from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.sparse import Factor
-from ..maps.energy import Elements, energies, local_derivatives, scatter, shortfall, squared
+from ..maps.energy import Elements, energies, face_derivatives, scatter, squared, target_error
 from .vertex_sweeps import Smoother
 
 ARMIJO = 1e-4
@@ -118,7 +118,7 @@ class Assembly:
     Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: of a mesh that is solved in parts, or None.
     """
 
-    def __init__(self, triangles: np.ndarray, n: int, parts: Overlapping | None = None):
+    def __init__(self, triangles: np.ndarray, n: int, parts: AdditiveSchwarz | None = None):
         self.parts = parts
         rows = np.repeat(triangles, 3, axis=1)
         columns = np.tile(triangles, (1, 3))
@@ -181,8 +181,8 @@ class Problem:
         return value + sum(e.energy(w) for e in self.extras) if np.isfinite(value) else value
 
     def area_error(self, w: np.ndarray) -> float:
-        """What a map w (n,) complex lacks of its areas, see `energy.shortfall`."""
-        return shortfall(self.faces if self.aim is None else self.aim, w)
+        """What a map w (n,) complex lacks of its areas, see `energy.target_error`."""
+        return target_error(self.faces if self.aim is None else self.aim, w)
 
     def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
         """A Newton step from a map w (n,) complex of energy `value`, see `newton_step`. Raises PrecisionError."""
@@ -215,7 +215,7 @@ def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarr
 def _equations(problem: Problem, w: np.ndarray, pressure, frame, free) -> tuple[sp.spmatrix, np.ndarray, float]:
     """Hessian (2n,2n) and slopes (2n,) along the axes of the frame, and the mean of the Hessian's diagonal."""
     n, faces = len(w), problem.faces
-    local = local_derivatives(faces, w, problem.weight, pressure)
+    local = face_derivatives(faces, w, problem.weight, pressure)
     gradient = scatter(faces, local.gradient, n)
     rows = np.ascontiguousarray((local.rows * frame[faces.triangles][:, None, :]).conj()).view(float)
     rows *= free[faces.triangles].reshape(-1, 1, 6)
@@ -234,7 +234,7 @@ def _equations(problem: Problem, w: np.ndarray, pressure, frame, free) -> tuple[
     return matrix + extra if problem.extras else matrix, axes.ravel(), scale
 
 
-def _solution(matrix: sp.spmatrix, b, scale: float, parts: Overlapping | None, w, axes) -> np.ndarray:
+def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | None, w, axes) -> np.ndarray:
     """Solution x (n,) of matrix x = b, shifted where rounding makes it singular: the step is shorter, and goes down."""
     shift = SHIFT
     while True:
@@ -248,7 +248,7 @@ def _solution(matrix: sp.spmatrix, b, scale: float, parts: Overlapping | None, w
 
 
 def newton_step(problem: Problem, w: np.ndarray, value: float, pressure: float = 1.0) -> Step:
-    """One line-searched Newton step from a map w (n,) complex of energy `value`; pressure: see `local_derivatives`."""
+    """One line-searched Newton step from a map w (n,) complex of energy `value`; pressure: see `face_derivatives`."""
     step, slope = newton_direction(problem, w, pressure)
     moved = problem.motion.frame(w) * step
     share = min(1.0, FOLD_SHARE * first_fold(problem.faces, w, moved))

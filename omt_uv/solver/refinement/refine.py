@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import MeshError, positive_density
-from ..linalg.additive_schwarz import overlapping
+from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import Elements, area_error, elements
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
@@ -172,7 +172,7 @@ def _refined(mesh: Renumbered, faces: Elements, options: RefinementOptions) -> S
     # A map to areas far from the surface's is sheared by right.
     far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
     start = STARTS[boundary](mesh.vertices, mesh.triangles, mesh.uv, loop, **({"relaxed": np.inf} if far else {}))
-    assembly = Assembly(mesh.triangles, n, overlapping(mesh.vertices, mesh.triangles))
+    assembly = Assembly(mesh.triangles, n, schwarz_solver(mesh.vertices, mesh.triangles))
     # Sweeps know of no springs, and of no balance.
     swept = faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
     smoother = Smoother(mesh.triangles, n) if swept else None

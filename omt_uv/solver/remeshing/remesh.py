@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.density import graded
+from ..analysis.density import graded_density
 from ..errors import CountError, positive_density
 from ..mesh.closest_point import ClosestPoint, vertex_normals
 from ..progress import Progress, Steps, part_of
@@ -86,7 +86,7 @@ def remesh(
         for them, after triangles of the measure-preserving one no edges flip to Delaunay on the surface
     fit : move vertices off the surface to halve the distance of the triangles to it
     rounds : of relaxation on the surface; 0 leaves the strategy's mesh as it is
-    grading : most that edges grow by per length, see `measure.graded`; 0 for as fast as the density has it
+    grading : most that edges grow by per length, see `density.graded_density`; 0 for as fast as the density has it
     original : the same surface and features, remeshed before: the maps that were made then serve again
 
     Raises
@@ -105,7 +105,7 @@ def remesh(
     found = original.parts
     if grading > 0 and np.ptp(wanted) > 0:
         samples = count if count_of == "vertices" else max(count // 2, 1)
-        wanted = graded(wanted, original.vertices, original.triangles, grading, samples)
+        wanted = graded_density(wanted, original.vertices, original.triangles, grading, samples)
     warnings = list(found.warnings)
     if count > FAR_MORE * len(original.vertices if count_of == "vertices" else original.triangles):
         warnings.append(f"{count} {count_of} are more than {FAR_MORE} times the input's; they add no detail")

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..linalg.sparse import Factor
-from ..maps.energy import Elements, Local, derivatives_of, energy_of, squared
+from ..maps.energy import Elements, FaceDerivatives, derivatives_of, energy_of, squared
 from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
 from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, Step, fold_share
 
@@ -127,7 +127,7 @@ def newton_direction(
     positions: np.ndarray,
     axes: np.ndarray,
     face: Seen,
-    local: Local,
+    local: FaceDerivatives,
     held: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """Step (n,2) along the tangents (n,2,3), 0 for vertices held (n,) bool, and the energy's slope along it."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..maps.energy import Elements, Local, elements, local_of, squared
+from ..maps.energy import Elements, FaceDerivatives, elements, face_derivatives_of, squared
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..progress import Progress, Steps
 from ..refinement.projected_newton import ARMIJO, Assembly
@@ -89,7 +89,7 @@ def _energy(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> float:
     return float(faces.weight @ ((outer + inner) / chi + AREA_WEIGHT * (chi + 1 / chi) / 2))
 
 
-def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> Local:
+def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> FaceDerivatives:
     """As `energy.derivatives_of`, for the energy with chi instead of the area ratio."""
     outer, inner = squared(a), squared(b)
     chi, first, second = _chi(outer - inner, eps)
@@ -108,7 +108,7 @@ def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> Local:
         -4 * weight * np.sqrt(outer * inner) * quotient,
         2 * by_inner + 4 * inner * ii,
     )
-    return local_of(faces, a, b, (by_outer, by_inner), (by_outer, by_inner), block)
+    return face_derivatives_of(faces, a, b, (by_outer, by_inner), (by_outer, by_inner), block)
 
 
 def locally_untangled(surface: np.ndarray, triangles: np.ndarray, positions: np.ndarray) -> Steps[np.ndarray]:

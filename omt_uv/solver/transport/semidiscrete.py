@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import TransportError
-from ..linalg.multigrid import Laplacians
+from ..linalg.multigrid import LaplacianSolver
 from ..mesh.geometry import as_complex, laplacian_from_weights
 from ..progress import Progress, Steps
 from .convex_domain import Domain
@@ -69,7 +69,7 @@ def transport(
     order = cKDTree(sites).indices
     sites, mass = sites[order], mass[order] * (domain.area / mass.sum())
     w = np.zeros(len(sites)) if weights is None else weights[order] - weights.mean()
-    diagrams, laplacians = _Diagrams(sites, domain), Laplacians()
+    diagrams, laplacians = _Diagrams(sites, domain), LaplacianSolver()
     cells = diagrams.anew(w)
     hidden = np.flatnonzero(cells.area <= 0)
     if len(hidden):
@@ -150,7 +150,9 @@ def _residual(cells: PowerDiagram, mass: np.ndarray) -> float:
     return float(np.max(np.abs(cells.area - mass) / mass))
 
 
-def _newton_direction(sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray, laplacians: Laplacians) -> np.ndarray:
+def _newton_direction(
+    sites: np.ndarray, cells: PowerDiagram, mass: np.ndarray, laplacians: LaplacianSolver
+) -> np.ndarray:
     """Derivative of area i by weight j: -|side ij| / (2 |y_i - y_j|); a common weight is its kernel."""
     i, j = cells.edges.T
     z = as_complex(sites)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import TransportError
-from ..linalg.multigrid import Laplacians
+from ..linalg.multigrid import LaplacianSolver
 from ..mesh.geometry import laplacian_from_weights
 from ..progress import Progress, Steps
 from .spherical_power_diagram import Hull, SphericalCells, by_flips, by_hull, spherical_cells
@@ -128,7 +128,7 @@ class _Newton:
 
     def __init__(self, sites: np.ndarray):
         self._order = cKDTree(sites).indices
-        self._place, self._laplacians = np.argsort(self._order), Laplacians()
+        self._place, self._laplacians = np.argsort(self._order), LaplacianSolver()
 
     def direction(self, cells: SphericalCells, mass: np.ndarray) -> np.ndarray:
         """A common weight changes nothing: the mean is 0."""

@@ -5,8 +5,18 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis import curvature
-from omt_uv.solver.analysis import density as measure
-from omt_uv.solver.analysis.region_density import exact_share
+from omt_uv.solver.analysis.density import (
+    checked_density,
+    from_vertices,
+    gaussian_curvature_density,
+    graded_density,
+    mean_curvature_density,
+    normalised_density,
+    painted_density,
+    region_share,
+    relative_entropy,
+)
+from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.errors import DensityError, ShareError, WeightError
 from omt_uv.solver.mesh.geometry import face_areas
 
@@ -22,13 +32,13 @@ def spot(V, rim=0.5, radius=0.25):
     """Weights of faces: 1 within the radius about the middle of a unit square, falling to 0 over the rim."""
     V, F = V
     d = np.linalg.norm(V[:, :2] - 0.5, axis=1)
-    return measure.from_vertices(np.clip((radius * (1 + rim / 2) - d) / (radius * rim), 0, 1), F)
+    return from_vertices(np.clip((radius * (1 + rim / 2) - d) / (radius * rim), 0, 1), F)
 
 
 def test_painted_weights():
     w = np.array([0, 0.5, 1.0])
-    np.testing.assert_allclose(measure.painted(w, 4), [1, 2.5, 4])
-    np.testing.assert_allclose(measure.painted(w, 1), measure.uniform(w))
+    np.testing.assert_allclose(painted_density(w, 4), [1, 2.5, 4])
+    np.testing.assert_allclose(painted_density(w, 1), np.ones(3))
 
 
 @pytest.mark.parametrize("factor", FACTORS)
@@ -36,13 +46,13 @@ def test_painted_weights():
 def test_the_share_is_exact(factor, rim):
     V, F = meshes.bumpy(40, 40)
     area, w = face_areas(V, F), spot((V, F), rim, radius=0.1)
-    found = exact_share(w, area, factor)
-    assert found.asked == pytest.approx(factor * measure.share(w, area))
-    assert measure.share(w, area * found.density) == pytest.approx(found.asked, rel=1e-9)
+    found = exact_density(w, area, factor)
+    assert found.target_share == pytest.approx(factor * region_share(w, area))
+    assert region_share(w, area * found.density) == pytest.approx(found.target_share, rel=1e-9)
     assert (found.density > 0).all()
     order = np.argsort(w)
     assert (np.diff(found.density[order]) * np.sign(factor - 1) >= -1e-12).all()
-    assert found.factor == pytest.approx(found.density[w == 1].mean() / found.density[w == 0].mean())
+    assert found.contrast == pytest.approx(found.density[w == 1].mean() / found.density[w == 0].mean())
 
 
 @pytest.mark.parametrize("rim", [0.5, 1.9])
@@ -50,40 +60,40 @@ def test_shares_compose(rim):
     """Twice by m is once by m^2, in every face; also where the rim is most of the region."""
     V, F = meshes.bumpy(40, 40)
     area, w = face_areas(V, F), spot((V, F), rim, radius=0.1)
-    factor = (0.9 / measure.share(w / w.max(), area)) ** 0.5
-    first = exact_share(w / w.max(), area, factor)
-    second = exact_share(w / w.max(), area, factor, base=first.density)
-    assert second.asked == pytest.approx(0.9)
-    once = exact_share(w / w.max(), area, factor**2).density
-    twice = measure.normalised(first.density * second.density, area)
-    np.testing.assert_allclose(twice, measure.normalised(once, area), rtol=1e-9)
+    factor = (0.9 / region_share(w / w.max(), area)) ** 0.5
+    first = exact_density(w / w.max(), area, factor)
+    second = exact_density(w / w.max(), area, factor, base=first.density)
+    assert second.target_share == pytest.approx(0.9)
+    once = exact_density(w / w.max(), area, factor**2).density
+    twice = normalised_density(first.density * second.density, area)
+    np.testing.assert_allclose(twice, normalised_density(once, area), rtol=1e-9)
 
 
 def test_no_measure_with_this_share_is_nearer():
     """Nearest in relative entropy: any change of the faces' areas that keeps the share takes it farther away."""
     V, F = meshes.bumpy(20, 20)
     area, w = face_areas(V, F), spot((V, F))
-    target = measure.normalised(exact_share(w, area, 2.0).density, area) * area
+    target = normalised_density(exact_density(w, area, 2.0).density, area) * area
     random = np.random.default_rng(0)
     for _ in range(5):
         change = random.normal(size=len(F)) * target
         kept = np.column_stack([np.ones(len(F)), w])
         change -= target[:, None] * kept @ np.linalg.solve(kept.T @ (target[:, None] * kept), kept.T @ change)
         other = target + 0.2 * change / np.abs(change / target).max()
-        assert measure.share(w, other) == pytest.approx(measure.share(w, target))
-        assert measure.entropy(other, area) > measure.entropy(target, area)
+        assert region_share(w, other) == pytest.approx(region_share(w, target))
+        assert relative_entropy(other, area) > relative_entropy(target, area)
 
 
 @pytest.mark.parametrize("share", [1.0, 1.5])
 def test_a_share_of_everything_is_refused(share):
     w = np.array([0, 0, 0, 1.0])
     with pytest.raises(ShareError, match="leaves nothing"):
-        exact_share(w, np.ones(4), 4 * share)
+        exact_density(w, np.ones(4), 4 * share)
 
 
 @pytest.mark.parametrize("factor", [0.0, -2.0, np.nan, np.inf])
 def test_factors_that_are_none(factor):
-    for call in (measure.painted, lambda w, m: exact_share(w, np.ones(2), m)):
+    for call in (painted_density, lambda w, m: exact_density(w, np.ones(2), m)):
         with pytest.raises(ShareError):
             call(np.array([0, 1.0]), factor)
 
@@ -99,7 +109,7 @@ def test_factors_that_are_none(factor):
 )
 def test_weights_that_mark_nothing(weights, message, elements):
     with pytest.raises(WeightError, match=message) as caught:
-        measure.painted(np.array(weights, float), 2.0)
+        painted_density(np.array(weights, float), 2.0)
     assert caught.value.elements.tolist() == elements
 
 
@@ -107,7 +117,7 @@ def test_gauss_bonnet():
     for (V, F), total in ((meshes.icosphere(2), 4 * np.pi), (meshes.torus(), 0.0)):
         assert curvature.gaussian(V, F).sum() == pytest.approx(total, abs=1e-9)
     V, F = meshes.bumpy()
-    rim = curvature.on_rim(F, len(V))
+    rim = curvature.on_boundary(F, len(V))
     assert rim.sum() == 4 * 16 and not curvature.gaussian(V, F)[rim].any()
 
 
@@ -118,7 +128,7 @@ def test_mean_curvature_of_a_sphere():
     assert not curvature.mean(*meshes.grid()).any()
 
 
-@pytest.mark.parametrize("make", [measure.gaussian_curvature, measure.mean_curvature])
+@pytest.mark.parametrize("make", [gaussian_curvature_density, mean_curvature_density])
 def test_curvature_densities_mean_the_same_on_every_mesh(make):
     """Half of a sphere's measure is curvature with c = 1, whatever its size; the density of a plane is 1."""
     V, F = meshes.icosphere(3)
@@ -138,19 +148,19 @@ def test_sharpness_of_a_cube():
 
 def test_densities_compose_and_normalise():
     V, F = meshes.bumpy()
-    area, a, b = face_areas(V, F), measure.painted(spot((V, F)), 3.0), measure.gaussian_curvature(V, F)
-    both = measure.attribute(a * b)
+    area, a, b = face_areas(V, F), painted_density(spot((V, F)), 3.0), gaussian_curvature_density(V, F)
+    both = checked_density(a * b)
     w = spot((V, F))
     # The factor is what it was, against what the other density gives the region and the rest.
-    inside, outside = (measure.share(w, area * d) / (1 - measure.share(w, area * d)) for d in (both, b))
+    inside, outside = (region_share(w, area * d) / (1 - region_share(w, area * d)) for d in (both, b))
     assert 1 < inside / outside <= 3
-    assert area @ measure.normalised(both, area) == pytest.approx(area.sum())
+    assert area @ normalised_density(both, area) == pytest.approx(area.sum())
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, 1e-9])
 def test_attributes_that_are_no_densities(bad):
     with pytest.raises(DensityError) as caught:
-        measure.attribute(np.array([1, bad, 1]))
+        checked_density(np.array([1, bad, 1]))
     assert caught.value.elements.tolist() == [1]
 
 
@@ -158,12 +168,12 @@ def test_grading_limits_how_fast_the_spacing_grows():
     V, F = meshes.grid(40, 40)
     samples, limit = 1000, 0.3
     density = np.where(np.arange(len(F)) == 1700, 400.0, 1.0)
-    normal = measure.normalised(density, face_areas(V, F))
-    graded = measure.graded(density, V, F, limit, samples)
+    normal = normalised_density(density, face_areas(V, F))
+    graded = graded_density(density, V, F, limit, samples)
     assert (graded >= normal * (1 - 1e-12)).all()
     centre = V[F].mean(axis=1)
     spacing = np.sqrt(1 / (samples * graded))
     far = np.linalg.norm(centre[:, None] - centre[None, ::7], axis=2)
     # Spacing is set at vertices and read at faces, whose corners are one edge apart.
     assert (spacing[:, None] <= spacing[None, ::7] + limit * (1.5 * far + 3 / 40)).all()
-    np.testing.assert_allclose(measure.graded(np.ones(len(F)), V, F, limit, samples), 1)
+    np.testing.assert_allclose(graded_density(np.ones(len(F)), V, F, limit, samples), 1)

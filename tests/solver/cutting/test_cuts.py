@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import prepare
-from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
 from omt_uv.solver.parameterization.chart_pins import CornerPins
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -93,7 +93,7 @@ def test_every_surface_becomes_one_disk(name):
 def test_cuts_are_seams_that_split_accepts(name):
     V, F = SURFACES[name]()
     cuts = cut(triangle_surface(V, F))
-    (chart,) = split(triangle_surface(V, F, cuts.edges))
+    (chart,) = strict_charts(triangle_surface(V, F, cuts.edges))
     assert len(chart.triangles) == len(F)
     length = np.linalg.norm(V[cuts.edges[:, 0]] - V[cuts.edges[:, 1]], axis=1).sum()
     assert np.isclose(cuts.length, length, rtol=1e-12)
@@ -182,7 +182,7 @@ def test_seams_of_the_artist_are_kept_and_used():
     cuts = cut(triangle_surface(V, F, seam), extremities=0)
     # The seam leaves a tube, which one path along it opens.
     assert cuts.pieces[0].boundaries == 2 and cuts.pieces[0].handles == 0
-    (chart,) = split(triangle_surface(V, F, np.concatenate([seam, cuts.edges])))
+    (chart,) = strict_charts(triangle_surface(V, F, np.concatenate([seam, cuts.edges])))
     assert len(chart.triangles) == len(F)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from omt_uv.solver.editing.live_map import Follower
 from omt_uv.solver.editing.refine_island import improve
-from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.progress import drain
 
@@ -39,7 +39,7 @@ def test_no_fold_on_the_way_and_in_place(mirror):
         assert np.abs(signed).sum() == pytest.approx(np.abs(signed_areas(start, F)).sum())
         assert area @ uv[F].mean(1) / area.sum() == pytest.approx(centre)
     for balance in (0.0, 0.5, 1.0):
-        figures = measure(V, F, at_rest(follower, balance)[F])
+        figures = distortion(V, F, at_rest(follower, balance)[F])
         errors.append((figures.area_l1, -figures.angle_mean))
     assert errors == sorted(errors)  # along the slider areas get worse and angles better
 

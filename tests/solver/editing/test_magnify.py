@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis import vertex_scores as scores
-from omt_uv.solver.analysis.density import Target, from_vertices, normalised, share
-from omt_uv.solver.analysis.region_density import exact_share
+from omt_uv.solver.analysis.density import Target, from_vertices, normalised_density, region_share
+from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.analysis.saliency import saliency
 from omt_uv.solver.editing.image_warp import warped
 from omt_uv.solver.editing.magnify import magnify_map, magnify_region
 from omt_uv.solver.errors import EmptyMeshError, FoldedUVError, WeightError
 from omt_uv.solver.maps.overlap import overlap_share
-from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas, vertex_areas
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -37,9 +37,9 @@ def disk():
 
 def magnified(uv, F, weights, factor, **options):
     area, w = np.abs(signed_areas(uv, F)), from_vertices(weights, F)
-    found = exact_share(w, area, factor)
-    result = drain(magnify_map(uv, F, normalised(found.density, area), region=w, **options))
-    return result, found, share(w, np.abs(signed_areas(result.uv, F)))
+    found = exact_density(w, area, factor)
+    result = drain(magnify_map(uv, F, normalised_density(found.density, area), region=w, **options))
+    return result, found, region_share(w, np.abs(signed_areas(result.uv, F)))
 
 
 @pytest.mark.parametrize("boundary", ["own", "free"])
@@ -48,7 +48,7 @@ def magnified(uv, F, weights, factor, **options):
 def test_the_region_gets_its_share_without_folds(make, factor, boundary):
     uv, F = make()
     result, found, after = magnified(uv, F, blob(uv, uv.mean(0) + 0.05, 0.15 * np.ptp(uv)), factor, boundary=boundary)
-    assert after == pytest.approx(found.asked, rel=5e-3)
+    assert after == pytest.approx(found.target_share, rel=5e-3)
     assert (signed_areas(result.uv, F) > 0).all()
     assert overlap_share(result.uv[F]) <= 1e-4
     # A polygon in a circle gains or loses a little where its vertices slide.
@@ -89,8 +89,8 @@ def test_steps_compose(make, boundary, first, second):
     once = drain(magnify_region(uv, F, w, first * second, boundary=boundary))
     half = drain(magnify_region(uv, F, w, first, boundary=boundary))
     twice = drain(magnify_region(half.uv, F, w, second, boundary=boundary))
-    shares = [share(w, np.abs(signed_areas(x.uv, F))) for x in (once, twice)]
-    assert shares == pytest.approx([first * second * share(w, np.abs(signed_areas(uv, F)))] * 2, rel=5e-3)
+    shares = [region_share(w, np.abs(signed_areas(x.uv, F))) for x in (once, twice)]
+    assert shares == pytest.approx([first * second * region_share(w, np.abs(signed_areas(uv, F)))] * 2, rel=5e-3)
     assert np.linalg.norm(twice.uv - once.uv, axis=1).max() <= 0.02 * np.ptp(once.uv, axis=0).max()
     assert (signed_areas(twice.uv, F) > 0).all() and once.area_error <= 0.02
 
@@ -118,15 +118,15 @@ def test_folded_uvs_are_refused():
 @pytest.mark.parametrize("boundary", ["free", "disk", "square"])
 @pytest.mark.parametrize("factor", [0.25, 4.0])
 def test_a_surface_is_unwrapped_with_a_density(factor, boundary):
-    (chart,) = split(triangle_surface(*meshes.head(16)))
+    (chart,) = strict_charts(triangle_surface(*meshes.head(16)))
     V, F = chart.vertices, chart.triangles
     w = from_vertices(blob(V, V[np.argmax(V[:, 0])], 0.6), F)
-    found = exact_share(w, face_areas(V, F), factor)
-    density = normalised(found.density, face_areas(V, F))
+    found = exact_density(w, face_areas(V, F), factor)
+    density = normalised_density(found.density, face_areas(V, F))
     result = drain(unwrap_chart(chart, boundary=boundary, density=density, region=w))
     area = signed_areas(result.uv, F)
     assert (area > 0).all() and result.area_l1 <= 0.02
-    assert share(w, area) == pytest.approx(found.asked, rel=5e-3)
+    assert region_share(w, area) == pytest.approx(found.target_share, rel=5e-3)
     assert area.sum() == pytest.approx(face_areas(V, F).sum(), rel=1e-9)
 
 
@@ -240,9 +240,9 @@ def test_areas_that_cannot_be_are_said():
     rough = from_vertices(np.random.default_rng(0).integers(0, 2, len(V)).astype(float), F)
     soft = from_vertices(blob(uv, uv.mean(0), 0.2), F)
     for weights, factor, said in ((rough, 1.9, True), (soft, 2.0, False)):
-        found = exact_share(weights, area := face_areas(V, F), factor)
-        (chart,) = split(triangle_surface(V, F))
-        options = {"density": normalised(found.density, area), "region": weights}
+        found = exact_density(weights, area := face_areas(V, F), factor)
+        (chart,) = strict_charts(triangle_surface(V, F))
+        options = {"density": normalised_density(found.density, area), "region": weights}
         result = drain(unwrap_chart(chart, **options))
         assert any("Areas are" in text for text in result.warnings) == said == (result.area_l1 > 0.016)
 

@@ -10,9 +10,9 @@ from omt_uv.settings import RefineSettings
 from omt_uv.solver.editing.refine_island import STRAIGHTENED, boundary_edges, improve
 from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, PinError
-from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.tutte import tutte
-from omt_uv.solver.maps.untangle import arc_length_rim
+from omt_uv.solver.maps.untangle import arc_length_boundary
 from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -26,7 +26,7 @@ def head(count=16):
     """A bust and its mean value map, which has no folds and very wrong areas."""
     V, F = meshes.head(count)
     loop = boundary_loops(F)[0]
-    return V, F, tutte(V, F, loop, arc_length_rim(V, loop, 1.0))
+    return V, F, tutte(V, F, loop, arc_length_boundary(V, loop, 1.0))
 
 
 def ring(sectors=32, rings=6):
@@ -46,7 +46,7 @@ def run(V, F, uv, **options):
 
 
 def figures(V, F, uv):
-    return measure(V, F, uv[F])
+    return distortion(V, F, uv[F])
 
 
 def centroid(V, F, uv):

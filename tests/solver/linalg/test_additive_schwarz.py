@@ -10,7 +10,7 @@ from counting import counted
 
 from omt_uv.solver.errors import PrecisionError
 from omt_uv.solver.linalg import additive_schwarz as schwarz
-from omt_uv.solver.linalg.additive_schwarz import Overlapping
+from omt_uv.solver.linalg.additive_schwarz import AdditiveSchwarz
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas
@@ -30,7 +30,7 @@ def flattened(kind, weight=500.0):
     else:
         motion = OnCircle(boundary_loops(F)[0], np.pi / 2, len(w))
     problem = Problem(elements(V, F, face_areas(V, F)), Assembly(F, len(w)), motion, weight)
-    return problem, replace(problem, assembly=Assembly(F, len(w), Overlapping(V, F, 200))), w
+    return problem, replace(problem, assembly=Assembly(F, len(w), AdditiveSchwarz(V, F, 200))), w
 
 
 @pytest.mark.parametrize("kind", ["free", "circle"])
@@ -93,7 +93,7 @@ def test_nonzeros_grow_with_the_mesh():
         V, F = meshes.bumpy(count, count, height=0.3)
         w = V[:, 0] + 0.2 * V[:, 1] + 1j * V[:, 1]
         faces = elements(V, F, face_areas(V, F))
-        problem = Problem(faces, Assembly(F, len(w), Overlapping(V, F, 200)), Free(np.zeros(len(w), bool)), 30.0)
+        problem = Problem(faces, Assembly(F, len(w), AdditiveSchwarz(V, F, 200)), Free(np.zeros(len(w), bool)), 30.0)
         with counted() as tally:
             newton_direction(problem, w)
         counts.append(tally.nonzeros / len(w))

@@ -6,7 +6,7 @@ from counting import counted
 from scipy.spatial import Delaunay, cKDTree
 
 from omt_uv.solver.linalg import multigrid
-from omt_uv.solver.linalg.multigrid import Laplacians, Multigrid
+from omt_uv.solver.linalg.multigrid import LaplacianSolver, Multigrid
 from omt_uv.solver.linalg.sparse import solve_spd
 from omt_uv.solver.mesh.geometry import laplacian_from_weights
 
@@ -25,7 +25,7 @@ def graph(count, stretch=1.0):
 def test_solutions_are_those_of_a_factorisation(count):
     A, b = graph(count)
     expected = np.concatenate([[0.0], solve_spd(A[1:, 1:], b[1:])])
-    found = Laplacians().solve(A, b + 3, np.ones(count), 1e-12)
+    found = LaplacianSolver().solve(A, b + 3, np.ones(count), 1e-12)
     np.testing.assert_allclose(found, expected - expected.mean(), atol=1e-9 * np.abs(expected).max())
 
 
@@ -34,7 +34,7 @@ def test_iterations_do_not_grow_with_the_size(stretch):
     for count in (5000, 30_000):
         A, b = graph(count, stretch)
         with counted() as tally:
-            Laplacians().solve(A, b, np.ones(count), 1e-6)
+            LaplacianSolver().solve(A, b, np.ones(count), 1e-6)
         assert tally.cycles <= 45 and tally.factorisations == 1
 
 
@@ -43,14 +43,14 @@ def test_small_loads_are_met_as_well_as_large_ones():
     scale = 10 ** np.random.default_rng(2).uniform(-6, 0, 3000)
     b = b * scale
     b -= scale * b.sum() / scale.sum()
-    left = b - A @ Laplacians().solve(A, b, scale, 1e-3)
+    left = b - A @ LaplacianSolver().solve(A, b, scale, 1e-3)
     assert np.abs(left / scale).max() <= 1.1e-3 * np.abs(b / scale).max()
 
 
 def test_a_hierarchy_serves_until_it_is_slow():
     A, b = graph(5000)
     far, _ = graph(5000, 0.01)
-    ones, laplacians = np.ones(5000), Laplacians()
+    ones, laplacians = np.ones(5000), LaplacianSolver()
     with counted() as tally:
         for matrix in (A, 1.1 * A, far, far):
             x = laplacians.solve(matrix, b, ones, 1e-6)
@@ -70,4 +70,4 @@ def test_a_cycle_is_symmetric():
 def test_without_convergence_it_is_factored(monkeypatch):
     monkeypatch.setattr(multigrid, "MOST", 1)
     A, b = graph(3000)
-    np.testing.assert_allclose(A @ Laplacians().solve(A, b, np.ones(3000), 1e-12), b, atol=1e-9 * np.abs(b).max())
+    np.testing.assert_allclose(A @ LaplacianSolver().solve(A, b, np.ones(3000), 1e-12), b, atol=1e-9 * np.abs(b).max())

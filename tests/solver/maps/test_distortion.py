@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from omt_uv.solver.maps.distortion import RATIO_FLOOR, face_distortion, measure
+from omt_uv.solver.maps.distortion import RATIO_FLOOR, distortion, face_distortion
 from omt_uv.solver.maps.overlap import overlap_share
 
 JUDGE = Path(os.environ.get("OMT_UV_JUDGE") or meshes.ROOT.parent / "shared" / "tools" / "judge_uv.py")
@@ -45,7 +45,7 @@ def rough_map(seed=0):
 
 def test_identity_is_exact():
     V, F = meshes.grid(7, 5, 2.0, 3.0)
-    d = measure(V, F, flat(V, F))
+    d = distortion(V, F, flat(V, F))
     assert (d.faces, d.charts, d.folds, d.skipped_zero_area_faces) == (70, 1, 0, 0)
     assert d.area_l1 == pytest.approx(0, abs=1e-12) and d.area_sd == pytest.approx(0, abs=1e-12)
     assert d.area_max == pytest.approx(0, abs=1e-12) and d.area_p99 == pytest.approx(0, abs=1e-12)
@@ -57,7 +57,7 @@ def test_identity_is_exact():
 @pytest.mark.parametrize("stretch", [1.0, 1.5, 4.0, 300.0])
 def test_stretch_shears_and_keeps_area_shares(stretch):
     V, F = meshes.grid()
-    d = measure(V, F, flat(V, F) * [stretch, 1.0])
+    d = distortion(V, F, flat(V, F) * [stretch, 1.0])
     assert d.angle_mean == pytest.approx(stretch) and d.angle_p99 == pytest.approx(stretch)
     assert d.seed_angle == pytest.approx(stretch + 1 / stretch)
     assert d.area_l1 == pytest.approx(0, abs=1e-12) and d.folds == 0
@@ -75,7 +75,7 @@ def test_area_figures_of_two_faces_by_hand():
     V, F = meshes.quad_patch()
     uv = flat(V, F)
     uv[1] *= np.sqrt(3)  # two charts of areas 1/2 and 3/2: UV shares 1/4 and 3/4 of what should be halves
-    d = measure(V, F, uv)
+    d = distortion(V, F, uv)
     assert d.charts == 2 and d.folds == 0
     assert d.area_l1 == pytest.approx(0.5) and d.area_sd == pytest.approx(0.5)
     assert d.area_max == pytest.approx(1.0) and d.seed_area == pytest.approx((0.5 + 2 + 1.5 + 2 / 3) / 2)
@@ -88,7 +88,7 @@ def test_one_fold_is_counted_and_left_out_of_the_angles():
     uv = flat(V, F)
     centre = F == 4
     uv[centre] = [1.2, 0.5]  # pulled across the right side: the faces between the centre and that side turn over
-    d = measure(V, F, uv)
+    d = distortion(V, F, uv)
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     turned = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] <= 0
     assert d.folds == turned.sum() > 0 and d.charts == 1
@@ -101,7 +101,7 @@ def test_a_mirrored_chart_is_no_fold():
     half = np.arange(len(F)) < len(F) // 2
     uv = flat(V, F)
     uv[half] = uv[half] * [-1, 1] - [5, 0]
-    assert measure(V, F, uv).folds == 0
+    assert distortion(V, F, uv).folds == 0
 
 
 def test_known_overlap():
@@ -110,10 +110,10 @@ def test_known_overlap():
     F = np.concatenate([F, F + 4])
     uv = flat(V, F)
     uv[2:] -= [2.75, 0]  # the second unit square covers three quarters of the first
-    d = measure(V, F, uv)
+    d = distortion(V, F, uv)
     assert d.charts == 2 and d.folds == 0
     assert d.overlap == pytest.approx(0.75, abs=0.005)
-    assert measure(V, F, uv, overlap=False).overlap is None
+    assert distortion(V, F, uv, overlap=False).overlap is None
 
 
 def test_overlap_counts_doubly_wound_strips_but_not_touching_faces():
@@ -133,7 +133,7 @@ def test_overlap_of_one_giant_and_many_tiny_faces_stays_small_in_memory():
 @pytest.mark.parametrize("transform", ["scale", "rotation", "mirror", "mesh scale", "relabelling"])
 def test_figures_do_not_depend_on(transform):
     V, F, uv = rough_map()
-    expected = measure(V, F, uv)
+    expected = distortion(V, F, uv)
     c, s = np.cos(1.1), np.sin(1.1)
     if transform == "scale":
         uv = uv * 1234.5
@@ -146,7 +146,7 @@ def test_figures_do_not_depend_on(transform):
     else:
         new = np.random.default_rng(1).permutation(len(V))
         F, V = new[F], V[np.argsort(new)]
-    result = measure(V, F, uv)
+    result = distortion(V, F, uv)
     assert result.folds == expected.folds > 0 and result.charts == expected.charts == 1
     for name in FIGURES:
         assert getattr(result, name) == pytest.approx(getattr(expected, name), rel=1e-8, abs=1e-3 * (name == "overlap"))
@@ -156,28 +156,28 @@ def test_bad_input_is_a_named_error():
     V, F = meshes.grid(2, 2)
     uv = flat(V, F)
     with pytest.raises(EmptyMeshError):
-        measure(V, F[:0], uv[:0])
+        distortion(V, F[:0], uv[:0])
     broken = uv.copy()
     broken[3, 1, 0] = np.nan
     with pytest.raises(NonFiniteError) as caught:
-        measure(V, F, broken)
+        distortion(V, F, broken)
     assert caught.value.kind == "face" and caught.value.elements.tolist() == [3]
     with pytest.raises(NonFiniteError):
-        measure(np.where(np.arange(len(V))[:, None] == 4, np.inf, V), F, uv)
+        distortion(np.where(np.arange(len(V))[:, None] == 4, np.inf, V), F, uv)
     with pytest.raises(ZeroAreaFaceError):
-        measure(V * [1, 0, 0], F, uv)
+        distortion(V * [1, 0, 0], F, uv)
     with pytest.raises(ValueError, match="expected F"):
-        measure(V, F, uv[:, :2])
+        distortion(V, F, uv[:, :2])
 
 
 def test_faces_without_area_are_skipped_and_vanished_maps_are_all_folds():
     V, F = meshes.grid(3, 3)
     F = np.concatenate([F, [[0, 1, 1]]])
-    d = measure(V, F, flat(V, F))
+    d = distortion(V, F, flat(V, F))
     assert d.skipped_zero_area_faces == 1 and d.faces == 18 and d.area_l1 == pytest.approx(0, abs=1e-12)
     octaves, shear = face_distortion(V, F, flat(V, F))
     assert octaves[-1] == 0 and shear[-1] == 1
-    vanished = measure(V, F, 0 * flat(V, F))
+    vanished = distortion(V, F, 0 * flat(V, F))
     assert vanished.folds == 18 and vanished.seed_area is None and vanished.overlap == 0
 
 
@@ -189,7 +189,7 @@ def judge(V, F, uv):
 
 
 def assert_agrees(V, F, uv):
-    ours, theirs = asdict(measure(V, F, uv)), judge(V, F, uv)
+    ours, theirs = asdict(distortion(V, F, uv)), judge(V, F, uv)
     assert set(theirs) <= set(ours)
     for name, value in theirs.items():
         assert ours[name] == pytest.approx(value, rel=1e-4, abs=1e-4), name

@@ -264,9 +264,10 @@ def test_a_refused_chart_that_touches_itself_is_offered_a_weld():
 
 def opened(V, F, seams):
     """The mesh with its vertices doubled along the seams, as if it had been ripped there."""
-    sheets = repair.join(triangle_surface(V, F, seams), np.ones(len(F), bool), np.arange(F.size).reshape(-1, 3),
-                         np.arange(len(F))).sheets  # fmt: skip
-    _, first, G = np.unique(corner_classes(sheets), return_index=True, return_inverse=True)
+    corners = np.arange(F.size).reshape(-1, 3)
+    repaired = repair.repaired_gluing(triangle_surface(V, F, seams), np.ones(len(F), bool), corners, np.arange(len(F)))
+    gluing = repaired.gluing
+    _, first, G = np.unique(corner_classes(gluing), return_index=True, return_inverse=True)
     return V[F.ravel()[first]], G.reshape(-1, 3)
 
 

@@ -7,7 +7,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.mesh.charts import split
+from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.convexity import opened
 from omt_uv.solver.parameterization.corner_solver import affordable
@@ -59,7 +59,7 @@ def test_the_barrier_is_the_integral_of_its_gradient():
 def darts():
     """A flat square of quads, and a map of it in which two quads are darts, one of them with a corner at the rim."""
     surface = quads()
-    (chart,) = split(surface)
+    (chart,) = strict_charts(surface)
     uv = chart.vertices[:, :2].copy()
     uv[np.isin(chart.vertex_ids, [0, 24])] += 0.1
     assert (signed_areas(uv, chart.triangles) > 0).all()
@@ -94,7 +94,7 @@ def test_the_cheapest_patches_that_a_chart_can_spare(seed):
 
 def test_maps_without_darts_are_left_alone():
     surface = quads(height=0.1)
-    (chart,) = split(surface)
+    (chart,) = strict_charts(surface)
     flat = chart.vertices[:, :2]
     assert opened(surface, [chart], [flat], [np.zeros(len(flat), bool)], [None], [500.0], [np.inf]) == {}
 
@@ -133,7 +133,7 @@ def test_nearly_straight_corners_are_opened():
     middle = 0.5 * (V[25] + V[31])
     V[24] = middle + 0.01 * (V[24] - middle)
     surface = replace(surface, positions=V)
-    (chart,) = split(surface)
+    (chart,) = strict_charts(surface)
     uv = V[chart.vertex_ids, :2].copy()
     here = int(np.flatnonzero(chart.vertex_ids == 24)[0])
     uv[here] += 0.15 * (V[32] - V[24])[:2]

@@ -6,7 +6,7 @@ import pytest
 
 from omt_uv.solver.cutting.disk_charts import prepare
 from omt_uv.solver.cutting.shear_slit import slit
-from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.parameterization.shear_bound import unwrap_within
 from omt_uv.solver.progress import drain
@@ -23,7 +23,7 @@ def test_slits_bring_the_shear_under_the_bound():
     lengths, shears = zip(*result.history, strict=True)
     assert shears[0] > 1.25 >= shears[-1] and (np.diff(lengths) > 0).all()
     # The slits are seams that leave one disk.
-    (chart,) = split(triangle_surface(V, F, result.slits))
+    (chart,) = strict_charts(triangle_surface(V, F, result.slits))
     assert len(chart.triangles) == len(F)
 
 

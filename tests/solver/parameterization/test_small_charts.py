@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.density import Target
-from omt_uv.solver.analysis.region_density import exact_share
-from omt_uv.solver.maps.distortion import measure
+from omt_uv.solver.analysis.region_density import exact_density
+from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.mesh.charts import triangle_rows, triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.parameterization import small_charts as batches
@@ -46,7 +46,7 @@ def test_together_is_as_good_as_one_by_one(monkeypatch, quality, balance):
     assert sum(m.newton_transport is None for m in together.maps) >= len(SHAPES)
     for chart, a, b in zip(together.charts, together.maps, alone.maps, strict=True):
         assert a.folds == 0 and (signed_areas(a.uv, chart.triangles) > 0).all()
-        figures = measure(chart.vertices, chart.triangles, a.uv[chart.triangles])
+        figures = distortion(chart.vertices, chart.triangles, a.uv[chart.triangles])
         assert figures.overlap <= 1e-4 and figures.area_l1 == pytest.approx(a.area_l1, abs=1e-9)
         assert figures.area_sd == pytest.approx(a.area_sd, abs=1e-9)
         assert figures.angle_mean == pytest.approx(a.angle_mean, rel=1e-6)
@@ -87,7 +87,7 @@ def test_regions_get_their_shares_together_as_one_by_one(monkeypatch):
     centre = surface.positions[surface.corner_vertex[surface.triangles]].mean(axis=1)
     w = np.clip(1.5 - 2 * np.abs(centre[:, 1] % 1 - 0.5) - (centre[:, 0] % 20 > 0.5), 0, 1)
     area = face_areas(surface.positions, surface.corner_vertex[surface.triangles])
-    target = Target(exact_share(w, area, 2.0).density, w)
+    target = Target(exact_density(w, area, 2.0).density, w)
     together = drain(unwrap(surface, target=target))
     alone = one_by_one(monkeypatch, surface, target=target)
     assert sum(m.newton_transport is None for m in together.maps) >= MANY - 2
@@ -97,7 +97,7 @@ def test_regions_get_their_shares_together_as_one_by_one(monkeypatch):
         asked = mine.density * face_areas(chart.vertices, chart.triangles)
         assert (has > 0).all() and has.sum() == pytest.approx(asked.sum(), rel=1e-9)
         assert mine.region @ has == pytest.approx(mine.region @ asked, rel=5e-3, abs=1e-3 * asked.sum())
-        figures = measure(chart.vertices, chart.triangles, a.uv[chart.triangles], density=mine.density)
+        figures = distortion(chart.vertices, chart.triangles, a.uv[chart.triangles], density=mine.density)
         assert figures.overlap <= 1e-4 and figures.area_l1 == pytest.approx(a.area_l1, abs=1e-9)
         assert figures.angle_mean == pytest.approx(a.angle_mean, rel=1e-6)
         assert a.angle_mean <= 1.05 * b.angle_mean and a.area_l1 <= max(1.5 * b.area_l1, 1e-3)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import errors
-from omt_uv.solver.maps.distortion import measure
-from omt_uv.solver.mesh.charts import split, triangle_surface
+from omt_uv.solver.maps.distortion import distortion
+from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
@@ -35,13 +35,13 @@ def test_areas_are_kept_and_nothing_folds(shape, boundary):
     assert (area > 0).all() and chart_map.folds == 0
     assert area.sum() == pytest.approx(face_areas(V, F).sum(), rel=1e-9)
     assert chart_map.area_l1 <= (0.01 if boundary == "free" else 0.02)
-    figures = measure(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])
+    figures = distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])
     assert figures.area_l1 == pytest.approx(chart_map.area_l1) and figures.overlap <= 1e-4
 
 
 def test_the_boundary_fills_the_domain():
     surface = triangle_surface(*meshes.head(16))
-    (chart,) = split(surface)
+    (chart,) = strict_charts(surface)
     (loop,) = boundary_loops(chart.triangles)
     disk = drain(unwrap(surface, boundary="disk")).maps[0].uv[loop]
     radius = np.linalg.norm(disk, axis=1)
@@ -124,7 +124,7 @@ def test_progress_never_runs_backwards():
 
 def test_a_density_magnifies_exactly():
     V, F = meshes.hemisphere(16, 48)
-    (chart,) = split(triangle_surface(V, F))
+    (chart,) = strict_charts(triangle_surface(V, F))
     density = np.where(chart.vertices[chart.triangles].mean(axis=1)[:, 2] > 0.8, 4.0, 1.0)
     result = drain(unwrap_chart(chart, density=density))
     target = face_areas(chart.vertices, chart.triangles) * density
@@ -135,7 +135,7 @@ def test_a_density_magnifies_exactly():
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_densities_that_make_no_sense(value):
-    (chart,) = split(triangle_surface(*meshes.bumpy(4, 4)))
+    (chart,) = strict_charts(triangle_surface(*meshes.bumpy(4, 4)))
     density = np.ones(len(chart.triangles))
     density[5] = value
     with pytest.raises(errors.DensityError) as caught:
@@ -185,7 +185,7 @@ def test_models(name):
     result = drain(unwrap(triangle_surface(*meshes.load_model(name))))
     (chart,), (chart_map,) = result.charts, result.maps
     assert chart_map.folds == 0 and chart_map.area_l1 <= 0.01
-    figures = measure(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])
+    figures = distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])
     assert figures.overlap <= 1e-4
     if chart_map.newton_conformal is not None:
         assert chart_map.newton_conformal <= 12 and chart_map.residual_conformal <= 1e-8

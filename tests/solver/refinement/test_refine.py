@@ -8,7 +8,7 @@ from omt_uv.solver.errors import DensityError, FoldedUVError, PinError
 from omt_uv.solver.maps import energy as E
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.maps.tutte import tutte
-from omt_uv.solver.maps.untangle import arc_length_rim, count_folds, untangle
+from omt_uv.solver.maps.untangle import arc_length_boundary, count_folds, untangle
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import Progress, drain
@@ -31,7 +31,7 @@ STANDARD = QUALITIES["standard"].area_error
 def start(V, F, domain="disk"):
     """Tutte's map, boundary spread by length."""
     loop = boundary_loops(F)[0]
-    rim = arc_length_rim(V, loop, 1.0)
+    rim = arc_length_boundary(V, loop, 1.0)
     if domain == "square":
         rim = rim / np.abs(rim).max(1)[:, None]
     return tutte(V, F, loop, rim)
@@ -97,7 +97,7 @@ def test_gradient_is_the_derivative_of_the_energy(balance):
 
 
 def hessian_of_one_face(faces, w, balance):
-    rows = np.ascontiguousarray(E.local_derivatives(faces, w, balance).rows.conj()).view(float)
+    rows = np.ascontiguousarray(E.face_derivatives(faces, w, balance).rows.conj()).view(float)
     return (np.swapaxes(rows, 1, 2) @ rows)[0]
 
 
@@ -147,7 +147,7 @@ def test_pressure_only_softens_the_hessian():
     V, F = meshes.bumpy()
     faces, w = elements_of(V, F), complex_map(V, F)
     w = w / np.sqrt(faces.areas(w).sum())
-    sizes = [np.square(np.abs(E.local_derivatives(faces, w, 50.0, p).rows)).sum() for p in (0.0, 0.3, 1.0)]
+    sizes = [np.square(np.abs(E.face_derivatives(faces, w, 50.0, p).rows)).sum() for p in (0.0, 0.3, 1.0)]
     assert sizes[0] < sizes[1] < sizes[2]
 
 

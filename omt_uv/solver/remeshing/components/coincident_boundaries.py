@@ -60,13 +60,13 @@ def opened(points: np.ndarray, triangles: np.ndarray, slits: np.ndarray) -> tupl
     return points[triangles.ravel()[np.unique(sides, return_index=True)[1]]], sides
 
 
-def copies(ends: np.ndarray, on_rim: np.ndarray) -> int:
+def copies(ends: np.ndarray, on_boundary: np.ndarray) -> int:
     """How many vertices an opening adds, of slit edges with the ends (2s,) and vertices (n,) bool on a boundary.
 
     So many edges of slits as meet inside of the surface part it into as many fans, or on a boundary into one more.
     """
-    meeting = np.bincount(ends, minlength=len(on_rim))
-    return int(np.maximum(meeting - ~on_rim, 0).sum())
+    meeting = np.bincount(ends, minlength=len(on_boundary))
+    return int(np.maximum(meeting - ~on_boundary, 0).sum())
 
 
 def _only_once(keys: np.ndarray) -> np.ndarray:

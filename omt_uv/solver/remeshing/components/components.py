@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import OrientationError, ZeroAreaFaceError
-from ...mesh.charts import Chart, assemble, chosen_triangles, triangle_surface
+from ...mesh.charts import Chart, charts_of, chosen_triangles, triangle_surface
 from ...mesh.geometry import face_areas
 from ...mesh.gluing import orientations, turn_over
-from ...mesh.repair import join
+from ...mesh.repair import repaired_gluing
 from ...mesh.topology import halfedges, pair_keys, twins
 from .coincident_boundaries import join_touching
 
@@ -97,8 +97,8 @@ def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarra
     area = face_areas(boxed, surface.corner_vertex[corners])
     if not area.sum() > 1e-20:
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
-    repaired = join(surface, faces, corners, owner)
-    turned, one_sided = orientations(repaired.sheets, area)
+    repaired = repaired_gluing(surface, faces, corners, owner)
+    turned, one_sided = orientations(repaired.gluing, area)
     if one_sided.any():
         raise OrientationError(
             "A part of the mesh has only one side, like a Moebius strip",
@@ -112,7 +112,7 @@ def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarra
     if len(joined.slits):
         touching = int(np.isin(joined.same, joined.slits).sum())
         warnings.append(f"{touching} boundary vertices lie on one another and stay apart; Merge by Distance joins them")
-    charts = assemble(surface, turn_over(repaired.sheets, turned))
+    charts = charts_of(surface, turn_over(repaired.gluing, turned))
     slits = np.sort(pair_keys(joined.slits[:, 0], joined.slits[:, 1]))
     features = joined.same[features]
     kept = np.union1d(pair_keys(features[:, 0], features[:, 1]), slits)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPoint, Located, Memory, face_normals, subdivision_centroids
+from ...mesh.closest_point import ClosestPoint, ClosestPointTracker, SurfacePoints, face_normals, subdivision_centroids
 from ...mesh.geometry import face_areas
 from ...mesh.topology import expand
 from ..relaxation.surface_samples import Samples
@@ -70,14 +70,17 @@ class Pairing:
 
     def __init__(self, index: ClosestPoint, samples: Samples, start: Start | None = None):
         self.index, self.samples = index, samples
-        self._there, self._back = Memory(SEARCH_EVERY, FAR), Memory(SEARCH_EVERY, FAR)
+        self._there, self._back = ClosestPointTracker(SEARCH_EVERY, FAR), ClosestPointTracker(SEARCH_EVERY, FAR)
         self.per_vertex: tuple[float, float] | None = None
         self._piece: np.ndarray | None = None
         self.places = start.places if start else PLACES
         if start:
             self._piece = start.piece
             # Only walks stay on a piece.
-            self._there, self._back = Memory(NEVER, start=start.there), Memory(1, FAR, start.back)
+            self._there, self._back = (
+                ClosestPointTracker(NEVER, start=start.there),
+                ClosestPointTracker(1, FAR, start.back),
+            )
             self.per_vertex = start.per_vertex
 
     @property
@@ -133,7 +136,7 @@ class Pairing:
             (len(near.faces), len(owner), n),
         )
 
-    def _look_around(self, mesh: ClosestPoint, piece: np.ndarray, near: Located) -> None:
+    def _look_around(self, mesh: ClosestPoint, piece: np.ndarray, near: SurfacePoints) -> None:
         """Compare what was found for samples that are far with all triangles of the same piece (m,)."""
         off = near.points - self.samples.points
         square = np.einsum("ki,ki->k", off, off)

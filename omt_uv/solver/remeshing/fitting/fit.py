@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPoint, Memory
+from ...mesh.closest_point import ClosestPoint, ClosestPointTracker
 from ...progress import Progress, Steps, part_of
 from ..edits.working_mesh import Draft
 from ..relaxation.surface_samples import area_samples, joined, tip_samples
@@ -29,7 +29,7 @@ def fit_to_surface(draft: Draft, index: ClosestPoint, density: np.ndarray) -> St
     """
     n = len(draft.points)
     samples = joined(area_samples(index, SAMPLES * n, density), tip_samples(index, n))
-    fitting = Fitting(draft, Pairing(index, samples), density, Memory(ROUNDS + 1))
+    fitting = Fitting(draft, Pairing(index, samples), density, ClosestPointTracker(ROUNDS + 1))
     for k in range(ROUNDS):
         if not fitting.step():
             break

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...mesh.closest_point import Memory, vertex_normals
+from ...mesh.closest_point import ClosestPointTracker, vertex_normals
 from ...mesh.topology import twins
 from ..edits.delaunay_flips import make_delaunay_embedded
 from ..edits.working_mesh import Draft
@@ -34,7 +34,7 @@ class Fitting:
         draft: Draft,
         pairing: Pairing,
         density: np.ndarray,
-        home: Memory,
+        home: ClosestPointTracker,
         outer: np.ndarray | None = None,
     ):
         self.start, self.pairing, self.index, self.density = draft, pairing, pairing.index, density

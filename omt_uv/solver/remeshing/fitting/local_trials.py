@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.closest_point import Memory, face_normals
+from ...mesh.closest_point import ClosestPointTracker, face_normals
 from ...mesh.geometry import angles_from_lengths, halfedge_lengths
 from ...mesh.topology import halfedges, pair_keys, twins
 from ..edits.delaunay_flips import flip_where_sound
@@ -103,7 +103,7 @@ class Batch:
         """The mesh of all copies as they are now."""
         whole = self.whole
         samples = picked(whole.pairing.samples, np.tile(self.peaks.samples, self.copies))
-        home = Memory(NEVER, start=np.tile(whole.on.faces[self.patches.vertices], self.copies))
+        home = ClosestPointTracker(NEVER, start=np.tile(whole.on.faces[self.patches.vertices], self.copies))
         draft = Draft(self.points, self.triangles, self.fixed, self.locked)
         return Fitting(draft, Pairing(whole.index, samples, self._start), whole.density, home, self.outer)
 

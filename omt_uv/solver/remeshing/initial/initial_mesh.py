@@ -311,10 +311,10 @@ def _copies(part: Part, lines: Network, samples: ArcSamples) -> int:
     if len(part.slits) == 0:
         return 0
     chains = [samples.along[k] for k in _along(lines, part.slits)]
-    on_rim = np.zeros(len(samples.points), dtype=bool)
+    on_boundary = np.zeros(len(samples.points), dtype=bool)
     for k in _along(lines, part.rim):
-        on_rim[samples.along[k]] = True
-    return copies(np.concatenate([end for chain in chains for end in (chain[:-1], chain[1:])]), on_rim)
+        on_boundary[samples.along[k]] = True
+    return copies(np.concatenate([end for chain in chains for end in (chain[:-1], chain[1:])]), on_boundary)
 
 
 def _along(lines: Network, keys: np.ndarray) -> list[int]:

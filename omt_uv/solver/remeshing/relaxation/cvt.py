@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...linalg.lbfgs import Descent
+from ...linalg.lbfgs import LBFGS
 from ...mesh.closest_point import vertex_normals
 from ...mesh.geometry import vertex_areas
 from ...mesh.topology import twins
@@ -39,7 +39,7 @@ def relax(draft: Draft, rounds: int, carrier: Carrier) -> Steps[tuple[Draft, flo
     """
     triangles, fixed = draft.triangles.copy(), draft.fixed
     twin = twins(triangles)
-    descent = Descent()
+    descent = LBFGS()
     best, moved = np.inf, 0.0
     normal = vertex_normals(draft.points, triangles)
     carrier.forget()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...mesh.closest_point import ClosestPoint, Memory
+from ...mesh.closest_point import ClosestPoint, ClosestPointTracker
 from .surface_samples import Samples, area_samples, crest_samples
 
 SAMPLES_PER_POINT = 6
@@ -32,11 +32,11 @@ class Carrier:
         self.index, self.density = index, density
         self._samples = area_samples(index, SAMPLES_PER_POINT * count, density)
         self._crests = crest_samples(index)
-        self._memory = Memory(SEARCH_EVERY)
+        self._memory = ClosestPointTracker(SEARCH_EVERY)
 
     def forget(self) -> None:
         """Search for the next points, whichever they are."""
-        self._memory = Memory(SEARCH_EVERY)
+        self._memory = ClosestPointTracker(SEARCH_EVERY)
 
     def onto(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Closest points (k,3) to points (k,3) with normals (k,3), and the density there; the same points each time."""

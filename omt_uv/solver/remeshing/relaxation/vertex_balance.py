@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ...linalg.sparse import solve_by_gradients
+from ...linalg.sparse import solve_conjugate_gradients
 from ...mesh.closest_point import vertex_normals
 from ...mesh.geometry import laplacian_from_weights
 from ...mesh.topology import halfedges, previous_halfedge, twins
@@ -98,7 +98,7 @@ def _surplus(draft: Draft, measure: np.ndarray, size: Size) -> np.ndarray:
     system = (smoother + sp.identity(n)).tocsr()
     left = surplus
     for _ in range(PASSES):
-        left = left - solve_by_gradients(system, left, EVEN_ENOUGH)
+        left = left - solve_conjugate_gradients(system, left, EVEN_ENOUGH)
     return surplus - left
 
 
