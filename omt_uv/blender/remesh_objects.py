@@ -173,7 +173,7 @@ def new_objects(
 def carried_attributes(request: Request, series: Series) -> list[Attributes]:
     """What the meshes of a series carry."""
     surface = request.job.surface
-    return [carry(request.attributes, surface, level.footprint) for level in series.levels]
+    return [carry(request.attributes, surface, level.correspondence) for level in series.levels]
 
 
 def _new_mesh(obj: bpy.types.Object, name: str, request: Request, level: Level) -> bpy.types.Mesh:

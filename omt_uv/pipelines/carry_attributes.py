@@ -15,12 +15,12 @@ from ..solver.mesh.charts import Surface
 from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.topology import pair_keys
 from ..solver.transfer import interpolate as transfer
-from ..solver.transfer.correspondence import Footprint
+from ..solver.transfer.correspondence import Correspondence
 from .attribute_types import TYPES
 from .attributes import Attributes, Layer, Marks, is_uv
 
 
-def carry(attributes: Attributes, surface: Surface, at: Footprint) -> Attributes:
+def carry(attributes: Attributes, surface: Surface, at: Correspondence) -> Attributes:
     """The attributes of a new mesh from those of the old one; shape keys become offsets of the new shape."""
     triangles = surface.corner_vertex[surface.triangles]
 
@@ -48,14 +48,14 @@ def carry(attributes: Attributes, surface: Surface, at: Footprint) -> Attributes
     )
 
 
-def _carried_uv(layer: Layer, surface: Surface, at: Footprint) -> tuple[np.ndarray, int]:
+def _carried_uv(layer: Layer, surface: Surface, at: Correspondence) -> tuple[np.ndarray, int]:
     """UVs of the new corners, and how many faces are folded though the map they come from is not."""
     uv = transfer.to_corners(at, surface.triangles, layer.values, extend=True)
     area = signed_areas(layer.values.astype(float), surface.triangles)
-    return straightened(at.triangles, uv, np.sign(area)[at.home])
+    return straightened(at.triangles, uv, np.sign(area)[at.face_triangle])
 
 
-def _carried(layer: Layer, surface: Surface, triangles: np.ndarray, at: Footprint) -> np.ndarray:
+def _carried(layer: Layer, surface: Surface, triangles: np.ndarray, at: Correspondence) -> np.ndarray:
     smooth = TYPES[layer.data_type][3]
     if layer.domain == "FACE":
         return transfer.to_faces(at, surface.triangle_face, layer.values)
@@ -66,7 +66,7 @@ def _carried(layer: Layer, surface: Surface, triangles: np.ndarray, at: Footprin
     return to_vertices(at, triangles, layer.values)
 
 
-def _carried_marks(marks: Marks, triangles: np.ndarray, at: Footprint) -> Marks:
+def _carried_marks(marks: Marks, triangles: np.ndarray, at: Correspondence) -> Marks:
     """Marks of the old edges that the seams of the new mesh follow; what follows a marked edge has its marks."""
     if not len(at.seams) or not len(marks.edges):
         none = np.zeros(len(at.seams), bool)

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..settings import RefineSettings
-from ..solver.editing.refine_island import boundary_edges, improve
+from ..solver.editing.refine_island import improve
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
 from ..solver.maps.distortion import distortion
 from ..solver.maps.overlap import overlap_share
 from ..solver.mesh.charts import Chart, Surface
 from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.topology import boundary_edges
 from ..solver.parameterization.chart_indices import located, located_pins
 from ..solver.parameterization.chart_pins import ChartPins, CornerPins
 from ..solver.progress import Progress, Steps, part_of

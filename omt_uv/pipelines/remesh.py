@@ -27,7 +27,7 @@ from ..solver.mesh.topology import halfedges
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.remeshing.initial.component_maps import Original
 from ..solver.remeshing.remesh import Remesh, remesh
-from ..solver.transfer.correspondence import Footprint, footprint
+from ..solver.transfer.correspondence import Correspondence, correspond
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Level:
 
     positions: np.ndarray
     triangles: np.ndarray
-    footprint: Footprint
+    correspondence: Correspondence
     found: Remesh
 
 
@@ -90,8 +90,8 @@ def remesh_series(job: Job, settings: RemeshSettings) -> Steps[Series]:
             level = yield from part_of(steps, k / len(counts), 1 / len(counts))
         levels.append(level)
         warnings += [name + text for text in (*joined, *level.found.warnings)]
-        if level.footprint.extended:
-            warnings.append(f"{name}{level.footprint.extended} faces reach across a seam; UVs are continued there")
+        if level.correspondence.extended:
+            warnings.append(f"{name}{level.correspondence.extended} faces reach across a seam; UVs are continued there")
     return Series(levels, warnings)
 
 
@@ -150,7 +150,7 @@ def _level(
     found = yield from part_of(steps, 0.0, 0.95)
     yield Progress("Attributes", 0.95)
     seams = all_edges(original.features, job.jumps)
-    at = footprint(positions, triangles, seams, found.vertices, found.triangles, found.faces, found.barycentric)
+    at = correspond(positions, triangles, seams, found.vertices, found.triangles, found.faces, found.barycentric)
     return Level(found.vertices, found.triangles, at, found)
 
 

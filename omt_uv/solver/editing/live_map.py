@@ -9,11 +9,12 @@ import numpy as np
 
 from ..maps.energy import elements
 from ..mesh.geometry import face_areas
+from ..mesh.topology import boundary_edges
 from ..refinement.continuation import FIRST_PRESSURE, NO_ENERGY, QUALITIES, Task, final_weight, rescaled
 from ..refinement.elimination_order import renumbered
 from ..refinement.pins import Pins, Springs
 from ..refinement.projected_newton import Assembly, Free, Problem, newton_step
-from .refine_island import boundary_edges, island_start, meets_itself, placed
+from .refine_island import island_start, meets_itself, placed
 
 # Of the springs between pins and where they are dragged to: stiff, as the barrier against folds must only just win.
 STIFFNESS = 1e6

@@ -17,13 +17,13 @@ from ..errors import FoldedUVError, MeshError
 from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import area_error, elements
 from ..mesh.geometry import face_areas, signed_areas
-from ..mesh.topology import boundary_loops
+from ..mesh.topology import boundary_edges, boundary_loops
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation import QUALITIES, Found, Task, stages
 from ..refinement.elimination_order import Renumbered, renumbered
 from ..refinement.projected_newton import Assembly
 from .outline import Outline, centroid, free, recognised
-from .refine_island import boundary_edges, meets_itself
+from .refine_island import meets_itself
 
 OUTLINES = ("own", "free")
 # Greatest step of a magnification, in the logarithm of the share.

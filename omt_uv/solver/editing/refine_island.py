@@ -15,7 +15,7 @@ from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import area_error, elements
 from ..maps.untangle import count_folds
 from ..mesh.geometry import face_areas, signed_areas
-from ..mesh.topology import boundary_loops, halfedges, twins
+from ..mesh.topology import boundary_edges, boundary_loops, halfedges
 from ..progress import Progress, Steps
 from ..refinement.boundary_barrier import contact, crossings
 from ..refinement.continuation import QUALITIES, Task, stages
@@ -115,13 +115,6 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
     if several is None:
         found = replace(found, w=placed(found.w, given, faces, pins))
     return found, error, (*warnings, *found.warnings)
-
-
-def boundary_edges(triangles: np.ndarray) -> np.ndarray:
-    """Edges (b,2) of all boundaries, surface on the left."""
-    tail, head = halfedges(triangles)
-    rim = twins(triangles) < 0
-    return np.column_stack([tail[rim], head[rim]])
 
 
 def meets_itself(w: np.ndarray, rim: np.ndarray) -> bool:

@@ -42,6 +42,13 @@ def twins(triangles: np.ndarray) -> np.ndarray:
     return twin
 
 
+def boundary_edges(triangles: np.ndarray) -> np.ndarray:
+    """Edges (b,2) of all boundaries of triangles (m,3), surface on the left, in the order of their halfedges."""
+    tail, head = halfedges(triangles)
+    boundary = twins(triangles) < 0
+    return np.column_stack([tail[boundary], head[boundary]])
+
+
 def next_halfedge(h: np.ndarray) -> np.ndarray:
     """The following halfedge within the same triangle."""
     return h + 1 - 3 * (h % 3 == 2)

@@ -1,7 +1,7 @@
-"""On which side of the seams the corners of new faces are, and where: walks over the old mesh that cross no seam.
+"""Find the side of the seams on which corners of new faces are, by walks over the old mesh that cross no seam.
 
-A face next to a seam takes a place that is on its side for certain, walks to its home from there, and from its home to
-its corners. Where it reaches across a seam all the same, the values of its home's side are extended.
+A face next to a seam starts from a vertex that is on its side for certain, walks to the triangle under its centroid
+from there, and on to its corners. Where it reaches across a seam all the same, the values of its side are extended.
 """
 
 from __future__ import annotations
@@ -14,38 +14,43 @@ from ..mesh.topology import halfedges
 
 # Nearer than this share of the extent is the same point.
 SAME_POINT = 1e-7
-# Vertices nearer to a seam than this share of an edge may be beyond it.
+# Share of the median edge: vertices nearer to a seam may be beyond it.
 UNSURE = 0.4
-WITNESS_ROUNDS = 20
+# Rounds in which vertices learn their side from a neighbour.
+REFERENCE_ROUNDS = 20
 # The longest way over the surface that is looked for, in straight lines.
 LONGEST_WAY = 6.0
-# Beyond this, a triangle is too slim to say what lies next to it.
+# Barycentric coordinate beyond which a triangle is too slim to say what lies next to it.
 MOST_EXTENDED = 8.0
+# Squared sine of an angle below which a triangle has no plane.
+DEGENERATE = 1e-14
 
 
-def witnesses(
+def reference_vertices(
     mesh: CutMesh, new_triangles: np.ndarray, free: np.ndarray, lifted: np.ndarray, spacing: float
 ) -> np.ndarray:
     """For every new vertex (k,) one that is on the same side of the seams, and so far from them that this is sure.
 
     New edges that follow a crooked seam cut its corners, and vertices next to them may lie beyond the old seam.
-    Vertices that are on no seam, `free` (k,), and joined by an edge are on the same side where seams are kept.
+    Vertices that are on no seam, `free` (k,), and joined by an edge are on the same side where seams are kept. lifted
+    (k,3): the new vertices on the old surface; spacing: median length of the new edges. A vertex that finds none is
+    its own.
     """
     points, _ = seam_points(mesh, spacing / 8)
     sure = free & (cKDTree(points).query(lifted)[0] > UNSURE * spacing) if len(points) else free
-    witness = np.where(sure, np.arange(len(free)), -1)
+    reference = np.where(sure, np.arange(len(free)), -1)
     tail, head = halfedges(new_triangles)
     open_ = free[tail] & free[head]
     a, b = np.concatenate([tail[open_], head[open_]]), np.concatenate([head[open_], tail[open_]])
-    for _ in range(WITNESS_ROUNDS):
-        asking = (witness[a] < 0) & (witness[b] >= 0)
+    for _ in range(REFERENCE_ROUNDS):
+        asking = (reference[a] < 0) & (reference[b] >= 0)
         if not asking.any():
             break
-        witness[a[asking]] = witness[b[asking]]
-    return np.where(witness < 0, np.arange(len(free)), witness)
+        reference[a[asking]] = reference[b[asking]]
+    return np.where(reference < 0, np.arange(len(free)), reference)
 
 
-def homes(
+def locate_faces(
     mesh: CutMesh,
     new_triangles: np.ndarray,
     free: np.ndarray,
@@ -53,10 +58,10 @@ def homes(
     centres: np.ndarray,
     nearest: np.ndarray,
 ) -> np.ndarray:
-    """Home triangle (t,) of new faces (t,3) whose centroids are at `centres` (t,3), `nearest` (t,) to them.
+    """Old triangle (t,) under each of the new faces (t,3) with centroids `centres` (t,3), on its side of the seams.
 
-    Next to a crooked seam the nearest triangle may be on the other side. So descents start from triangles `start`
-    (k,) that are on the side of each `free` (k,) vertex, and the end of that which comes nearest to the centre is home.
+    Next to a crooked seam the `nearest` (t,) triangle may be on the other side. So descents start from triangles
+    `start` (k,) that are on the side of each `free` (k,) vertex, and the end that comes nearest to the centre is taken.
     """
     distance = np.full(new_triangles.shape, np.inf)
     end = np.repeat(nearest[:, None], 3, axis=1)
@@ -65,10 +70,10 @@ def homes(
     return end[np.arange(len(end)), distance.argmin(axis=1)]
 
 
-def corners_of(
+def locate_corners(
     mesh: CutMesh,
     new_triangles: np.ndarray,
-    home: np.ndarray,
+    face_triangle: np.ndarray,
     free: np.ndarray,
     lifted: np.ndarray,
     faces: np.ndarray,
@@ -76,10 +81,12 @@ def corners_of(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Triangle (t,3), coordinates (t,3,3) and side (t,3) of the corners of new faces, and how many were extended.
 
-    The side is -1 where a vertex has one only.
+    face_triangle (t,): old triangle under each face; free (k,), lifted (k,3), faces (k,), barycentric (k,3): of the new
+    vertices, whether on no seam, and where. A side is a number that corners of one vertex share just when no seam
+    parts them: -1 where a vertex has one side only, below that where the face reaches across a seam.
     """
     flat = new_triangles.ravel()
-    end, reached, own = _sought(mesh, np.repeat(home, 3), lifted[flat], faces[flat], free[flat])
+    end, reached, own = _sought(mesh, np.repeat(face_triangle, 3), lifted[flat], faces[flat], free[flat])
     weights = _coordinates(mesh, lifted[flat], end)
     weights[reached] = np.clip(weights[reached], 0, 1)
     weights /= weights.sum(axis=1, keepdims=True)
@@ -120,7 +127,7 @@ def _coordinates(mesh: CutMesh, points: np.ndarray, faces: np.ndarray) -> np.nda
     u, v, w = b - a, c - a, points - a
     uu, uv, vv, wu, wv = (np.einsum("kj,kj->k", *pair) for pair in ((u, u), (u, v), (v, v), (w, u), (w, v)))
     determinant = uu * vv - uv * uv
-    safe = determinant > 1e-14 * uu * vv
+    safe = determinant > DEGENERATE * uu * vv
     scale = np.where(safe, determinant, 1)
     s, t = (vv * wu - uv * wv) / scale, (uu * wv - uv * wu) / scale
     weights = np.stack([1 - s - t, s, t], axis=1)
@@ -129,19 +136,20 @@ def _coordinates(mesh: CutMesh, points: np.ndarray, faces: np.ndarray) -> np.nda
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def unite(
+def agree_on_sides(
     new_triangles: np.ndarray,
-    alone: np.ndarray,
+    one_sided: np.ndarray,
     corner_triangle: np.ndarray,
     corner_weights: np.ndarray,
     side: np.ndarray,
 ) -> None:
-    """Give all corners of vertices `alone` (k,) the side that most of them have; arrays (t,3), (t,3,3), (t,3) in place.
+    """Give all corners of vertices `one_sided` (k,) the side of most of them, by vote.
 
-    Next to boundaries that touch, single faces may have found the other one.
+    Next to boundaries that touch, single faces may have found the other one. corner_triangle (t,3), corner_weights
+    (t,3,3) and side (t,3) are changed in place.
     """
-    corner = np.flatnonzero(alone[new_triangles.ravel()])
-    # All that could not reach the vertex agree in that: it lies, as on a thin part, on the sheet behind.
+    corner = np.flatnonzero(one_sided[new_triangles.ravel()])
+    # All that could not reach the vertex agree in that: it lies, as on a thin wall, on the surface behind.
     vertex, own = new_triangles.ravel()[corner], np.maximum(side.ravel()[corner], -2)
     order = np.lexsort([own, vertex])
     first = np.flatnonzero(np.r_[True, (np.diff(vertex[order]) != 0) | (np.diff(own[order]) != 0)][: len(order)])
@@ -149,7 +157,7 @@ def unite(
     best = np.lexsort([-votes, vertex[order[first]]])
     voters = vertex[order[first]][best]
     elected = order[first[best[np.r_[True, np.diff(voters) != 0][: len(best)]]]]
-    leader = np.zeros(len(alone), np.int64)
+    leader = np.zeros(len(one_sided), np.int64)
     leader[vertex[elected]] = corner[elected]
     chosen = leader[vertex]
     corner_triangle.ravel()[corner] = corner_triangle.ravel()[chosen]

@@ -7,7 +7,7 @@ import pytest
 from omt_uv.pipelines.refine import refine_islands
 from omt_uv.pipelines.unwrap import Refusal
 from omt_uv.settings import RefineSettings
-from omt_uv.solver.editing.refine_island import STRAIGHTENED, boundary_edges, improve
+from omt_uv.solver.editing.refine_island import STRAIGHTENED, improve
 from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, PinError
 from omt_uv.solver.maps.distortion import distortion
@@ -15,7 +15,7 @@ from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary
 from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
-from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.mesh.topology import boundary_edges, boundary_loops
 from omt_uv.solver.parameterization.chart_pins import CornerPins
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

@@ -11,7 +11,7 @@ from omt_uv.solver.mesh.closest_point import ClosestPoint, vertex_normals
 from omt_uv.solver.mesh.cut_mesh import cut_open
 from omt_uv.solver.mesh.topology import halfedges, pair_keys
 from omt_uv.solver.transfer import interpolate as transfer
-from omt_uv.solver.transfer.correspondence import footprint
+from omt_uv.solver.transfer.correspondence import correspond
 
 
 def fine_and_coarse(turn=0.0, subdivisions=2):
@@ -34,7 +34,7 @@ def meridian(V, F):
 
 
 def laid(V, F, seams, W, G, on):
-    return footprint(V, F, seams, W, G, on.faces, on.barycentric)
+    return correspond(V, F, seams, W, G, on.faces, on.barycentric)
 
 
 def edge_set(edges):
