@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import UserError
 from ..pipelines.attributes import Attributes, followed, marked_sharp, material_borders, uv_seams
 from ..pipelines.carry_attributes import carry
-from ..pipelines.remesh import Job, Level, Series, oriented
+from ..pipelines.remesh import LevelOfDetail, RemeshJob, Series, oriented
 from ..settings import RemeshSettings
 from ..solver.analysis.density import from_polygons, from_vertices
 from ..solver.analysis.feature_edges import all_edges, sharp_edges
@@ -44,7 +44,7 @@ class SourceError(UserError):
 class Request:
     """What to remesh, what it carries, and the stretch (3,3) of its positions, see `blender_mesh.stretch`."""
 
-    job: Job
+    job: RemeshJob
     attributes: Attributes
     stretch: np.ndarray
     evaluated: bool
@@ -78,7 +78,7 @@ def read_request(
     jumps = all_edges(uv_seams(attributes, surface), material_borders(attributes, surface))
     features = _features(attributes, surface, settings)
     kept = followed(attributes, all_edges(features, jumps))
-    return Request(Job(surface, features, jumps, values, warnings), kept, stretch, depsgraph is not None)
+    return Request(RemeshJob(surface, features, jumps, values, warnings), kept, stretch, depsgraph is not None)
 
 
 @contextmanager
@@ -176,7 +176,7 @@ def carried_attributes(request: Request, series: Series) -> list[Attributes]:
     return [carry(request.attributes, surface, level.correspondence) for level in series.levels]
 
 
-def _new_mesh(obj: bpy.types.Object, name: str, request: Request, level: Level) -> bpy.types.Mesh:
+def _new_mesh(obj: bpy.types.Object, name: str, request: Request, level: LevelOfDetail) -> bpy.types.Mesh:
     positions = np.linalg.solve(request.stretch, level.positions.T).T
     mesh = blender_mesh.new_mesh(name, positions.tolist(), level.triangles.tolist())
     for material in obj.data.materials:

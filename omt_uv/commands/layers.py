@@ -23,7 +23,7 @@ def read_layers(options: argparse.Namespace) -> list:
 @contextmanager
 def refusals(objects: list, *errors: type[Exception]) -> Iterator[None]:
     """Turn what is refused, and the given errors, into a CommandError that names the object."""
-    from ..pipelines.unwrap import Refusal
+    from ..pipelines.layout import Refusal
 
     files, blender_mesh, _ = blender()
     try:

@@ -49,7 +49,8 @@ def add(commands) -> None:
 def run(options: argparse.Namespace) -> None:
     _, _, blender_pack = blender()
     from ..blender.seams import GroupError, avoided
-    from ..pipelines.unwrap import Job, lay_out
+    from ..pipelines.layout import UnwrapJob
+    from ..pipelines.unwrap import lay_out
     from ..xatlas.packing import PackingError
 
     settings = Settings(
@@ -68,7 +69,7 @@ def run(options: argparse.Namespace) -> None:
     objects = [obj for obj, _ in pairs]
     with refusals(objects, PackingError, GroupError):
         free = avoided(objects, options.keep_free)
-        jobs = [Job(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
+        jobs = [UnwrapJob(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
         layout = drain_shown(lay_out(jobs, settings, blender_pack.pack))
         warnings = write_layers(options, objects, layout)
     if options.report:

@@ -102,8 +102,8 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         from ..blender.seams import GroupError
         from ..blender.weights import ScoreError
         from ..files.images import ImageError, picture_of, straight_alpha
+        from ..pipelines.layout import Refusal
         from ..pipelines.magnify import Region, magnify, warped_picture
-        from ..pipelines.unwrap import Refusal
         from ..session import run as running
         from ..xatlas import packing
 

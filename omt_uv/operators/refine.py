@@ -44,8 +44,8 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
     def steps(self, context: bpy.types.Context):
         from ..blender import mesh as blender_mesh
         from ..blender import uv_packer as blender_pack
+        from ..pipelines.layout import Refusal
         from ..pipelines.refine import refine_islands
-        from ..pipelines.unwrap import Refusal
         from ..session import run as running
         from ..xatlas import packing
 

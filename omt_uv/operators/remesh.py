@@ -148,7 +148,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context):
         from ..blender.remesh_objects import SourceError, alike, read_request
-        from ..pipelines.unwrap import Refusal
+        from ..pipelines.layout import Refusal
         from ..session import run as running
         from ..solver.errors import MeshError
 
@@ -209,8 +209,8 @@ def _figures(levels: list) -> tuple[tuple[str, str], ...]:
 def _remesh_all(requests: list, settings: RemeshSettings):
     """The series of every request and what its meshes carry; Refusal says which one has none."""
     from ..blender.remesh_objects import carried_attributes
+    from ..pipelines.layout import Refusal
     from ..pipelines.remesh import remesh_series
-    from ..pipelines.unwrap import Refusal
     from ..solver.errors import MeshError
     from ..solver.progress import part_of
 

@@ -38,7 +38,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context):
         from ..blender.seams import GroupError, avoided
-        from ..pipelines.unwrap import Refusal
+        from ..pipelines.layout import Refusal
         from ..session import run as running
 
         pairs = read_objects(context)
@@ -69,7 +69,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
 
 def _cut_all(readings: list, free: list, options: dict):
     """The cuts of every surface; Refusal says which one has none."""
-    from ..pipelines.unwrap import Refusal
+    from ..pipelines.layout import Refusal
     from ..solver.cutting.cuts import cut
     from ..solver.errors import MeshError
     from ..solver.parameterization.chart_pins import clear_of_pins

@@ -74,8 +74,8 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         from ..blender.seams import GroupError
         from ..blender.weights import ScoreError
         from ..pipelines.globe import globe_jobs, project
+        from ..pipelines.layout import Refusal
         from ..pipelines.panorama_redraw import redraw
-        from ..pipelines.unwrap import Refusal
         from ..session import run as running
         from ..solver.errors import MeshError
         from ..solver.globe.rotation import MarkerError

@@ -70,7 +70,8 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         from ..blender import mesh as blender_mesh
         from ..blender import uv_packer as blender_pack
         from ..blender.seams import GroupError, avoided
-        from ..pipelines.unwrap import Job, Refusal, lay_out
+        from ..pipelines.layout import Refusal, UnwrapJob
+        from ..pipelines.unwrap import lay_out
         from ..session import run as running
         from ..xatlas import packing
 
@@ -81,7 +82,7 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             free = avoided([obj for obj, _ in pairs], self.keep_free)
         except (blender_mesh.TargetError, GroupError) as error:
             raise Complaint(str(error)) from error
-        jobs = [Job(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
+        jobs = [UnwrapJob(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
         try:
             steps = lay_out(jobs, self.settings(), running.in_front(blender_pack.pack))
             layout = yield from running.aside(steps)

@@ -21,7 +21,7 @@ from ..solver.mesh.gluing import groups
 from ..solver.mesh.spherical_geometry import spherical_areas
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.sphere.sphere_map import SphereMap, sphere_map
-from .unwrap import Refusal
+from .layout import Refusal
 
 # Of the work on one part, what its map to the sphere takes.
 MAPPING = 0.9
@@ -53,7 +53,7 @@ def globe_jobs(readings: Sequence, densities: Sequence, markers: Sequence) -> li
 
 
 @dataclass(frozen=True)
-class Part:
+class ClosedComponent:
     """A closed part: vertices (n,3), triangles (m,3), of the surface the corners (m,3), faces (m,), vertex_ids (n,)
     and the numbers (m,) of its triangles."""
 
@@ -70,7 +70,7 @@ class Globe:
     """A part, its map to the sphere, that map as it was laid out (n,3), the corners (c,) with their UVs (c,2), of its
     triangles the shares (m,) of the texture they were to have and the areas (m,) they have, and warnings."""
 
-    part: Part
+    part: ClosedComponent
     sphere: SphereMap
     points: np.ndarray
     corners: np.ndarray
@@ -142,7 +142,7 @@ def _globes(job: GlobeJob, settings: GlobeSettings) -> Steps[list[Globe]]:
     return globes
 
 
-def closed_parts(surface: Surface, faces: np.ndarray | None = None) -> list[Part]:
+def closed_parts(surface: Surface, faces: np.ndarray | None = None) -> list[ClosedComponent]:
     """Parts of the polygons `faces` (f,) bool that have no vertex in common; seams play no part.
 
     Raises
@@ -159,11 +159,11 @@ def closed_parts(surface: Surface, faces: np.ndarray | None = None) -> list[Part
     for mine in groups(label[vertex[:, 0]]):
         ids, local = np.unique(vertex[mine], return_inverse=True)
         local = local.reshape(-1, 3).astype(np.int64)
-        parts.append(Part(surface.positions[ids], local, triangles[mine], owner[mine], ids, members[mine]))
+        parts.append(ClosedComponent(surface.positions[ids], local, triangles[mine], owner[mine], ids, members[mine]))
     return parts
 
 
-def _globe(part: Part, job: GlobeJob, settings: GlobeSettings) -> Steps[Globe]:
+def _globe(part: ClosedComponent, job: GlobeJob, settings: GlobeSettings) -> Steps[Globe]:
     density = None if job.density is None else job.density[part.members]
     found = yield from part_of(
         sphere_map(part.vertices, part.triangles, density, settings.balance, settings.quality, settings.method),
@@ -198,14 +198,14 @@ def _laid_out(
     return exact.unfolding.corners(), placed, unfolded.missed
 
 
-def _shares(part: Part, density: np.ndarray | None) -> np.ndarray:
+def _shares(part: ClosedComponent, density: np.ndarray | None) -> np.ndarray:
     """Shares (m,) of the texture that the triangles of a part shall have."""
     area = face_areas(part.vertices, part.triangles)
     mass = area if density is None else area * density
     return mass / mass.sum()
 
 
-def _rotation(part: Part, positions: np.ndarray, markers: Markers | None) -> np.ndarray:
+def _rotation(part: ClosedComponent, positions: np.ndarray, markers: Markers | None) -> np.ndarray:
     if markers is None or not markers.pole[part.vertex_ids].any():
         return along_axes(positions, part.vertices, part.triangles)
 
@@ -227,7 +227,7 @@ def _complaints(missed: int, folded: int) -> list[str]:
     return told
 
 
-def _located(error: MeshError, part: Part) -> MeshError:
+def _located(error: MeshError, part: ClosedComponent) -> MeshError:
     """The error with indices of the surface in the place of the part's."""
     ids = part.faces if error.kind == "face" else part.vertex_ids
     elements = ids[error.elements] if len(error.elements) else error.elements

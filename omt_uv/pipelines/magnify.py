@@ -1,4 +1,4 @@
-"""A painted region gets its share of the texture; the one path of the operator and of the command line.
+"""Magnify painted regions to their share of the texture; the one path of the operator and of the command line.
 
 From the mesh, surfaces are unwrapped with the density as target. From existing UVs, every island is a plane of its own
 and magnified inside its own outline.
@@ -27,19 +27,17 @@ from ..solver.editing.magnify import OUTLINES, Lens, aligned_to, magnify_region,
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, MeshError, WeightError
 from ..solver.maps.distortion import distortion
-from ..solver.maps.overlap import overlap_share
 from ..solver.mesh.charts import Surface, check_disk, triangle_rows
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.parameterization.chart_indices import located
 from ..solver.parameterization.chart_map import unwrap_chart
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.progress import Steps, part_of
-from .unwrap import Job, Packer, Refusal, lay_out
+from .layout import Packer, PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
+from .unwrap import lay_out
 
 # Shares that are off by more than this, relatively, are said.
 OFF = 5e-3
-# More overlap than this, as a share of the UV area, is said.
-OVERLAP = 1e-4
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ def magnify(
     Raises
     ------
     Refusal : with the index of the surface and the MeshError that says why
-    packing.PackingError : see `unwrapping.lay_out`
+    PackingError : see `unwrap.lay_out`
     """
     for index, region in enumerate(regions):
         try:
@@ -145,7 +143,7 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
         full[rows], inside[rows] = density[start : start + len(a)], w
         start += len(a)
         pins = region.pins if region.pins is not None and region.pins.pinned.any() else None
-        jobs.append(Job(region.surface, region.faces, pins, target=Target(full, inside)))
+        jobs.append(UnwrapJob(region.surface, region.faces, pins, target=Target(full, inside)))
     if settings.boundary == "own":
         settings = replace(settings, boundary="free")
     layout = yield from lay_out(jobs, settings, spare_packer)
@@ -185,7 +183,7 @@ def _uv_areas(region: Region, part, corners: np.ndarray, uv: np.ndarray) -> np.n
 
 
 @dataclass(frozen=True)
-class _Piece:
+class _MagnifiedIsland:
     """An island of surface `owner`, its region (m,) and UV area (m,), the share wanted, and what became of it."""
 
     owner: int
@@ -202,22 +200,25 @@ def _from_uv(regions, settings: MagnifySettings) -> Steps[Magnified]:
     """Magnify inside every island that the region touches; the others stay to the bit."""
     islands, warnings = _islands(regions)
     total = sum(len(island.chart.triangles) for _, island in islands)
-    pieces: list[_Piece] = []
+    magnified: list[_MagnifiedIsland] = []
     done = 0
     for owner, island in islands:
         size = len(island.chart.triangles)
         weights = _weights_of(regions[owner], island)
         try:
-            piece, texts = yield from part_of(_piece(owner, island, weights, settings), done / total, size / total)
+            result, texts = yield from part_of(_magnified(owner, island, weights, settings), done / total, size / total)
         except MeshError as error:
             raise Refusal(owner, located(error, island.chart)) from error
-        pieces.append(piece)
+        magnified.append(result)
         warnings += [(owner, text) for text in texts]
         done += size
-    warnings += _grown_together(pieces, islands)
-    corners, uv = _scatter(regions, pieces)
-    reports = [[_report(p) for p in pieces if p.owner == index] for index in range(len(regions))]
-    shares = _overall(pieces)
+    placed = [PlacedIsland(owner=p.owner, chart=p.island.chart, uv=p.uv, before=p.island.uv) for p in magnified]
+    # Inside outlines that stay nothing grows.
+    if any(p.outline not in ("circle", "sides") for p in magnified) and (warning := grown_together(placed)):
+        warnings.append((-1, warning))
+    corners, uv = corner_uvs(len(regions), placed)
+    reports = [[_report(p) for p in magnified if p.owner == index] for index in range(len(regions))]
+    shares = _overall(magnified)
     warnings += ((-1, text) for text in shares.warnings())
     return Magnified(corners, uv, reports, shares, warnings)
 
@@ -255,7 +256,9 @@ def _weights_of(region: Region, island: Island) -> np.ndarray:
     return region.of_triangles(triangle_rows(region.surface, island.chart))
 
 
-def _piece(owner: int, island: Island, weights, settings: MagnifySettings) -> Steps[tuple[_Piece, tuple[str, ...]]]:
+def _magnified(
+    owner: int, island: Island, weights, settings: MagnifySettings
+) -> Steps[tuple[_MagnifiedIsland, tuple[str, ...]]]:
     """An island after its magnification, and warnings."""
     triangles = island.chart.triangles
     refuse_folds(island.uv, triangles)
@@ -274,7 +277,7 @@ def _piece(owner: int, island: Island, weights, settings: MagnifySettings) -> St
         )
     else:
         lens = yield from _into_shape(island, area, found, weights, settings)
-    return _Piece(owner, island, weights, area, found, lens.uv, lens.outline, lens.iterations), lens.warnings
+    return _MagnifiedIsland(owner, island, weights, area, found, lens.uv, lens.outline, lens.iterations), lens.warnings
 
 
 def _into_shape(island: Island, area, found: RegionDensity, weights, settings: MagnifySettings) -> Steps[Lens]:
@@ -292,59 +295,34 @@ def _into_shape(island: Island, area, found: RegionDensity, weights, settings: M
     return Lens(placed, settings.boundary, done.newton_refinement, 0.0, done.status, done.area_l1, texts)
 
 
-def _overall(pieces: Sequence[_Piece]) -> Shares:
+def _overall(magnified: Sequence[_MagnifiedIsland]) -> Shares:
     """Shares of the region in all islands that it touches, by their UV area."""
-    size = np.array([piece.area.sum() for piece in pieces])
+    size = np.array([island.area.sum() for island in magnified])
     size = size / size.sum()
-    before = size @ [region_share(p.region, p.area) for p in pieces]
-    asked = size @ [p.found.target_share for p in pieces]
-    after = size @ [region_share(p.region, np.abs(signed_areas(p.uv, p.island.chart.triangles))) for p in pieces]
-    return Shares(float(before), float(asked), float(after), pieces[0].found.contrast)
+    before = size @ [region_share(p.region, p.area) for p in magnified]
+    asked = size @ [p.found.target_share for p in magnified]
+    after = size @ [region_share(p.region, np.abs(signed_areas(p.uv, p.island.chart.triangles))) for p in magnified]
+    return Shares(float(before), float(asked), float(after), magnified[0].found.contrast)
 
 
-def _grown_together(pieces: Sequence[_Piece], islands) -> list[tuple[int, str]]:
-    """A warning if islands that lay apart cover each other now."""
-    if len(pieces) < 2 or all(p.outline in ("circle", "sides") for p in pieces):
-        return []
-    before, after = (
-        overlap_share(np.concatenate([x[p.island.chart.triangles] for p, x in zip(pieces, maps, strict=True)]))
-        for maps in ([p.island.uv for p in pieces], [p.uv for p in pieces])
-    )
-    grown = after - before
-    return [] if grown < OVERLAP else [(-1, f"Islands grew into each other, by {100 * grown:.1f} %; pack them")]
-
-
-def _scatter(regions, pieces: Sequence[_Piece]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """From island vertices to the corners of each surface."""
-    corners, uv = [], []
-    for index in range(len(regions)):
-        mine = [p for p in pieces if p.owner == index]
-        k = np.concatenate([np.zeros(0, np.int64), *(p.island.chart.corners.ravel() for p in mine)])
-        values = np.concatenate([np.zeros((0, 2)), *(p.uv[p.island.chart.triangles.ravel()] for p in mine)])
-        unique, first = np.unique(k, return_index=True)
-        corners.append(unique)
-        uv.append(values[first])
-    return corners, uv
-
-
-def _report(piece: _Piece) -> dict:
-    chart = piece.island.chart
-    flat = np.column_stack([piece.island.uv, np.zeros(len(piece.uv))])
-    figures = distortion(flat, chart.triangles, piece.uv[chart.triangles], density=piece.found.density)
-    now = np.abs(signed_areas(piece.uv, chart.triangles))
+def _report(done: _MagnifiedIsland) -> dict:
+    chart = done.island.chart
+    flat = np.column_stack([done.island.uv, np.zeros(len(done.uv))])
+    figures = distortion(flat, chart.triangles, done.uv[chart.triangles], density=done.found.density)
+    now = np.abs(signed_areas(done.uv, chart.triangles))
     return {
         "vertices": len(chart.vertices),
         "triangles": len(chart.triangles),
-        "outline": piece.outline,
-        "newton_refinement": piece.iterations,
-        "share_before": region_share(piece.region, piece.area),
-        "share_asked": piece.found.target_share,
-        "share_after": region_share(piece.region, now),
+        "outline": done.outline,
+        "newton_refinement": done.iterations,
+        "share_before": region_share(done.region, done.area),
+        "share_asked": done.found.target_share,
+        "share_after": region_share(done.region, now),
         "area_l1": figures.area_l1,
         "angle_mean": figures.angle_mean,
         "folds": figures.folds,
         "overlap": figures.overlap,
-        "warnings": list(piece.found.warnings),
+        "warnings": list(done.found.warnings),
     }
 
 

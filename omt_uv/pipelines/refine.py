@@ -1,4 +1,4 @@
-"""UV islands of several surfaces, improved where they lie; the one path of the operator and of the command line."""
+"""Refine UV islands of several surfaces where they lie; the one path of the operator and of the command line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from ..solver.editing.refine_island import improve
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
 from ..solver.maps.distortion import distortion
-from ..solver.maps.overlap import overlap_share
 from ..solver.mesh.charts import Chart, Surface
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.topology import boundary_edges
@@ -20,15 +19,14 @@ from ..solver.parameterization.chart_indices import located, located_pins
 from ..solver.parameterization.chart_pins import ChartPins, CornerPins
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.refinement.refine import Refinement
-from .unwrap import Packer, Refusal, pack_islands
+from .layout import Packer, PlacedIsland, Refusal, corner_uvs, grown_together, pack_islands
 
-# More overlap than this, as a share of the UV area, is said.
-OVERLAP = 1e-4
+# Of `Distortion`, what a report says of an island before and after.
 FIGURES = ("area_l1", "area_sd", "angle_mean", "folds")
 
 
 @dataclass(frozen=True)
-class Refined:
+class RefinedLayout:
     """Corners (k,) to write and their UVs (k,2), and the report of every island, of each surface; warnings.
 
     `warnings` are pairs of surface index and text; -1 stands for all surfaces.
@@ -41,13 +39,16 @@ class Refined:
 
 
 @dataclass(frozen=True)
-class _Piece:
-    """An island of surface `owner` and what became of it; held: pins fix its scale; pins: it is not packed."""
+class _RefinedIsland:
+    """An island of surface `owner` and its refinement.
+
+    pins : those it has, which keep it from being packed; fixed_scale : whether they also fix how large it is
+    """
 
     owner: int
     island: Island
     pins: ChartPins | None
-    held: bool
+    fixed_scale: bool
     refinement: Refinement
 
     @property
@@ -62,7 +63,7 @@ def refine_islands(
     surfaces: Sequence[tuple[Surface, np.ndarray | None, CornerPins | None]],
     settings: RefineSettings,
     spare_packer: Packer | None = None,
-) -> Steps[Refined]:
+) -> Steps[RefinedLayout]:
     """Improve the UV islands that contain the given polygons (f,) bool of surfaces with UVs and pins.
 
     Every island keeps its centroid, direction and mirroring. All get one texel density, at which together they have
@@ -72,50 +73,51 @@ def refine_islands(
     Raises
     ------
     Refusal : with the index of the surface and the MeshError that says why
-    packing.PackingError : neither packer can place the islands
+    PackingError : neither packer can place the islands
     """
     found, warnings = found_islands(surfaces)
     total = sum(len(island.chart.triangles) for _, island, _ in found)
-    pieces, done = [], 0
+    refined, done = [], 0
     for owner, island, pins in found:
         share = len(island.chart.triangles)
         steps = _improve(island, pins, settings)
         try:
-            held, refinement = yield from part_of(steps, done / total, share / total)
+            fixed_scale, refinement = yield from part_of(steps, done / total, share / total)
         except MeshError as error:
             raise Refusal(owner, located(_shown(error, island.chart), island.chart)) from error
-        pieces.append(_Piece(owner, island, pins, held, refinement))
+        refined.append(
+            _RefinedIsland(owner=owner, island=island, pins=pins, fixed_scale=fixed_scale, refinement=refinement)
+        )
         warnings += [(owner, text) for text in (*refinement.warnings, *_unfinished(refinement))]
         done += share
-    placed = _at_one_density(pieces)
+    uvs = _at_one_density(refined)
     if settings.pack:
         yield Progress("Packing", 1.0)
-        placed, complaints = _packed(pieces, placed, settings, spare_packer)
-        warnings += [(-1, text) for text in complaints]
-    elif grown := _grown_together(pieces, placed):
-        warnings.append((-1, grown))
-    corners, uv = _scatter(surfaces, pieces, placed)
+        uvs, texts = _packed(refined, uvs, settings, spare_packer)
+        warnings += [(-1, text) for text in texts]
+    placed = [
+        PlacedIsland(owner=r.owner, chart=r.island.chart, uv=uv, before=r.island.uv)
+        for r, uv in zip(refined, uvs, strict=True)
+    ]
+    if not settings.pack and (warning := grown_together(placed)):
+        warnings.append((-1, warning))
+    corners, uv = _free_corners(surfaces, placed)
     reports: list[list[dict]] = [[] for _ in surfaces]
-    for piece, place in zip(pieces, placed, strict=True):
-        reports[piece.owner].append(_report(piece, place))
-    return Refined(corners, uv, reports, warnings)
+    for r, its_uv in zip(refined, uvs, strict=True):
+        reports[r.owner].append(_report(r, its_uv))
+    return RefinedLayout(corners=corners, uv=uv, reports=reports, warnings=warnings)
+
+
+def _free_corners(surfaces, placed: Sequence[PlacedIsland]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Corners of each surface that are not pinned (the others are where they shall be), and their UVs."""
+    corners, uv = corner_uvs(len(surfaces), placed)
+    free = [~pins.pinned[k] for (_, _, pins), k in zip(surfaces, corners, strict=True)]
+    return [k[f] for k, f in zip(corners, free, strict=True)], [x[f] for x, f in zip(uv, free, strict=True)]
 
 
 def _unfinished(refinement: Refinement) -> tuple[str, ...]:
     """A warning where the refinement used up its steps."""
     return ("The refinement of an island stopped before it was done",) if refinement.status == "steps" else ()
-
-
-def _grown_together(pieces: Sequence[_Piece], placed: Sequence[np.ndarray]) -> str:
-    """A warning if islands that lay apart cover each other now."""
-    if len(pieces) == 1:
-        return ""
-    before, after = (
-        overlap_share(np.concatenate([x[p.island.chart.triangles] for p, x in zip(pieces, maps, strict=True)]))
-        for maps in ([p.island.uv for p in pieces], placed)
-    )
-    more = after - before
-    return "" if more < OVERLAP else f"Islands grew into each other, by {100 * more:.1f} % of the UV area; pack them"
 
 
 def found_islands(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]], list[tuple[int, str]]]:
@@ -140,8 +142,8 @@ def _improve(island: Island, pins: ChartPins | None, settings: RefineSettings) -
     vertices = np.zeros(0, np.int64) if pins is None else pins.vertices
     places = np.zeros((0, 2)) if pins is None else pins.places
     if settings.keep_boundary:
-        rim = np.setdiff1d(boundary_edges(chart.triangles), vertices)
-        vertices, places = np.concatenate([vertices, rim]), np.concatenate([places, island.uv[rim]])
+        outline = np.setdiff1d(boundary_edges(chart.triangles), vertices)
+        vertices, places = np.concatenate([vertices, outline]), np.concatenate([places, island.uv[outline]])
     try:
         refinement = yield from improve(
             chart.vertices,
@@ -170,19 +172,19 @@ def _shown(error: MeshError, chart: Chart) -> MeshError:
     return error
 
 
-def _at_one_density(pieces: Sequence[_Piece]) -> list[np.ndarray]:
-    """UVs (n_i,2) of all islands, those that are not held scaled about their centroid, or their pin."""
-    sizes = np.array([piece.areas for piece in pieces])
-    loose = np.array([not piece.held for piece in pieces])
-    placed = []
-    for piece, (space, covered) in zip(pieces, sizes, strict=True):
-        uv = piece.refinement.uv
-        if not piece.held:
-            wanted = space * sizes[loose, 1].sum() / sizes[loose, 0].sum()
-            centre = _centroid(piece.island.chart, uv) if piece.pins is None else piece.pins.places[0]
-            uv = centre + (uv - centre) * np.sqrt(wanted / covered)
-        placed.append(uv)
-    return placed
+def _at_one_density(refined: Sequence[_RefinedIsland]) -> list[np.ndarray]:
+    """UVs (n_i,2) of all islands, those of no fixed scale scaled about their centroid, or their pin."""
+    areas = np.array([r.areas for r in refined])
+    loose = np.array([not r.fixed_scale for r in refined])
+    uvs = []
+    for r, (space, covered) in zip(refined, areas, strict=True):
+        uv = r.refinement.uv
+        if not r.fixed_scale:
+            target = space * areas[loose, 1].sum() / areas[loose, 0].sum()
+            centre = _centroid(r.island.chart, uv) if r.pins is None else r.pins.places[0]
+            uv = centre + (uv - centre) * np.sqrt(target / covered)
+        uvs.append(uv)
+    return uvs
 
 
 def _centroid(chart: Chart, uv: np.ndarray) -> np.ndarray:
@@ -191,41 +193,27 @@ def _centroid(chart: Chart, uv: np.ndarray) -> np.ndarray:
     return (area[:, None] * uv[chart.triangles].mean(axis=1)).sum(axis=0) / area.sum()
 
 
-def _packed(pieces, placed, settings, spare_packer) -> tuple[list[np.ndarray], list[str]]:
+def _packed(refined: Sequence[_RefinedIsland], uvs, settings, spare_packer) -> tuple[list[np.ndarray], list[str]]:
     """The islands without pins packed into the unit square, the others where they are, and warnings."""
-    loose = [k for k, piece in enumerate(pieces) if piece.pins is None and not piece.held]
-    triangles = [pieces[k].island.chart.triangles for k in loose]
-    packed, complaint = pack_islands([placed[k] for k in loose], triangles, settings, spare_packer)
-    result = list(placed)
+    loose = [k for k, r in enumerate(refined) if r.pins is None and not r.fixed_scale]
+    triangles = [refined[k].island.chart.triangles for k in loose]
+    packed, warning = pack_islands([uvs[k] for k in loose], triangles, settings, spare_packer)
+    result = list(uvs)
     for k, uv in zip(loose, packed.islands, strict=True):
         result[k] = uv
-    return result, [complaint] if complaint else []
+    return result, [warning] if warning else []
 
 
-def _scatter(surfaces, pieces, placed) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """From island vertices to the corners of each surface; pinned corners are left out, they are where they are."""
-    corners, uv = [], []
-    for index, (_, _, pins) in enumerate(surfaces):
-        mine = [(p.island.chart, place) for p, place in zip(pieces, placed, strict=True) if p.owner == index]
-        k = np.concatenate([chart.corners.ravel() for chart, _ in mine])
-        values = np.concatenate([place[chart.triangles.ravel()] for chart, place in mine])
-        k, first = np.unique(k, return_index=True)
-        free = ~pins.pinned[k]
-        corners.append(k[free])
-        uv.append(values[first][free])
-    return corners, uv
-
-
-def _report(piece: _Piece, uv: np.ndarray) -> dict:
-    chart, done = piece.island.chart, piece.refinement
+def _report(refined: _RefinedIsland, uv: np.ndarray) -> dict:
+    chart, done = refined.island.chart, refined.refinement
     before, after = (
-        distortion(chart.vertices, chart.triangles, x[chart.triangles], overlap=False) for x in (piece.island.uv, uv)
+        distortion(chart.vertices, chart.triangles, x[chart.triangles], overlap=False) for x in (refined.island.uv, uv)
     )
     return {
         "vertices": len(chart.vertices),
         "faces": len(np.unique(chart.faces)),
         "triangles": len(chart.triangles),
-        "pins": 0 if piece.pins is None else len(piece.pins.vertices),
+        "pins": 0 if refined.pins is None else len(refined.pins.vertices),
         "newton_refinement": done.iterations,
         "residual_refinement": done.residual,
         "status": done.status,

@@ -31,7 +31,7 @@ from ..solver.transfer.correspondence import Correspondence, correspond
 
 
 @dataclass(frozen=True)
-class Job:
+class RemeshJob:
     """A surface and what the new mesh shall follow.
 
     features (e,2): vertex pairs of edges to keep; jumps (s,2): edges across which values jump, kept or not;
@@ -46,7 +46,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Level:
+class LevelOfDetail:
     """A new mesh: positions (k,3), triangles (t,3), and where it lies on the old one."""
 
     positions: np.ndarray
@@ -59,11 +59,11 @@ class Level:
 class Series:
     """New meshes, the finest first, and warnings."""
 
-    levels: list[Level]
+    levels: list[LevelOfDetail]
     warnings: list[str]
 
 
-def remesh_series(job: Job, settings: RemeshSettings) -> Steps[Series]:
+def remesh_series(job: RemeshJob, settings: RemeshSettings) -> Steps[Series]:
     """Remesh a surface as often as the settings say, each time from the surface itself and with the same maps of it.
 
     Raises
@@ -78,7 +78,7 @@ def remesh_series(job: Job, settings: RemeshSettings) -> Steps[Series]:
     originals: dict[bytes, Original] = {}
     with _located(surface, ""):
         density = density_of(job, triangles, settings)
-    levels: list[Level] = []
+    levels: list[LevelOfDetail] = []
     warnings = list(job.warnings)
     for k, count in enumerate(counts):
         name = f"LOD{k}: " if len(counts) > 1 else ""
@@ -113,7 +113,7 @@ def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -
 
 
 def _features(
-    job: Job, triangles: np.ndarray, density: np.ndarray | None, samples: int
+    job: RemeshJob, triangles: np.ndarray, density: np.ndarray | None, samples: int
 ) -> tuple[np.ndarray, tuple[str, ...]]:
     """The features (e,2) that a mesh of so many vertices can show, and a warning about others."""
     area = face_areas(job.surface.positions, triangles)
@@ -128,13 +128,13 @@ def _features(
 
 
 def _level(
-    job: Job,
+    job: RemeshJob,
     original: Original,
     density: np.ndarray | None,
     count_of: str,
     count: int,
     settings: RemeshSettings,
-) -> Steps[Level]:
+) -> Steps[LevelOfDetail]:
     positions, triangles = original.vertices, original.triangles
     steps = remesh(
         positions,
@@ -151,7 +151,7 @@ def _level(
     yield Progress("Attributes", 0.95)
     seams = all_edges(original.features, job.jumps)
     at = correspond(positions, triangles, seams, found.vertices, found.triangles, found.faces, found.barycentric)
-    return Level(found.vertices, found.triangles, at, found)
+    return LevelOfDetail(found.vertices, found.triangles, at, found)
 
 
 @contextmanager
@@ -182,40 +182,40 @@ def oriented(surface: Surface) -> tuple[Surface, tuple[str, ...]]:
     return replace(surface, triangles=triangles), (f"{text}; turned over in the new mesh",)
 
 
-def density_of(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray | None:
+def density_of(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray | None:
     """Samples per area (m,) up to a factor that the settings ask for, None where it is the same everywhere."""
     return None if settings.density == "uniform" else _DENSITIES[settings.density](job, triangles, settings)
 
 
-def _curvature(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+def _curvature(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     return mean_curvature_density(job.surface.positions, triangles, settings.amount)
 
 
-def _gaussian(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+def _gaussian(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     return gaussian_curvature_density(job.surface.positions, triangles, settings.amount)
 
 
-def _saliency(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+def _saliency(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     positions = job.surface.positions
     weights = soft_weights(score("saliency", positions, triangles), areas(positions, triangles))
     return painted_density(from_vertices(weights, triangles), settings.factor)
 
 
-def _painted(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+def _painted(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     return painted_density(_values(job), settings.factor)
 
 
-def _attribute(job: Job, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+def _attribute(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     return checked_density(_values(job))
 
 
-def _values(job: Job) -> np.ndarray:
+def _values(job: RemeshJob) -> np.ndarray:
     if job.values is None:
         raise DensityError("There is nothing to read the density from", "Name a vertex group or an attribute")
     return job.values
 
 
-_DENSITIES: dict[str, Callable[[Job, np.ndarray, RemeshSettings], np.ndarray]] = {
+_DENSITIES: dict[str, Callable[[RemeshJob, np.ndarray, RemeshSettings], np.ndarray]] = {
     "curvature": _curvature,
     "gaussian": _gaussian,
     "saliency": _saliency,

@@ -1,69 +1,31 @@
-"""Several surfaces to one packed layout; the one path of the operator and of the command line."""
+"""Unwrap several surfaces into one packed layout; the one path of the operator and of the command line."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..errors import UserError
 from ..settings import Settings
-from ..solver.analysis.density import Target
 from ..solver.errors import MeshError
-from ..solver.mesh.charts import Chart, Surface
+from ..solver.mesh.charts import Chart
 from ..solver.mesh.topology import twins
 from ..solver.parameterization.chart_indices import chart_target, located, located_pins
 from ..solver.parameterization.chart_map import ChartMap, unwrap_chart
-from ..solver.parameterization.chart_pins import CornerPins, chart_pins, clear_of_pins
+from ..solver.parameterization.chart_pins import chart_pins, clear_of_pins
 from ..solver.parameterization.convex_maps import with_open_corners
 from ..solver.parameterization.shear_bound import unwrap_within
 from ..solver.parameterization.unwrap import SurfaceMap, unwrap
 from ..solver.progress import Progress, Steps, part_of
-from ..xatlas import packing
 from ..xatlas.segmentation import SegmentationError, chart_seams
-
-Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
-
-
-class Refusal(UserError):
-    """A surface that cannot be unwrapped: its index and the error."""
-
-    def __init__(self, index: int, error: MeshError):
-        super().__init__(str(error))
-        self.index, self.error = index, error
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Corners (k,) and their UVs (k,2) of each surface, the maps with their reports, the packing and warnings.
-
-    `warnings` are pairs of surface index and text; -1 stands for the layout as a whole.
-    """
-
-    corners: list[np.ndarray]
-    uv: list[np.ndarray]
-    maps: list[SurfaceMap]
-    packing: packing.Packing
-    warnings: list[tuple[int, str]]
-
-
-@dataclass(frozen=True)
-class Job:
-    """A surface, the polygons (f,) bool to unwrap, its pins, vertices (n,) in [0,1] to keep free of cuts, and what
-    its triangles shall get: their own areas by default. Targets of several surfaces are relative to each other."""
-
-    surface: Surface
-    faces: np.ndarray | None = None
-    pins: CornerPins | None = None
-    avoid: np.ndarray | None = None
-    target: Target | None = None
+from .layout import Layout, Packer, PlacedIsland, Refusal, UnwrapJob, corner_uvs, pack_islands
 
 
 def lay_out(
-    jobs: Sequence[Job],
+    jobs: Sequence[UnwrapJob],
     settings: Settings,
     spare_packer: Packer | None = None,
 ) -> Steps[Layout]:
@@ -76,33 +38,39 @@ def lay_out(
     Raises
     ------
     Refusal : with the index of the surface and the MeshError that says why
-    packing.PackingError : neither packer can place the islands
+    PackingError : neither packer can place the islands
     """
     maps: list[SurfaceMap] = []
     warnings: list[tuple[int, str]] = []
     for index, job in enumerate(jobs):
         try:
-            job, complaint = _with_charts(job) if settings.seams == "charts" else (job, "")
+            job, warning = _with_charts(job) if settings.seams == "charts" else (job, "")
             maps.append((yield from part_of(_mapped(job, settings), index / len(jobs), 1 / len(jobs))))
         except MeshError as error:
             raise Refusal(index, error) from error
-        warnings += [(index, text) for text in (complaint, *maps[-1].warnings) if text]
+        warnings += [(index, text) for text in (warning, *maps[-1].warnings) if text]
         warnings += [(index, text) for chart_map in maps[-1].maps for text in chart_map.warnings]
     yield Progress("Packing", 1.0)
-    charts = [pair for surface_map in maps for pair in zip(surface_map.charts, surface_map.maps, strict=True)]
-    free = [(c, m.uv) for c, m in charts if not m.pinned]
-    if len(free) < len(charts):
-        warnings.append((-1, _in_place(len(charts) - len(free), len(free))))
-    islands = [uv for _, uv in free]
-    packed, complaint = pack_islands(islands, [_in_one_piece(chart) for chart, _ in free], settings, spare_packer)
-    if complaint:
-        warnings.append((-1, complaint))
-    placed = iter(packed.islands)
-    corners, uv = _scatter(maps, [m.uv if m.pinned else next(placed) for _, m in charts])
-    return Layout(corners, uv, maps, packed, warnings)
+    mapped = [
+        PlacedIsland(index, chart, chart_map.uv)
+        for index, surface_map in enumerate(maps)
+        for chart, chart_map in zip(surface_map.charts, surface_map.maps, strict=True)
+    ]
+    pinned = [chart_map.pinned for surface_map in maps for chart_map in surface_map.maps]
+    free = [island for island, stays in zip(mapped, pinned, strict=True) if not stays]
+    if len(free) < len(mapped):
+        warnings.append((-1, _in_place(len(mapped) - len(free), len(free))))
+    triangles = [_connected_triangles(island.chart) for island in free]
+    packed, warning = pack_islands([island.uv for island in free], triangles, settings, spare_packer)
+    if warning:
+        warnings.append((-1, warning))
+    packed_uv = iter(packed.islands)
+    placed = [i if stays else replace(i, uv=next(packed_uv)) for i, stays in zip(mapped, pinned, strict=True)]
+    corners, uv = corner_uvs(len(maps), placed)
+    return Layout(corners=corners, uv=uv, maps=maps, packing=packed, warnings=warnings)
 
 
-def _with_charts(job: Job) -> tuple[Job, str]:
+def _with_charts(job: UnwrapJob) -> tuple[UnwrapJob, str]:
     """The job with the seams of charts of low distortion added, or as it is and a warning."""
     try:
         more = chart_seams(job.surface, job.faces)
@@ -112,7 +80,7 @@ def _with_charts(job: Job) -> tuple[Job, str]:
     return replace(job, surface=replace(job.surface, seams=seams)), ""
 
 
-def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
+def _mapped(job: UnwrapJob, settings: Settings) -> Steps[SurfaceMap]:
     options = settings.preparation_arguments()
     if not settings.max_shear:
         arguments = {**settings.solver_arguments(), **options}
@@ -142,9 +110,9 @@ def _mapped(job: Job, settings: Settings) -> Steps[SurfaceMap]:
     return SurfaceMap(charts, maps, cuts, tuple(warnings))
 
 
-def _in_one_piece(chart: Chart) -> np.ndarray:
+def _connected_triangles(chart: Chart) -> np.ndarray:
     """Triangles (m,3) to pack a chart by: with those that fill its holes where it falls apart without, or hangs by a
-    vertex. The packer would scatter such pieces."""
+    vertex. The packer would scatter its parts."""
     if not len(chart.patches):
         return chart.triangles
     twin = twins(chart.triangles)
@@ -157,41 +125,3 @@ def _in_one_piece(chart: Chart) -> np.ndarray:
 def _in_place(pinned: int, others: int) -> str:
     text = "An island with pins stays" if pinned == 1 else f"{pinned} islands with pins stay"
     return f"{text} in place" + ("; the others were packed as if there were none" if others else "")
-
-
-def pack_islands(
-    islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray], settings: Settings, spare_packer: Packer | None
-) -> tuple[packing.Packing, str]:
-    """Islands (n_i,2) packed as the settings say, and a warning or an empty text; see `packing.pack`."""
-    if not islands:
-        return packing.Packing([], 0.0, "none", 0.0), ""
-    packed, complaint = _packed(islands, triangles, settings, spare_packer)
-    return replace(packed, islands=[uv + settings.tile_origin for uv in packed.islands]), complaint
-
-
-def _packed(islands, triangles, settings: Settings, spare_packer: Packer | None) -> tuple[packing.Packing, str]:
-    """Islands in the unit square, and a warning or an empty text."""
-    if not settings.pack:
-        return packing.stack(islands), ""
-    try:
-        return packing.pack(islands, triangles, settings.margin, settings.texture_size), ""
-    except packing.MarginError:
-        raise
-    except packing.PackingError as error:
-        if spare_packer is None:
-            raise
-        result = spare_packer(islands, triangles, settings.margin, settings.texture_size)
-        return result, f"{error}; packed with {result.packer} instead"
-
-
-def _scatter(maps: Sequence[SurfaceMap], placed: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """From island vertices to the corners of each surface."""
-    island = iter(placed)
-    corners, uv = [], []
-    for surface_map in maps:
-        k = [chart.corners.ravel() for chart in surface_map.charts]
-        v = [next(island)[chart.triangles.ravel()] for chart in surface_map.charts]
-        unique, first = np.unique(np.concatenate(k), return_index=True)
-        corners.append(unique)
-        uv.append(np.concatenate(v)[first])
-    return corners, uv

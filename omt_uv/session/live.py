@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 
 from ..blender import mesh as blender_mesh
+from ..pipelines.layout import Refusal
 from ..pipelines.refine import found_islands
-from ..pipelines.unwrap import Refusal
 from ..solver.editing.live_map import Follower
 from ..solver.errors import MeshError
 from ..solver.parameterization.chart_indices import located
@@ -22,7 +22,7 @@ SLICE = 0.1
 
 
 @dataclass
-class _Piece:
+class _LiveIsland:
     """An island of object number `owner`: corners (k,) to write, their vertices (k,), and corners of its pins (p,)."""
 
     owner: int
@@ -51,12 +51,12 @@ class Session:
         self._sizes = [self._size(obj) for obj in self.objects]
         self._before = [reading.uv for _, reading in pairs]
         self._lost = False
-        self._pieces = [self._piece(*found) for found in _islands(pairs)]
+        self._islands = [self._live(*found) for found in _islands(pairs)]
         self._handlers = [bpy.app.handlers.undo_post, bpy.app.handlers.redo_post, bpy.app.handlers.load_pre]
         for kind in self._handlers:
             kind.append(self._on_exchange)
 
-    def _piece(self, owner: int, island, pins) -> _Piece:
+    def _live(self, owner: int, island, pins) -> _LiveIsland:
         chart = island.chart
         corners, first = np.unique(chart.corners.ravel(), return_index=True)
         vertices = chart.triangles.ravel()[first]
@@ -71,7 +71,7 @@ class Session:
             follower = Follower(chart.vertices, chart.triangles, island.uv, at)
         except MeshError as error:
             raise Refusal(owner, located(error, chart)) from error
-        return _Piece(owner, corners[free], vertices[free], pin_corners, follower)
+        return _LiveIsland(owner, corners[free], vertices[free], pin_corners, follower)
 
     def follow(self, balance: float, seconds: float = SLICE) -> bool:
         """Work for about so long, and write what has moved; whether anything has.
@@ -82,29 +82,29 @@ class Session:
         """
         self._check()
         end, moved = time.monotonic() + seconds, False
-        for piece in self._pieces:
-            places = self._places(piece)
-            before = piece.follower.uv
-            uv = piece.follower.follow(balance, places, max(end - time.monotonic(), 0.0))
+        for island in self._islands:
+            places = self._places(island)
+            before = island.follower.uv
+            uv = island.follower.follow(balance, places, max(end - time.monotonic(), 0.0))
             if not np.array_equal(before, uv):
                 moved = True
-                self._write(piece, uv)
+                self._write(island, uv)
             if time.monotonic() > end:
                 break
         # Those that are not at rest come first next time.
-        self._pieces.sort(key=lambda piece: piece.follower.at_rest)
+        self._islands.sort(key=lambda island: island.follower.at_rest)
         return moved
 
-    def _places(self, piece: _Piece) -> np.ndarray | None:
+    def _places(self, island: _LiveIsland) -> np.ndarray | None:
         """Where the pins are by now; only Edit Mode lets them move."""
-        obj = self.objects[piece.owner]
-        if not len(piece.pin_corners) or obj.mode != "EDIT":
+        obj = self.objects[island.owner]
+        if not len(island.pin_corners) or obj.mode != "EDIT":
             return None
-        return blender_mesh.corner_uvs(obj, self._layers[piece.owner], piece.pin_corners, self._starts[piece.owner])
+        return blender_mesh.corner_uvs(obj, self._layers[island.owner], island.pin_corners, self._starts[island.owner])
 
-    def _write(self, piece: _Piece, uv: np.ndarray) -> None:
-        obj = self.objects[piece.owner]
-        blender_mesh.write_uv(obj, self._layers[piece.owner], piece.corners, uv[piece.vertices])
+    def _write(self, island: _LiveIsland, uv: np.ndarray) -> None:
+        obj = self.objects[island.owner]
+        blender_mesh.write_uv(obj, self._layers[island.owner], island.corners, uv[island.vertices])
 
     def restore(self) -> None:
         """Every corner as it was at the beginning, to the bit; nothing if the objects are gone."""

@@ -103,7 +103,8 @@ def test_the_fuzz_meets_maps_and_every_kind_of_error():
 def test_every_layout_is_whole_or_refused_by_name(seams):
     """The path that operator and command line share, with charts by xatlas and with a bound on the shear."""
     pytest.importorskip("xatlas")
-    from omt_uv.pipelines.unwrap import Job, Refusal, lay_out
+    from omt_uv.pipelines.layout import Refusal, UnwrapJob
+    from omt_uv.pipelines.unwrap import lay_out
     from omt_uv.settings import Settings
     from omt_uv.xatlas import packing
 
@@ -113,7 +114,7 @@ def test_every_layout_is_whole_or_refused_by_name(seams):
         settings = Settings("free", "draft", texture_size=256, seams=seams, max_shear=bound)
         before = arrays(surface)
         try:
-            layout = drain(lay_out([Job(surface, faces)], settings, lambda islands, *_: packing.stack(islands)))
+            layout = drain(lay_out([UnwrapJob(surface, faces)], settings, lambda islands, *_: packing.stack(islands)))
         except Refusal as refusal:
             check_error(refusal.error, surface)
         else:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from omt_uv.pipelines.unwrap import _in_one_piece
+from omt_uv.pipelines.unwrap import _connected_triangles
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import prepare
 from omt_uv.solver.errors import NotADiskError
@@ -164,7 +164,7 @@ def test_a_lattice_without_sides_falls_into_fragments():
     check(V, F, 1.5, parts)
 
 
-def test_a_plate_with_few_holes_through_it_stays_in_one_piece():
+def test_a_plate_with_few_holes_through_it_stays_connected_triangles():
     check(*plate(6), 1.2)
 
 
@@ -202,11 +202,11 @@ def test_marked_seams_are_kept_in_sieves():
 
 def test_what_hangs_by_a_vertex_is_packed_with_what_fills_its_holes():
     chart = prepare(triangle_surface(*wavy_sheet(25, lattice(3, 1))), sieve=32).charts[0]
-    assert _in_one_piece(chart) is chart.triangles
+    assert _connected_triangles(chart) is chart.triangles
     half = len(chart.triangles) // 2
     quad, two = (replace(chart, triangles=chart.triangles[[0, k]]) for k in (half, half - 1))
-    assert len(_in_one_piece(quad)) == 2
-    assert len(_in_one_piece(two)) == len(two.disk)
+    assert len(_connected_triangles(quad)) == 2
+    assert len(_connected_triangles(two)) == len(two.disk)
 
 
 @pytest.mark.parametrize("change", [lambda V: 1e-6 * V, lambda V: V + 1e3])

@@ -4,8 +4,8 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.refine import refine_islands
-from omt_uv.pipelines.unwrap import Refusal
 from omt_uv.settings import RefineSettings
 from omt_uv.solver.editing.refine_island import STRAIGHTENED, improve
 from omt_uv.solver.editing.uv_islands import uv_islands

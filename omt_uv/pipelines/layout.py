@@ -1,0 +1,129 @@
+"""Lay out islands of several surfaces: jobs, packing, and the way back to the corners of each surface.
+
+What unwrapping, refinement, magnification, globes and live maps share. Warnings of a layout are pairs of surface
+index and text; index -1 stands for the layout as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import UserError
+from ..settings import Settings
+from ..solver.analysis.density import Target
+from ..solver.errors import MeshError
+from ..solver.maps.overlap import overlap_share
+from ..solver.mesh.charts import Chart, Surface
+from ..solver.parameterization.chart_pins import CornerPins
+from ..solver.parameterization.unwrap import SurfaceMap
+from ..xatlas import packing
+
+Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
+
+# More new overlap than this, as a share of the UV area, is said: less is rounding.
+OVERLAP = 1e-4
+
+
+class Refusal(UserError):
+    """A surface that has no valid map: its index and the error."""
+
+    def __init__(self, index: int, error: MeshError):
+        super().__init__(str(error))
+        self.index, self.error = index, error
+
+
+@dataclass(frozen=True)
+class UnwrapJob:
+    """A surface to unwrap.
+
+    faces : its polygons (f,) bool to unwrap, all by default; pins : corners that stay; avoid : vertices (n,) in [0,1]
+        to keep free of cuts; target : density and region of its triangles, their own areas by default. Targets of
+        several surfaces are relative to each other
+    """
+
+    surface: Surface
+    faces: np.ndarray | None = None
+    pins: CornerPins | None = None
+    avoid: np.ndarray | None = None
+    target: Target | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Corners (k,) and their UVs (k,2) of each surface, the maps with their reports, the packing and warnings."""
+
+    corners: list[np.ndarray]
+    uv: list[np.ndarray]
+    maps: list[SurfaceMap]
+    packing: packing.Packing
+    warnings: list[tuple[int, str]]
+
+
+@dataclass(frozen=True)
+class PlacedIsland:
+    """An island of surface `owner`: its chart, and the UVs (n,2) of its vertices now and, if it had any, before."""
+
+    owner: int
+    chart: Chart
+    uv: np.ndarray
+    before: np.ndarray | None = None
+
+
+def pack_islands(
+    islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray], settings: Settings, spare_packer: Packer | None
+) -> tuple[packing.Packing, str]:
+    """Pack islands (n_i,2) with triangles (m_i,3) into the UDIM tile of the settings, all by one scale.
+
+    `spare_packer` takes over where xatlas cannot, and then the text is a warning; otherwise it is empty.
+
+    Raises
+    ------
+    PackingError : neither packer can place the islands; MarginError : the margins leave no room
+    """
+    if not islands:
+        return packing.Packing([], 0.0, "none", 0.0), ""
+    packed, warning = _in_unit_square(islands, triangles, settings, spare_packer)
+    return replace(packed, islands=[uv + settings.tile_origin for uv in packed.islands]), warning
+
+
+def _in_unit_square(islands, triangles, settings: Settings, spare_packer: Packer | None) -> tuple[packing.Packing, str]:
+    """Pack islands into the unit square; with a warning or an empty text."""
+    if not settings.pack:
+        return packing.stack(islands), ""
+    try:
+        return packing.pack(islands, triangles, settings.margin, settings.texture_size), ""
+    except packing.MarginError:
+        raise
+    except packing.PackingError as error:
+        if spare_packer is None:
+            raise
+        result = spare_packer(islands, triangles, settings.margin, settings.texture_size)
+        return result, f"{error}; packed with {result.packer} instead"
+
+
+def corner_uvs(surface_count: int, islands: Sequence[PlacedIsland]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Corners (k,) of every surface that lie on its islands, each once and in order, and their UVs (k,2)."""
+    of_surface: list[list[PlacedIsland]] = [[] for _ in range(surface_count)]
+    for island in islands:
+        of_surface[island.owner].append(island)
+    corners, uv = [], []
+    for mine in of_surface:
+        every = np.concatenate([np.zeros(0, np.int64), *(i.chart.corners.ravel() for i in mine)])
+        values = np.concatenate([np.zeros((0, 2)), *(i.uv[i.chart.triangles.ravel()] for i in mine)])
+        unique, first = np.unique(every, return_index=True)
+        corners.append(unique)
+        uv.append(values[first])
+    return corners, uv
+
+
+def grown_together(islands: Sequence[PlacedIsland]) -> str:
+    """A warning if islands that lay apart cover each other now, or an empty text."""
+    if len(islands) < 2:
+        return ""
+    before = overlap_share(np.concatenate([i.before[i.chart.triangles] for i in islands if i.before is not None]))
+    after = overlap_share(np.concatenate([i.uv[i.chart.triangles] for i in islands]))
+    more = after - before
+    return "" if more < OVERLAP else f"Islands grew into each other, by {100 * more:.1f} % of the UV area; pack them"
