@@ -10,10 +10,10 @@ import numpy as np
 from ..maps.energy import elements
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_edges
-from ..refinement.continuation import FIRST_PRESSURE, NO_ENERGY, QUALITIES, Task, final_weight, rescaled
+from ..refinement.continuation import FIRST_PRESSURE, NO_ENERGY, QUALITIES, MapProblem, final_weight, rescaled
 from ..refinement.elimination_order import renumbered
-from ..refinement.pins import Pins, Springs
-from ..refinement.projected_newton import Assembly, Free, Problem, newton_step
+from ..refinement.pins import PinEnergy, Pins
+from ..refinement.projected_newton import Assembly, FreeMotion, NewtonProblem, newton_step
 from .refine_island import island_start, meets_itself, placed
 
 # Of the springs between pins and where they are dragged to: stiff, as the barrier against folds must only just win.
@@ -47,8 +47,8 @@ class Follower:
         rim = boundary_edges(mesh.triangles)
         start, self.warnings = island_start(vertices, mesh.triangles, given, rim, mesh.pins is not None)
         guard = None if meets_itself(start, rim) else rim
-        motion = Free(np.zeros(len(given), bool))
-        self._task = Task(self._faces, Assembly(mesh.triangles, len(given)), motion, guard, False)
+        motion = FreeMotion(np.zeros(len(given), bool))
+        self._task = MapProblem(self._faces, Assembly(mesh.triangles, len(given)), motion, guard, False)
         self._w, self._pins, self._guarded = start, mesh.pins, False
         self._balance = -1.0
         self.at_rest = False
@@ -88,16 +88,16 @@ class Follower:
         if self._pins is not None:
             task = rescaled(task, self._w)
             unit = np.sqrt(np.abs(task.faces.areas(self._w)).sum())
-            extras = (Springs(self._pins, STIFFNESS, unit),)
+            extras = (PinEnergy(self._pins, STIFFNESS, unit),)
         if self._guarded:
-            extras = (*extras, task.guard(self._w))
+            extras = (*extras, task.barrier(self._w))
         weight = final_weight(self._balance, QUALITIES["standard"])
-        problem = Problem(task.faces, task.assembly, task.motion, weight, extras)
+        problem = NewtonProblem(task.faces, task.assembly, task.motion, weight, extras)
         value = problem.energy(self._w)
         step = newton_step(problem, self._w, value, FIRST_PRESSURE)
         if step.share == 0:
             step = newton_step(problem, self._w, value)
-        if not self._guarded and task.crosses(step.w):
+        if not self._guarded and task.boundary_crosses(step.w):
             self._guarded = task.loop is not None
             return
         self._w = step.w

@@ -19,7 +19,7 @@ from ..maps.energy import area_error, elements
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_edges, boundary_loops
 from ..progress import Progress, Steps, part_of
-from ..refinement.continuation import QUALITIES, Found, Task, stages
+from ..refinement.continuation import QUALITIES, ContinuationResult, MapProblem, minimise_in_stages
 from ..refinement.elimination_order import Renumbered, renumbered
 from ..refinement.projected_newton import Assembly
 from .outline import Outline, centroid, free, recognised
@@ -81,7 +81,7 @@ def magnify_map(
     try:
         found, outline, error = yield from _magnified(mesh, density, region, boundary, settings)
     except MeshError as problem:
-        raise mesh.blame(problem) from problem
+        raise mesh.original_error(problem) from problem
     return Lens(
         mesh.original(found.w) * size + middle,
         outline.kind,
@@ -150,7 +150,9 @@ def refuse_folds(uv: np.ndarray, triangles: np.ndarray) -> None:
         )
 
 
-def _magnified(mesh: Renumbered, density, region, boundary: str, settings) -> Steps[tuple[Found, Outline, float]]:
+def _magnified(
+    mesh: Renumbered, density, region, boundary: str, settings
+) -> Steps[tuple[ContinuationResult, Outline, float]]:
     given = mesh.uv @ [1, 1j]
     outline = recognised(given, _outer(given, mesh.triangles))
     if boundary == "free":
@@ -164,8 +166,8 @@ def _magnified(mesh: Renumbered, density, region, boundary: str, settings) -> St
         rim = rim[~np.isin(rim[:, 0], _outer(given, mesh.triangles))]
     guard = rim if len(rim) and not meets_itself(outline.w, rim) else None
     assembly = Assembly(mesh.triangles, len(given), schwarz_solver(mesh.vertices, mesh.triangles))
-    task = Task(faces, assembly, outline.motion, guard, False, outline.kind != "free")
-    found = yield from stages(task, outline.w, 0.0, settings)
+    task = MapProblem(faces, assembly, outline.motion, guard, False, outline.kind != "free")
+    found = yield from minimise_in_stages(task, outline.w, 0.0, settings)
     error = area_error(faces, found.w)
     return replace(found, w=_aligned(found.w, given, outline, faces, region)), outline, error
 

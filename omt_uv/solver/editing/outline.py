@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..refinement.projected_newton import Free, Motion, OnCircle, OnLines
+from ..refinement.projected_newton import CircleMotion, FreeMotion, LineMotion, Motion
 
 # Distances of the outline from a circle, relative to its radius, and fewest vertices that make one.
 ROUND, FEWEST = 2e-3, 12
@@ -35,16 +35,16 @@ def recognised(w: np.ndarray, loop: np.ndarray) -> Outline:
     if len(loop) >= FEWEST and np.ptp(np.abs(rim - centre)) < ROUND * radius:
         moved = w - centre
         moved[loop] *= radius / np.abs(moved[loop])
-        return Outline("circle", OnCircle(loop, radius, len(w)), moved, centre)
+        return Outline("circle", CircleMotion(loop, radius, len(w)), moved, centre)
     corner = np.abs(_turns(rim)) >= STRAIGHT
     if corner.sum() >= 3 and (corner.sum() <= 4 or corner.mean() <= 1 - MOSTLY):
         return _on_sides(w, loop, corner)
     return Outline("free", free(len(w)), w, 0j)
 
 
-def free(n: int) -> Free:
+def free(n: int) -> FreeMotion:
     """Every one of n vertices may go anywhere."""
-    return Free(np.zeros(n, bool))
+    return FreeMotion(np.zeros(n, bool))
 
 
 def centroid(rim: np.ndarray) -> tuple[complex, float]:
@@ -76,5 +76,5 @@ def _on_sides(w: np.ndarray, loop: np.ndarray, corner: np.ndarray) -> Outline:
     along = ((rim - rim[first]) * direction.conj()).real
     moved = w.copy()
     moved[loop] = np.where(corner, rim, rim[first] + along * direction)
-    motion = OnLines(loop[~corner], direction[~corner], loop[corner], len(w))
+    motion = LineMotion(loop[~corner], direction[~corner], loop[corner], len(w))
     return Outline("sides", motion, moved, 0j)

@@ -17,12 +17,12 @@ from ..maps.untangle import count_folds
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_edges, boundary_loops, halfedges
 from ..progress import Progress, Steps
-from ..refinement.boundary_barrier import contact, crossings
-from ..refinement.continuation import QUALITIES, Task, stages
+from ..refinement.boundary_barrier import crossings, make_barrier
+from ..refinement.continuation import QUALITIES, MapProblem, minimise_in_stages
 from ..refinement.elimination_order import renumbered
-from ..refinement.initial_maps import disk_start
-from ..refinement.pins import Pins, aligned, drag
-from ..refinement.projected_newton import Assembly, Free
+from ..refinement.initial_maps import disk_initial_map
+from ..refinement.pins import Pins, aligned, move_pins
+from ..refinement.projected_newton import Assembly, FreeMotion
 from ..refinement.refine import Refinement
 
 STRAIGHTENED = "The UVs were folded, or met themselves; the refinement started from a straightened map"
@@ -70,7 +70,7 @@ def improve(
             mesh.vertices, mesh.triangles, given, balance, QUALITIES[quality], mesh.pins
         )
     except MeshError as problem:
-        raise mesh.blame(problem) from problem
+        raise mesh.original_error(problem) from problem
     improved = mesh.original(found.w)
     if pins is not None:
         improved[pins[0]] = pins[1]
@@ -100,17 +100,17 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
     guard = None if meets_itself(start, rim) else rim
     if guard is None and not (pins is not None and np.isin(rim, pins.vertices).all()):
         warnings = (*warnings, UNGUARDED)
-    task = Task(
+    task = MapProblem(
         faces,
         Assembly(triangles, len(given), schwarz_solver(vertices, triangles)),
-        Free(np.zeros(len(given), bool)),
+        FreeMotion(np.zeros(len(given), bool)),
         guard,
         False,
     )
     w = start
     if several is not None:
-        task, w = yield from drag(task, w, several)
-    found = yield from stages(task, w, balance, settings)
+        task, w = yield from move_pins(task, w, several)
+    found = yield from minimise_in_stages(task, w, balance, settings)
     error = area_error(faces, found.w)
     if several is None:
         found = replace(found, w=placed(found.w, given, faces, pins))
@@ -120,7 +120,7 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
 def meets_itself(w: np.ndarray, rim: np.ndarray) -> bool:
     """Whether boundary edges (b,2) of a map (n,) cross, or come so near to others that they all but touch."""
     with np.errstate(over="ignore"):
-        nearest = contact(w, rim, 1.0).energy(w)
+        nearest = make_barrier(w, rim, 1.0).energy(w)
     return not nearest < (1 / TOUCHING) ** 2 or len(crossings(w, rim)) > 0
 
 
@@ -171,7 +171,7 @@ def _straightened(vertices, triangles, uv) -> np.ndarray | None:
     holes = [loop for k, loop in enumerate(loops) if k != outer]
     points, fans = _fans(np.column_stack([vertices, uv]), holes)
     try:
-        start = disk_start(points[:, :3], np.concatenate([triangles, fans]), points[:, 3:], loops[outer])
+        start = disk_initial_map(points[:, :3], np.concatenate([triangles, fans]), points[:, 3:], loops[outer])
     except FoldedUVError:
         return None
     straight = start.uv[:n]

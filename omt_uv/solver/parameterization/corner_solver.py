@@ -11,7 +11,15 @@ from scipy.sparse.csgraph import connected_components
 from ..maps.energy import elements, energies, gradient
 from ..mesh.geometry import face_areas
 from ..mesh.topology import halfedges
-from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
+from ..refinement.projected_newton import (
+    ARMIJO,
+    FOLD_SHARE,
+    Assembly,
+    FreeMotion,
+    NewtonProblem,
+    fold_shares,
+    newton_direction,
+)
 from .polygon_corners import OPEN, Barrier, Corners
 
 STRENGTH = 30.0
@@ -48,7 +56,7 @@ class Patches:
     def __init__(self, mesh: Mesh, corners: Corners, free: np.ndarray):
         n, triangles = len(free), mesh.triangles
         self.faces = elements(mesh.positions, triangles, mesh.target)
-        self.assembly, self.motion = Assembly(triangles, n), Free(~free)
+        self.assembly, self.motion = Assembly(triangles, n), FreeMotion(~free)
         self.weight, self.corners = mesh.weight, corners
         self.strength = STRENGTH * corners.whole / mesh.target.sum()
         every = np.concatenate([triangles, corners.triangles])
@@ -94,7 +102,7 @@ class Patches:
 
     def _stepped(self, w, weight, barrier: Barrier) -> np.ndarray:
         """The map after some Newton steps, of which every patch takes as much as it may."""
-        problem = Problem(self.faces, self.assembly, self.motion, weight, (barrier,))
+        problem = NewtonProblem(self.faces, self.assembly, self.motion, weight, (barrier,))
         value = self._values(w, weight, barrier)
         for _ in range(STEPS):
             step, _ = newton_direction(problem, w, PRESSURE)

@@ -23,7 +23,7 @@ from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import Steps, part_of
 from ..refinement.initial_maps import is_far
-from ..refinement.mesh_hierarchy import coarsened
+from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed
 from ..transport.convex_domain import Disk, Domain, Rectangle
@@ -80,7 +80,7 @@ def coarse_first_map(
             flat = mean_value_sites(vertices, triangles, loop, None, Disk())
         goal = len(vertices) // (COARSER_FAR if far else COARSER)
         density = _density(vertices, triangles, target, goal) if far else None
-        steps = coarsened(vertices, triangles, flat, target, goal, region, density)
+        steps = coarsen_disk(vertices, triangles, flat, target, goal, region, density)
         coarse = yield from part_of(steps, *COARSENING)
     if len(coarse.kept) > (COARSE_ENOUGH_FAR if far else COARSE_ENOUGH) * len(vertices):
         return None

@@ -46,7 +46,7 @@ class Corners:
 
 @dataclass(frozen=True)
 class Barrier:
-    """The energy of corners with slack (k,) and strength (k,); one of the extras of `newton.Problem`."""
+    """The energy of corners with slack (k,) and strength (k,); one of the extras of `newton.NewtonProblem`."""
 
     corners: Corners
     slack: np.ndarray

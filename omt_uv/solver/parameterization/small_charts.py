@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import MeshError, positive_density
 from ..mesh.charts import Chart
 from ..progress import Steps, part_of
-from ..refinement.batch_refine import Maps, solve_many
+from ..refinement.batch_refine import BatchMaps, refine_batch
 from .chart_map import ChartMap, in_place, in_unit_box
 
 # Charts of at most SMALL triangles are solved together where there are at least MANY, about BATCH triangles at a time.
@@ -38,7 +38,7 @@ def together(charts: list[Chart], targets: list[dict], quality: str, balance: fl
             boxes = [in_unit_box(c.vertices) for c in members]
             meshes = [(v, c.triangles) for (v, _), c in zip(boxes, members, strict=True)]
             maps = yield from part_of(
-                solve_many(meshes, quality, balance, **_side_by_side([targets[k] for k in batch])),
+                refine_batch(meshes, quality, balance, **_side_by_side([targets[k] for k in batch])),
                 done,
                 float(sizes[batch[-1]] / sizes[-1]) - done,
             )
@@ -62,7 +62,7 @@ def _side_by_side(targets: list[dict]) -> dict:
     return {"density": density, "region": None if regions[0] is None else np.concatenate(regions)}
 
 
-def _of_many(maps: Maps, k: int, uv: np.ndarray, seconds: float) -> ChartMap:
+def _of_many(maps: BatchMaps, k: int, uv: np.ndarray, seconds: float) -> ChartMap:
     return ChartMap(
         uv,
         None,

@@ -17,15 +17,15 @@ from .continuation import (
     STAGE_STEPS,
     STRICT,
     STUCK,
-    growth,
-    weights_of,
+    planned_weights,
+    weight_growth,
 )
 
 Energies = Callable[[np.ndarray], np.ndarray]  # of each chart (c,), by the weights of the area term (c,)
 
 
 @dataclass(frozen=True)
-class Lack:
+class AreaErrors:
     """What the map of every chart lacks (c,): `energy.target_error`, the same but for the share of its region, and the
     tilt that this share lacks."""
 
@@ -34,16 +34,16 @@ class Lack:
     tilt: np.ndarray
 
 
-class Control:
+class BatchContinuation:
     """Weight of the area term, `pressure` of the Hessian, energy and fate of every chart, (c,) each.
 
-    live: on its way; solved: arrived where the quality asks for; steps: Newton steps; residual: see `stages.Stage`;
-    multiplier: see `continuation.Found`.
+    live: on its way; solved: arrived where the quality asks for; steps: Newton steps; residual: see
+    `continuation.StageResult`; multiplier: see `continuation.ContinuationResult`.
     """
 
     def __init__(self, count: int, quality: str, balance: float, energies: Energies):
         self.settings, self.balance = QUALITIES[quality], balance
-        self.weights = np.array(weights_of(balance, self.settings))
+        self.weights = np.array(planned_weights(balance, self.settings))
         self.level, self.weight = np.zeros(count, np.int64), np.full(count, self.weights[0])
         squeezed = (energies(self.weight) > SQUEEZED) & (self.weights[0] > 1)
         self.level[squeezed], self.weight[squeezed] = -1, 1.0
@@ -54,7 +54,7 @@ class Control:
         self.steps, self.stage_steps = np.zeros_like(self.level), np.zeros_like(self.level)
         self.pressure, self.residual = np.full(count, FIRST_PRESSURE), np.full(count, np.inf)
 
-    def update(self, value, decrement, share, lack: Lack, energies: Energies) -> None:
+    def update(self, value, decrement, share, lack: AreaErrors, energies: Energies) -> None:
         """After a step: new energies, decreases promised, shares of the step taken, (c,) each; what is left to do."""
         live, used, error = self.live, self.pressure, lack.error
         gain = self.value - value
@@ -76,7 +76,7 @@ class Control:
         )
         self.value = np.where(self.live & (self.stage_steps == 0), energies(self.weight), self.value)
 
-    def _next_stage(self, ended, failed, lack: Lack) -> None:
+    def _next_stage(self, ended, failed, lack: AreaErrors) -> None:
         settings, last = self.settings, len(self.weights)
         self.level += ended
         enough = (lack.error <= settings.area_error) | (self.balance > 0) | (self.weight >= settings.greatest_weight)
@@ -88,7 +88,7 @@ class Control:
         further = ended & ~finished
         if self.balance == 0:
             self.multiplier = np.where(further, self.multiplier + self.weight * lack.tilt, self.multiplier)
-        more = self.weight * growth(lack.but_share / settings.area_error)
+        more = self.weight * weight_growth(lack.but_share / settings.area_error)
         planned = self.weights[np.clip(self.level, 0, last - 1)]
         self.weight = np.where(further, np.where(self.level < last, planned, more), self.weight)
         self.pressure[further], self.stage_steps[further] = FIRST_PRESSURE, 0

@@ -19,10 +19,10 @@ from ..maps.tutte import arc_length_parameters, tutte
 from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps
-from .batch_continuation import Control, Lack
+from .batch_continuation import AreaErrors, BatchContinuation
 from .boundary_barrier import crossings
 from .initial_maps import NEARLY_FLAT, unroll
-from .projected_newton import ARMIJO, FOLD_SHARE, Assembly, Free, Problem, fold_shares, newton_direction
+from .projected_newton import ARMIJO, FOLD_SHARE, Assembly, FreeMotion, NewtonProblem, fold_shares, newton_direction
 
 # Halvings of a step before it counts as none.
 MAX_HALVINGS = 12
@@ -31,7 +31,7 @@ REBUILD = 0.6
 
 
 @dataclass(frozen=True)
-class Union:
+class MeshUnion:
     """Charts side by side: positions (n,3), triangles (m,3), rim edges (b,2), and the chart of each of them."""
 
     positions: np.ndarray
@@ -48,7 +48,7 @@ class Union:
 
 
 @dataclass(frozen=True)
-class Maps:
+class BatchMaps:
     """Coordinates uv (n,2) of all charts, one after the other, without folds.
 
     Per chart (c,): solved (False: nothing was found), Newton steps, residual, area_l1, area_sd and angle_mean.
@@ -64,13 +64,13 @@ class Maps:
     weight: np.ndarray
 
 
-def solve_many(
+def refine_batch(
     meshes: list[tuple[np.ndarray, np.ndarray]],
     quality: str,
     balance: float,
     density: np.ndarray | None = None,
     region: np.ndarray | None = None,
-) -> Steps[Maps]:
+) -> Steps[BatchMaps]:
     """Area-preserving maps with free boundaries of disks, vertices (n,3) of unit extent and triangles (m,3) each.
 
     density, region : of the triangles of all disks, one after the other, see `chart_map.unwrap_chart`. Every map has
@@ -89,7 +89,7 @@ def solve_many(
     share = parts.sums(faces.weight)
     w = _starts(parts, meshes, area)
     order = minimum_degree(vertex_graph(parts.triangles, len(w)))
-    control = Control(
+    control = BatchContinuation(
         parts.count, quality, balance, lambda weight: parts.sums(energies(faces, w, weight[parts.of_face])) / share
     )
     while control.live.any():
@@ -103,7 +103,7 @@ def solve_many(
     has, target = faces.areas(w), faces.area * faces.ratio
     weight = target / parts.sums(target)[parts.of_face]
     ratio = has / parts.sums(has)[parts.of_face] / weight
-    return Maps(
+    return BatchMaps(
         np.column_stack([w.real, w.imag]),
         control.solved,
         control.steps,
@@ -115,7 +115,7 @@ def solve_many(
     )
 
 
-def _union(meshes) -> Union:
+def _union(meshes) -> MeshUnion:
     sizes = np.array([len(v) for v, _ in meshes])
     first = np.cumsum(sizes) - sizes
     triangles = np.concatenate([t + k for (_, t), k in zip(meshes, first, strict=True)])
@@ -123,10 +123,12 @@ def _union(meshes) -> Union:
     loops = sorted(boundary_loops(triangles), key=lambda loop: of_vertex[loop[0]])
     rim = np.concatenate([np.column_stack([loop, np.roll(loop, -1)]) for loop in loops])
     positions = np.concatenate([v for v, _ in meshes])
-    return Union(positions, triangles, rim, of_vertex, of_vertex[triangles[:, 0]], of_vertex[rim[:, 0]], len(meshes))
+    return MeshUnion(
+        positions, triangles, rim, of_vertex, of_vertex[triangles[:, 0]], of_vertex[rim[:, 0]], len(meshes)
+    )
 
 
-def _starts(parts: Union, meshes, area: np.ndarray) -> np.ndarray:
+def _starts(parts: MeshUnion, meshes, area: np.ndarray) -> np.ndarray:
     """Every chart with its area, (n,) complex: its mean value map with a circle as the boundary, or unrolled."""
     loop = parts.rim[:, 0]
     ends = np.flatnonzero(parts.of_rim[1:] != parts.of_rim[:-1]) + 1
@@ -150,7 +152,7 @@ def _starts(parts: Union, meshes, area: np.ndarray) -> np.ndarray:
 class _Group:
     """The charts of a union that are still on their way, renumbered."""
 
-    def __init__(self, parts: Union, faces: Elements, order: np.ndarray, live: np.ndarray):
+    def __init__(self, parts: MeshUnion, faces: Elements, order: np.ndarray, live: np.ndarray):
         self.vertices = order[live[parts.of_vertex[order]]]
         place = np.empty(len(order), np.int64)
         place[self.vertices] = np.arange(len(self.vertices))
@@ -164,13 +166,13 @@ class _Group:
         self.count = parts.count
         self.share = np.maximum(self._sums(self.faces.weight), 1e-300)
         self.assembly = Assembly(triangles, len(self.vertices))
-        self.motion = Free(np.zeros(len(self.vertices), bool))
+        self.motion = FreeMotion(np.zeros(len(self.vertices), bool))
 
-    def step(self, whole: np.ndarray, control: Control) -> None:
+    def step(self, whole: np.ndarray, control: BatchContinuation) -> None:
         """A Newton step of all charts of the group, every one as far as it may go, in place."""
         w, weight = whole[self.vertices], control.weight[self.of_face]
         faces = self._tilted(control, control.weight)
-        problem = Problem(faces, self.assembly, self.motion, weight)
+        problem = NewtonProblem(faces, self.assembly, self.motion, weight)
         step, _ = newton_direction(problem, w, control.pressure[self.of_face])
         down = (step.conj() * gradient(faces, w, weight)).real
         slope = np.bincount(self.of_vertex, down, self.count) / self.share
@@ -200,7 +202,7 @@ class _Group:
     def _energies(self, faces, w, weight):
         return self._sums(energies(faces, w, weight)) / self.share
 
-    def _tilted(self, control: Control, weight) -> Elements:
+    def _tilted(self, control: BatchContinuation, weight) -> Elements:
         """The faces with the targets that lead to the shares, see `energy.tilted`."""
         faces = self.faces
         if faces.region is None:
@@ -209,16 +211,16 @@ class _Group:
         scale = self._sums(faces.area * faces.ratio) / np.maximum(self._sums(faces.area * ratio), 1e-300)
         return replace(faces, ratio=ratio * scale[self.of_face])
 
-    def _lack(self, w) -> Lack:
+    def _lack(self, w) -> AreaErrors:
         area, target = self.faces.areas(w), self.faces.area * self.faces.ratio
         error, region = self._errors(area, target), self.faces.region
         if region is None:
-            return Lack(error, error, np.zeros(self.count))
+            return AreaErrors(error, error, np.zeros(self.count))
         has, aim = (x / np.maximum(self._sums(x), 1e-300)[self.of_face] for x in (area, target))
         mean = self._sums(region * has)
         spread = self._sums(region**2 * has) - mean**2
         tilt = np.where(spread > 0, self._sums(region * aim) - mean, 0) / np.where(spread > 0, spread, 1)
-        return Lack(error, self._errors(area * np.exp(tilt[self.of_face] * region), target), tilt)
+        return AreaErrors(error, self._errors(area * np.exp(tilt[self.of_face] * region), target), tilt)
 
     def _errors(self, area, target):
         """`energy.target_error` of every chart, (c,), by the areas that its faces have and are to have."""
@@ -237,7 +239,7 @@ class _Group:
         return np.bincount(self.of_face, face_values, self.count)
 
 
-def _apart(parts: Union, w: np.ndarray) -> np.ndarray:
+def _apart(parts: MeshUnion, w: np.ndarray) -> np.ndarray:
     """The maps (n,) moved and scaled until none of them touches another."""
     first = np.searchsorted(parts.of_vertex, np.arange(parts.count))
     low, high = ([f.reduceat(x, first) for x in (w.real, w.imag)] for f in (np.minimum, np.maximum))
@@ -248,6 +250,6 @@ def _apart(parts: Union, w: np.ndarray) -> np.ndarray:
     return (w - corner[parts.of_vertex]) / extent[parts.of_vertex] + place[parts.of_vertex]
 
 
-def _normals(parts: Union) -> np.ndarray:
+def _normals(parts: MeshUnion) -> np.ndarray:
     p = parts.positions[parts.triangles]
     return np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])

@@ -23,17 +23,17 @@ CONTACT_SHARE = 0.8
 TOUCH = 1e-9
 
 
-def rim_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def loop_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tails and heads (b,) of the edges of a boundary: a loop (b,) of vertices, or edges (b,2) of several loops."""
     return (loop[:, 0], loop[:, 1]) if loop.ndim == 2 else (loop, np.roll(loop, -1))
 
 
 def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Pairs (k,2) of edges of a boundary that cross: edge i goes from loop[i] to the next; see `rim_edges`.
+    """Pairs (k,2) of edges of a boundary that cross: edge i goes from loop[i] to the next; see `loop_edges`.
 
     Touching at a common vertex is no crossing, and neither are edges that only touch.
     """
-    tail, head = rim_edges(loop)
+    tail, head = loop_edges(loop)
     a, b = w[tail], w[head]
     low, high = _box(np.stack([a, b]))
     i, j = box_pairs(low, high, low, high)
@@ -52,7 +52,7 @@ def _passes(a, b, p, q, depth: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Contact:
+class BoundaryBarrier:
     """Barrier of the boundary edges tail, head (b,); reach (b,) of the vertex tail and of the edge."""
 
     tail: np.ndarray
@@ -136,14 +136,14 @@ class _Near:
         return np.sqrt(size * rate) * (slide / size + turn / rate)
 
 
-def contact(w: np.ndarray, loop: np.ndarray, strength: float) -> Contact:
-    """A barrier for a boundary, see `rim_edges`, whose reach follows the edge lengths of the map w (n,)."""
-    tail, head = rim_edges(loop)
+def make_barrier(w: np.ndarray, loop: np.ndarray, strength: float) -> BoundaryBarrier:
+    """A barrier for a boundary, see `loop_edges`, whose reach follows the edge lengths of the map w (n,)."""
+    tail, head = loop_edges(loop)
     edge = np.abs(w[head] - w[tail])
     edge = np.minimum(edge, edge.mean())
     before = np.empty_like(edge)
     before[np.argsort(tail)] = edge[np.argsort(head)]
-    return Contact(tail, head, REACH * np.minimum(edge, before), REACH * edge, strength)
+    return BoundaryBarrier(tail, head, REACH * np.minimum(edge, before), REACH * edge, strength)
 
 
 def _contact_times(p, dp, e, de):

@@ -11,8 +11,8 @@ import numpy as np
 from ..analysis.density import INEXACT
 from ..maps.energy import Elements, missing_tilt, target_error, target_error_but_share, tilted
 from ..progress import Progress, Steps
-from .boundary_barrier import Contact, contact, crossings
-from .projected_newton import Assembly, Motion, Problem, Step
+from .boundary_barrier import BoundaryBarrier, crossings, make_barrier
+from .projected_newton import Assembly, Motion, NewtonProblem, NewtonStep
 from .vertex_sweeps import Smoother
 
 # A stage that reaches the goal ends when Newton promises less than this share of the energy. One on the way ends sooner
@@ -77,41 +77,48 @@ CONTACT_STRENGTH = 0.3
 
 
 @dataclass(frozen=True)
-class Task:
-    """faces, assembly and motion for Newton; loop: a boundary, see `contact.rim_edges`, that may not cross itself, or
-    None; guarded: from the beginning; scale_free: the scale of the targets follows the map; smoother: see `Problem`."""
+class MapProblem:
+    """A map to be found: its energy, and what no step may do.
+
+    Attributes
+    ----------
+    faces, assembly, motion, smoother : see `NewtonProblem`
+    loop : a boundary, see `boundary_barrier.loop_edges`, that may not cross itself, or None
+    with_barrier : from the beginning
+    scale_free : the scale of the targets follows the map
+    """
 
     faces: Elements
     assembly: Assembly
     motion: Motion
     loop: np.ndarray | None
-    guarded: bool
+    with_barrier: bool
     scale_free: bool = False
     smoother: Smoother | None = None
 
-    def problem(self, w: np.ndarray, weight: float, guarded: bool, tilt: float = 0.0) -> Problem:
+    def problem(self, w: np.ndarray, weight: float, with_barrier: bool, tilt: float = 0.0) -> NewtonProblem:
         """What Newton minimises at a weight of the area term; guarded: with the barrier `guard` of the map w (n,).
 
         tilt: of the targets, see `energy.tilted`.
 
         Raises ValueError where guarded without a loop.
         """
-        extras = (self.guard(w),) if guarded else ()
+        terms = (self.barrier(w),) if with_barrier else ()
         faces = tilted(self.faces, tilt)
-        return Problem(faces, self.assembly, self.motion, weight, extras, self.faces, self.smoother)
+        return NewtonProblem(faces, self.assembly, self.motion, weight, terms, self.faces, self.smoother)
 
-    def guard(self, w: np.ndarray) -> Contact:
+    def barrier(self, w: np.ndarray) -> BoundaryBarrier:
         """The barrier that keeps the boundary of the map w (n,) from crossing itself."""
         if self.loop is None:
             raise ValueError("a boundary that may not move has nothing to be kept from")
-        return contact(w, self.loop, CONTACT_STRENGTH / len(self.faces.area))
+        return make_barrier(w, self.loop, CONTACT_STRENGTH / len(self.faces.area))
 
-    def crosses(self, w: np.ndarray) -> bool:
+    def boundary_crosses(self, w: np.ndarray) -> bool:
         """Whether the boundary of the map w (n,) crosses itself; never without a loop."""
         return self.loop is not None and len(crossings(w, self.loop)) > 0
 
 
-def rescaled(task: Task, w: np.ndarray) -> Task:
+def rescaled(task: MapProblem, w: np.ndarray) -> MapProblem:
     """The task with its targets scaled to sum to the area of the map w (n,).
 
     Only then can every face have its target: under any other scale what is missing is taken from the faces that have
@@ -122,7 +129,7 @@ def rescaled(task: Task, w: np.ndarray) -> Task:
 
 
 @dataclass(frozen=True)
-class Found:
+class ContinuationResult:
     """What all stages found.
 
     Attributes
@@ -147,7 +154,7 @@ class Found:
     multiplier: float = 0.0
 
 
-def weights_of(balance: float, settings: Quality) -> list[float]:
+def planned_weights(balance: float, settings: Quality) -> list[float]:
     """The preset's weights; with a balance, those on the way to one between the preset's last and LEAST_WEIGHT."""
     if balance == 0:
         return list(settings.weights)
@@ -160,44 +167,50 @@ def final_weight(balance: float, settings: Quality) -> float:
     return settings.weights[-1] ** (1 - balance) * LEAST_WEIGHT**balance
 
 
-def growth(excess: np.ndarray | float) -> np.ndarray | float:
+def weight_growth(excess: np.ndarray | float) -> np.ndarray | float:
     """Factors for weights that leave area errors so many times (any shape) as large as they are to be."""
     return np.clip(np.square(excess), LEAST_GROWTH, MOST_GROWTH)
 
 
-def stages(
-    task: Task, w: np.ndarray, balance: float, settings: Quality, warm_start: bool = False, multiplier: float = 0.0
-) -> Steps[Found]:
+def minimise_in_stages(
+    task: MapProblem,
+    w: np.ndarray,
+    balance: float,
+    settings: Quality,
+    warm_start: bool = False,
+    multiplier: float = 0.0,
+) -> Steps[ContinuationResult]:
     """Newton in stages of growing weight, until the area error is small enough.
 
     warm_start: the map w (n,) is nearly the one that is looked for; the least weight would lead away from it.
-    multiplier: that of a coarser map, see `Found`. The shear pulls all faces of a region one way, and a weight at which
-        its share came out all the same would take many more steps. So its targets lead: a method of multipliers
-        (Hestenes 1969), with one for the share.
+    multiplier: that of a coarser map, see `ContinuationResult`. The shear pulls all faces of a region one way, and a
+        weight at which its share came out all the same would take many more steps. So its targets lead: a method of
+        multipliers (Hestenes 1969), with one for the share.
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
-    weights = weights_of(balance, settings)
+    weights = planned_weights(balance, settings)
     if warm_start and len(weights) > 1:
         weights = [NEAR * weight for weight in weights[1:]]
     elif task.problem(w, weights[0], False).energy(w) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
-    overlap, guarded, steps, k, before, last = task.crosses(w), task.guarded, 0, 0, np.inf, weights[0]
+    overlap, with_barrier = task.boundary_crosses(w), task.with_barrier
+    steps, k, before, last = 0, 0, np.inf, weights[0]
     warnings = ("The boundary of the start crosses itself; it is not kept apart",) if overlap else ()
     while True:
         weight = weights[k]
         task = rescaled(task, w) if task.scale_free else task
-        problem = task.problem(w, weight, guarded, multiplier / weight)
+        problem = task.problem(w, weight, with_barrier, multiplier / weight)
         if task.smoother is not None:
             w = task.smoother.smoothed(problem.faces, w, weight, FIRST_SWEEPS)
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
-        watch = None if guarded or overlap else task.crosses
+        watch = None if with_barrier or overlap else task.boundary_crosses
         tolerance, loose = _ends(task, balance, settings, k < len(weights) - 1)
         stage = yield from minimise(problem, w, goal, allowed, k, watch, tolerance, loose)
         w, steps = stage.w, steps + stage.steps
         if stage.status == "crossed":
-            guarded = True
+            with_barrier = True
             continue
         k += 1
         error, rest = target_error(task.faces, w), target_error_but_share(task.faces, w)
@@ -210,27 +223,27 @@ def stages(
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
             break
         if k >= len(weights):
-            weights.append(weights[-1] * float(growth(rest / settings.area_error)))
-    return Found(
+            weights.append(weights[-1] * float(weight_growth(rest / settings.area_error)))
+    return ContinuationResult(
         w=w,
         steps=steps,
         residual=stage.residual,
         area_weight=weight,
         energy=stage.energy,
         status=stage.status,
-        overlap=task.crosses(w),
+        overlap=task.boundary_crosses(w),
         warnings=warnings,
         multiplier=multiplier,
     )
 
 
-def _stuck(task: Task, grown: float, excess: float) -> float:
+def _stuck(task: MapProblem, grown: float, excess: float) -> float:
     """Share of the error before above which a weight so many times greater was of no use; excess: error over goal."""
     far = task.faces.region is not None and grown >= GROWN and excess > INEXACT
     return min(STUCK, grown**-SLUGGISH) if far else STUCK
 
 
-def _ends(task: Task, balance: float, settings: Quality, on_the_way: bool) -> tuple[float, float]:
+def _ends(task: MapProblem, balance: float, settings: Quality, on_the_way: bool) -> tuple[float, float]:
     """Tolerance and looseness of a stage, see `minimise`."""
     if balance > 0:
         return STRICT, LOOSE
@@ -240,8 +253,11 @@ def _ends(task: Task, balance: float, settings: Quality, on_the_way: bool) -> tu
 
 
 @dataclass(frozen=True)
-class Stage:
-    """What one stage found, as in `Found`; status "crossed": the next step would let the boundary cross itself."""
+class StageResult:
+    """What one stage found, as in `ContinuationResult`.
+
+    status "crossed": the next step would let the boundary cross itself.
+    """
 
     w: np.ndarray
     steps: int
@@ -250,7 +266,7 @@ class Stage:
     status: str
 
 
-class Minimised(Protocol):
+class Minimisable(Protocol):
     """An energy of maps w, arrays of any shape, with a Newton step that never folds a face."""
 
     def energy(self, w: np.ndarray) -> float:
@@ -259,12 +275,12 @@ class Minimised(Protocol):
     def area_error(self, w: np.ndarray) -> float:
         """What a map lacks of its areas: 0 where every face has its own."""
 
-    def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
+    def step(self, w: np.ndarray, value: float, pressure: float) -> NewtonStep:
         """A line-searched step from a map of energy `value`; pressure: see `energy.face_derivatives`."""
 
 
 def minimise(
-    problem: Minimised,
+    problem: Minimisable,
     w: np.ndarray,
     goal: float,
     allowed: int,
@@ -272,7 +288,7 @@ def minimise(
     watch: Callable[[np.ndarray], bool] | None = None,
     tolerance: float = LOOSE,
     loose: float = LOOSE,
-) -> Steps[Stage]:
+) -> Steps[StageResult]:
     """Newton until it promises less than `loose`; where that leaves the area error above the goal, than `tolerance`.
 
     place: the number of this stage, for the progress; watch: a step to where this is true is not taken, and the
@@ -284,7 +300,7 @@ def minimise(
         step, used = problem.step(w, value, pressure), pressure
         pressure = _next_pressure(pressure, step, value)
         if watch is not None and watch(step.w):
-            return Stage(w, steps + 1, residual, value, "crossed")
+            return StageResult(w, steps + 1, residual, value, "crossed")
         w, value, steps = step.w, step.energy, steps + 1
         residual = step.decrement / max(value, NO_ENERGY)
         # How many stages and steps there will be is not known: every stage covers half of what is left.
@@ -301,10 +317,10 @@ def minimise(
                 status = "converged"
                 break
             pressure = 0.0
-    return Stage(w, steps, residual, value, status)
+    return StageResult(w, steps, residual, value, status)
 
 
-def _next_pressure(pressure: float, step: Step, value: float) -> float:
+def _next_pressure(pressure: float, step: NewtonStep, value: float) -> float:
     """Less of the indefinite part of the Hessian while full steps keep their promise, more when they do not."""
     if step.share == 1 and value - step.energy > 0.7 * step.decrement:
         return pressure / 3 if pressure > LEAST_PRESSURE else 0.0

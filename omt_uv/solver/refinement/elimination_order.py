@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import MeshError
 from ..linalg.nested_dissection import mesh_order
 from ..mesh.geometry import signed_areas
-from .initial_maps import check_start
+from .initial_maps import check_initial_map
 from .pins import Pins, check_pins
 
 
@@ -33,7 +33,7 @@ class Renumbered:
         uv[self.order] = np.column_stack([w.real, w.imag]) * self.mirror
         return uv
 
-    def blame(self, error: MeshError) -> MeshError:
+    def original_error(self, error: MeshError) -> MeshError:
         """An error with the vertices of the mesh as it was."""
         elements = self.order[error.elements] if error.kind in ("vertex", "edge") else error.elements
         return type(error)(error.cause, error.remedy, error.kind, elements)
@@ -44,10 +44,10 @@ def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | No
 
     Raises
     ------
-    FoldedUVError, PinError : see `starts.check_start` and `pins.check_pins`
+    FoldedUVError, PinError : see `initial_maps.check_initial_map` and `pins.check_pins`
     """
     uv = np.asarray(uv, float)
-    check_start(uv, triangles)
+    check_initial_map(uv, triangles)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
     order = mesh_order(vertices, triangles)
     place = np.empty(len(order), np.int64)

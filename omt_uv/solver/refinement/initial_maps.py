@@ -19,7 +19,7 @@ from ..maps.untangle import USABLE, arc_length_boundary, circle_boundary, count_
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import expand, halfedges, twins
 from .boundary_barrier import crossings
-from .projected_newton import Free, Motion, OnCircle, OnLines, linear_forms
+from .projected_newton import CircleMotion, FreeMotion, LineMotion, Motion, linear_forms
 
 SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"
 SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by the length of the boundary"
@@ -42,7 +42,7 @@ USELESS = 1e-3
 
 
 @dataclass(frozen=True)
-class Start:
+class InitialMap:
     """A map uv (n,2) without folds, the motion of its vertices, and what was replaced; may_cross: its boundary
     might come to cross itself; guarded: it would, in ways that `crossings` cannot see."""
 
@@ -50,7 +50,7 @@ class Start:
     motion: Motion
     warnings: tuple[str, ...]
     may_cross: bool = False
-    guarded: bool = False
+    with_barrier: bool = False
 
 
 def is_far(target: np.ndarray, area: np.ndarray) -> bool:
@@ -58,7 +58,7 @@ def is_far(target: np.ndarray, area: np.ndarray) -> bool:
     return relative_entropy(target, area) > FAR
 
 
-def disk_start(vertices, triangles, uv, loop) -> Start:
+def disk_initial_map(vertices, triangles, uv, loop) -> InitialMap:
     """Boundary on the circle about 0 that has the area of the surface."""
     radius = np.sqrt(face_areas(vertices, triangles).sum() / np.pi)
     warnings = []
@@ -68,10 +68,10 @@ def disk_start(vertices, triangles, uv, loop) -> Start:
         warnings.append(SPREAD)
         rim = arc_length_boundary(vertices, loop, radius)
     straight = _straighten(uv, vertices, triangles, loop, rim, warnings)
-    return Start(straight, OnCircle(loop, radius, len(vertices)), tuple(warnings))
+    return InitialMap(straight, CircleMotion(loop, radius, len(vertices)), tuple(warnings))
 
 
-def notched_disk(start: Start, triangles, loop) -> Start | None:
+def notched_disk(start: InitialMap, triangles, loop) -> InitialMap | None:
     """A disk start with those vertices off the circle whose faces hardly have room there; None if there are none.
 
     A part that one inner edge cuts off has all its boundary on an arc, and an arc encloses little.
@@ -81,32 +81,32 @@ def notched_disk(start: Start, triangles, loop) -> Start | None:
     if not released.any():
         return None
     radius = float(np.linalg.norm(start.uv[loop], axis=1).mean())
-    motion = OnCircle(loop[~released], radius, len(start.uv))
+    motion = CircleMotion(loop[~released], radius, len(start.uv))
     warning = f"{released.sum()} boundary vertices leave the circle, where it has no room for their faces"
-    return Start(start.uv, motion, (*start.warnings, warning), True, True)
+    return InitialMap(start.uv, motion, (*start.warnings, warning), True, True)
 
 
-def free_start(vertices, triangles, uv, loop, relaxed: float = RELAXED) -> Start:
+def free_initial_map(vertices, triangles, uv, loop, relaxed: float = RELAXED) -> InitialMap:
     """Free boundary: the given map if it is one to one, else a disk; charts that are flat are unrolled.
 
     The disk is the given map untangled. Where that squeezes faces, of an energy above `relaxed`, and a mean value map
     less, it is the latter: Newton's way from squeezed faces is long, and takes its turns by chance.
     """
     area = face_areas(vertices, triangles).sum()
-    motion = Free(np.zeros(len(vertices), bool))
+    motion = FreeMotion(np.zeros(len(vertices), bool))
     flat = unroll(vertices, triangles, loop)
     if flat is not None:
-        return Start(flat, motion, (), True)
+        return InitialMap(flat, motion, (), True)
     uv = uv * np.sqrt(area / np.abs(signed_areas(uv, triangles)).sum())
     if count_folds(uv, triangles) == 0 and not len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
-        return Start(uv, motion, (), True)
-    start = disk_start(vertices, triangles, uv - _middle(uv[loop]), loop)
+        return InitialMap(uv, motion, (), True)
+    start = disk_initial_map(vertices, triangles, uv - _middle(uv[loop]), loop)
     least = map_energy(start.uv, vertices, triangles)
     if least > relaxed:
         fresh = tutte(vertices, triangles, loop, arc_length_boundary(vertices, loop, np.sqrt(area / np.pi)))
         if map_energy(fresh, vertices, triangles) < least:
-            return Start(fresh, motion, (), True)
-    return Start(start.uv, motion, start.warnings, True)
+            return InitialMap(fresh, motion, (), True)
+    return InitialMap(start.uv, motion, start.warnings, True)
 
 
 def _middle(outline: np.ndarray) -> np.ndarray:
@@ -118,7 +118,7 @@ def _middle(outline: np.ndarray) -> np.ndarray:
     return outline[0] + (twice @ (a + b)) / (3 * twice.sum())
 
 
-def square_start(vertices, triangles, uv, loop) -> Start:
+def square_initial_map(vertices, triangles, uv, loop) -> InitialMap:
     """Boundary on the square about 0 that has the area of the surface; the vertices nearest to its corners take them.
 
     Where that squeezes faces beyond use, the corners are spread by the boundary's length instead.
@@ -142,7 +142,7 @@ def square_start(vertices, triangles, uv, loop) -> Start:
     return best
 
 
-def _attempt(vertices, triangles, uv, loop, s, half, reasons) -> tuple[Start | FoldedUVError, float]:
+def _attempt(vertices, triangles, uv, loop, s, half, reasons) -> tuple[InitialMap | FoldedUVError, float]:
     """A start with these positions along the square, or why there is none, and its energy."""
     try:
         start = _on_sides(vertices, triangles, uv, loop, s, half, reasons)
@@ -151,7 +151,7 @@ def _attempt(vertices, triangles, uv, loop, s, half, reasons) -> tuple[Start | F
     return start, map_energy(start.uv, vertices, triangles)
 
 
-def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> Start:
+def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> InitialMap:
     """A start with the boundary loop (b,) at the positions s (b,) in [0, 4) along the square.
 
     Where a face would have all its corners on one side, one of its vertices is released from the side.
@@ -165,10 +165,10 @@ def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> Start:
         warnings.append(f"{released.sum()} boundary vertices leave the square, where a face would lie along a side")
     straight = _straighten(uv, vertices, triangles, loop[~released], rim[~released], warnings)
     slide = ~corner & ~released
-    motion = OnLines(loop[slide], np.where(side[slide] % 2 == 0, 1.0, 1j), loop[corner], len(vertices))
+    motion = LineMotion(loop[slide], np.where(side[slide] % 2 == 0, 1.0, 1j), loop[corner], len(vertices))
     # Vertices of a side could pass each other where a released one between them leaves the side.
     notched = bool(released.any())
-    return Start(straight, motion, tuple(warnings), notched, notched)
+    return InitialMap(straight, motion, tuple(warnings), notched, notched)
 
 
 def unroll(vertices, triangles, loop) -> np.ndarray | None:
@@ -202,7 +202,7 @@ def unroll(vertices, triangles, loop) -> np.ndarray | None:
     return uv * np.sqrt(area.sum() / signed.sum())
 
 
-def check_start(uv: np.ndarray, triangles: np.ndarray) -> None:
+def check_initial_map(uv: np.ndarray, triangles: np.ndarray) -> None:
     """Raise FoldedUVError unless uv (n,2) is finite, has an area, and lies on one side for the most part."""
     wrong = np.flatnonzero(~np.isfinite(uv).all(1))
     if len(wrong):

@@ -16,7 +16,7 @@ from ..maps.energy import Elements, elements
 from ..mesh.geometry import cross2, dot2, face_areas
 from ..mesh.topology import boundary_loops, expand, halfedges, twins
 from ..progress import Progress, Steps
-from .vertex_sweeps import independent, relax, stars
+from .vertex_sweeps import independent_set, relax, stars
 
 # A vertex with more faces stays: comparing all its collapses costs the square of their number.
 MOST_FACES = 9
@@ -35,7 +35,7 @@ RELAX_STEPS, RELAX_WEIGHT = 6, 10.0
 
 
 @dataclass(frozen=True)
-class Removal:
+class CollapseRound:
     """One round: vertex (k,) went to `into` (k,); it returns to the mean of corner (k,3) with the weights share (k,3).
 
     Its star was the triangles (vertex[row], after, before), all (s,), and is kept as `faces` with their target areas.
@@ -57,7 +57,7 @@ class Removal:
 
 
 @dataclass(frozen=True)
-class Coarse:
+class CoarseMesh:
     """Vertices kept (c,), triangles (t,3) of them, mass (t,) of the triangles and the weights (t,) of a region, if
     there is one, and the rounds that led there."""
 
@@ -65,7 +65,7 @@ class Coarse:
     triangles: np.ndarray
     mass: np.ndarray
     region: np.ndarray | None
-    rounds: list[Removal]
+    rounds: list[CollapseRound]
 
     def prolonged(self, uv: np.ndarray, n: int) -> Steps[np.ndarray]:
         """A map uv (c,2) of the coarse mesh without folds, carried to all n vertices, without folds."""
@@ -79,7 +79,7 @@ class Coarse:
         return np.column_stack([w.real, w.imag])
 
 
-def coarsened(vertices, triangles, flat, mass, goal: int, region=None, density=None) -> Steps[Coarse]:
+def coarsen_disk(vertices, triangles, flat, mass, goal: int, region=None, density=None) -> Steps[CoarseMesh]:
     """Coarsen a disk (n,3), (m,3) to about `goal` vertices.
 
     flat (n,2): an embedding in the plane with a convex boundary; mass (m,): what the triangles' areas in the final map
@@ -87,7 +87,7 @@ def coarsened(vertices, triangles, flat, mass, goal: int, region=None, density=N
     how many vertices are to be left there for an area, relative to elsewhere; by default that is left to chance.
     """
     mass = np.column_stack([mass] if region is None else [mass, mass * region])
-    rounds: list[Removal] = []
+    rounds: list[CollapseRound] = []
     left = count = len(vertices)
     rim = boundary_loops(triangles)[0]
     while left > goal:
@@ -107,7 +107,7 @@ def coarsened(vertices, triangles, flat, mass, goal: int, region=None, density=N
     place = np.full(count, -1)
     place[kept] = np.arange(len(kept))
     region = None if region is None else mass[:, 1] / mass[:, 0]
-    return Coarse(kept, place[triangles], mass[:, 0], region, rounds)
+    return CoarseMesh(kept, place[triangles], mass[:, 0], region, rounds)
 
 
 def _heavy(V, F, density):
@@ -123,7 +123,7 @@ def _round(V, F, flat, mass, rank):
     ahead = np.full(len(V), -1)
     ahead[tail[rim]] = head[rim]
     count = np.bincount(F.ravel(), minlength=len(V))
-    star, turned = stars(F, independent(F, np.where((count > MOST_FACES) | (count < 2), -1, rank)))
+    star, turned = stars(F, independent_set(F, np.where((count > MOST_FACES) | (count < 2), -1, rank)))
     v, after, before = np.take_along_axis(F[star], turned, 1).T
     into, good = _best_collapses(V, flat, v, after, before, ahead)
     star, v, after, before, into = (x[good] for x in (star, v, after, before, into))
@@ -132,7 +132,7 @@ def _round(V, F, flat, mass, rank):
     new = np.column_stack([into, after, before])[stays]
     corner, share = _places(V, flat, vertex, row[stays], new, ahead)
     faces = elements(V, np.column_stack([v, after, before]), mass[star, 0])
-    removal = Removal(
+    removal = CollapseRound(
         vertex, new[np.searchsorted(row[stays], np.arange(len(vertex))), 0], corner, share, row, after, before, faces
     )
     size = np.sqrt(_squared(_normals(V, new)[0]))
@@ -196,7 +196,7 @@ def _places(V, flat, vertex, row, new, ahead):
     return corner, share
 
 
-def _returned(removal: Removal, w: np.ndarray) -> np.ndarray:
+def _returned(removal: CollapseRound, w: np.ndarray) -> np.ndarray:
     """Places (k,) of the vertices that return: where they belong, or as near to it as their stars allow."""
     target = (removal.share * w[removal.corner]).sum(1)
     row, count, base = removal.row, len(removal.vertex), w[removal.into]

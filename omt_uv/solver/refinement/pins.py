@@ -9,9 +9,9 @@ import numpy as np
 from ..errors import PinError
 from ..maps.energy import squared
 from ..progress import Progress, Steps
-from .continuation import Task, rescaled
+from .continuation import MapProblem, rescaled
 from .continuation import minimise as minimise_energy
-from .projected_newton import Free, Problem
+from .projected_newton import FreeMotion, NewtonProblem
 
 # Weight of the area term while pins are dragged, and stiffness of the springs that drag them: from soft to hard.
 DRAG_WEIGHT = 10.0
@@ -54,7 +54,7 @@ def check_pins(vertices: np.ndarray, places: np.ndarray, n: int) -> Pins:
 
 
 @dataclass(frozen=True)
-class Springs:
+class PinEnergy:
     """An energy that draws pins to their places: stiffness times the squared distance, in the given length unit."""
 
     pins: Pins
@@ -88,7 +88,7 @@ def aligned(w: np.ndarray, pins: Pins) -> np.ndarray:
     return (w - centre) * factor + goal
 
 
-def drag(task: Task, w: np.ndarray, pins: Pins) -> Steps[tuple[Task, np.ndarray]]:
+def move_pins(task: MapProblem, w: np.ndarray, pins: Pins) -> Steps[tuple[MapProblem, np.ndarray]]:
     """The map w (n,), moved until all pins (two or more) are in place, and the task that keeps them there.
 
     Springs of growing stiffness draw the pins; the barriers against folds and against a boundary that crosses itself
@@ -104,12 +104,12 @@ def drag(task: Task, w: np.ndarray, pins: Pins) -> Steps[tuple[Task, np.ndarray]
         snapped = w.copy()
         snapped[pins.vertices] = pins.places
         near = np.abs(snapped - w).max() <= NEAR * extent or k == 0
-        if near and (task.faces.areas(snapped) > 0).all() and not task.crosses(snapped):
+        if near and (task.faces.areas(snapped) > 0).all() and not task.boundary_crosses(snapped):
             return replace(rescaled(task, snapped), motion=_held(len(w), pins), scale_free=True), snapped
         task = rescaled(task, w)
-        guard = task.guard(w)
-        springs = Springs(pins, stiffness, extent)
-        problem = Problem(task.faces, task.assembly, task.motion, DRAG_WEIGHT, (springs, guard))
+        guard = task.barrier(w)
+        springs = PinEnergy(pins, stiffness, extent)
+        problem = NewtonProblem(task.faces, task.assembly, task.motion, DRAG_WEIGHT, (springs, guard))
         yield Progress("Pins", k / len(STIFFNESS))
         w = (yield from minimise_energy(problem, w, np.inf, 40, k)).w
     far = pins.vertices[np.abs(w[pins.vertices] - pins.places) > NEAR * extent]
@@ -119,4 +119,4 @@ def drag(task: Task, w: np.ndarray, pins: Pins) -> Steps[tuple[Task, np.ndarray]
 def _held(n, pins):
     pinned = np.zeros(n, bool)
     pinned[pins.vertices] = True
-    return Free(pinned)
+    return FreeMotion(pinned)

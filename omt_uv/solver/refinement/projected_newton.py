@@ -41,7 +41,7 @@ class Motion(Protocol):
         """The map after a step (n,) complex in the frame's axes."""
 
 
-class Free:
+class FreeMotion:
     """Every vertex may go anywhere, except the pinned ones (n,) bool."""
 
     def __init__(self, pinned: np.ndarray):
@@ -60,7 +60,7 @@ class Free:
         return w + step
 
 
-class OnCircle:
+class CircleMotion:
     """Vertices of `loop` slide on the circle of this radius about 0, the others are free."""
 
     def __init__(self, loop: np.ndarray, radius: float, n: int):
@@ -89,7 +89,7 @@ class OnCircle:
         return moved
 
 
-class OnLines:
+class LineMotion:
     """Vertices (k,) slide along the directions (k,) complex; `fixed` (c,) stay; the others are free."""
 
     def __init__(self, sliding: np.ndarray, direction: np.ndarray, fixed: np.ndarray, n: int):
@@ -147,7 +147,7 @@ class Assembly:
         return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
 
 
-class Extra(Protocol):
+class EnergyTerm(Protocol):
     """An energy beside that of the faces, for example a barrier."""
 
     def energy(self, w: np.ndarray) -> float:
@@ -161,7 +161,7 @@ class Extra(Protocol):
 
 
 @dataclass(frozen=True)
-class Problem:
+class NewtonProblem:
     """What Newton minimises: faces, the weight of their area term, one or (m,), the motion, further energies.
 
     aim: faces with the targets that count, where those minimised lead to them; smoother: what follows every step.
@@ -171,30 +171,30 @@ class Problem:
     assembly: Assembly
     motion: Motion
     weight: float | np.ndarray
-    extras: tuple[Extra, ...] = ()
+    terms: tuple[EnergyTerm, ...] = ()
     aim: Elements | None = None
     smoother: Smoother | None = None
 
     def energy(self, w: np.ndarray) -> float:
         """Energy of the faces and of all extras at a map w (n,) complex; infinity where a face is folded."""
         value = float(energies(self.faces, w, self.weight).sum())
-        return value + sum(e.energy(w) for e in self.extras) if np.isfinite(value) else value
+        return value + sum(e.energy(w) for e in self.terms) if np.isfinite(value) else value
 
     def area_error(self, w: np.ndarray) -> float:
         """What a map w (n,) complex lacks of its areas, see `energy.target_error`."""
         return target_error(self.faces if self.aim is None else self.aim, w)
 
-    def step(self, w: np.ndarray, value: float, pressure: float) -> Step:
+    def step(self, w: np.ndarray, value: float, pressure: float) -> NewtonStep:
         """A Newton step from a map w (n,) complex of energy `value`, see `newton_step`. Raises PrecisionError."""
         step = newton_step(self, w, value, pressure)
         if self.smoother is None:
             return step
         smooth = self.smoother.smoothed(self.faces, step.w, float(self.weight))
-        return Step(smooth, self.energy(smooth), step.decrement, step.share)
+        return NewtonStep(smooth, self.energy(smooth), step.decrement, step.share)
 
 
 @dataclass(frozen=True)
-class Step:
+class NewtonStep:
     """A step: map and energy after it, decrease promised by the full step, share of it taken (0: none helps)."""
 
     w: np.ndarray
@@ -203,7 +203,9 @@ class Step:
     share: float
 
 
-def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarray = 1.0) -> tuple[np.ndarray, float]:
+def newton_direction(
+    problem: NewtonProblem, w: np.ndarray, pressure: float | np.ndarray = 1.0
+) -> tuple[np.ndarray, float]:
     """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
     frame, free = problem.motion.frame(w), problem.motion.free.astype(float)
     matrix, slopes, scale = _equations(problem, w, pressure, frame, free)
@@ -212,7 +214,7 @@ def newton_direction(problem: Problem, w: np.ndarray, pressure: float | np.ndarr
     return step.view(complex), float(step @ slopes)
 
 
-def _equations(problem: Problem, w: np.ndarray, pressure, frame, free) -> tuple[sp.spmatrix, np.ndarray, float]:
+def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> tuple[sp.spmatrix, np.ndarray, float]:
     """Hessian (2n,2n) and slopes (2n,) along the axes of the frame, and the mean of the Hessian's diagonal."""
     n, faces = len(w), problem.faces
     local = face_derivatives(faces, w, problem.weight, pressure)
@@ -222,7 +224,7 @@ def _equations(problem: Problem, w: np.ndarray, pressure, frame, free) -> tuple[
     blocks = np.matmul(rows.transpose(0, 2, 1), rows)
     scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
     extra = sp.csr_matrix((2 * n, 2 * n))
-    for part in problem.extras:
+    for part in problem.terms:
         slope, vertices, forms = part.derivatives(w)
         gradient = gradient + slope
         linear = linear_forms(vertices, forms * frame[vertices], n) @ sp.diags(free.ravel())
@@ -231,7 +233,7 @@ def _equations(problem: Problem, w: np.ndarray, pressure, frame, free) -> tuple[
     diagonal = 1 - free
     diagonal[:, 0] += np.maximum(problem.motion.bend(w, gradient), 0) * free[:, 0]
     matrix = problem.assembly.matrix(blocks, diagonal.ravel() + SHIFT * scale)
-    return matrix + extra if problem.extras else matrix, axes.ravel(), scale
+    return matrix + extra if problem.terms else matrix, axes.ravel(), scale
 
 
 def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | None, w, axes) -> np.ndarray:
@@ -247,21 +249,21 @@ def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | Non
             matrix = matrix + shift * scale * sp.identity(len(b))
 
 
-def newton_step(problem: Problem, w: np.ndarray, value: float, pressure: float = 1.0) -> Step:
+def newton_step(problem: NewtonProblem, w: np.ndarray, value: float, pressure: float = 1.0) -> NewtonStep:
     """One line-searched Newton step from a map w (n,) complex of energy `value`; pressure: see `face_derivatives`."""
     step, slope = newton_direction(problem, w, pressure)
     moved = problem.motion.frame(w) * step
     share = min(1.0, FOLD_SHARE * first_fold(problem.faces, w, moved))
-    for extra in problem.extras:
+    for extra in problem.terms:
         # Of what is left of the step: how far a whole one would reach is a large search, and of no use.
         share *= min(1.0, extra.limit(w, share * moved))
     for _ in range(MAX_HALVINGS):
         trial = problem.motion.move(w, share * step)
         trial_value = problem.energy(trial)
         if trial_value <= value + ARMIJO * share * slope:
-            return Step(trial, trial_value, -slope / 2, share)
+            return NewtonStep(trial, trial_value, -slope / 2, share)
         share *= 0.5
-    return Step(w, value, -slope / 2, 0.0)
+    return NewtonStep(w, value, -slope / 2, 0.0)
 
 
 def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:

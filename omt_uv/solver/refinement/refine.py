@@ -16,15 +16,15 @@ from ..maps.energy import Elements, area_error, elements
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps, part_of
-from .continuation import QUALITIES, Found, Task, stages, weights_of
+from .continuation import QUALITIES, ContinuationResult, MapProblem, minimise_in_stages, planned_weights
 from .elimination_order import Renumbered, renumbered
-from .initial_maps import Start, disk_start, free_start, is_far, notched_disk, square_start
-from .pins import Pins, drag
+from .initial_maps import InitialMap, disk_initial_map, free_initial_map, is_far, notched_disk, square_initial_map
+from .pins import Pins, move_pins
 from .projected_newton import Assembly
 from .vertex_sweeps import Smoother, smoothed
 
-STARTS = {"free": free_start, "disk": disk_start, "square": square_start}
-BOUNDARIES = tuple(STARTS)
+INITIAL_MAPS = {"free": free_initial_map, "disk": disk_initial_map, "square": square_initial_map}
+BOUNDARIES = tuple(INITIAL_MAPS)
 # Below so many vertices Newton's steps take so little time that sweeps between them save none.
 SWEPT_ABOVE = 2000
 # Area error of a disk above which vertices without room may leave the circle.
@@ -82,7 +82,7 @@ class Refinement:
     status : "converged", "stalled" (no decrease could be found) or "steps" (allowance used up)
     overlap : the free boundary crosses itself
     warnings : what was replaced and why
-    multiplier : Lagrange multiplier of the region's share, see `continuation.Found`
+    multiplier : Lagrange multiplier of the region's share, see `continuation.ContinuationResult`
     """
 
     uv: np.ndarray
@@ -139,7 +139,7 @@ def refine(
     try:
         found, warnings = yield from _refined(mesh, faces, options)
     except MeshError as error:
-        raise mesh.blame(error) from error
+        raise mesh.original_error(error) from error
     yield Progress("Refinement", 1.0)
     refined = mesh.original(found.w)
     if pins is not None and mesh.pins is not None:
@@ -165,13 +165,15 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     return target * (area.sum() / target.sum())
 
 
-def _refined(mesh: Renumbered, faces: Elements, options: RefinementOptions) -> Steps[tuple[Found, tuple[str, ...]]]:
+def _refined(
+    mesh: Renumbered, faces: Elements, options: RefinementOptions
+) -> Steps[tuple[ContinuationResult, tuple[str, ...]]]:
     """Stages on a renumbered chart: what was found, and the warnings of the start it was found from."""
     boundary, balance, quality = options.boundary, options.balance, QUALITIES[options.quality]
     pins, loop, n = mesh.pins, boundary_loops(mesh.triangles)[0], len(mesh.vertices)
     # A map to areas far from the surface's is sheared by right.
     far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
-    start = STARTS[boundary](mesh.vertices, mesh.triangles, mesh.uv, loop, **({"relaxed": np.inf} if far else {}))
+    start = INITIAL_MAPS[boundary](mesh.vertices, mesh.triangles, mesh.uv, loop, **({"relaxed": np.inf} if far else {}))
     assembly = Assembly(mesh.triangles, n, schwarz_solver(mesh.vertices, mesh.triangles))
     # Sweeps know of no springs, and of no balance.
     swept = faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
@@ -180,17 +182,19 @@ def _refined(mesh: Renumbered, faces: Elements, options: RefinementOptions) -> S
     w, given = start.uv @ [1, 1j], mesh.uv @ [1, 1j]
     placed = boundary == "free"
     if pins is not None and len(pins.vertices) > 1:
-        task, w = yield from drag(task, w, pins)
+        task, w = yield from move_pins(task, w, pins)
         placed = False
     elif boundary == "free":
-        w = yield from part_of(_eased(task, w, weights_of(balance, quality)[0]), *EASING)
-    way = stages(task, w, balance, quality, options.warm_start, options.multiplier)
+        w = yield from part_of(_eased(task, w, planned_weights(balance, quality)[0]), *EASING)
+    way = minimise_in_stages(task, w, balance, quality, options.warm_start, options.multiplier)
     found = yield from part_of(way, *STAGES)
     error = area_error(faces, found.w)
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):
         notched = notched_disk(start, mesh.triangles, loop)
         if notched is not None:
-            again = yield from stages(_task(faces, assembly, notched, loop, boundary, smoother), w, balance, quality)
+            again = yield from minimise_in_stages(
+                _task(faces, assembly, notched, loop, boundary, smoother), w, balance, quality
+            )
             if area_error(faces, again.w) < error:
                 found, start = again, notched
     if placed:
@@ -198,22 +202,24 @@ def _refined(mesh: Renumbered, faces: Elements, options: RefinementOptions) -> S
     return found, start.warnings
 
 
-def _eased(task: Task, w: np.ndarray, weight: float) -> Steps[np.ndarray]:
+def _eased(task: MapProblem, w: np.ndarray, weight: float) -> Steps[np.ndarray]:
     """A start w (n,) whose vertices, those of the boundary too, have moved within their stars, if it is tense.
 
     Triangles of three boundary vertices are slivers in a disk. They hold up Newton's first steps, and have lost the
     digits that say whither.
     """
     tense = len(task.faces.triangles) > FEW and task.problem(w, weight, False).energy(w) > TENSE
-    if tense and not task.crosses(w):
+    if tense and not task.boundary_crosses(w):
         w = yield from smoothed(task.faces, w, weight, SWEEPS, task.loop)
     return w
 
 
-def _task(faces: Elements, assembly: Assembly, start: Start, loop, boundary: str, smoother) -> Task:
+def _task(faces: Elements, assembly: Assembly, start: InitialMap, loop, boundary: str, smoother) -> MapProblem:
     # A polygon in a circle, or a notched square, has less area than the surface: the targets follow it.
     follows = boundary != "free"
-    return Task(faces, assembly, start.motion, loop if start.may_cross else None, start.guarded, follows, smoother)
+    return MapProblem(
+        faces, assembly, start.motion, loop if start.may_cross else None, start.with_barrier, follows, smoother
+    )
 
 
 def _placed(w: np.ndarray, given: np.ndarray, faces: Elements, pins: Pins | None) -> np.ndarray:

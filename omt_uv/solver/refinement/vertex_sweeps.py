@@ -12,7 +12,7 @@ import numpy as np
 from ..maps.energy import Elements, energies, squared
 from ..mesh.topology import halfedges, twins
 from ..progress import Progress, Steps
-from .boundary_barrier import crossings, rim_edges
+from .boundary_barrier import crossings, loop_edges
 
 # Least eigenvalue of a vertex's Hessian over the greatest, halvings of a step.
 CONVEX, HALVINGS = 0.01, 5
@@ -27,8 +27,8 @@ WORST, AFTER_STEP = 2.0, 4
 def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int, loop=None) -> Steps[np.ndarray]:
     """A map w (n,) complex without folds after sweeps over all its vertices, without folds.
 
-    weight: that of the area term; loop: a boundary, see `contact.rim_edges`, that moves, too, and does not come to
-    cross itself. Without it the boundary stays.
+    weight: that of the area term; loop: a boundary, see `boundary_barrier.loop_edges`, that moves, too, and does not
+    come to cross itself. Without it the boundary stays.
     """
     w = w.copy()
     sets = list(_sets(faces, len(w), loop is not None))
@@ -44,7 +44,7 @@ def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int, loop=No
 
 def _uncross(w: np.ndarray, before: np.ndarray, loop: np.ndarray) -> None:
     """Take back, in place, what moved of edges of a boundary that cross, or would soon."""
-    tail, head = rim_edges(loop)
+    tail, head = loop_edges(loop)
     # What goes right over a narrow part crosses it now, and farther on no longer.
     while len(pairs := np.concatenate([crossings(before + k * (w - before), loop) for k in (1, ROOM)])):
         ends = np.concatenate([tail[pairs].ravel(), head[pairs].ravel()])
@@ -72,7 +72,7 @@ class Smoother:
         for vertex, row, around, corner in self._sets:
             kept = bad[vertex]
             place, rows = np.cumsum(kept) - 1, kept[row]
-            sets.append((vertex[kept], place[row[rows]], part(faces, around[rows], corner[rows])))
+            sets.append((vertex[kept], place[row[rows]], take_faces(faces, around[rows], corner[rows])))
         w = w.copy()
         for _ in range(sweeps):
             for vertex, row, around in sets:
@@ -83,7 +83,7 @@ class Smoother:
 def _sets(faces: Elements, n: int, whole=False):
     """Independent sets of vertices, inner or all: vertices (k,), and the rows (s,) and faces of their stars."""
     for vertex, row, star, corner in _stars(faces.triangles, n, whole):
-        yield vertex, row, part(faces, star, corner)
+        yield vertex, row, take_faces(faces, star, corner)
 
 
 def _stars(F: np.ndarray, n: int, whole=False):
@@ -95,14 +95,14 @@ def _stars(F: np.ndarray, n: int, whole=False):
         rim = twins(F) < 0
         inner[tail[rim]] = inner[head[rim]] = False
     for _ in range(SETS):
-        chosen = independent(F, np.where(inner, random.permutation(n), -1))
+        chosen = independent_set(F, np.where(inner, random.permutation(n), -1))
         inner &= ~chosen
         star, corner = stars(F, chosen)
         vertex, row = np.unique(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0], return_inverse=True)
         yield vertex, row, star, corner
 
 
-def independent(F: np.ndarray, rank: np.ndarray) -> np.ndarray:
+def independent_set(F: np.ndarray, rank: np.ndarray) -> np.ndarray:
     """Vertices (n,) bool, no two in one face, those of high rank (n,) first; none of negative rank."""
     faces = np.bincount(F.ravel(), minlength=len(rank))
     rank = rank.copy()
@@ -124,7 +124,7 @@ def stars(F: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return star[order], corner[order]
 
 
-def part(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Elements:
+def take_faces(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Elements:
     """Some faces (s,), with their corners in the order (s,3)."""
     triangles, gradient = (np.take_along_axis(x[star], corner, 1) for x in (faces.triangles, faces.gradient))
     return Elements(triangles, faces.area[star], gradient, faces.ratio[star], faces.weight[star])

@@ -15,7 +15,7 @@ import numpy as np
 from ..linalg.sparse import Factor
 from ..maps.energy import Elements, FaceDerivatives, derivatives_of, energy_of, squared
 from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
-from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, Step, fold_share
+from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, NewtonStep, fold_share
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class SphereProblem:
         error = np.abs((squared(a) - squared(b)) / self.faces.ratio - 1)
         return float(self.target @ error / self.target.sum())
 
-    def step(self, positions: np.ndarray, value: float, pressure: float) -> Step:
+    def step(self, positions: np.ndarray, value: float, pressure: float) -> NewtonStep:
         """One line-searched Newton step from unit vectors (n,3) of energy `value`."""
         face = seen(positions, self.faces.triangles)
         a, b = derivatives(self.faces, face.corner)
@@ -116,9 +116,9 @@ class SphereProblem:
             trial = moved(positions, axes, share * direction)
             trial_value = self.energy(trial)
             if trial_value <= value + ARMIJO * share * slope:
-                return Step(trial, trial_value, -slope / 2, share)
+                return NewtonStep(trial, trial_value, -slope / 2, share)
             share *= 0.5
-        return Step(positions, value, -slope / 2, 0.0)
+        return NewtonStep(positions, value, -slope / 2, 0.0)
 
 
 def newton_direction(

@@ -11,7 +11,16 @@ from ..linalg.nested_dissection import mesh_order
 from ..maps.energy import Elements, elements, squared
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..progress import Progress, Steps
-from ..refinement.continuation import LOOSE, QUALITIES, SQUEEZED, STAGE_STEPS, STRICT, Quality, minimise, weights_of
+from ..refinement.continuation import (
+    LOOSE,
+    QUALITIES,
+    SQUEEZED,
+    STAGE_STEPS,
+    STRICT,
+    Quality,
+    minimise,
+    planned_weights,
+)
 from ..refinement.projected_newton import Assembly
 from .newton import SphereProblem, derivatives, seen
 from .untangle import untangle_on_sphere
@@ -121,7 +130,7 @@ def _in_order(positions: np.ndarray, order: np.ndarray) -> np.ndarray:
 
 def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Quality) -> Steps[SphereRefinement]:
     """Newton in stages of growing weight, as `stages.stages`."""
-    weights = weights_of(balance, settings)
+    weights = planned_weights(balance, settings)
     if seen_from_above(problem, p, weights[0]).energy(p) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
     steps, k, error = 0, 0, np.inf

@@ -19,7 +19,7 @@ from omt_uv.solver.mesh.topology import boundary_edges, boundary_loops
 from omt_uv.solver.parameterization.chart_pins import CornerPins
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.boundary_barrier import contact, crossings
+from omt_uv.solver.refinement.boundary_barrier import crossings, make_barrier
 
 
 def head(count=16):
@@ -117,13 +117,13 @@ def test_a_hole_is_kept_apart_from_the_outline():
     inner = np.abs(w) < 1.3
     step = np.where(inner, 1.5, 0) + 0j
     assert len(crossings(w + step, rim)) > 0
-    assert contact(w, rim, 1.0).limit(w, step) < 1
+    assert make_barrier(w, rim, 1.0).limit(w, step) < 1
 
 
 def test_contact_of_edges_equals_contact_of_a_loop():
     V, F, uv = bump()
     loop, w = boundary_loops(F)[0], (uv + 0.02 * np.sin(40 * uv[:, ::-1])) @ [1, 1j]
-    a, b = contact(w, loop, 1.0), contact(w, boundary_edges(F), 1.0)
+    a, b = make_barrier(w, loop, 1.0), make_barrier(w, boundary_edges(F), 1.0)
     assert a.energy(w) == pytest.approx(b.energy(w))
     assert a.derivatives(w)[0] == pytest.approx(b.derivatives(w)[0])
 

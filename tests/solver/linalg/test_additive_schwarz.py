@@ -17,7 +17,13 @@ from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.projected_newton import Assembly, Free, OnCircle, Problem, newton_direction
+from omt_uv.solver.refinement.projected_newton import (
+    Assembly,
+    CircleMotion,
+    FreeMotion,
+    NewtonProblem,
+    newton_direction,
+)
 
 
 def flattened(kind, weight=500.0):
@@ -26,10 +32,10 @@ def flattened(kind, weight=500.0):
     direction = V[:, 0] + 1j * V[:, 1]
     w = np.arctan2(np.abs(direction), V[:, 2]) * np.exp(1j * np.angle(direction))
     if kind == "free":
-        motion = Free(np.arange(len(w)) % 97 == 0)
+        motion = FreeMotion(np.arange(len(w)) % 97 == 0)
     else:
-        motion = OnCircle(boundary_loops(F)[0], np.pi / 2, len(w))
-    problem = Problem(elements(V, F, face_areas(V, F)), Assembly(F, len(w)), motion, weight)
+        motion = CircleMotion(boundary_loops(F)[0], np.pi / 2, len(w))
+    problem = NewtonProblem(elements(V, F, face_areas(V, F)), Assembly(F, len(w)), motion, weight)
     return problem, replace(problem, assembly=Assembly(F, len(w), AdditiveSchwarz(V, F, 200))), w
 
 
@@ -93,7 +99,9 @@ def test_nonzeros_grow_with_the_mesh():
         V, F = meshes.bumpy(count, count, height=0.3)
         w = V[:, 0] + 0.2 * V[:, 1] + 1j * V[:, 1]
         faces = elements(V, F, face_areas(V, F))
-        problem = Problem(faces, Assembly(F, len(w), AdditiveSchwarz(V, F, 200)), Free(np.zeros(len(w), bool)), 30.0)
+        problem = NewtonProblem(
+            faces, Assembly(F, len(w), AdditiveSchwarz(V, F, 200)), FreeMotion(np.zeros(len(w), bool)), 30.0
+        )
         with counted() as tally:
             newton_direction(problem, w)
         counts.append(tally.nonzeros / len(w))

@@ -14,7 +14,7 @@ from omt_uv.solver.parameterization.initial_map import COARSE_ABOVE, mean_value_
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.boundary_barrier import crossings
-from omt_uv.solver.refinement.mesh_hierarchy import coarsened
+from omt_uv.solver.refinement.mesh_hierarchy import coarsen_disk
 from omt_uv.solver.refinement.vertex_sweeps import smoothed
 from omt_uv.solver.transport.convex_domain import Disk
 
@@ -25,7 +25,7 @@ def coarse_of(name, share=8):
     V, F = getattr(meshes, name)()
     flat = mean_value_sites(V, F, boundary_loops(F)[0], None, Disk())
     mass = face_areas(V, F)
-    return V, F, flat, mass, drain(coarsened(V, F, flat, mass, len(V) // share))
+    return V, F, flat, mass, drain(coarsen_disk(V, F, flat, mass, len(V) // share))
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -51,7 +51,7 @@ def test_vertices_are_left_where_they_are_wanted(name):
     """Of a part that is to have eight times as many vertices for its area a greater share stays than of the rest."""
     V, F, flat, mass, _ = coarse_of(name)
     inside = np.linalg.norm(V - V[np.argmax(V @ [1.0, 0.6, 0.3])], axis=1) < 0.35 * np.ptp(V, axis=0).max()
-    coarse = drain(coarsened(V, F, flat, mass, len(V) // 5, density=np.where(inside, 8.0, 1.0)))
+    coarse = drain(coarsen_disk(V, F, flat, mass, len(V) // 5, density=np.where(inside, 8.0, 1.0)))
     kept = np.zeros(len(V), bool)
     kept[coarse.kept] = True
     assert kept[inside].mean() > 2 * kept[~inside].mean()
@@ -119,7 +119,7 @@ def test_smoothing_lowers_the_energy_and_folds_nothing():
 def test_what_returns_to_the_boundary_crosses_nothing():
     V, F = meshes.head(60)
     flat = mean_value_sites(V, F, boundary_loops(F)[0], None, Disk())
-    coarse = drain(coarsened(V, F, flat, face_areas(V, F), len(V) // 12))
+    coarse = drain(coarsen_disk(V, F, flat, face_areas(V, F), len(V) // 12))
     # A conformal map whose boundary is not convex.
     w = flat[coarse.kept] @ [1, 1j]
     w = w + 0.12 * w**5
@@ -133,7 +133,7 @@ def test_what_returns_to_the_boundary_stays_inside(make):
     """Also where the faces along its chord have no room: beyond it may be another part of the map."""
     V, F = make()
     flat = mean_value_sites(V, F, boundary_loops(F)[0], None, Disk())
-    coarse = drain(coarsened(V, F, flat, face_areas(V, F), len(V) // 8))
+    coarse = drain(coarsen_disk(V, F, flat, face_areas(V, F), len(V) // 8))
     squeezed = flat[coarse.kept] @ [[1, 0.3], [-0.3, 1]] * [1.0, 1e-3]
     fine = drain(coarse.prolonged(squeezed, len(V)))
     assert (signed_areas(fine, F) > 0).all()

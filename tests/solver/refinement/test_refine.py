@@ -12,13 +12,13 @@ from omt_uv.solver.maps.untangle import arc_length_boundary, count_folds, untang
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import Progress, drain
-from omt_uv.solver.refinement.boundary_barrier import box_pairs, contact, crossings
+from omt_uv.solver.refinement.boundary_barrier import box_pairs, crossings, make_barrier
 from omt_uv.solver.refinement.continuation import QUALITIES
 from omt_uv.solver.refinement.projected_newton import (
     Assembly,
-    Free,
-    OnCircle,
-    Problem,
+    CircleMotion,
+    FreeMotion,
+    NewtonProblem,
     first_fold,
     newton_direction,
     newton_step,
@@ -182,8 +182,8 @@ def test_first_fold_is_where_the_first_face_has_no_area():
 def test_newton_direction_descends_along_the_motion(kind):
     V, F = meshes.bumpy()
     faces, w, loop = elements_of(V, F), complex_map(V, F), boundary_loops(F)[0]
-    motion = OnCircle(loop, 1.0, len(w)) if kind == "circle" else Free(np.zeros(len(w), bool))
-    problem = Problem(faces, Assembly(F, len(w)), motion, 5.0)
+    motion = CircleMotion(loop, 1.0, len(w)) if kind == "circle" else FreeMotion(np.zeros(len(w), bool))
+    problem = NewtonProblem(faces, Assembly(F, len(w)), motion, 5.0)
     step, slope = newton_direction(problem, w)
     h = 1e-6
     difference = (problem.energy(motion.move(w, h * step)) - problem.energy(motion.move(w, -h * step))) / (2 * h)
@@ -194,7 +194,7 @@ def test_newton_direction_descends_along_the_motion(kind):
 def test_newton_converges_fast_near_its_minimum():
     V, F = meshes.bumpy()
     w = complex_map(V, F)
-    problem = Problem(elements_of(V, F), Assembly(F, len(w)), Free(np.zeros(len(w), bool)), 5.0)
+    problem = NewtonProblem(elements_of(V, F), Assembly(F, len(w)), FreeMotion(np.zeros(len(w), bool)), 5.0)
     value, decrements = problem.energy(w), []
     while not decrements or decrements[-1] > 1e-13:
         step = newton_step(problem, w, value)
@@ -394,7 +394,7 @@ def slot():
 
 def test_contact_gradient_is_the_derivative_of_its_energy():
     ring, loop = slot()
-    barrier = contact(ring, loop, 1.0)
+    barrier = make_barrier(ring, loop, 1.0)
     assert barrier.energy(ring) > 0
     rng = np.random.default_rng(0)
     direction = rng.normal(size=len(ring)) + 1j * rng.normal(size=len(ring))
@@ -407,7 +407,7 @@ def test_contact_gradient_is_the_derivative_of_its_energy():
 def test_contact_hessian_bounds_how_the_energy_bends():
     # A spike that nearly touches an edge; the second derivative counts sliding along an edge that turns.
     spike = np.array([0, 1, 1 + 0.5j, 0.4 + 0.01j, 0.5j])
-    barrier = contact(spike, np.arange(5), 1.0)
+    barrier = make_barrier(spike, np.arange(5), 1.0)
     _, vertices, rows = barrier.derivatives(spike)
     h = 1e-6
     for direction in np.random.default_rng(0).normal(size=(200, 5, 2)) @ [1, 1j]:
@@ -418,7 +418,7 @@ def test_contact_hessian_bounds_how_the_energy_bends():
 
 def test_no_step_goes_through_an_edge():
     ring, loop = slot()
-    barrier = contact(ring, loop, 1.0)
+    barrier = make_barrier(ring, loop, 1.0)
     # Both ends move towards each other by more than the gap.
     step = np.where(ring.imag > 0, -1j, 1j) * (ring.real > 0) * (np.abs(ring.imag) < 0.5) * 0.2
     assert len(crossings(ring + step, loop)) > 0
