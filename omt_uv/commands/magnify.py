@@ -120,36 +120,21 @@ def _picture(options: argparse.Namespace):
         raise CommandError("A picture needs both --image and --image-output.")
     if options.source != "uv":
         raise CommandError("A picture can only follow UVs that exist. Use --source uv.")
-    from ..files.images import FORMATS, ImageError, picture_of, straight_alpha
+    from ..files import images
 
-    if options.image_output.suffix.lower() not in FORMATS:
-        raise CommandError(f"{options.image_output}: unknown format. Use one of {' '.join(FORMATS)}.")
-    if not options.image_output.resolve().parent.is_dir():
-        raise CommandError(f"{options.image_output}: there is no such folder")
     try:
-        name = _load(options.image)
-        return picture_of(name), straight_alpha(name)
-    except (RuntimeError, ImageError) as error:
-        raise CommandError(f"{options.image}: cannot be read as a picture") from error
-
-
-def _load(path: Path) -> str:
-    import bpy
-
-    from ..files.silence import silence
-
-    with silence():
-        return bpy.data.images.load(str(path.resolve())).name
+        images.check_target(options.image_output)
+        image = images.load(options.image)
+        return images.pixels_of(image), images.has_straight_alpha(image)
+    except images.ImageError as error:
+        raise CommandError(str(error)) from error
 
 
 def _write_picture(options: argparse.Namespace, picture) -> None:
-    from ..files.images import save_copy
-    from ..files.silence import silence
+    from ..files import images
 
-    # Reading the mesh has closed the file that it was in.
-    name = _load(options.image)
     try:
-        with silence():
-            save_copy(name, picture, options.image_output)
-    except RuntimeError as error:
-        raise CommandError(f"{options.image_output}: cannot be written") from error
+        # Reading the mesh has closed the file that the image was in.
+        images.save(options.image_output, picture, images.load(options.image))
+    except images.ImageError as error:
+        raise CommandError(str(error)) from error

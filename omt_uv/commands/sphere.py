@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> None:
     from ..blender.markers import globe_densities, group_markers
     from ..blender.seams import GroupError
     from ..blender.weights import ScoreError
-    from ..files.panorama import ImageError
+    from ..files.images import ImageError
     from ..pipelines.globe import globe_jobs, project
     from ..solver.errors import MeshError
     from ..solver.globe.rotation import MarkerError
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _check_image(options: argparse.Namespace) -> None:
     """Refuse what cannot be written before the long work."""
-    from ..files.panorama import ImageError, check_target
+    from ..files.images import ImageError, check_target
 
     if (options.image is None) != (options.image_out is None):
         raise CommandError("--image and --image-out go together. Give both.")
@@ -84,7 +84,7 @@ def _check_image(options: argparse.Namespace) -> None:
 
 def _redrawn(options: argparse.Namespace):
     """Pixels of the redrawn image and the image they come from; None without one."""
-    from ..files.panorama import load, pixels_of
+    from ..files.images import load, pixels_of
     from ..pipelines.panorama_redraw import redraw
 
     if options.image is None:
@@ -94,6 +94,6 @@ def _redrawn(options: argparse.Namespace):
 
 
 def _write_image(options: argparse.Namespace, pixels, source) -> None:
-    from ..files.panorama import save
+    from ..files.images import save
 
     save(options.image_out, pixels, source)

@@ -1,4 +1,7 @@
-"""Images of Blender as arrays, and back as copies; see `blender_mesh.py`."""
+"""Read and write Blender's images as arrays (h,w,4) float32, row 0 at the bottom.
+
+What is written looks like the image it comes from: the same colour space, depth and kind of alpha.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,13 @@ import bpy
 import numpy as np
 
 from ..errors import UserError
+from .silence import silence
 
-# File formats by suffix.
+# What can be written: Blender's name of the format by the suffix of the file.
 FORMATS = {
     ".png": "PNG",
     ".exr": "OPEN_EXR",
+    ".hdr": "HDR",
     ".tif": "TIFF",
     ".tiff": "TIFF",
     ".jpg": "JPEG",
@@ -21,90 +26,131 @@ FORMATS = {
     ".tga": "TARGA",
     ".bmp": "BMP",
 }
-# What formats can hold: alpha, and more than 8 bits.
+# Formats that hold alpha.
 WITH_ALPHA = {"PNG", "OPEN_EXR", "TIFF", "TARGA"}
-DEPTHS = {"PNG": "16", "TIFF": "16", "OPEN_EXR": "32"}
+# Bits per channel of formats that hold more than 8.
+DEPTHS = {"PNG": "16", "TIFF": "16", "OPEN_EXR": "32", "HDR": "32"}
 
 
 class ImageError(UserError):
-    """There is no such image, or it has no pixels."""
+    """An image that is missing, has no pixels, or cannot be read or written."""
 
 
-def picture_of(name: str) -> np.ndarray:
-    """Pixels (h,w,4) float32 of an image, the lowest row first.
+def named(name: str) -> bpy.types.Image:
+    """Find an image of the open session by its name.
 
     Raises
     ------
-    ImageError : no image of this name, or one without pixels
+    ImageError : there is none
     """
     image = bpy.data.images.get(name)
     if image is None:
         raise ImageError(f"There is no image {name!r}. Choose one, or leave it empty.")
+    return image
+
+
+def load(path: Path) -> bpy.types.Image:
+    """Load an image from a file.
+
+    Raises
+    ------
+    ImageError : there is no such file, or it is no image
+    """
+    if not path.is_file():
+        raise ImageError(f"{path}: there is no such file")
+    try:
+        with silence():
+            image = bpy.data.images.load(str(path.resolve()))
+            pixels_of(image)
+    except (RuntimeError, ImageError) as error:
+        raise ImageError(f"{path}: cannot be read as an image") from error
+    return image
+
+
+def pixels_of(image: bpy.types.Image) -> np.ndarray:
+    """Read the pixels (h,w,4) of an image as they are stored, in its own colour space.
+
+    Raises
+    ------
+    ImageError : it has none, for example because its file is missing, or other than four channels
+    """
     width, height = image.size
     if not width or not height:
-        raise ImageError(f"The image {name!r} has no pixels. Reload it, or choose another one.")
+        raise ImageError(f"The image {image.name!r} has no pixels. Reload it, or choose another one.")
     if image.channels != 4:
-        raise ImageError(f"The image {name!r} has {image.channels} channels. Convert it to RGBA.")
-    pixels = np.zeros(4 * width * height, np.float32)
-    image.pixels.foreach_get(pixels)
-    return pixels.reshape(height, width, 4)
+        raise ImageError(f"The image {image.name!r} has {image.channels} channels. Convert it to RGBA.")
+    values = np.empty(4 * width * height, np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(height, width, 4)
 
 
-def straight_alpha(name: str) -> bool:
+def has_straight_alpha(image: bpy.types.Image) -> bool:
     """Whether the colours of an image are not multiplied by its alpha. Those of floats are, whatever the file has."""
-    image = bpy.data.images[name]
     return image.alpha_mode == "STRAIGHT" and not image.is_float
 
 
-def write_copy(name: str, picture: np.ndarray) -> str:
-    """A new packed image like `name` with the picture (h,w,4) in it; its name."""
-    image = _copy(name, picture)
+def packed_image(name: str, pixels: np.ndarray, like: bpy.types.Image) -> bpy.types.Image:
+    """Make a packed image of the pixels (h,w,4), in colour space, depth and alpha like another."""
+    image = _new_image(name, pixels, like)
     image.pack()
-    return image.name
+    return image
 
 
-def save_copy(name: str, picture: np.ndarray, path: Path) -> None:
-    """Write the picture (h,w,4) to a file, in the format that its suffix names, as an image like `name`.
+def check_target(path: Path) -> None:
+    """Raise ImageError unless an image can be written to the path."""
+    if path.suffix.lower() not in FORMATS:
+        raise ImageError(f"{path}: unknown image format. Use one of {' '.join(FORMATS)}.")
+    if not path.resolve().parent.is_dir():
+        raise ImageError(f"{path}: there is no such folder")
 
-    Raises RuntimeError if it cannot be written.
+
+def save(path: Path, pixels: np.ndarray, like: bpy.types.Image) -> None:
+    """Write pixels (h,w,4) to a file in the format of its suffix, in colour space, depth and alpha like an image.
+
+    Raises
+    ------
+    ImageError : the file cannot be written
     """
-    image = _copy(name, picture)
-    kind = FORMATS[path.suffix.lower()]
+    check_target(path)
+    image = _new_image(path.stem, pixels, like)
+    file_format = FORMATS[path.suffix.lower()]
     try:
-        if image.is_float:
-            _render(image, path, kind)
-        else:
-            image.filepath_raw, image.file_format = str(path.resolve()), kind
-            image.save()
+        with silence():
+            if image.is_float:
+                _render(image, path, file_format)
+            else:
+                image.filepath_raw, image.file_format = str(path.resolve()), file_format
+                image.save()
+    except RuntimeError as error:
+        raise ImageError(f"{path}: {str(error).strip() or 'cannot be written'}") from error
     finally:
         bpy.data.images.remove(image)
 
 
-def _render(image: bpy.types.Image, path: Path, kind: str) -> None:
+def _render(image: bpy.types.Image, path: Path, file_format: str) -> None:
     """Write an image of floats with as many bits as the format has; `Image.save` would write 8."""
     scene = bpy.data.scenes.new("omt")
     try:
         scene.view_settings.view_transform = "Standard"
         settings = scene.render.image_settings
-        settings.file_format = kind
-        settings.color_mode = "RGBA" if kind in WITH_ALPHA else "RGB"
-        settings.color_depth = DEPTHS.get(kind, "8")
+        settings.file_format = file_format
+        settings.color_mode = "RGBA" if file_format in WITH_ALPHA else "RGB"
+        settings.color_depth = DEPTHS.get(file_format, "8")
         image.save_render(str(path.resolve()), scene=scene)
     finally:
         bpy.data.scenes.remove(scene)
 
 
-def _copy(name: str, picture: np.ndarray) -> bpy.types.Image:
-    old = bpy.data.images[name]
-    height, width = picture.shape[:2]
-    image = bpy.data.images.new(f"{name} warped", width, height, alpha=True, float_buffer=old.is_float)
-    if not old.is_float:
-        image.colorspace_settings.name, image.alpha_mode = old.colorspace_settings.name, old.alpha_mode
+def _new_image(name: str, pixels: np.ndarray, like: bpy.types.Image) -> bpy.types.Image:
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=like.is_float)
+    if not like.is_float:
+        image.colorspace_settings.name, image.alpha_mode = like.colorspace_settings.name, like.alpha_mode
     else:
         # Its pixels are linear, and multiplied by alpha, and are packed so, whatever the file had.
-        image.alpha_mode = "PREMUL" if old.alpha_mode == "STRAIGHT" else old.alpha_mode
-        if old.colorspace_settings.is_data:
-            image.colorspace_settings.name = old.colorspace_settings.name
-    image.pixels.foreach_set(np.ascontiguousarray(picture, np.float32).ravel())
+        image.alpha_mode = "PREMUL" if like.alpha_mode == "STRAIGHT" else like.alpha_mode
+        if like.colorspace_settings.is_data:
+            image.colorspace_settings.name = like.colorspace_settings.name
+    image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
     image.update()
     return image

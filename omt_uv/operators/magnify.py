@@ -101,7 +101,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         from ..blender import uv_packer as blender_pack
         from ..blender.seams import GroupError
         from ..blender.weights import ScoreError
-        from ..files.images import ImageError, picture_of, straight_alpha
+        from ..files import images
         from ..pipelines.layout import Refusal
         from ..pipelines.magnify import Region, magnify, warped_picture
         from ..session import run as running
@@ -111,9 +111,9 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         try:
             for obj, _ in pairs:
                 blender_mesh.check_target(obj.data, "")
-            picture = picture_of(self.image) if self.image and self.source == "UV" else None
+            picture = images.pixels_of(images.named(self.image)) if self.image and self.source == "UV" else None
             weights, warnings = self._weights(context, pairs)
-        except (blender_mesh.TargetError, GroupError, ImageError) as error:
+        except (blender_mesh.TargetError, GroupError, images.ImageError) as error:
             raise Complaint(str(error)) from error
         except ScoreError as error:
             raise Complaint(str(error), error.obj, error.error) from error
@@ -129,7 +129,9 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         except packing.PackingError as error:
             raise Complaint(str(error)) from error
         if picture is not None:
-            picture = warped_picture(picture, regions, result, self.margin, straight_alpha(self.image))
+            picture = warped_picture(
+                picture, regions, result, self.margin, images.has_straight_alpha(images.named(self.image))
+            )
         result = replace(result, warnings=[*warnings, *result.warnings])
         return [obj for obj, _ in pairs], result, picture
 
@@ -143,7 +145,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result) -> None:
         from ..blender import mesh as blender_mesh
-        from ..files.images import write_copy
+        from ..files import images
 
         objects, magnified, picture = result
         for obj, corners, uv in zip(objects, magnified.corners, magnified.uv, strict=True):
@@ -159,7 +161,8 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         warn(self, objects, magnified.warnings)
         text = shares.text()
         if picture is not None:
-            text += f"; the warped image is {write_copy(self.image, picture)!r}"
+            warped = images.packed_image(f"{self.image} warped", picture, images.named(self.image))
+            text += f"; the warped image is {warped.name!r}"
         self.report({"INFO"}, text)
 
 

@@ -100,13 +100,13 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
 
     def _pixels(self):
         """The pixels of the image to redraw, None without one."""
-        from ..files import panorama as blender_panorama
+        from ..files import images
 
         if not self.image:
             return None
         try:
-            return blender_panorama.pixels_of(blender_panorama.named(self.image))
-        except blender_panorama.ImageError as error:
+            return images.pixels_of(images.named(self.image))
+        except images.ImageError as error:
             raise Complaint(str(error)) from error
 
     def _markers(self, context: bpy.types.Context, objects: list) -> list:
@@ -124,7 +124,7 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result) -> None:
         from ..blender import mesh as blender_mesh
-        from ..files import panorama as blender_panorama
+        from ..files import images
 
         objects, globes, pixels = result
         # A layout of the whole globe cannot keep areas; the map to the sphere does.
@@ -134,8 +134,8 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
             layer = blender_mesh.target_layer(obj.data, self.uv_layer)
             blender_mesh.write_uv(obj, layer, corners, uv)
         if pixels is not None:
-            source = blender_panorama.named(self.image)
-            blender_panorama.make(f"{source.name} {self.projection.lower()}", pixels, source)
+            source = images.named(self.image)
+            images.packed_image(f"{source.name} {self.projection.lower()}", pixels, source)
         warn(self, objects, globes.warnings)
 
 
