@@ -16,7 +16,7 @@ import meshes
 import numpy as np
 from seams import cut_seams
 
-from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 

@@ -28,9 +28,9 @@ from cases import Table
 from omt_uv.solver.cutting.component import make_piece
 from omt_uv.solver.cutting.cut_graph import greedy_arcs
 from omt_uv.solver.cutting.cuts import cut
-from omt_uv.solver.mesh.charts import chosen_triangles, triangle_surface
 from omt_uv.solver.mesh.gluing import corner_classes
 from omt_uv.solver.mesh.repair import repaired_gluing
+from omt_uv.solver.mesh.surface import chosen_triangles, triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 
 MODELS = ["max_planck", "bunny_small", "spot", "homer", "cow", "bunny", "david", "armadillo", "stanford_bunny",

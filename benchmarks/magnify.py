@@ -16,8 +16,9 @@ from rivals import make_object, read_uv, remove_object
 
 from omt_uv.solver.analysis.density import from_vertices, region_share
 from omt_uv.solver.analysis.region_density import exact_density
-from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.progress import drain
 

@@ -11,9 +11,9 @@ import numpy as np
 from cases import Table, load_case, timed
 from rivals import make_object, remove_object
 
-from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.mesh.closest_point import ClosestPoint, spread_points
 from omt_uv.solver.mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import halfedges, pair_keys
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

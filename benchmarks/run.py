@@ -38,8 +38,9 @@ from scipy.spatial import ConvexHull
 from omt_uv.solver.conformal.disk_map import conformal_disk
 from omt_uv.solver.errors import MeshError
 from omt_uv.solver.maps.distortion import distortion
-from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import vertex_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.transport.convex_domain import Disk

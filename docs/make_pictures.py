@@ -29,7 +29,7 @@ from omt_uv.solver.analysis.density import mean_curvature_density
 from omt_uv.solver.globe.rotation import along_axes
 from omt_uv.solver.globe.unfolding import polygons_of, unfold
 from omt_uv.solver.maps.distortion import distortion, face_distortion
-from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing.initial.component_maps import Original
 from omt_uv.solver.remeshing.initial.disk_samples import STRATEGIES

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import UserError
 from ..pipelines.reading import Reading
 from ..solver.errors import MeshError, NonFiniteError
-from ..solver.mesh.charts import Surface
+from ..solver.mesh.surface import Surface
 from .versions import uv_values
 
 UV_LAYER_NAME = "UVMap"

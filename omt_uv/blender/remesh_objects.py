@@ -18,7 +18,7 @@ from ..settings import RemeshSettings
 from ..solver.analysis.density import from_polygons, from_vertices
 from ..solver.analysis.feature_edges import all_edges, sharp_edges
 from ..solver.errors import EmptyMeshError, MeshError
-from ..solver.mesh.charts import Surface
+from ..solver.mesh.surface import Surface
 from . import mesh as blender_mesh
 from .read_attributes import group_weights, read_attributes
 from .write_attributes import write_attributes

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..solver.analysis.feature_edges import all_edges, region_borders, value_jumps
-from ..solver.mesh.charts import Surface
+from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import pair_keys
 
 # UVs nearer than this share of their extent are the same.

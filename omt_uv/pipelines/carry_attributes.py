@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..solver.maps.local_untangle import straightened
-from ..solver.mesh.charts import Surface
 from ..solver.mesh.geometry import signed_areas
+from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import pair_keys
 from ..solver.transfer import interpolate as transfer
 from ..solver.transfer.correspondence import Correspondence

@@ -15,10 +15,10 @@ from ..solver.globe.exact_areas import equirectangular_areas, plane_areas, with_
 from ..solver.globe.projections import EQUIRECT
 from ..solver.globe.rotation import MarkerError, along_axes, by_markers
 from ..solver.globe.unfolding import Polygons, polygons_of, unfold
-from ..solver.mesh.charts import Surface, chosen_triangles
 from ..solver.mesh.geometry import face_areas
 from ..solver.mesh.gluing import groups
 from ..solver.mesh.spherical_geometry import spherical_areas
+from ..solver.mesh.surface import Surface, chosen_triangles
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.sphere.sphere_map import SphereMap, sphere_map
 from .layout import Refusal

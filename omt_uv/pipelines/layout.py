@@ -16,7 +16,8 @@ from ..settings import Settings
 from ..solver.analysis.density import Target
 from ..solver.errors import MeshError
 from ..solver.maps.overlap import overlap_share
-from ..solver.mesh.charts import Chart, Surface
+from ..solver.mesh.charts import Chart
+from ..solver.mesh.surface import Surface
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..xatlas import packing

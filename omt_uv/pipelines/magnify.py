@@ -27,8 +27,9 @@ from ..solver.editing.magnify import OUTLINES, Lens, aligned_to, magnify_region,
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, MeshError, WeightError
 from ..solver.maps.distortion import distortion
-from ..solver.mesh.charts import Surface, check_disk, triangle_rows
+from ..solver.mesh.charts import check_disk, triangle_rows
 from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.surface import Surface
 from ..solver.parameterization.chart_indices import located
 from ..solver.parameterization.chart_map import unwrap_chart
 from ..solver.parameterization.chart_pins import CornerPins

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..solver.mesh.charts import Surface
+from ..solver.mesh.surface import Surface
 from ..solver.parameterization.chart_pins import CornerPins
 
 

@@ -12,8 +12,9 @@ from ..solver.editing.refine_island import improve
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
 from ..solver.maps.distortion import distortion
-from ..solver.mesh.charts import Chart, Surface
+from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_edges
 from ..solver.parameterization.chart_indices import located, located_pins
 from ..solver.parameterization.chart_pins import ChartPins, CornerPins

@@ -19,10 +19,10 @@ from ..solver.analysis.density import (
 from ..solver.analysis.feature_edges import all_edges, within_resolution
 from ..solver.analysis.vertex_scores import areas, score, soft_weights
 from ..solver.errors import CountError, DensityError, MeshError
-from ..solver.mesh.charts import Surface, chosen_triangles
 from ..solver.mesh.geometry import face_areas
 from ..solver.mesh.gluing import orientations
 from ..solver.mesh.repair import repaired_gluing
+from ..solver.mesh.surface import Surface, chosen_triangles
 from ..solver.mesh.topology import halfedges
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.remeshing.initial.component_maps import Original

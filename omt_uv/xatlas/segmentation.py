@@ -7,7 +7,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import UserError
-from ..solver.mesh.charts import Surface, chosen_triangles
+from ..solver.mesh.surface import Surface, chosen_triangles
 from ..solver.mesh.topology import halfedges, pair_keys, pair_up
 
 # xatlas drops faces of meshes with small units.

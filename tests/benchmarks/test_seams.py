@@ -8,7 +8,8 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.surface import triangle_surface
 
 sys.path.insert(0, str(meshes.ROOT / "benchmarks"))
 

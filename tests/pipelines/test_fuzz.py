@@ -8,7 +8,7 @@ import pytest
 from broken_meshes import broken_mesh, broken_model
 
 from omt_uv.solver.errors import MeshError
-from omt_uv.solver.mesh.charts import Surface
+from omt_uv.solver.mesh.surface import Surface
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 

@@ -212,7 +212,7 @@ def torus(major=24, minor=12, radius=0.4):
 
 def polygon_surface(V, polygons, seams=()):
     """The `Surface` of a polygon mesh, polygons (lists of vertices) cut into fans of triangles."""
-    from omt_uv.solver.mesh.charts import Surface
+    from omt_uv.solver.mesh.surface import Surface
 
     sizes = np.array([len(p) for p in polygons], dtype=np.int64)
     start = np.concatenate([[0], np.cumsum(sizes)])

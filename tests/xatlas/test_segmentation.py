@@ -8,7 +8,7 @@ import pytest
 
 from omt_uv.solver.cutting.disk_charts import prepare
 from omt_uv.solver.errors import EmptyMeshError
-from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.xatlas.segmentation import chart_seams
 
 pytest.importorskip("xatlas")

@@ -7,8 +7,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..errors import EmptyMeshError, WeightError
-from ..mesh.charts import check_finite
 from ..mesh.geometry import vertex_areas
+from ..mesh.surface import check_finite
 from ..mesh.topology import halfedges, pair_keys, pair_up, previous_halfedge
 from . import curvature
 from .heat_means import HeatMeans

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ..mesh.charts import Surface, chosen_triangles, is_seam, is_sharp
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups, orientations, turn_over
 from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluing
+from ..mesh.surface import Surface, chosen_triangles, is_seam, is_sharp
 from ..mesh.topology import pair_keys
 from .component import NOISE, SEAM, SHARP, Kind, Piece, classify, edge_graph, fingerprint, make_piece, rim_loops
 from .cut_graph import greedy_arcs, path_to, shorten

@@ -7,17 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ZeroAreaFaceError
-from ..mesh.charts import (
-    Chart,
-    Surface,
-    charts_of,
-    check_disk,
-    check_edges,
-    chosen_triangles,
-    strict_charts,
-    strict_gluing,
-)
+from ..mesh.charts import Chart, charts_of, check_disk, check_edges, strict_charts
 from ..mesh.repair import repaired_gluing, with_area
+from ..mesh.surface import Surface, chosen_triangles, strict_gluing
 from .cuts import MOST_EXTREMITIES, Cuts, open_sheets, sieved
 from .hole_filling import fill_holes as fill_holes_of
 

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..mesh.charts import Surface
 from ..mesh.gluing import Gluing, components, corner_classes
+from ..mesh.surface import Surface
 from ..mesh.topology import halfedges
 from .component import NOISE
 

@@ -6,9 +6,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..mesh.charts import Chart, Surface, is_sharp
+from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import polygon_sides
+from ..mesh.surface import Surface, is_sharp
 from ..mesh.topology import boundary_loops, halfedges, pair_keys, twins
 from .component import AVOIDED, NOISE, SHARP
 

@@ -13,10 +13,11 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import FoldedUVError, NonManifoldEdgeError, OrientationError
 from ..maps.distortion import WELD
-from ..mesh.charts import Chart, Surface, charts_of, chosen_triangles
+from ..mesh.charts import Chart, charts_of
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import orientations, turn_over
 from ..mesh.repair import repaired_gluing, with_area
+from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import pair_keys
 
 

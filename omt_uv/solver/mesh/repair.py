@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import ZeroAreaFaceError
-from .charts import Chart, Surface, degenerate_triangles, duplicate_faces, is_seam
+from .charts import Chart
 from .gluing import Gluing, corner_classes, diagonal_pairs, polygon_sides
+from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam
 from .topology import halfedges, pair_keys, pair_up
 
 # Vertices of a triangle without area move by this share of the height of the flattest sound triangle around them:

@@ -6,7 +6,8 @@ import numpy as np
 
 from ..analysis.density import Target
 from ..errors import MeshError
-from ..mesh.charts import Chart, Surface, triangle_rows
+from ..mesh.charts import Chart, triangle_rows
+from ..mesh.surface import Surface
 from .chart_pins import ChartPins, CornerPins, chart_pins
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import PinError
-from ..mesh.charts import Chart, Surface
+from ..mesh.charts import Chart
+from ..mesh.surface import Surface
 from ..refinement.pins import Pins, aligned, check_pins
 
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..analysis.density import Target
 from ..maps.distortion import distortion
-from ..mesh.charts import Chart, Surface
+from ..mesh.charts import Chart
 from ..mesh.geometry import signed_areas
+from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops
 from ..refinement.continuation import QUALITIES
 from .chart_indices import chart_target

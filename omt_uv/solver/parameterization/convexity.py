@@ -21,8 +21,9 @@ from scipy.sparse.csgraph import connected_components
 
 from ..linalg.nested_dissection import vertex_graph
 from ..linalg.sparse import minimum_degree
-from ..mesh.charts import Chart, Surface
+from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops
 from ..refinement.boundary_barrier import crossings
 from .corner_solver import Mesh, Patches

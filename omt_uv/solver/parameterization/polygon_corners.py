@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.charts import Surface
+from ..mesh.surface import Surface
 
 # A corner counts where it has the share SHARP of its polygon's area on the surface, and is open where it has more
 # than the share OPEN of that in the map.

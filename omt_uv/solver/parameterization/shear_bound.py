@@ -11,8 +11,9 @@ from ..cutting.disk_charts import Prepared, prepare
 from ..cutting.hole_filling import MANY
 from ..cutting.shear_slit import slit
 from ..maps.distortion import face_distortion
-from ..mesh.charts import Chart, Surface
+from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas
+from ..mesh.surface import Surface
 from ..progress import Steps
 from .chart_map import ChartMap
 

@@ -10,7 +10,8 @@ from ..analysis.density import Target
 from ..cutting.disk_charts import prepare
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError
-from ..mesh.charts import Chart, Surface
+from ..mesh.charts import Chart
+from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
 from .chart_indices import chart_target, located, located_pins
 from .chart_map import ChartMap, unwrap_chart

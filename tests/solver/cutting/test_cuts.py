@@ -11,7 +11,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import prepare
-from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_pins import CornerPins
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

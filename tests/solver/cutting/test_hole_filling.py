@@ -9,8 +9,8 @@ from omt_uv.pipelines.unwrap import _connected_triangles
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import prepare
 from omt_uv.solver.errors import NotADiskError
-from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

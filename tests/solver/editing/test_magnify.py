@@ -12,8 +12,9 @@ from omt_uv.solver.editing.image_warp import warped
 from omt_uv.solver.editing.magnify import magnify_map, magnify_region
 from omt_uv.solver.errors import EmptyMeshError, FoldedUVError, WeightError
 from omt_uv.solver.maps.overlap import overlap_share
-from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas, vertex_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

@@ -13,8 +13,8 @@ from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, PinError
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary
-from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_edges, boundary_loops
 from omt_uv.solver.parameterization.chart_pins import CornerPins
 from omt_uv.solver.parameterization.unwrap import unwrap

@@ -12,8 +12,8 @@ from omt_uv.solver.errors import PrecisionError
 from omt_uv.solver.linalg import additive_schwarz as schwarz
 from omt_uv.solver.linalg.additive_schwarz import AdditiveSchwarz
 from omt_uv.solver.maps.energy import elements
-from omt_uv.solver.mesh.charts import triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

@@ -8,7 +8,7 @@ from scipy.sparse import csc_matrix, diags
 
 from omt_uv.solver.linalg.nested_dissection import Dissection
 from omt_uv.solver.linalg.sparse import Factor, minimum_degree
-from omt_uv.solver.mesh.charts import triangle_surface
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import halfedges
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import errors
-from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 
 

@@ -9,9 +9,9 @@ from omt_uv.solver import errors
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import prepare
 from omt_uv.solver.mesh import repair
-from omt_uv.solver.mesh.charts import degenerate_triangles, triangle_surface
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.gluing import corner_classes
+from omt_uv.solver.mesh.surface import degenerate_triangles, triangle_surface
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

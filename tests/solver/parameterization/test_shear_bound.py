@@ -6,7 +6,8 @@ import pytest
 
 from omt_uv.solver.cutting.disk_charts import prepare
 from omt_uv.solver.cutting.shear_slit import slit
-from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.parameterization.shear_bound import unwrap_within
 from omt_uv.solver.progress import drain

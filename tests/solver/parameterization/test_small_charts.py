@@ -7,8 +7,9 @@ import pytest
 from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.maps.distortion import distortion
-from omt_uv.solver.mesh.charts import triangle_rows, triangle_surface
+from omt_uv.solver.mesh.charts import triangle_rows
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import small_charts as batches
 from omt_uv.solver.parameterization.small_charts import MANY
 from omt_uv.solver.parameterization.unwrap import unwrap

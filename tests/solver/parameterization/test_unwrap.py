@@ -9,8 +9,9 @@ import pytest
 
 from omt_uv.solver import errors
 from omt_uv.solver.maps.distortion import distortion
-from omt_uv.solver.mesh.charts import strict_charts, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.parameterization.unwrap import unwrap

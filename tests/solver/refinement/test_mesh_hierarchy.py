@@ -7,8 +7,9 @@ import pytest
 from omt_uv.solver.analysis.density import Target, region_share
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.maps.energy import elements, energy
-from omt_uv.solver.mesh.charts import strict_charts, triangle_rows, triangle_surface
+from omt_uv.solver.mesh.charts import strict_charts, triangle_rows
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, twins
 from omt_uv.solver.parameterization.initial_map import COARSE_ABOVE, mean_value_sites
 from omt_uv.solver.parameterization.unwrap import unwrap

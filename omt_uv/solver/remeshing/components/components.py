@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import OrientationError, ZeroAreaFaceError
-from ...mesh.charts import Chart, charts_of, chosen_triangles, triangle_surface
+from ...mesh.charts import Chart, charts_of
 from ...mesh.geometry import face_areas
 from ...mesh.gluing import orientations, turn_over
 from ...mesh.repair import repaired_gluing
+from ...mesh.surface import chosen_triangles, triangle_surface
 from ...mesh.topology import halfedges, pair_keys, twins
 from .coincident_boundaries import join_touching
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...cutting.disk_charts import prepare
 from ...errors import MeshError
-from ...mesh.charts import Chart, triangle_surface
+from ...mesh.charts import Chart
+from ...mesh.surface import triangle_surface
 from ...progress import Steps, part_of
 from ...sphere.conformal import ConformalSphere, conformal_sphere
 from ..components.component_batch import piled

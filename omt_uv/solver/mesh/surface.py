@@ -1,0 +1,168 @@
+"""Check a polygon surface, and glue its triangles across every edge that is no seam.
+
+What is wrong with a surface is an error that names the elements: nothing is repaired here, see `repair.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import (
+    DuplicateFaceError,
+    EmptyMeshError,
+    NonFiniteError,
+    NonManifoldEdgeError,
+    OrientationError,
+    ZeroAreaFaceError,
+)
+from .gluing import Gluing, diagonal_pairs, polygon_sides
+from .topology import pair_keys, pair_up
+
+# A triangle whose area is below this share of its longest side squared is a line.
+DEGENERATE = 1e-10
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A polygon mesh as arrays; a corner is a vertex of one polygon.
+
+    positions (n,3), corner_vertex (c,), face_start (f+1,) so that polygon f owns the corners
+    face_start[f]:face_start[f+1], triangles (m,3) of corners, triangle_face (m,), seams (k,2) vertex pairs,
+    sharp (k,2) vertex pairs of edges that are marked sharp, where cuts are welcome.
+    """
+
+    positions: np.ndarray
+    corner_vertex: np.ndarray
+    face_start: np.ndarray
+    triangles: np.ndarray
+    triangle_face: np.ndarray
+    seams: np.ndarray
+    sharp: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+
+
+def triangle_surface(positions: np.ndarray, triangles: np.ndarray, seams=()) -> Surface:
+    """The surface of a triangle mesh: positions (n,3), triangles (m,3), seams (k,2)."""
+    triangles = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
+    m = len(triangles)
+    corners = np.arange(3 * m).reshape(m, 3)
+    seams = np.asarray(seams, dtype=np.int64).reshape(-1, 2)
+    return Surface(
+        np.asarray(positions, dtype=float), triangles.ravel(), 3 * np.arange(m + 1), corners, np.arange(m), seams
+    )
+
+
+def strict_gluing(surface: Surface, faces: np.ndarray | None = None) -> Gluing:
+    """The triangles of sound polygons, joined across every edge that is no seam; raises what `strict_charts` raises."""
+    faces, triangles, owner = chosen_triangles(surface, faces)
+    _check_areas(surface, triangles, owner)
+    duplicates = duplicate_faces(surface, faces)
+    if len(duplicates):
+        raise DuplicateFaceError(
+            "Faces share all their vertices with another face", kind="face", elements=duplicates[:, 0]
+        )
+    return _joined(surface, triangles, owner)
+
+
+def chosen_triangles(surface: Surface, faces: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The polygons (f,) bool, their triangles (m,3) of corners, and the polygon (m,) of each.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError : nothing to unwrap, or not anywhere
+    """
+    if faces is None:
+        faces = np.ones(len(surface.face_start) - 1, dtype=bool)
+    faces = np.asarray(faces, dtype=bool)
+    chosen = faces[surface.triangle_face]
+    triangles, owner = surface.triangles[chosen], surface.triangle_face[chosen]
+    if len(triangles) == 0:
+        raise EmptyMeshError("There are no faces to unwrap")
+    check_finite(surface.positions, surface.corner_vertex[triangles])
+    return faces, triangles, owner
+
+
+def check_finite(positions: np.ndarray, triangles: np.ndarray) -> None:
+    """Raise NonFiniteError unless the vertices of triangles (m,3) are somewhere."""
+    used = np.unique(triangles)
+    wrong = used[~np.isfinite(positions[used]).all(axis=1)]
+    if len(wrong):
+        raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
+
+
+def degenerate_triangles(positions: np.ndarray, triangles: np.ndarray, flat: float = DEGENERATE) -> np.ndarray:
+    """Triangles (m,3) of positions (n,3) that are a line or a point next to the extent of them all, (m,) bool.
+
+    flat : share of the square of its longest side that the area of a line does not exceed
+    """
+    p = positions[triangles]
+    # Halves: the difference of two huge numbers may be infinite.
+    side = p / 2 - p[:, :1] / 2
+    size = np.abs(side).max(axis=(1, 2))
+    # Scaling first keeps tiny and huge meshes clear of underflow and overflow.
+    side = side / np.where(size > 0, size, 1)[:, None, None]
+    area = 0.5 * np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1)
+    extent = np.ptp(p.reshape(-1, 3) / 2, axis=0).max()
+    return (area <= flat) | (size <= 1e-9 * extent)
+
+
+def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> None:
+    wrong = degenerate_triangles(surface.positions, surface.corner_vertex[triangles])
+    if wrong.any():
+        raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(owner[wrong]))
+
+
+def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
+    """Polygons on the same set of vertices as another: rows (k,2) of polygon and its number among its likes."""
+    size = np.diff(surface.face_start)
+    rows = [np.zeros((0, 2), np.int64)]
+    for s in np.unique(size[faces]):
+        index = np.flatnonzero(faces & (size == s))
+        vertices = np.sort(surface.corner_vertex[surface.face_start[index][:, None] + np.arange(s)], axis=1)
+        _, inverse, count = np.unique(vertices, axis=0, return_inverse=True, return_counts=True)
+        inverse = inverse.ravel()
+        order = np.argsort(inverse, kind="stable")
+        number = np.zeros(len(index), np.int64)
+        number[order] = np.arange(len(index)) - (np.cumsum(count) - count)[inverse[order]]
+        twice = count[inverse] > 1
+        rows.append(np.stack([index[twice], number[twice]], axis=1))
+    return np.concatenate(rows)
+
+
+def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Gluing:
+    """Triangles joined across every edge that is no seam; what cannot be joined is an error."""
+    side = polygon_sides(len(surface.corner_vertex), surface.face_start, triangles)
+    gluing = Gluing(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
+    sides = np.flatnonzero(side)
+    a, b = gluing.ends(sides)
+    key = pair_keys(a, b)
+    keep = ~is_seam(surface, key)
+    sides, key, a, b = sides[keep], key[keep], a[keep], b[keep]
+    _, index, count = np.unique(key, return_index=True, return_counts=True)
+    if (count > 2).any():
+        h = index[count > 2]
+        raise NonManifoldEdgeError(
+            "More than two faces meet at an edge", kind="edge", elements=np.stack([a[h], b[h]], axis=1)
+        )
+    first, second = pair_up(key)
+    wrong = first[a[first] == a[second]]
+    if len(wrong):
+        raise OrientationError(
+            "Neighbouring faces point to opposite sides", kind="edge", elements=np.stack([a[wrong], b[wrong]], axis=1)
+        )
+    return replace(
+        gluing,
+        first=np.concatenate([gluing.first, sides[first]]),
+        second=np.concatenate([gluing.second, sides[second]]),
+    )
+
+
+def is_seam(surface: Surface, key: np.ndarray) -> np.ndarray:
+    """Whether edges, given by `topology.pair_keys` of their vertices, are seams; (k,) bool."""
+    return np.isin(key, pair_keys(surface.seams[:, 0], surface.seams[:, 1]))
+
+
+def is_sharp(surface: Surface, key: np.ndarray) -> np.ndarray:
+    """Whether edges, given by `topology.pair_keys` of their vertices, are marked sharp; (k,) bool."""
+    return np.isin(key, pair_keys(surface.sharp[:, 0], surface.sharp[:, 1]))
