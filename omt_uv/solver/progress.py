@@ -7,7 +7,9 @@ operator, which steps the generator from a timer and closes it to cancel.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Generator
+import time
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeAlias, TypeVar
 
@@ -82,3 +84,20 @@ def aside(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
     if errors:
         raise errors[0]
     return results[0]
+
+
+class RunLog:
+    """What happened in a run of a solver: warnings, and seconds per stage."""
+
+    def __init__(self):
+        self.warnings: list[str] = []
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Context that adds the seconds spent in it to those of a stage, also when it ends in an error."""
+        begin = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin

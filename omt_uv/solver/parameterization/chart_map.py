@@ -16,13 +16,13 @@ from ..maps.distortion import distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_loops
-from ..progress import Steps, part_of
+from ..progress import RunLog, Steps, part_of
 from ..refinement.continuation import QUALITIES
 from ..refinement.initial_maps import unroll
 from ..refinement.refine import BOUNDARIES, Refinement, RefinementOptions, refine
 from ..transport.convex_domain import Disk, Domain, Rectangle
 from .chart_pins import ChartPins, anchored, facing, refuse_outline
-from .initial_map import COARSE_ABOVE, FirstMap, Log, coarse_first_map, first_map, mean_value_sites
+from .initial_map import COARSE_ABOVE, FirstMap, coarse_first_map, first_map, mean_value_sites
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 FIRST, REFINEMENT = (0.0, 0.4), (0.4, 0.6)
@@ -93,7 +93,7 @@ def unwrap_chart(
     if boundary not in BOUNDARIES:
         raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
     refuse_outline(pins, boundary)
-    log = Log()
+    log = RunLog()
     vertices, unit = in_unit_box(chart.vertices)
     # Patches over holes are mapped with the rest, and forgotten afterwards.
     triangles = chart.disk
@@ -143,7 +143,7 @@ def unwrap_chart(
 
 
 def _first_map(
-    vertices, triangles, target, region, loop, corners, domain: Domain, boundary: str, balance: float, log: Log
+    vertices, triangles, target, region, loop, corners, domain: Domain, boundary: str, balance: float, log: RunLog
 ) -> Steps[FirstMap]:
     """Where the refinement starts; a flat chart with a free boundary is unrolled, large ones come by way of coarser."""
     if boundary == "free":
@@ -161,7 +161,7 @@ def _first_map(
     return (yield from first_map(vertices, triangles, target, loop, corners, domain, log))
 
 
-def _refined(vertices, triangles, uv, options: RefinementOptions, target: dict, log: Log) -> Steps[Refinement]:
+def _refined(vertices, triangles, uv, options: RefinementOptions, target: dict, log: RunLog) -> Steps[Refinement]:
     """The refined map, with a free boundary where the domain asked for leaves faces folded.
 
     target: target, region and pins of `refine`

@@ -6,9 +6,6 @@ do. Coarsening goes on until the chart is small.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +18,7 @@ from ..maps.energy import elements
 from ..maps.tutte import arc_length_parameters, tutte
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
-from ..progress import Steps, part_of
+from ..progress import RunLog, Steps, part_of
 from ..refinement.initial_maps import is_far
 from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import RefinementOptions, refine
@@ -67,7 +64,7 @@ class FirstMap:
 
 
 def coarse_first_map(
-    vertices, triangles, target, loop, corners, boundary: str, balance, log: Log, flat=None, region=None
+    vertices, triangles, target, loop, corners, boundary: str, balance, log: RunLog, flat=None, region=None
 ) -> Steps[FirstMap | None]:
     """A first map by way of a coarser mesh; None where the mesh cannot be coarsened, or where that does not pay.
 
@@ -128,7 +125,7 @@ def _density(vertices, triangles, target, goal: int) -> np.ndarray:
     return has / all_of_it
 
 
-def first_map(vertices, triangles, target, loop, corners, domain: Domain, log: Log) -> Steps[FirstMap]:
+def first_map(vertices, triangles, target, loop, corners, domain: Domain, log: RunLog) -> Steps[FirstMap]:
     """Conformal map and transport to the areas target (m,) of a disk (n,3), (m,3) with its boundary loop (b,).
 
     The conformal map moved by the transport; where rounding decides where its points lie, a mean value map so moved.
@@ -149,7 +146,7 @@ def first_map(vertices, triangles, target, loop, corners, domain: Domain, log: L
     return FirstMap(conformal, cells, centroid_map(cells, domain, loop, corners, log.warnings))
 
 
-def _conformal_sites(vertices, triangles, corners, log: Log):
+def _conformal_sites(vertices, triangles, corners, log: RunLog):
     """Conformal map, its coordinates (n,2) in the domain, and why they cannot be used or an empty text."""
     with log.timed("conformal"):
         try:
@@ -180,7 +177,7 @@ def _centred(sites: np.ndarray, mass: np.ndarray, triangles: np.ndarray, loop: n
     return centred if halfedge_lengths(centred, triangles).min() >= SITE_RESOLUTION else sites
 
 
-def _transport(sites, mass, domain: Domain, log: Log):
+def _transport(sites, mass, domain: Domain, log: RunLog):
     """The transport, or None and why there is none."""
     with log.timed("transport"):
         try:
@@ -234,20 +231,3 @@ def _into_corners(domain: Domain, loop, along, corners) -> tuple[np.ndarray, np.
     place = np.flatnonzero(np.isin(loop, corners))
     ends = np.append(along[place], along[0] + domain.period)
     return loop, np.interp(along, ends, domain.period * np.arange(5) / 4)
-
-
-class Log:
-    """What happened to one chart: warnings, and seconds per stage."""
-
-    def __init__(self):
-        self.warnings: list[str] = []
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        """Context that adds the seconds spent in it to those of a stage, also when it ends in an error."""
-        begin = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begin
