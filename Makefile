@@ -11,7 +11,7 @@ test: $(STAMP)
 	$(PY) -m pytest
 
 demo: $(STAMP)
-	$(PY) benchmarks/demo.py
+	$(PY) scripts/pictures/demo.py
 
 check: $(STAMP)
 	$(PY) -m ruff check .
@@ -22,10 +22,10 @@ bench: $(STAMP)
 	$(PY) benchmarks/run.py
 
 extension: $(STAMP)
-	$(PY) scripts/build_extension.py
+	$(PY) scripts/release/build_extension.py
 
 matrix: $(STAMP)
-	$(PY) scripts/matrix.py
+	$(PY) scripts/release/matrix.py
 
 gui: $(STAMP)
 	OMT_UV_GUI=1 $(PY) -m pytest tests/gui
@@ -35,7 +35,7 @@ venv: $(STAMP)
 $(STAMP): requirements.txt requirements-dev.txt
 	@$(PY) -c "" 2>/dev/null || { \
 	    python="$(PYTHON)"; \
-	    [ -n "$$python" ] || python=$$(scripts/find_python.sh) || exit 1; \
+	    [ -n "$$python" ] || python=$$(scripts/release/find_python.sh) || exit 1; \
 	    echo "Setting up $(VENV) with $$python"; \
 	    "$$python" -m venv --clear $(VENV); }
 	$(PY) -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt

@@ -1,27 +1,21 @@
-"""What every benchmark shares: where the modules and models are, the cases, and tables."""
+"""Load what every benchmark works on: a mesh, with the seams that make it one disk; and unwrap it by our pipeline."""
 
 from __future__ import annotations
 
-import os
-import sys
-import time
 from dataclasses import dataclass
-from pathlib import Path
-
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # processor time is only comparable when one thread does the work
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 import meshes
 import numpy as np
-from seams import cut_seams
 
+from benchmarks.seams import cut_seams
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
 CUT_MODELS = ["max_planck", "spot", "homer", "bunny", "stanford_bunny", "armadillo"]
 MODELS = meshes.DISK_MODELS + CUT_MODELS
+# Where no model is at hand.
+STAND_INS = ["bumpy", "hemisphere", "comb", "head", "icosphere"]
 
 
 @dataclass(frozen=True)
@@ -44,17 +38,10 @@ def load_case(name: str) -> Case:
 
 
 def available(names=None) -> list[str]:
-    """The names asked for, by default all models at hand, or procedural stand-ins where there are none."""
+    """The names asked for, by default all models at hand, or procedural stand-ins where there is none."""
     if names:
         return list(names)
-    return [n for n in MODELS if meshes.model_path(n)] or ["bumpy", "hemisphere", "comb", "head", "icosphere"]
-
-
-def timed(work):
-    """The result of `work()` and its processor seconds."""
-    start = time.process_time()
-    result = work()
-    return result, time.process_time() - start
+    return [n for n in MODELS if meshes.model_path(n)] or STAND_INS
 
 
 def our_uv(case: Case, boundary, quality, balance=0.0):
@@ -65,29 +52,3 @@ def our_uv(case: Case, boundary, quality, balance=0.0):
     full = np.zeros((3 * len(case.F), 2))
     full[corners] = uv
     return full.reshape(-1, 3, 2), result
-
-
-class Table:
-    """Rows printed as they come, and written as TSV at the end."""
-
-    def __init__(self, title: str, columns: dict[str, int]):
-        self.columns, self.rows = columns, []
-        print(f"\n{title}\n" + self._line(columns), flush=True)
-
-    def add(self, **row):
-        self.rows.append([_text(row.get(c, "")) for c in self.columns])
-        print(self._line(self.rows[-1]), flush=True)
-
-    def _line(self, cells):
-        return "  ".join(
-            cell.ljust(w) if w > 14 else cell.rjust(w) for cell, w in zip(cells, self.columns.values(), strict=True)
-        ).rstrip()
-
-    def write(self, path: Path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("\n".join("\t".join(r) for r in [list(self.columns), *self.rows]) + "\n")
-        print(f"written to {path}")
-
-
-def _text(value):
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""One fixed seam per model, so that every unwrap is given the same chart.
+"""Cut one fixed seam per model, so that every unwrap is given the same chart.
 
 A closed surface of genus 0 is cut along a tree of shortest edge paths through a few extremities, found by
 farthest-point sampling on the edge graph; boundary loops are joined into the tree first. The result is one disk.
@@ -23,7 +23,7 @@ def cut_seams(V, F, extremities=EXTREMITIES):
         return np.empty((0, 2), np.int64)
     seams, tree = [], set(loops[0].tolist()) if loops else set()
     waiting = loops[1:]
-    while waiting:  # nearest loop first, or a path could run along the rim of another one and pinch it
+    while waiting:  # nearest loop first, or a path could run along the boundary of another one and pinch it
         distance, before = _from_set(graph, tree)
         nearest = min(range(len(waiting)), key=lambda i: distance[waiting[i]].min())
         loop = waiting.pop(nearest)
@@ -46,10 +46,12 @@ def _edge_graph(V, F):
     i, j = edges.T
     length = np.linalg.norm(V[i] - V[j], axis=1)
     graph = csr_matrix((np.tile(length, 2), (np.concatenate([i, j]), np.concatenate([j, i]))), shape=(len(V),) * 2)
-    rim = edges[uses == 1]
-    _, label = connected_components(csr_matrix((np.ones(len(rim)), rim.T), shape=(len(V),) * 2), directed=False)
-    on_boundary = np.unique(rim)
-    return graph, [on_boundary[label[on_boundary] == k] for k in np.unique(label[on_boundary])]
+    boundary = edges[uses == 1]
+    _, label = connected_components(
+        csr_matrix((np.ones(len(boundary)), boundary.T), shape=(len(V),) * 2), directed=False
+    )
+    used = np.unique(boundary)
+    return graph, [used[label[used] == k] for k in np.unique(label[used])]
 
 
 def _farthest_points(graph, used, count):

@@ -1,4 +1,4 @@
-"""How long Blender waits for a run: the longest slice between two looks at the keyboard, and what cancelling takes.
+"""Measure how long Blender waits for a run: the longest slice between two looks at the keyboard, and cancelling.
 
 `slice` and `cancel` are wall-clock milliseconds, which other jobs on the machine lengthen; `working` and `writing` are
 those that the main thread itself worked. The last slice writes and measures: it cannot be cancelled, and stands apart.
@@ -11,17 +11,26 @@ import types
 
 import bpy
 
+import meshes
 import numpy as np
-from cases import Table, meshes
+import scenes
 
-SIZES = (100, 224, 316)
-SLICE_GOAL, CANCEL_GOAL, LIVE_GOAL = 200.0, 300.0, 300.0
+from benchmarks.part import Option, Part
+from benchmarks.tables import Table, missed
+
+SIZES = Option("sizes", (100, 224, 316), "heads of N * N vertices", {"nargs": "+", "type": int, "metavar": "N"})
+SLICE_GOAL = 200.0  # milliseconds, up to the second of the sizes
+CANCEL_GOAL = 300.0  # milliseconds
+LIVE_GOAL = 300.0  # milliseconds of work, at the first of the sizes
+CANCELLED = 4  # times, at moments spread over a run
+SETTLING = 0.5  # seconds in which a solver that was thrown away ends in the background
 OPERATORS = ("uv.omt_unwrap", "uv.omt_refine", "uv.omt_seams")
 TIMER = types.SimpleNamespace(type="TIMER", value="NOTHING")
 ESCAPE = types.SimpleNamespace(type="ESC", value="PRESS")
 
 
-def latency_part(args):
+def latency_table(args) -> Table:
+    """One row for every size, mode and operator."""
     from omt_uv import registration
 
     table = Table(
@@ -31,7 +40,7 @@ def latency_part(args):
     )
     registration.register()
     try:
-        for size in args.sizes or SIZES:
+        for size in args.sizes:
             for mode in ("OBJECT", "EDIT"):
                 for name in OPERATORS:
                     _add(table, size, mode, name)
@@ -42,8 +51,7 @@ def latency_part(args):
 
 
 def _add(table, size, mode, name):
-    import scenes
-
+    """The row of an operator."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     V, F = meshes.head(size)
     obj = scenes.add(V, F)
@@ -61,7 +69,7 @@ def _add(table, size, mode, name):
     longest = max(during, default=(0.0, 0.0, ""))
     worked = max((own for _, own, _ in during), default=0.0)
     cancel = longest[0] + _cancelling(scenes.stand_in(name), seconds)
-    missed = ["slice"] * (longest[1] > SLICE_GOAL and size <= 224) + ["cancel"] * (cancel > CANCEL_GOAL)
+    goals = {"slice": longest[1] > SLICE_GOAL and size <= SIZES.default[1], "cancel": cancel > CANCEL_GOAL}
     table.add(
         vertices=len(V),
         operator=name,
@@ -72,7 +80,8 @@ def _add(table, size, mode, name):
         working=worked,
         writing=writing,
         cancel=cancel,
-        **{"longest slice in": longest[2], "missed goals": ", ".join(missed)},
+        **{"longest slice in": longest[2]},
+        **missed(**goals),
     )
     if mode == "EDIT":
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -80,8 +89,6 @@ def _add(table, size, mode, name):
 
 def _add_live(table, size, mode):
     """The slider dragged from area to angle in steps of a twentieth: the longest wait for the UVs to follow one."""
-    import scenes
-
     from omt_uv import operators
     from omt_uv.session import live as following
 
@@ -106,7 +113,7 @@ def _add_live(table, size, mode):
         slice=max(waits),
         working=max(works),
         cancel=max(waits),
-        **{"missed goals": "live" if size <= 100 and max(works) > LIVE_GOAL else ""},
+        **missed(live=size <= SIZES.default[0] and max(works) > LIVE_GOAL),
     )
     if mode == "EDIT":
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -127,17 +134,22 @@ def _slices(operator):
     return found
 
 
-def _cancelling(operator, seconds, tries=4):
+def _cancelling(operator, seconds):
     """The most milliseconds that the answer to Esc takes, at moments spread over a run of so many seconds."""
     most = 0.0
-    for k in range(tries):
+    for k in range(CANCELLED):
         begin = time.perf_counter()
         state = operator.start(bpy.context)
-        while "RUNNING_MODAL" in state and time.perf_counter() - begin < seconds * k / tries:
+        while "RUNNING_MODAL" in state and time.perf_counter() - begin < seconds * k / CANCELLED:
             state = operator.modal(bpy.context, TIMER)
         if "RUNNING_MODAL" in state:
             begin = time.perf_counter()
             operator.modal(bpy.context, ESCAPE)
             most = max(most, 1e3 * (time.perf_counter() - begin))
-            time.sleep(0.5)  # the solver that was thrown away ends in the background
+            time.sleep(SETTLING)
     return most
+
+
+PARTS = (
+    Part("latency", "how long Blender waits for a slice of a run and for Esc, wall clock", latency_table, (SIZES,)),
+)

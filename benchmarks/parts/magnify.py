@@ -1,7 +1,6 @@
-"""Magnification from the mesh: the share that a painted region gets, beside Blender's Minimum Stretch with the same
-vertex group.
+"""Magnify a painted region in an unwrap, beside Blender's Minimum Stretch with the same vertex group.
 
-The region is a geodesic ball of 5 % of the surface about a random vertex, with a soft rim.
+The region is a geodesic ball of 5 % of the surface about a random vertex, with a soft border.
 """
 
 from __future__ import annotations
@@ -10,10 +9,12 @@ import time
 
 import bpy
 
-from cases import Table, load_case, timed
-from regions import areas, ball, figures
-from rivals import make_object, read_uv, remove_object
-
+from benchmarks.cases import load_case
+from benchmarks.part import BOUNDARY, MODELS, Part
+from benchmarks.regions import areas, ball, figures, missed_by
+from benchmarks.rivals import make_object, read_uv, remove_object
+from benchmarks.tables import Table
+from benchmarks.timing import fastest_of
 from omt_uv.solver.analysis.density import from_vertices, region_share
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.mesh.charts import strict_charts
@@ -22,39 +23,30 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_map import unwrap_chart
 from omt_uv.solver.progress import drain
 
-MODELS = ["lion", "max_planck", "face"]
-FACTORS = [0.25, 2.0, 4.0, 16.0]
-RIVAL_FACTORS = [1.0, 4.0, 16.0]
-# What a magnification should reach.
-SHARE_GOAL, AREA_GOAL, OVERLAP_GOAL, TIME_GOAL = 5e-3, 0.02, 1e-4, 1.3
-# Of twice by 2 against once by 4: share, and distance of corresponding points over the domain's width.
-CASCADE_GOAL = 0.02
-RUNS = 2
+DEFAULT_MODELS = ("lion", "max_planck", "face")
+FACTORS = (0.25, 2.0, 4.0, 16.0)
+RIVAL_FACTORS = (1.0, 4.0, 16.0)
+REPEATS = 2
 
 
-def magnify_part(args):
+def magnify_table(args) -> Table:
+    """One row for every model and factor, of the rival and of ours by boundary."""
     table = Table(
-        "Share of a region against the share asked; area errors against the density; ratio = time / plain unwrap",
-        {"model": 15, "method": 24, "before": 8, "asked": 8, "share": 8, "error": 10, "area_l1": 9, "region": 9}
+        "Share of a region against the target share; area errors against the density; ratio = time / plain unwrap",
+        {"model": 15, "method": 24, "before": 8, "target": 8, "share": 8, "error": 10, "area_l1": 9, "region": 9}
         | {"context": 9, "shear": 7, "folds": 5, "overlap": 8, "time": 8, "ratio": 7, "missed goals": 20},
     )
-    for name in args.models or MODELS:
+    for name in args.models or DEFAULT_MODELS:
         case = load_case(name)
         weights = ball(case.V, case.F)
         for factor in RIVAL_FACTORS:
             _rival(table, case, weights, factor)
         (chart,) = strict_charts(triangle_surface(case.V, case.F, case.seams))
         for boundary in args.boundaries:
-            _, plain = fastest(lambda b=boundary, c=chart: drain(unwrap_chart(c, boundary=b)))
+            _, plain = fastest_of(REPEATS, lambda b=boundary, c=chart: drain(unwrap_chart(c, boundary=b)))
             for factor in FACTORS:
                 _ours(table, case.name, chart, weights[chart.vertex_ids], factor, boundary, plain)
     return table
-
-
-def fastest(work):
-    """The result of `work()`, and the least of its times in a few runs."""
-    result, seconds = timed(work)
-    return result, min([seconds, *(timed(work)[1] for _ in range(RUNS - 1))])
 
 
 def _ours(table, name, chart, weights, factor, boundary, plain):
@@ -62,35 +54,21 @@ def _ours(table, name, chart, weights, factor, boundary, plain):
     area, w = face_areas(chart.vertices, F), from_vertices(weights, F)
     found = exact_density(w, area, factor)
     options = {"boundary": boundary, "density": found.density * (area.sum() / (area @ found.density)), "region": w}
-    result, seconds = fastest(lambda: drain(unwrap_chart(chart, **options)))
+    result, seconds = fastest_of(REPEATS, lambda: drain(unwrap_chart(chart, **options)))
     has = figures(chart.vertices, F, result.uv[F], found.density, w)
     off = has.share / found.target_share - 1
     table.add(
         model=name,
         method=f"ours {factor:g} x {boundary}",
         before=found.share_before,
-        asked=found.target_share,
+        target=found.target_share,
         error=off,
         **vars(has),
         shear=result.angle_mean,
         time=seconds,
         ratio=seconds / plain,
-        **{"missed goals": missed(has, off, seconds / plain)},
+        **missed_by(has, off, seconds / plain),
     )
-
-
-def missed(has, off, ratio, cascade=0.0) -> str:
-    """Names of the goals that figures miss, with the relative error of the share, the time over that of a plain unwrap,
-    and what twice differs by from once."""
-    goals = {
-        "share": abs(off) > SHARE_GOAL,
-        "area": max(has.area_l1, has.region, has.context) > AREA_GOAL,
-        "folds": has.folds,
-        "overlap": has.overlap > OVERLAP_GOAL,
-        "cascade": cascade > CASCADE_GOAL,
-        "time": ratio > TIME_GOAL,
-    }
-    return ", ".join(goal for goal, wrong in goals.items() if wrong)
 
 
 def _rival(table, case, weights, factor):
@@ -128,3 +106,9 @@ def _rival(table, case, weights, factor):
         overlap=has.overlap,
         time=seconds,
     )
+
+
+PARTS = (
+    Part("magnify", "the share that a painted region gets, and Minimum Stretch with the same vertex group",
+         magnify_table, (MODELS, BOUNDARY)),
+)  # fmt: skip

@@ -1,4 +1,4 @@
-"""Remeshing to 5,000 vertices beside Blender's QuadriFlow and Decimate, and the four strategies of B. Gu 2018.
+"""Remesh to 5,000 vertices, beside Blender's QuadriFlow and Decimate, and by the four strategies of B. Gu 2018.
 
 Shapes are of triangles, quads cut along a diagonal. Distances are both ways, in shares of the box's diagonal.
 """
@@ -8,9 +8,12 @@ from __future__ import annotations
 import bpy
 
 import numpy as np
-from cases import Table, load_case, timed
-from rivals import make_object, remove_object
 
+from benchmarks.cases import load_case
+from benchmarks.part import MODELS, Part
+from benchmarks.rivals import make_object, remove_object
+from benchmarks.tables import Table, missed
+from benchmarks.timing import timed
 from omt_uv.solver.mesh.closest_point import ClosestPoint, spread_points
 from omt_uv.solver.mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -21,10 +24,15 @@ from omt_uv.solver.remeshing.initial.component_maps import Original
 from omt_uv.solver.remeshing.initial.disk_samples import STRATEGIES
 from omt_uv.solver.remeshing.remesh import remesh
 
-MODELS = ["lion", "face", "max_planck", "rocker_arm"]
-COUNT = 5000
+DEFAULT_MODELS = ("lion", "face", "max_planck", "rocker_arm")
+VERTEX_COUNT = 5000
 # What our meshes should reach.
-ANGLE_GOAL, THIN_GOAL, EDGE_GOAL, TIME_GOAL = 39.0, 0.1, 0.10, 3.0
+ANGLE_GOAL = 39.0  # degrees that 99 of 100 triangles' smallest angles have at least
+BELOW_30_GOAL = 0.1  # per cent of triangles
+EDGE_GOAL = 0.10  # standard deviation of lengths over their mean
+TIME_GOAL = 3.0  # times the time of our unwrap
+POINTS_AN_EDGE = 3  # of the new mesh: how dense the points are whose distances are taken
+STRATEGY_FIGURES = ("angle_p1", "edge_cv", "area_cv")
 
 
 def shape(V, F):
@@ -44,10 +52,10 @@ def shape(V, F):
 
 def distances(V, F, W, G):
     """Largest and root mean square distance of two meshes, over the diagonal of the first."""
-    spacing = np.sqrt(face_areas(V, F).sum() / COUNT)
+    spacing = np.sqrt(face_areas(V, F).sum() / VERTEX_COUNT)
     largest, squares = [], []
     for source, target in (((V, F), (W, G)), ((W, G), (V, F))):
-        owner, points = spread_points(*source, spacing / 3)
+        owner, points = spread_points(*source, spacing / POINTS_AN_EDGE)
         weight = (face_areas(*source) / np.bincount(owner, minlength=len(source[1])))[owner]
         # Without normals the search is by position alone.
         found = ClosestPoint(*target, spacing)(points, np.zeros(points.shape))
@@ -67,27 +75,28 @@ def _triangles_of(obj):
     return V.reshape(-1, 3).astype(float), F.reshape(-1, 3).astype(np.int64)
 
 
-def quadriflow(V, F, count=COUNT):
-    """Blender's QuadriFlow with as many quads as vertices are asked for."""
+def quadriflow(V, F, vertex_count=VERTEX_COUNT):
+    """Blender's QuadriFlow with as many quads as vertices are asked for; the mesh and its processor seconds."""
     obj = make_object(V, F)
-    _, seconds = timed(lambda: bpy.ops.object.quadriflow_remesh(mode="FACES", target_faces=count, seed=0))
+    _, seconds = timed(lambda: bpy.ops.object.quadriflow_remesh(mode="FACES", target_faces=vertex_count, seed=0))
     found = _triangles_of(obj)
     remove_object(obj)
     return found, seconds
 
 
 def decimate(V, F):
-    """Blender's Decimate modifier."""
+    """Blender's Decimate modifier; the mesh and its processor seconds."""
     obj = make_object(V, F)
     modifier = obj.modifiers.new("Decimate", "DECIMATE")
-    modifier.ratio = min(1.0, 2 * COUNT / len(F))
+    modifier.ratio = min(1.0, 2 * VERTEX_COUNT / len(F))
     found, seconds = timed(lambda: _triangles_of(obj))
     remove_object(obj)
     return found, seconds
 
 
 def ours(V, F):
-    result, seconds = timed(lambda: drain(remesh(V, F, COUNT)))
+    """Our remeshing; the mesh and its processor seconds."""
+    result, seconds = timed(lambda: drain(remesh(V, F, VERTEX_COUNT)))
     return (result.vertices, result.triangles), seconds
 
 
@@ -100,59 +109,65 @@ def _model(name):
     return case.V[used], place.reshape(-1, 3)
 
 
-def remesh_part(args):
+def remesh_table(args) -> Table:
+    """One row for every model and method."""
     table = Table(
-        f"Remeshed to {COUNT} vertices; ratio = time / time of our unwrap",
+        f"Remeshed to {VERTEX_COUNT} vertices; ratio = time / time of our unwrap",
         {"model": 15, "method": 15, "vertices": 8, "angle_p1": 8, "below 30 %": 10, "edge_cv": 8, "area_cv": 8}
         | {"hausdorff": 9, "rms": 9, "time": 8, "ratio": 7, "missed goals": 20},
     )
-    for name in args.models or MODELS:
+    for name in args.models or DEFAULT_MODELS:
         V, F = _model(name)
         _, unit = timed(lambda V=V, F=F: drain(unwrap(triangle_surface(V, F))))
         for method, work in METHODS.items():
             (W, G), seconds = work(V, F)
             row = {**shape(W, G), **distances(V, F, W, G), "time": seconds, "ratio": seconds / unit}
-            missed = ", ".join(_missed(row)) if method == "ours" else ""
-            table.add(model=name, method=method, vertices=len(W), **row, **{"missed goals": missed})
-    _strategies(args)
+            goals = _goals(row) if method == "ours" else {}
+            table.add(model=name, method=method, vertices=len(W), **row, **missed(**goals))
     return table
 
 
-def _missed(row):
-    if row["angle_p1"] < ANGLE_GOAL or row["below 30 %"] > THIN_GOAL:
-        yield "angles"
-    if row["edge_cv"] > EDGE_GOAL:
-        yield "edges"
-    if row["ratio"] > TIME_GOAL:
-        yield "time"
+def _goals(row):
+    """The goals of a mesh of ours by name, each with whether it is missed."""
+    return {
+        "angles": row["angle_p1"] < ANGLE_GOAL or row["below 30 %"] > BELOW_30_GOAL,
+        "edges": row["edge_cv"] > EDGE_GOAL,
+        "time": row["ratio"] > TIME_GOAL,
+    }
 
 
-def _strategies(args):
+def strategies_table(args) -> Table:
     """Sampled on one map, triangulated on another: alone, and relaxed and fitted as the strategy has it."""
-    columns = ["angle_p1", "edge_cv", "area_cv"]
     table = Table(
         "Strategies: sampled on the first map, triangulated on the second; then relaxed and fitted",
         {"model": 15, "strategy": 15}
-        | {f"{c} {when}": 16 for when in ("raw", "relaxed") for c in columns}
+        | {f"{c} {when}": 16 for when in ("raw", "relaxed") for c in STRATEGY_FIGURES}
         | {"best": 6},
     )
-    for name in args.models or MODELS:
+    for name in args.models or DEFAULT_MODELS:
         original = Original(*_model(name))
-        rows = {strategy: _strategy(original, strategy, columns) for strategy in STRATEGIES}
+        rows = {strategy: _strategy(original, strategy) for strategy in STRATEGIES}
         for strategy, row in rows.items():
             others = [other for key, other in rows.items() if key != strategy]
             best = all(row["angle_p1 relaxed"] > other["angle_p1 relaxed"] for other in others)
             for spread in ("edge_cv relaxed", "area_cv relaxed"):
                 best &= all(row[spread] < other[spread] for other in others)
             table.add(model=name, strategy=strategy, **row, best="in all" if best else "")
-    table.write(args.out / "strategies.tsv")
+    return table
 
 
-def _strategy(original, strategy, columns):
+def _strategy(original, strategy):
+    """Figures of one strategy, raw and relaxed."""
     row = {}
     for when, options in {"raw": {"rounds": 0, "fit": False}, "relaxed": {}}.items():
         found = drain(
-            remesh(original.vertices, original.triangles, COUNT, strategy=strategy, original=original, **options)
+            remesh(original.vertices, original.triangles, VERTEX_COUNT, strategy=strategy, original=original, **options)
         )
-        row |= {f"{c} {when}": v for c, v in shape(found.vertices, found.triangles).items() if c in columns}
+        row |= {f"{c} {when}": v for c, v in shape(found.vertices, found.triangles).items() if c in STRATEGY_FIGURES}
     return row
+
+
+PARTS = (
+    Part("remesh", "triangles, distances and time beside QuadriFlow and Decimate", remesh_table, (MODELS,)),
+    Part("strategies", "the four strategies of B. Gu 2018, raw and relaxed", strategies_table, (MODELS,)),
+)

@@ -1,4 +1,4 @@
-"""The main job on one real mesh: unwrap it, measure it beside Blender's own unwraps, and show it.
+"""Do the main job on one real mesh: unwrap it, measure it beside Blender's own unwraps, and show it.
 
 Writes a .blend with one object per method, pictures and a table to build/demo. The mesh is a published model where
 OMT_UV_MODELS has it, a procedural head otherwise.
@@ -7,15 +7,23 @@ OMT_UV_MODELS has it, a procedural head otherwise.
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 import bpy
 
-import numpy as np
-from cases import ROOT, Table, load_case, meshes, our_uv, timed
-from pictures import VIEWS, View, area_colours, checker, checker_material, equal_density, render_checker, render_colours
-from rivals import METHODS, make_object, unwrap, write_uv
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
 
+import numpy as np
+from renders import VIEWS, View, checker_material, render_checker, render_colours
+from sheets import area_colours
+from textures import checker, equal_density
+
+from benchmarks.cases import load_case, meshes, our_uv
+from benchmarks.rivals import METHODS, make_object, unwrap, write_uv
+from benchmarks.tables import Table
+from benchmarks.timing import timed
 from omt_uv.solver.maps.distortion import distortion, face_distortion
 
 OURS = {
@@ -26,6 +34,7 @@ OURS = {
 }
 COLUMNS = {"area_l1": 8, "area_sd": 8, "angle_mean": 10, "folds": 5, "overlap": 8, "seconds": 8}
 CELLS = 300  # checker cells on the model
+SHOWN = ("Blender Angle Based", "Blender Minimum Stretch 50", "OMT UV free")  # in pictures
 
 
 def all_maps(case):
@@ -59,10 +68,34 @@ def show_textures():
 
 
 def slug(name):
+    """The name of a method as part of a file's name."""
     return name.lower().replace(" ", "_")
 
 
+def measured(case, folder):
+    """Corner UVs (m,3,2) by method, and their figures as a table, printed and written."""
+    table = Table(f"{case.name}, {len(case.F)} triangles: distortion of one chart", {"method": 28} | COLUMNS)
+    maps = {}
+    for name, uv, seconds in all_maps(case):
+        figures = distortion(case.V, case.F, uv)
+        table.add(method=name, seconds=seconds, **{c: getattr(figures, c) for c in COLUMNS if c != "seconds"})
+        maps[name] = uv
+    print("area_l1: share of texture in the wrong place, 0 is exact; angle_mean: shear s1/s2, 1 is conformal")
+    table.write(folder / "distortion.tsv")
+    return maps
+
+
+def draw(case, maps, view, folder, texture):
+    """Pictures of a few maps: the checker, and the area as colours."""
+    for name in SHOWN:
+        scaled = equal_density(case.V, case.F, maps[name], CELLS)
+        render_checker(case.V, case.F, scaled, view, folder / f"checker_{slug(name)}.png", texture)
+        colours = area_colours(face_distortion(case.V, case.F, maps[name])[0])
+        render_colours(case.V, case.F, colours, view, folder / f"area_{slug(name)}.png")
+
+
 def main():
+    """Unwrap, measure, draw, and write the .blend."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", default="lion" if meshes.model_path("lion") else "head")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "demo")
@@ -71,23 +104,10 @@ def main():
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 
     case = load_case(args.model)
-    table = Table(f"{case.name}, {len(case.F)} triangles: distortion of one chart", {"method": 28} | COLUMNS)
-    maps = {}
-    for name, uv, seconds in all_maps(case):
-        figures = distortion(case.V, case.F, uv)
-        table.add(method=name, seconds=seconds, **{c: getattr(figures, c) for c in COLUMNS if c != "seconds"})
-        maps[name] = uv
-    print("area_l1: share of texture in the wrong place, 0 is exact; angle_mean: shear s1/s2, 1 is conformal")
-    table.write(args.out / "distortion.tsv")
-
-    texture = checker(args.out / "checker.png")
     view = VIEWS.get(args.model, View())
-    for name in ("Blender Angle Based", "Blender Minimum Stretch 50", "OMT UV free"):
-        uv = maps[name]
-        scaled = equal_density(case.V, case.F, uv, CELLS)
-        render_checker(case.V, case.F, scaled, view, args.out / f"checker_{slug(name)}.png", texture)
-        colours = area_colours(face_distortion(case.V, case.F, uv)[0])
-        render_colours(case.V, case.F, colours, view, args.out / f"area_{slug(name)}.png")
+    maps = measured(case, args.out)
+    texture = checker(args.out / "checker.png")
+    draw(case, maps, view, args.out, texture)
     add_objects(case, maps, checker_material(texture), view.up)
     show_textures()
     blend = args.out / f"{args.model}.blend"

@@ -1,4 +1,4 @@
-"""A radial graph of 200 nodes drawn on a square grid of 10,201 vertices, and its crowded centre magnified four times.
+"""Draw a radial graph of 200 nodes on a square grid of 10,201 vertices, and magnify its crowded centre four times.
 
 After Zhao et al. 2013, figure 9: the picture itself is warped through the map, the outline of the square stays.
 """
@@ -8,14 +8,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import matplotlib
 import numpy as np
-from cases import meshes
-from pictures import typeface
 from PIL import Image, ImageDraw
+from textures import typeface
 
+from benchmarks.cases import meshes
 from omt_uv.solver.analysis.density import from_vertices, region_share
 from omt_uv.solver.editing.image_warp import warped
 from omt_uv.solver.editing.magnify import magnify_region
@@ -27,7 +27,10 @@ FACTOR, RADIUS = 4.0, 0.15
 # Nodes of each ring about the root, and the ring's radius: the centre is crowded.
 RINGS = ((12, 0.055), (34, 0.105), (61, 0.27), (92, 0.43))
 PIXELS = 2048
-INK, PAPER = (38, 44, 56), (250, 249, 246)
+INK = (38, 44, 56)
+PAPER = (250, 249, 246)
+FAINT = (216, 214, 208)
+EDGE = (132, 140, 152)
 
 
 def graph():
@@ -54,11 +57,11 @@ def drawn(grid_every=10):
     draw = ImageDraw.Draw(image)
     for k in range(0, CELLS + 1, grid_every):
         x = k / CELLS * (PIXELS - 1)
-        draw.line([x, 0, x, PIXELS], fill=(216, 214, 208), width=3)
-        draw.line([0, x, PIXELS, x], fill=(216, 214, 208), width=3)
+        draw.line([x, 0, x, PIXELS], fill=FAINT, width=3)
+        draw.line([0, x, PIXELS, x], fill=FAINT, width=3)
     at = places * PIXELS
     for a, b in edges:
-        draw.line([*at[a], *at[b]], fill=(132, 140, 152), width=5)
+        draw.line([*at[a], *at[b]], fill=EDGE, width=5)
     colours = matplotlib.colormaps["viridis"](np.linspace(0.05, 0.85, len(RINGS) + 1))
     font = typeface(15)
     for k, (x, y) in enumerate(at.tolist()):

@@ -11,18 +11,20 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "docs")]
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
 
 import magnified_graph
 import numpy as np
-import pictures
-import rivals
+import renders
+import sheets
+import textures
 import world_map
-from cases import load_case, meshes, our_uv
-from remesh import quadriflow, shape
-from sphere import sphere_figures
 
+from benchmarks import rivals
+from benchmarks.cases import load_case, meshes, our_uv
+from benchmarks.parts.remesh import quadriflow, shape
+from benchmarks.parts.sphere import sphere_figures
 from omt_uv.pipelines.globe import GlobeJob, project
 from omt_uv.settings import GlobeSettings
 from omt_uv.solver.analysis.density import mean_curvature_density
@@ -41,7 +43,11 @@ RIVALS = {"Blender Angle Based": "Angle Based", "Blender Minimum Stretch": "Mini
 OURS = "OMT UV"
 GLOBES = ("max_planck", "bunny")
 BALANCES = (0.0, 0.25, 0.5, 1.0)
-REMESHED, REMESHED_COUNT = ("max_planck", "rocker_arm"), 3000
+REMESHED = ("max_planck", "rocker_arm")
+VERTEX_COUNT = 3000  # of remeshes
+GALLERY = ("face", "lion", "lilium", "max_planck")
+CHECKERS = 300  # cells on a model that CELLS does not name
+PACKED = 600  # likewise of CIRCLES
 
 
 def maps(case):
@@ -56,45 +62,45 @@ def gallery(name, out, scratch, pixels):
     case = load_case(name)
     V, F = case.V, case.F
     view = view_of(name)
-    texture = pictures.checker(scratch / "checker.png")
+    texture = textures.checker(scratch / "checker.png")
     checks, areas, shears, layouts, captions = [], [], [], [], []
     uvs = maps(case)
     for k, uv in enumerate(uvs.values()):
         octaves, shear = face_distortion(V, F, uv)
-        area_rgb, shear_rgb = pictures.area_colours(octaves), pictures.shear_colours(shear)
+        area_rgb, shear_rgb = sheets.area_colours(octaves), sheets.shear_colours(shear)
         captions.append(caption(case, uv))
         for folder, suffix in ((checks, "checker"), (areas, "area"), (shears, "shear"), (layouts, "layout")):
             folder.append(scratch / f"{name}_{k}_{suffix}.png")
-        scaled = pictures.equal_density(V, F, uv, CELLS.get(name, 300))
-        pictures.render_checker(V, F, scaled, view, checks[-1], texture, pixels)
-        pictures.render_colours(V, F, area_rgb, view, areas[-1], pixels)
-        pictures.render_colours(V, F, shear_rgb, view, shears[-1], pixels)
-        pictures.layout(uv, pictures.lit(V, F, area_rgb), layouts[-1], pixels)
+        scaled = textures.equal_density(V, F, uv, CELLS.get(name, CHECKERS))
+        renders.render_checker(V, F, scaled, view, checks[-1], texture, pixels)
+        renders.render_colours(V, F, area_rgb, view, areas[-1], pixels)
+        renders.render_colours(V, F, shear_rgb, view, shears[-1], pixels)
+        sheets.layout(uv, sheets.lit(V, F, area_rgb), layouts[-1], pixels)
     titles, blank = list(uvs), [""] * len(uvs)
-    pictures.sheet(out / f"{name}_checker.png", titles, [("", checks, captions, None)])
-    rows = [("area", areas, blank, pictures.AREA_SCALE), ("shear", shears, captions, pictures.SHEAR_SCALE)]
-    pictures.sheet(out / f"{name}_distortion.png", titles, rows)
-    pictures.sheet(out / f"{name}_layout.png", titles, [("", layouts, captions, pictures.AREA_SCALE)])
+    sheets.sheet(out / f"{name}_checker.png", titles, [("", checks, captions, None)])
+    rows = [("area", areas, blank, sheets.AREA_SCALE), ("shear", shears, captions, sheets.SHEAR_SCALE)]
+    sheets.sheet(out / f"{name}_distortion.png", titles, rows)
+    sheets.sheet(out / f"{name}_layout.png", titles, [("", layouts, captions, sheets.AREA_SCALE)])
 
 
 def balance_sheet(name, out, scratch, pixels):
     """One sheet of the slider from exact area to conformal."""
     case = load_case(name)
-    texture = pictures.checker(scratch / "checker.png")
-    renders, layouts, captions = [], [], []
+    texture = textures.checker(scratch / "checker.png")
+    drawn, layouts, captions = [], [], []
     for balance in BALANCES:
         uv, _ = our_uv(case, "free", "standard", balance)
         captions.append(caption(case, uv))
-        renders.append(scratch / f"balance_{balance}.png")
+        drawn.append(scratch / f"balance_{balance}.png")
         layouts.append(scratch / f"balance_{balance}_layout.png")
-        scaled = pictures.equal_density(case.V, case.F, uv, CELLS.get(name, 300))
-        pictures.render_checker(case.V, case.F, scaled, view_of(name), renders[-1], texture, pixels)
+        scaled = textures.equal_density(case.V, case.F, uv, CELLS.get(name, CHECKERS))
+        renders.render_checker(case.V, case.F, scaled, view_of(name), drawn[-1], texture, pixels)
         octaves, _ = face_distortion(case.V, case.F, uv)
-        rgb = pictures.lit(case.V, case.F, pictures.area_colours(octaves))
-        pictures.layout(uv, rgb, layouts[-1], pixels)
+        rgb = sheets.lit(case.V, case.F, sheets.area_colours(octaves))
+        sheets.layout(uv, rgb, layouts[-1], pixels)
     titles = [f"balance {b:g}" for b in BALANCES]
-    rows = [("", renders, captions, None), ("", layouts, [""] * len(BALANCES), pictures.AREA_SCALE)]
-    pictures.sheet(out / f"{name}_balance.png", titles, rows)
+    rows = [("", drawn, captions, None), ("", layouts, [""] * len(BALANCES), sheets.AREA_SCALE)]
+    sheets.sheet(out / f"{name}_balance.png", titles, rows)
 
 
 def globe_sheet(names, out, scratch, pixels):
@@ -104,14 +110,14 @@ def globe_sheet(names, out, scratch, pixels):
     for name in names:
         V, F = meshes.load_model(name)
         view = view_of(name)
-        turned = V @ pictures.front_to_south(view).T
-        renders, captions = [], []
+        turned = V @ renders.front_to_south(view).T
+        drawn, captions = [], []
         for k, (points, uv) in enumerate(globe_maps(turned, F)):
-            renders.append(scratch / f"{name}_globe_{k}.png")
-            pictures.render_checker(V, F, uv, view, renders[-1], world, pixels)
+            drawn.append(scratch / f"{name}_globe_{k}.png")
+            renders.render_checker(V, F, uv, view, drawn[-1], world, pixels)
             captions.append(sphere_caption(V, F, points))
-        rows.append((name.replace("_", " "), renders, captions, None))
-    pictures.sheet(out / "globes.png", ["Conformal", "Balance 0.5", "Area preserving"], rows)
+        rows.append((name.replace("_", " "), drawn, captions, None))
+    sheets.sheet(out / "globes.png", ["Conformal", "Balance 0.5", "Area preserving"], rows)
 
 
 def globe_maps(V, F):
@@ -138,21 +144,21 @@ def circle_sheet(name, out, scratch, pixels):
     As Su 2015, figure 14.
     """
     case = load_case(name)
-    texture = pictures.circle_packing(scratch / "circles.png")
+    texture = textures.circle_packing(scratch / "circles.png")
     uvs = {"Blender Angle Based: any size": rivals.unwrap(case.V, case.F, case.seams, "Angle Based").uv}
     for balance, title in ((0.5, "OMT UV, balance 0.5"), (0.0, "OMT UV: one size")):
         uvs[title] = our_uv(case, "free", "standard", balance)[0]
-    renders, layouts, captions = [], [], []
+    drawn, layouts, captions = [], [], []
     for k, uv in enumerate(uvs.values()):
-        renders.append(scratch / f"{name}_circles_{k}.png")
+        drawn.append(scratch / f"{name}_circles_{k}.png")
         layouts.append(scratch / f"{name}_circles_{k}_layout.png")
         captions.append(caption(case, uv))
-        scaled = pictures.equal_density(case.V, case.F, uv, CIRCLES.get(name, 600))
-        pictures.render_checker(case.V, case.F, scaled, view_of(name), renders[-1], texture, pixels)
+        scaled = textures.equal_density(case.V, case.F, uv, CIRCLES.get(name, PACKED))
+        renders.render_checker(case.V, case.F, scaled, view_of(name), drawn[-1], texture, pixels)
         octaves, _ = face_distortion(case.V, case.F, uv)
-        pictures.layout(uv, pictures.lit(case.V, case.F, pictures.area_colours(octaves)), layouts[-1], pixels)
-    rows = [("", renders, captions, None), ("", layouts, [""] * len(uvs), pictures.AREA_SCALE)]
-    pictures.sheet(out / f"{name}_circles.png", list(uvs), rows)
+        sheets.layout(uv, sheets.lit(case.V, case.F, sheets.area_colours(octaves)), layouts[-1], pixels)
+    rows = [("", drawn, captions, None), ("", layouts, [""] * len(uvs), sheets.AREA_SCALE)]
+    sheets.sheet(out / f"{name}_circles.png", list(uvs), rows)
 
 
 def remesh_sheet(names, out, scratch, pixels):
@@ -161,38 +167,38 @@ def remesh_sheet(names, out, scratch, pixels):
     for name in names:
         V, F = meshes.load_model(name)
         found = [
-            quadriflow(V, F, REMESHED_COUNT)[0],
+            quadriflow(V, F, VERTEX_COUNT)[0],
             _remeshed(V, F, None),
             _remeshed(V, F, mean_curvature_density(V, F, 2.0)),
         ]
-        renders, captions = [], []
+        drawn, captions = [], []
         for k, (W, G) in enumerate([(V, F), *found]):
-            renders.append(scratch / f"{name}_wires_{k}.png")
-            pictures.render_wires(W, G, view_of(name), renders[-1], pixels)
+            drawn.append(scratch / f"{name}_wires_{k}.png")
+            renders.render_wires(W, G, view_of(name), drawn[-1], pixels)
             figures = shape(W, G)
             captions.append(f"{len(np.unique(G)):,} vertices, {figures['below 30 %']:.1f} % below 30 degrees")
-        rows.append((name.replace("_", " "), renders, captions, None))
+        rows.append((name.replace("_", " "), drawn, captions, None))
     titles = ["Input", "Blender QuadriFlow", f"{OURS}, uniform", f"{OURS}, by curvature"]
-    pictures.sheet(out / "remesh.png", titles, rows)
+    sheets.sheet(out / "remesh.png", titles, rows)
 
 
 def _remeshed(V, F, density):
-    found = drain(remesh(V, F, REMESHED_COUNT, density=density))
+    found = drain(remesh(V, F, VERTEX_COUNT, density=density))
     return found.vertices, found.triangles
 
 
 def strategies_sheet(name, out, scratch, pixels):
     """Wireframes of the four pairs of maps to sample and to triangulate on (B. Gu 2018, figure 5)."""
     V, F = meshes.load_model(name)
-    original, renders, captions = Original(V, F), [], []
+    original, drawn, captions = Original(V, F), [], []
     for strategy in STRATEGIES:
-        found = drain(remesh(V, F, REMESHED_COUNT, strategy=strategy, original=original))
-        renders.append(scratch / f"{name}_{strategy}.png")
-        pictures.render_wires(found.vertices, found.triangles, view_of(name), renders[-1], pixels)
+        found = drain(remesh(V, F, VERTEX_COUNT, strategy=strategy, original=original))
+        drawn.append(scratch / f"{name}_{strategy}.png")
+        renders.render_wires(found.vertices, found.triangles, view_of(name), drawn[-1], pixels)
         figures = shape(found.vertices, found.triangles)
         captions.append(f"angle_p1 {figures['angle_p1']:.1f}, edges vary by {figures['edge_cv']:.2f}")
     titles = [strategy.upper() for strategy in STRATEGIES]
-    pictures.sheet(out / "strategies.png", titles, [("", renders, captions, None)])
+    sheets.sheet(out / "strategies.png", titles, [("", drawn, captions, None)])
 
 
 def caption(case, uv):
@@ -201,12 +207,12 @@ def caption(case, uv):
 
 
 def view_of(name):
-    return pictures.VIEWS.get(name, pictures.View())
+    return renders.VIEWS.get(name, renders.View())
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    present = [n for n in ("face", "lion", "lilium", "max_planck") if meshes.model_path(n)]
+    present = [n for n in GALLERY if meshes.model_path(n)]
     parser.add_argument("--models", nargs="*", default=present or ["head"])
     found = [n for n in ("lion", "max_planck") if n in present]
     parser.add_argument("--circles", nargs="*", default=found or ["head"], help="models with a circle packing on them")

@@ -1,4 +1,4 @@
-"""A globe-like map in longitude and latitude: rough continents with names, a graticule, and circles of one size.
+"""Draw a map of the world in longitude and latitude: rough continents with names, a graticule, circles of one size.
 
 On an area-preserving map all circles show the same area, on a conformal one all stay round.
 """
@@ -6,14 +6,16 @@ On an area-preserving map all circles show the same area, on a conformal one all
 from __future__ import annotations
 
 import numpy as np
-from pictures import typeface
 from PIL import Image, ImageDraw
+from textures import typeface
 
 HEIGHT = 1024
 OVERSAMPLE = 2
-SEA, LINE, INK = (196, 222, 236), (150, 188, 210), (40, 44, 60)
-# Radius of the circles, and how far apart their centres are, in degrees.
-RADIUS, STEP = 6.0, 30
+SEA = (196, 222, 236)
+LINE = (150, 188, 210)
+INK = (40, 44, 60)
+RADIUS = 6.0  # of the circles, in degrees
+STEP = 30  # between their centres, in degrees
 CIRCLE = np.array([196.0, 40, 60])
 
 # Outlines as longitude and latitude, colour, and where the name stands.

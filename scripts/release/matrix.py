@@ -35,7 +35,9 @@ def environment(version: str) -> Path | None:
     python_version, bpy, numpy = VERSIONS[version]
     python = ROOT / f".venv-{version}" / "bin" / "python"
     if not python.exists():
-        found = subprocess.run([ROOT / "scripts" / "find_python.sh", python_version], capture_output=True, text=True)
+        found = subprocess.run(
+            [ROOT / "scripts" / "release" / "find_python.sh", python_version], capture_output=True, text=True
+        )
         if found.returncode:
             return None
         subprocess.run([found.stdout.strip(), "-m", "venv", str(python.parent.parent)], check=True)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-
 import meshes
 import numpy as np
 import pytest
 
+from benchmarks.seams import cut_seams
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
-
-sys.path.insert(0, str(meshes.ROOT / "benchmarks"))
-
-from seams import cut_seams
 
 
 def holed_sphere():

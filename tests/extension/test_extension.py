@@ -49,7 +49,9 @@ def archive():
     if given:
         return Path(given)
     done = subprocess.run(
-        [sys.executable, str(ROOT / "scripts" / "build_extension.py"), "--here"], capture_output=True, text=True
+        [sys.executable, str(ROOT / "scripts" / "release" / "build_extension.py"), "--here"],
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr
     return ROOT / done.stdout.split()[0]

@@ -1,4 +1,4 @@
-"""Counts that say how much work was done, the same on every machine."""
+"""Count how much work was done: figures that are the same on every machine."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from omt_uv.solver.linalg.multigrid import Multigrid
 
 
 @dataclass
-class Tally:
+class Work:
     """Sparse factorisations, the nonzeros of all their factors, and cycles of multigrid."""
 
     factorisations: int = 0
@@ -19,22 +19,22 @@ class Tally:
 
 
 @contextmanager
-def counted():
-    """A `Tally` of what is factored meanwhile."""
-    tally, original, cycle = Tally(), linear.splu, Multigrid.cycle
+def counted_work():
+    """The `Work` of what is solved meanwhile."""
+    work, original, cycle = Work(), linear.splu, Multigrid.cycle
 
     def counting(*arguments, **options):
         factors = original(*arguments, **options)
-        tally.factorisations += 1
-        tally.nonzeros += factors.nnz
+        work.factorisations += 1
+        work.nonzeros += factors.nnz
         return factors
 
     def cycling(self, b, level=0):
-        tally.cycles += level == 0
+        work.cycles += level == 0
         return cycle(self, b, level)
 
     linear.splu, Multigrid.cycle = counting, cycling
     try:
-        yield tally
+        yield work
     finally:
         linear.splu, Multigrid.cycle = original, cycle

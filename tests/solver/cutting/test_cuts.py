@@ -1,6 +1,5 @@
 """Cuts: every surface becomes a disk, along short paths, where the artist wants them, whatever the units."""
 
-import sys
 from dataclasses import replace
 
 import meshes
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
+from short_cuts import cotree_length, shortest_tree
 
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import prepare
@@ -16,10 +16,6 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_pins import CornerPins
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-
-sys.path.insert(0, str(meshes.ROOT / "benchmarks"))
-
-from cuts import cotree_length, shortest_tree
 
 
 def holed_sphere(holes=3, subdivisions=3):

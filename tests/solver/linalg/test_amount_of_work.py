@@ -3,8 +3,8 @@
 import meshes
 import numpy as np
 import pytest
-from counting import counted
 from scipy.sparse import csc_matrix, diags
+from work import counted_work
 
 from omt_uv.solver.linalg.nested_dissection import Dissection
 from omt_uv.solver.linalg.sparse import Factor, minimum_degree
@@ -25,7 +25,7 @@ def random_sites(count):
 
 def test_transport_of_random_sites():
     sites = random_sites(10_000)
-    with counted() as tally:
+    with counted_work() as tally:
         found = drain(transport(sites, np.ones(len(sites)), Disk()))
     assert found.iterations <= 9 and found.diagrams <= 11 and found.hulls <= 2
     assert found.flips <= 5000
@@ -54,7 +54,7 @@ def test_dissection_fills_little_more_than_minimum_degree():
     matrix = (graph + diags(1e-3 - np.asarray(graph.sum(axis=1)).ravel())).tocsc()
     counts = []
     for permutation in (order, minimum_degree(matrix)):
-        with counted() as tally:
+        with counted_work() as tally:
             Factor(matrix, permutation)
         counts.append(tally.nonzeros)
     assert counts[0] <= 2.2 * counts[1]
@@ -63,7 +63,7 @@ def test_dissection_fills_little_more_than_minimum_degree():
 @pytest.mark.parametrize(("count", "steps"), [(60, 12), (90, 14)])
 def test_newton_steps_do_not_grow_with_the_mesh(count, steps):
     V, F = meshes.head(count)
-    with counted() as tally:
+    with counted_work() as tally:
         (chart_map,) = drain(unwrap(triangle_surface(V, F))).maps
     assert chart_map.newton_refinement <= steps and chart_map.newton_conformal <= 12
     assert tally.nonzeros <= 4000 * len(V)
@@ -71,7 +71,7 @@ def test_newton_steps_do_not_grow_with_the_mesh(count, steps):
 
 @meshes.models_missing
 def test_lion():
-    with counted() as tally:
+    with counted_work() as tally:
         (chart_map,) = drain(unwrap(triangle_surface(*meshes.load_model("lion")))).maps
     assert chart_map.newton_refinement <= 10
     assert tally.factorisations <= 50 and tally.nonzeros <= 20e6

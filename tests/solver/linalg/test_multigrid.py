@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from counting import counted
 from scipy.spatial import Delaunay, cKDTree
+from work import counted_work
 
 from omt_uv.solver.linalg import multigrid
 from omt_uv.solver.linalg.multigrid import LaplacianSolver, Multigrid
@@ -33,7 +33,7 @@ def test_solutions_are_those_of_a_factorisation(count):
 def test_iterations_do_not_grow_with_the_size(stretch):
     for count in (5000, 30_000):
         A, b = graph(count, stretch)
-        with counted() as tally:
+        with counted_work() as tally:
             LaplacianSolver().solve(A, b, np.ones(count), 1e-6)
         assert tally.cycles <= 45 and tally.factorisations == 1
 
@@ -51,7 +51,7 @@ def test_a_hierarchy_serves_until_it_is_slow():
     A, b = graph(5000)
     far, _ = graph(5000, 0.01)
     ones, laplacians = np.ones(5000), LaplacianSolver()
-    with counted() as tally:
+    with counted_work() as tally:
         for matrix in (A, 1.1 * A, far, far):
             x = laplacians.solve(matrix, b, ones, 1e-6)
             assert np.abs(b - matrix @ x).max() <= 1.1e-6 * np.abs(b).max()
