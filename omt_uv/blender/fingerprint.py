@@ -8,7 +8,7 @@ import bpy
 
 import numpy as np
 
-from ..pipelines.attribute_types import TYPES
+from ..pipelines.attributes import TYPES
 
 # Blender's own caches, made and dropped as it likes.
 _DERIVED = (".select_", ".uv_select_", ".hide_")

@@ -8,8 +8,7 @@ import bpy
 
 import numpy as np
 
-from ..pipelines.attribute_types import TYPES
-from ..pipelines.attributes import Attributes, Layer, Marks, ShapeKey
+from ..pipelines.attributes import TYPES, Attributes, Layer, Marks, ShapeKey
 
 # What the mesh is made of, what is written otherwise, and what follows from the shape.
 OWN = {"position", "material_index", "sharp_face", "sharp_edge", "uv_seam", "crease_edge", "custom_normal"}

@@ -8,8 +8,7 @@ import bpy
 
 import numpy as np
 
-from ..pipelines.attribute_types import TYPES
-from ..pipelines.attributes import Attributes, Layer, Marks, is_uv
+from ..pipelines.attributes import TYPES, Attributes, Layer, Marks, is_uv
 from ..solver.mesh.topology import pair_keys
 from .read_attributes import get
 

@@ -1,4 +1,4 @@
-"""Everything that a mesh carries besides its shape, as arrays, and the edges at which it jumps."""
+"""Hold what a mesh carries besides its shape, as arrays, and find the edges at which it jumps."""
 
 from __future__ import annotations
 
@@ -9,6 +9,23 @@ import numpy as np
 from ..solver.analysis.feature_edges import all_edges, region_borders, value_jumps
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import pair_keys
+
+# How values of Blender's types of attributes are read and written in bulk: the property of their elements, numbers
+# each, the numpy type, and whether values can be interpolated.
+TYPES: dict[str, tuple[str, int, type, bool]] = {
+    "FLOAT": ("value", 1, np.float32, True),
+    "FLOAT2": ("vector", 2, np.float32, True),
+    "FLOAT_VECTOR": ("vector", 3, np.float32, True),
+    "FLOAT_COLOR": ("color", 4, np.float32, True),
+    "BYTE_COLOR": ("color", 4, np.float32, True),
+    "QUATERNION": ("value", 4, np.float32, False),
+    "FLOAT4X4": ("value", 16, np.float32, False),
+    "INT": ("value", 1, np.int32, False),
+    "INT8": ("value", 1, np.int32, False),
+    "INT16_2D": ("value", 2, np.int32, False),
+    "INT32_2D": ("value", 2, np.int32, False),
+    "BOOLEAN": ("value", 1, bool, False),
+}
 
 # UVs nearer than this share of their extent are the same.
 SAME_UV = 1e-5

@@ -16,8 +16,7 @@ from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import pair_keys
 from ..solver.transfer import interpolate as transfer
 from ..solver.transfer.correspondence import Correspondence
-from .attribute_types import TYPES
-from .attributes import Attributes, Layer, Marks, is_uv
+from .attributes import TYPES, Attributes, Layer, Marks, is_uv
 
 
 def carry(attributes: Attributes, surface: Surface, at: Correspondence) -> Attributes:

@@ -1,16 +1,18 @@
-"""Images of the whole sphere from one layout to another, so that they look right on it (Dominitz, Tannenbaum 2010,
-5)."""
+"""Redraw images of the whole sphere for another layout, by supersampling (Dominitz, Tannenbaum 2010, section 5)."""
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
+from ..solver.editing.image_warp import bilinear
 from ..solver.globe.projections import OCTAHEDRAL, check_projection, is_cylindrical, to_plane, to_sphere
 from ..solver.progress import Progress, Steps
 
-# Samples along each side of a pixel: enough where a row at a pole covers a dozen rows of the source.
+# Samples along each side of a pixel, enough where a row at a pole covers a dozen rows of the source.
 SAMPLES = 4
-# Pixels that are resampled at once; bounds the memory.
+# Samples taken at once, which bounds the memory.
 BLOCK = 1 << 18
 
 
@@ -38,13 +40,15 @@ def redraw(image: np.ndarray, source: str, target: str, size: tuple[int, int] | 
         last = min(first + at_once, rows)
         v = ((np.arange(first, last)[:, None] + spread) / rows).ravel()
         uv = np.stack(np.meshgrid(u, v), axis=-1)
-        colours = _bilinear(image, to_plane(to_sphere(uv, target), source), source)
+        places = to_plane(to_sphere(uv, target), source)
+        colours = bilinear(image, places, partial(_pixels, image, source))
         blocks = colours.reshape(last - first, SAMPLES, columns, SAMPLES, -1)
         result[first:last] = blocks.mean(axis=(1, 3))
     return result
 
 
 def _size(image: np.ndarray, target: str) -> tuple[int, int]:
+    """Rows and columns for a layout: those of the image, but as many pixels in a square for the octahedral one."""
     rows, columns = image.shape[:2]
     if target == OCTAHEDRAL:
         side = max(1, round(float(np.sqrt(rows * columns))))
@@ -52,18 +56,7 @@ def _size(image: np.ndarray, target: str) -> tuple[int, int]:
     return rows, columns
 
 
-def _bilinear(image: np.ndarray, uv: np.ndarray, layout: str) -> np.ndarray:
-    """Colours (...,c) of an image at uv (...,2); pixel centres are at half integers, and the layout goes on beyond."""
-    rows, columns = image.shape[:2]
-    x, y = uv[..., 0] * columns - 0.5, uv[..., 1] * rows - 0.5
-    j, i = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    fx, fy = (x - j)[..., None], (y - i)[..., None]
-    low = (1 - fx) * _pixels(image, i, j, layout) + fx * _pixels(image, i, j + 1, layout)
-    high = (1 - fx) * _pixels(image, i + 1, j, layout) + fx * _pixels(image, i + 1, j + 1, layout)
-    return (1 - fy) * low + fy * high
-
-
-def _pixels(image: np.ndarray, i: np.ndarray, j: np.ndarray, layout: str) -> np.ndarray:
+def _pixels(image: np.ndarray, layout: str, i: np.ndarray, j: np.ndarray) -> np.ndarray:
     """Pixels at rows i and columns j, at most one beyond the image, where the layout has its continuation."""
     rows, columns = image.shape[:2]
     if is_cylindrical(layout):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
@@ -25,7 +27,7 @@ def warped(
     place, covered = _places(old, new, height, width)
     place, known = _padded(place, covered, margin)
     result = np.array(picture, dtype=float, copy=True)
-    result[known] = _by_alpha(picture, place[known]) if straight else _bilinear(picture, place[known])
+    result[known] = _by_alpha(picture, place[known]) if straight else _repeated(picture, place[known])
     if np.issubdtype(picture.dtype, np.floating):
         return result.astype(picture.dtype)
     return _rounded(result, picture.dtype)
@@ -88,21 +90,30 @@ def _padded(place: np.ndarray, covered: np.ndarray, margin: int) -> tuple[np.nda
 
 def _by_alpha(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:
     """Samples (k,c) of a picture (h,w,c) at UVs (k,2), colours weighed by the last channel, where there is any."""
-    plain = _bilinear(picture, uv)
+    plain = _repeated(picture, uv)
     alpha = picture[..., -1:].astype(float)
-    weighed, weight = _bilinear(picture * alpha, uv), plain[:, -1:]
+    weighed, weight = _repeated(picture * alpha, uv), plain[:, -1:]
     colours = np.where(weight > 0, weighed / np.where(weight > 0, weight, 1), plain)
     return np.column_stack([colours[:, :-1], plain[:, -1]])
 
 
-def _bilinear(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Samples (k,c) of a picture (h,w,c) at UVs (k,2)."""
+def bilinear(
+    picture: np.ndarray, uv: np.ndarray, pixels_at: Callable[[np.ndarray, np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """Sample a picture (h,w,c) at UVs (...,2): (...,c), bilinearly between pixels, whose centres are at half integers.
+
+    pixels_at : pixels (...,c) at rows and columns (...) of integers, beyond the picture as well
+    """
     height, width = picture.shape[:2]
-    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    x, y = uv[..., 0] * width - 0.5, uv[..., 1] * height - 0.5
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    s, t = (x - column)[:, None], (y - row)[:, None]
-    left, right = column % width, (column + 1) % width
-    below, above = row % height, (row + 1) % height
-    lower = picture[below, left] * (1 - s) + picture[below, right] * s
-    upper = picture[above, left] * (1 - s) + picture[above, right] * s
-    return lower * (1 - t) + upper * t
+    s, t = (x - column)[..., None], (y - row)[..., None]
+    lower = (1 - s) * pixels_at(row, column) + s * pixels_at(row, column + 1)
+    upper = (1 - s) * pixels_at(row + 1, column) + s * pixels_at(row + 1, column + 1)
+    return (1 - t) * lower + t * upper
+
+
+def _repeated(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Samples (k,c) at UVs (k,2) of a picture (h,w,c) that repeats beyond [0,1]."""
+    height, width = picture.shape[:2]
+    return bilinear(picture, uv, lambda row, column: picture[row % height, column % width])
