@@ -1,8 +1,9 @@
-"""Polar factorisation of a map into a convex domain: measure preserving first, the gradient of a convex function after.
+"""Factor a map into a convex domain: a measure-preserving map, then the gradient of a convex function (Brenier 1991).
 
-Brenier 1991: every map phi of a measure space (S, mu) to a convex domain factors uniquely as phi = grad u o s, where s
-carries mu to the uniform measure and u is convex. Su 2015, section 3.2.8, varies the measure between that of the
-surface and that of the conformal map and thereby moves from the area-preserving to the angle-preserving map.
+Every map phi of a measure space (S, mu) to a convex domain factors uniquely as phi = grad u o s, where s carries mu to
+the uniform measure and u is convex. Su 2015, section 3.2.8, varies the measure between that of the surface and that of
+the conformal map and thereby moves from the area-preserving to the angle-preserving map. Unwrapping does not come this
+way: it stands by itself, as a tool to look at maps.
 """
 
 from __future__ import annotations
@@ -21,22 +22,28 @@ from .semidiscrete import transport
 class PolarFactorisation:
     """phi = grad u o s at the vertices of a mesh.
 
-    sites (n,2): phi; uv (n,2): s, the centroids of the cells; mass (n,): the measure, its sum the domain's area;
-    area (n,): of the cells; weights (n,): u(x) = max_i (2 x . y_i - |y_i|^2 + w_i) / 2; residual: largest
-    |area - mass| / mass; iterations: Newton steps of the transport.
+    Attributes
+    ----------
+    sites : (n,2) phi
+    uv : (n,2) s, the centroids of the cells
+    mass : (n,) the measure, its sum the domain's area
+    area : (n,) of the cells
+    site_weights : (n,) h of the convex function u(x) = max_i (2 x . y_i - |y_i|^2 + h_i) / 2
+    residual : largest |area - mass| / mass
+    iterations : Newton steps of the transport
     """
 
     sites: np.ndarray
     uv: np.ndarray
     mass: np.ndarray
     area: np.ndarray
-    weights: np.ndarray
+    site_weights: np.ndarray
     residual: float
     iterations: int
 
     def potential(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """u at points (k,2), (k,), and its gradient (k,2): the site whose cell the point lies in."""
-        planes = x @ self.sites.T - ((self.sites**2).sum(axis=1) - self.weights) / 2
+        planes = x @ self.sites.T - ((self.sites**2).sum(axis=1) - self.site_weights) / 2
         cell = planes.argmax(axis=1)
         return planes[np.arange(len(x)), cell], self.sites[cell]
 
@@ -61,5 +68,11 @@ def polar_factorisation(
     blend = (1 - balance) * mass * (domain.area / mass.sum()) + balance * own
     found = yield from transport(sites, blend, domain)
     return PolarFactorisation(
-        sites, found.cells.centroid, blend, found.cells.area, found.weights, found.residual, found.iterations
+        sites=sites,
+        uv=found.cells.centroid,
+        mass=blend,
+        area=found.cells.area,
+        site_weights=found.site_weights,
+        residual=found.residual,
+        iterations=found.iterations,
     )

@@ -13,7 +13,7 @@ import numpy as np
 from ..mesh.geometry import as_complex, as_points, dot2, in_parts
 from ..mesh.topology import next_halfedge
 from .convex_domain import Domain, segment_integrals
-from .regular_triangulation import Regular, by_hull, power_centres
+from .regular_triangulation import RegularTriangulation, by_hull, power_centres
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class PowerDiagram:
     second: np.ndarray
     edges: np.ndarray
     length: np.ndarray
-    dual: Regular
+    dual: RegularTriangulation
 
     @property
     def centroid(self) -> np.ndarray:
@@ -48,7 +48,9 @@ class PowerDiagram:
         return PowerDiagram(area, moment, second, order[self.edges], self.length, self.dual.renumbered(order))
 
 
-def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: Regular | None = None) -> PowerDiagram:
+def power_diagram(
+    sites: np.ndarray, site_weights: np.ndarray, domain: Domain, dual: RegularTriangulation | None = None
+) -> PowerDiagram:
     """Power diagram of sites (n,2) with power weights (n,) inside the domain; hidden sites have area 0.
 
     `dual` is the regular triangulation of these sites and weights, if it is known already.
@@ -61,24 +63,24 @@ def power_diagram(sites: np.ndarray, weights: np.ndarray, domain: Domain, dual: 
     TransportError : the sites cannot be triangulated
     """
     if dual is None:
-        dual = by_hull(sites, weights)
+        dual = by_hull(sites, site_weights)
     z = as_complex(sites)
-    centre = power_centres(z, weights, dual)
+    centre = power_centres(z, site_weights, dual)
     inside = np.append(domain.contains(as_points(centre)), False)
     once = np.flatnonzero(dual.twin < np.arange(len(dual.twin)))
     whole = inside[once // 3] & inside[dual.twin[once] // 3]
-    cut, p, q, entering, leaving = _cut_sides(z, weights, centre, inside, dual, once[~whole], domain)
+    cut, p, q, entering, leaving = _cut_sides(z, site_weights, centre, inside, dual, once[~whole], domain)
     parts = [_whole_sides(z, centre, dual, h) for (h,) in in_parts(once[whole])]
     i, j, length, along = (np.concatenate(kind, axis=-1) for kind in zip(*parts, cut, strict=True))
     # At a crossing of the boundary one cell's arc ends and its neighbour's begins.
     a, b, *_ = cut
     ends, begins = np.concatenate([a[entering], b[leaving]]), np.concatenate([b[entering], a[leaving]])
-    integrals = _arcs(z, weights, domain, np.concatenate([p[entering], q[leaving]]), ends, begins)
+    integrals = _arcs(z, site_weights, domain, np.concatenate([p[entering], q[leaving]]), ends, begins)
     _scatter(integrals, i, j, along)
     return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], np.stack([i, j], axis=1), length, dual)
 
 
-def _arcs(z, weights, domain: Domain, crossing, ends, begins) -> np.ndarray:
+def _arcs(z, site_weights, domain: Domain, crossing, ends, begins) -> np.ndarray:
     """The four integrals of every cell along the boundary, (4,n); which cells end and begin at the crossings (k,)."""
     arcs = np.zeros((4, len(z)))
     if len(crossing):
@@ -87,12 +89,12 @@ def _arcs(z, weights, domain: Domain, crossing, ends, begins) -> np.ndarray:
         around = int(arcs[0].argmin())
     else:
         corner = as_complex(domain.boundary_point(np.zeros(1)))
-        around = int((np.abs(z - corner) ** 2 - weights).argmin())
+        around = int((np.abs(z - corner) ** 2 - site_weights).argmin())
     arcs[:, around] += domain.total_integrals()
     return arcs
 
 
-def _whole_sides(z, centre, dual: Regular, h) -> tuple[np.ndarray, ...]:
+def _whole_sides(z, centre, dual: RegularTriangulation, h) -> tuple[np.ndarray, ...]:
     """Sides of the halfedges h (k,) that end at power centres inside the domain, the one to their left last.
 
     Returns the sites i, j on both sides (k,), the lengths (k,), and the integrals along (4,k).
@@ -104,7 +106,7 @@ def _whole_sides(z, centre, dual: Regular, h) -> tuple[np.ndarray, ...]:
     return i, j, np.maximum(length, 0), segment_integrals(as_points(p), as_points(q))
 
 
-def _cut_sides(z, weights, centre, inside, dual: Regular, h, domain: Domain):
+def _cut_sides(z, site_weights, centre, inside, dual: RegularTriangulation, h, domain: Domain):
     """Sides that reach out of the domain, cut, as `_whole_sides`.
 
     Also their ends p, q (k,) complex, and which of them enter (k,), and which leave, (k,).
@@ -113,7 +115,7 @@ def _cut_sides(z, weights, centre, inside, dual: Regular, h, domain: Domain):
     i, j = tail[h], tail[next_halfedge(h)]
     apart = z[j] - z[i]
     distance = np.abs(apart)
-    origin = z[i] + (0.5 + (weights[i] - weights[j]) / (2 * distance**2)) * apart
+    origin = z[i] + (0.5 + (site_weights[i] - site_weights[j]) / (2 * distance**2)) * apart
     direction = 1j * apart / distance
     t_left = ((centre[left] - origin) * direction.conj()).real
     t_right = np.where(right < 0, -np.inf, ((centre[right] - origin) * direction.conj()).real)

@@ -23,7 +23,7 @@ MAX_ROUNDS = 200
 
 
 @dataclass(frozen=True)
-class Regular:
+class RegularTriangulation:
     """Triangles (k,3) of sites, counter-clockwise, and their twin halfedges (3k,), -1 on the hull.
 
     whole: the triangles fill the convex hull of all sites, so that edges which are regular one by one prove that the
@@ -35,18 +35,18 @@ class Regular:
     whole: bool
     flips: int = 0
 
-    def renumbered(self, order: np.ndarray) -> Regular:
+    def renumbered(self, order: np.ndarray) -> RegularTriangulation:
         """The same triangles with site k called order[k], (n,)."""
         return replace(self, triangles=order[self.triangles])
 
 
-def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
+def by_hull(sites: np.ndarray, site_weights: np.ndarray) -> RegularTriangulation:
     """Regular triangulation of sites (n,2) with weights (n,); sites above the hull are in no triangle.
 
     Raises TransportError for fewer than three sites, sites on one line, and sites that coincide.
     """
     # The hull of three lifted points is flat; a fourth far above closes it from the upper side.
-    lifted = np.column_stack([sites, dot2(sites, sites) - weights])
+    lifted = np.column_stack([sites, dot2(sites, sites) - site_weights])
     spread = max(np.ptp(lifted[:, 2]), np.ptp(sites, axis=0).max(), 1e-300)
     above = np.append(sites.mean(axis=0), lifted[:, 2].max() + spread)
     try:
@@ -63,10 +63,12 @@ def by_hull(sites: np.ndarray, weights: np.ndarray) -> Regular:
     turned = ((b - a).conj() * (c - a)).imag < 0
     triangles[turned] = triangles[turned][:, [0, 2, 1]]
     whole = whole and len(np.unique(triangles)) == len(sites)
-    return Regular(triangles, twins(triangles), whole)
+    return RegularTriangulation(triangles, twins(triangles), whole)
 
 
-def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Regular | None, bool]:
+def by_flips(
+    start: RegularTriangulation, sites: np.ndarray, site_weights: np.ndarray
+) -> tuple[RegularTriangulation | None, bool]:
     """Repair a triangulation of all sites after their weights changed.
 
     Returns the regular triangulation, or None where flips alone do not reach it, and whether a site is certainly
@@ -78,21 +80,21 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
     waiting = [np.zeros(0, np.int64)]
 
     def violation(edges):
-        below, convex = _below(z, weights, flat, edges, twin[edges])
+        below, convex = _below(z, site_weights, flat, edges, twin[edges])
         waiting.append(edges[(below < 0) & ~convex])
         return np.where(convex, below, 0.0)
 
     def flip(edges):
         flip_in_place(triangles, twin, edges)
 
-    flips, settled = flip_until_none(twin, violation, flip, MAX_ROUNDS, _backward(z, weights, start))
+    flips, settled = flip_until_none(twin, violation, flip, MAX_ROUNDS, _backward(z, site_weights, start))
     # Edges that wanted to flip and could not; a flip next to them may have helped since.
     edges = np.unique(np.concatenate(waiting))
     edges = edges[twin[edges] >= 0]
-    below, _ = _below(z, weights, flat, edges, twin[edges])
+    below, _ = _below(z, site_weights, flat, edges, twin[edges])
     stuck = edges[below < 0]
     if settled and len(stuck) == 0:
-        return Regular(triangles, twin, start.whole, flips), False
+        return RegularTriangulation(triangles, twin, start.whole, flips), False
     degree = np.bincount(flat, minlength=len(sites))
     on_hull = np.zeros(len(sites), dtype=bool)
     on_hull[flat[twin < 0]] = True
@@ -100,25 +102,25 @@ def by_flips(start: Regular, sites: np.ndarray, weights: np.ndarray) -> tuple[Re
     return None, bool(((degree[ends] == 3) & ~on_hull[ends]).any())
 
 
-def power_centres(z: np.ndarray, weights: np.ndarray, dual: Regular) -> np.ndarray:
+def power_centres(z: np.ndarray, site_weights: np.ndarray, dual: RegularTriangulation) -> np.ndarray:
     """Point of equal power of each triangle, (k,) complex, of sites z (n,) complex with weights (n,)."""
-    return np.concatenate([_power_centres(z, weights, *corners.T) for (corners,) in in_parts(dual.triangles)])
+    return np.concatenate([_power_centres(z, site_weights, *corners.T) for (corners,) in in_parts(dual.triangles)])
 
 
-def _power_centres(z, weights, i, j, k) -> np.ndarray:
+def _power_centres(z, site_weights, i, j, k) -> np.ndarray:
     # Relative to the first corner, so that clusters keep precision.
-    a, base = z[i], weights[i]
+    a, base = z[i], site_weights[i]
     b, c = z[j] - a, z[k] - a
-    rb = (b * b.conj()).real - weights[j] + base
-    rc = (c * c.conj()).real - weights[k] + base
+    rb = (b * b.conj()).real - site_weights[j] + base
+    rc = (c * c.conj()).real - site_weights[k] + base
     twice = 2 * (b.conj() * c).imag
     twice = np.where(np.abs(twice) > 1e-300, twice, 1e-300)
     return a - 1j * (rb * c - rc * b) / twice
 
 
-def _backward(z, weights, start: Regular) -> np.ndarray:
+def _backward(z, site_weights, start: RegularTriangulation) -> np.ndarray:
     """The edges whose side between two cells runs backwards, as one of each pair of halfedges: those that may flip."""
-    centre, tail = power_centres(z, weights, start), start.triangles.ravel()
+    centre, tail = power_centres(z, site_weights, start), start.triangles.ravel()
     found, edges = [], np.flatnonzero(start.twin > np.arange(len(start.twin)))
     for h, g in in_parts(edges, start.twin[edges]):
         apart, side = z[tail[g]] - z[tail[h]], centre[h // 3] - centre[g // 3]
@@ -126,12 +128,12 @@ def _backward(z, weights, start: Regular) -> np.ndarray:
     return np.concatenate(found)
 
 
-def _below(z, weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
+def _below(z, site_weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
     """How far the far corner of g lies below the lifted triangle of h, negative when it does, else 0; flip possible?"""
     i, j, k, far = flat[h], flat[g], flat[previous_halfedge(h)], flat[previous_halfedge(g)]
-    origin, base = z[far], weights[far]
+    origin, base = z[far], site_weights[far]
     a, b, c = z[i] - origin, z[j] - origin, z[k] - origin
-    za, zb, zc = ((x * x.conj()).real - weights[v] + base for x, v in ((a, i), (b, j), (c, k)))
+    za, zb, zc = ((x * x.conj()).real - site_weights[v] + base for x, v in ((a, i), (b, j), (c, k)))
     bc, ca, ab = ((x.conj() * y).imag for x, y in ((b, c), (c, a), (a, b)))
     terms = za * bc, zb * ca, zc * ab
     determinant = sum(terms)

@@ -53,10 +53,10 @@ class SphericalCells:
         return normalized(self.moment)
 
 
-def spherical_cells(sites: np.ndarray, weights: np.ndarray, hull: Hull) -> SphericalCells:
+def spherical_cells(sites: np.ndarray, site_weights: np.ndarray, hull: Hull) -> SphericalCells:
     """Cells of unit vectors (n,3) with weights (n,), whose convex hull is given."""
     triangles = hull.triangles
-    normal = _normals(sites, weights, triangles)
+    normal = _normals(sites, site_weights, triangles)
     tail, head = halfedges(triangles)
     # Around the tail, counter-clockwise, the facet to the right of a halfedge comes before its own.
     before, after = normal[hull.twin // 3], np.repeat(normal, 3, axis=0)
@@ -68,19 +68,19 @@ def spherical_cells(sites: np.ndarray, weights: np.ndarray, hull: Hull) -> Spher
     moment = _sum(tail, 0.5 * arc[:, None] * normalized(np.cross(before, after - before)), n)
     once = np.arange(len(tail)) < hull.twin
     i, j = tail[once], head[once]
-    radial, across = _from(sites, weights, i, j)
+    radial, across = _from(sites, site_weights, i, j)
     # The integral of x along an arc is tan(arc / 2) times the sum of its ends; lengths are in units of exp(h_i).
     integral = np.einsum("md,md->m", (before + after)[once], sites[i]) * apart[once] / along[once]
     conductance = np.maximum(integral, 0) / np.hypot(radial, np.linalg.norm(across, axis=1))
     return SphericalCells(area, moment, np.stack([i, j], axis=1), conductance, hull)
 
 
-def by_hull(sites: np.ndarray, weights: np.ndarray) -> Hull:
+def by_hull(sites: np.ndarray, site_weights: np.ndarray) -> Hull:
     """Convex hull of the weighted sites (n,3), (n,).
 
     Raises TransportError where sites coincide, are hidden, or leave half of the sphere empty.
     """
-    points = sites * np.exp(weights - weights.max())[:, None]
+    points = sites * np.exp(site_weights - site_weights.max())[:, None]
     try:
         hull = ConvexHull(points, qhull_options="Qt Q12")
     except (QhullError, ValueError) as error:
@@ -98,7 +98,7 @@ def by_hull(sites: np.ndarray, weights: np.ndarray) -> Hull:
     return Hull(triangles, twin)
 
 
-def by_flips(near: Hull, sites: np.ndarray, weights: np.ndarray) -> tuple[Hull | None, bool]:
+def by_flips(near: Hull, sites: np.ndarray, site_weights: np.ndarray) -> tuple[Hull | None, bool]:
     """Repair a hull of all sites after their weights changed.
 
     Returns the hull, or None where flips alone do not reach it, and whether a site is certainly hidden: it has three
@@ -108,12 +108,12 @@ def by_flips(near: Hull, sites: np.ndarray, weights: np.ndarray) -> tuple[Hull |
     flat = triangles.reshape(-1)
 
     def violation(edges):
-        hollow, possible = _hollow(sites, weights, flat, edges, twin[edges])
+        hollow, possible = _hollow(sites, site_weights, flat, edges, twin[edges])
         return np.where(possible, -hollow, 0.0)
 
     flip_until_none(twin, violation, lambda edges: flip_in_place(triangles, twin, edges), MAX_ROUNDS)
     edges = np.flatnonzero(twin > np.arange(len(twin)))
-    hollow, _ = _hollow(sites, weights, flat, edges, twin[edges])
+    hollow, _ = _hollow(sites, site_weights, flat, edges, twin[edges])
     stuck = edges[hollow > 0]
     if len(stuck) == 0:
         return Hull(triangles, twin), False
@@ -121,28 +121,28 @@ def by_flips(near: Hull, sites: np.ndarray, weights: np.ndarray) -> tuple[Hull |
     return None, bool((degree[np.concatenate([flat[stuck], flat[twin[stuck]]])] == 3).any())
 
 
-def _from(sites, weights, i, j) -> tuple[np.ndarray, np.ndarray]:
+def _from(sites, site_weights, i, j) -> tuple[np.ndarray, np.ndarray]:
     """q_j - q_i (k,) in units of exp(h_i): its part along y_i, (k,), and across, (k,3)."""
     d = sites[j] - sites[i]
-    change = weights[j] - weights[i]
+    change = site_weights[j] - site_weights[i]
     half = 0.5 * np.einsum("md,md->m", d, d)
     scale = np.exp(change)
     return np.expm1(change) - scale * half, scale[:, None] * (d + half[:, None] * sites[i])
 
 
-def _normals(sites, weights, triangles) -> np.ndarray:
+def _normals(sites, site_weights, triangles) -> np.ndarray:
     """Unit outer normals (m,3) of the facets."""
     i, j, k = triangles.T
-    (ra, a), (rb, b) = _from(sites, weights, i, j), _from(sites, weights, i, k)
+    (ra, a), (rb, b) = _from(sites, site_weights, i, j), _from(sites, site_weights, i, k)
     y = sites[i]
     normal = y * np.einsum("md,md->m", y, np.cross(a, b))[:, None]
     return normalized(normal + ra[:, None] * np.cross(y, b) + rb[:, None] * np.cross(a, y))
 
 
-def _hollow(sites, weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
+def _hollow(sites, site_weights, flat, h, g) -> tuple[np.ndarray, np.ndarray]:
     """How far the far corner of g rises above the facet of h, (k,), 0 if not at all; and whether a flip is possible."""
     i, j, k, far = flat[h], flat[g], flat[previous_halfedge(h)], flat[previous_halfedge(g)]
-    (ra, a), (rb, b), (rc, c) = (_from(sites, weights, i, x) for x in (j, k, far))
+    (ra, a), (rb, b), (rc, c) = (_from(sites, site_weights, i, x) for x in (j, k, far))
     y = sites[i]
     terms = np.stack([r * np.einsum("md,md->m", y, np.cross(u, v)) for r, u, v in ((ra, b, c), (rb, c, a), (rc, a, b))])
     determinant, size = terms.sum(axis=0), np.abs(terms).sum(axis=0)

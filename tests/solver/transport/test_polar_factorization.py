@@ -80,7 +80,7 @@ def test_balance_moves_from_equal_area_to_the_given_map(case):
     assert (np.diff(moved) < 0).all()
     assert error[0] < 1e-6 * domain.area
     assert steps[-1].iterations == 0
-    assert np.abs(steps[-1].weights).max() == 0
+    assert np.abs(steps[-1].site_weights).max() == 0
 
 
 def test_a_measure_preserving_map_is_its_own_first_factor(case):

@@ -57,10 +57,10 @@ def test_cells_sum_to_the_domain(name, count):
 def test_cells_are_where_their_power_is_least(name):
     domain = DOMAINS[name]
     sites = inside(domain, 12)
-    weights = 0.05 * domain.area * np.random.default_rng(3).random(12)
-    cells = power_diagram(sites, weights, domain)
+    site_weights = 0.05 * domain.area * np.random.default_rng(3).random(12)
+    cells = power_diagram(sites, site_weights, domain)
     x = samples(domain, 200_000)
-    owner = (((x[:, None] - sites) ** 2).sum(axis=2) - weights).argmin(axis=1)
+    owner = (((x[:, None] - sites) ** 2).sum(axis=2) - site_weights).argmin(axis=1)
     share = np.bincount(owner, minlength=12) / len(x)
     np.testing.assert_allclose(cells.area / domain.area, share, atol=6e-3)
     held = share > 0.01
@@ -82,9 +82,9 @@ def test_symmetric_sites_on_the_boundary():
 
 def test_hidden_sites_have_no_area():
     sites = inside(Disk(), 30)
-    weights = np.zeros(30)
-    weights[4] = -5
-    cells = power_diagram(sites, weights, Disk())
+    site_weights = np.zeros(30)
+    site_weights[4] = -5
+    cells = power_diagram(sites, site_weights, Disk())
     assert cells.area[4] == 0 and cells.area.sum() == pytest.approx(np.pi, rel=1e-12)
 
 
@@ -162,9 +162,9 @@ def test_the_assignment_is_optimal_for_its_own_areas():
     sites = inside(domain, 30)
     mass = np.random.default_rng(8).uniform(0.5, 2, 30)
     result = drain(transport(sites, mass, domain))
-    dual = (result.weights * mass).sum() * domain.area / mass.sum()
+    dual = (result.site_weights * mass).sum() * domain.area / mass.sum()
     x = samples(domain, 200_000)
-    least = (((x[:, None] - sites) ** 2).sum(axis=2) - result.weights).min(axis=1).mean() * domain.area
+    least = (((x[:, None] - sites) ** 2).sum(axis=2) - result.site_weights).min(axis=1).mean() * domain.area
     assert dual + least == pytest.approx(result.cost, rel=1e-2)
 
 
@@ -217,9 +217,9 @@ def test_flips_repair_the_triangulation_a_hull_would_give():
     assert start.whole
     reached = 0
     for size in (1e-5, 1e-4, 5e-4, 3e-3):
-        weights = size * rng.normal(size=300)
-        repaired, hidden = by_flips(start, sites, weights)
-        expected = by_hull(sites, weights)
+        site_weights = size * rng.normal(size=300)
+        repaired, hidden = by_flips(start, sites, site_weights)
+        expected = by_hull(sites, site_weights)
         if repaired is None:
             # Flips alone cannot take a site out; the certificate must then be right.
             assert not hidden or len(np.unique(expected.triangles)) < 300
