@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.seams import cut_seams
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
@@ -47,7 +48,7 @@ def available(names=None) -> list[str]:
 def our_uv(case: Case, boundary, quality, balance=0.0):
     """Corner UVs (m,3,2) by our pipeline, and its result."""
     surface = triangle_surface(case.V, case.F, case.seams)
-    result = drain(unwrap(surface, boundary=boundary, quality=quality, balance=balance))
+    result = drain(unwrap(surface, options=UnwrapOptions(boundary, quality, balance)))
     corners, uv = result.corner_uv()
     full = np.zeros((3 * len(case.F), 2))
     full[corners] = uv

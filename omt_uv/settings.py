@@ -93,13 +93,16 @@ class Settings:
         row, column = divmod(self.tile - FIRST_TILE, 10)
         return column, row
 
-    def solver_arguments(self) -> dict:
-        """How to map a chart: keyword arguments of `solver.chart_map.unwrap_chart`."""
-        return {"boundary": self.boundary, "quality": self.quality, "balance": self.balance}
-
-    def preparation_arguments(self) -> dict:
-        """How to make charts: keyword arguments of `solver.preparation.prepare`."""
-        return {"seams": "existing" if self.seams == "existing" else "auto", "fill_holes": self.fill_holes}
+    def unwrap_arguments(self) -> dict:
+        """How to make and map charts: arguments of the solver's `UnwrapOptions`."""
+        return {
+            "boundary": self.boundary,
+            "quality": self.quality,
+            "balance": self.balance,
+            "seams": "existing" if self.seams == "existing" else "auto",
+            "fill_holes": self.fill_holes,
+            "max_shear": self.max_shear,
+        }
 
 
 @dataclass(frozen=True)

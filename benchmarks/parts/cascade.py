@@ -15,7 +15,8 @@ from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.editing.magnify import magnify_region
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.options import MapOptions
 from omt_uv.solver.progress import drain
 
 
@@ -31,7 +32,7 @@ def cascade_table(args) -> Table:
         (chart,) = strict_charts(triangle_surface(case.V, case.F, case.seams))
         w = from_vertices(ball(case.V, case.F)[chart.vertex_ids], chart.triangles)
         for boundary in args.boundaries:
-            plain, seconds = fastest_of(REPEATS, lambda b=boundary, c=chart: drain(unwrap_chart(c, boundary=b)))
+            plain, seconds = fastest_of(REPEATS, lambda b=boundary, c=chart: drain(map_chart(c, options=MapOptions(b))))
             for factor in FACTORS:
                 head = {"model": case.name, "method": f"UVs {factor:g} x {boundary}"}
                 _add(table, head, plain.uv, chart.triangles, w, factor, seconds)

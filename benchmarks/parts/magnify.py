@@ -15,12 +15,13 @@ from benchmarks.regions import areas, ball, figures, missed_by
 from benchmarks.rivals import make_object, read_uv, remove_object
 from benchmarks.tables import Table
 from benchmarks.timing import fastest_of
-from omt_uv.solver.analysis.density import from_vertices, region_share
+from omt_uv.solver.analysis.density import Target, from_vertices, region_share
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.options import MapOptions
 from omt_uv.solver.progress import drain
 
 DEFAULT_MODELS = ("lion", "max_planck", "face")
@@ -43,7 +44,7 @@ def magnify_table(args) -> Table:
             _rival(table, case, weights, factor)
         (chart,) = strict_charts(triangle_surface(case.V, case.F, case.seams))
         for boundary in args.boundaries:
-            _, plain = fastest_of(REPEATS, lambda b=boundary, c=chart: drain(unwrap_chart(c, boundary=b)))
+            _, plain = fastest_of(REPEATS, lambda b=boundary, c=chart: drain(map_chart(c, options=MapOptions(b))))
             for factor in FACTORS:
                 _ours(table, case.name, chart, weights[chart.vertex_ids], factor, boundary, plain)
     return table
@@ -53,8 +54,8 @@ def _ours(table, name, chart, weights, factor, boundary, plain):
     F = chart.triangles
     area, w = face_areas(chart.vertices, F), from_vertices(weights, F)
     found = exact_density(w, area, factor)
-    options = {"boundary": boundary, "density": found.density * (area.sum() / (area @ found.density)), "region": w}
-    result, seconds = fastest_of(REPEATS, lambda: drain(unwrap_chart(chart, **options)))
+    target = Target(found.density * (area.sum() / (area @ found.density)), w)
+    result, seconds = fastest_of(REPEATS, lambda: drain(map_chart(chart, options=MapOptions(boundary), target=target)))
     has = figures(chart.vertices, F, result.uv[F], found.density, w)
     off = has.share / found.target_share - 1
     table.add(

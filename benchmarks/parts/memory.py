@@ -12,6 +12,7 @@ from benchmarks import ROOT
 from benchmarks.part import PRESET, Part
 from benchmarks.tables import Table, missed
 from benchmarks.timing import peak_mib
+from omt_uv.solver.parameterization.options import UnwrapOptions
 
 PEAK_GOAL = 2048  # MiB
 SIDE = 224  # squares along a side: 100,352 faces
@@ -37,7 +38,7 @@ def print_peak(preset) -> None:
     from omt_uv.solver.progress import drain
 
     V, F = meshes.bumpy(SIDE, SIDE, height=0.3)
-    drain(unwrap(triangle_surface(V, F), boundary="free", quality=preset))
+    drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(quality=preset)))
     print(peak_mib())
 
 

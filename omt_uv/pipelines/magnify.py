@@ -31,8 +31,9 @@ from ..solver.mesh.charts import check_disk, triangle_rows
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.surface import Surface
 from ..solver.parameterization.chart_indices import located
-from ..solver.parameterization.chart_map import unwrap_chart
+from ..solver.parameterization.chart_map import map_chart
 from ..solver.parameterization.chart_pins import CornerPins
+from ..solver.parameterization.options import MapOptions
 from ..solver.progress import Steps, part_of
 from .layout import Packer, PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
 from .unwrap import lay_out
@@ -288,9 +289,8 @@ def _into_shape(island: Island, area, found: RegionDensity, weights, settings: M
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
     flat = replace(island.chart, vertices=np.column_stack([uv * mirror, np.zeros(len(uv))]))
     density = normalised_density(found.density, area)
-    done = yield from unwrap_chart(
-        flat, boundary=settings.boundary, quality=settings.quality, density=density, region=weights
-    )
+    options = MapOptions(boundary=settings.boundary, quality=settings.quality)
+    done = yield from map_chart(flat, options=options, target=Target(density, weights))
     placed = aligned_to(done.uv, uv * mirror, triangles, 1 - weights, quarters=settings.boundary == "square") * mirror
     texts = (*found.warnings, *done.warnings)
     return Lens(placed, settings.boundary, done.newton_refinement, 0.0, done.status, done.area_l1, texts)

@@ -16,8 +16,8 @@ from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_edges
-from ..solver.parameterization.chart_indices import located, located_pins
-from ..solver.parameterization.chart_pins import ChartPins, CornerPins
+from ..solver.parameterization.chart_indices import located
+from ..solver.parameterization.chart_pins import ChartPins, CornerPins, pins_of_chart
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.refinement.refine import Refinement
 from .layout import Packer, PlacedIsland, Refusal, corner_uvs, grown_together, pack_islands
@@ -131,7 +131,7 @@ def found_islands(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]],
             islands = uv_islands(surface, pins.uv, faces)
             warnings += [(index, text) for text in islands.warnings]
             for island in islands.islands:
-                found.append((index, island, located_pins(pins, island.chart)))
+                found.append((index, island, pins_of_chart(pins, island.chart)))
         except MeshError as error:
             raise Refusal(index, error) from error
     return found, warnings

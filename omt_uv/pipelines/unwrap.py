@@ -13,11 +13,7 @@ from ..settings import Settings
 from ..solver.errors import MeshError
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.topology import twins
-from ..solver.parameterization.chart_indices import chart_target, located, located_pins
-from ..solver.parameterization.chart_map import ChartMap, unwrap_chart
-from ..solver.parameterization.chart_pins import chart_pins, clear_of_pins
-from ..solver.parameterization.convex_maps import with_open_corners
-from ..solver.parameterization.shear_bound import unwrap_within
+from ..solver.parameterization.options import UnwrapOptions
 from ..solver.parameterization.unwrap import SurfaceMap, unwrap
 from ..solver.progress import Progress, Steps, part_of
 from ..xatlas.segmentation import SegmentationError, chart_seams
@@ -40,12 +36,14 @@ def lay_out(
     Refusal : with the index of the surface and the MeshError that says why
     PackingError : neither packer can place the islands
     """
+    options = UnwrapOptions(**settings.unwrap_arguments())
     maps: list[SurfaceMap] = []
     warnings: list[tuple[int, str]] = []
     for index, job in enumerate(jobs):
         try:
             job, warning = _with_charts(job) if settings.seams == "charts" else (job, "")
-            maps.append((yield from part_of(_mapped(job, settings), index / len(jobs), 1 / len(jobs))))
+            steps = unwrap(job.surface, job.faces, options=options, pins=job.pins, target=job.target, avoid=job.avoid)
+            maps.append((yield from part_of(steps, index / len(jobs), 1 / len(jobs))))
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for text in (warning, *maps[-1].warnings) if text]
@@ -78,36 +76,6 @@ def _with_charts(job: UnwrapJob) -> tuple[UnwrapJob, str]:
         return job, f"{error}; cut only where it has to be"
     seams = np.concatenate([job.surface.seams, more])
     return replace(job, surface=replace(job.surface, seams=seams)), ""
-
-
-def _mapped(job: UnwrapJob, settings: Settings) -> Steps[SurfaceMap]:
-    options = settings.preparation_arguments()
-    if not settings.max_shear:
-        arguments = {**settings.solver_arguments(), **options}
-        return (
-            yield from unwrap(job.surface, job.faces, pins=job.pins, avoid=job.avoid, target=job.target, **arguments)
-        )
-
-    def map_chart(chart: Chart) -> Steps[ChartMap]:
-        try:
-            arguments = {**settings.solver_arguments(), **chart_target(job.target, job.surface, chart)}
-            return (yield from unwrap_chart(chart, pins=chart_pins(job.pins, chart), **arguments))
-        except MeshError as error:
-            raise located(error, chart) from error
-
-    avoid = clear_of_pins(job.surface, job.pins, job.avoid)
-    found = yield from unwrap_within(job.surface, job.faces, map_chart, settings.max_shear, avoid=avoid, **options)
-    charts, held = found.prepared.charts, [located_pins(job.pins, c) for c in found.prepared.charts]
-    maps = with_open_corners(job.surface, charts, found.maps, held, settings.boundary, settings.quality, job.target)
-    cuts = found.slits if found.prepared.cuts is None else np.concatenate([found.prepared.cuts.edges, found.slits])
-    (length, shear), first = found.history[-1], found.history[0]
-    warnings = list(found.prepared.warnings)
-    if not found.reached:
-        warnings.append(
-            f"The mean shear went from {first[1]:.3g} to {shear:.3g} with {length - first[0]:.3g} more of seam, "
-            f"not below {settings.max_shear:.3g}; the least that was found is kept"
-        )
-    return SurfaceMap(charts, maps, cuts, tuple(warnings))
 
 
 def _connected_triangles(chart: Chart) -> np.ndarray:

@@ -7,6 +7,8 @@ from dataclasses import replace
 import meshes
 import numpy as np
 
+from omt_uv.solver.parameterization.options import UnwrapOptions
+
 MODELS = ["cow", "spot", "homer", "suzanne", "teapot", "camel_b", "three_holes", "fertility", "snail", "lilium", "ogre"]
 
 
@@ -188,7 +190,7 @@ def _lists(polygons):
 
 
 def broken_mesh(seed):
-    """The surface, the chosen faces (or None) and options of case `seed`."""
+    """The surface, the chosen faces (or None) and arguments of `unwrap` of case `seed`."""
     rng = np.random.default_rng(seed)
     if rng.random() < 0.15:
         V, P = soup(rng)
@@ -223,18 +225,17 @@ def broken_model(seed):
 
 
 def marked(rng, V, P, auto, sparse=1):
-    """The mesh with random seams, sharp edges, chosen faces and options."""
+    """The mesh with random seams, sharp edges, chosen faces and arguments of `unwrap`."""
     seams = rng.integers(len(V), size=(rng.integers(0, 4), 2))
     if P and rng.random() < 0.5:
         edges = np.array([[p[0], p[1]] for p in P])
         seams = np.concatenate([seams, edges[rng.random(len(edges)) < rng.random() ** sparse]])
     surface = meshes.polygon_surface(V, P, seams)
     faces = rng.random(len(P)) < 0.8 if rng.random() < 0.2 else None
-    options = {"boundary": str(rng.choice(["disk", "square", "free"])), "quality": "draft"}
-    options["seams"] = "auto" if rng.random() < auto else "existing"
-    if rng.random() < 0.3:
-        options["fill_holes"] = True
+    boundary = str(rng.choice(["disk", "square", "free"]))
+    seams = "auto" if rng.random() < auto else "existing"
+    arguments = {"options": UnwrapOptions(boundary, "draft", seams=seams, fill_holes=bool(rng.random() < 0.3))}
     if rng.random() < 0.2:
         surface = replace(surface, sharp=rng.integers(len(V), size=(8, 2)))
-        options["avoid"] = rng.random(len(V))
-    return surface, faces, options
+        arguments["avoid"] = rng.random(len(V))
+    return surface, faces, arguments

@@ -1,4 +1,4 @@
-"""What is said of a surface in the terms of one of its charts, and of a chart in those of the surface."""
+"""Translate between a surface and one of its charts: targets to the chart, the elements of errors back."""
 
 from __future__ import annotations
 
@@ -8,27 +8,15 @@ from ..analysis.density import Target
 from ..errors import MeshError
 from ..mesh.charts import Chart, triangle_rows
 from ..mesh.surface import Surface
-from .chart_pins import ChartPins, CornerPins, chart_pins
 
 
-def chart_target(target: Target | None, surface: Surface, chart: Chart) -> dict:
-    """Arguments of `chart_map.unwrap_chart` for the part of a surface's target that a chart has."""
-    if target is None:
-        return {}
-    mine = target.of(triangle_rows(surface, chart))
-    return {"density": mine.density, "region": mine.region}
-
-
-def located_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
-    """The pins of a chart; errors have the element indices of the surface."""
-    try:
-        return chart_pins(pins, chart)
-    except MeshError as error:
-        raise located(error, chart) from error
+def chart_target(target: Target | None, surface: Surface, chart: Chart) -> Target | None:
+    """The part of a surface's target that the triangles of a chart have; None for none."""
+    return None if target is None else target.of(triangle_rows(surface, chart))
 
 
 def located(error: MeshError, chart: Chart) -> MeshError:
-    """The same error with the element indices of the surface instead of the chart's; patches are nobody's fault."""
+    """The same error with the element indices of the surface instead of the chart's; patches have none."""
     patched = np.concatenate([chart.faces, np.full(len(chart.patches), -1)])
     place = {"vertex": chart.vertex_ids, "edge": chart.vertex_ids, "face": patched}.get(error.kind)
     elements = error.elements

@@ -9,36 +9,41 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.density import area_error_warnings
+from ..analysis.density import Target, area_error_warnings
 from ..conformal.disk_map import sharpest_corners
 from ..errors import FoldedUVError, MeshError, positive_density
-from ..maps.distortion import distortion
+from ..maps.distortion import Distortion, distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.continuation import QUALITIES
 from ..refinement.initial_maps import unroll
-from ..refinement.refine import BOUNDARIES, Refinement, RefinementOptions, refine
-from ..transport.convex_domain import Disk, Domain, Rectangle
+from ..refinement.refine import Refinement, RefinementOptions, refine
+from ..transport.convex_domain import Disk
 from .chart_pins import ChartPins, anchored, facing, refuse_outline
-from .initial_map import COARSE_ABOVE, FirstMap, coarse_first_map, first_map, mean_value_sites
+from .initial_map import COARSE_ABOVE, DiskMesh, InitialChartMap, coarse_initial_map, initial_map, mean_value_sites
+from .options import MapOptions
 
-# Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
-FIRST, REFINEMENT = (0.0, 0.4), (0.4, 0.6)
+# Where the time of a chart goes, roughly, as start and width in [0, 1]: a bar that moves evenly needs no more.
+INITIAL = (0.0, 0.4)
+REFINEMENT = (0.4, 0.6)
 
 
 @dataclass(frozen=True)
 class ChartMap:
     """Texture coordinates of one chart.
 
-    uv (n,2) in the units of the surface: the UV area is the area of the chart, and 0 the centroid of a chart with a
-    free boundary, the middle of its disk or square otherwise. A chart with pins
-    (pinned) is where its pins are instead, at a scale that follows from them.
+    Attributes
+    ----------
+    uv (n,2) : in the units of the surface: the UV area is the area of the chart, and 0 the centroid of a chart with a
+        free boundary, the middle of its disk or square otherwise. A chart with pins (pinned) is where its pins are
+        instead, at a scale that follows from them
     newton_conformal, newton_transport : Newton steps; None where a stage was replaced
     residual_conformal : largest error of an angle sum, radians; residual_transport : |cell area - mass| / mass
-    newton_refinement, residual_refinement, status : see `refine.Refinement`
-    warnings : what was replaced and why; seconds : wall-clock time per stage; weight : of the area term at the end
+    newton_refinement, residual_refinement, status, area_weight : see `refine.Refinement`
+    area_l1, area_sd, angle_mean, folds : see `maps.distortion`
+    warnings : what was replaced and why; seconds : wall-clock time per stage
     """
 
     uv: np.ndarray
@@ -56,32 +61,29 @@ class ChartMap:
     warnings: tuple[str, ...]
     seconds: dict[str, float]
     pinned: bool = False
-    weight: float = 0.0
+    area_weight: float = 0.0
 
     def report(self, chart: Chart) -> dict:
         """Everything but the coordinates, for a JSON file."""
-        figures = {k: v for k, v in vars(self).items() if k != "uv"}
+        figures = {k: v for k, v in vars(self).items() if k not in ("uv", "area_weight")}
         size = {"vertices": len(chart.vertices), "faces": len(np.unique(chart.faces))}
-        return {**size, "triangles": len(chart.triangles), **figures, "warnings": list(self.warnings)}
+        counts = {**size, "triangles": len(chart.triangles)}
+        return {**counts, **figures, "warnings": list(self.warnings), "weight": self.area_weight}
 
 
-def unwrap_chart(
+def map_chart(
     chart: Chart,
     *,
-    boundary: str = "free",
-    quality: str = "standard",
-    balance: float = 0.0,
-    density: np.ndarray | None = None,
-    region: np.ndarray | None = None,
+    options: MapOptions | None = None,
+    target: Target | None = None,
     pins: ChartPins | None = None,
 ) -> Steps[ChartMap]:
-    """Area-preserving map of one chart: conformal map, transport, authalic refinement.
+    """Map one chart so that its areas are kept, by a conformal map, optimal transport and Newton's method.
 
     Parameters
     ----------
-    boundary, quality, balance : see `parameterize.unwrap`
-    density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default. The map has the area asked for
-    region : (m,) in [0, 1], weights of a region whose share of the map is to be exact
+    target : density (m,) > 0 multiplies the area that each triangle asks for, 1 by default; the map has the area asked
+        for. Of a region (m,) the share of the map is to be exact
     pins : two or more fix place, direction and scale; one fixes the place, and the chart stays as large as it is
 
     Raises
@@ -90,101 +92,115 @@ def unwrap_chart(
     PrecisionError, TransportError, FoldedUVError : where even the fallbacks fail
     DensityError : a density that is not positive and finite
     """
-    if boundary not in BOUNDARIES:
-        raise ValueError(f"boundary must be one of {', '.join(BOUNDARIES)}, not {boundary!r}")
-    refuse_outline(pins, boundary)
+    options = options or MapOptions()
+    refuse_outline(pins, options.boundary)
     log = RunLog()
+    density = None if target is None else target.density
     vertices, unit = in_unit_box(chart.vertices)
-    # Patches over holes are mapped with the rest, and forgotten afterwards.
-    triangles = chart.disk
-    density, region = _with_patches(density, region, len(chart.patches))
-    loop = boundary_loops(triangles)[0]
-    if boundary == "square" and len(loop) < 4:
-        log.warnings.append("A chart with only three boundary vertices does not fill a square; its boundary is free")
-        boundary = "free"
-    domain: Domain = Rectangle() if boundary == "square" else Disk()
-    corners = sharpest_corners(vertices, triangles, loop) if boundary == "square" else None
-    area = face_areas(vertices, triangles)
-    wanted = None if density is None else area * density
-    asked_for = area if wanted is None else wanted
-    way = _first_map(vertices, triangles, asked_for, region, loop, corners, domain, boundary, balance, log)
-    first = yield from part_of(way, *FIRST)
+    disk = _disk_mesh(vertices, chart, options.boundary, target, log)
+    initial = yield from part_of(_initial_map(disk, options.balance, log), *INITIAL)
     with log.timed("refinement"):
-        uv, held = facing(first.uv, pins)
-        options = RefinementOptions(boundary, balance, quality, first.near and held is None, first.pull)
-        target = {"target": wanted, "region": region, "pins": held}
-        refined = yield from part_of(_refined(vertices, triangles, uv, options, target, log), *REFINEMENT)
+        start, places = facing(initial.uv, pins)
+        refinement_options = RefinementOptions(
+            boundary=disk.boundary,
+            balance=options.balance,
+            quality=options.quality,
+            warm_start=initial.warm and places is None,
+            multiplier=initial.multiplier,
+        )
+        given = {"target": None if target is None else disk.target, "region": disk.region, "pins": places}
+        refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
     with log.timed("measure"):
-        asked = None if density is None else density[: len(chart.triangles)]
-        figures = distortion(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=asked)
-    if density is not None and balance == 0:
-        log.warnings += area_error_warnings(figures.area_l1, QUALITIES[quality].area_error)
+        figures = distortion(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=density)
+    if target is not None and options.balance == 0:
+        log.warnings += area_error_warnings(figures.area_l1, QUALITIES[options.quality].area_error)
     if figures.folds:
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
-    free = boundary == "free"
+    uv = refined.uv
+    if places is None:
+        uv = in_place(uv, vertices, chart.triangles, density, unit, pins, disk.boundary == "free")
+    return _chart_map(uv, initial, refined, figures, log, pins is not None)
+
+
+def _chart_map(
+    uv: np.ndarray,
+    initial: InitialChartMap,
+    refined: Refinement,
+    figures: Distortion,
+    log: RunLog,
+    pinned: bool,
+) -> ChartMap:
+    """What the stages of a map found, in one."""
+    conformal, cells = initial.conformal, initial.cells
     return ChartMap(
-        refined.uv if held else in_place(refined.uv, vertices, chart.triangles, asked, unit, pins, free),
-        first.conformal.iterations if first.conformal else None,
-        first.conformal.residual if first.conformal else None,
-        first.cells.iterations if first.cells else None,
-        first.cells.residual if first.cells else None,
-        refined.iterations,
-        refined.residual,
-        refined.status,
-        figures.area_l1,
-        figures.area_sd,
-        figures.angle_mean,
-        figures.folds,
-        tuple(dict.fromkeys((*log.warnings, *refined.warnings))),
-        log.seconds,
-        pins is not None,
-        refined.area_weight,
+        uv=uv,
+        newton_conformal=conformal.iterations if conformal else None,
+        residual_conformal=conformal.residual if conformal else None,
+        newton_transport=cells.iterations if cells else None,
+        residual_transport=cells.residual if cells else None,
+        newton_refinement=refined.iterations,
+        residual_refinement=refined.residual,
+        status=refined.status,
+        area_l1=figures.area_l1,
+        area_sd=figures.area_sd,
+        angle_mean=figures.angle_mean,
+        folds=figures.folds,
+        warnings=tuple(dict.fromkeys((*log.warnings, *refined.warnings))),
+        seconds=log.seconds,
+        pinned=pinned,
+        area_weight=refined.area_weight,
     )
 
 
-def _first_map(
-    vertices, triangles, target, region, loop, corners, domain: Domain, boundary: str, balance: float, log: RunLog
-) -> Steps[FirstMap]:
-    """Where the refinement starts; a flat chart with a free boundary is unrolled, large ones come by way of coarser."""
-    if boundary == "free":
-        flat = unroll(vertices, triangles, loop)
+def _disk_mesh(vertices: np.ndarray, chart: Chart, boundary: str, target: Target | None, log: RunLog) -> DiskMesh:
+    """The chart, vertices (n,3) in a unit box, as a disk to be mapped.
+
+    Patches over holes are mapped with the rest, and forgotten afterwards.
+    """
+    area, region, loop = face_areas(vertices, chart.disk), None, boundary_loops(chart.disk)[0]
+    if target is not None:
+        patches = len(chart.patches)
+        area = area * np.concatenate([positive_density(target.density), np.ones(patches)])
+        if target.region is not None:
+            region = np.concatenate([target.region, np.zeros(patches)])
+    if boundary == "square" and len(loop) < 4:
+        log.warnings.append("A chart with only three boundary vertices does not fill a square; its boundary is free")
+        boundary = "free"
+    corners = sharpest_corners(vertices, chart.disk, loop) if boundary == "square" else None
+    return DiskMesh(vertices, chart.disk, area, loop, boundary, corners, region)
+
+
+def _initial_map(disk: DiskMesh, balance: float, log: RunLog) -> Steps[InitialChartMap]:
+    """The initial map: flat charts with a free boundary are unrolled, large ones come by way of a coarser mesh."""
+    if disk.boundary == "free":
+        flat = unroll(disk.vertices, disk.triangles, disk.loop)
         if flat is not None:
-            return FirstMap(None, None, flat)
-    if len(vertices) > COARSE_ABOVE:
+            return InitialChartMap(flat)
+    if len(disk.vertices) > COARSE_ABOVE:
         try:
-            options = (boundary, balance, log, None, region)
-            found = yield from coarse_first_map(vertices, triangles, target, loop, corners, *options)
+            found = yield from coarse_initial_map(disk, balance, log)
             if found is not None:
                 return found
         except MeshError as error:
             log.warnings.append(f"{error.cause}; refined without a coarser mesh")
-    return (yield from first_map(vertices, triangles, target, loop, corners, domain, log))
+    return (yield from initial_map(disk, log))
 
 
-def _refined(vertices, triangles, uv, options: RefinementOptions, target: dict, log: RunLog) -> Steps[Refinement]:
+def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: dict, log: RunLog) -> Steps[Refinement]:
     """The refined map, with a free boundary where the domain asked for leaves faces folded.
 
-    target: target, region and pins of `refine`
+    given : target, region and pins of `refine`
     """
     try:
-        return (yield from refine(vertices, triangles, uv, options, **target))
+        return (yield from refine(disk.vertices, disk.triangles, uv, options, **given))
     except FoldedUVError as error:
         domain = options.boundary
         if domain == "free":
             raise
         log.warnings.append(f"The {domain} has no room for this chart ({error.cause}); its boundary is free instead")
-    loop = boundary_loops(triangles)[0]
-    uv = mean_value_sites(vertices, triangles, loop, None, Disk())
+    uv = mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk())
     free = RefinementOptions(balance=options.balance, quality=options.quality)
-    return (yield from refine(vertices, triangles, uv, free, **target))
-
-
-def _with_patches(density, region, patches: int) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Density and region of all triangles of a chart's disk, those of the patches over holes included."""
-    return (
-        None if density is None else np.concatenate([positive_density(density), np.ones(patches)]),
-        None if region is None else np.concatenate([region, np.zeros(patches)]),
-    )
+    return (yield from refine(disk.vertices, disk.triangles, uv, free, **given))
 
 
 def in_place(

@@ -10,6 +10,7 @@ from ..errors import PinError
 from ..mesh.charts import Chart
 from ..mesh.surface import Surface
 from ..refinement.pins import Pins, aligned, check_pins
+from .chart_indices import located
 
 
 @dataclass(frozen=True)
@@ -29,19 +30,24 @@ class ChartPins:
     given: np.ndarray
 
 
-def chart_pins(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
+def pins_of_chart(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
     """Pins of a chart, None if it has none.
 
     Raises
     ------
-    PinError : see `pins.check_pins`; pinned corners of one chart vertex that lie apart are two places of it
+    PinError : see `pins.check_pins`; pinned corners of one chart vertex that lie apart are two places of it. Its
+        elements are those of the surface
     """
     if pins is None or not pins.pinned[chart.corners].any():
         return None
     mask = pins.pinned[chart.corners]
     given = np.asarray(pins.uv, float)[chart.corners]
-    checked = check_pins(chart.triangles[mask], given[mask], len(chart.vertices))
-    return ChartPins(checked.vertices, np.column_stack([checked.places.real, checked.places.imag]), given)
+    try:
+        checked = check_pins(chart.triangles[mask], given[mask], len(chart.vertices))
+    except PinError as error:
+        raise located(error, chart) from error
+    places = np.column_stack([checked.places.real, checked.places.imag])
+    return ChartPins(vertices=checked.vertices, places=places, given=given)
 
 
 def clear_of_pins(surface: Surface, pins: CornerPins | None, avoid: np.ndarray | None) -> np.ndarray | None:

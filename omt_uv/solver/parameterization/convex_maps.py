@@ -1,4 +1,4 @@
-"""Maps of a surface whose convex polygons stay convex, where that costs no area."""
+"""Keep convex polygons convex in the maps of a surface, where that costs no area."""
 
 from __future__ import annotations
 
@@ -17,37 +17,39 @@ from ..refinement.continuation import QUALITIES
 from .chart_indices import chart_target
 from .chart_map import ChartMap, in_unit_box
 from .chart_pins import ChartPins
-from .convexity import opened
+from .convexity import keep_convex
+from .options import MapOptions
 
 # The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
 AREA_KEPT = 1.1
 
 
-def with_open_corners(
+def with_convex_polygons(
     surface: Surface,
     charts: list[Chart],
     maps: list[ChartMap],
-    held: Sequence[ChartPins | None],
-    boundary: str,
-    quality: str,
+    pins: Sequence[ChartPins | None],
+    options: MapOptions,
     target: Target | None = None,
 ) -> list[ChartMap]:
-    """The maps with polygons that are convex on the surface convex in them, too, as far as may be: `convex.opened`.
+    """The maps with polygons that are convex on the surface convex in them, too, as far as may be: `keep_convex`.
 
-    held: the pins of every chart; the others as for `parameterize.unwrap`. A map that would lose its areas stays so.
+    pins : of every chart; options and target : those of the maps. A map that would lose its areas stays as it is.
     """
     if not (np.diff(surface.face_start) > 3).any():
         return maps
-    fixed = [_fixed(c, p, boundary) for c, p in zip(charts, held, strict=True)]
-    density = [chart_target(target, surface, c).get("density") for c in charts]
-    spare = [AREA_KEPT * max(m.area_l1, QUALITIES[quality].area_error) - m.area_l1 for m in maps]
+    fixed = [_fixed(c, p, options.boundary) for c, p in zip(charts, pins, strict=True)]
+    targets = [chart_target(target, surface, c) for c in charts]
+    density = [None if t is None else t.density for t in targets]
+    goal = QUALITIES[options.quality].area_error
+    spare = [AREA_KEPT * max(m.area_l1, goal) - m.area_l1 for m in maps]
     new = list(maps)
-    found = opened(surface, charts, [m.uv for m in maps], fixed, density, [m.weight for m in maps], spare)
+    found = keep_convex(surface, charts, [m.uv for m in maps], fixed, density, [m.area_weight for m in maps], spare)
     for k, uv in found.items():
         chart, old = charts[k], maps[k]
         (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
         figures = distortion(vertices, chart.triangles, flat[chart.triangles], overlap=False, density=density[k])
-        if figures.area_l1 <= AREA_KEPT * max(old.area_l1, QUALITIES[quality].area_error) and not figures.folds:
+        if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and not figures.folds:
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
             new[k] = replace(

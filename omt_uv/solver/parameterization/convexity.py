@@ -36,7 +36,7 @@ RINGS, ROOM, LARGEST = 4, 50, 800
 ATTEMPTS = 5
 
 
-def opened(
+def keep_convex(
     surface: Surface,
     charts: Sequence[Chart],
     maps: Sequence[np.ndarray],

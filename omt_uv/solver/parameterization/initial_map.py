@@ -21,7 +21,7 @@ from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.initial_maps import is_far
 from ..refinement.mesh_hierarchy import coarsen_disk
-from ..refinement.refine import RefinementOptions, refine
+from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed
 from ..transport.convex_domain import Disk, Domain, Rectangle
 from ..transport.semidiscrete import Transport, transport
@@ -50,69 +50,109 @@ SWEEPS, SMOOTH_WEIGHT, SMOOTH_WEIGHT_FAR = 8, 30.0, 500.0
 
 
 @dataclass(frozen=True)
-class FirstMap:
-    """Coordinates uv (n,2), and the conformal map and the transport they come from, on the coarsest mesh, or None.
+class DiskMesh:
+    """A disk that is to be mapped, and to what.
 
-    near: the map comes from a refined one, and is smooth; pull: its multiplier, see `refine.Refinement`.
+    Attributes
+    ----------
+    vertices (n,3), triangles (m,3) : in a unit box, with one boundary loop
+    target (m,) : areas of the triangles in the map
+    loop (b,) : the boundary
+    boundary : "free", "disk" or "square"
+    corners (4,) : boundary vertices that go into the corners of a square; None in another boundary
+    region (m,) : weights in [0, 1] of a region whose share is to be exact, or None
     """
 
-    conformal: ConformalMap | None
-    cells: Transport | None
+    vertices: np.ndarray
+    triangles: np.ndarray
+    target: np.ndarray
+    loop: np.ndarray
+    boundary: str = "free"
+    corners: np.ndarray | None = None
+    region: np.ndarray | None = None
+
+    @property
+    def domain(self) -> Domain:
+        """Where the transport goes: the square if the map is to fill one, the disk otherwise."""
+        return Rectangle() if self.boundary == "square" else Disk()
+
+
+@dataclass(frozen=True)
+class InitialChartMap:
+    """The map from which the refinement of a chart starts.
+
+    Attributes
+    ----------
+    uv (n,2) : coordinates
+    conformal, cells : the conformal map and the transport they come from, on the coarsest mesh; None where there is
+        none
+    warm : the map comes from a refined one, and is smooth
+    multiplier : of that, see `refine.Refinement`
+    """
+
     uv: np.ndarray
-    near: bool = False
-    pull: float = 0.0
+    conformal: ConformalMap | None = None
+    cells: Transport | None = None
+    warm: bool = False
+    multiplier: float = 0.0
 
 
-def coarse_first_map(
-    vertices, triangles, target, loop, corners, boundary: str, balance, log: RunLog, flat=None, region=None
-) -> Steps[FirstMap | None]:
-    """A first map by way of a coarser mesh; None where the mesh cannot be coarsened, or where that does not pay.
+def coarse_initial_map(
+    disk: DiskMesh, balance: float, log: RunLog, flat: np.ndarray | None = None
+) -> Steps[InitialChartMap | None]:
+    """Map a disk by way of a coarser mesh; None where it cannot be coarsened, or where that does not pay.
 
-    target (m,): areas of the triangles in the map; flat (n,2): an embedding, a mean value map by default; region (m,):
-    weights of a region whose share is to be exact.
+    flat (n,2) : an embedding, a mean value map by default
     """
-    far = is_far(target, face_areas(vertices, triangles))
+    vertices, triangles = disk.vertices, disk.triangles
+    far = is_far(disk.target, face_areas(vertices, triangles))
     with log.timed("coarsening"):
         if flat is None:
-            flat = mean_value_sites(vertices, triangles, loop, None, Disk())
+            flat = mean_value_sites(vertices, triangles, disk.loop, None, Disk())
         goal = len(vertices) // (COARSER_FAR if far else COARSER)
-        density = _density(vertices, triangles, target, goal) if far else None
-        steps = coarsen_disk(vertices, triangles, flat, target, goal, region, density)
+        density = _density(vertices, triangles, disk.target, goal) if far else None
+        steps = coarsen_disk(vertices, triangles, flat, disk.target, goal, disk.region, density)
         coarse = yield from part_of(steps, *COARSENING)
     if len(coarse.kept) > (COARSE_ENOUGH_FAR if far else COARSE_ENOUGH) * len(vertices):
         return None
-    points, mesh, mass = vertices[coarse.kept], coarse.triangles, coarse.mass
-    found: FirstMap | None = None
-    rim = boundary_loops(mesh)[0]
-    if boundary != "free" and len(rim) < len(loop):
-        return None  # what returned to the rim would lie on a chord
-    corners = None if corners is None else np.searchsorted(coarse.kept, corners)
+    loop = boundary_loops(coarse.triangles)[0]
+    if disk.boundary != "free" and len(loop) < len(disk.loop):
+        return None  # what returned to the boundary would lie on a chord
+    corners = None if disk.corners is None else np.searchsorted(coarse.kept, disk.corners)
+    points = vertices[coarse.kept]
+    coarse_disk = DiskMesh(points, coarse.triangles, coarse.mass, loop, disk.boundary, corners, coarse.region)
+    found = None
     if len(points) > (DIRECT_FAR if far else COARSE_ABOVE):
-        rest = (boundary, balance, log, flat[coarse.kept], coarse.region)
-        found = yield from part_of(coarse_first_map(points, mesh, mass, rim, corners, *rest), *COARSE_MAP)
+        found = yield from part_of(coarse_initial_map(coarse_disk, balance, log, flat[coarse.kept]), *COARSE_MAP)
     if found is None:
-        domain = Rectangle() if boundary == "square" else Disk()
-        direct = first_map(points, mesh, mass, rim, corners, domain, log)
-        found = yield from part_of(direct, *COARSE_MAP)
+        found = yield from part_of(initial_map(coarse_disk, log), *COARSE_MAP)
     with log.timed("coarse refinement"):
-        options = RefinementOptions(
-            boundary=boundary,
-            balance=balance,
-            quality="rough" if far else "relaxed",
-            warm_start=found.near,
-            multiplier=found.pull,
-        )
-        way = refine(points, mesh, found.uv, options, target=mass, region=coarse.region)
-        refined = yield from part_of(way, *COARSE_REFINEMENT)
+        refined = yield from part_of(_coarse_refined(coarse_disk, found, balance, far), *COARSE_REFINEMENT)
     log.warnings += refined.warnings
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
-        faces, w = elements(vertices, triangles, target), uv @ [1, 1j]
-        w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
-        sweeps = smoothed(faces, w, SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT, SWEEPS)
-        w = yield from part_of(sweeps, *SMOOTHING)
-        uv = np.column_stack([w.real, w.imag])
-    return FirstMap(found.conformal, found.cells, uv, far, refined.multiplier)
+        uv = yield from part_of(_smoothed(disk, uv, far), *SMOOTHING)
+    return InitialChartMap(uv, found.conformal, found.cells, far, refined.multiplier)
+
+
+def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, far: bool) -> Steps[Refinement]:
+    """The refined map of a coarse mesh."""
+    options = RefinementOptions(
+        boundary=disk.boundary,
+        balance=balance,
+        quality="rough" if far else "relaxed",
+        warm_start=initial.warm,
+        multiplier=initial.multiplier,
+    )
+    return refine(disk.vertices, disk.triangles, initial.uv, options, target=disk.target, region=disk.region)
+
+
+def _smoothed(disk: DiskMesh, uv: np.ndarray, far: bool) -> Steps[np.ndarray]:
+    """A map uv (n,2) that came from a coarser mesh, its vertices moved within their stars."""
+    faces, w = elements(disk.vertices, disk.triangles, disk.target), uv @ [1, 1j]
+    w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
+    w = yield from smoothed(faces, w, SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT, SWEEPS)
+    return np.column_stack([w.real, w.imag])
 
 
 def _density(vertices, triangles, target, goal: int) -> np.ndarray:
@@ -125,25 +165,26 @@ def _density(vertices, triangles, target, goal: int) -> np.ndarray:
     return has / all_of_it
 
 
-def first_map(vertices, triangles, target, loop, corners, domain: Domain, log: RunLog) -> Steps[FirstMap]:
-    """Conformal map and transport to the areas target (m,) of a disk (n,3), (m,3) with its boundary loop (b,).
+def initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
+    """Map a disk conformally and move that map by optimal transport to the target's areas.
 
-    The conformal map moved by the transport; where rounding decides where its points lie, a mean value map so moved.
+    Where rounding decides where the points of the conformal map lie, a mean value map is moved instead.
     """
-    mass = np.bincount(triangles.ravel(), np.repeat(target / 3, 3), len(vertices))
+    vertices, triangles, loop, corners, domain = disk.vertices, disk.triangles, disk.loop, disk.corners, disk.domain
+    mass = np.bincount(triangles.ravel(), np.repeat(disk.target / 3, 3), len(vertices))
     conformal, sites, trouble = yield from _conformal_sites(vertices, triangles, corners, log)
     if not trouble:
         sites = _centred(sites, mass, triangles, loop) if corners is None else sites
         cells, trouble = yield from _transport(sites, mass, domain, log)
         if cells is not None:
-            return FirstMap(conformal, cells, centroid_map(cells, domain, loop, corners, log.warnings))
+            return InitialChartMap(centroid_map(cells, domain, loop, corners, log.warnings), conformal, cells)
     log.warnings.append(f"{trouble}; started from a mean value map instead")
     sites = mean_value_sites(vertices, triangles, loop, corners, domain)
     cells, trouble = yield from _transport(sites, mass, domain, log)
     if cells is None:
         log.warnings.append(f"{trouble}; refined the embedding without transport")
-        return FirstMap(conformal, None, sites)
-    return FirstMap(conformal, cells, centroid_map(cells, domain, loop, corners, log.warnings))
+        return InitialChartMap(sites, conformal)
+    return InitialChartMap(centroid_map(cells, domain, loop, corners, log.warnings), conformal, cells)
 
 
 def _conformal_sites(vertices, triangles, corners, log: RunLog):

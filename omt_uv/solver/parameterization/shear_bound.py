@@ -1,4 +1,4 @@
-"""A cut budget: charts are cut further until their maps shear less than a bound, length of seam against shear."""
+"""Bound the shear of maps, by slits from the boundaries of charts to where they shear most."""
 
 from __future__ import annotations
 
@@ -17,39 +17,63 @@ from ..mesh.surface import Surface
 from ..progress import Steps
 from .chart_map import ChartMap
 
+# Rounds of slits, one slit a chart in each.
 MOST_ROUNDS = 12
 
 
 @dataclass(frozen=True)
-class Budgeted:
-    """The preparation, the maps of its charts, the slits (k,2) that were added to its cuts, and what they brought.
+class BoundedShear:
+    """Charts slit until their maps shear less than a bound.
 
-    history: length of all cuts and slits, and mean shear of the whole surface, before the first round and after each.
-    reached: the shear of every chart is within the bound; otherwise this is the round of the least shear.
+    Attributes
+    ----------
+    prepared : the charts, and the cuts that were made before the first slit
+    maps : of the charts
+    slits (k,2) : edges that were added to the cuts
+    history : length of all cuts and slits, and mean shear of the whole surface, before the first round and after each
+    bound : of the mean shear s1/s2 of a chart
+    reached : every chart keeps the bound; otherwise this is the round of the least shear
     """
 
     prepared: Prepared
     maps: list[ChartMap]
     slits: np.ndarray
     history: tuple[tuple[float, float], ...]
+    bound: float
     reached: bool
 
+    @property
+    def cuts(self) -> np.ndarray:
+        """Edges (k,2) of all cuts and slits."""
+        return self.slits if self.prepared.cuts is None else np.concatenate([self.prepared.cuts.edges, self.slits])
 
-def unwrap_within(
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was repaired, and whether the bound is not kept."""
+        if self.reached:
+            return self.prepared.warnings
+        (length, shear), first = self.history[-1], self.history[0]
+        missed = (
+            f"The mean shear went from {first[1]:.3g} to {shear:.3g} with {length - first[0]:.3g} more of seam, "
+            f"not below {self.bound:.3g}; the least that was found is kept"
+        )
+        return (*self.prepared.warnings, missed)
+
+
+def bound_shear(
     surface: Surface,
     faces: np.ndarray | None,
-    map_chart: Callable[[Chart], Steps[ChartMap]],
+    map_one: Callable[[Chart], Steps[ChartMap]],
     bound: float,
     *,
     seams: str = "auto",
     fill_holes: bool = False,
     avoid: np.ndarray | None = None,
     rounds: int = MOST_ROUNDS,
-) -> Steps[Budgeted]:
+) -> Steps[BoundedShear]:
     """Map all charts, and slit those whose mean shear s1/s2 is above `bound` > 1, until none is or `rounds` are over.
 
-    Parameters and errors are those of
-    `preparation.prepare`, and errors of `map_chart`, a solver for one chart.
+    Parameters and errors are those of `disk_charts.prepare`, and errors of `map_one`, a solver for one chart.
     """
     if not bound > 1:
         raise ValueError(f"no map shears less than 1; the bound must be greater, not {bound}")
@@ -61,7 +85,7 @@ def unwrap_within(
     history: list[tuple[float, float]] = []
     best = None
     while True:
-        maps = yield from _mapped(prepared.charts, charts, maps, map_chart)
+        maps = yield from _mapped(prepared.charts, charts, maps, map_one)
         charts = prepared.charts
         shear = [_shear(c, m) for c, m in zip(charts, maps, strict=True)]
         mean = np.array([_mean(c, s) for c, s in zip(charts, shear, strict=True)])
@@ -74,18 +98,19 @@ def unwrap_within(
         if not sum(map(len, new)):
             break
         slits = np.concatenate([slits, *new])
-        opened = replace(surface, seams=np.concatenate([surface.seams, cuts, slits]))
-        prepared = prepare(opened, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
+        slit_surface = replace(surface, seams=np.concatenate([surface.seams, cuts, slits]))
+        prepared = prepare(slit_surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
     charts, maps, slits, reached = best
-    return Budgeted(Prepared(charts, first.cuts, first.warnings), maps, slits, tuple(history), reached)
+    prepared = Prepared(charts, first.cuts, first.warnings)
+    return BoundedShear(prepared=prepared, maps=maps, slits=slits, history=tuple(history), bound=bound, reached=reached)
 
 
-def _mapped(charts, old_charts, old_maps, map_chart) -> Steps[list[ChartMap]]:
+def _mapped(charts, old_charts, old_maps, map_one) -> Steps[list[ChartMap]]:
     """Maps of the charts; those that are as they were keep theirs. Slits never change the number of charts."""
     maps = []
     for k, chart in enumerate(charts):
         same = k < len(old_charts) and _same(chart, old_charts[k])
-        maps.append(old_maps[k] if same else (yield from map_chart(chart)))
+        maps.append(old_maps[k] if same else (yield from map_one(chart)))
     return maps
 
 

@@ -1,4 +1,4 @@
-"""Many small charts of a surface, mapped together."""
+"""Map many small charts together, in batches."""
 
 from __future__ import annotations
 
@@ -6,14 +6,20 @@ import time
 
 import numpy as np
 
+from ..analysis.density import Target
 from ..errors import MeshError, positive_density
 from ..mesh.charts import Chart
 from ..progress import Steps, part_of
 from ..refinement.batch_refine import BatchMaps, refine_batch
 from .chart_map import ChartMap, in_place, in_unit_box
+from .options import MapOptions
 
-# Charts of at most SMALL triangles are solved together where there are at least MANY, about BATCH triangles at a time.
-SMALL, MANY, BATCH = 1000, 8, 50_000
+# Most triangles of a chart that is solved together with others.
+SMALL = 1000
+# Fewest charts that are solved together: for less the batch does not pay.
+MANY = 8
+# Triangles of a batch, roughly, for memory.
+BATCH = 50_000
 
 
 def small(chart: Chart) -> bool:
@@ -21,62 +27,70 @@ def small(chart: Chart) -> bool:
     return len(chart.triangles) <= SMALL and not len(chart.patches)
 
 
-def together(charts: list[Chart], targets: list[dict], quality: str, balance: float) -> Steps[list[ChartMap | None]]:
-    """Maps with free boundaries of small charts, solved together if they are many; None where one has to go alone.
+def map_together(
+    charts: list[Chart], targets: list[Target | None], options: MapOptions
+) -> Steps[list[ChartMap | None]]:
+    """Map small charts with free boundaries side by side if they are many; None where one has to go alone.
 
-    targets : density and region of each, or nothing, see `chart_terms.chart_target`
+    targets : of each chart, see `chart_indices.chart_target`
     """
     found: list[ChartMap | None] = [None] * len(charts)
     if len(charts) < MANY:
         return found
     sizes = np.cumsum([len(c.triangles) for c in charts])
     for batch in np.split(np.arange(len(charts)), np.flatnonzero(np.diff(sizes // BATCH)) + 1):
-        members = [charts[k] for k in batch]
-        begin = time.perf_counter()
         done = float(sizes[batch[0]] / sizes[-1])
-        try:
-            boxes = [in_unit_box(c.vertices) for c in members]
-            meshes = [(v, c.triangles) for (v, _), c in zip(boxes, members, strict=True)]
-            maps = yield from part_of(
-                refine_batch(meshes, quality, balance, **_side_by_side([targets[k] for k in batch])),
-                done,
-                float(sizes[batch[-1]] / sizes[-1]) - done,
-            )
-        except MeshError:
-            continue  # one of them is to blame, and will say so alone
-        seconds = (time.perf_counter() - begin) / len(members)
-        pieces = np.split(maps.uv, np.cumsum([len(v) for v, _ in meshes])[:-1])
-        for k, (vertices, unit), chart, uv, place in zip(batch, boxes, members, pieces, range(len(batch)), strict=True):
-            if maps.solved[place]:
-                uv = in_place(uv, vertices, chart.triangles, targets[k].get("density"), unit, None)
-                found[k] = _of_many(maps, place, uv, seconds)
+        steps = _map_batch([charts[k] for k in batch], [targets[k] for k in batch], options)
+        maps = yield from part_of(steps, done, float(sizes[batch[-1]] / sizes[-1]) - done)
+        for k, chart_map in zip(batch, maps, strict=True):
+            found[k] = chart_map
     return found
 
 
-def _side_by_side(targets: list[dict]) -> dict:
+def _map_batch(charts: list[Chart], targets: list[Target | None], options: MapOptions) -> Steps[list[ChartMap | None]]:
+    """BatchMaps of the charts of one batch; None where one has to go alone."""
+    begin = time.perf_counter()
+    try:
+        boxes = [in_unit_box(c.vertices) for c in charts]
+        meshes = [(v, c.triangles) for (v, _), c in zip(boxes, charts, strict=True)]
+        maps = yield from refine_batch(meshes, options.quality, options.balance, **_side_by_side(targets))
+    except MeshError:
+        return [None] * len(charts)  # the one with the error has it alone, too, and says so
+    seconds = (time.perf_counter() - begin) / len(charts)
+    coordinates = np.split(maps.uv, np.cumsum([len(v) for v, _ in meshes])[:-1])
+    found: list[ChartMap | None] = []
+    for k, ((vertices, unit), chart, uv) in enumerate(zip(boxes, charts, coordinates, strict=True)):
+        density = None if (target := targets[k]) is None else target.density
+        placed = in_place(uv, vertices, chart.triangles, density, unit, None) if maps.solved[k] else None
+        found.append(None if placed is None else _of_many(maps, k, placed, seconds))
+    return found
+
+
+def _side_by_side(targets: list[Target | None]) -> dict:
     """Densities and regions of several charts as those of their union."""
-    if not targets[0]:
+    given = [t for t in targets if t is not None]
+    if not given:
         return {}
-    density = positive_density(np.concatenate([t["density"] for t in targets]))
-    regions = [t["region"] for t in targets]
-    return {"density": density, "region": None if regions[0] is None else np.concatenate(regions)}
+    density = positive_density(np.concatenate([t.density for t in given]))
+    regions = [t.region for t in given if t.region is not None]
+    return {"density": density, "region": np.concatenate(regions) if regions else None}
 
 
 def _of_many(maps: BatchMaps, k: int, uv: np.ndarray, seconds: float) -> ChartMap:
     return ChartMap(
-        uv,
-        None,
-        None,
-        None,
-        None,
-        int(maps.steps[k]),
-        float(maps.residual[k]),
-        "converged",
-        float(maps.area_l1[k]),
-        float(maps.area_sd[k]),
-        float(maps.angle_mean[k]),
-        0,
-        (),
-        {"refinement": seconds},
-        weight=float(maps.weight[k]),
+        uv=uv,
+        newton_conformal=None,
+        residual_conformal=None,
+        newton_transport=None,
+        residual_transport=None,
+        newton_refinement=int(maps.steps[k]),
+        residual_refinement=float(maps.residual[k]),
+        status="converged",
+        area_l1=float(maps.area_l1[k]),
+        area_sd=float(maps.area_sd[k]),
+        angle_mean=float(maps.angle_mean[k]),
+        folds=0,
+        warnings=(),
+        seconds={"refinement": seconds},
+        area_weight=float(maps.weight[k]),
     )

@@ -1,4 +1,4 @@
-"""The pipeline: polygon mesh -> charts -> maps of these (see `chart_map`) -> texture coordinates."""
+"""Unwrap a surface: polygon mesh -> charts -> maps of these (see `chart_map`) -> texture coordinates."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from ..errors import MeshError
 from ..mesh.charts import Chart
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
-from .chart_indices import chart_target, located, located_pins
-from .chart_map import ChartMap, unwrap_chart
-from .chart_pins import CornerPins, clear_of_pins
-from .convex_maps import with_open_corners
-from .small_charts import small, together
+from .chart_indices import chart_target, located
+from .chart_map import ChartMap, map_chart
+from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
+from .convex_maps import with_convex_polygons
+from .options import UnwrapOptions
+from .shear_bound import bound_shear
+from .small_charts import map_together, small
 
 
 @dataclass(frozen=True)
@@ -48,55 +50,76 @@ def unwrap(
     surface: Surface,
     faces: np.ndarray | None = None,
     *,
-    boundary: str = "free",
-    quality: str = "standard",
-    balance: float = 0.0,
+    options: UnwrapOptions | None = None,
     pins: CornerPins | None = None,
-    seams: str = "auto",
-    fill_holes: bool = False,
-    avoid: np.ndarray | None = None,
     target: Target | None = None,
+    avoid: np.ndarray | None = None,
 ) -> Steps[SurfaceMap]:
-    """Area-preserving texture coordinates of the polygons `faces` (f,) bool, all by default.
+    """Map the polygons `faces` (f,) bool of a surface, all by default, so that areas are kept.
 
     Parameters
     ----------
-    boundary : "free" for the least shear; "disk" or "square", which every chart then fills
-    quality : "draft", "standard" or "exact", how small the area error of single faces becomes
-    balance : from 0, exact areas, to 1, least shear
     pins : corners that keep their places, with a free boundary
-    seams, fill_holes, avoid : see `preparation.prepare`; cuts avoid pinned vertices, too, and sieves are filled anyway
     target : density (m,) of the triangles of the surface, and a region; every triangle its own area by default
+    avoid : (n,) in [0,1], vertices to keep free of cuts; cuts avoid pinned vertices, too
 
     Raises
     ------
-    MeshError : see `preparation.prepare` and `chart_map.unwrap_chart`; element indices are those of the surface
+    MeshError : see `disk_charts.prepare` and `chart_map.map_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
+    task = _Task(surface, options or UnwrapOptions(), pins, target)
     avoid = clear_of_pins(surface, pins, avoid)
-    prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
-    charts = prepared.charts
-    held = [located_pins(pins, chart) for chart in charts]
-    maps: list[ChartMap] = []
-    total = sum(len(c.triangles) for c in charts)
-    alike = [k for k, c in enumerate(charts) if boundary == "free" and held[k] is None and small(c)]
-    done = sum(len(charts[k].triangles) for k in alike) / total
-    targets = [chart_target(target, surface, charts[k]) for k in alike]
-    found = yield from part_of(together([charts[k] for k in alike], targets, quality, balance), 0.0, done)
-    ready = dict(zip(alike, found, strict=True))
-    for k, (chart, fixed) in enumerate(zip(charts, held, strict=True)):
-        mapped = ready.get(k)
-        if mapped is not None:
-            maps.append(mapped)
-            continue
-        share = 0.0 if k in ready else len(chart.triangles) / total
-        options: dict = {"boundary": boundary, "quality": quality, "balance": balance, "pins": fixed}
-        steps = unwrap_chart(chart, **options, **chart_target(target, surface, chart))
+    seams, fill_holes, bound = task.options.seams, task.options.fill_holes, task.options.max_shear
+    if bound:
+        found = yield from bound_shear(
+            surface, faces, task.map_one, bound, seams=seams, fill_holes=fill_holes, avoid=avoid
+        )
+        charts, maps, cuts, warnings = found.prepared.charts, found.maps, found.cuts, found.warnings
+        chart_pins = [pins_of_chart(pins, chart) for chart in charts]
+    else:
+        prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
+        charts, warnings = prepared.charts, prepared.warnings
+        chart_pins = [pins_of_chart(pins, chart) for chart in charts]
+        maps = yield from task.map_all(charts, chart_pins)
+        cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
+    maps = with_convex_polygons(surface, charts, maps, chart_pins, task.options, target)
+    return SurfaceMap(charts, maps, cuts, warnings)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What all charts of a surface have in common."""
+
+    surface: Surface
+    options: UnwrapOptions
+    pins: CornerPins | None
+    target: Target | None
+
+    def map_one(self, chart: Chart) -> Steps[ChartMap]:
+        """The map of one chart; errors have the element indices of the surface."""
+        pins = pins_of_chart(self.pins, chart)
+        target = chart_target(self.target, self.surface, chart)
         try:
-            maps.append((yield from part_of(steps, done, share)))
+            return (yield from map_chart(chart, options=self.options, target=target, pins=pins))
         except MeshError as error:
             raise located(error, chart) from error
-        done += share
-    maps = with_open_corners(surface, charts, maps, held, boundary, quality, target)
-    cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
-    return SurfaceMap(charts, maps, cuts, prepared.warnings)
+
+    def map_all(self, charts: list[Chart], pins: list[ChartPins | None]) -> Steps[list[ChartMap]]:
+        """Maps of all charts, small ones without pins together."""
+        total = sum(len(c.triangles) for c in charts)
+        free = self.options.boundary == "free"
+        alike = [k for k, c in enumerate(charts) if free and pins[k] is None and small(c)]
+        done = sum(len(charts[k].triangles) for k in alike) / total
+        targets = [chart_target(self.target, self.surface, charts[k]) for k in alike]
+        found = yield from part_of(map_together([charts[k] for k in alike], targets, self.options), 0.0, done)
+        ready = dict(zip(alike, found, strict=True))
+        maps = []
+        for k, chart in enumerate(charts):
+            chart_map = ready.get(k)
+            if chart_map is None:
+                share = 0.0 if k in ready else len(chart.triangles) / total
+                chart_map = yield from part_of(self.map_one(chart), done, share)
+                done += share
+            maps.append(chart_map)
+        return maps

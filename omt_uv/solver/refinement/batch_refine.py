@@ -73,7 +73,7 @@ def refine_batch(
 ) -> Steps[BatchMaps]:
     """Area-preserving maps with free boundaries of disks, vertices (n,3) of unit extent and triangles (m,3) each.
 
-    density, region : of the triangles of all disks, one after the other, see `chart_map.unwrap_chart`. Every map has
+    density, region : of the triangles of all disks, one after the other, see `chart_map.map_chart`. Every map has
         the area of its disk
 
     Raises

@@ -15,7 +15,8 @@ from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas, vertex_areas
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.options import MapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
@@ -124,7 +125,7 @@ def test_a_surface_is_unwrapped_with_a_density(factor, boundary):
     w = from_vertices(blob(V, V[np.argmax(V[:, 0])], 0.6), F)
     found = exact_density(w, face_areas(V, F), factor)
     density = normalised_density(found.density, face_areas(V, F))
-    result = drain(unwrap_chart(chart, boundary=boundary, density=density, region=w))
+    result = drain(map_chart(chart, options=MapOptions(boundary), target=Target(density, w)))
     area = signed_areas(result.uv, F)
     assert (area > 0).all() and result.area_l1 <= 0.02
     assert region_share(w, area) == pytest.approx(found.target_share, rel=5e-3)
@@ -244,7 +245,7 @@ def test_areas_that_cannot_be_are_said():
         found = exact_density(weights, area := face_areas(V, F), factor)
         (chart,) = strict_charts(triangle_surface(V, F))
         options = {"density": normalised_density(found.density, area), "region": weights}
-        result = drain(unwrap_chart(chart, **options))
+        result = drain(map_chart(chart, target=Target(**options)))
         assert any("Areas are" in text for text in result.warnings) == said == (result.area_l1 > 0.016)
 
 

@@ -17,6 +17,7 @@ from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_edges, boundary_loops
 from omt_uv.solver.parameterization.chart_pins import CornerPins
+from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.boundary_barrier import crossings, make_barrier
@@ -369,5 +370,5 @@ def test_unwrapping_names_pins_that_contradict():
         drain(unwrap(surface, pins=CornerPins(F.ravel() == 84, uv)))
     assert info.value.elements.tolist() == [84]
     with pytest.raises(PinError, match="square") as info:
-        drain(unwrap(surface, boundary="square", pins=CornerPins(F.ravel() == 7, uv)))
+        drain(unwrap(surface, options=UnwrapOptions("square"), pins=CornerPins(F.ravel() == 7, uv)))
     assert info.value.elements.tolist() == [7]

@@ -15,6 +15,7 @@ from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.projected_newton import (
@@ -84,9 +85,9 @@ def test_singular_parts_are_named():
 @pytest.mark.parametrize("boundary", ["free", "disk"])
 def test_maps_are_those_of_whole_charts(boundary, monkeypatch):
     V, F = meshes.head(70)
-    (whole,) = drain(unwrap(triangle_surface(V, F), boundary=boundary)).maps
+    (whole,) = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(boundary))).maps
     monkeypatch.setattr(schwarz, "LARGE", 1000)
-    (parted,) = drain(unwrap(triangle_surface(V, F), boundary=boundary)).maps
+    (parted,) = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(boundary))).maps
     assert parted.folds == 0 and parted.status == "converged"
     assert parted.area_l1 <= 0.008
     assert parted.angle_mean == pytest.approx(whole.angle_mean, rel=0.01)

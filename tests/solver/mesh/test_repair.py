@@ -12,7 +12,8 @@ from omt_uv.solver.mesh import repair
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.gluing import corner_classes
 from omt_uv.solver.mesh.surface import degenerate_triangles, triangle_surface
-from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
@@ -31,7 +32,7 @@ def prepared(V, F, seams=(), **options):
 
 def mapped(chart):
     """The map of a chart, which must not fold."""
-    chart_map = drain(unwrap_chart(chart, quality="draft"))
+    chart_map = drain(map_chart(chart, options=MapOptions(quality="draft")))
     assert np.isfinite(chart_map.uv).all()
     uv = chart_map.uv / np.ptp(chart_map.uv, axis=0).max()
     assert (signed_areas(uv, chart.triangles) > 0).all()
@@ -107,7 +108,7 @@ def test_faces_turned_for_the_map_are_counted_and_said():
 def test_what_has_one_side_is_opened_where_its_faces_disagree(places):
     """Along a Moebius band the winding changes an odd number of times; if once, no face has to be turned over."""
     V, F = strip(places)
-    result = drain(unwrap(triangle_surface(V, F), seams="auto"))
+    result = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(seams="auto")))
     assert len(result.charts) == 1 and len(result.seams) >= 1
     corners, uv = result.corner_uv()
     signed = signed_areas(uv[np.argsort(corners)], np.arange(F.size).reshape(-1, 3))

@@ -9,7 +9,7 @@ import pytest
 
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
-from omt_uv.solver.parameterization.convexity import opened
+from omt_uv.solver.parameterization.convexity import keep_convex
 from omt_uv.solver.parameterization.corner_solver import affordable
 from omt_uv.solver.parameterization.polygon_corners import Barrier, Corners, convex_corners
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -73,7 +73,7 @@ def test_darts_open_and_what_is_fixed_stays():
     vertex[chart.corners] = chart.triangles
     assert (signed_areas(uv, vertex[corner]) < 0).sum() >= 2
     for held in (np.zeros(len(uv), bool), chart.vertex_ids == 30):
-        found = opened(surface, [chart], [uv], [held], [None], [500.0], [np.inf])[0]
+        found = keep_convex(surface, [chart], [uv], [held], [None], [500.0], [np.inf])[0]
         area = signed_areas(found, chart.triangles)
         assert (signed_areas(found, vertex[corner]) > 0).all() and (area > 0).all()
         np.testing.assert_array_equal(found[held], uv[held])
@@ -96,7 +96,7 @@ def test_maps_without_darts_are_left_alone():
     surface = quads(height=0.1)
     (chart,) = strict_charts(surface)
     flat = chart.vertices[:, :2]
-    assert opened(surface, [chart], [flat], [np.zeros(len(flat), bool)], [None], [500.0], [np.inf]) == {}
+    assert keep_convex(surface, [chart], [flat], [np.zeros(len(flat), bool)], [None], [500.0], [np.inf]) == {}
 
 
 @pytest.mark.parametrize("scale, shift", [(1, 0), (1e-6, 0), (1e6, 0), (1, 1e5)])
@@ -142,7 +142,7 @@ def test_nearly_straight_corners_are_opened():
     at = np.empty((len(surface.corner_vertex), 2))
     at[chart.corners.ravel()] = uv[chart.triangles.ravel()]
     assert (signed_areas(at, corner) < 0).any()
-    new = opened(surface, [chart], [uv], [np.zeros(len(uv), bool)], [None], [500.0], [np.inf])[0]
+    new = keep_convex(surface, [chart], [uv], [np.zeros(len(uv), bool)], [None], [500.0], [np.inf])[0]
     at[chart.corners.ravel()] = new[chart.triangles.ravel()]
     assert (signed_areas(at, corner) > 0).all() and (signed_areas(new, chart.triangles) > 0).all()
 

@@ -11,6 +11,7 @@ from omt_uv.solver.mesh.charts import triangle_rows
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import small_charts as batches
+from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.small_charts import MANY
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -32,18 +33,19 @@ def all_shapes():
     return [*shapes, *(meshes.random_disk(80, seed) for seed in range(4)), meshes.grid(1, 1)]
 
 
-def one_by_one(monkeypatch, surface, **options):
+def one_by_one(monkeypatch, surface, **arguments):
     with monkeypatch.context() as patch:
         patch.setattr(batches, "MANY", 1000)
-        return drain(unwrap(surface, **options))
+        return drain(unwrap(surface, **arguments))
 
 
 @pytest.mark.parametrize(("quality", "balance"), [("standard", 0.0), ("exact", 0.0), ("standard", 0.5)])
 def test_together_is_as_good_as_one_by_one(monkeypatch, quality, balance):
     surface = side_by_side(all_shapes())
     assert len(all_shapes()) >= MANY
-    together = drain(unwrap(surface, quality=quality, balance=balance))
-    alone = one_by_one(monkeypatch, surface, quality=quality, balance=balance)
+    options = UnwrapOptions(quality=quality, balance=balance)
+    together = drain(unwrap(surface, options=options))
+    alone = one_by_one(monkeypatch, surface, options=options)
     assert sum(m.newton_transport is None for m in together.maps) >= len(SHAPES)
     for chart, a, b in zip(together.charts, together.maps, alone.maps, strict=True):
         assert a.folds == 0 and (signed_areas(a.uv, chart.triangles) > 0).all()

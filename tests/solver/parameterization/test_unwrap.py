@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import errors
+from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
-from omt_uv.solver.parameterization.chart_map import unwrap_chart
+from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import Progress, drain
 
@@ -30,7 +32,7 @@ def two_charts():
 @pytest.mark.parametrize("shape", ["bumpy", "cone", "hemisphere", "head", "random_disk", "quad_patch"])
 def test_areas_are_kept_and_nothing_folds(shape, boundary):
     V, F = getattr(meshes, shape)()
-    result = drain(unwrap(triangle_surface(V, F), boundary=boundary))
+    result = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(boundary)))
     (chart,), (chart_map,) = result.charts, result.maps
     area = signed_areas(chart_map.uv, chart.triangles)
     assert (area > 0).all() and chart_map.folds == 0
@@ -44,10 +46,10 @@ def test_the_boundary_fills_the_domain():
     surface = triangle_surface(*meshes.head(16))
     (chart,) = strict_charts(surface)
     (loop,) = boundary_loops(chart.triangles)
-    disk = drain(unwrap(surface, boundary="disk")).maps[0].uv[loop]
+    disk = drain(unwrap(surface, options=UnwrapOptions("disk"))).maps[0].uv[loop]
     radius = np.linalg.norm(disk, axis=1)
     np.testing.assert_allclose(radius, radius[0], rtol=1e-9)
-    square = drain(unwrap(surface, boundary="square")).maps[0].uv[loop]
+    square = drain(unwrap(surface, options=UnwrapOptions("square"))).maps[0].uv[loop]
     side = np.abs(square).max()
     np.testing.assert_allclose(np.abs(square).max(axis=1), side, rtol=1e-9)
     assert (np.abs(np.abs(square) - side) < 1e-9 * side).all(axis=1).sum() == 4
@@ -74,9 +76,9 @@ def test_pose_and_units_only_scale_the_result(boundary):
     V, F = meshes.head(12)
     rotation = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     rotation *= np.linalg.det(rotation)
-    reference = drain(unwrap(triangle_surface(V, F), boundary=boundary)).maps[0].uv
+    reference = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(boundary))).maps[0].uv
     for moved, scale in ((1e-6 * V, 1e-6), (1e6 * V, 1e6), (V @ rotation.T + 7, 1), (V @ rotation.T + 1e5, 1)):
-        uv = drain(unwrap(triangle_surface(moved, F), boundary=boundary)).maps[0].uv / scale
+        uv = drain(unwrap(triangle_surface(moved, F), options=UnwrapOptions(boundary))).maps[0].uv / scale
         np.testing.assert_allclose(uv, reference, atol=1e-6 * np.abs(reference).max())
 
 
@@ -127,7 +129,7 @@ def test_a_density_magnifies_exactly():
     V, F = meshes.hemisphere(16, 48)
     (chart,) = strict_charts(triangle_surface(V, F))
     density = np.where(chart.vertices[chart.triangles].mean(axis=1)[:, 2] > 0.8, 4.0, 1.0)
-    result = drain(unwrap_chart(chart, density=density))
+    result = drain(map_chart(chart, target=Target(density)))
     target = face_areas(chart.vertices, chart.triangles) * density
     area = signed_areas(result.uv, chart.triangles)
     share = area / area.sum()
@@ -140,14 +142,14 @@ def test_densities_that_make_no_sense(value):
     density = np.ones(len(chart.triangles))
     density[5] = value
     with pytest.raises(errors.DensityError) as caught:
-        drain(unwrap_chart(chart, density=density))
+        drain(map_chart(chart, target=Target(density)))
     assert caught.value.elements.tolist() == [5]
 
 
 def test_an_elongated_chart_falls_back_and_says_so():
     V, F = meshes.grid(200, 2, width=100.0)
     V[:, 2] = 0.1 * np.cos(3 * V[:, 0]) * (V[:, 1] == 0.5)
-    (chart_map,) = drain(unwrap(triangle_surface(V, F), boundary="free")).maps
+    (chart_map,) = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions("free"))).maps
     assert any("double precision" in w for w in chart_map.warnings)
     assert chart_map.area_l1 < 0.01 and chart_map.angle_mean < 1.1 and chart_map.folds == 0
 
@@ -166,8 +168,9 @@ def test_flat_charts_are_unrolled_however_long_or_slit(scale, shift):
 def test_errors_carry_the_indices_of_the_surface():
     V, F = meshes.bumpy(6, 6)
     A, T = meshes.annulus()
+    both = triangle_surface(np.vstack([V, A + 5]), np.vstack([F, T + len(V)]))
     with pytest.raises(errors.NotADiskError) as caught:
-        drain(unwrap(triangle_surface(np.vstack([V, A + 5]), np.vstack([F, T + len(V)])), seams="existing"))
+        drain(unwrap(both, options=UnwrapOptions(seams="existing")))
     assert caught.value.elements.min() >= len(V)
 
 

@@ -12,6 +12,7 @@ from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, twins
 from omt_uv.solver.parameterization.initial_map import COARSE_ABOVE, mean_value_sites
+from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.boundary_barrier import crossings
@@ -82,7 +83,7 @@ def test_large_charts_come_by_way_of_coarser_ones():
 @pytest.mark.parametrize("boundary", ["disk", "square"])
 def test_domains_are_reached_by_way_of_coarser_charts_too(boundary):
     V, F = meshes.head(75)
-    (chart_map,) = drain(unwrap(triangle_surface(V, F), boundary=boundary, quality="draft")).maps
+    (chart_map,) = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(boundary, "draft"))).maps
     assert "coarsening" in chart_map.seconds
     assert chart_map.folds == 0 and chart_map.area_l1 <= 0.05 and not chart_map.warnings
 
@@ -100,7 +101,7 @@ def test_a_region_of_most_of_the_texture_gets_it_by_way_of_coarser_charts():
     centre = V[F].mean(axis=1)
     w = np.clip(2 - 4 * np.linalg.norm(centre - V[np.argmax(V[:, 2])], axis=1) / np.ptp(V[:, 2]), 0, 1)
     found = exact_density(w, area := face_areas(V, F), 0.8 / region_share(w, area))
-    (chart_map,) = drain(unwrap(surface, target=Target(found.density, w), quality="draft")).maps
+    (chart_map,) = drain(unwrap(surface, target=Target(found.density, w), options=UnwrapOptions(quality="draft"))).maps
     assert chart_map.folds == 0 and "coarsening" in chart_map.seconds
     (chart,) = strict_charts(surface)
     has = signed_areas(chart_map.uv, chart.triangles)

@@ -1,0 +1,67 @@
+"""State how charts are made and mapped, in one dataclass for a chart and one for a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..cutting.disk_charts import SEAMS
+from ..refinement.continuation import QUALITIES
+from ..refinement.refine import BOUNDARIES
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """How a chart is mapped.
+
+    Attributes
+    ----------
+    boundary : "free" for the least shear; "disk" or "square", which every chart then fills
+    quality : "draft", "standard" or "exact", how small the area error of single faces becomes
+    balance : from 0, exact areas, to 1, least shear
+
+    Raises
+    ------
+    ValueError : a boundary or a quality that is none of these, a balance outside of [0, 1]
+    """
+
+    boundary: str = "free"
+    quality: str = "standard"
+    balance: float = 0.0
+
+    def __post_init__(self):
+        _check("boundary", self.boundary, BOUNDARIES)
+        _check("quality", self.quality, QUALITIES)
+        if not 0 <= self.balance <= 1:
+            raise ValueError(f"balance must lie in [0, 1], not {self.balance}")
+
+
+@dataclass(frozen=True)
+class UnwrapOptions(MapOptions):
+    """How a surface becomes charts, and how these are mapped.
+
+    Attributes
+    ----------
+    seams : "auto" repairs and cuts, for the map only; "existing" splits along the seams of the surface alone and
+        refuses what is no disk
+    fill_holes : fill all boundaries of a component but the longest, for the map only, instead of cutting to them
+    max_shear : charts are slit until their mean shear s1/s2 is at most this, > 1; 0 for no slits
+
+    Raises
+    ------
+    ValueError : see `MapOptions`; seams that are neither, a bound that no map can keep
+    """
+
+    seams: str = "auto"
+    fill_holes: bool = False
+    max_shear: float = 0.0
+
+    def __post_init__(self):
+        super().__post_init__()
+        _check("seams", self.seams, SEAMS)
+        if self.max_shear and not self.max_shear > 1:
+            raise ValueError(f"no map shears less than 1; the bound must be greater, not {self.max_shear}")
+
+
+def _check(name: str, value: str, allowed) -> None:
+    if value not in allowed:
+        raise ValueError(f"{name} must be one of {', '.join(allowed)}, not {value!r}")
