@@ -1,4 +1,4 @@
-"""Conformal map of a disk chart to the unit disk or to a rectangle.
+"""Map a disk conformally to the unit disk or to a rectangle, by flattening its double (Campen, Capouellez et al. 2021).
 
 The chart is doubled along its boundary and made flat but for four corners of the boundary, where each copy
 keeps a right angle: the dynamic Yamabe flow on a closed surface, which is convex and always has a solution.
@@ -19,7 +19,7 @@ from ..maps.untangle import count_folds, untangle
 from ..mesh.geometry import angles_from_lengths, cotangents_from_lengths, halfedge_lengths, vertex_areas
 from ..mesh.topology import boundary_loops, halfedges
 from ..progress import Steps
-from .double_cover import crossed_segment, double
+from .double_cover import crossed_segment, double_disk
 from .intrinsic_triangulation import euclidean_diagonal, from_mesh, make_delaunay, split_boundary_edge
 from .rectangle_to_disk import centre_in_disk, rectangle_to_disk
 from .yamabe_flow import TOLERANCE, YamabeFlow, yamabe_flow
@@ -35,11 +35,16 @@ QUARTER_SLACK = 1e-3
 class ConformalMap:
     """A conformal image of a chart.
 
-    uv (n,2) in the unit disk or in the rectangle [0,1] x [0,aspect]; corners (4,) vertices with a right
-    angle in the rectangle, -1 for a point between two vertices; residual: largest error of an angle sum in
-    radians; iterations: Newton steps; flips of edges; log_scale (n,) of the flat metric of the rectangle;
-    straightened: faces that a flat metric puts on the wrong side of a straight line between their corners, and
-    that were moved back by `untangle`.
+    Attributes
+    ----------
+    uv : (n,2) in the unit disk or in the rectangle [0,1] x [0,aspect]
+    aspect : height of the rectangle over its width, the conformal modulus
+    corners : (4,) vertices with a right angle in the rectangle, -1 for a point between two vertices
+    residual : largest error of an angle sum, in radians
+    iterations, flips : Newton steps, and edges flipped
+    log_scale : (n,) of the flat metric of the rectangle
+    straightened : faces that a flat metric puts on the wrong side of a straight line between their corners, and that
+        were moved back by `untangle`
     """
 
     uv: np.ndarray
@@ -120,6 +125,7 @@ def sharpest_corners(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarr
 
 
 def _rectangle(vertices, triangles, loop, corners, tolerance=TOLERANCE) -> Steps[ConformalMap]:
+    """The map to the rectangle, by flattening the double with cone angles of pi at the corners (4,)."""
     n = len(vertices)
     loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
     scale = np.sqrt(vertex_areas(vertices, triangles).sum())
@@ -130,7 +136,7 @@ def _rectangle(vertices, triangles, loop, corners, tolerance=TOLERANCE) -> Steps
         corners = loop
     tri, _ = make_delaunay(tri, euclidean_diagonal)
     count = n + (len(loop) == 4 and loop.max() >= n)
-    doubled, owner = double(tri, loop, count)
+    doubled, owner = double_disk(tri, loop, count)
     doubled, _ = make_delaunay(doubled, euclidean_diagonal)
     cone_angle = np.full(count, 4 * np.pi)
     cone_angle[loop] = 2 * np.pi
@@ -138,13 +144,13 @@ def _rectangle(vertices, triangles, loop, corners, tolerance=TOLERANCE) -> Steps
     flow = yield from yamabe_flow(doubled, owner, cone_angle, tolerance)
     uv, aspect = _layout(flow, owner, loop, corners, count)
     return ConformalMap(
-        uv[:n],
-        aspect,
-        np.where(corners < n, corners, -1),
-        flow.residual,
-        flow.iterations,
-        flow.flips,
-        flow.log_scale[:n],
+        uv=uv[:n],
+        aspect=aspect,
+        corners=np.where(corners < n, corners, -1),
+        residual=flow.residual,
+        iterations=flow.iterations,
+        flips=flow.flips,
+        log_scale=flow.log_scale[:n],
     )
 
 

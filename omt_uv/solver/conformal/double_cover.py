@@ -1,8 +1,8 @@
-"""The double of a disk: two mirrored copies glued along the boundary, a closed surface without a rim.
+"""Double a disk: two mirrored copies glued along the boundary, a closed surface (Gu, Luo, Sun, Wu 2018).
 
 A boundary edge cannot flip, so a flow on the disk alone breaks where such an edge grows too long. In the
-double it flips like any other, and by symmetry the boundary stays the mirror line (Gu, Luo, Sun, Wu 2018;
-Campen, Capouellez, Shen, Zhu, Panozzo, Zorin 2021).
+double it flips like any other, and by symmetry the boundary stays the mirror line (Campen, Capouellez, Shen, Zhu,
+Panozzo, Zorin 2021).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .intrinsic_triangulation import IntrinsicTriangulation
 MIRRORED = np.array([0, 2, 1])
 
 
-def double(tri: IntrinsicTriangulation, loop: np.ndarray, n: int) -> tuple[IntrinsicTriangulation, np.ndarray]:
+def double_disk(tri: IntrinsicTriangulation, loop: np.ndarray, n: int) -> tuple[IntrinsicTriangulation, np.ndarray]:
     """Double of a disk with n vertices and boundary loop (b,): the triangulation and the owner (2n-b,).
 
     Vertices 0 ... n-1 are the disk's; every inner vertex has a mirror image behind them. owner[v] is the

@@ -1,7 +1,7 @@
-"""Intrinsic triangulations as flat arrays, made Delaunay by vectorised edge flips.
+"""Make intrinsic triangulations Delaunay, by edge flips in parallel (Bobenko, Springborn 2007).
 
-A flip keeps the metric (`euclidean_diagonal`) or the discrete conformal class (`ptolemy_diagonal`); see the picture
-in `flips.py`. A triangulation may become a Delta-complex: several edges between the same two vertices are fine.
+A flip keeps the metric (`euclidean_diagonal`) or the discrete conformal class (`ptolemy_diagonal`); see the picture in
+`mesh/edge_flips.py`. A triangulation may become a Delta-complex: several edges between the same two vertices are fine.
 """
 
 from __future__ import annotations
@@ -40,12 +40,15 @@ def from_mesh(positions: np.ndarray, triangles: np.ndarray) -> IntrinsicTriangul
 
 
 def ptolemy_diagonal(jk, ki, il, lj, ij):
-    """Log length of kl by Ptolemy's relation (Springborn et al. 2008, eq. 19; Gillespie et al. 2021, eq. 4)."""
+    """Log length (k,) of kl by Ptolemy's relation, from those of the other sides: l_kl l_ij = l_jk l_il + l_ki l_lj.
+
+    Springborn et al. 2008, eq. 19; Gillespie et al. 2021, eq. 4.
+    """
     return np.logaddexp(jk + il, ki + lj) - ij
 
 
 def euclidean_diagonal(jk, ki, il, lj, ij):
-    """Log length of kl after unfolding both triangles into the plane."""
+    """Log length (k,) of kl, from those of the other sides, after unfolding both triangles into the plane."""
     jk, ki, il, lj = (np.exp(x - ij) for x in (jk, ki, il, lj))
     xk, xl = (ki**2 - jk**2 + 1) / 2, (il**2 - lj**2 + 1) / 2
     yk, yl = np.sqrt(np.maximum(ki**2 - xk**2, 0)), np.sqrt(np.maximum(il**2 - xl**2, 0))
@@ -113,7 +116,7 @@ def make_delaunay(
 
 
 def edge_cosines(flat, log_length, u, h):
-    """Cosine opposite to the halfedges h in the scaled metric."""
+    """Cosines (k,) opposite to the halfedges h (k,) in the metric scaled by u (n,)."""
     n, p = next_halfedge(h), previous_halfedge(h)
     i, j, k = u[flat[h]], u[flat[n]], u[flat[p]]
     side = np.stack([log_length[h] + i + j, log_length[n] + j + k, log_length[p] + k + i], axis=1)
@@ -121,9 +124,9 @@ def edge_cosines(flat, log_length, u, h):
 
 
 def split_boundary_edge(tri: IntrinsicTriangulation, loop: np.ndarray, n: int):
-    """Put a vertex n in the middle of the longest boundary edge; returns the triangulation and the new loop."""
-    rim = np.flatnonzero(tri.twin < 0)
-    h = rim[np.argmax(tri.log_length[rim])]
+    """Put vertex number n in the middle of the longest boundary edge; the triangulation and the new loop (b+1,)."""
+    boundary = np.flatnonzero(tri.twin < 0)
+    h = boundary[np.argmax(tri.log_length[boundary])]
     after, before = next_halfedge(h), previous_halfedge(h)
     i, j, k = tri.triangles.ravel()[[h, after, before]]
     ij, jk, ki = np.exp(tri.log_length[[h, after, before]])

@@ -1,4 +1,4 @@
-"""The plane, the unit sphere, and the Moebius maps of the sphere."""
+"""Map between plane and unit sphere, and centre maps to the sphere, by Moebius maps (Baden, Crane, Kazhdan 2018)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import PrecisionError
 
-MAX_STEPS = 60
+MAX_STEPS = 60  # of Newton's method for the centre
 
 
 def to_sphere(z: np.ndarray) -> np.ndarray:
@@ -33,7 +33,7 @@ def boost(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
     return moved / np.linalg.norm(moved, axis=1, keepdims=True)
 
 
-def centred(points: np.ndarray, mass: np.ndarray) -> np.ndarray:
+def centre_on_sphere(points: np.ndarray, mass: np.ndarray) -> np.ndarray:
     """Unit vectors (n,3) after the Moebius map that brings their mean, weighted by mass (n,), to 0.
 
     Newton's method on the convex energy whose gradient is the mean (Baden, Crane, Kazhdan 2018); unique up to a

@@ -1,4 +1,4 @@
-"""Dynamic Yamabe flow of a sphere with one vertex at infinity: the others come to lie in the plane.
+"""Flatten a sphere without one of its vertices, by dynamic Yamabe flow (Springborn, Schroeder, Pinkall 2008).
 
 Scaled by u_v -> infinity, the triangles around the vertex v become half-strips: their sides at v must be equal, so the
 neighbours j of v are held at u_j = -log l_vj, and the rest becomes a flat polygon (Springborn, Schroeder, Pinkall
@@ -23,44 +23,55 @@ from ..mesh.topology import boundary_loops, halfedges, next_halfedge, pair_keys,
 from ..progress import Progress, Steps
 from .intrinsic_triangulation import IntrinsicTriangulation, edge_cosines, flip_metric_in_place, ptolemy_diagonal
 
-TOLERANCE = 1e-10
+TOLERANCE = 1e-10  # largest error of an angle sum, radians
 MAX_STEPS = 60
 # Scales further apart than this put neighbours of the plane closer together than double precision resolves.
 MAX_LOG_SCALE = 40.0
-MAX_ROUNDS = 1000
-FLIP_TOLERANCE = 1e-11
+MAX_ROUNDS = 1000  # of edge flips
+FLIP_TOLERANCE = 1e-11  # an edge flips where its two opposite cosines sum to less than minus this
 
 
 @dataclass(frozen=True)
 class FlatPolygon:
     """The plane without a neighbourhood of infinity.
 
-    triangulation: all triangles, those at the infinite vertex included; inner (m,) bool: the finite ones; length
-    (m,3), of use where finite; log_scale (n,); rim (b,): neighbours of infinity in counter-clockwise order, and the
-    length (b,) of the polygon's side that begins at each of them; angle (b,) of the polygon there.
+    Attributes
+    ----------
+    triangulation : all triangles, those at the puncture included
+    inner : (m,) bool, the triangles that are not at the puncture
+    length : (m,3) sides of the triangles, of use for inner ones
+    log_scale : (n,)
+    boundary : (b,) neighbours of the puncture in counter-clockwise order
+    side_length : (b,) of the polygon's side that begins at each of them
+    angle : (b,) of the polygon there, in radians
+    residual : largest error of an angle sum, in radians
+    iterations, flips : Newton steps, and edges flipped
     """
 
     triangulation: IntrinsicTriangulation
     inner: np.ndarray
     length: np.ndarray
     log_scale: np.ndarray
-    rim: np.ndarray
-    side: np.ndarray
+    boundary: np.ndarray
+    side_length: np.ndarray
     angle: np.ndarray
     residual: float
     iterations: int
     flips: int
 
 
-def flatten_to_infinity(tri: IntrinsicTriangulation, infinite: int) -> Steps[FlatPolygon]:
-    """Scale a sphere (n vertices, closed and Delaunay) to a flat polygon, with one vertex at infinity.
+def flatten_punctured_sphere(tri: IntrinsicTriangulation, puncture: int) -> Steps[FlatPolygon]:
+    """Scale a sphere (n vertices, closed and Delaunay) conformally to a flat polygon, with one vertex at infinity.
+
+    Newton's method on the convex energy whose gradient is the angle defect of the vertices that are not neighbours of
+    the puncture.
 
     Raises
     ------
     PrecisionError : the scale leaves double precision, Newton's method does not converge, or the boundary touches
         itself
     """
-    flow = _Flow(tri, infinite)
+    flow = _PuncturedMetric(tri, puncture)
     if flow.pinched:
         raise PrecisionError("The surface is too narrow around the vertex that was sent to infinity")
     first = None
@@ -75,31 +86,31 @@ def flatten_to_infinity(tri: IntrinsicTriangulation, infinite: int) -> Steps[Fla
     raise PrecisionError(f"The conformal map did not converge in {MAX_STEPS} steps")
 
 
-class _Flow:
+class _PuncturedMetric:
     """A triangulation and scales u (n,), flipped until Delaunay; gradient (n,): angle defect where u is free."""
 
-    def __init__(self, tri: IntrinsicTriangulation, infinite: int, u: np.ndarray | None = None, flips: int = 0):
-        self.infinite = infinite
+    def __init__(self, tri: IntrinsicTriangulation, puncture: int, u: np.ndarray | None = None, flips: int = 0):
+        self.puncture = puncture
         if u is None:
-            u = _inversion(tri, infinite)
-        self.tri, self.u, more = _delaunay(tri, u, infinite)
+            u = _inversion(tri, puncture)
+        self.tri, self.u, more = _delaunay(tri, u, puncture)
         self.flips = flips + more
         triangles = self.tri.triangles
-        self.inner = (triangles != infinite).all(axis=1)
+        self.inner = (triangles != puncture).all(axis=1)
         tail, head = halfedges(triangles)
-        spokes = np.flatnonzero(tail == infinite)
+        spokes = np.flatnonzero(tail == puncture)
         link = head[spokes]
         # A boundary that touches itself: scales between this one and the last keep it open.
-        self.pinched = len(np.unique(link)) < len(link) or infinite in link
+        self.pinched = len(np.unique(link)) < len(link) or puncture in link
         self.free = np.ones(len(self.u), dtype=bool)
-        self.free[link] = self.free[infinite] = False
+        self.free[link] = self.free[puncture] = False
         self.length = np.exp(self.tri.scaled(self.u)).reshape(-1, 3)
         angle = angles_from_lengths(self.length[self.inner])
         corner = triangles[self.inner][:, [2, 0, 1]]
         self.angle_sum = np.bincount(corner.ravel(), angle.ravel(), len(self.u))
         self.gradient = np.where(self.free, 2 * np.pi - self.angle_sum, 0.0)
 
-    def step(self) -> _Flow:
+    def step(self) -> _PuncturedMetric:
         """The flow after a Newton step, halved while the energy's slope has changed sign."""
         direction = self._newton_direction()
         slope = float(self.gradient @ direction)
@@ -107,7 +118,7 @@ class _Flow:
         while share > 1e-4:
             u = self.u + share * direction
             if np.ptp(u[self.free]) < MAX_LOG_SCALE:
-                trial = _Flow(self.tri, self.infinite, u, self.flips)
+                trial = _PuncturedMetric(self.tri, self.puncture, u, self.flips)
                 if not trial.pinched and trial.gradient @ direction <= 0.1 * abs(slope):
                     return trial
             share /= 2
@@ -128,26 +139,26 @@ class _Flow:
         tail, head = halfedges(self.tri.triangles)
         opposite = tail[previous_halfedge(np.arange(len(tail)))]
         # A side runs the other way round in the strip behind it.
-        strip = np.flatnonzero(opposite == self.infinite)
+        strip = np.flatnonzero(opposite == self.puncture)
         h = self.tri.twin[strip]
         (loop,) = boundary_loops(self.tri.triangles[self.inner])
         side = np.zeros(len(self.u))
         side[tail[h]] = self.length.ravel()[h]
         return FlatPolygon(
-            self.tri,
-            self.inner,
-            self.length,
-            self.u,
-            loop,
-            side[loop],
-            self.angle_sum[loop],
-            residual,
-            iterations,
-            self.flips,
+            triangulation=self.tri,
+            inner=self.inner,
+            length=self.length,
+            log_scale=self.u,
+            boundary=loop,
+            side_length=side[loop],
+            angle=self.angle_sum[loop],
+            residual=residual,
+            iterations=iterations,
+            flips=self.flips,
         )
 
 
-def _inversion(tri: IntrinsicTriangulation, infinite: int) -> np.ndarray:
+def _inversion(tri: IntrinsicTriangulation, puncture: int) -> np.ndarray:
     """Scales (n,) of the inversion in a unit sphere about a vertex: l_ij / (r_i r_j), r the distances from it.
 
     Along the edges these are nearly right, and on the neighbours exactly. In space this inversion is a Moebius map,
@@ -156,38 +167,38 @@ def _inversion(tri: IntrinsicTriangulation, infinite: int) -> np.ndarray:
     tail, head = halfedges(tri.triangles)
     n = int(tri.triangles.max()) + 1
     shortest = np.full(n, np.inf)
-    spokes = tail == infinite
+    spokes = tail == puncture
     np.minimum.at(shortest, head[spokes], tri.log_length[spokes])
     # The least of several edges between the same two vertices: sums would be wrong.
     key, place = np.unique(pair_keys(tail, head), return_inverse=True)
     length = np.full(len(key), np.inf)
     np.minimum.at(length, place.ravel(), np.exp(tri.log_length))
     graph = csr_matrix((length, (key >> 32, key & 0xFFFFFFFF)), shape=(n, n))
-    distance = dijkstra(graph, directed=False, indices=infinite)
-    distance[infinite] = 1.0
+    distance = dijkstra(graph, directed=False, indices=puncture)
+    distance[puncture] = 1.0
     return np.where(np.isfinite(shortest), -shortest, -np.log(distance))
 
 
-def _delaunay(tri: IntrinsicTriangulation, u: np.ndarray, infinite: int):
+def _delaunay(tri: IntrinsicTriangulation, u: np.ndarray, puncture: int):
     """Flip until Delaunay with a vertex at infinity; the triangulation, the scales (n,), and the number of flips."""
     triangles, twin, log_length, u = tri.triangles.copy(), tri.twin.copy(), tri.log_length.copy(), u.copy()
     flat = triangles.reshape(-1)
-    u[infinite] = 0.0
+    u[puncture] = 0.0
 
     def cosine(h):
         # Seen from infinity every side has the angle 0.
-        far = flat[previous_halfedge(h)] == infinite
+        far = flat[previous_halfedge(h)] == puncture
         return np.where(far, 1.0, edge_cosines(flat, log_length, u, h))
 
     def violation(edges):
-        spoke = (flat[edges] == infinite) | (flat[next_halfedge(edges)] == infinite)
+        spoke = (flat[edges] == puncture) | (flat[next_halfedge(edges)] == puncture)
         return np.where(spoke, 1.0, cosine(edges) + cosine(twin[edges]) + FLIP_TOLERANCE)
 
     def flip(edges):
         g = twin[edges]
         flip_metric_in_place(triangles, twin, log_length, edges, ptolemy_diagonal)
         new = np.concatenate([3 * (edges // 3) + 1, 3 * (g // 3) + 1])
-        spoke = new[flat[new] == infinite]
+        spoke = new[flat[new] == puncture]
         u[flat[next_halfedge(spoke)]] = -log_length[spoke]
 
     flips, settled = flip_until_none(twin, violation, flip, MAX_ROUNDS)

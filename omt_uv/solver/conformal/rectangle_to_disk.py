@@ -1,4 +1,4 @@
-"""The exact conformal map from a rectangle to the unit disk, by Jacobi's elliptic sine."""
+"""Map a rectangle conformally to the unit disk, exactly, by Jacobi's elliptic sine (DLMF 22)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 
 from ..errors import PrecisionError
 
-# The image of a longer rectangle has its ends squeezed below double precision.
+# Longer side over shorter: the image of a longer rectangle has its ends squeezed below double precision.
 MAX_ASPECT = 8.0
+MAX_ROUNDS = 1000  # of Moebius maps, when a disk is centred
 
 
 def rectangle_to_disk(points: np.ndarray, height: float) -> np.ndarray:
@@ -50,7 +51,7 @@ def centre_in_disk(points: np.ndarray, mass: np.ndarray, tolerance: float = 1e-1
     """
     z = points[:, 0] + 1j * points[:, 1]
     share = mass / mass.sum()
-    for _ in range(1000):
+    for _ in range(MAX_ROUNDS):
         mean = share @ z
         if abs(mean) < tolerance:
             break

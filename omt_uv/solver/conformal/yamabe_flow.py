@@ -1,8 +1,8 @@
-"""Dynamic Yamabe flow: conformal factors with prescribed cone angles, by Newton's method with Ptolemy flips.
+"""Scale a metric conformally to prescribed cone angles, by dynamic Yamabe flow (Gu, Luo, Sun, Wu 2018).
 
-The energy of the ideal Delaunay triangulation is convex and its gradient is the angle defect (Springborn,
-Schroeder, Pinkall 2008; Gu, Luo, Sun, Wu 2018; Gillespie, Springborn, Crane 2021), so on a closed surface
-a solution always exists and Newton's method finds it.
+Lengths l_ij exp(u_i + u_j), and Ptolemy flips that keep the triangulation Delaunay. The energy of the ideal Delaunay
+triangulation is convex and its gradient is the angle defect (Springborn, Schroeder, Pinkall 2008; Gillespie,
+Springborn, Crane 2021), so on a closed surface a solution always exists and Newton's method finds it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..mesh.topology import halfedges
 from ..progress import Progress, Steps
 from .intrinsic_triangulation import IntrinsicTriangulation, make_delaunay, ptolemy_diagonal
 
-TOLERANCE = 1e-10
+TOLERANCE = 1e-10  # largest error of an angle sum, radians
 MAX_STEPS = 40
 # Scale factors spread further than this put neighbouring vertices closer than double precision resolves.
 MAX_LOG_SCALE = 30.0
@@ -26,7 +26,16 @@ MAX_LOG_SCALE = 30.0
 
 @dataclass(frozen=True)
 class YamabeFlow:
-    """Flat metric: Delaunay triangulation, log scale u (n,), its lengths (m,3), largest angle error, counts."""
+    """A metric with the cone angles that were prescribed.
+
+    Attributes
+    ----------
+    triangulation : Delaunay, of the unscaled metric
+    log_scale : (n,) u
+    length : (m,3) sides of its triangles in the scaled metric
+    residual : largest error of an angle sum, in radians
+    iterations, flips : Newton steps, and edges flipped
+    """
 
     triangulation: IntrinsicTriangulation
     log_scale: np.ndarray
@@ -62,7 +71,14 @@ def yamabe_flow(
         done = 1 - np.log(max(residual, tolerance) / tolerance) / np.log(1 + first / tolerance)
         yield Progress("Conformal map", float(np.clip(done, 0, 1)))
         if residual <= tolerance:
-            return YamabeFlow(tri, u, length, residual, iteration, total_flips)
+            return YamabeFlow(
+                triangulation=tri,
+                log_scale=u,
+                length=length,
+                residual=residual,
+                iterations=iteration,
+                flips=total_flips,
+            )
         direction = _newton_direction(tri, owner, length, gradient)
         slope = gradient @ direction
         step = 1.0

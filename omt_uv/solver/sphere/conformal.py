@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..conformal.intrinsic_triangulation import IntrinsicTriangulation, euclidean_diagonal, from_mesh, make_delaunay
-from ..conformal.moebius import centred, to_sphere
-from ..conformal.punctured_sphere import FlatPolygon, flatten_to_infinity
+from ..conformal.moebius import centre_on_sphere, to_sphere
+from ..conformal.punctured_sphere import FlatPolygon, flatten_punctured_sphere
 from ..conformal.yamabe_flow import yamabe_flow
 from ..errors import PrecisionError
 from ..linalg.sparse import solve_spd
@@ -68,7 +68,7 @@ def conformal_sphere(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Confo
     infinite, flat = yield from _flattened(tri, magnified_vertices(vertices, triangles))
     z = lay_out(flat, len(vertices))
     mass = vertex_areas(vertices, triangles)
-    sites = centred(_on_sphere(z, infinite, mass), mass)
+    sites = centre_on_sphere(_on_sphere(z, infinite, mass), mass)
     folds = int((~(signed_volumes(sites, triangles) > 0)).sum())
     positions = sites
     if folds:
@@ -87,7 +87,7 @@ def _flattened(tri: IntrinsicTriangulation, candidates: np.ndarray) -> Steps[tup
             tri = yield from rounded(tri, n)
         for vertex in candidates.tolist():
             try:
-                return vertex, (yield from flatten_to_infinity(tri, vertex))
+                return vertex, (yield from flatten_punctured_sphere(tri, vertex))
             except PrecisionError as error:
                 failure = error
     raise failure
@@ -97,7 +97,7 @@ def rounded(tri: IntrinsicTriangulation, n: int) -> Steps[IntrinsicTriangulation
     """A conformally equivalent triangulation, Delaunay, whose curvature is spread evenly over its n vertices.
 
     Such a metric always exists (Gu, Luo, Sun, Wu 2018), and from there the way to infinity is about as short as from a
-    round sphere. Raises PrecisionError: see `yamabe.yamabe_flow`.
+    round sphere. Raises PrecisionError: see `yamabe_flow.yamabe_flow`.
     """
     even = yield from yamabe_flow(tri, np.arange(n), np.full(n, 2 * np.pi * (1 - 2 / n)))
     return IntrinsicTriangulation(even.triangulation.triangles, even.triangulation.twin, np.log(even.length).ravel())
@@ -127,15 +127,15 @@ def magnified_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarra
 def lay_out(flat: FlatPolygon, n: int) -> np.ndarray:
     """Places (n,) complex of the vertices in the plane; the infinite one's is not meant."""
     heading = np.concatenate([[0.0], np.cumsum(np.pi - flat.angle[1:])])
-    step = flat.side * np.exp(1j * heading)
+    step = flat.side_length * np.exp(1j * heading)
     z = np.zeros(n, complex)
-    z[flat.rim] = np.concatenate([[0.0], np.cumsum(step)[:-1]])
+    z[flat.boundary] = np.concatenate([[0.0], np.cumsum(step)[:-1]])
     tail, head = halfedges(flat.triangulation.triangles[flat.inner])
     weight = cotangents_from_lengths(flat.length[flat.inner]).ravel()
     matrix = laplacian_from_weights(tail, head, weight, n)
     free = np.zeros(n, dtype=bool)
     free[tail] = True
-    free[flat.rim] = False
+    free[flat.boundary] = False
     if free.any():
         right = -(matrix @ np.column_stack([z.real, z.imag]))[free]
         solved = solve_spd(matrix[free][:, free].tocsc(), right, order="mmd")

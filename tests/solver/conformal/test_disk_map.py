@@ -7,7 +7,7 @@ from scipy.special import ellipj, ellipk
 
 from omt_uv.solver import errors
 from omt_uv.solver.conformal.disk_map import conformal_disk, conformal_rectangle, quarter_points, sharpest_corners
-from omt_uv.solver.conformal.double_cover import double
+from omt_uv.solver.conformal.double_cover import double_disk
 from omt_uv.solver.conformal.intrinsic_triangulation import euclidean_diagonal, from_mesh, make_delaunay
 from omt_uv.solver.conformal.rectangle_to_disk import centre_in_disk, rectangle_to_disk
 from omt_uv.solver.conformal.yamabe_flow import yamabe_flow
@@ -153,7 +153,7 @@ def test_the_flow_meets_any_admissible_cone_angles():
     V, F = meshes.cap(10, 16)
     (loop,) = boundary_loops(F)
     tri, _ = make_delaunay(from_mesh(V, F), euclidean_diagonal)
-    doubled, owner = double(tri, loop, len(V))
+    doubled, owner = double_disk(tri, loop, len(V))
     doubled, _ = make_delaunay(doubled, euclidean_diagonal)
     angle = np.full(len(V), 4 * np.pi)
     angle[loop] = 2 * np.pi
@@ -170,7 +170,7 @@ def test_double_is_closed_and_mirrored():
     V, F = meshes.bumpy(6, 6)
     (loop,) = boundary_loops(F)
     tri = from_mesh(V, F)
-    doubled, owner = double(tri, loop, len(V))
+    doubled, owner = double_disk(tri, loop, len(V))
     assert (doubled.twin >= 0).all() and len(owner) == 2 * len(V) - len(loop)
     assert (doubled.twin[doubled.twin] == np.arange(len(doubled.twin))).all()
     np.testing.assert_array_equal(doubled.log_length, doubled.log_length[doubled.twin])

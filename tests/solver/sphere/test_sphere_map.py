@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver import errors
-from omt_uv.solver.conformal.moebius import boost, centred, to_plane, to_sphere
+from omt_uv.solver.conformal.moebius import boost, centre_on_sphere, to_plane, to_sphere
 from omt_uv.solver.maps.energy import derivatives_of, elements
 from omt_uv.solver.mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
@@ -52,7 +52,7 @@ def test_planes_and_moebius_maps():
     there = boost(p, np.array([0.3, -0.2, 0.5]))
     np.testing.assert_allclose(boost(there, -np.array([0.3, -0.2, 0.5])), p, atol=1e-13)
     mass = rng.random(50)
-    np.testing.assert_allclose(mass @ centred(p, mass), 0, atol=1e-12)
+    np.testing.assert_allclose(mass @ centre_on_sphere(p, mass), 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...conformal.moebius import centred
+from ...conformal.moebius import centre_on_sphere
 from ...errors import PrecisionError, TransportError
 from ...mesh.closed_surface import closed_surface
 from ...mesh.geometry import vertex_areas
@@ -51,7 +51,7 @@ def sphere_image(
     mass = vertex_areas(sound.vertices, triangles, density)
     hull = Hull(conformal.triangles, twins(conformal.triangles))
     # Half of a mass that is gathered on one side has no transport; Moebius maps keep the hull's triangles.
-    found = yield from sphere_transport(centred(conformal.sites, mass), mass, TOLERANCE, hull, MOST_STEPS)
+    found = yield from sphere_transport(centre_on_sphere(conformal.sites, mass), mass, TOLERANCE, hull, MOST_STEPS)
     return found.cells.centroids()
 
 
@@ -67,7 +67,7 @@ def sample_sphere(
     corners = triangles[face]
     images = normalized(np.einsum("kc,kcj->kj", bary, to_map[corners]))
     # Moebius maps leave circles circles, and what is Delaunay so; the hull is best seen from the middle.
-    images = centred(images, np.ones(count))
+    images = centre_on_sphere(images, np.ones(count))
     kept = np.arange(count)
     for _ in range(ATTEMPTS):
         try:
