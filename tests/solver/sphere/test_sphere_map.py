@@ -225,7 +225,7 @@ def test_the_plane_agrees():
     turn = np.linalg.svd(found.sites[k][None])[2][[1, 2, 0]]
     turn[2] = found.sites[k]
     turn[0] *= np.sign(np.linalg.det(turn))
-    np.testing.assert_allclose(plane_areas(found.sites @ turn.T, carried.weights, k), cells.area, atol=1e-7)
+    np.testing.assert_allclose(plane_areas(found.sites @ turn.T, carried.site_weights, k), cells.area, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", SHAPES)
