@@ -1,4 +1,4 @@
-"""What a user can choose, in one place for the operator, the panels and the command line."""
+"""List what a user can choose, in one place for the operators, the panels and the command line."""
 
 from __future__ import annotations
 
@@ -39,8 +39,10 @@ DEFAULT_BOUNDARY = "FREE"
 DEFAULT_SEAMS = "AUTO"
 DEFAULT_QUALITY = "STANDARD"
 DEFAULT_BALANCE = 0.0
+# Pixels between islands, and along a side of the texture.
 DEFAULT_MARGIN = 4
 DEFAULT_TEXTURE_SIZE = 1024
+# UDIM number of the unit square.
 FIRST_TILE = 1001
 COUNTS = (
     ("VERTICES", "Vertices", "As many vertices as asked"),
@@ -208,4 +210,6 @@ WEIGHT_KINDS = (
 )
 DEFAULT_KIND = "SALIENCY"
 DEFAULT_GROUP = "omt_weights"
-DEFAULT_LOW, DEFAULT_HIGH = 0.5, 0.95
+# Shares of the surface area with weight 0, and up to weight 1.
+DEFAULT_LOW = 0.5
+DEFAULT_HIGH = 0.95

@@ -217,8 +217,8 @@ def test_entry_of_the_extension_imports_nothing_at_the_top():
     assert not [n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)]
 
 
-@pytest.mark.parametrize("name", ["omt_uv.solver", "omt_uv.registration", "omt_uv.cli"])
+@pytest.mark.parametrize("name", ["solver", "pipelines", "files", "display", "xatlas", "registration", "cli"])
 def test_start_imports_no_scipy(name):
     """Blender's start waits for nothing but what it needs."""
-    code = f"import sys, {name}; sys.exit('scipy' in sys.modules or 'xatlas' in sys.modules)"
+    code = f"import sys, omt_uv.{name}; sys.exit('scipy' in sys.modules or 'xatlas' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0

@@ -108,7 +108,7 @@ def run(options: argparse.Namespace) -> None:
     print(result.shares.text())
     if options.report:
         more = {"weights": options.weights, "factor": options.factor, "exact": options.exact, "source": options.source}
-        shares = {"share": vars(result.shares)}
+        shares = {"share": result.shares.report()}
         write_report(options, {**more, "cascade": options.cascade, **shares}, objects, result.reports, warnings)
 
 

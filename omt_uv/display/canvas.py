@@ -1,4 +1,4 @@
-"""Pictures made of arrays: Blender images and PNG files, and text drawn into arrays with Blender's own font."""
+"""Make Blender images and PNG files of arrays, and draw text into arrays with Blender's own font."""
 
 from __future__ import annotations
 

@@ -1,11 +1,12 @@
-"""Colours of distortion: the area in octaves from blue over white to red, shear in viridis."""
+"""Colour distortion: the area in octaves from blue over white to red, shear in viridis."""
 
 from __future__ import annotations
 
 import numpy as np
 
-# Ends of the scales: a quarter and four times the texture that is due; and this ratio of the singular values.
+# Ends of the scale of areas, in octaves: a quarter and four times the texture that is due.
 AREA_OCTAVES = 2.0
+# End of the scale of shear, the ratio of the singular values.
 SHEAR_TOP = 4.0
 
 # Where a face has too little texture it is blue, where it has too much, red (ColorBrewer's RdBu).

@@ -1,4 +1,4 @@
-"""Distortion as colours: an attribute in the 3D View, filled faces in the UV editor. Taken back, nothing is left."""
+"""Show distortion as colours: an attribute in the 3D View, filled faces in the UV editor; nothing stays behind."""
 
 from __future__ import annotations
 

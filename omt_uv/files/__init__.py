@@ -1,1 +1,14 @@
+"""Files in and out of Blender: meshes in several formats with all their digits, and images as arrays.
 
+Imports errors and blender.
+Main names: meshes.load, meshes.save, images.load, images.save, pixels_of.
+"""
+
+from ..solver.lazy import lazy
+
+__getattr__, __all__ = lazy(
+    __name__,
+    images="ImageError has_straight_alpha packed_image pixels_of",
+    meshes="FileError",
+    obj_precision="restore_precision",
+)

@@ -1,4 +1,4 @@
-"""Mesh files in and out of the open Blender session, with coordinates and the order of vertices and faces kept."""
+"""Load and save mesh files, with coordinates and the order of vertices and faces kept."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from ..blender.mesh import new_mesh
 from ..errors import UserError
-from . import obj_precision as obj_text
+from .obj_precision import restore_precision
 from .silence import silence
 
 READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx", ".off")
@@ -175,7 +175,7 @@ def _write_obj(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
         apply_modifiers=False,
         **AXES,
     )
-    obj_text.restore_precision(path, objects)
+    restore_precision(path, objects)
     return [] if ordered else ["Materials were left out of the OBJ file, which would have changed the order of faces"]
 
 

@@ -1,4 +1,4 @@
-"""Full precision for OBJ files: Blender writes six decimals, which blurs small meshes and dense UVs."""
+"""Restore full precision in OBJ files: Blender writes six decimals, which blurs small meshes and dense UVs."""
 
 from __future__ import annotations
 

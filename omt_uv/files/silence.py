@@ -1,4 +1,4 @@
-"""Blender talks while it loads, reads and writes; a command that is piped into another must not."""
+"""Silence Blender while it loads, reads and writes: a command that is piped into another must not talk."""
 
 from __future__ import annotations
 

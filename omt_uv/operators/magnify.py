@@ -154,7 +154,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         worst = max((island["area_l1"] for mine in magnified.reports for island in mine), default=0.0)
         self.said = (
             ("Region before", f"{100 * shares.before:.3f} %"),
-            ("Region asked", f"{100 * shares.asked:.3f} %"),
+            ("Region asked", f"{100 * shares.target:.3f} %"),
             ("Region now", f"{100 * shares.after:.3f} %"),
             ("Area error", f"{100 * worst:.2f} %"),
         )

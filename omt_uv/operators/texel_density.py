@@ -47,11 +47,11 @@ class UV_OT_omt_density_get(TextureSize, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from ..pipelines.texel_density import density
+        from ..pipelines.texel_density import texel_density
         from ..solver.errors import MeshError
 
         try:
-            found = density([reading for _, reading in read_objects(context)], self.texels(context))
+            found = texel_density([reading for _, reading in read_objects(context)], self.texels(context))
         except Complaint as complaint:
             return tell(self, context, complaint)
         except MeshError as error:
@@ -84,7 +84,7 @@ class UV_OT_omt_density_set(TextureSize, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from ..blender import mesh as blender_mesh
-        from ..pipelines.texel_density import with_density
+        from ..pipelines.texel_density import with_texel_density
         from ..solver.errors import MeshError
 
         try:
@@ -92,7 +92,7 @@ class UV_OT_omt_density_set(TextureSize, bpy.types.Operator):
             for obj, _ in pairs:
                 blender_mesh.check_target(obj.data, "")
             each = self.scope == "ISLANDS"
-            scaled = with_density([r for _, r in pairs], self.density, self.texels(context), each)
+            scaled = with_texel_density([r for _, r in pairs], self.density, self.texels(context), each)
         except Complaint as complaint:
             return tell(self, context, complaint)
         except (MeshError, blender_mesh.TargetError) as error:

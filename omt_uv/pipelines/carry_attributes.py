@@ -1,4 +1,4 @@
-"""What a mesh carries given to a new mesh that lies on it; see `solver/transfer.py` for how values are carried.
+"""Carry what a mesh carries to a new mesh that lies on it; `solver.transfer.interpolate` says how values are carried.
 
 Normals are none of it: they follow the new shape, smooth and sharp as its faces and edges are marked.
 """

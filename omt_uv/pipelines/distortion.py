@@ -1,4 +1,4 @@
-"""Distortion of several readings as one: they share a texture, so one scale holds for all."""
+"""Measure the distortion of several readings as one: they share a texture, so one scale holds for all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Closed parts of surfaces to the sphere and on to the plane; the one path of the operator and of the command line."""
+"""Map closed components of surfaces to the sphere and on to the plane; the one path of operator and command line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ..solver.progress import Progress, Steps, part_of
 from ..solver.sphere.sphere_map import SphereMap, sphere_map
 from .layout import Refusal
 
-# Of the work on one part, what its map to the sphere takes.
+# Share of the work on one component that its map to the sphere takes.
 MAPPING = 0.9
 
 
@@ -54,8 +54,8 @@ def globe_jobs(readings: Sequence, densities: Sequence, markers: Sequence) -> li
 
 @dataclass(frozen=True)
 class ClosedComponent:
-    """A closed part: vertices (n,3), triangles (m,3), of the surface the corners (m,3), faces (m,), vertex_ids (n,)
-    and the numbers (m,) of its triangles."""
+    """A closed component: vertices (n,3) and triangles (m,3); of the surface its corners (m,3), faces (m,),
+    vertex_ids (n,) and `members` (m,), the rows of its triangles."""
 
     vertices: np.ndarray
     triangles: np.ndarray
@@ -67,10 +67,10 @@ class ClosedComponent:
 
 @dataclass(frozen=True)
 class Globe:
-    """A part, its map to the sphere, that map as it was laid out (n,3), the corners (c,) with their UVs (c,2), of its
-    triangles the shares (m,) of the texture they were to have and the areas (m,) they have, and warnings."""
+    """A component, its map to the sphere and that map as it was laid out: points (n,3), corners (c,) with their UVs
+    (c,2), of its triangles the shares (m,) of the texture they shall have and the areas (m,) they have; warnings."""
 
-    part: ClosedComponent
+    component: ClosedComponent
     sphere: SphereMap
     points: np.ndarray
     corners: np.ndarray
@@ -81,10 +81,10 @@ class Globe:
 
     def report(self) -> dict:
         """Figures for a report."""
-        on_sphere = spherical_areas(self.sphere.positions, self.part.triangles)
+        on_sphere = spherical_areas(self.sphere.positions, self.component.triangles)
         return {
-            "vertices": len(self.part.vertices),
-            "faces": len(np.unique(self.part.faces)),
+            "vertices": len(self.component.vertices),
+            "faces": len(np.unique(self.component.faces)),
             "status": self.sphere.status,
             "iterations": self.sphere.iterations,
             "residual": self.sphere.residual,
@@ -95,7 +95,7 @@ class Globe:
 
 @dataclass(frozen=True)
 class Globes:
-    """Corners (k,) and their UVs (k,2) of each surface, its globes, and warnings as in `unwrapping.Layout`."""
+    """Corners (k,) and their UVs (k,2) of each surface, its globes, and warnings as in `layout.Layout`."""
 
     corners: list[np.ndarray]
     uv: list[np.ndarray]
@@ -104,15 +104,15 @@ class Globes:
 
 
 def project(jobs: Sequence[GlobeJob], settings: GlobeSettings) -> Steps[Globes]:
-    """Map every closed part of every surface to a sphere of its own, and lay each out over the unit square.
+    """Map every closed component of every surface to a sphere of its own, and lay each out over the unit square.
 
     The axes of the surface turn the globe: Z is north, -Y the central meridian. Markers, where there are any on a
-    part, do it instead.
+    component, do it instead.
 
     Raises
     ------
     Refusal : with the index of the surface and the MeshError that says why
-    MarkerError : markers give no direction, or are on no part
+    MarkerError : markers give no direction, or are on no component
     """
     globes: list[list[Globe]] = []
     for index, job in enumerate(jobs):
@@ -125,25 +125,28 @@ def project(jobs: Sequence[GlobeJob], settings: GlobeSettings) -> Steps[Globes]:
     warnings = [(k, text) for k, mine in enumerate(globes) for g in mine for text in g.warnings]
     if sum(map(len, globes)) > 1:
         warnings.append((-1, f"{sum(map(len, globes))} closed parts; every one has the whole texture to itself"))
-    return Globes(corners, uv, globes, warnings)
+    return Globes(corners=corners, uv=uv, globes=globes, warnings=warnings)
 
 
 def _globes(job: GlobeJob, settings: GlobeSettings) -> Steps[list[Globe]]:
-    parts = closed_parts(job.surface, job.faces)
+    """Globes of all components of a surface."""
+    components = closed_components(job.surface, job.faces)
     markers = job.markers
-    if markers is not None and not any(markers.pole[p.vertex_ids].any() for p in parts):
+    if markers is not None and not any(markers.pole[p.vertex_ids].any() for p in components):
         raise MarkerError("The marker of the pole is on no part of the mesh. Mark a vertex of the surface.")
     globes = []
-    for k, part in enumerate(parts):
+    for k, component in enumerate(components):
         try:
-            globes.append((yield from part_of(_globe(part, job, settings), k / len(parts), 1 / len(parts))))
+            globes.append(
+                (yield from part_of(_globe(component, job, settings), k / len(components), 1 / len(components)))
+            )
         except MeshError as error:
-            raise _located(error, part) from error
+            raise _located(error, component) from error
     return globes
 
 
-def closed_parts(surface: Surface, faces: np.ndarray | None = None) -> list[ClosedComponent]:
-    """Parts of the polygons `faces` (f,) bool that have no vertex in common; seams play no part.
+def closed_components(surface: Surface, faces: np.ndarray | None = None) -> list[ClosedComponent]:
+    """Components of the polygons `faces` (f,) bool, which have no vertex in common, whatever the seams.
 
     Raises
     ------
@@ -155,31 +158,52 @@ def closed_parts(surface: Surface, faces: np.ndarray | None = None) -> list[Clos
     n = len(surface.positions)
     rows, columns = vertex[:, [0, 1]].ravel(), vertex[:, [1, 2]].ravel()
     label = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False)[1]
-    parts = []
+    components = []
     for mine in groups(label[vertex[:, 0]]):
         ids, local = np.unique(vertex[mine], return_inverse=True)
         local = local.reshape(-1, 3).astype(np.int64)
-        parts.append(ClosedComponent(surface.positions[ids], local, triangles[mine], owner[mine], ids, members[mine]))
-    return parts
+        components.append(
+            ClosedComponent(
+                vertices=surface.positions[ids],
+                triangles=local,
+                corners=triangles[mine],
+                faces=owner[mine],
+                vertex_ids=ids,
+                members=members[mine],
+            )
+        )
+    return components
 
 
-def _globe(part: ClosedComponent, job: GlobeJob, settings: GlobeSettings) -> Steps[Globe]:
-    density = None if job.density is None else job.density[part.members]
+def _globe(component: ClosedComponent, job: GlobeJob, settings: GlobeSettings) -> Steps[Globe]:
+    """Map a component to the sphere, turn it, and lay it out."""
+    density = None if job.density is None else job.density[component.members]
     found = yield from part_of(
-        sphere_map(part.vertices, part.triangles, density, settings.balance, settings.quality, settings.method),
+        sphere_map(
+            component.vertices, component.triangles, density, settings.balance, settings.quality, settings.method
+        ),
         0.0,
         MAPPING,
     )
-    points = found.positions @ _rotation(part, found.positions, job.markers).T
-    polygons, corners = polygons_of(part.corners, part.triangles, part.faces)
-    on_sphere = spherical_areas(points, part.triangles) / (4 * np.pi)
+    points = found.positions @ _rotation(component, found.positions, job.markers).T
+    polygons, corners = polygons_of(component.corners, component.triangles, component.faces)
+    on_sphere = spherical_areas(points, component.triangles) / (4 * np.pi)
     # Where areas shall be exact, what is left of their error on the sphere need not be kept.
-    shares = _shares(part, density) if settings.balance == 0 else on_sphere
+    shares = _shares(component, density) if settings.balance == 0 else on_sphere
     laying = _laid_out(points, polygons, shares, settings)
     uv, points, missed = yield from part_of(laying, MAPPING, 1 - MAPPING)
     areas = plane_areas(uv, polygons.triangles)
-    warnings = (*found.warnings, *_complaints(missed, int(((areas <= 0) & (on_sphere > 0)).sum())))
-    return Globe(part, found, points, corners, uv, _shares(part, density), areas, warnings)
+    warnings = (*found.warnings, *_pole_warnings(missed, int(((areas <= 0) & (on_sphere > 0)).sum())))
+    return Globe(
+        component=component,
+        sphere=found,
+        points=points,
+        corners=corners,
+        uv=uv,
+        shares=_shares(component, density),
+        areas=areas,
+        warnings=warnings,
+    )
 
 
 def _laid_out(
@@ -198,41 +222,43 @@ def _laid_out(
     return exact.unfolding.corners(), placed, unfolded.missed
 
 
-def _shares(part: ClosedComponent, density: np.ndarray | None) -> np.ndarray:
-    """Shares (m,) of the texture that the triangles of a part shall have."""
-    area = face_areas(part.vertices, part.triangles)
+def _shares(component: ClosedComponent, density: np.ndarray | None) -> np.ndarray:
+    """Shares (m,) of the texture that the triangles of a component shall have."""
+    area = face_areas(component.vertices, component.triangles)
     mass = area if density is None else area * density
     return mass / mass.sum()
 
 
-def _rotation(part: ClosedComponent, positions: np.ndarray, markers: Markers | None) -> np.ndarray:
-    if markers is None or not markers.pole[part.vertex_ids].any():
-        return along_axes(positions, part.vertices, part.triangles)
+def _rotation(component: ClosedComponent, positions: np.ndarray, markers: Markers | None) -> np.ndarray:
+    """Rotation (3,3) of the map (n,3): by the markers where there are any on the component, else by the axes."""
+    if markers is None or not markers.pole[component.vertex_ids].any():
+        return along_axes(positions, component.vertices, component.triangles)
 
     def middle(weights: np.ndarray | None) -> np.ndarray | None:
-        mine = None if weights is None else weights[part.vertex_ids]
+        mine = None if weights is None else weights[component.vertex_ids]
         return mine @ positions if mine is not None and mine.any() else None
 
-    return by_markers(markers.pole[part.vertex_ids] @ positions, middle(markers.meridian), middle(markers.side))
+    return by_markers(markers.pole[component.vertex_ids] @ positions, middle(markers.meridian), middle(markers.side))
 
 
-def _complaints(missed: int, folded: int) -> list[str]:
-    told = []
+def _pole_warnings(missed: int, folded: int) -> list[str]:
+    """Warnings of poles of the projection within faces, and of faces folded over near them."""
+    texts = []
     if missed:
         where = "A pole of the projection lies" if missed == 1 else f"{missed} poles of the projection lie"
-        told.append(f"{where} within a face, which is stretched there; subdivide the mesh, or turn the globe")
+        texts.append(f"{where} within a face, which is stretched there; subdivide the mesh, or turn the globe")
     if folded:
         who = "A face is" if folded == 1 else f"{folded} faces are"
-        told.append(f"{who} folded over near a pole of the projection; subdivide the mesh, or turn the globe")
-    return told
+        texts.append(f"{who} folded over near a pole of the projection; subdivide the mesh, or turn the globe")
+    return texts
 
 
-def _located(error: MeshError, part: ClosedComponent) -> MeshError:
-    """The error with indices of the surface in the place of the part's."""
-    ids = part.faces if error.kind == "face" else part.vertex_ids
+def _located(error: MeshError, component: ClosedComponent) -> MeshError:
+    """The error with indices of the surface in the place of the component's."""
+    ids = component.faces if error.kind == "face" else component.vertex_ids
     elements = ids[error.elements] if len(error.elements) else error.elements
     if error.kind == "face":
         elements = np.unique(elements)
     if not error.kind:
-        return type(error)(error.cause, error.remedy, "face", np.unique(part.faces))
+        return type(error)(error.cause, error.remedy, "face", np.unique(component.faces))
     return type(error)(error.cause, error.remedy, error.kind, elements)

@@ -38,8 +38,8 @@ from ..solver.progress import Steps, part_of
 from .layout import Packer, PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
 from .unwrap import lay_out
 
-# Shares that are off by more than this, relatively, are said.
-OFF = 5e-3
+# Shares that miss their target by more than this, relative to it, are said.
+MISSED = 5e-3
 
 
 @dataclass(frozen=True)
@@ -62,24 +62,30 @@ class Region:
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the region before, as asked and as measured in the result; factor of weight 1 against weight 0."""
+    """Shares of the region before, as they shall be and as measured in the result, and the contrast of the densities:
+    that of weight 1 over that of weight 0."""
 
     before: float
-    asked: float
+    target: float
     after: float
-    factor: float
+    contrast: float
+
+    def report(self) -> dict[str, float]:
+        """Figures for a report."""
+        return {"before": self.before, "asked": self.target, "after": self.after, "factor": self.contrast}
 
     def text(self) -> str:
+        """One sentence for the user."""
         return (
             f"The region went from {100 * self.before:.4g} % to {100 * self.after:.4g} % of the texture "
-            f"({100 * self.asked:.4g} % asked)"
+            f"({100 * self.target:.4g} % asked)"
         )
 
     def warnings(self) -> tuple[str, ...]:
-        """What is to be said where the region has not got what was asked."""
-        if abs(self.after / self.asked - 1) <= OFF:
+        """What is to be said where the region has missed its target."""
+        if abs(self.after / self.target - 1) <= MISSED:
             return ()
-        return (f"The region has {100 * self.after:.4g} % of the texture instead of {100 * self.asked:.4g} %",)
+        return (f"The region has {100 * self.after:.4g} % of the texture instead of {100 * self.target:.4g} %",)
 
 
 @dataclass(frozen=True)
@@ -151,11 +157,14 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
     layout = yield from lay_out(jobs, settings, spare_packer)
     after = [_uv_areas(*x) for x in zip(regions, parts, layout.corners, layout.uv, strict=True)]
     shares = Shares(
-        found.share_before, found.target_share, region_share(weights, np.concatenate(after)), found.contrast
+        before=found.share_before,
+        target=found.target_share,
+        after=region_share(weights, np.concatenate(after)),
+        contrast=found.contrast,
     )
     reports = [m.report() for m in layout.maps]
     warnings = [*layout.warnings, *((-1, text) for text in (*found.warnings, *shares.warnings()))]
-    return Magnified(layout.corners, layout.uv, reports, shares, warnings)
+    return Magnified(corners=layout.corners, uv=layout.uv, reports=reports, shares=shares, warnings=warnings)
 
 
 def whole_factor(settings: MagnifySettings) -> float:
@@ -186,7 +195,7 @@ def _uv_areas(region: Region, part, corners: np.ndarray, uv: np.ndarray) -> np.n
 
 @dataclass(frozen=True)
 class _MagnifiedIsland:
-    """An island of surface `owner`, its region (m,) and UV area (m,), the share wanted, and what became of it."""
+    """An island of surface `owner`, its region (m,), UV area (m,) and target density, and what became of it."""
 
     owner: int
     island: Island
@@ -222,7 +231,7 @@ def _from_uv(regions, settings: MagnifySettings) -> Steps[Magnified]:
     reports = [[_report(p) for p in magnified if p.owner == index] for index in range(len(regions))]
     shares = _overall(magnified)
     warnings += ((-1, text) for text in shares.warnings())
-    return Magnified(corners, uv, reports, shares, warnings)
+    return Magnified(corners=corners, uv=uv, reports=reports, shares=shares, warnings=warnings)
 
 
 def _islands(regions) -> tuple[list[tuple[int, Island]], list[tuple[int, str]]]:
@@ -268,7 +277,7 @@ def _magnified(
     factor = whole_factor(settings)
     found = target_density(weights, area, factor, settings.exact)
     if settings.boundary in OUTLINES:
-        lens = yield from magnify_region(
+        done = yield from magnify_region(
             island.uv,
             triangles,
             weights,
@@ -278,8 +287,18 @@ def _magnified(
             quality=settings.quality,
         )
     else:
-        lens = yield from _into_shape(island, area, found, weights, settings)
-    return _MagnifiedIsland(owner, island, weights, area, found, lens.uv, lens.outline, lens.iterations), lens.warnings
+        done = yield from _into_shape(island, area, found, weights, settings)
+    result = _MagnifiedIsland(
+        owner=owner,
+        island=island,
+        region=weights,
+        area=area,
+        found=found,
+        uv=done.uv,
+        outline=done.outline,
+        iterations=done.iterations,
+    )
+    return result, done.warnings
 
 
 def _into_shape(island: Island, area, found: RegionDensity, weights, settings: MagnifySettings) -> Steps[Lens]:
@@ -301,12 +320,13 @@ def _overall(magnified: Sequence[_MagnifiedIsland]) -> Shares:
     size = np.array([island.area.sum() for island in magnified])
     size = size / size.sum()
     before = size @ [region_share(p.region, p.area) for p in magnified]
-    asked = size @ [p.found.target_share for p in magnified]
+    target = size @ [p.found.target_share for p in magnified]
     after = size @ [region_share(p.region, np.abs(signed_areas(p.uv, p.island.chart.triangles))) for p in magnified]
-    return Shares(float(before), float(asked), float(after), magnified[0].found.contrast)
+    return Shares(before=float(before), target=float(target), after=float(after), contrast=magnified[0].found.contrast)
 
 
 def _report(done: _MagnifiedIsland) -> dict:
+    """Figures of an island for a report."""
     chart = done.island.chart
     flat = np.column_stack([done.island.uv, np.zeros(len(done.uv))])
     figures = distortion(flat, chart.triangles, done.uv[chart.triangles], density=done.found.density)
@@ -330,9 +350,9 @@ def _report(done: _MagnifiedIsland) -> dict:
 def warped_picture(
     picture: np.ndarray, regions: Sequence[Region], result: Magnified, margin: float, straight: bool = False
 ) -> np.ndarray:
-    """A picture (h,w,c) of the UVs there were as one of those that the result has, islands continued by the margin.
+    """Warp a picture (h,w,c) of the UVs there were to those that the result has, islands continued by the margin.
 
-    straight : see `solver.warp.warped`
+    straight : see `solver.editing.image_warp.warped`
     """
     old, new = [], []
     for region, corners, uv in zip(regions, result.corners, result.uv, strict=True):

@@ -1,4 +1,4 @@
-"""What is read of a mesh object: its surface, the polygons to work on, and its UVs."""
+"""Hold what is read of a mesh object: its surface, the polygons to work on, and its UVs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One surface to new meshes that lie on it, a single one or a series; the one path of operator and command line."""
+"""Remesh a surface once or as a series of levels of detail; the one path of operator and command line."""
 
 from __future__ import annotations
 
@@ -28,6 +28,9 @@ from ..solver.progress import Progress, Steps, part_of
 from ..solver.remeshing.initial.component_maps import Original
 from ..solver.remeshing.remesh import Remesh, remesh
 from ..solver.transfer.correspondence import Correspondence, correspond
+
+# Share of the work on one level that its mesh takes; the rest is where it lies on the surface.
+REMESHING = 0.95
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ def remesh_series(job: RemeshJob, settings: RemeshSettings) -> Steps[Series]:
 
     Raises
     ------
-    MeshError : CountError, DensityError, WeightError and those of `solver.remesh.remesh`; elements are vertices,
+    MeshError : CountError, DensityError, WeightError and those of `solver.remeshing.remesh`; elements are vertices,
         edges and polygons of the surface
     """
     surface = job.surface
@@ -113,15 +116,15 @@ def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -
 
 
 def _features(
-    job: RemeshJob, triangles: np.ndarray, density: np.ndarray | None, samples: int
+    job: RemeshJob, triangles: np.ndarray, density: np.ndarray | None, vertex_count: int
 ) -> tuple[np.ndarray, tuple[str, ...]]:
     """The features (e,2) that a mesh of so many vertices can show, and a warning about others."""
     area = face_areas(job.surface.positions, triangles)
     if not len(job.features) or not area.sum() > 0:
         return job.features, ()
-    level = np.ones(len(area)) if density is None else density
+    sample_density = np.ones(len(area)) if density is None else density
     # Every vertex has the area of two equilateral triangles.
-    size = np.sqrt(area @ level / (max(samples, 1) * np.sqrt(3) / 2) / level)
+    size = np.sqrt(area @ sample_density / (max(vertex_count, 1) * np.sqrt(3) / 2) / sample_density)
     features, joined = within_resolution(job.surface.positions, triangles, job.features, size)
     text = "1 region is" if joined == 1 else f"{joined} regions between features are"
     return features, (f"{text} too small for triangles of this size and not kept apart",) if joined else ()
@@ -135,6 +138,7 @@ def _level(
     count: int,
     settings: RemeshSettings,
 ) -> Steps[LevelOfDetail]:
+    """One remesh of so many vertices or faces, and where it lies on the surface."""
     positions, triangles = original.vertices, original.triangles
     steps = remesh(
         positions,
@@ -147,11 +151,11 @@ def _level(
         grading=settings.grading,
         original=original,
     )
-    found = yield from part_of(steps, 0.0, 0.95)
-    yield Progress("Attributes", 0.95)
+    found = yield from part_of(steps, 0.0, REMESHING)
+    yield Progress("Attributes", REMESHING)
     seams = all_edges(original.features, job.jumps)
     at = correspond(positions, triangles, seams, found.vertices, found.triangles, found.faces, found.barycentric)
-    return LevelOfDetail(found.vertices, found.triangles, at, found)
+    return LevelOfDetail(positions=found.vertices, triangles=found.triangles, correspondence=at, found=found)
 
 
 @contextmanager

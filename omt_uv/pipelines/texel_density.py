@@ -1,4 +1,4 @@
-"""Texel density of UV islands: how many pixels of the texture a metre of the surface gets."""
+"""Measure and set the texel density of UV islands: how many pixels of the texture a metre of the surface gets."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class _Faces:
     uv_area: np.ndarray
 
 
-def density(readings: Sequence[Reading], texels: Texels) -> float:
+def texel_density(readings: Sequence[Reading], texels: Texels) -> float:
     """Pixels per metre of the chosen polygons of all readings together.
 
     Raises
@@ -40,23 +40,23 @@ def density(readings: Sequence[Reading], texels: Texels) -> float:
     EmptyMeshError : no UVs, or no polygon is chosen; ZeroAreaFaceError : nothing has an area
     """
     faces = [_faces(reading) for reading in readings]
-    return _density(sum(f.space.sum() for f in faces), sum(f.uv_area.sum() for f in faces), texels)
+    return _texels_per_metre(sum(f.space.sum() for f in faces), sum(f.uv_area.sum() for f in faces), texels)
 
 
-def with_density(
-    readings: Sequence[Reading], wanted: float, texels: Texels, each_island: bool
+def with_texel_density(
+    readings: Sequence[Reading], target: float, texels: Texels, each_island: bool
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Corners (k,) and UVs (k,2) of the chosen polygons of every reading, scaled to `wanted` pixels per metre.
+    """Corners (k,) and UVs (k,2) of the chosen polygons of every reading, scaled to `target` pixels per metre.
 
     each_island: every island about the middle of its bounding box, so that afterwards all have this density; otherwise
     the whole layout by one factor about its middle, which keeps the differences between islands.
 
     Raises
     ------
-    EmptyMeshError, ZeroAreaFaceError : as for `density`
+    EmptyMeshError, ZeroAreaFaceError : as for `texel_density`
     """
     faces = [_faces(reading) for reading in readings]
-    common = wanted / _density(sum(f.space.sum() for f in faces), sum(f.uv_area.sum() for f in faces), texels)
+    common = target / _texels_per_metre(sum(f.space.sum() for f in faces), sum(f.uv_area.sum() for f in faces), texels)
     used = np.concatenate([f.uv[np.unique(f.corners)] for f in faces])
     middle = (used.min(axis=0) + used.max(axis=0)) / 2
     result = []
@@ -64,20 +64,20 @@ def with_density(
         corners, first = np.unique(face.corners, return_index=True)
         uv = face.uv[corners]
         if each_island:
-            factor, centre = _of_islands(face, first, uv, wanted, texels)
+            factor, centre = _of_islands(face, first, uv, target, texels)
         else:
             factor, centre = np.full(len(uv), common), middle
         result.append((corners, centre + (uv - centre) * factor[:, None]))
     return result
 
 
-def _of_islands(face: _Faces, first, uv, wanted: float, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
+def _of_islands(face: _Faces, first, uv, target: float, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
     """Factor (k,) and centre (k,2) of the islands of corners first (k,); islands without area stay as they are."""
     count, of_face = uv_charts(face.vertices, face.uv[face.corners])
     space, covered = np.bincount(of_face, face.space, count), np.bincount(of_face, face.uv_area, count)
     island = np.repeat(of_face, 3)[first]
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = wanted * texels.metres / texels.texture_size * np.sqrt(space / covered)
+        factor = target * texels.metres / texels.texture_size * np.sqrt(space / covered)
     factor = np.where(np.isfinite(factor) & (factor > 0), factor, 1.0)
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, island, uv)
@@ -86,6 +86,7 @@ def _of_islands(face: _Faces, first, uv, wanted: float, texels: Texels) -> tuple
 
 
 def _faces(reading: Reading) -> _Faces:
+    """Triangles of the chosen polygons, as they lie in space and in UV."""
     if reading.uv is None:
         raise EmptyMeshError("There are no UVs", remedy="Unwrap the mesh first")
     surface = reading.surface
@@ -96,7 +97,8 @@ def _faces(reading: Reading) -> _Faces:
     return _Faces(uv, corners, triangles, face_areas(surface.positions, triangles), np.abs(signed_areas(uv, corners)))
 
 
-def _density(space: float, covered: float, texels: Texels) -> float:
+def _texels_per_metre(space: float, covered: float, texels: Texels) -> float:
+    """Pixels per metre where faces of so much area in space cover so much of the unit square."""
     if not (space > 0 and covered > 0):
         raise ZeroAreaFaceError("The faces have no area in space, or none in the UV map")
     return float(texels.texture_size / texels.metres * np.sqrt(covered / space))

@@ -27,12 +27,12 @@ state = State()
 def figures(readings, texture_size: float, metres: float) -> tuple[tuple[str, str], ...]:
     """Rows about the active UVs of readings; none where there is nothing to measure."""
     from ..pipelines.distortion import measure_readings
-    from ..pipelines.texel_density import Texels, density
+    from ..pipelines.texel_density import Texels, texel_density
     from ..solver.errors import MeshError
 
     try:
         found = measure_readings(readings, overlap=False)
-        pixels = density(readings, Texels(texture_size, metres))
+        pixels = texel_density(readings, Texels(texture_size, metres))
     except MeshError:
         return ()
     return (

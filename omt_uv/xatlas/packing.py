@@ -1,4 +1,4 @@
-"""Islands into the unit square with xatlas: one scale for all, a margin in pixels, no overlap.
+"""Pack islands into the unit square with xatlas: one scale for all, a margin in pixels, no overlap.
 
 xatlas decides only where islands go. It stretches every chart to whole texels, and its own quarter turns
 mirror charts, so neither is taken over: islands are turned here and moved by a translation.
@@ -14,17 +14,22 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import UserError
 
-# xatlas drops faces of meshes with small units, and islands smaller than about this share of the largest.
-EXTENT, SPECK = 100.0, 1e-4
-# Rasterising finer than this costs more than the space it saves.
+# Extent that the largest island has for xatlas, which drops faces of meshes with small units.
+EXTENT = 100.0
+# Islands below this share of the largest are shown to xatlas in this size: it drops smaller ones.
+SPECK = 1e-4
+# Texels along a side; rasterising finer costs more than the space it saves.
 MAX_RASTER = 2048
-# Wider gaps, in texels, are made by rasterising coarser.
+# Texels of the widest gap; wider ones are made by rasterising coarser.
 MAX_GAP = 31
+# How often the raster is made coarser until the margins fit; a few times are enough where they do at all.
 ATTEMPTS = 8
 # Rectangles whose areas differ by this share are equally large.
 EQUAL = 1e-6
-# Atlases up to so many times as wide as high are square enough; for others larger scales are tried so often.
-OBLONG, TRIALS = 1.05, 5
+# Atlases up to so many times as wide as high are square enough.
+OBLONG = 1.05
+# How often a larger scale is tried in a square for others: each halves the range of scales, and costs a packing.
+TRIALS = 5
 REMEDY = "Lower the margin or raise the texture size"
 
 

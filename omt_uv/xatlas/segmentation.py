@@ -1,4 +1,4 @@
-"""Many charts of low distortion, by xatlas, as seams: for textures where islands matter less than shear."""
+"""Find seams of many charts of low distortion, by xatlas: for textures where islands matter less than shear."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..errors import UserError
 from ..solver.mesh.surface import Surface, chosen_triangles
 from ..solver.mesh.topology import halfedges, pair_keys, pair_up
 
-# xatlas drops faces of meshes with small units.
+# Extent of the mesh for xatlas, which drops faces of meshes with small units.
 EXTENT = 100.0
 
 

@@ -128,7 +128,7 @@ def globe_maps(V, F):
         globe = drain(project([GlobeJob(triangle_surface(V, F))], settings)).globes[0][0]
         maps.append((globe.points, globe.uv.reshape(-1, 3, 2)))
     conformal = globe.sphere.conformal @ along_axes(globe.sphere.conformal, V, F).T
-    polygons, _ = polygons_of(globe.part.corners, F, globe.part.faces)
+    polygons, _ = polygons_of(globe.component.corners, F, globe.component.faces)
     unfolded, _ = unfold(conformal, polygons, "equirect")
     return [(conformal, unfolded.corners()[polygons.triangles]), *maps]
 
