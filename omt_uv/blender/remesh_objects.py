@@ -16,7 +16,7 @@ from ..pipelines.carry_attributes import carry
 from ..pipelines.remesh import LevelOfDetail, RemeshJob, Series, oriented
 from ..settings import RemeshSettings
 from ..solver.analysis.density import from_polygons, from_vertices
-from ..solver.analysis.feature_edges import all_edges, sharp_edges
+from ..solver.analysis.feature_edges import edge_union, sharp_edges
 from ..solver.errors import EmptyMeshError, MeshError
 from ..solver.mesh.surface import Surface
 from . import mesh as blender_mesh
@@ -75,9 +75,9 @@ def read_request(
     stretch = blender_mesh.stretch(obj)
     if abs(np.linalg.det(stretch)) <= 1e-12 * np.abs(stretch).max() ** 3:
         raise MeshError("The scale of the object is zero along an axis", "Clear or fix its scale")
-    jumps = all_edges(uv_seams(attributes, surface), material_borders(attributes, surface))
+    jumps = edge_union(uv_seams(attributes, surface), material_borders(attributes, surface))
     features = _features(attributes, surface, settings)
-    kept = followed(attributes, all_edges(features, jumps))
+    kept = followed(attributes, edge_union(features, jumps))
     return Request(RemeshJob(surface, features, jumps, values, warnings), kept, stretch, depsgraph is not None)
 
 
@@ -106,7 +106,7 @@ def _features(attributes: Attributes, surface: Surface, settings: RemeshSettings
         kept += [surface.seams, uv_seams(attributes, surface)]
     if settings.preserve_materials:
         kept.append(material_borders(attributes, surface))
-    return all_edges(*kept)
+    return edge_union(*kept)
 
 
 def source_of(obj: bpy.types.Object, settings: RemeshSettings) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import UserError
 from ..pipelines.reading import Reading
-from ..solver.analysis.vertex_scores import areas, score, soft_weights
+from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
 from ..solver.errors import MeshError
 from .seams import GroupError, group_weights
 
@@ -144,8 +144,8 @@ def computed_weights(
     surface = reading.surface
     triangles = surface.corner_vertex[surface.triangles]
     try:
-        values = score(kind, surface.positions, triangles, selected)
-        return soft_weights(values, areas(surface.positions, triangles), low, high, invert)
+        values = vertex_score(kind, surface.positions, triangles, selected)
+        return soft_weights(values, scaled_vertex_areas(surface.positions, triangles), low, high, invert)
     except MeshError as error:
         raise ScoreError(obj, error) from error
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..solver.analysis.feature_edges import all_edges, region_borders, value_jumps
+from ..solver.analysis.feature_edges import edge_union, region_borders, value_jumps
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import pair_keys
 
@@ -118,7 +118,7 @@ def uv_seams(attributes: Attributes, surface: Surface) -> np.ndarray:
     """Edges (k,2) where islands of any UV map end."""
     triangles = surface.corner_vertex[surface.triangles]
     maps = [layer.values for layer in attributes.layers if is_uv(layer)]
-    return all_edges(
+    return edge_union(
         *(value_jumps(triangles, surface.triangles, uv, SAME_UV * np.ptp(uv, axis=0).max(initial=0)) for uv in maps)
     )
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..solver.maps.local_untangle import straightened
+from ..solver.maps.local_untangle import straighten_folds
 from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import pair_keys
@@ -51,7 +51,7 @@ def _carried_uv(layer: Layer, surface: Surface, at: Correspondence) -> tuple[np.
     """UVs of the new corners, and how many faces are folded though the map they come from is not."""
     uv = transfer.to_corners(at, surface.triangles, layer.values, extend=True)
     area = signed_areas(layer.values.astype(float), surface.triangles)
-    return straightened(at.triangles, uv, np.sign(area)[at.face_triangle])
+    return straighten_folds(at.triangles, uv, np.sign(area)[at.face_triangle])
 
 
 def _carried(layer: Layer, surface: Surface, triangles: np.ndarray, at: Correspondence) -> np.ndarray:

@@ -16,8 +16,8 @@ from ..solver.analysis.density import (
     mean_curvature_density,
     painted_density,
 )
-from ..solver.analysis.feature_edges import all_edges, within_resolution
-from ..solver.analysis.vertex_scores import areas, score, soft_weights
+from ..solver.analysis.feature_edges import edge_union, resolved_features
+from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
 from ..solver.errors import CountError, DensityError, MeshError
 from ..solver.mesh.geometry import face_areas
 from ..solver.mesh.gluing import orientations
@@ -125,7 +125,7 @@ def _features(
     sample_density = np.ones(len(area)) if density is None else density
     # Every vertex has the area of two equilateral triangles.
     size = np.sqrt(area @ sample_density / (max(vertex_count, 1) * np.sqrt(3) / 2) / sample_density)
-    features, joined = within_resolution(job.surface.positions, triangles, job.features, size)
+    features, joined = resolved_features(job.surface.positions, triangles, job.features, size)
     text = "1 region is" if joined == 1 else f"{joined} regions between features are"
     return features, (f"{text} too small for triangles of this size and not kept apart",) if joined else ()
 
@@ -153,7 +153,7 @@ def _level(
     )
     found = yield from part_of(steps, 0.0, REMESHING)
     yield Progress("Attributes", REMESHING)
-    seams = all_edges(original.features, job.jumps)
+    seams = edge_union(original.features, job.jumps)
     at = correspond(positions, triangles, seams, found.vertices, found.triangles, found.faces, found.barycentric)
     return LevelOfDetail(positions=found.vertices, triangles=found.triangles, correspondence=at, found=found)
 
@@ -201,7 +201,7 @@ def _gaussian(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -
 
 def _saliency(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     positions = job.surface.positions
-    weights = soft_weights(score("saliency", positions, triangles), areas(positions, triangles))
+    weights = soft_weights(vertex_score("saliency", positions, triangles), scaled_vertex_areas(positions, triangles))
     return painted_density(from_vertices(weights, triangles), settings.factor)
 
 

@@ -136,7 +136,7 @@ def aside(steps):
 
     if current is None or not threads:
         return steps
-    return _collecting(progress.aside(_without_collector(steps)))
+    return _collecting(progress.on_thread(_without_collector(steps)))
 
 
 def _without_collector(steps):

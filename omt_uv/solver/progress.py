@@ -52,7 +52,7 @@ def part_of(steps: Steps[T], start: float, width: float) -> Steps[T]:
         yield Progress(progress.stage, min(start + width * progress.fraction, 1.0))
 
 
-def aside(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
+def on_thread(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
     """Run a solver on a thread of its own; what it yields, returns and raises comes out here.
 
     Factorisations and convex hulls take a second on large meshes, and give up the interpreter's lock meanwhile: whoever

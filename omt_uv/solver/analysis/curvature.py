@@ -12,7 +12,7 @@ from ..mesh.geometry import angles_from_lengths, cotangent_laplacian, halfedge_l
 from ..mesh.topology import halfedges, pair_keys, pair_up
 
 
-def gaussian(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def gaussian_curvature(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Angle defect (n,) in radians: 2 pi minus the angles around a vertex, 0 on the rim (Gauss, Bonnet).
 
     positions (n,3), triangles (m,3)
@@ -23,7 +23,7 @@ def gaussian(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.where(on_boundary(triangles, len(positions)), 0.0, 2 * np.pi - around)
 
 
-def mean(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def mean_curvature(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Mean curvature times area (n,), a length, positive on a sphere seen from outside, 0 on the rim.
 
     Half of the cotangent Laplacian of the positions along the normal (Meyer, Desbrun, Schroeder, Barr 2003, eq. 8).

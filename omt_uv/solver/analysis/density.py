@@ -66,7 +66,7 @@ def gaussian_curvature_density(positions: np.ndarray, triangles: np.ndarray, c: 
     positions (n,3), triangles (m,3)
     """
     area = face_areas(positions, triangles)
-    return curved(area, triangles, curvature.gaussian(positions, triangles), c, 4 * np.pi)
+    return curved(area, triangles, curvature.gaussian_curvature(positions, triangles), c, 4 * np.pi)
 
 
 def mean_curvature_density(positions: np.ndarray, triangles: np.ndarray, c: float = 1.0) -> np.ndarray:
@@ -76,7 +76,7 @@ def mean_curvature_density(positions: np.ndarray, triangles: np.ndarray, c: floa
     """
     area = face_areas(positions, triangles)
     whole = np.sqrt(4 * np.pi * area.sum())
-    return curved(area, triangles, curvature.mean(positions, triangles), c, whole)
+    return curved(area, triangles, curvature.mean_curvature(positions, triangles), c, whole)
 
 
 def from_vertices(values: np.ndarray, triangles: np.ndarray) -> np.ndarray:

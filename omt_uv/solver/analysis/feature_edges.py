@@ -50,12 +50,12 @@ def _pairs(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return first, second, np.stack([tail[first], head[first]], axis=1)
 
 
-def all_edges(*sets: np.ndarray) -> np.ndarray:
+def edge_union(*sets: np.ndarray) -> np.ndarray:
     """The union (k,2) of sets of edges, every edge once, the smaller vertex first."""
     return np.unique(np.sort(np.concatenate([NO_EDGES, *(np.reshape(s, (-1, 2)) for s in sets)]), axis=1), axis=0)
 
 
-def within_resolution(
+def resolved_features(
     positions: np.ndarray, triangles: np.ndarray, features: np.ndarray, size: np.ndarray
 ) -> tuple[np.ndarray, int]:
     """The features (e,2) of a mesh (n,3), (m,3) without the borders of regions too small to show.

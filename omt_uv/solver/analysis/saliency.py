@@ -11,7 +11,7 @@ import numpy as np
 
 from ..mesh.geometry import face_areas
 from ..mesh.topology import halfedges
-from .curvature import mean
+from .curvature import mean_curvature
 from .heat_means import HeatMeans
 
 # Scales, in multiples of EPSILON times the diagonal (section 3.1 and 4: epsilon is 0.3 % of it).
@@ -34,7 +34,7 @@ def saliency(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     positions = unit_size(positions, triangles)
     around = HeatMeans(positions, triangles, 6 * EPSILON)
     sigmas = np.unique(np.concatenate([SCALES, 2 * SCALES]))
-    means = around.means(mean(positions, triangles), EPSILON * sigmas)
+    means = around.means(mean_curvature(positions, triangles), EPSILON * sigmas)
     at = {s: means[k] for k, s in enumerate(sigmas.tolist())}
     total = np.zeros(len(positions))
     for scale in SCALES.tolist():

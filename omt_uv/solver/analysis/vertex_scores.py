@@ -24,7 +24,9 @@ NO_CURVATURE = {"gaussian": 1e-3, "mean": 0.03}
 SAME = 1e-6
 
 
-def score(kind: str, positions: np.ndarray, triangles: np.ndarray, selected: np.ndarray | None = None) -> np.ndarray:
+def vertex_score(
+    kind: str, positions: np.ndarray, triangles: np.ndarray, selected: np.ndarray | None = None
+) -> np.ndarray:
     """Score (n,) of the vertices of a surface (n,3), (m,3); greater is more. `selected` (n,) bool is for "distance".
 
     Raises
@@ -46,7 +48,7 @@ def score(kind: str, positions: np.ndarray, triangles: np.ndarray, selected: np.
             raise EmptyMeshError("No vertex is selected to be near to", "Select one or more vertices in Edit Mode")
         return -distance(positions, triangles, np.flatnonzero(selected))
     positions = unit_size(positions, triangles)
-    amount = {"gaussian": curvature.gaussian, "mean": curvature.mean}[kind](positions, triangles)
+    amount = {"gaussian": curvature.gaussian_curvature, "mean": curvature.mean_curvature}[kind](positions, triangles)
     found = HeatMeans(positions, triangles, SMOOTH).means(np.abs(amount), np.array([SMOOTH]))[0]
     return found if found.max() > NO_CURVATURE[kind] else np.zeros(len(positions))
 
@@ -120,6 +122,6 @@ def _across(positions, triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return opposite[0][inside], opposite[1][inside], np.hypot(x[0] - x[1], total)[inside]
 
 
-def areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def scaled_vertex_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Area (n,) of every vertex, finite at any scale."""
     return vertex_areas(unit_size(positions, triangles), triangles)

@@ -76,10 +76,10 @@ def solve_general(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray = "cola
 
 def solve_conjugate_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-6, most: int = 200) -> np.ndarray:
     """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite and close to its diagonal."""
-    return by_gradients(lambda x: A @ x, b, sp.diags(1 / A.diagonal()), tolerance, most)
+    return conjugate_gradients(lambda x: A @ x, b, sp.diags(1 / A.diagonal()), tolerance, most)
 
 
-def by_gradients(
+def conjugate_gradients(
     times: Callable[[np.ndarray], np.ndarray], b: np.ndarray, inverse: sp.spmatrix, tolerance: float, most: int = 200
 ) -> np.ndarray:
     """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite, given by `times`, x to A x, and close

@@ -25,7 +25,7 @@ PUSHED_AREA = 0.05
 PUSH_ROUNDS = 30
 
 
-def straightened(triangles: np.ndarray, uv: np.ndarray, side: np.ndarray) -> tuple[np.ndarray, int]:
+def straighten_folds(triangles: np.ndarray, uv: np.ndarray, side: np.ndarray) -> tuple[np.ndarray, int]:
     """UVs (3t,2) of the corners of faces (t,3) without folds that the map they come from does not have.
 
     side (t,): -1, 0 or 1, which way the map they come from lies under each face. Where single faces of that map lie

@@ -115,17 +115,17 @@ def test_weights_that_mark_nothing(weights, message, elements):
 
 def test_gauss_bonnet():
     for (V, F), total in ((meshes.icosphere(2), 4 * np.pi), (meshes.torus(), 0.0)):
-        assert curvature.gaussian(V, F).sum() == pytest.approx(total, abs=1e-9)
+        assert curvature.gaussian_curvature(V, F).sum() == pytest.approx(total, abs=1e-9)
     V, F = meshes.bumpy()
     rim = curvature.on_boundary(F, len(V))
-    assert rim.sum() == 4 * 16 and not curvature.gaussian(V, F)[rim].any()
+    assert rim.sum() == 4 * 16 and not curvature.gaussian_curvature(V, F)[rim].any()
 
 
 def test_mean_curvature_of_a_sphere():
     """H = 1 / R, outward positive: the integral is 4 pi R."""
     V, F = meshes.icosphere(3)
-    assert curvature.mean(3 * V + 50, F).sum() == pytest.approx(4 * np.pi * 3, rel=0.01)
-    assert not curvature.mean(*meshes.grid()).any()
+    assert curvature.mean_curvature(3 * V + 50, F).sum() == pytest.approx(4 * np.pi * 3, rel=0.01)
+    assert not curvature.mean_curvature(*meshes.grid()).any()
 
 
 @pytest.mark.parametrize("make", [gaussian_curvature_density, mean_curvature_density])

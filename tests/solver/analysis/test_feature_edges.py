@@ -6,7 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.analysis.feature_edges import region_borders, sharp_edges, within_resolution
+from omt_uv.solver.analysis.feature_edges import region_borders, resolved_features, sharp_edges
 from omt_uv.solver.mesh.topology import pair_keys
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing.remesh import remesh
@@ -62,10 +62,10 @@ def island(scale=1.0):
 def test_an_island_too_small_for_the_new_mesh_joins_its_neighbour(scale):
     V, F, region, edge = island(scale)
     features = region_borders(F, region)
-    fine, joined = within_resolution(V, F, features, np.full(len(F), 0.5 * edge))
+    fine, joined = resolved_features(V, F, features, np.full(len(F), 0.5 * edge))
     assert joined == 0
     assert (fine == features).all()
-    coarse, joined = within_resolution(V, F, features, np.full(len(F), 3 * edge))
+    coarse, joined = resolved_features(V, F, features, np.full(len(F), 3 * edge))
     assert joined == 1
     kept = set(pair_keys(*coarse.T).tolist())
     # The island is part of one half, and the halves stay apart.
@@ -78,7 +78,7 @@ def test_lines_that_end_on_the_surface_are_kept_at_any_size():
     row = np.flatnonzero(np.abs(V[:, 1] - np.unique(V[:, 1])[7]) < 1e-9)
     line = row[np.argsort(V[row, 0])][3:9]
     features = np.stack([line[:-1], line[1:]], axis=1)
-    kept, joined = within_resolution(V, F, features, np.full(len(F), 10 * edge))
+    kept, joined = resolved_features(V, F, features, np.full(len(F), 10 * edge))
     assert joined == 0
     assert (kept == features).all()
 
@@ -89,7 +89,7 @@ def test_a_narrow_strip_is_no_region_though_it_is_long():
     rows = np.unique(V[:, 1].round(9))
     strip = np.digitize(centre[:, 1], [rows[7], rows[8]])
     features = region_borders(F, strip)
-    assert within_resolution(V, F, features, np.full(len(F), edge))[1] == 0
-    kept, joined = within_resolution(V, F, features, np.full(len(F), 6 * edge))
+    assert resolved_features(V, F, features, np.full(len(F), edge))[1] == 0
+    kept, joined = resolved_features(V, F, features, np.full(len(F), 6 * edge))
     assert joined == 1
     assert len(kept) == len(features) / 2

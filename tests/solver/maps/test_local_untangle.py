@@ -6,7 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.maps.local_untangle import straightened
+from omt_uv.solver.maps.local_untangle import straighten_folds
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 
@@ -27,7 +27,7 @@ def areas(values):
 def test_a_sound_map_keeps_every_bit():
     uv, F = flat()
     values = corners(uv, F)
-    new, left = straightened(F, values, np.ones(len(F)))
+    new, left = straighten_folds(F, values, np.ones(len(F)))
     assert left == 0
     assert new.tobytes() == values.tobytes()
 
@@ -42,7 +42,7 @@ def test_folds_are_opened_and_the_rest_stays(scale, offset, mirrored):
     wrong = wrong * [mirrored * scale, scale] + offset
     values = corners(wrong, F)
     assert (mirrored * areas(values) <= 0).any()
-    new, left = straightened(F, values, np.full(len(F), mirrored))
+    new, left = straighten_folds(F, values, np.full(len(F), mirrored))
     assert left == 0
     assert (mirrored * areas(new) > 0).all()
     far = np.linalg.norm(uv - uv[middle], axis=1) > 0.6
@@ -56,7 +56,7 @@ def test_a_corner_of_the_outline_that_is_folded_in_is_pushed_open():
     F = np.concatenate([F, [[b, a, len(uv)]]])
     # The tip is on the wrong side of its base, inside of the map.
     wrong = np.concatenate([uv, [(uv[a] + uv[b]) / 2 - 0.4 * out]])
-    new, left = straightened(F, corners(wrong, F), np.ones(len(F)))
+    new, left = straighten_folds(F, corners(wrong, F), np.ones(len(F)))
     assert left == 0
     assert (areas(new) > 0).all()
 
@@ -67,7 +67,7 @@ def test_a_map_that_folds_along_a_line_of_symmetry_is_left_alone():
     centre = uv[F].mean(axis=1)[:, 0] > np.median(np.unique(uv[:, 0]))
     folded = np.stack([np.abs(uv[:, 0] - np.median(np.unique(uv[:, 0]))), uv[:, 1]], axis=1)
     values = corners(folded, F)
-    new, left = straightened(F, values, np.where(centre, 1, -1))
+    new, left = straighten_folds(F, values, np.where(centre, 1, -1))
     assert left == 0
     assert (new == values).all()
 
@@ -75,6 +75,6 @@ def test_a_map_that_folds_along_a_line_of_symmetry_is_left_alone():
 def test_uvs_without_extent_are_left_alone():
     _, F = flat()
     values = np.zeros((F.size, 2))
-    new, left = straightened(F, values, np.zeros(len(F)))
+    new, left = straighten_folds(F, values, np.zeros(len(F)))
     assert left == 0
     assert (new == values).all()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from ...linalg.sparse import by_gradients
+from ...linalg.sparse import conjugate_gradients
 from ...mesh.closest_point import face_normals, vertex_normals
 from ...mesh.topology import halfedges
 from .closest_pairs import Pairs
@@ -71,7 +71,7 @@ def displacements(
 
     near = np.linalg.inv(diagonal + FAIRNESS * even.diagonal[:, None, None] * np.eye(3))
     inverse = sp.bsr_matrix((near, np.arange(n), np.arange(n + 1)))
-    return by_gradients(times, free * right.ravel(), inverse, TOLERANCE).reshape(n, 3)
+    return conjugate_gradients(times, free * right.ravel(), inverse, TOLERANCE).reshape(n, 3)
 
 
 def _distances(
