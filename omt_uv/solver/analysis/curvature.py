@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import angles_from_lengths, cotangent_laplacian, halfedge_lengths
+from ..mesh.geometry import angles_from_lengths, cotangent_laplacian, face_normals, halfedge_lengths, vertex_normals
 from ..mesh.topology import halfedges, pair_keys, pair_up
 
 
@@ -46,21 +46,6 @@ def sharpness(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return sharpest
 
 
-def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (m,3), 0 for a triangle without area."""
-    p = positions[triangles]
-    return _unit(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
-
-
-def vertex_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (n,3), the mean of the adjacent faces' by area, 0 where they cancel."""
-    p = positions[triangles]
-    twice = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    flat = triangles.ravel()
-    total = np.stack([np.bincount(flat, np.repeat(x, 3), len(positions)) for x in twice.T], axis=1)
-    return _unit(total)
-
-
 def on_boundary(triangles: np.ndarray, n: int) -> np.ndarray:
     """Vertices (n,) bool at an edge that does not have two faces."""
     tail, head = halfedges(triangles)
@@ -69,8 +54,3 @@ def on_boundary(triangles: np.ndarray, n: int) -> np.ndarray:
     rim = np.zeros(n, bool)
     rim[tail[open_edge]] = rim[head[open_edge]] = True
     return rim
-
-
-def _unit(v: np.ndarray) -> np.ndarray:
-    size = np.linalg.norm(v, axis=1, keepdims=True)
-    return v / np.where(size > 0, size, 1)

@@ -6,8 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..mesh.closest_point import face_normals
-from ..mesh.geometry import face_areas, halfedge_lengths
+from ..mesh.geometry import face_areas, face_normals, halfedge_lengths
 from ..mesh.topology import halfedges, pair_keys, pair_up, twins
 
 NO_EDGES = np.zeros((0, 2), np.int64)

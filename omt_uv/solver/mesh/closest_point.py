@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .geometry import face_normals
 from .topology import twins
 
 CANDIDATES = 4
@@ -88,38 +89,8 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.einsum("...i,...i->...", a, b)
-
-
 def _square(a: np.ndarray) -> np.ndarray:
-    return _dot(a, a)
-
-
-def unit(v: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of length one; 0 stays 0."""
-    length = np.sqrt(_dot(v, v))[..., None]
-    return v / np.where(length > 0, length, 1)
-
-
-def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (m,3)."""
-    return unit(np.stack(_double_areas(positions, triangles), axis=1))
-
-
-def _double_areas(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Coordinates (m,) of normals as long as twice the areas."""
-    x, y, z = np.take(positions.T, triangles.T, axis=1)
-    a, b, c = x[1] - x[0], y[1] - y[0], z[1] - z[0]
-    d, e, f = x[2] - x[0], y[2] - y[0], z[2] - z[0]
-    return b * f - c * e, c * d - a * f, a * e - b * d
-
-
-def vertex_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (n,3), weighted by the areas of the adjacent faces."""
-    flat, n = triangles.ravel(), len(positions)
-    total = [np.bincount(flat, np.repeat(k, 3), n) for k in _double_areas(positions, triangles)]
-    return unit(np.stack(total, axis=1))
+    return np.einsum("...i,...i->...", a, a)
 
 
 class ClosestPoint:

@@ -48,6 +48,32 @@ def face_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return 0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
 
 
+def unit(v: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) of length one; 0 stays 0."""
+    length = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
+    return v / np.where(length > 0, length, 1)
+
+
+def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (m,3) of triangles (m,3) of positions (n,3), 0 for a triangle without area."""
+    return unit(np.stack(_double_areas(positions, triangles), axis=1))
+
+
+def vertex_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (n,3), the mean of those of the adjacent faces by area, 0 where they cancel."""
+    flat, n = triangles.ravel(), len(positions)
+    total = [np.bincount(flat, np.repeat(k, 3), n) for k in _double_areas(positions, triangles)]
+    return unit(np.stack(total, axis=1))
+
+
+def _double_areas(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates (m,) of normals as long as twice the areas."""
+    x, y, z = np.take(positions.T, triangles.T, axis=1)
+    a, b, c = x[1] - x[0], y[1] - y[0], z[1] - z[0]
+    d, e, f = x[2] - x[0], y[2] - y[0], z[2] - z[0]
+    return b * f - c * e, c * d - a * f, a * e - b * d
+
+
 def signed_areas(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Area of every triangle in the plane, (m,), positive when counter-clockwise, of uv (n,2)."""
     p = uv[triangles]

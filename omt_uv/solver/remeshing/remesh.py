@@ -13,7 +13,8 @@ import numpy as np
 
 from ..analysis.density import graded_density
 from ..errors import CountError, positive_density
-from ..mesh.closest_point import ClosestPoint, vertex_normals
+from ..mesh.closest_point import ClosestPoint
+from ..mesh.geometry import vertex_normals
 from ..progress import Progress, Steps, part_of
 from .components.coincident_boundaries import opened
 from .components.components import Part

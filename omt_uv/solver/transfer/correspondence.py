@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.closest_point import ClosestPoint, face_normals
+from ..mesh.closest_point import ClosestPoint
 from ..mesh.cut_mesh import CutMesh, cut_open, on_seam, seam_points
+from ..mesh.geometry import face_normals
 from ..mesh.topology import boundary_edges, halfedges, pair_keys, pair_up
 from .seam_sides import agree_on_sides, locate_corners, locate_faces, reference_vertices
 

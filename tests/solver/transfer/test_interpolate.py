@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.feature_edges import region_borders, sharp_edges, value_jumps
-from omt_uv.solver.mesh.closest_point import ClosestPoint, vertex_normals
+from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.mesh.cut_mesh import cut_open
+from omt_uv.solver.mesh.geometry import vertex_normals
 from omt_uv.solver.mesh.topology import halfedges, pair_keys
 from omt_uv.solver.transfer import interpolate as transfer
 from omt_uv.solver.transfer.correspondence import correspond

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...mesh.closest_point import unit
 from ...mesh.edge_flips import flip_in_place, flip_until_none
+from ...mesh.geometry import unit
 from ...mesh.topology import halfedges, pair_keys, previous_halfedge, twins
 
 # The new faces of a flip may lean against the old ones by this cosine at most.

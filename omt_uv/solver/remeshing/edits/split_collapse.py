@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ...mesh.closest_point import unit
+from ...mesh.geometry import unit
 from ...mesh.topology import halfedges, pair_keys, previous_halfedge, twins
 
 # A face may turn by this cosine at most when an edge at it collapses.

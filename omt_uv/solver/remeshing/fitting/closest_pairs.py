@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPoint, ClosestPointTracker, SurfacePoints, face_normals, subdivision_centroids
-from ...mesh.geometry import face_areas
+from ...mesh.closest_point import ClosestPoint, ClosestPointTracker, SurfacePoints, subdivision_centroids
+from ...mesh.geometry import face_areas, face_normals
 from ...mesh.topology import expand
 from ..relaxation.surface_samples import Samples
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPointTracker, vertex_normals
+from ...mesh.closest_point import ClosestPointTracker
+from ...mesh.geometry import vertex_normals
 from ...mesh.topology import twins
 from ..edits.delaunay_flips import make_delaunay_embedded
 from ..edits.working_mesh import Draft

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPoint, vertex_normals
-from ...mesh.geometry import face_areas
+from ...mesh.closest_point import ClosestPoint
+from ...mesh.geometry import face_areas, vertex_normals
 from ...progress import Progress, Steps
 from ..edits.working_mesh import Draft
 from ..relaxation.surface_samples import Samples, joined

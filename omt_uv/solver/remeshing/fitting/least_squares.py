@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...linalg.sparse import conjugate_gradients
-from ...mesh.closest_point import face_normals, vertex_normals
+from ...mesh.geometry import face_normals, vertex_normals
 from ...mesh.topology import halfedges
 from .closest_pairs import Pairs
 from .shape_terms import Fairness, equilateral, smallness

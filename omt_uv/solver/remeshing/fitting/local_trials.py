@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.closest_point import ClosestPointTracker, face_normals
-from ...mesh.geometry import angles_from_lengths, halfedge_lengths
+from ...mesh.closest_point import ClosestPointTracker
+from ...mesh.geometry import angles_from_lengths, face_normals, halfedge_lengths
 from ...mesh.topology import halfedges, pair_keys, twins
 from ..edits.delaunay_flips import flip_where_sound
 from ..edits.working_mesh import Draft

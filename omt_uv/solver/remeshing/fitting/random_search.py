@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...mesh.closest_point import face_normals
-from ...mesh.geometry import least_angles
+from ...mesh.geometry import face_normals, least_angles
 from ...mesh.topology import halfedges
 from .closest_pairs import Pairs
 from .fit_state import Fitting

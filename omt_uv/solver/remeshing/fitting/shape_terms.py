@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ...mesh.closest_point import face_normals
-from ...mesh.geometry import least_angles
+from ...mesh.geometry import face_normals, least_angles
 from ...mesh.topology import halfedges
 
 # Where angles fall below the first, springs set in, and are twice as strong as STRENGTH at most where they are smaller

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...linalg.lbfgs import LBFGS
-from ...mesh.closest_point import vertex_normals
-from ...mesh.geometry import vertex_areas
+from ...mesh.geometry import vertex_areas, vertex_normals
 from ...mesh.topology import twins
 from ...progress import Progress, Steps
 from ..edits.delaunay_flips import make_delaunay_embedded

@@ -12,8 +12,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ...linalg.sparse import solve_conjugate_gradients
-from ...mesh.closest_point import vertex_normals
-from ...mesh.geometry import laplacian_from_weights
+from ...mesh.geometry import laplacian_from_weights, vertex_normals
 from ...mesh.topology import halfedges, previous_halfedge, twins
 from ..edits.split_collapse import Edit, collapse_edges, independent_splits, interior_edges, split_edges
 from ..edits.vertex_count import Size, adjust_count, settled

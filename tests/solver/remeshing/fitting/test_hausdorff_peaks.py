@@ -6,8 +6,8 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.mesh.closest_point import ClosestPoint, vertex_normals
-from omt_uv.solver.mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
+from omt_uv.solver.mesh.closest_point import ClosestPoint
+from omt_uv.solver.mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, vertex_normals
 from omt_uv.solver.mesh.topology import boundary_loops, twins
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing.fitting import hausdorff_peaks as peaks

@@ -5,7 +5,7 @@ from __future__ import annotations
 import meshes
 import numpy as np
 
-from omt_uv.solver.mesh.closest_point import face_normals
+from omt_uv.solver.mesh.geometry import face_normals
 from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.remeshing.fitting import least_squares as displacement
 from omt_uv.solver.remeshing.fitting.closest_pairs import Pairs
