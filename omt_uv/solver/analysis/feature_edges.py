@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..mesh.geometry import face_areas, face_normals, halfedge_lengths
-from ..mesh.topology import halfedges, pair_keys, pair_up, twins
+from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up, twins
 
 NO_EDGES = np.zeros((0, 2), np.int64)
 # A region of fewer new triangles than this, or narrower than this share of a new edge, has no shape of its own.
@@ -66,7 +64,7 @@ def resolved_features(
     first, second, edges = _pairs(triangles)
     keys = pair_keys(*features.T)
     parts = np.isin(pair_keys(*edges.T), keys)
-    count, label = _components(first[~parts] // 3, second[~parts] // 3, len(triangles))
+    count, label = graph_components(first[~parts] // 3, second[~parts] // 3, len(triangles))
     own, other = label[first[parts] // 3], label[second[parts] // 3]
     length = halfedge_lengths(positions, triangles) / np.repeat(size, 3)
     open_ = np.flatnonzero(twins(triangles) < 0)
@@ -75,10 +73,6 @@ def resolved_features(
     group = _merged(area, rim, own, other, (length[first] + length[second])[parts] / 2)
     lost = edges[parts][(own != other) & (group[own] == group[other])]
     return features[~np.isin(keys, pair_keys(*lost.T))], count - len(np.unique(group))
-
-
-def _components(a: np.ndarray, b: np.ndarray, count: int) -> tuple[int, np.ndarray]:
-    return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)
 
 
 def _merged(area: np.ndarray, rim: np.ndarray, own: np.ndarray, other: np.ndarray, length: np.ndarray) -> np.ndarray:
@@ -103,4 +97,4 @@ def _merged(area: np.ndarray, rim: np.ndarray, own: np.ndarray, other: np.ndarra
             return group
         order = np.lexsort([-total, pair // count])
         best = pair[order[np.r_[True, np.diff(pair[order] // count) > 0]]]
-        group = _components(best // count, best % count, count)[1][group]
+        group = graph_components(best // count, best % count, count)[1][group]

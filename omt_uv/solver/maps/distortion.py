@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
 from ..mesh.geometry import cross2, face_areas
+from ..mesh.topology import graph_components
 from .overlap import overlap_share
 
 SHEAR_CAP = 1e6  # a face squashed onto a line must not drown the mean of all others
@@ -202,8 +201,7 @@ def uv_charts(F, uv):
     order = np.argsort(edge)
     same = edge[order][1:] == edge[order][:-1]
     face = np.repeat(np.arange(len(F)), 3)[order]
-    joined = coo_matrix((np.ones(same.sum(), bool), (face[1:][same], face[:-1][same])), shape=(len(F), len(F)))
-    return connected_components(joined, directed=False)
+    return graph_components(face[1:][same], face[:-1][same], len(F))
 
 
 def _weighted_quantile(values, weights, q):

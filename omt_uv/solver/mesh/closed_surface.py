@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import (
     DuplicateFaceError,
@@ -17,7 +15,7 @@ from ..errors import (
     OrientationError,
 )
 from .repair import perturbed
-from .topology import halfedges, pair_keys
+from .topology import graph_components, halfedges, next_halfedge, pair_keys
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ def _check_parts(triangles: np.ndarray, n: int) -> None:
             "A vertex belongs to no face", "Use Mesh > Clean Up > Delete Loose", "vertex", np.flatnonzero(~used)
         )
     tail, head = halfedges(triangles)
-    count, part = connected_components(coo_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n)), directed=False)
+    count, part = graph_components(tail, head, n)
     if count > 1:
         of_face = part[triangles[:, 0]]
         largest = np.bincount(of_face).argmax()
@@ -111,9 +109,9 @@ def _check_parts(triangles: np.ndarray, n: int) -> None:
     m = len(triangles)
     order = np.lexsort((tail < head, pair_keys(tail, head)))
     first, second = order[0::2], order[1::2]
-    following = np.arange(3 * m) + 1 - 3 * (np.arange(3 * m) % 3 == 2)
-    joined = np.concatenate([first, following[first]]), np.concatenate([following[second], second])
-    fans, fan = connected_components(coo_matrix((np.ones(3 * m), joined), shape=(3 * m, 3 * m)), directed=False)
+    rows = np.concatenate([first, next_halfedge(first)])
+    columns = np.concatenate([next_halfedge(second), second])
+    fans, fan = graph_components(rows, columns, 3 * m)
     if fans > n:
         pairs = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)
         torn = np.flatnonzero(np.bincount(pairs[:, 0], minlength=n) > 1)

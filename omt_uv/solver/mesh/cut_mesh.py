@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 
 from .closest_point import closest_on_triangles
-from .topology import expand, halfedges, next_halfedge, pair_keys, pair_up, twins
+from .topology import expand, graph_components, halfedges, next_halfedge, pair_keys, pair_up, twins
 
 MOST_ROUNDS = 200
 MOST_CELLS = 5_000_000
@@ -50,8 +50,7 @@ def cut_open(positions: np.ndarray, triangles: np.ndarray, seams: np.ndarray) ->
     rows = np.concatenate([f, next_halfedge(f)])
     columns = np.concatenate([np.where(same, s, next_halfedge(s)), np.where(same, next_halfedge(s), s)])
     c = len(tail)
-    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(c, c))
-    count, label = connected_components(graph, directed=False)
+    count, label = graph_components(rows, columns, c)
     owner = np.arange(c) // 3
     star = csr_matrix((np.ones(c), (label, owner)), shape=(count, len(triangles)))
     return CutMesh(positions, triangles, label.reshape(-1, 3).astype(np.int64), seam, star)

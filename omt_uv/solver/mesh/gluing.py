@@ -10,10 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-from .topology import halfedges, pair_keys, pair_up
+from .topology import graph_components, halfedges, pair_keys, pair_up
 
 
 @dataclass(frozen=True)
@@ -72,16 +70,12 @@ def corner_classes(gluing: Gluing) -> np.ndarray:
     f, s = gluing.first, gluing.second
     rows = np.concatenate([tail[f], head[f]])
     columns = np.concatenate([np.where(same, tail[s], head[s]), np.where(same, head[s], tail[s])])
-    c = len(gluing.vertex)
-    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(c, c))
-    return connected_components(graph, directed=False)[1]
+    return graph_components(rows, columns, len(gluing.vertex))[1]
 
 
 def components(gluing: Gluing) -> np.ndarray:
     """Connected part (m,) of every triangle."""
-    m = len(gluing.triangles)
-    graph = coo_matrix((np.ones(len(gluing.first)), (gluing.first // 3, gluing.second // 3)), shape=(m, m))
-    return connected_components(graph, directed=False)[1]
+    return graph_components(gluing.first // 3, gluing.second // 3, len(gluing.triangles))[1]
 
 
 def orientations(gluing: Gluing, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -94,8 +88,7 @@ def orientations(gluing: Gluing, area: np.ndarray) -> tuple[np.ndarray, np.ndarr
     t, s = gluing.first // 3, gluing.second // 3
     shift = m * gluing.parallel()
     rows, columns = np.concatenate([t, t + m]), np.concatenate([s + shift, s + m - shift])
-    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * m, 2 * m))
-    label = connected_components(graph, directed=False)[1]
+    label = graph_components(rows, columns, 2 * m)[1]
     front, back = label[:m], label[m:]
     weight = np.bincount(front, area, label.max() + 1) if m else np.zeros(0)
     turned = (weight[front] < weight[back]) | ((weight[front] == weight[back]) & (front > back))

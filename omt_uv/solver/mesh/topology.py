@@ -65,6 +65,11 @@ def expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
+def graph_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndarray]:
+    """Number of components of a graph of n nodes with the edges a, b (e,), and the component (n,) of every node."""
+    return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
+
+
 def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
     """Vertices of every boundary loop in order, surface on the left; longest loop first.
 
@@ -77,8 +82,7 @@ def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
     vertices = tail[rim]
     successor = np.full(int(triangles.max()) + 1, -1, dtype=np.int64)
     successor[vertices] = head[rim]
-    graph = coo_matrix((np.ones(len(rim)), (vertices, head[rim])), shape=(len(successor),) * 2)
-    label = connected_components(graph, directed=False)[1][vertices]
+    label = graph_components(vertices, head[rim], len(successor))[1][vertices]
     loops = [_walk(successor, vertices[label == c]) for c in np.unique(label)]
     return sorted(loops, key=len, reverse=True)
 
