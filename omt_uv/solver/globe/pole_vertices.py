@@ -13,7 +13,7 @@ import numpy as np
 
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..progress import drain
-from ..sphere.untangle import around, straightened
+from ..sphere.untangle import straighten_around, with_rings
 from .projections import is_cylindrical
 
 POLES = np.array([[0.0, 0, 1], [0, 0, -1]])
@@ -76,9 +76,9 @@ def _straightened(
         moved = points.copy()
         moved[vertex] = target
         wrong = before & ~(signed_volumes(moved, triangles) > 0)
-        free = around(triangles, wrong | (triangles == vertex).any(axis=1), len(points))
+        free = with_rings(triangles, wrong | (triangles == vertex).any(axis=1), len(points))
         free[[vertex, *taken[taken >= 0]]] = False
-        found = drain(straightened(points, triangles, moved, area, free))
+        found = drain(straighten_around(points, triangles, moved, area, free))
         if found is not None and (signed_volumes(found, triangles)[before] > 0).all():
             return found, vertex
     return points, -1

@@ -1,8 +1,8 @@
-"""A closed triangle mesh made coarser, down to a tetrahedron, by collapsing edges, many at once.
+"""Coarsen a closed triangle mesh to a tetrahedron, by half-edge collapses, many at once (Praun, Hoppe 2003).
 
 A vertex i that is removed moves into its neighbour j; the hole is filled by a fan from j. That keeps a sphere a sphere
 exactly when i and j have just two common neighbours (Dey, Edelsbrunner, Guha, Nekhayev 1999). Vertices are removed in
-rounds whose neighbourhoods do not meet, so that they can be put back in any order (Praun, Hoppe 2003).
+rounds whose neighbourhoods do not meet, so that they can be put back in any order.
 """
 
 from __future__ import annotations
@@ -22,13 +22,16 @@ SHRINK = 0.45
 QUANTILE = 0.6
 # Passes that look for more vertices whose neighbourhoods do not meet those already chosen.
 PASSES = 3
-# Degree that a collapse makes only at a price.
+# Degree beyond which every edge more adds the length of the collapsed edge once more to its price.
 HIGH_DEGREE = 9
+# Least shape that the cost of a vertex is divided by; 1 is equilateral.
+LEAST_SHAPE = 1e-4
+# Rounds on one level, which no mesh needs.
 MAX_ROUNDS = 1000
 
 
 @dataclass(frozen=True)
-class Round:
+class CollapseRound:
     """Vertices (r,) removed together, the neighbours (r,) that they moved into, and the triangles that surrounded them.
 
     star (k,3): triangles, the removed vertex first; owner (k,): which of the r; mass (k,) of the triangles.
@@ -42,21 +45,27 @@ class Round:
 
 
 @dataclass(frozen=True)
-class Level:
+class SphereLevel:
     """A mesh (n,3), (m,3) with the mass (m,) of its faces, the rounds that coarsen it, and the vertices left (k,)."""
 
     vertices: np.ndarray
     triangles: np.ndarray
     mass: np.ndarray
-    rounds: tuple[Round, ...]
+    rounds: tuple[CollapseRound, ...]
     kept: np.ndarray
 
 
-def coarsened(vertices: np.ndarray, triangles: np.ndarray, mass: np.ndarray, seed: int = 0) -> list[Level]:
-    """Levels of a closed surface of genus 0 (n,3), (m,3) with face masses (m,), the finest first.
+def collapse_to_tetrahedron(
+    vertices: np.ndarray, triangles: np.ndarray, mass: np.ndarray, seed: int = 0
+) -> list[SphereLevel]:
+    """Collapse a closed surface of genus 0 (n,3), (m,3) with face masses (m,) to a tetrahedron; levels, finest first.
 
-    The last level is a tetrahedron, without rounds. Masses move to the faces that fill a hole; their sum is kept.
+    The last level is the tetrahedron, without rounds. Masses move to the faces that fill a hole; their sum is kept.
     Another seed removes vertices in another order.
+
+    Raises
+    ------
+    MeshError : no edge can be collapsed, though more than four vertices are left
     """
     rng = np.random.default_rng(seed)
     levels = []
@@ -64,31 +73,34 @@ def coarsened(vertices: np.ndarray, triangles: np.ndarray, mass: np.ndarray, see
         level, triangles, mass = _level(vertices, triangles, mass, rng)
         levels.append(level)
         vertices = vertices[level.kept]
-    levels.append(Level(vertices, triangles, mass, (), np.arange(len(vertices))))
+    levels.append(
+        SphereLevel(vertices=vertices, triangles=triangles, mass=mass, rounds=(), kept=np.arange(len(vertices)))
+    )
     return levels
 
 
-def _level(vertices, triangles, mass, rng) -> tuple[Level, np.ndarray, np.ndarray]:
+def _level(vertices, triangles, mass, rng) -> tuple[SphereLevel, np.ndarray, np.ndarray]:
     """A level, and the triangles and masses of the next in its numbering."""
     n = left = len(vertices)
-    now, weight, rounds = triangles, mass, []
+    faces, face_mass, rounds = triangles, mass, []
     alive = np.ones(n, dtype=bool)
     for _ in range(MAX_ROUNDS):
-        removed, parent = _choose(vertices, now, rng)
+        removed, parent = _choose(vertices, faces, rng)
         if len(removed) == 0:
             raise MeshError("The mesh cannot be made coarser", "Check it with Mesh > Clean Up")
         # At the coarse end no more may go than a tetrahedron can spare.
         removed, parent = removed[: left - 4], parent[: left - 4]
-        step, now, weight = _collapse(vertices, now, weight, removed, parent)
+        step, faces, face_mass = _collapse(vertices, faces, face_mass, removed, parent)
         rounds.append(step)
         alive[removed] = False
         left -= len(removed)
         if left <= max(4, SHRINK * n):
             break
     kept = np.flatnonzero(alive)
-    number = np.full(n, -1, dtype=np.int64)
-    number[kept] = np.arange(len(kept))
-    return Level(vertices, triangles, mass, tuple(rounds), kept), number[now], weight
+    place = np.full(n, -1, dtype=np.int64)
+    place[kept] = np.arange(len(kept))
+    level = SphereLevel(vertices=vertices, triangles=triangles, mass=mass, rounds=tuple(rounds), kept=kept)
+    return level, place[faces], face_mass
 
 
 def _choose(vertices, triangles, rng) -> tuple[np.ndarray, np.ndarray]:
@@ -114,16 +126,16 @@ def _choose(vertices, triangles, rng) -> tuple[np.ndarray, np.ndarray]:
     turn = np.where(cheap, rng.permutation(n), n).astype(np.int64)
     chosen = np.zeros(n, dtype=bool)
     for _ in range(PASSES):
-        least = _around(_around(turn, tail, head), tail, head)
+        least = _least_around(_least_around(turn, tail, head), tail, head)
         more = (turn < n) & (turn == least)
         chosen |= more
-        near = _around(_around(np.where(more, -1, 0), tail, head), tail, head) < 0
+        near = _least_around(_least_around(np.where(more, -1, 0), tail, head), tail, head) < 0
         turn[near] = n
     removed = np.flatnonzero(chosen)
     return removed, parent[removed]
 
 
-def _around(value: np.ndarray, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
+def _least_around(value: np.ndarray, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
     """The least value (n,) of each vertex and its neighbours."""
     least = value.copy()
     np.minimum.at(least, tail, value[head])
@@ -131,32 +143,33 @@ def _around(value: np.ndarray, tail: np.ndarray, head: np.ndarray) -> np.ndarray
 
 
 def _worst_shape(vertices, triangles, parent) -> np.ndarray:
-    """Shape (n,) of the worst triangle that moving a vertex into its parent makes: 1 equilateral, at least 1e-4."""
+    """Shape (n,) of the worst triangle that a move into the parent makes, as `_shape`; not below LEAST_SHAPE."""
     corner = np.arange(3 * len(triangles))
     i, a, b = (triangles.ravel()[x] for x in (corner, next_halfedge(corner), next_halfedge(next_halfedge(corner))))
     j = parent[i]
     stays = (j >= 0) & (j != a) & (j != b)
     worst = np.ones(len(vertices))
     np.minimum.at(worst, i[stays], _shape(vertices[j[stays]], vertices[a[stays]], vertices[b[stays]]))
-    return np.maximum(worst, 1e-4)
+    return np.maximum(worst, LEAST_SHAPE)
 
 
 def _shape(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Shape (k,) of triangles, 4 sqrt(3) area / (sum of the squared sides): 1 equilateral, 0 without area."""
     area = np.linalg.norm(np.cross(q - p, r - p), axis=1)
     squares = ((q - p) ** 2).sum(axis=1) + ((r - q) ** 2).sum(axis=1) + ((p - r) ** 2).sum(axis=1)
     return 2 * np.sqrt(3) * area / np.maximum(squares, 1e-300)
 
 
 def _collapse(vertices, triangles, mass, removed, parent):
-    """The round, and the triangles and masses after it."""
-    number = np.full(len(vertices), -1, dtype=np.int64)
-    number[removed] = np.arange(len(removed))
-    which = number[triangles]
+    """Fill the holes of vertices (r,) by fans from their parents (r,): the round, and triangles and masses after it."""
+    place = np.full(len(vertices), -1, dtype=np.int64)
+    place[removed] = np.arange(len(removed))
+    which = place[triangles]
     inside = (which >= 0).any(axis=1)
-    rows, place = triangles[inside], which[inside].argmax(axis=1)
-    star = np.take_along_axis(rows, (place[:, None] + np.arange(3)) % 3, axis=1)
-    owner = number[star[:, 0]]
-    step = Round(removed, parent, star, owner, mass[inside])
+    rows, corner = triangles[inside], which[inside].argmax(axis=1)
+    star = np.take_along_axis(rows, (corner[:, None] + np.arange(3)) % 3, axis=1)
+    owner = place[star[:, 0]]
+    step = CollapseRound(removed=removed, parent=parent, star=star, owner=owner, mass=mass[inside])
     target = parent[owner]
     fan = (star[:, 1] != target) & (star[:, 2] != target)
     new = np.column_stack([target[fan], star[fan, 1], star[fan, 2]])

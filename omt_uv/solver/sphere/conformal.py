@@ -1,4 +1,8 @@
-"""Conformal map of a closed surface of genus 0 to the unit sphere, centred by a Moebius map."""
+"""Map a closed surface of genus 0 to the unit sphere, conformally, by discrete uniformisation (Springborn et al. 2008).
+
+One vertex goes to infinity, the others are laid out in the plane; the inverse stereographic projection brings them to
+the sphere, where a Moebius map centres them.
+"""
 
 from __future__ import annotations
 
@@ -24,20 +28,25 @@ from ..mesh.geometry import (
 from ..mesh.spherical_geometry import signed_volumes
 from ..mesh.topology import halfedges
 from ..progress import Steps
-from .untangle import locally_untangled
+from .untangle import untangle_locally
 
-# Among this share of the vertices, those whose surroundings the map magnifies most, the best fan goes to infinity.
-CANDIDATES = 0.02
-ATTEMPTS = 4
+# Share of the vertices, those whose surroundings the map magnifies most, among which the best fan goes to infinity.
+CANDIDATE_SHARE = 0.02
+# Vertices that are tried at infinity.
+MOST_CANDIDATES = 4
+# Cotangent weights that the estimate of the magnification is bounded to.
+LEAST_COTANGENT = 1e-3
+GREATEST_COTANGENT = 1e3
 
 
 @dataclass(frozen=True)
 class ConformalSphere:
-    """positions (n,3) on the unit sphere, faces counter-clockwise seen from outside, area-weighted mean at 0.
+    """A conformal map: positions (n,3) on the unit sphere, faces counter-clockwise seen from outside.
 
-    sites (n,3): the same before faces were straightened which come out folded, as edges that flipped may, and their
-    number; infinite: the vertex that was sent to infinity; triangles (m,3): the Delaunay triangulation of the sites,
-    to which the edges flipped; residual: largest error of an angle sum in radians; Newton steps, and flips.
+    sites (n,3): the same before folded faces were straightened, as some are across which edges flipped, with the
+    area-weighted mean at 0; straightened: how many faces those were; infinite: the vertex that was sent to infinity;
+    triangles (m,3): the Delaunay triangulation of the sites, to which the edges flipped; residual: largest error of an
+    angle sum in radians; iterations: Newton steps; flips: of edges.
     """
 
     positions: np.ndarray
@@ -51,7 +60,7 @@ class ConformalSphere:
 
 
 def conformal_sphere(vertices: np.ndarray, triangles: np.ndarray) -> Steps[ConformalSphere]:
-    """Discrete conformal map of a closed surface (n,3), (m,3) to the sphere.
+    """Map a closed surface (n,3), (m,3) conformally to the unit sphere.
 
     Discrete uniformisation with Ptolemy flips and one vertex at infinity (Springborn, Schroeder, Pinkall 2008,
     section 5; Gillespie, Springborn, Crane 2021), laid out in the plane, projected stereographically, and centred so
@@ -59,32 +68,41 @@ def conformal_sphere(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Confo
 
     Raises
     ------
-    MeshError : see `closed.closed_surface`
+    MeshError : see `closed_surface.closed_surface`
     PrecisionError : the map leaves double precision
     """
     surface = closed_surface(vertices, triangles)
     vertices, triangles = surface.vertices, surface.triangles
     tri, _ = make_delaunay(from_mesh(vertices, triangles), euclidean_diagonal)
-    infinite, flat = yield from _flattened(tri, magnified_vertices(vertices, triangles))
-    z = lay_out(flat, len(vertices))
+    infinite, flat = yield from _flatten(tri, magnified_vertices(vertices, triangles))
+    z = plane_layout(flat, len(vertices))
     mass = vertex_areas(vertices, triangles)
-    sites = centre_on_sphere(_on_sphere(z, infinite, mass), mass)
+    sites = centre_on_sphere(_halved_by_equator(z, infinite, mass), mass)
     folds = int((~(signed_volumes(sites, triangles) > 0)).sum())
     positions = sites
     if folds:
-        positions = yield from locally_untangled(vertices, triangles, sites)
+        positions = yield from untangle_locally(vertices, triangles, sites)
     if not signed_volumes(positions, triangles).min() > 0:
         raise PrecisionError("Faces of the conformal map are too small for double precision on the sphere")
     delaunay = flat.triangulation.triangles
-    return ConformalSphere(positions, sites, folds, infinite, delaunay, flat.residual, flat.iterations, flat.flips)
+    return ConformalSphere(
+        positions=positions,
+        sites=sites,
+        straightened=folds,
+        infinite=infinite,
+        triangles=delaunay,
+        residual=flat.residual,
+        iterations=flat.iterations,
+        flips=flat.flips,
+    )
 
 
-def _flattened(tri: IntrinsicTriangulation, candidates: np.ndarray) -> Steps[tuple[int, FlatPolygon]]:
-    """The first of the vertices that can be sent to infinity, and what becomes of the others."""
+def _flatten(tri: IntrinsicTriangulation, candidates: np.ndarray) -> Steps[tuple[int, FlatPolygon]]:
+    """Send the first of the candidate vertices (k,) to infinity that can be; it, and what becomes of the others."""
     n = int(tri.triangles.max()) + 1
     for start in ("as it is", "rounded"):
         if start == "rounded":
-            tri = yield from rounded(tri, n)
+            tri = yield from with_even_curvature(tri, n)
         for vertex in candidates.tolist():
             try:
                 return vertex, (yield from flatten_punctured_sphere(tri, vertex))
@@ -93,7 +111,7 @@ def _flattened(tri: IntrinsicTriangulation, candidates: np.ndarray) -> Steps[tup
     raise failure
 
 
-def rounded(tri: IntrinsicTriangulation, n: int) -> Steps[IntrinsicTriangulation]:
+def with_even_curvature(tri: IntrinsicTriangulation, n: int) -> Steps[IntrinsicTriangulation]:
     """A conformally equivalent triangulation, Delaunay, whose curvature is spread evenly over its n vertices.
 
     Such a metric always exists (Gu, Luo, Sun, Wu 2018), and from there the way to infinity is about as short as from a
@@ -115,17 +133,20 @@ def magnified_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarra
     mass = vertex_areas(vertices, triangles)
     tail, head = halfedges(triangles)
     cotangent = cotangents_from_lengths(halfedge_lengths(vertices, triangles).reshape(-1, 3)).ravel()
-    matrix = laplacian_from_weights(tail, head, np.clip(0.5 * cotangent, 1e-3, 1e3), n)
+    matrix = laplacian_from_weights(tail, head, np.clip(0.5 * cotangent, LEAST_COTANGENT, GREATEST_COTANGENT), n)
     u = np.zeros(n)
     u[1:] = solve_spd(matrix[1:][:, 1:].tocsc(), (4 * np.pi * mass / mass.sum() - curvature)[1:])
-    likely = np.argsort(-u, kind="stable")[: max(ATTEMPTS, int(CANDIDATES * n))]
+    likely = np.argsort(-u, kind="stable")[: max(MOST_CANDIDATES, int(CANDIDATE_SHARE * n))]
     least = np.full(n, np.pi)
     np.minimum.at(least, triangles.ravel(), np.repeat(angle.min(axis=1), 3))
-    return likely[np.argsort(-least[likely], kind="stable")][:ATTEMPTS]
+    return likely[np.argsort(-least[likely], kind="stable")][:MOST_CANDIDATES]
 
 
-def lay_out(flat: FlatPolygon, n: int) -> np.ndarray:
-    """Places (n,) complex of the vertices in the plane; the infinite one's is not meant."""
+def plane_layout(flat: FlatPolygon, n: int) -> np.ndarray:
+    """Lay the vertices out in the plane, (n,) complex; the place of the infinite one has no meaning.
+
+    The boundary from its sides and angles, what is inside it as the harmonic map of cotangent weights.
+    """
     heading = np.concatenate([[0.0], np.cumsum(np.pi - flat.angle[1:])])
     step = flat.side_length * np.exp(1j * heading)
     z = np.zeros(n, complex)
@@ -143,8 +164,8 @@ def lay_out(flat: FlatPolygon, n: int) -> np.ndarray:
     return z
 
 
-def _on_sphere(z: np.ndarray, infinite: int, mass: np.ndarray) -> np.ndarray:
-    """Unit vectors (n,3), about half of the mass (n,) on either half of the sphere."""
+def _halved_by_equator(z: np.ndarray, infinite: int, mass: np.ndarray) -> np.ndarray:
+    """Unit vectors (n,3) of places (n,) in the plane, about half of the mass (n,) on either half of the sphere."""
     finite = np.arange(len(z)) != infinite
     weight = mass[finite]
     centre = _median(z[finite].real, weight) + 1j * _median(z[finite].imag, weight)
@@ -157,6 +178,7 @@ def _on_sphere(z: np.ndarray, infinite: int, mass: np.ndarray) -> np.ndarray:
 
 
 def _median(value: np.ndarray, weight: np.ndarray) -> float:
+    """Median of values (k,) with weights (k,)."""
     order = np.argsort(value, kind="stable")
     total = np.cumsum(weight[order])
     return float(value[order][np.searchsorted(total, total[-1] / 2)])

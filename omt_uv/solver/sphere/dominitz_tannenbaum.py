@@ -1,4 +1,4 @@
-"""The area-preserving maps of Dominitz and Tannenbaum (2010) on the sphere, a road of its own to the optimal one.
+"""Map a sphere to itself with prescribed areas, by Moser's flow and gradient flow (Dominitz, Tannenbaum 2010).
 
 From a conformal map, Moser's flow makes areas right; then a gradient flow of the transport cost, without divergence so
 that they stay right, takes out what was moved in vain. The cost is the mass times |x - y|^2 / 2 between the conformal
@@ -14,22 +14,37 @@ import numpy as np
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..progress import Progress, Steps, part_of
 from .moser_flow import moser_map
-from .stream_functions import Level, Pairs, allowance, best_flow, level, pairs, transported, velocity
+from .stream_functions import BumpBasis, BumpPairs, advect, best_flow, bump_basis, bump_pairs, longest_motion, velocity
 
-# Moser's map is made in so many parts, each a share of the way in the logarithm of the density: much milder than one.
-STAGES = 8
-# Bumps of the stream functions, coarse to fine; levels finer than the mesh are left out.
-LEVELS = (16, 60, 240, 960)
+# Flows that Moser's map is made of, each a share of the way in the logarithm of the density: much milder than one.
+MOSER_STAGES = 8
+# Bumps of the stream functions, coarse to fine; bases finer than the mesh are left out.
+BUMP_COUNTS = (16, 60, 240, 960)
+# Points that a bump has to move for its basis to be used.
 POINTS_PER_BUMP = 40
-# Steps on one level, and the share of the cost that another one has to take off.
-STEPS, GAIN = 10, 2e-4
-MOSER = 0.5
+# Steps with one basis.
+STEPS = 10
+# Share of the cost that a step has to take off for another one to follow.
+GAIN = 2e-4
+# Halvings of a step that does not lower the cost.
+HALVINGS = 6
+# Share of the longest motion that the fastest point takes.
+MOTION = 0.9
+# Least mass of a face for Moser's flow, relative to the mean.
+LEAST_MASS = 1e-9
+# Rounding error of the cost, relative to it.
+ROUNDING = 1e-12
+# Share of the time that Moser's flow takes, roughly.
+MOSER_TIME = 0.5
 
 
 @dataclass(frozen=True)
 class SphereFlow:
-    """positions (n,3); moser (n,3) after the first part; costs: of the transport, after the first part and every step;
-    drift: sum |change of a face's share of the sphere| during the second part; status; iterations: steps of it."""
+    """A map of the sphere: positions (n,3), unit vectors; moser (n,3): those after Moser's flow.
+
+    costs: of the transport, after Moser's flow and every step of the gradient flow; drift: sum |change of a face's
+    share of the sphere| during the latter; status; iterations: its steps.
+    """
 
     positions: np.ndarray
     moser: np.ndarray
@@ -40,48 +55,67 @@ class SphereFlow:
 
 
 def flow_map(conformal: np.ndarray, triangles: np.ndarray, mass: np.ndarray) -> Steps[SphereFlow]:
-    """Carry a conformal map (n,3) to the sphere along to one that gives every triangle its mass (m,) of area.
+    """Carry a conformal map (n,3) of triangles (m,3) to the sphere along to one where each has its mass (m,) of area.
+
+    First Moser's flow, which makes areas right; then the gradient flow of sum mass |x - y|^2 / 2, projected to flows
+    without divergence, which keeps them.
 
     Raises
     ------
-    PrecisionError : see `moser.moser_map`
+    PrecisionError : see `moser_flow.moser_map`
+
+    References
+    ----------
+    Dominitz, Tannenbaum 2010, section 3
     """
     mass = 4 * np.pi * mass / mass.sum()
-    moser = yield from part_of(_areas(conformal, triangles, mass), 0.0, MOSER)
+    moser = yield from part_of(_moser_in_stages(conformal, triangles, mass), 0.0, MOSER_TIME)
     weight = np.bincount(triangles.ravel(), np.repeat(mass / 3, 3), len(conformal))
-    positions, costs = yield from part_of(descent(moser, conformal, triangles, weight), MOSER, 1 - MOSER)
+    positions, costs = yield from part_of(reduce_cost(moser, conformal, triangles, weight), MOSER_TIME, 1 - MOSER_TIME)
     before, after = spherical_areas(moser, triangles), spherical_areas(positions, triangles)
     drift = float(np.abs(after - before).sum() / (4 * np.pi))
-    return SphereFlow(positions, moser, tuple(costs), drift, "converged", len(costs) - 1)
+    return SphereFlow(
+        positions=positions,
+        moser=moser,
+        costs=tuple(costs),
+        drift=drift,
+        status="converged",
+        iterations=len(costs) - 1,
+    )
 
 
-def _areas(points: np.ndarray, triangles: np.ndarray, mass: np.ndarray) -> Steps[np.ndarray]:
-    floor = 1e-9 * mass.mean()
+def _moser_in_stages(points: np.ndarray, triangles: np.ndarray, mass: np.ndarray) -> Steps[np.ndarray]:
+    """Unit vectors (n,3) whose triangles (m,3) have their mass (m,), but for the errors of Moser's flow."""
+    floor = LEAST_MASS * mass.mean()
     first = np.maximum(spherical_areas(points, triangles), floor)
-    for k in range(1, STAGES + 1):
-        share = k / STAGES
-        aim = first ** (1 - share) * np.maximum(mass, floor) ** share
-        points = (yield from part_of(moser_map(points, triangles, aim), (k - 1) / STAGES, 1 / STAGES)).positions
+    for k in range(1, MOSER_STAGES + 1):
+        share = k / MOSER_STAGES
+        goal = first ** (1 - share) * np.maximum(mass, floor) ** share
+        stage = yield from part_of(moser_map(points, triangles, goal), (k - 1) / MOSER_STAGES, 1 / MOSER_STAGES)
+        points = stage.positions
     return points
 
 
-def descent(
+def reduce_cost(
     points: np.ndarray, origin: np.ndarray, triangles: np.ndarray, weight: np.ndarray
 ) -> Steps[tuple[np.ndarray, list[float]]]:
-    """Positions (n,3) of least cost that flows of all levels lead to, and the costs on the way."""
-    costs = [_cost(points, origin, weight)]
-    levels = [n for n in LEVELS if n * POINTS_PER_BUMP <= len(points)] or LEVELS[:1]
-    for number, count in enumerate(levels):
-        at = level(count)
+    """Positions (n,3) of least cost that flows of all bases lead to from unit vectors (n,3), and the costs on the way.
+
+    origin (n,3): where the points come from; weight (n,): their masses.
+    """
+    costs = [transport_cost(points, origin, weight)]
+    counts = [n for n in BUMP_COUNTS if n * POINTS_PER_BUMP <= len(points)] or BUMP_COUNTS[:1]
+    for index, count in enumerate(counts):
+        basis = bump_basis(count)
         for k in range(STEPS):
-            yield Progress("Gradient flow", (number + k / STEPS) / len(levels))
-            close = pairs(points, at)
+            yield Progress("Gradient flow", (index + k / STEPS) / len(counts))
+            pairs = bump_pairs(points, basis)
             # The slope of the cost is -origin, as far as it is tangent.
-            wish = origin - (origin * points).sum(axis=1, keepdims=True) * points
-            coefficients = best_flow(points, weight, wish, at, close)
-            moved = _stepped(points, origin, triangles, weight, at, close, coefficients)
-            cost = _cost(moved, origin, weight)
-            if cost > costs[-1] * (1 - 1e-12):
+            target = origin - (origin * points).sum(axis=1, keepdims=True) * points
+            coefficients = best_flow(points, weight, target, basis, pairs)
+            moved = _line_search(points, origin, triangles, weight, basis, pairs, coefficients)
+            cost = transport_cost(moved, origin, weight)
+            if cost > costs[-1] * (1 - ROUNDING):
                 break
             points, gain = moved, 1 - cost / costs[-1]
             costs.append(cost)
@@ -90,21 +124,22 @@ def descent(
     return points, costs
 
 
-def _stepped(points, origin, triangles, weight, at: Level, close: Pairs, coefficients) -> np.ndarray:
+def _line_search(points, origin, triangles, weight, basis: BumpBasis, pairs: BumpPairs, coefficients) -> np.ndarray:
     """The points after the longest of some times that lowers the cost and folds no more faces."""
-    fastest = np.linalg.norm(velocity(points, at, close, coefficients), axis=1).max()
+    fastest = np.linalg.norm(velocity(points, basis, pairs, coefficients), axis=1).max()
     if fastest == 0:
         return points
-    time = min(1.0, 0.9 * allowance(at) / fastest)
+    time = min(1.0, MOTION * longest_motion(basis) / fastest)
     folds = (signed_volumes(points, triangles) <= 0).sum()
-    cost = _cost(points, origin, weight)
-    for _ in range(6):
-        moved = transported(points, at, close, coefficients * time)
-        if _cost(moved, origin, weight) < cost and (signed_volumes(moved, triangles) <= 0).sum() <= folds:
+    cost = transport_cost(points, origin, weight)
+    for _ in range(HALVINGS):
+        moved = advect(points, basis, pairs, coefficients * time)
+        if transport_cost(moved, origin, weight) < cost and (signed_volumes(moved, triangles) <= 0).sum() <= folds:
             return moved
         time /= 2
     return points
 
 
-def _cost(points: np.ndarray, origin: np.ndarray, weight: np.ndarray) -> float:
+def transport_cost(points: np.ndarray, origin: np.ndarray, weight: np.ndarray) -> float:
+    """Mean of |x - y|^2 / 2 over the weights (n,), of points and origins (n,3)."""
     return float(weight @ (1 - (points * origin).sum(axis=1)) / weight.sum())

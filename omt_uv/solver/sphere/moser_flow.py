@@ -1,6 +1,7 @@
-"""Moser's area-preserving map of the sphere (Moser 1965; Dominitz, Tannenbaum 2010, section 3.1), without a time step.
+"""Map the sphere to itself with prescribed areas, by Moser's flow without a time step (Moser 1965).
 
-The density of the surface, carried to the sphere by a conformal map, flows to the uniform one: with the masses A of the
+As in Dominitz, Tannenbaum 2010, section 3.1, the density of the surface, carried to the sphere by a conformal map,
+flows to the uniform one. With the masses A of the
 faces at first and S at last, m(t) = A - t (A - S), and a flux F with div F = A - S, everything moves with the velocity
 F / m. The flux is that of the lowest Raviart-Thomas elements, one number for every edge, so masses are exact for every
 face. In barycentric coordinates of a face the motion is
@@ -23,19 +24,21 @@ from ..mesh.topology import next_halfedge, previous_halfedge, twins
 from ..progress import Progress, Steps
 
 # Barycentric coordinate, by its corner, of the centre of the share of a face that belongs to the corner.
-CORNER = 22 / 36
-# Rounds of points crossing into the next face; after so many, what still moves stays where it is.
+CORNER_SHARE = 22 / 36
+# Rounds of points crossing into the next face, after which what still moves stays where it is.
 CROSSINGS = 20_000
 # Least mass of a face at the end, relative to the mean: faces folded on the sphere have less than none.
 LEAST_SHARE = 1e-6
-# A point that has just come in does not leave at once across the same side for a rounding error.
+# Least barycentric coordinate: a point that has just come in does not leave at once for a rounding error.
 GRAZE = 1e-14
 
 
 @dataclass(frozen=True)
-class Moser:
-    """positions (n,3): the middle of the image of every vertex' cell; crossings: rounds of faces that points crossed;
-    stuck: points that had to be left on the way; status."""
+class MoserMap:
+    """A map of the sphere: positions (n,3), unit vectors, the middle of the image of every vertex' cell.
+
+    crossings: rounds of faces that points crossed; stuck: points that had to be left on the way; status.
+    """
 
     positions: np.ndarray
     crossings: int
@@ -43,10 +46,11 @@ class Moser:
     status: str
 
 
-def moser_map(points: np.ndarray, triangles: np.ndarray, mass: np.ndarray) -> Steps[Moser]:
-    """Carry the vertices (n,3) of a map to the sphere along so that the masses (m,) of its faces become uniform.
+def moser_map(points: np.ndarray, triangles: np.ndarray, mass: np.ndarray) -> Steps[MoserMap]:
+    """Carry the vertices (n,3) of a map to the sphere along so that the masses (m,) of its faces (m,3) become uniform.
 
-    Faces have to be counter-clockwise seen from outside.
+    Faces have to be counter-clockwise seen from outside. With the flux of `edge_fluxes`, points in the corners of every
+    face move by the closed solution in the module's head; a vertex goes to their mean.
 
     Raises
     ------
@@ -58,16 +62,17 @@ def moser_map(points: np.ndarray, triangles: np.ndarray, mass: np.ndarray) -> St
     flux = edge_fluxes(points, triangles, first - last)
     m = len(triangles)
     start = np.repeat(np.arange(m), 3)
-    cell = _samples(points, triangles)
-    face, weights, rounds, stuck = yield from carried(triangles, flux, first, last, start, cell)
-    share = _reproducing(points, triangles, _placed(points, triangles, start, cell))
-    images = share[:, None] * _placed(points, triangles, face, weights)
+    cell = _corner_samples(points, triangles)
+    face, weights, rounds, stuck = yield from advect_points(triangles, flux, first, last, start, cell)
+    share = _mean_value_weights(points, triangles, _on_sphere(points, triangles, start, cell))
+    images = share[:, None] * _on_sphere(points, triangles, face, weights)
     positions = np.stack([np.bincount(triangles.ravel(), c, len(points)) for c in images.T], axis=1)
     positions = positions / np.linalg.norm(positions, axis=1, keepdims=True)
-    return Moser(positions, rounds, stuck, "converged" if not stuck else "points left on the way")
+    status = "points left on the way" if stuck else "converged"
+    return MoserMap(positions=positions, crossings=rounds, stuck=stuck, status=status)
 
 
-def _samples(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def _corner_samples(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Barycentric coordinates (3m,3) of a point in every corner, on the line that halves its angle.
 
     So two that follow each other around a vertex are less than half a turn apart, and the vertex lies between them all.
@@ -78,19 +83,19 @@ def _samples(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     m = len(triangles)
     cell = np.zeros((m, 3, 3))
     rows, k = np.arange(m)[:, None], np.arange(3)[None, :]
-    cell[rows, k, k] = CORNER
-    cell[rows, k, (k + 1) % 3] = (1 - CORNER) * before / (after + before)
-    cell[rows, k, (k + 2) % 3] = (1 - CORNER) * after / (after + before)
+    cell[rows, k, k] = CORNER_SHARE
+    cell[rows, k, (k + 1) % 3] = (1 - CORNER_SHARE) * before / (after + before)
+    cell[rows, k, (k + 2) % 3] = (1 - CORNER_SHARE) * after / (after + before)
     return cell.reshape(-1, 3)
 
 
-def _placed(points: np.ndarray, triangles: np.ndarray, face: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _on_sphere(points: np.ndarray, triangles: np.ndarray, face: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Unit vectors (p,3) at barycentric coordinates (p,3) of faces (p,)."""
     x = np.einsum("pk,pkd->pd", weights, points[triangles[face]])
     return x / np.linalg.norm(x, axis=1, keepdims=True)
 
 
-def _reproducing(points: np.ndarray, triangles: np.ndarray, samples: np.ndarray) -> np.ndarray:
+def _mean_value_weights(points: np.ndarray, triangles: np.ndarray, samples: np.ndarray) -> np.ndarray:
     """Weights (3m,) > 0 of the samples (3m,3) in the corners around every vertex, whose mean is towards the vertex.
 
     Mean value coordinates (Floater 2003) in the plane that touches the sphere there: where nothing flows nothing moves,
@@ -126,17 +131,17 @@ def edge_fluxes(points: np.ndarray, triangles: np.ndarray, gain: np.ndarray) -> 
     # The side opposite to corner k is halfedge k + 1.
     side = 3 * np.arange(m)[:, None] + np.array([1, 2, 0])
     edge = np.unique(np.minimum(side, twins(triangles)[side]), return_inverse=True)[1].reshape(m, 3)
-    count = edge.max() + 1
+    unknowns = edge.max() + 1
     rows, columns = np.repeat(edge, 3, axis=1).ravel(), np.tile(edge, (1, 3)).ravel()
-    K = sp.csr_matrix((stiffness.ravel(), (rows, columns)), shape=(count, count))
-    load = -np.bincount(edge.ravel(), np.repeat(gain / 3, 3), count)
-    u = np.zeros(count)
+    K = sp.csr_matrix((stiffness.ravel(), (rows, columns)), shape=(unknowns, unknowns))
+    load = -np.bincount(edge.ravel(), np.repeat(gain / 3, 3), unknowns)
+    u = np.zeros(unknowns)
     # Constants are in the kernel; one unknown is given.
     u[1:] = solve_spd(K[1:, 1:], load[1:])
     return np.einsum("mjk,mk->mj", stiffness, u[edge]) + gain[:, None] / 3
 
 
-def carried(
+def advect_points(
     triangles: np.ndarray,
     flux: np.ndarray,
     first: np.ndarray,
@@ -144,10 +149,10 @@ def carried(
     face: np.ndarray,
     weights: np.ndarray,
 ) -> Steps[tuple[np.ndarray, np.ndarray, int, int]]:
-    """Points at time 1, their faces (p,) and barycentric coordinates (p,3), that start from these.
+    """Move points from time 0 to 1: their faces (p,) and barycentric coordinates (p,3), from those of the start.
 
-    flux (m,3) as of `edge_fluxes`; first, last (m,) masses of the faces before and after. Also returns how many rounds
-    it took, and how many points did not arrive.
+    flux (m,3) as of `edge_fluxes`; first, last (m,): masses of the triangles (m,3) before and after. Also returns how
+    many rounds it took, and how many points did not arrive.
     """
     twin = twins(triangles)
     face, weights = face.copy(), weights.copy()
@@ -177,7 +182,7 @@ def carried(
         w /= w.sum(axis=1, keepdims=True)
         weights[active], time[active] = w, np.where(done, 1, t + np.where(done, 0, duration))
         going = np.flatnonzero(~done)
-        _cross(triangles, twin, face, weights, active[going], k[going])
+        _enter_next_face(triangles, twin, face, weights, active[going], k[going])
         active = active[going]
         rounds += 1
         if rounds % 50 == 0:
@@ -185,7 +190,7 @@ def carried(
     return face, weights, rounds, len(active)
 
 
-def _cross(triangles, twin, face, weights, points, k) -> None:
+def _enter_next_face(triangles, twin, face, weights, points, k) -> None:
     """Bring points (p,) that are on the side opposite to corner k (p,) of their face to the face beyond."""
     h = 3 * face[points] + (k + 1) % 3
     g = twin[h]

@@ -1,9 +1,10 @@
-"""The energy of `energy.py` for maps to the unit sphere, and its projected Newton step.
+"""Evaluate the energy of maps to the unit sphere and its projected Newton step, face by face in tangent planes.
 
-A face is measured as its corners are seen from above their middle c = (p_0 + p_1 + p_2) / |p_0 + p_1 + p_2|: in a frame
-of two axes across c, where it has no area just when it has none on the sphere. With the corners the frame turns: their
-coordinates change by dz_k = axes (dp_k - (c . p_k) / |p_0 + p_1 + p_2| (dp_0 + dp_1 + dp_2)). What is seen is smaller
-than the spherical triangle, so the areas asked for are shrunk alike, anew in every stage.
+The energy is that of `maps.energy` (symmetric MIPS and area; Degener, Meseth, Klein 2003). A face is measured by the
+orthographic projection of its corners along their middle c = (p_0 + p_1 + p_2) / |p_0 + p_1 + p_2|: in a frame of two
+axes across c, where it has no area just when it has none on the sphere. With the corners the frame turns: their
+coordinates change by dz_k = axes (dp_k - (c . p_k) / |p_0 + p_1 + p_2| (dp_0 + dp_1 + dp_2)). The projection is smaller
+than the spherical triangle, so the target areas are shrunk alike, anew in every stage.
 """
 
 from __future__ import annotations
@@ -19,16 +20,17 @@ from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIF
 
 
 @dataclass(frozen=True)
-class Seen:
-    """Faces from above: axes (m,2,3) of their frames, corners (m,3) complex, mixing (m,3,3) of what corners change.
+class ProjectedFaces:
+    """Faces projected along their middles: axes (m,2,3) of their frames, corners (m,3) complex in them.
 
-    least (m,): cosine of the distance from the middle to the farthest corner.
+    mixing (m,3,3): what a change of each corner does to every one; least_cosine (m,): of the distances from the middle
+    to the corners.
     """
 
     axes: np.ndarray
     corner: np.ndarray
     mixing: np.ndarray
-    least: np.ndarray
+    least_cosine: np.ndarray
 
     def change(self, vectors: np.ndarray) -> np.ndarray:
         """How the corners (m,3) complex change when those on the sphere move by vectors (m,3,3)."""
@@ -36,8 +38,8 @@ class Seen:
         return np.einsum("mkl,ml->mk", self.mixing, part[..., 0] + 1j * part[..., 1])
 
 
-def seen(positions: np.ndarray, triangles: np.ndarray) -> Seen:
-    """The faces (m,3) of unit vectors (n,3) from above."""
+def project_faces(positions: np.ndarray, triangles: np.ndarray) -> ProjectedFaces:
+    """Project the faces (m,3) of unit vectors (n,3) along their middles."""
     p = positions[triangles]
     total = p.sum(axis=1)
     size = np.linalg.norm(total, axis=1, keepdims=True)
@@ -48,7 +50,8 @@ def seen(positions: np.ndarray, triangles: np.ndarray) -> Seen:
     part = np.einsum("mad,mkd->mka", axes, p - p[:, :1])
     height = np.einsum("md,mkd->mk", up, p)
     mixing = np.eye(3) - (height / np.maximum(size, 1e-300))[:, :, None]
-    return Seen(axes, part[..., 0] + 1j * part[..., 1], mixing, height.min(axis=1))
+    corner = part[..., 0] + 1j * part[..., 1]
+    return ProjectedFaces(axes=axes, corner=corner, mixing=mixing, least_cosine=height.min(axis=1))
 
 
 def derivatives(faces: Elements, corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -65,14 +68,17 @@ def tangents(positions: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(positions, first)], axis=1)
 
 
-def moved(positions: np.ndarray, axes: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Unit vectors (n,3) after steps (n,2) along their tangents (n,2,3)."""
+def retract(positions: np.ndarray, axes: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Unit vectors (n,3) after steps (n,2) along their tangents (n,2,3): the retraction by normalising.
+
+    Absil, Mahony, Sepulchre 2008, section 4.1.
+    """
     return normalized(positions + np.einsum("na,nad->nd", step, axes))
 
 
 @dataclass(frozen=True)
 class SphereProblem:
-    """What Newton minimises: faces whose ratio is as seen from above, the weight of their area term.
+    """What Newton minimises: faces whose ratio is that of their projections, and the area weight.
 
     target (m,): spherical areas, summing to 4 pi; ratio (m,): theirs over those of the surface.
     """
@@ -81,15 +87,14 @@ class SphereProblem:
     target: np.ndarray
     ratio: np.ndarray
     assembly: Assembly
-    weight: float
+    area_weight: float
 
     def energy(self, positions: np.ndarray) -> float:
         """The energy of unit vectors (n,3); infinity where a face is folded."""
         if not signed_volumes(positions, self.faces.triangles).min() > 0:
             return np.inf
-        return energy_of(
-            self.faces, *derivatives(self.faces, seen(positions, self.faces.triangles).corner), self.weight
-        )
+        corner = project_faces(positions, self.faces.triangles).corner
+        return energy_of(self.faces, *derivatives(self.faces, corner), self.area_weight)
 
     def area_error(self, positions: np.ndarray) -> float:
         """The larger of the share of the area in the wrong place and the deviation of the areas' ratios."""
@@ -97,23 +102,23 @@ class SphereProblem:
         ratio = spherical_areas(positions, self.faces.triangles) / self.target
         return float(max(share @ np.abs(ratio - 1), np.sqrt(share @ (ratio - 1) ** 2)))
 
-    def error_seen(self, positions: np.ndarray) -> float:
-        """Share of the area in the wrong place, of faces seen from above against what is asked of them."""
-        a, b = derivatives(self.faces, seen(positions, self.faces.triangles).corner)
+    def projected_area_error(self, positions: np.ndarray) -> float:
+        """Share of the area in the wrong place, of projected faces against their own targets."""
+        a, b = derivatives(self.faces, project_faces(positions, self.faces.triangles).corner)
         error = np.abs((squared(a) - squared(b)) / self.faces.ratio - 1)
         return float(self.target @ error / self.target.sum())
 
     def step(self, positions: np.ndarray, value: float, pressure: float) -> NewtonStep:
         """One line-searched Newton step from unit vectors (n,3) of energy `value`."""
-        face = seen(positions, self.faces.triangles)
+        face = project_faces(positions, self.faces.triangles)
         a, b = derivatives(self.faces, face.corner)
-        local = derivatives_of(self.faces, a, b, self.weight, pressure)
+        local = derivatives_of(self.faces, a, b, self.area_weight, pressure)
         axes = tangents(positions)
         direction, slope = newton_direction(self.faces, self.assembly, positions, axes, face, local)
         change = np.einsum("na,nad->nd", direction, axes)[self.faces.triangles]
         share = min(1.0, FOLD_SHARE * fold_share(a, b, *derivatives(self.faces, face.change(change))))
         for _ in range(MAX_HALVINGS):
-            trial = moved(positions, axes, share * direction)
+            trial = retract(positions, axes, share * direction)
             trial_value = self.energy(trial)
             if trial_value <= value + ARMIJO * share * slope:
                 return NewtonStep(trial, trial_value, -slope / 2, share)
@@ -126,11 +131,11 @@ def newton_direction(
     assembly: Assembly,
     positions: np.ndarray,
     axes: np.ndarray,
-    face: Seen,
+    face: ProjectedFaces,
     local: FaceDerivatives,
-    held: np.ndarray | None = None,
+    fixed: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
-    """Step (n,2) along the tangents (n,2,3), 0 for vertices held (n,) bool, and the energy's slope along it."""
+    """Step (n,2) along the tangents (n,2,3), 0 for fixed vertices (n,) bool, and the energy's slope along it."""
     n, triangles = len(positions), faces.triangles
     # How the tangents of the corners lie in the frames of the faces: (m, corner, frame axis, tangent).
     turn = np.einsum("mfd,mkad->mkfa", face.axes, axes[triangles])
@@ -144,9 +149,9 @@ def newton_direction(
     # Moving along a great circle bends inwards: the pull along the radius adds to the Hessian.
     bend = np.maximum(-np.einsum("nd,nd->n", gradient, positions), 0)
     scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
-    if held is not None:
-        rows *= ~np.repeat(held[triangles], 2, axis=1)[:, None, :]
-        gradient[held], bend[held] = 0, 1
+    if fixed is not None:
+        rows *= ~np.repeat(fixed[triangles], 2, axis=1)[:, None, :]
+        gradient[fixed], bend[fixed] = 0, 1
     matrix = assembly.matrix(np.matmul(rows.transpose(0, 2, 1), rows), np.repeat(bend, 2) + SHIFT * scale)
     slope = np.einsum("nd,nad->na", gradient, axes).ravel()
     step = -Factor(matrix, "natural").solve(slope)

@@ -1,4 +1,8 @@
-"""Authalic refinement on the sphere: every face gets its area, none folds, and the shear is as low as can be."""
+"""Refine a map to the sphere until every face has its area, none folds, and the shear is low, by Newton's method.
+
+The energy and its continuation are those of the plane (`refinement.continuation`); faces are measured in tangent planes
+(`newton`).
+"""
 
 from __future__ import annotations
 
@@ -22,10 +26,10 @@ from ..refinement.continuation import (
     planned_weights,
 )
 from ..refinement.projected_newton import Assembly
-from .newton import SphereProblem, derivatives, seen
+from .newton import SphereProblem, derivatives, project_faces
 from .untangle import untangle_on_sphere
 
-# Where the area error is not reached, a weight is left for a greater one when Newton promises less than this.
+# Predicted decrease over energy at which an area weight is left for a greater one, where the area error is not reached.
 TOLERANCE = 1e-2
 # Steps on the way from coarse to fine: the finer levels do the rest.
 RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
@@ -33,11 +37,11 @@ RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
 
 @dataclass(frozen=True)
 class SphereRefinement:
-    """positions (n,3) on the sphere, no face folded; Newton steps, after those for untangling.
+    """A refined map: positions (n,3) on the sphere, no face folded.
 
-    residual: last predicted decrease over energy; area_error: the larger of the share of the area in the wrong place
-    and the deviation of the areas' ratios; weight: that of the area term; energy at the end; status: "converged",
-    "stalled" or "steps".
+    iterations: Newton steps, after those for untangling; residual: last predicted decrease over energy; area_error: the
+    larger of the share of the area in the wrong place and the deviation of the areas' ratios; area_weight and energy at
+    the end; status: "converged", "stalled" or "steps".
     """
 
     positions: np.ndarray
@@ -45,7 +49,7 @@ class SphereRefinement:
     untangling: int
     residual: float
     area_error: float
-    weight: float
+    area_weight: float
     energy: float
     status: str
 
@@ -59,7 +63,10 @@ def sphere_refine(
     balance: float = 0.0,
     quality: str = "standard",
 ) -> Steps[SphereRefinement]:
-    """Refine a map (n,3) of a closed surface (n,3), (m,3) until every face has its area.
+    """Refine a map (n,3) of a closed surface (n,3), (m,3) to the sphere until every face has its area.
+
+    Minimises sum a_f (symmetric MIPS + area weight (r + 1 / r) / 2), r the ratio of a face's area to its target, with
+    growing area weight, by projected Newton steps.
 
     Parameters
     ----------
@@ -73,7 +80,7 @@ def sphere_refine(
 
     References
     ----------
-    As for `refine.refine`.
+    As for `refinement.refine.refine`.
     """
     if not 0 <= balance <= 1:
         raise ValueError(f"balance must lie in [0, 1], not {balance}")
@@ -91,7 +98,7 @@ def sphere_refine(
 def relax(
     vertices: np.ndarray, triangles: np.ndarray, positions: np.ndarray, target: np.ndarray, regular: bool = False
 ) -> Steps[tuple[np.ndarray, int]]:
-    """A few steps from a map without folds (n,3), and their number: areas roughly right, shear low.
+    """Relax a map without folds (n,3) by a few steps, and their number: areas (m,) roughly right, shear low.
 
     regular: every face counts as equilateral, whatever its shape.
     """
@@ -104,7 +111,7 @@ def relax(
 
 
 def _equilateral(problem: SphereProblem) -> Elements:
-    """The faces as they were if each were equilateral, of the area that it asks for."""
+    """The faces as they were if each were equilateral, of its target area."""
     m = len(problem.target)
     side = np.sqrt(problem.target)[:, None, None]
     corners = side * np.array([[0, 0, 0], [1, 0, 0], [0.5, np.sqrt(0.75), 0]])
@@ -119,23 +126,25 @@ def _renumbered(vertices, triangles, target) -> tuple[SphereProblem, np.ndarray]
     place[order] = np.arange(len(order))
     triangles, target = place[triangles], target * (4 * np.pi / target.sum())
     faces = elements(vertices[order], triangles, target)
-    return SphereProblem(faces, target, faces.ratio, Assembly(triangles, len(vertices)), 1.0), order
+    assembly = Assembly(triangles, len(vertices))
+    return SphereProblem(faces=faces, target=target, ratio=faces.ratio, assembly=assembly, area_weight=1.0), order
 
 
 def _in_order(positions: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Positions (n,3) of vertices order (n,) back in the order of the mesh."""
     result = np.empty_like(positions)
     result[order] = positions
     return result
 
 
 def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Quality) -> Steps[SphereRefinement]:
-    """Newton in stages of growing weight, as `stages.stages`."""
+    """Newton in stages of growing area weight, as `refinement.continuation.minimise_in_stages`."""
     weights = planned_weights(balance, settings)
-    if seen_from_above(problem, p, weights[0]).energy(p) > SQUEEZED and weights[0] > 1:
+    if with_projected_targets(problem, p, weights[0]).energy(p) > SQUEEZED and weights[0] > 1:
         weights = [1.0, *weights]
     steps, k, error = 0, 0, np.inf
     while True:
-        current = seen_from_above(problem, p, weights[k])
+        current = with_projected_targets(problem, p, weights[k])
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
@@ -145,17 +154,26 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
         before, error = error, problem.area_error(p)
         enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
-            return SphereRefinement(p, steps, 0, stage.residual, error, weight, stage.energy, stage.status)
+            return SphereRefinement(
+                positions=p,
+                iterations=steps,
+                untangling=0,
+                residual=stage.residual,
+                area_error=error,
+                area_weight=weight,
+                energy=stage.energy,
+                status=stage.status,
+            )
         if k >= len(weights):
-            # What is left may be due to large faces, which look smaller from above: then looking anew is enough.
-            seen_right = current.error_seen(p) <= 0.5 * settings.area_error and error < 0.9 * before
-            growth = 1.0 if seen_right else min(max(2.0, (error / settings.area_error) ** 2), 10.0)
+            # What is left may be due to large faces, whose projections are smaller: then projecting anew is enough.
+            projections_right = current.projected_area_error(p) <= 0.5 * settings.area_error and error < 0.9 * before
+            growth = 1.0 if projections_right else min(max(2.0, (error / settings.area_error) ** 2), 10.0)
             weights.append(weights[-1] * growth)
 
 
-def seen_from_above(problem: SphereProblem, p: np.ndarray, weight: float) -> SphereProblem:
-    """The problem with its targets as much below the spherical ones as the faces of the map p (n,3) are."""
+def with_projected_targets(problem: SphereProblem, p: np.ndarray, area_weight: float) -> SphereProblem:
+    """The problem with its targets as much below the spherical ones as the projected faces of the map p (n,3) are."""
     triangles = problem.faces.triangles
-    a, b = derivatives(problem.faces, seen(p, triangles).corner)
+    a, b = derivatives(problem.faces, project_faces(p, triangles).corner)
     shrink = (squared(a) - squared(b)) * problem.target / problem.ratio / spherical_areas(p, triangles)
-    return replace(problem, faces=replace(problem.faces, ratio=problem.ratio * shrink), weight=weight)
+    return replace(problem, faces=replace(problem.faces, ratio=problem.ratio * shrink), area_weight=area_weight)

@@ -1,4 +1,4 @@
-"""Area-preserving maps of closed surfaces of genus 0 to the unit sphere.
+"""Map closed surfaces of genus 0 to the unit sphere with prescribed areas, by optimal transport and refinement.
 
 Conformal map, transport, refinement, as on the plane; and where one of the first two leaves double precision, a start
 from coarse to fine instead, which always exists.
@@ -24,9 +24,17 @@ from .dominitz_tannenbaum import flow_map
 from .multilevel import multilevel_start
 from .refine import SphereRefinement, sphere_refine
 
-NEWTON, FLOW = METHODS = ("newton", "flow")
-# Where the time goes, roughly, as start and width.
-CONFORMAL, TRANSPORT, REFINEMENT, ANEW = (0.0, 0.15), (0.15, 0.25), (0.4, 0.6), (0.4, 0.3)
+# Optimal transport, by Newton's method.
+NEWTON = "newton"
+# Moser's flow and gradient flow (`dominitz_tannenbaum`).
+FLOW = "flow"
+METHODS = (NEWTON, FLOW)
+# Where the time goes, roughly, as start and width of the whole.
+CONFORMAL = (0.0, 0.15)
+TRANSPORT = (0.15, 0.25)
+REFINEMENT = (0.4, 0.6)
+# From coarse to fine, where the transport failed.
+MULTILEVEL = (0.4, 0.3)
 
 
 @dataclass(frozen=True)
@@ -35,7 +43,7 @@ class SphereMap:
 
     positions (n,3) unit vectors, faces counter-clockwise seen from outside; conformal (n,3): the Moebius-centred
     conformal map it started from, or the map of least shear where that leaves double precision; status: see
-    `sphere_refine.SphereRefinement`; iterations: Newton steps of the refinement; residual: last predicted decrease
+    `refine.SphereRefinement`; iterations: Newton steps of the refinement; residual: last predicted decrease
     over energy; warnings: what was repaired or replaced, and why.
     """
 
@@ -66,9 +74,15 @@ def sphere_map(
 
     Raises
     ------
-    MeshError : see `closed.closed_surface`
+    MeshError : see `closed_surface.closed_surface`
     DensityError : a density that is not positive and finite
     PrecisionError : the surface has no map without folds in double precision
+    ValueError : an unknown method, or a balance outside of [0, 1]
+
+    References
+    ----------
+    Springborn, Schroeder, Pinkall 2008 (conformal map); Dominitz, Tannenbaum 2010 ("flow"); Praun, Hoppe 2003 (where
+    the conformal map leaves double precision)
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
@@ -80,31 +94,36 @@ def sphere_map(
     refined = None
     if found is not None:
         if method == NEWTON:
-            begin = _centroids(found, vertex_areas(surface.vertices, surface.triangles, density))
+            begin = _transport_start(found, vertex_areas(surface.vertices, surface.triangles, density))
         else:
-            begin = _flowed(found, surface.triangles, target)
-        refined = yield from _transported(surface, begin, target, warnings, options)
+            begin = _flow_start(found, surface.triangles, target)
+        refined = yield from _refined_start(surface, begin, target, warnings, options)
     if refined is None:
-        start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *ANEW)
+        start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *MULTILEVEL)
         refined = yield from _refined(surface, start, target, options)
     if balance == 0 and refined.area_error > QUALITIES[quality].area_error:
-        warnings.append(_left(refined.positions, surface.triangles, target))
+        warnings.append(_area_warning(refined.positions, surface.triangles, target))
     conformal = found.positions if found else (yield from _least_shear(surface, refined))
     return SphereMap(
-        refined.positions, conformal, refined.status, refined.iterations, refined.residual, tuple(warnings)
+        positions=refined.positions,
+        conformal=conformal,
+        status=refined.status,
+        iterations=refined.iterations,
+        residual=refined.residual,
+        warnings=tuple(warnings),
     )
 
 
 def _target(surface: ClosedSurface, density: np.ndarray | None) -> np.ndarray:
-    """Area (m,) that every face asks for."""
+    """Area (m,) of every face times its density: its target."""
     area = face_areas(surface.vertices, surface.triangles)
     if density is None:
         return area
     return area * positive_density(density)
 
 
-def _left(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> str:
-    """How far areas on the sphere are from what was asked for."""
+def _area_warning(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> str:
+    """Say how far areas on the sphere are from the target (m,)."""
     share = target / target.sum()
     off = np.abs(spherical_areas(positions, triangles) / (4 * np.pi * share) - 1)
     mean, deviation = 100 * (share @ off), 100 * np.sqrt(share @ off**2)
@@ -124,7 +143,7 @@ def _conformal(surface: ClosedSurface, warnings: list[str]) -> Steps[ConformalSp
     return found
 
 
-def _transported(
+def _refined_start(
     surface: ClosedSurface, start: Steps[np.ndarray], target: np.ndarray, warnings: list[str], options: dict
 ) -> Steps[SphereRefinement | None]:
     """The transport map, refined; None, and a warning, where the transport or the straightening of its folds fails."""
@@ -136,17 +155,19 @@ def _transported(
     return None
 
 
-def _centroids(found: ConformalSphere, mass: np.ndarray) -> Steps[np.ndarray]:
+def _transport_start(found: ConformalSphere, mass: np.ndarray) -> Steps[np.ndarray]:
     """Every vertex in the middle of its cell, (n,3)."""
     hull = Hull(found.triangles, twins(found.triangles))
     return (yield from sphere_transport(found.sites, mass, hull=hull)).cells.centroids()
 
 
-def _flowed(found: ConformalSphere, triangles: np.ndarray, target: np.ndarray) -> Steps[np.ndarray]:
+def _flow_start(found: ConformalSphere, triangles: np.ndarray, target: np.ndarray) -> Steps[np.ndarray]:
+    """Unit vectors (n,3) by the flow of Dominitz and Tannenbaum."""
     return (yield from flow_map(found.positions, triangles, target)).positions
 
 
 def _refined(surface: ClosedSurface, start: np.ndarray, target: np.ndarray, options: dict) -> Steps[SphereRefinement]:
+    """The map that starts from unit vectors (n,3), refined."""
     steps = sphere_refine(surface.vertices, surface.triangles, start, target, **options)
     return (yield from part_of(steps, *REFINEMENT))
 

@@ -1,6 +1,6 @@
-"""Straighten a map to the sphere that has folded faces, by an energy that is finite at a fold.
+"""Untangle a map to the sphere that has folded faces, by an energy that is finite at a fold (Garanzha et al. 2021).
 
-In the energy of `energy.py` the area ratio r of a face is replaced by chi(r) = (r + sqrt(eps^2 + r^2)) / 2, positive
+In the energy of `maps.energy` the area ratio r of a face is replaced by chi(r) = (r + sqrt(eps^2 + r^2)) / 2, positive
 for folded faces too, and eps shrinks with the worst fold (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov 2021).
 """
 
@@ -14,30 +14,32 @@ from ..maps.energy import Elements, FaceDerivatives, elements, face_derivatives_
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..progress import Progress, Steps
 from ..refinement.projected_newton import ARMIJO, Assembly
-from .newton import derivatives, moved, newton_direction, seen, tangents
+from .newton import derivatives, newton_direction, project_faces, retract, tangents
 
+# Newton steps.
 MAX_STEPS = 40
+# Halvings of a step that does not lower the energy enough.
 MAX_HALVINGS = 12
-# eps is one of these shares of the worst fold, the next where no step helps, and at least LEAST.
-SHARES = (0.2, 1.0, 5.0)
-LEAST = 0.05
-# No vertex moves farther in a step.
-FARTHEST = 0.05
+# eps is one of these shares of the worst fold's area ratio, the next where no step helps, and at least LEAST_EPS.
+EPS_SHARES = (0.2, 1.0, 5.0)
+LEAST_EPS = 0.05
+# Radians that a vertex moves in a step at most.
+LONGEST_MOVE = 0.05
 # Folds may become this many times as many on the way.
 SPREADING = 3
+# Of the energy that untangles; the refinement that follows has its own.
 AREA_WEIGHT = 1.0
-# Around folds that are straightened alone.
+# Rings of vertices around a few folds that move with them.
 RINGS = 4
 
 
 def untangle_on_sphere(
-    faces: Elements, assembly: Assembly, positions: np.ndarray, held: np.ndarray | None = None
+    faces: Elements, assembly: Assembly, positions: np.ndarray, fixed: np.ndarray | None = None
 ) -> Steps[tuple[np.ndarray, int]]:
     """Unit vectors (n,3) near the given ones with no face folded, if that is found, and the steps taken.
 
-    Vertices held (n,) bool stay.
-
-    The caller checks: the method has no guarantee, and gives up where it makes no more progress.
+    Fixed vertices (n,) bool stay. Newton's method on the energy with chi, eps anew in every step. The caller checks for
+    folds: the method has no guarantee, and gives up where it makes no more progress.
     """
     # In units of the areas asked for; faces of little area must not fold either.
     even = np.full(len(faces.area), 1 / len(faces.area))
@@ -49,7 +51,7 @@ def untangle_on_sphere(
         if folds == 0 or folds > most:
             return positions, k
         yield Progress("Untangling", k / MAX_STEPS)
-        tries = (_step(faces, assembly, positions, held, share) for share in SHARES)
+        tries = (_step(faces, assembly, positions, fixed, share) for share in EPS_SHARES)
         following = next((found for found in tries if found is not None), None)
         if following is None:
             return positions, k
@@ -57,18 +59,19 @@ def untangle_on_sphere(
     return positions, MAX_STEPS
 
 
-def _step(faces: Elements, assembly: Assembly, positions: np.ndarray, held, eps_share: float) -> np.ndarray | None:
-    face = seen(positions, faces.triangles)
+def _step(faces: Elements, assembly: Assembly, positions: np.ndarray, fixed, eps_share: float) -> np.ndarray | None:
+    """Unit vectors (n,3) after one line-searched Newton step; None where no share of it lowers the energy."""
+    face = project_faces(positions, faces.triangles)
     a, b = derivatives(faces, face.corner)
     worst = min(float((squared(a) - squared(b)).min()), 0.0)
-    eps = np.hypot(LEAST, eps_share * worst)
+    eps = np.hypot(LEAST_EPS, eps_share * worst)
     value, local = _energy(faces, a, b, eps), _local(faces, a, b, eps)
     axes = tangents(positions)
-    direction, slope = newton_direction(faces, assembly, positions, axes, face, local, held)
-    share = min(1.0, FARTHEST / max(float(np.linalg.norm(direction, axis=1).max()), FARTHEST))
+    direction, slope = newton_direction(faces, assembly, positions, axes, face, local, fixed)
+    share = min(1.0, LONGEST_MOVE / max(float(np.linalg.norm(direction, axis=1).max()), LONGEST_MOVE))
     for _ in range(MAX_HALVINGS):
-        trial = moved(positions, axes, share * direction)
-        there = derivatives(faces, seen(trial, faces.triangles).corner)
+        trial = retract(positions, axes, share * direction)
+        there = derivatives(faces, project_faces(trial, faces.triangles).corner)
         if _energy(faces, *there, eps) <= value + ARMIJO * share * slope:
             return trial
         share /= 2
@@ -76,7 +79,7 @@ def _step(faces: Elements, assembly: Assembly, positions: np.ndarray, held, eps_
 
 
 def _chi(det: np.ndarray, eps: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """chi and its first two derivatives."""
+    """chi(det) = (det + sqrt(eps^2 + det^2)) / 2 and its first two derivatives, (m,) each."""
     root = np.hypot(eps, det)
     # For folds the sum cancels: chi = eps^2 / (2 (root - det)).
     chi = np.where(det > 0, 0.5 * (det + root), 0.5 * eps**2 / (root + np.abs(det)))
@@ -84,13 +87,14 @@ def _chi(det: np.ndarray, eps: float) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def _energy(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> float:
+    """Sum over the faces of weight ((|a|^2 + |b|^2) / chi + AREA_WEIGHT (chi + 1 / chi) / 2)."""
     outer, inner = squared(a), squared(b)
     chi, _, _ = _chi(outer - inner, eps)
     return float(faces.weight @ ((outer + inner) / chi + AREA_WEIGHT * (chi + 1 / chi) / 2))
 
 
 def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> FaceDerivatives:
-    """As `energy.derivatives_of`, for the energy with chi instead of the area ratio."""
+    """As `maps.energy.derivatives_of`, for the energy with chi instead of the area ratio."""
     outer, inner = squared(a), squared(b)
     chi, first, second = _chi(outer - inner, eps)
     total = outer + inner
@@ -111,25 +115,24 @@ def _local(faces: Elements, a: np.ndarray, b: np.ndarray, eps: float) -> FaceDer
     return face_derivatives_of(faces, a, b, (by_outer, by_inner), (by_outer, by_inner), block)
 
 
-def locally_untangled(surface: np.ndarray, triangles: np.ndarray, positions: np.ndarray) -> Steps[np.ndarray]:
-    """Unit vectors (n,3) of a map whose few folded faces are straightened, all but a few rings of vertices untouched.
+def untangle_locally(surface: np.ndarray, triangles: np.ndarray, positions: np.ndarray) -> Steps[np.ndarray]:
+    """Untangle the few folded faces of a map to the sphere, unit vectors (n,3), moving a few rings of vertices only.
 
-    Every face is to keep the area that it has on the sphere, folded or not. Where that fails the map is returned as it
-    was.
+    surface (n,3): shapes that the faces (m,3) are to keep; their areas are those that they have on the sphere, folded
+    or not. Where that fails the map is returned as it was.
     """
-    touched = around(triangles, ~(signed_volumes(positions, triangles) > 0), len(positions))
+    touched = with_rings(triangles, ~(signed_volumes(positions, triangles) > 0), len(positions))
     area = np.abs(spherical_areas(positions, triangles))
-    straight = yield from straightened(surface, triangles, positions, area, touched)
+    straight = yield from straighten_around(surface, triangles, positions, area, touched)
     return positions if straight is None else straight
 
 
-def straightened(
+def straighten_around(
     reference: np.ndarray, triangles: np.ndarray, positions: np.ndarray, area: np.ndarray, free: np.ndarray
 ) -> Steps[np.ndarray | None]:
-    """Unit vectors (n,3) without a fold among the faces at the vertices free (n,) bool, which alone move; None where
-    that fails.
+    """Untangle the faces at the free vertices (n,) bool, which alone move: unit vectors (n,3), None where that fails.
 
-    The faces are to keep the shapes of the reference (n,3) and the area (m,).
+    The faces (m,3) are to keep the shapes of the reference (n,3) and the area (m,).
     """
     target = np.maximum(area, 1e-9 * np.median(area))
     inside = free[triangles].any(axis=1)
@@ -145,7 +148,7 @@ def straightened(
     return result
 
 
-def around(triangles: np.ndarray, faces: np.ndarray, n: int) -> np.ndarray:
+def with_rings(triangles: np.ndarray, faces: np.ndarray, n: int) -> np.ndarray:
     """Vertices (n,) bool of the faces (m,) bool and of a few rings around them."""
     touched = np.zeros(n, dtype=bool)
     touched[triangles[faces]] = True

@@ -10,9 +10,9 @@ from scipy.spatial import ConvexHull
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.progress import drain
-from omt_uv.solver.sphere.dominitz_tannenbaum import descent, flow_map
-from omt_uv.solver.sphere.moser_flow import carried, edge_fluxes, moser_map
-from omt_uv.solver.sphere.stream_functions import best_flow, level, pairs, transported, velocity
+from omt_uv.solver.sphere.dominitz_tannenbaum import flow_map, reduce_cost
+from omt_uv.solver.sphere.moser_flow import advect_points, edge_fluxes, moser_map
+from omt_uv.solver.sphere.stream_functions import advect, best_flow, bump_basis, bump_pairs, velocity
 
 
 def random_sphere(count=500, seed=0):
@@ -56,7 +56,7 @@ def test_points_spread_by_mass_arrive_spread_by_area():
     cut = np.sort(rng.random((count, 2)), axis=1)
     weights = np.column_stack([cut[:, 0], cut[:, 1] - cut[:, 0], 1 - cut[:, 1]])
     flux = edge_fluxes(P, F, first - last)
-    face, weights, rounds, stuck = drain(carried(F, flux, first, last, face, weights))
+    face, weights, rounds, stuck = drain(advect_points(F, flux, first, last, face, weights))
     assert stuck == 0 and rounds > 1
     assert (weights >= 0).all() and np.allclose(weights.sum(axis=1), 1)
     expected = count * last / last.sum()
@@ -95,14 +95,14 @@ def test_moser_turns_with_the_sphere():
 
 
 def test_stream_functions_move_along_the_sphere_and_keep_areas():
-    at = level(60)
+    basis = bump_basis(60)
     coefficients = 0.03 * np.random.default_rng(0).normal(size=60)
     P, _ = random_sphere(400)
-    v = velocity(P, at, pairs(P, at), coefficients)
+    v = velocity(P, basis, bump_pairs(P, basis), coefficients)
     assert np.abs((v * P).sum(axis=1)).max() < 1e-12
     corners = P[:, None] + 1e-5 * np.random.default_rng(1).normal(size=(len(P), 3, 3))
     corners = (corners / np.linalg.norm(corners, axis=2, keepdims=True)).reshape(-1, 3)
-    moved = transported(corners, at, pairs(corners, at), coefficients)
+    moved = advect(corners, basis, bump_pairs(corners, basis), coefficients)
     assert np.linalg.norm(moved - corners, axis=1).max() > 0.02
     tiny = np.arange(len(corners)).reshape(-1, 3)
     before, after = (signed_volumes(x, tiny) for x in (corners, moved))
@@ -111,24 +111,24 @@ def test_stream_functions_move_along_the_sphere_and_keep_areas():
 
 def test_the_best_flow_finds_a_flow_and_no_gradient():
     P, F = icosphere(4)
-    at = level(60)
+    basis = bump_basis(60)
     mass = np.bincount(F.ravel(), np.repeat(spherical_areas(P, F) / 3, 3))
-    close = pairs(P, at)
-    wanted = velocity(P, at, close, np.random.default_rng(0).normal(size=60))
-    found = velocity(P, at, close, best_flow(P, mass, wanted, at, close))
-    assert np.linalg.norm(found - wanted) < 0.1 * np.linalg.norm(wanted)
+    pairs = bump_pairs(P, basis)
+    target = velocity(P, basis, pairs, np.random.default_rng(0).normal(size=60))
+    found = velocity(P, basis, pairs, best_flow(P, mass, target, basis, pairs))
+    assert np.linalg.norm(found - target) < 0.1 * np.linalg.norm(target)
     gradient = np.array([0, 0, 1.0]) - P[:, 2:] * P
-    found = velocity(P, at, close, best_flow(P, mass, gradient, at, close))
+    found = velocity(P, basis, pairs, best_flow(P, mass, gradient, basis, pairs))
     assert np.linalg.norm(found) < 1e-2 * np.linalg.norm(gradient)
 
 
 def test_the_descent_undoes_a_stir():
     """Of a map that is optimal but for a flow without divergence, most of the cost of that flow comes back."""
     P, F = icosphere(4)
-    at = level(24)
-    stirred = transported(P, at, pairs(P, at), 0.03 * np.random.default_rng(0).normal(size=24))
+    basis = bump_basis(24)
+    stirred = advect(P, basis, bump_pairs(P, basis), 0.03 * np.random.default_rng(0).normal(size=24))
     weight = np.bincount(F.ravel(), np.repeat(spherical_areas(P, F) / 3, 3))
-    found, costs = drain(descent(stirred, P, F, weight))
+    found, costs = drain(reduce_cost(stirred, P, F, weight))
     assert (np.diff(costs) < 0).all()
     assert costs[-1] < 0.1 * costs[0]
     assert np.linalg.norm(found - P, axis=1).mean() < 0.35 * np.linalg.norm(stirred - P, axis=1).mean()

@@ -12,10 +12,10 @@ from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, sp
 from omt_uv.solver.mesh.topology import halfedges, twins
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.projected_newton import Assembly
-from omt_uv.solver.sphere.coarsen import coarsened
+from omt_uv.solver.sphere.coarsen import collapse_to_tetrahedron
 from omt_uv.solver.sphere.conformal import conformal_sphere
 from omt_uv.solver.sphere.multilevel import multilevel_start
-from omt_uv.solver.sphere.newton import SphereProblem, derivatives, moved, newton_direction, seen, tangents
+from omt_uv.solver.sphere.newton import SphereProblem, derivatives, newton_direction, project_faces, retract, tangents
 from omt_uv.solver.sphere.refine import sphere_refine
 from omt_uv.solver.sphere.sphere_map import sphere_map
 from omt_uv.solver.transport.semidiscrete_sphere import sphere_transport
@@ -319,7 +319,7 @@ def test_long_limbs_are_mapped_from_coarse_to_fine():
 def test_coarse_to_fine_never_folds(name):
     V, F = SHAPES[name]
     area = face_areas(V, F)
-    for level in (levels := coarsened(V, F, area)):
+    for level in (levels := collapse_to_tetrahedron(V, F, area)):
         assert len(level.triangles) == 2 * len(level.vertices) - 4 and (twins(level.triangles) >= 0).all()
         np.testing.assert_allclose(level.mass.sum(), area.sum())
         assert len(level.mass) == len(level.triangles) and level.mass.min() > 0
@@ -355,10 +355,10 @@ def test_the_slope_is_the_derivative():
     faces = elements(V, F, target)
     problem = SphereProblem(faces, target, faces.ratio, Assembly(F, len(V)), 3.0)
     p = normalized(V)
-    axes, face = tangents(p), seen(p, F)
+    axes, face = tangents(p), project_faces(p, F)
     local = derivatives_of(faces, *derivatives(faces, face.corner), 3.0, 1.0)
     direction, slope = newton_direction(faces, problem.assembly, p, axes, face, local)
-    before, after = (problem.energy(moved(p, axes, s * direction)) for s in (-1e-6, 1e-6))
+    before, after = (problem.energy(retract(p, axes, s * direction)) for s in (-1e-6, 1e-6))
     np.testing.assert_allclose((after - before) / 2e-6, slope, rtol=1e-5)
 
 
@@ -378,7 +378,7 @@ def test_balance_trades_area_for_shear():
     shear, error = [], []
     for balance in (0.0, 0.3, 0.6, 1.0):
         found = drain(sphere_map(V, F, balance=balance))
-        a, b = derivatives(elements(V, F, face_areas(V, F)), seen(found.positions, F).corner)
+        a, b = derivatives(elements(V, F, face_areas(V, F)), project_faces(found.positions, F).corner)
         shear.append((np.abs(b) / np.abs(a)).mean())
         error.append(figures(V, F, found.positions)[1])
     assert (np.diff(shear) < 0).all() and (np.diff(error) > 0).all()
