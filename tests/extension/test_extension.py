@@ -62,7 +62,8 @@ def test_contents(archive):
         names = content.namelist()
     assert "blender_manifest.toml" in names
     assert "__init__.py" in names
-    assert "omt_uv/solver/parameterize.py" in names
+    modules = {str(p.relative_to(ROOT)) for p in (ROOT / "omt_uv").glob("**/*.py")}
+    assert {name for name in names if name.startswith("omt_uv/")} == modules
     wheels = [name for name in names if name.endswith(".whl")]
     assert {name.split("-")[0] for name in wheels} == {"wheels/scipy", "wheels/xatlas"}
     assert {name.split("-")[2] for name in wheels} == {"cp311", "cp313"}
