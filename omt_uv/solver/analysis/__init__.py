@@ -1,1 +1,18 @@
+"""What is read off a surface: curvature, saliency, feature edges, and target densities of its faces.
 
+Imports solver.errors, solver.mesh and solver.linalg.
+Main names: Target, target_density, exact_density, painted_density, vertex_score, soft_weights, sharp_edges.
+"""
+
+from ..lazy import lazy
+
+__getattr__, __all__ = lazy(
+    __name__,
+    curvature="gaussian_curvature mean_curvature sharpness",
+    density="Target checked_density from_polygons from_vertices gaussian_curvature_density graded_density "
+    "mean_curvature_density normalised_density painted_density region_share relative_entropy",
+    feature_edges="edge_union region_borders resolved_features sharp_edges value_jumps",
+    heat_means="HeatMeans",
+    region_density="RegionDensity exact_density target_density",
+    vertex_scores="distance scaled_vertex_areas soft_weights vertex_score",
+)

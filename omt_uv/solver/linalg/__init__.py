@@ -1,1 +1,16 @@
+"""Sparse linear systems of meshes: direct and iterative solvers, elimination orders, and L-BFGS.
 
+Imports solver.errors and solver.mesh.
+Main names: Factor, solve_spd, solve_general, LaplacianSolver, AdditiveSchwarz, Dissection, LBFGS.
+"""
+
+from ..lazy import lazy
+
+__getattr__, __all__ = lazy(
+    __name__,
+    additive_schwarz="AdditiveSchwarz schwarz_solver",
+    lbfgs="LBFGS",
+    multigrid="LaplacianSolver Multigrid",
+    nested_dissection="Dissection kd_parts mesh_order vertex_graph",
+    sparse="Factor conjugate_gradients minimum_degree solve_conjugate_gradients solve_general solve_spd",
+)
