@@ -23,7 +23,7 @@ from ..solver.analysis.density import (
 )
 from ..solver.analysis.region_density import RegionDensity, target_density
 from ..solver.editing.image_warp import warped
-from ..solver.editing.magnify import OUTLINES, Lens, aligned_to, magnify_region, refuse_folds
+from ..solver.editing.magnify import OUTLINES, RegionMagnification, magnify_region, placed_like_outside, refuse_folds
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, MeshError, WeightError
 from ..solver.maps.distortion import distortion
@@ -271,29 +271,24 @@ def _magnified(
     owner: int, island: Island, weights, settings: MagnifySettings
 ) -> Steps[tuple[_MagnifiedIsland, tuple[str, ...]]]:
     """An island after its magnification, and warnings."""
-    triangles = island.chart.triangles
-    refuse_folds(island.uv, triangles)
-    area = np.abs(signed_areas(island.uv, triangles))
-    factor = whole_factor(settings)
-    found = target_density(weights, area, factor, settings.exact)
     if settings.boundary in OUTLINES:
         done = yield from magnify_region(
             island.uv,
-            triangles,
+            island.chart.triangles,
             weights,
-            factor,
+            whole_factor(settings),
             exact=settings.exact,
             boundary=settings.boundary,
             quality=settings.quality,
         )
     else:
-        done = yield from _into_shape(island, area, found, weights, settings)
+        done = yield from _into_shape(island, weights, settings)
     result = _MagnifiedIsland(
         owner=owner,
         island=island,
         region=weights,
-        area=area,
-        found=found,
+        area=np.abs(signed_areas(island.uv, island.chart.triangles)),
+        found=done.target,
         uv=done.uv,
         outline=done.outline,
         iterations=done.iterations,
@@ -301,18 +296,30 @@ def _magnified(
     return result, done.warnings
 
 
-def _into_shape(island: Island, area, found: RegionDensity, weights, settings: MagnifySettings) -> Steps[Lens]:
-    """An island, of UV areas (m,), in a disk or a square: the plane is unwrapped like any other surface."""
+def _into_shape(island: Island, weights: np.ndarray, settings: MagnifySettings) -> Steps[RegionMagnification]:
+    """An island in a disk or a square: the plane is unwrapped like any other surface."""
     uv, triangles = island.uv, island.chart.triangles
+    refuse_folds(uv, triangles)
+    area = np.abs(signed_areas(uv, triangles))
+    found = target_density(weights, area, whole_factor(settings), settings.exact)
     check_disk(island.chart)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
     flat = replace(island.chart, vertices=np.column_stack([uv * mirror, np.zeros(len(uv))]))
     density = normalised_density(found.density, area)
     options = MapOptions(boundary=settings.boundary, quality=settings.quality)
     done = yield from map_chart(flat, options=options, target=Target(density, weights))
-    placed = aligned_to(done.uv, uv * mirror, triangles, 1 - weights, quarters=settings.boundary == "square") * mirror
-    texts = (*found.warnings, *done.warnings)
-    return Lens(placed, settings.boundary, done.newton_refinement, 0.0, done.status, done.area_l1, texts)
+    square = settings.boundary == "square"
+    placed = placed_like_outside(done.uv, uv * mirror, triangles, 1 - weights, quarters=square) * mirror
+    return RegionMagnification(
+        uv=placed,
+        outline=settings.boundary,
+        iterations=done.newton_refinement,
+        residual=0.0,
+        status=done.status,
+        area_error=done.area_l1,
+        warnings=(*found.warnings, *done.warnings),
+        target=found,
+    )
 
 
 def _overall(magnified: Sequence[_MagnifiedIsland]) -> Shares:

@@ -12,9 +12,9 @@ from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_edges
 from ..refinement.continuation import FIRST_PRESSURE, NO_ENERGY, QUALITIES, MapProblem, final_weight, rescaled
 from ..refinement.elimination_order import renumbered
-from ..refinement.pins import PinEnergy, Pins
+from ..refinement.pins import PinEnergy, Pins, placed_like
 from ..refinement.projected_newton import Assembly, FreeMotion, NewtonProblem, newton_step
-from .refine_island import island_start, meets_itself, placed
+from .refine_island import island_start, meets_itself
 
 # Of the springs between pins and where they are dragged to: stiff, as the barrier against folds must only just win.
 STIFFNESS = 1e6
@@ -73,7 +73,7 @@ class Follower:
     def uv(self) -> np.ndarray:
         """The map (n,2) as it is; without pins it lies as the given one did."""
         held = self._pins is not None
-        return self._mesh.original(self._w if held else placed(self._w, self._given, self._faces, None))
+        return self._mesh.original(self._w if held else placed_like(self._w, self._given, self._faces))
 
     def _pull(self, pins: Pins, places: np.ndarray) -> None:
         # `renumbered` sorts pins by vertex, which `_pins` keeps.

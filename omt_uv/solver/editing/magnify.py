@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..analysis.density import area_error_warnings, normalised_density, region_share
-from ..analysis.region_density import exact_density, target_density
+from ..analysis.region_density import RegionDensity, exact_density, target_density
 from ..errors import FoldedUVError, MeshError
 from ..linalg.additive_schwarz import schwarz_solver
-from ..maps.energy import area_error, elements
+from ..maps.energy import Elements, area_error, elements
+from ..maps.similarity import fit_similarity
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_edges, boundary_loops
 from ..progress import Progress, Steps, part_of
@@ -31,9 +32,16 @@ LARGEST_STEP = np.log(2)
 
 
 @dataclass(frozen=True)
-class Lens:
-    """uv (n,2) of the magnified map; outline "circle", "sides" or "free"; the rest as in `refine.Refinement`, with the
-    area error against the density."""
+class Magnification:
+    """A magnified map, and how it came about.
+
+    Attributes
+    ----------
+    uv : (n,2)
+    outline : "circle", "sides" or "free", or the shape that the map was made to fill
+    iterations, residual, status, warnings : see `refine.Refinement`
+    area_error : share of the area that is in the wrong place, against the density
+    """
 
     uv: np.ndarray
     outline: str
@@ -42,6 +50,13 @@ class Lens:
     status: str
     area_error: float
     warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RegionMagnification(Magnification):
+    """A map with a magnified region; target: what that was to get."""
+
+    target: RegionDensity
 
 
 def magnify_map(
@@ -53,7 +68,7 @@ def magnify_map(
     boundary: str = "own",
     quality: str = "standard",
     stricter: float = 1.0,
-) -> Steps[Lens]:
+) -> Steps[Magnification]:
     """Change the areas of a map uv (n,2), triangles (m,3), by a density (m,), without folds.
 
     Parameters
@@ -82,14 +97,14 @@ def magnify_map(
         found, outline, error = yield from _magnified(mesh, density, region, boundary, settings)
     except MeshError as problem:
         raise mesh.original_error(problem) from problem
-    return Lens(
-        mesh.original(found.w) * size + middle,
-        outline.kind,
-        found.steps,
-        found.residual,
-        found.status,
-        error,
-        found.warnings,
+    return Magnification(
+        uv=mesh.original(found.w) * size + middle,
+        outline=outline.kind,
+        iterations=found.steps,
+        residual=found.residual,
+        status=found.status,
+        area_error=error,
+        warnings=found.warnings,
     )
 
 
@@ -102,7 +117,7 @@ def magnify_region(
     exact: bool = True,
     boundary: str = "own",
     quality: str = "standard",
-) -> Steps[Lens]:
+) -> Steps[RegionMagnification]:
     """Give a region of weights (m,) in [0, 1] `factor` times its share of a map uv (n,2), in steps of at most 2.
 
     Each step shears the map before it as little as it can. Steps are a flow: what it has done twice by 2 is what it
@@ -128,13 +143,22 @@ def magnify_region(
         rest = whole.share_before * factor ** ((k + 1) / count) / region_share(weights, area)
         density = exact_density(weights, area, rest).density if exact else whole.density ** (1 / count)
         job = magnify_map(uv, triangles, normalised_density(density, area), **options)
-        lens = yield from part_of(job, k / count, 1 / count)
-        uv, done = lens.uv, done + lens.iterations
-        texts += [text for text in lens.warnings if text not in texts]
-    has, asked = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
-    error = float(np.abs(has - asked).sum())
+        step = yield from part_of(job, k / count, 1 / count)
+        uv, done = step.uv, done + step.iterations
+        texts += [text for text in step.warnings if text not in texts]
+    has, target = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
+    error = float(np.abs(has - target).sum())
     texts += area_error_warnings(error, count * QUALITIES[quality].area_error)
-    return replace(lens, iterations=done, area_error=error, warnings=tuple(texts))
+    return RegionMagnification(
+        uv=uv,
+        outline=step.outline,
+        iterations=done,
+        residual=step.residual,
+        status=step.status,
+        area_error=error,
+        warnings=tuple(texts),
+        target=whole,
+    )
 
 
 def refuse_folds(uv: np.ndarray, triangles: np.ndarray) -> None:
@@ -169,7 +193,7 @@ def _magnified(
     task = MapProblem(faces, assembly, outline.motion, guard, False, outline.kind != "free")
     found = yield from minimise_in_stages(task, outline.w, 0.0, settings)
     error = area_error(faces, found.w)
-    return replace(found, w=_aligned(found.w, given, outline, faces, region)), outline, error
+    return replace(found, w=_placed_like_outside(found.w, given, outline, faces, region)), outline, error
 
 
 def _outer(w: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -178,7 +202,7 @@ def _outer(w: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return max(loops, key=lambda loop: centroid(w[loop])[1])
 
 
-def aligned_to(
+def placed_like_outside(
     uv: np.ndarray, given: np.ndarray, triangles: np.ndarray, calm: np.ndarray, quarters: bool
 ) -> np.ndarray:
     """A map uv (n,2) turned, moved and scaled to lie as the given one does, with its area; both are unmirrored.
@@ -187,25 +211,23 @@ def aligned_to(
     """
     w, aim = uv @ [1, 1j], given @ [1, 1j]
     area = signed_areas(given, triangles)
-    middle = [(a @ x[triangles].mean(axis=1)) / a.sum() for x, a in ((w, signed_areas(uv, triangles)), (aim, area))]
-    weight = np.bincount(triangles.ravel(), np.repeat(area * calm, 3), len(w))
-    turn = (weight * (w - middle[0]).conj()) @ (aim - middle[1])
-    if quarters:
-        turn = 1j ** np.round(2 * np.angle(turn) / np.pi)
-    scale = np.sqrt(area.sum() / signed_areas(uv, triangles).sum())
-    placed = (w - middle[0]) * (scale * (turn / abs(turn) if abs(turn) > 0 else 1)) + middle[1]
+    w = w * np.sqrt(area.sum() / signed_areas(uv, triangles).sum())
+    centre, goal = (
+        (a @ x[triangles].mean(axis=1)) / a.sum() for x, a in ((w, signed_areas(uv, triangles)), (aim, area))
+    )
+    mass = np.bincount(triangles.ravel(), np.repeat(area * calm, 3), len(w))
+    similarity = fit_similarity(w, aim, mass, rigid=True, about=(centre, goal))
+    placed = (similarity.in_quarter_turns() if quarters else similarity)(w)
     return np.column_stack([placed.real, placed.imag])
 
 
-def _aligned(w: np.ndarray, given: np.ndarray, outline: Outline, faces, region) -> np.ndarray:
+def _placed_like_outside(w: np.ndarray, given: np.ndarray, outline: Outline, faces: Elements, region) -> np.ndarray:
     """The map turned, and with a free outline moved and scaled, so that what is not magnified lies as it did."""
     if outline.kind == "sides":
         return w
     calm = faces.area if region is None else faces.area * (1 - region)
     mass = np.bincount(faces.triangles.ravel(), np.repeat(calm / calm.sum(), 3) / 3, len(w))
-    here, there = (0j, outline.centre) if outline.kind == "circle" else (mass @ w, mass @ given)
     if outline.kind == "free":
         w = w * np.sqrt(abs(faces.areas(given).sum()) / faces.areas(w).sum())
-        here = mass @ w
-    turn = (mass * (w - here).conj()) @ (given - there)
-    return (w - here) * (turn / abs(turn) if abs(turn) > 0 else 1) + there
+    about = (0j, outline.centre) if outline.kind == "circle" else None
+    return fit_similarity(w, given, mass, rigid=True, about=about)(w)

@@ -21,7 +21,7 @@ from ..refinement.boundary_barrier import crossings, make_barrier
 from ..refinement.continuation import QUALITIES, MapProblem, minimise_in_stages
 from ..refinement.elimination_order import renumbered
 from ..refinement.initial_maps import disk_initial_map
-from ..refinement.pins import Pins, aligned, move_pins
+from ..refinement.pins import aligned_to_pins, move_pins, placed_like
 from ..refinement.projected_newton import Assembly, FreeMotion
 from ..refinement.refine import Refinement
 
@@ -87,7 +87,7 @@ def improve(
     )
 
 
-def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
+def _improved(vertices, triangles, given, balance, settings, pins):
     """What was found from the map given (n,) complex, in its place; its area error; warnings."""
     # The energy weighs lengths: surface and map are measured in the same unit, in which both have the area 1.
     vertices = vertices / np.sqrt(face_areas(vertices, triangles).sum())
@@ -113,7 +113,8 @@ def _improved(vertices, triangles, given, balance, settings, pins: Pins | None):
     found = yield from minimise_in_stages(task, w, balance, settings)
     error = area_error(faces, found.w)
     if several is None:
-        found = replace(found, w=placed(found.w, given, faces, pins))
+        two = pins is not None and len(pins.vertices) == 2
+        found = replace(found, w=aligned_to_pins(found.w, pins) if two else placed_like(found.w, given, faces, pins))
     return found, error, (*warnings, *found.warnings)
 
 
@@ -192,15 +193,3 @@ def _fans(points: np.ndarray, holes: list[np.ndarray]) -> tuple[np.ndarray, np.n
     centres = np.stack([points[loop].mean(axis=0) for loop in holes])
     fans = [np.column_stack([np.roll(x, -1), x, np.full(len(x), n + k)]) for k, x in enumerate(holes)]
     return np.concatenate([points, centres]), np.concatenate(fans)
-
-
-def placed(w: np.ndarray, given: np.ndarray, faces, pins: Pins | None) -> np.ndarray:
-    """The map w (n,) moved, turned and scaled to lie as the given one does, with its UV area; a pin keeps its place."""
-    if pins is not None and len(pins.vertices) == 2:
-        return aligned(w, pins)
-    w = w * np.sqrt(abs(faces.areas(given).sum()) / faces.areas(w).sum())
-    mass = np.bincount(faces.triangles.ravel(), np.repeat(faces.area, 3) / 3, len(w))
-    centred, aim = w - mass @ w, given - mass @ given
-    turn = (mass * centred.conj()) @ aim
-    moved = centred * (turn / abs(turn) if abs(turn) > 0 else 1) + mass @ given
-    return moved if pins is None else moved + (pins.places[0] - moved[pins.vertices[0]])

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import PinError
+from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart
 from ..mesh.surface import Surface
-from ..refinement.pins import Pins, aligned, check_pins
+from ..refinement.pins import Pins, aligned_to_pins, check_pins
 from .chart_indices import located
 
 
@@ -82,7 +83,7 @@ def facing(uv: np.ndarray, pins: ChartPins | None) -> tuple[np.ndarray, tuple[np
         return uv, None
     held = Pins(pins.vertices, pins.places @ [1, 1j])
     maps = uv @ [1, 1j], uv @ [1, -1j]
-    miss, mirrored = (np.abs(aligned(w, held)[held.vertices] - held.places).sum() for w in maps)
+    miss, mirrored = (np.abs(aligned_to_pins(w, held)[held.vertices] - held.places).sum() for w in maps)
     # Pins in a row fit either way: then the map is not mirrored.
     turn_over = miss - mirrored > 1e-4 * np.abs(held.places - held.places.mean()).sum()
     return uv * [1, -1 if turn_over else 1], (pins.vertices, pins.places)
@@ -96,18 +97,19 @@ def anchored(uv: np.ndarray, triangles: np.ndarray, pins: ChartPins) -> np.ndarr
     """
     w, places = uv @ [1, 1j], pins.places @ [1, 1j]
     if len(pins.vertices) > 1:
-        w = aligned(w, Pins(pins.vertices, places))
+        w = aligned_to_pins(w, Pins(pins.vertices, places))
     else:
-        w = w * _likeness(w[triangles], pins.given @ [1, 1j])
-        w += places[0] - w[pins.vertices[0]]
+        w = _placed_like_given(w, triangles, pins.given @ [1, 1j])
+        w = w + (places[0] - w[pins.vertices[0]])
     w[pins.vertices] = places
     return np.column_stack([w.real, w.imag])
 
 
-def _likeness(w: np.ndarray, given: np.ndarray) -> complex:
-    """Factor that turns and scales the corners w (m,3) of triangles to have direction and area of those given (m,3)."""
-    now, then = (np.abs(((x[:, 1] - x[:, 0]).conj() * (x[:, 2] - x[:, 0])).imag).sum() for x in (w, given))
+def _placed_like_given(w: np.ndarray, triangles: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """The map w (n,), its triangles turned and scaled to the direction and area of those given, by corners (m,3)."""
+    corners = w[triangles]
+    now, then = (np.abs(((x[:, 1] - x[:, 0]).conj() * (x[:, 2] - x[:, 0])).imag).sum() for x in (corners, given))
     if not (np.isfinite(then) and then > 0):
-        return 1 / max(np.ptp(w.real), np.ptp(w.imag))
-    turn = ((w - w.mean()).conj() * (given - given.mean())).sum()
-    return np.sqrt(then / now) * (turn / abs(turn) if abs(turn) > 0 else 1)
+        return w / max(np.ptp(corners.real), np.ptp(corners.imag))
+    scale = np.sqrt(then / now)
+    return fit_similarity(scale * corners.ravel(), given.ravel(), rigid=True)(scale * w)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..analysis.density import Target
 from ..maps.distortion import distortion
+from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart
 from ..mesh.geometry import signed_areas
 from ..mesh.surface import Surface
@@ -70,8 +71,7 @@ def _fixed(chart: Chart, pins: ChartPins | None, boundary: str) -> np.ndarray:
 
 def _as_before(uv: np.ndarray, given: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """A map (n,2) moved, turned and scaled to the place, direction and area of another one of the same triangles."""
-    centre = given.mean(axis=0)
-    w, aim = ((x - x.mean(axis=0)) @ [1, 1j] for x in (uv, given))
-    w = w * np.exp(1j * np.angle(np.vdot(w, aim)))
-    w = w * np.sqrt(signed_areas(given, triangles).sum() / signed_areas(uv, triangles).sum())
-    return np.column_stack([w.real, w.imag]) + centre
+    scale = np.sqrt(signed_areas(given, triangles).sum() / signed_areas(uv, triangles).sum())
+    w = scale * (uv @ [1, 1j])
+    w = fit_similarity(w, given @ [1, 1j], rigid=True)(w)
+    return np.column_stack([w.real, w.imag])

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import PinError
-from ..maps.energy import squared
+from ..maps.energy import Elements, squared
+from ..maps.similarity import fit_similarity
 from ..progress import Progress, Steps
 from .continuation import MapProblem, rescaled
 from .continuation import minimise as minimise_energy
@@ -78,14 +79,24 @@ class PinEnergy:
         return np.inf
 
 
-def aligned(w: np.ndarray, pins: Pins) -> np.ndarray:
+def aligned_to_pins(w: np.ndarray, pins: Pins) -> np.ndarray:
     """The map w (n,) moved, turned and scaled so that the pins (two or more) come nearest to their places."""
-    at, aim = w[pins.vertices], pins.places
-    centre, goal = at.mean(), aim.mean()
-    factor = ((at - centre).conj() @ (aim - goal)) / max(squared(at - centre).sum(), 1e-300)
-    if abs(factor) < 1e-6 * np.sqrt(squared(aim - goal).sum() / max(squared(at - centre).sum(), 1e-300)):
-        factor = np.sqrt(squared(aim - goal).sum() / squared(at - centre).sum())
-    return (w - centre) * factor + goal
+    return fit_similarity(w[pins.vertices], pins.places)(w)
+
+
+def placed_like(
+    w: np.ndarray, given: np.ndarray, faces: Elements, pins: Pins | None = None, area: float | None = None
+) -> np.ndarray:
+    """The map w (n,) turned and moved to lie as the given one (n,) does, with that UV area; the first pin in its place.
+
+    area : UV area of the result, that of the given map by default
+    """
+    if area is None:
+        area = abs(faces.areas(given).sum())
+    w = w * np.sqrt(area / faces.areas(w).sum())
+    mass = np.bincount(faces.triangles.ravel(), np.repeat(faces.area, 3) / 3, len(w))
+    placed = fit_similarity(w, given, mass, rigid=True)(w)
+    return placed if pins is None else placed + (pins.places[0] - placed[pins.vertices[0]])
 
 
 def move_pins(task: MapProblem, w: np.ndarray, pins: Pins) -> Steps[tuple[MapProblem, np.ndarray]]:
@@ -98,7 +109,7 @@ def move_pins(task: MapProblem, w: np.ndarray, pins: Pins) -> Steps[tuple[MapPro
     ------
     PinError : some pins cannot reach their places without a fold
     """
-    w = aligned(w, pins)
+    w = aligned_to_pins(w, pins)
     extent = np.abs(pins.places - pins.places.mean()).max()
     for k, stiffness in enumerate(STIFFNESS):
         snapped = w.copy()

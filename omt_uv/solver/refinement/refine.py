@@ -19,7 +19,7 @@ from ..progress import Progress, Steps, part_of
 from .continuation import QUALITIES, ContinuationResult, MapProblem, minimise_in_stages, planned_weights
 from .elimination_order import Renumbered, renumbered
 from .initial_maps import InitialMap, disk_initial_map, free_initial_map, is_far, notched_disk, square_initial_map
-from .pins import Pins, move_pins
+from .pins import move_pins, placed_like
 from .projected_newton import Assembly
 from .vertex_sweeps import Smoother, smoothed
 
@@ -198,7 +198,8 @@ def _refined(
             if area_error(faces, again.w) < error:
                 found, start = again, notched
     if placed:
-        found = replace(found, w=_placed(found.w, given, faces, pins))
+        area = faces.area @ faces.ratio if pins is None else None
+        found = replace(found, w=placed_like(found.w, given, faces, pins, area))
     return found, start.warnings
 
 
@@ -220,17 +221,3 @@ def _task(faces: Elements, assembly: Assembly, start: InitialMap, loop, boundary
     return MapProblem(
         faces, assembly, start.motion, loop if start.may_cross else None, start.with_barrier, follows, smoother
     )
-
-
-def _placed(w: np.ndarray, given: np.ndarray, faces: Elements, pins: Pins | None) -> np.ndarray:
-    """The map turned and moved to lie as the given one did, with the UV area of its targets.
-
-    With a pin it keeps the scale of the given map, and the pin its place.
-    """
-    area = faces.area @ faces.ratio if pins is None else abs(faces.areas(given).sum())
-    w = w * np.sqrt(area / faces.areas(w).sum())
-    mass = np.bincount(faces.triangles.ravel(), np.repeat(faces.area, 3) / 3, len(w))
-    centred, aim = w - mass @ w, given - mass @ given
-    turn = (mass * centred.conj()) @ aim
-    placed = centred * (turn / abs(turn) if abs(turn) > 0 else 1) + mass @ given
-    return placed if pins is None else placed + (pins.places[0] - placed[pins.vertices[0]])
