@@ -11,11 +11,11 @@ from scipy.sparse.csgraph import connected_components
 
 from ..settings import GlobeSettings
 from ..solver.errors import MeshError
-from ..solver.globe.exact_areas import equirectangular_areas, plane_areas, with_areas
+from ..solver.globe.exact_areas import correct_areas, equirectangular_areas
 from ..solver.globe.projections import EQUIRECT
 from ..solver.globe.rotation import MarkerError, along_axes, by_markers
-from ..solver.globe.unfolding import Polygons, polygons_of, unfold
-from ..solver.mesh.geometry import face_areas
+from ..solver.globe.unfolding import Polygons, gather_polygons, unfold
+from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.gluing import groups
 from ..solver.mesh.spherical_geometry import spherical_areas
 from ..solver.mesh.surface import Surface, chosen_triangles
@@ -186,13 +186,13 @@ def _globe(component: ClosedComponent, job: GlobeJob, settings: GlobeSettings) -
         MAPPING,
     )
     points = found.positions @ _rotation(component, found.positions, job.markers).T
-    polygons, corners = polygons_of(component.corners, component.triangles, component.faces)
+    polygons, corners = gather_polygons(component.corners, component.triangles, component.faces)
     on_sphere = spherical_areas(points, component.triangles) / (4 * np.pi)
     # Where areas shall be exact, what is left of their error on the sphere need not be kept.
     shares = _shares(component, density) if settings.balance == 0 else on_sphere
     laying = _laid_out(points, polygons, shares, settings)
     uv, points, missed = yield from part_of(laying, MAPPING, 1 - MAPPING)
-    areas = plane_areas(uv, polygons.triangles)
+    areas = signed_areas(uv, polygons.triangles)
     warnings = (*found.warnings, *_pole_warnings(missed, int(((areas <= 0) & (on_sphere > 0)).sum())))
     return Globe(
         component=component,
@@ -218,7 +218,7 @@ def _laid_out(
     areas = shares
     if settings.projection == EQUIRECT:
         areas = equirectangular_areas(placed, unfolded, polygons)
-    exact = yield from with_areas(unfolded, polygons, areas, settings.projection)
+    exact = yield from correct_areas(unfolded, polygons, areas, settings.projection)
     return exact.unfolding.corners(), placed, unfolded.missed
 
 

@@ -29,7 +29,7 @@ from omt_uv.pipelines.globe import GlobeJob, project
 from omt_uv.settings import GlobeSettings
 from omt_uv.solver.analysis.density import mean_curvature_density
 from omt_uv.solver.globe.rotation import along_axes
-from omt_uv.solver.globe.unfolding import polygons_of, unfold
+from omt_uv.solver.globe.unfolding import gather_polygons, unfold
 from omt_uv.solver.maps.distortion import distortion, face_distortion
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
@@ -128,7 +128,7 @@ def globe_maps(V, F):
         globe = drain(project([GlobeJob(triangle_surface(V, F))], settings)).globes[0][0]
         maps.append((globe.points, globe.uv.reshape(-1, 3, 2)))
     conformal = globe.sphere.conformal @ along_axes(globe.sphere.conformal, V, F).T
-    polygons, _ = polygons_of(globe.component.corners, F, globe.component.faces)
+    polygons, _ = gather_polygons(globe.component.corners, F, globe.component.faces)
     unfolded, _ = unfold(conformal, polygons, "equirect")
     return [(conformal, unfolded.corners()[polygons.triangles]), *maps]
 

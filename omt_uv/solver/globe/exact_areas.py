@@ -1,4 +1,4 @@
-"""Exact areas for a laid out sphere: a straight triangle is not the image of a spherical one.
+"""Correct the areas of a laid out sphere, whose straight triangles are not images of spherical ones, by least squares.
 
 An equal-area projection keeps the area of a spherical triangle, whose sides come out as curves. The triangle on its
 three corners is off by what lies between curve and chord: little at the equator, half of the face at a pole. Moving
@@ -13,31 +13,43 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..linalg.sparse import minimum_degree, solve_spd
-from ..mesh.geometry import cross2
+from ..mesh.geometry import cross2, signed_areas
 from ..mesh.spherical_geometry import spherical_areas
 from ..progress import Progress, Steps
 from .projections import EQUIRECT, is_cylindrical
-from .unfolding import Polygons, Unfolding, brought_back, moved
+from .unfolding import Polygons, Unfolding, brought_into_square
 
+# Steps of Levenberg and Marquardt.
 ROUNDS = 14
+# Share of the area in the wrong place at which the areas count as exact.
 TOLERANCE = 1e-4
-# Where faces are still folded, as often again, and so many times more weight for them.
-REPEATS, EMPHASIS = 3, 5.0
-# Weight of the displacement, in radians on the sphere, against the areas' relative errors, both squared.
+# As often the steps are repeated, while faces are still folded.
+REPEATS = 3
+# Factor of what folded faces count, with every repeat.
+EMPHASIS = 5.0
+# Factor of the squared displacement, in radians on the sphere, against the squared relative errors of the areas.
 ANCHOR = 1e-5
-# First weight of the length of a step, and by how much it changes with success and failure.
-DAMPING, RELAX, TIGHTEN = 1e-2, 0.1, 5.0
-# Smallest share of the area to ask for, relative to that of a face on average: relative errors of less mean nothing.
+# First factor of the squared length of a step.
+DAMPING = 1e-2
+# Its factor after a step that lowers the energy.
+DAMPING_DECREASE = 0.1
+# Its factor after one that does not.
+DAMPING_INCREASE = 5.0
+# Least target share of a face, relative to the mean: relative errors of less mean nothing.
 LEAST_SHARE = 1e-4
 # A straight triangle with less than this share of the area of its curved image is no image of it.
 USABLE = 0.25
 # A round that was hardly damped has to lower the sum of both by this share, or is the last.
-GAIN = 0.02
+LEAST_GAIN = 0.02
 
 
 @dataclass(frozen=True)
 class ExactAreas:
-    """The unfolding with its areas put right; residual: sum |area share - asked share| left; folded faces left (k,)."""
+    """The unfolding with its areas corrected.
+
+    status: "converged" or "improved"; iterations: steps; residual: sum |area share - target share| left; folded (k,):
+    faces that still are.
+    """
 
     unfolding: Unfolding
     status: str
@@ -46,19 +58,13 @@ class ExactAreas:
     folded: np.ndarray
 
 
-def plane_areas(corners: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Signed areas (m,) of triangles (m,3) of corners (c,2)."""
-    p = corners[triangles]
-    return 0.5 * cross2(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-
-
 def equirectangular_areas(points: np.ndarray, unfolded: Unfolding, polygons: Polygons) -> np.ndarray:
-    """Areas (m,) that the straight triangles of an equirectangular unfolding of unit vectors (n,3) shall have.
+    """Target areas (m,) of the straight triangles of an equirectangular unfolding of unit vectors (n,3).
 
     Most keep what they have; those near a pole, but not at it, that are folded, or far from the area of their curved
     image, get the latter. The points are as they were laid out.
     """
-    straight = plane_areas(unfolded.corners(), polygons.triangles)
+    straight = signed_areas(unfolded.corners(), polygons.triangles)
     cells = np.einsum("qk,mkd->mqd", _CELLS, points[polygons.vertex_triangles])
     cosine = np.hypot(cells[..., 0], cells[..., 1]) / np.linalg.norm(cells, axis=2)
     stretch = (1 / np.maximum(cosine, 1e-9)).mean(axis=1)
@@ -67,33 +73,35 @@ def equirectangular_areas(points: np.ndarray, unfolded: Unfolding, polygons: Pol
     return np.where(at_pole | (straight > USABLE * curved), straight, curved)
 
 
-def with_areas(unfolded: Unfolding, polygons: Polygons, shares: np.ndarray, projection: str) -> Steps[ExactAreas]:
+def correct_areas(unfolded: Unfolding, polygons: Polygons, shares: np.ndarray, projection: str) -> Steps[ExactAreas]:
     """Move the points of an unfolding so that every triangle has its share (m,) of the area in the plane.
 
-    Levenberg-Marquardt on sum (area / target - 1)^2 target, plus a little of the displacement on the sphere: of all
-    ways to the same areas, nearly the shortest. Points of a cylinder stay within it. Shares that are not positive, of
-    faces folded on the sphere, are taken for tiny ones.
+    Levenberg-Marquardt (Marquardt 1963) on sum (area / target - 1)^2 target, plus a little of the displacement on the
+    sphere: of all ways to the same areas, nearly the shortest. Points of a cylinder stay within it. Shares that are not
+    positive, of faces folded on the sphere, are taken for tiny ones.
     """
     shares = np.maximum(shares / shares.sum(), LEAST_SHARE / len(shares))
     shares /= shares.sum()
     cylindrical = is_cylindrical(projection)
-    problem = _Problem(unfolded, polygons, shares, _sphere_metric(unfolded, projection), cylindrical)
+    problem = _AreaProblem(unfolded, polygons, shares, _sphere_metric(unfolded, projection), cylindrical)
     uv, done = unfolded.uv, 0
     for repeat in range(REPEATS):
         uv, rounds = yield from _levenberg_marquardt(problem, uv, repeat / REPEATS)
         done += rounds
         if not problem.emphasise_folds(uv):
             break
-    result = moved(unfolded, uv)
+    result = unfolded.with_points(uv)
     if cylindrical:
-        result = brought_back(result, polygons)
-    areas = plane_areas(result.corners(), polygons.triangles)
+        result = brought_into_square(result, polygons)
+    areas = signed_areas(result.corners(), polygons.triangles)
     left = float(np.abs(areas / areas.sum() - shares).sum())
     status = "converged" if left < TOLERANCE else "improved"
-    return ExactAreas(result, status, done, left, np.flatnonzero(areas <= 0))
+    return ExactAreas(
+        unfolding=result, status=status, iterations=done, residual=left, folded=np.flatnonzero(areas <= 0)
+    )
 
 
-def _levenberg_marquardt(problem: _Problem, uv: np.ndarray, start: float) -> Steps[tuple[np.ndarray, int]]:
+def _levenberg_marquardt(problem: _AreaProblem, uv: np.ndarray, start: float) -> Steps[tuple[np.ndarray, int]]:
     """Points (k,2) of less energy, and the rounds it took; the progress goes on from `start`."""
     damping, energy, order = DAMPING, problem.energy(uv), problem.order
     done = 0
@@ -102,16 +110,16 @@ def _levenberg_marquardt(problem: _Problem, uv: np.ndarray, start: float) -> Ste
         trial = problem.within(uv + problem.step(uv, damping, order))
         lower = problem.energy(trial)
         if lower < energy:
-            settled = damping <= ANCHOR and lower > (1 - GAIN) * energy
-            uv, energy, damping = trial, lower, damping * RELAX
+            settled = damping <= ANCHOR and lower > (1 - LEAST_GAIN) * energy
+            uv, energy, damping = trial, lower, damping * DAMPING_DECREASE
             if settled:
                 break
         else:
-            damping *= TIGHTEN
+            damping *= DAMPING_INCREASE
     return uv, done
 
 
-class _Problem:
+class _AreaProblem:
     """Residuals (area - target) / sqrt(target) of the triangles, and their derivatives by the points of an
     unfolding."""
 
@@ -137,13 +145,13 @@ class _Problem:
         return np.argsort(place[self.free])
 
     def residual(self, uv: np.ndarray) -> np.ndarray:
-        """Share of the area less the share asked for, times `scale`, (m,), with the points at uv (k,2)."""
-        areas = plane_areas(moved(self.unfolded, uv).corners(), self.triangles)
+        """Share of the area less the target share, times `scale`, (m,), with the points at uv (k,2)."""
+        areas = signed_areas(self.unfolded.with_points(uv).corners(), self.triangles)
         return (areas / areas.sum() - self.shares) * self.scale
 
     def emphasise_folds(self, uv: np.ndarray) -> bool:
         """Let faces that are folded at uv (k,2) count more from now on; whether there are any."""
-        folded = plane_areas(moved(self.unfolded, uv).corners(), self.triangles) <= 0
+        folded = signed_areas(self.unfolded.with_points(uv).corners(), self.triangles) <= 0
         self.scale = np.where(folded, EMPHASIS * np.maximum(self.scale, 1 / np.sqrt(self.shares.mean())), self.scale)
         return bool(folded.any())
 
@@ -168,7 +176,7 @@ class _Problem:
         damping: in units of the metric; order: elimination order of the free coordinates.
         Raises PrecisionError.
         """
-        p = moved(self.unfolded, uv).corners()[self.triangles]
+        p = self.unfolded.with_points(uv).corners()[self.triangles]
         opposite = np.roll(p, -1, axis=1) - np.roll(p, 1, axis=1)
         slope = 0.5 * self.sign[..., None] * np.stack([opposite[..., 1], -opposite[..., 0]], axis=-1)
         total = 0.5 * cross2(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]).sum()

@@ -1,5 +1,4 @@
-"""Vertices on the poles: a sphere map pushed, without a change of area, so that given points of the sphere are
-vertices.
+"""Move vertices of a sphere map onto given points, without a change of area, by flows of local stream functions.
 
 A face with a pole inside it has no image in a cylindrical projection, and one with a fourfold point of the octahedral
 layout inside it cannot be laid out flat. Where these points are vertices there is no such face.
@@ -11,8 +10,9 @@ from itertools import product
 
 import numpy as np
 
-from ..mesh.spherical_geometry import signed_volumes, spherical_areas
+from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
 from ..progress import drain
+from ..sphere.stream_functions import runge_kutta_slopes
 from ..sphere.untangle import straighten_around, with_rings
 from .projections import is_cylindrical
 
@@ -23,8 +23,13 @@ CONES = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
 # and where that folds a coarse mesh, no farther than the vertex itself.
 REACHES = (12.0, 6.0, 3.0, 0.0)
 # How many of the vertices nearest to a point may be the one that is pushed onto it.
-CANDIDATES = 6
-STEPS = 16
+MOST_CANDIDATES = 6
+# Of Runge and Kutta, in a push.
+PUSH_STEPS = 16
+# Sine of a distance of which there is no direction.
+SAME_POINT = 1e-12
+# Distance within which a push is a rotation, in units of what it moves the vertex by.
+RIGID = 1.02
 
 
 def singular_points(projection: str) -> np.ndarray:
@@ -32,8 +37,8 @@ def singular_points(projection: str) -> np.ndarray:
     return POLES if is_cylindrical(projection) else CONES
 
 
-def on_vertices(points: np.ndarray, triangles: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n,3) with the vertex nearest to each target (k,3) pushed onto it, and these vertices (k,), -1 for none.
+def move_vertices_onto(points: np.ndarray, triangles: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Push the vertex of points (n,3) nearest to each target (k,3) onto it: points, and vertices (k,), -1 for none.
 
     Other vertices move only nearby and, but for what a mesh does not resolve, without a change of area. A push that
     would fold a face of triangles (m,3) is not done; then the next nearest vertices are tried. Where all would, as
@@ -43,7 +48,7 @@ def on_vertices(points: np.ndarray, triangles: np.ndarray, targets: np.ndarray) 
     found = np.full(len(targets), -1)
     for k, target in enumerate(targets):
         sound = signed_volumes(points, triangles) > 0
-        nearest = np.argsort(-(points @ target))[:CANDIDATES]
+        nearest = np.argsort(-(points @ target))[:MOST_CANDIDATES]
         for vertex, reach in product(nearest[~np.isin(nearest, found)], REACHES):
             pushed = push(points, points[vertex], target, reach, limit)
             pushed[vertex] = target
@@ -51,13 +56,15 @@ def on_vertices(points: np.ndarray, triangles: np.ndarray, targets: np.ndarray) 
                 points, found[k] = pushed, vertex
                 break
         else:
-            corners = _holding(points, triangles, target)
+            corners = _corners_around(points, triangles, target)
             candidates = np.concatenate([corners, nearest[~np.isin(nearest, corners)]])
-            points, found[k] = _straightened(points, triangles, target, candidates[~np.isin(candidates, found)], found)
+            points, found[k] = _put_and_straighten(
+                points, triangles, target, candidates[~np.isin(candidates, found)], found
+            )
     return points, found
 
 
-def _holding(points: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> np.ndarray:
+def _corners_around(points: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Corners of the faces that hold the target, the one that would move least first."""
     p = points[triangles]
     inside = (np.cross(p, np.roll(p, -1, axis=1)) @ target >= 0).all(axis=1)
@@ -65,11 +72,11 @@ def _holding(points: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> n
     return corners[np.argsort(-(points[corners] @ target), kind="stable")]
 
 
-def _straightened(
+def _put_and_straighten(
     points: np.ndarray, triangles: np.ndarray, target: np.ndarray, candidates: np.ndarray, taken: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Points (n,3) with the first of the candidates (c,) put onto the target around which faces can be straightened,
-    and which, -1 for none. Vertices taken (k,) stay."""
+    """Put the first of the candidates (c,) onto the target around which faces can be straightened: points (n,3), and
+    which vertex, -1 for none. Vertices taken (k,) stay."""
     area = np.maximum(spherical_areas(points, triangles), 0)
     before = signed_volumes(points, triangles) > 0
     for vertex in candidates.tolist():
@@ -85,12 +92,13 @@ def _straightened(
 
 
 def _separation(targets: np.ndarray) -> float:
+    """Least distance in radians between two of unit vectors (k,3)."""
     cosine = targets @ targets.T - 2 * np.eye(len(targets))
     return float(np.arccos(np.clip(cosine.max(), -1, 1)))
 
 
 def push(points: np.ndarray, start: np.ndarray, end: np.ndarray, reach: float, limit: float) -> np.ndarray:
-    """Unit vectors (n,3) moved so that `start` comes to `end`, unless that is farther than `limit`.
+    """Push unit vectors (n,3) so that `start` (3,) comes to `end` (3,), unless that is farther than `limit` radians.
 
     Nothing farther from `end` than `reach` times the distance of the two, or than `limit`, moves.
 
@@ -100,13 +108,13 @@ def push(points: np.ndarray, start: np.ndarray, end: np.ndarray, reach: float, l
     axis = np.cross(start, end)
     sine = np.linalg.norm(axis)
     angle = np.arctan2(sine, start @ end)
-    inner, outer = 1.02 * angle, min(reach * angle, limit)
-    if sine < 1e-12 or inner >= outer:
+    inner, outer = RIGID * angle, min(reach * angle, limit)
+    if sine < SAME_POINT or inner >= outer:
         return points.copy()
     axis /= sine
     result = points.copy()
     near = np.flatnonzero(points @ end > np.cos(outer))
-    x, step = points[near], angle / STEPS
+    x, step = points[near], angle / PUSH_STEPS
 
     def velocity(x: np.ndarray) -> np.ndarray:
         cosine = np.clip(x @ end, -1, 1)
@@ -116,12 +124,8 @@ def push(points: np.ndarray, start: np.ndarray, end: np.ndarray, reach: float, l
         bend = (x @ axis) * slope / np.maximum(np.sin(r), 1e-12)
         return np.cross(axis, x) * f[:, None] - swirl * bend[:, None]
 
-    for _ in range(STEPS):
-        k1 = velocity(x)
-        k2 = velocity(_unit(x + step / 2 * k1))
-        k3 = velocity(_unit(x + step / 2 * k2))
-        k4 = velocity(_unit(x + step * k3))
-        x = _unit(x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+    for _ in range(PUSH_STEPS):
+        x = normalized(x + step / 6 * runge_kutta_slopes(velocity, x, step))
     result[near] = x
     return result
 
@@ -130,7 +134,3 @@ def _smooth_step(r: np.ndarray, inner: float, outer: float) -> tuple[np.ndarray,
     """A function (n,) that falls from 1 at `inner` to 0 at `outer` with two continuous derivatives, and its slope."""
     s = np.clip((r - inner) / (outer - inner), 0, 1)
     return 1 - s**3 * (10 - 15 * s + 6 * s**2), -30 * (s * (1 - s)) ** 2 / (outer - inner)
-
-
-def _unit(x: np.ndarray) -> np.ndarray:
-    return x / np.linalg.norm(x, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""From the unit sphere to the unit square and back: equirectangular, Lambert cylindrical and octahedral equal-area.
+"""Project the unit sphere to the unit square and back: equirectangular, Lambert cylindrical, octahedral equal-area.
 
 North is +Z, the central meridian -Y, which is the front in Blender, and east +X, so that a map seen from outside is not
 mirrored. Equal-area means a constant Jacobian: the square's unit of area for the sphere's 4 pi.
@@ -8,7 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-EQUIRECT, LAMBERT, OCTAHEDRAL = "equirect", "lambert", "octahedral"
+# Longitude and latitude, both evenly spaced.
+EQUIRECT = "equirect"
+# Longitude and height: equal-area (Lambert 1772).
+LAMBERT = "lambert"
+# Octants to triangles: equal-area (Clarberg 2008).
+OCTAHEDRAL = "octahedral"
 PROJECTIONS = (EQUIRECT, LAMBERT, OCTAHEDRAL)
 
 

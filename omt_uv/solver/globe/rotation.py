@@ -1,4 +1,6 @@
-"""Which way round a globe stands: rotations of a sphere map, the only motions that change neither angles nor areas.
+"""Rotate a sphere map to its axes or to markers, by least squares (Kabsch 1976).
+
+Rotations are the only motions of the sphere that change neither angles nor areas.
 
 North is +Z, the central meridian -Y, east +X, as in `projections.py`.
 """
@@ -11,8 +13,8 @@ from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.spherical_geometry import signed_volumes
 
 NORTH = np.array([0.0, 0, 1])
-# Two markers closer than this to each other or to the opposite point give no direction.
-TOO_CLOSE = 1e-6
+# Markers closer than this, on the unit sphere, to each other or to the opposite point give no direction.
+LEAST_DISTANCE = 1e-6
 
 
 class MarkerError(ValueError):
@@ -36,7 +38,7 @@ def along_axes(points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray) 
 
 
 def nearest_rotation(points: np.ndarray, directions: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Rotation R (3,3) with the largest sum of weight (n,) * <R points, directions>, (n,3) both."""
+    """Rotation R (3,3) with the largest sum of weight (n,) * <R points, directions>, (n,3) both (Kabsch 1976)."""
     u, _, vt = np.linalg.svd((directions * weight[:, None]).T @ points)
     return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
 
@@ -51,12 +53,12 @@ def by_markers(pole: np.ndarray, meridian: np.ndarray | None = None, side: np.nd
     ------
     MarkerError : the meridian's marker, or the side's, is at a pole; or the side's is in the west
     """
-    tilt = _shortest_rotation(_unit(pole), NORTH)
+    tilt = _shortest_rotation(_direction(pole), NORTH)
     if meridian is None:
         return tilt
-    turn = _equator_angle(tilt @ _unit(meridian), "meridian")
+    turn = _equator_angle(tilt @ _direction(meridian), "meridian")
     if side is not None:
-        east = _equator_angle(tilt @ _unit(side), "side")
+        east = _equator_angle(tilt @ _direction(side), "side")
         if np.sin(np.angle(east / turn)) <= 0:
             raise MarkerError(
                 "The marker of the eastern side lies west of the meridian. Pick one on the other side; "
@@ -70,7 +72,7 @@ def by_markers(pole: np.ndarray, meridian: np.ndarray | None = None, side: np.nd
 def _equator_angle(point: np.ndarray, name: str) -> complex:
     """cos(latitude) * exp(i longitude), longitude 0 at the central meridian and growing to the east."""
     value = complex(-point[1], point[0])
-    if abs(value) < TOO_CLOSE:
+    if abs(value) < LEAST_DISTANCE:
         raise MarkerError(f"The marker of the {name} lies at a pole of the map. Pick one that is farther from it.")
     return value
 
@@ -79,14 +81,15 @@ def _shortest_rotation(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Rotation (3,3) from one unit vector to another about the axis normal to both."""
     axis, cosine = np.cross(start, end), float(start @ end)
     if cosine < -1 + 1e-12:
-        axis = _unit(np.cross(start, [1.0, 0, 0] if abs(start[0]) < 0.9 else [0, 1.0, 0]))
+        axis = _direction(np.cross(start, [1.0, 0, 0] if abs(start[0]) < 0.9 else [0, 1.0, 0]))
         return 2 * np.outer(axis, axis) - np.eye(3)
     K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     return np.eye(3) + K + K @ K / (1 + cosine)
 
 
-def _unit(x: np.ndarray) -> np.ndarray:
+def _direction(x: np.ndarray) -> np.ndarray:
+    """Unit vector (3,) of the mean x (3,) of a marker's vertices. Raises MarkerError where they have none."""
     length = np.linalg.norm(x)
-    if not length > TOO_CLOSE:
+    if not length > LEAST_DISTANCE:
         raise MarkerError("The vertices of a marker are all around the sphere and have no middle. Mark fewer of them.")
     return x / length

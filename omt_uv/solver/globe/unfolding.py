@@ -1,7 +1,7 @@
-"""A map to the sphere laid out in the plane, with no face torn by the edge of the projection.
+"""Lay a map to the sphere out in the plane, no face torn, by placing every corner on a copy of the unit square.
 
-Every corner of a face lies on the copy of the square on which its face hangs together: a face that crosses the seam of
-a cylinder goes on past u = 1, one that crosses a side of the octahedral square goes on beyond that side.
+A corner lies on the copy on which its face hangs together: a face that crosses the seam of a cylinder goes on past u =
+1, one that crosses a side of the octahedral square goes on beyond that side.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .pole_vertices import on_vertices, singular_points
+from .pole_vertices import move_vertices_onto, singular_points
 from .projections import OCTAHEDRAL, check_projection, octahedral_to_plane, to_plane
 
-# A corner this far left of the seam, by rounding, still counts as on it.
+# Of the width of the square: a corner this far left of the seam, by rounding, still counts as on it.
 SEAM_SLACK = 1e-6
 
 
 @dataclass(frozen=True)
 class Polygons:
-    """The faces of one closed part, by their corners.
+    """The faces of one closed component, by their corners.
 
     vertex (c,) of every corner; polygon (c,) ascending from 0, the face it belongs to; triangles (m,3) of corners.
     """
@@ -51,13 +51,17 @@ class Unfolding:
     poles: np.ndarray
     missed: int
 
+    def with_points(self, uv: np.ndarray) -> Unfolding:
+        """The unfolding with its points at uv (k,2)."""
+        return replace(self, uv=uv)
+
     def corners(self) -> np.ndarray:
         """UV (c,2) of every corner."""
         return self.sign[:, None] * self.uv[self.index] + self.offset
 
 
-def polygons_of(corners: np.ndarray, triangles: np.ndarray, faces: np.ndarray) -> tuple[Polygons, np.ndarray]:
-    """Polygons of the triangles (m,3) of local vertices with corners (m,3) of a surface and faces (m,), as in a Chart.
+def gather_polygons(corners: np.ndarray, triangles: np.ndarray, faces: np.ndarray) -> tuple[Polygons, np.ndarray]:
+    """Gather the polygons of a Chart: triangles (m,3) of its vertices, their corners (m,3) on the surface, faces (m,).
 
     Also returns the surface's corner (c,) of every corner.
     """
@@ -72,11 +76,11 @@ def unfold(points: np.ndarray, polygons: Polygons, projection: str) -> tuple[Unf
     """Lay the unit vectors (n,3) of a sphere map out in the plane; also returns them as they were laid out.
 
     The vertices nearest to the poles (to the midpoints of the sides of the octahedral square) are pushed onto them
-    first, `globe_poles.on_vertices`. A corner at a pole gets the mean u of the other corners of its face.
+    first, `move_vertices_onto`. A corner at a pole gets the mean u of the other corners of its face.
     """
     check_projection(projection)
     targets = singular_points(projection)
-    points, singular = on_vertices(points, polygons.vertex_triangles, targets)
+    points, singular = move_vertices_onto(points, polygons.vertex_triangles, targets)
     points = points + 0.0  # no -0.0, whose sign would count
     if projection == OCTAHEDRAL:
         unfolded = _unfold_octahedron(points, polygons, singular)
@@ -89,12 +93,13 @@ def unfold(points: np.ndarray, polygons: Polygons, projection: str) -> tuple[Unf
 
 
 def _unfold_cylinder(points: np.ndarray, polygons: Polygons, projection: str, singular: np.ndarray) -> Unfolding:
+    """The unfolding of a cylinder: u of every corner within half a turn of the first usable one of its face."""
     uv = to_plane(points, projection)
     vertex, polygon = polygons.vertex, polygons.polygon
     at_pole = np.isin(vertex, singular[singular >= 0])
-    at_pole |= _stand_in(points, polygons)
+    at_pole |= _pole_corners(points, polygons)
     u = uv[vertex, 0]
-    u = u - np.round(u - u[_first_sound(polygon, ~at_pole)][polygon])
+    u = u - np.round(u - u[_first_usable(polygon, ~at_pole)][polygon])
     count = polygon.max() + 1
     others = np.bincount(polygon[~at_pole], minlength=count)
     mean = np.bincount(polygon[~at_pole], u[~at_pole], count) / np.maximum(others, 1)
@@ -109,11 +114,19 @@ def _unfold_cylinder(points: np.ndarray, polygons: Polygons, projection: str, si
     poles = np.arange(len(uv)) >= len(points)
     fixed = np.column_stack([poles, poles])
     fixed[np.setdiff1d(np.arange(len(points)), index)] = True
-    return Unfolding(uv, index, np.ones(len(u)), offset, fixed, poles, int((singular < 0).sum()))
+    return Unfolding(
+        uv=uv,
+        index=index,
+        sign=np.ones(len(u)),
+        offset=offset,
+        fixed=fixed,
+        poles=poles,
+        missed=int((singular < 0).sum()),
+    )
 
 
-def brought_back(unfolded: Unfolding, polygons: Polygons) -> Unfolding:
-    """An unfolded cylinder, its points moved, with faces that have left the square brought back by a whole turn."""
+def brought_into_square(unfolded: Unfolding, polygons: Polygons) -> Unfolding:
+    """Bring faces that have left the square, of a cylinder whose points were moved, back by a whole turn."""
     u, polygon = unfolded.corners()[:, 0], polygons.polygon
     start = np.searchsorted(polygon, np.arange(polygon.max() + 1))
     mean = np.bincount(polygon, u) / np.bincount(polygon)
@@ -123,7 +136,7 @@ def brought_back(unfolded: Unfolding, polygons: Polygons) -> Unfolding:
     return replace(unfolded, offset=offset)
 
 
-def _stand_in(points: np.ndarray, polygons: Polygons) -> np.ndarray:
+def _pole_corners(points: np.ndarray, polygons: Polygons) -> np.ndarray:
     """Corners (c,) bool that stand for a pole inside their face: the nearest one of every triangle around a pole."""
     chosen = np.zeros(len(polygons.vertex), bool)
     p = points[polygons.vertex_triangles]
@@ -134,9 +147,9 @@ def _stand_in(points: np.ndarray, polygons: Polygons) -> np.ndarray:
     return chosen
 
 
-def _first_sound(polygon: np.ndarray, sound: np.ndarray) -> np.ndarray:
-    """The first sound corner of every polygon, or the first one where none is."""
-    order = np.lexsort((~sound, polygon))
+def _first_usable(polygon: np.ndarray, usable: np.ndarray) -> np.ndarray:
+    """The first usable corner of every polygon, or the first one where none is."""
+    order = np.lexsort((~usable, polygon))
     return order[np.searchsorted(polygon[order], np.arange(polygon.max() + 1))]
 
 
@@ -144,22 +157,31 @@ def _first_sound(polygon: np.ndarray, sound: np.ndarray) -> np.ndarray:
 
 
 def _unfold_octahedron(points: np.ndarray, polygons: Polygons, singular: np.ndarray) -> Unfolding:
+    """The unfolding of the octahedron: every corner on the copy that the arc from its face's first one leads to."""
     vertex, polygon = polygons.vertex, polygons.polygon
     square = octahedral_to_plane(points)
-    first = _first_sound(polygon, ~np.isin(vertex, singular))
-    sign, offset = _crossings(points[vertex[first][polygon]], points[vertex])
-    sign, offset = _settled(square[vertex], polygon, sign, offset)
+    first = _first_usable(polygon, ~np.isin(vertex, singular))
+    sign, offset = _copies_along_arcs(points[vertex[first][polygon]], points[vertex])
+    sign, offset = _copies_of_middles(square[vertex], polygon, sign, offset)
     fixed = np.zeros((len(points), 2), bool)
     fixed[singular[singular >= 0]] = True
     fixed[np.setdiff1d(np.arange(len(points)), vertex)] = True
     # From [-1, 1] to [0, 1].
     offset = 0.5 * (offset + 1 - sign[:, None])
     none = np.zeros(len(points), bool)
-    return Unfolding(0.5 * (square + 1), vertex, sign, offset, fixed, none, int((singular < 0).sum()))
+    return Unfolding(
+        uv=0.5 * (square + 1),
+        index=vertex,
+        sign=sign,
+        offset=offset,
+        fixed=fixed,
+        poles=none,
+        missed=int((singular < 0).sum()),
+    )
 
 
-def _crossings(p: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sign (c,) and offset (c,2) that bring the image of q to the sheet of p, for arcs between unit vectors (c,3).
+def _copies_along_arcs(p: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sign (c,) and offset (c,2) that bring the image of q to the copy of p, for arcs between unit vectors (c,3).
 
     The square is cut along the southern halves of the meridians of its sides' midpoints c; beyond one it goes on as
     x -> 2 c - x.
@@ -181,7 +203,7 @@ def _crossings(p: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     for k in (0, 1):
         centres[k][:, k] = np.where(sides[k] < 0, -1, 1)
     sign, offset = np.ones(len(p)), np.zeros((len(p), 2))
-    # The sheets are left one by one, so the turn about the last cut is done first.
+    # The copies are left one by one, so the turn about the last cut is done first.
     for k in (0, 1):
         crossed = np.isfinite(np.where(x_last, times[1 - k], times[k]))
         centre = np.where(x_last[:, None], centres[1 - k], centres[k])
@@ -190,10 +212,10 @@ def _crossings(p: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return sign, offset
 
 
-def _settled(
+def _copies_of_middles(
     square: np.ndarray, polygon: np.ndarray, sign: np.ndarray, offset: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sign and offset of all corners with every polygon moved to the sheet that holds its middle."""
+    """Sign and offset of all corners with every polygon moved to the copy that holds its middle."""
     uv = sign[:, None] * square + offset
     count = np.bincount(polygon)
     middle = np.column_stack([np.bincount(polygon, x) / count for x in uv.T])[polygon]
@@ -202,8 +224,3 @@ def _settled(
     order = np.lexsort((np.round(excess, 9), polygon))
     best = order[np.searchsorted(polygon[order], np.arange(polygon.max() + 1))][polygon]
     return sign[best] * sign, sign[best][:, None] * (offset - offset[best])
-
-
-def moved(unfolded: Unfolding, uv: np.ndarray) -> Unfolding:
-    """The unfolding with its points at uv (k,2)."""
-    return replace(unfolded, uv=uv)

@@ -31,6 +31,11 @@ from .untangle import untangle_on_sphere
 
 # Predicted decrease over energy at which an area weight is left for a greater one, where the area error is not reached.
 TOLERANCE = 1e-2
+# Least and greatest factor by which the area weight grows where the area error is not reached.
+LEAST_GROWTH = 2.0
+MOST_GROWTH = 10.0
+# Share of its value below which the area error has to fall for the same area weight to be used again.
+ENOUGH_PROGRESS = 0.9
 # Steps on the way from coarse to fine: the finer levels do the rest.
 RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
 
@@ -166,8 +171,11 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
             )
         if k >= len(weights):
             # What is left may be due to large faces, whose projections are smaller: then projecting anew is enough.
-            projections_right = current.projected_area_error(p) <= 0.5 * settings.area_error and error < 0.9 * before
-            growth = 1.0 if projections_right else min(max(2.0, (error / settings.area_error) ** 2), 10.0)
+            projections_right = (
+                current.projected_area_error(p) <= 0.5 * settings.area_error and error < ENOUGH_PROGRESS * before
+            )
+            excess = error / settings.area_error
+            growth = 1.0 if projections_right else min(max(LEAST_GROWTH, excess**2), MOST_GROWTH)
             weights.append(weights[-1] * growth)
 
 

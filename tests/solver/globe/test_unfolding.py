@@ -7,10 +7,11 @@ import pytest
 from meshes import icosphere, polygon_surface
 from scipy.spatial import ConvexHull
 
-from omt_uv.solver.globe.exact_areas import equirectangular_areas, plane_areas, with_areas
-from omt_uv.solver.globe.pole_vertices import CONES, POLES, on_vertices, push
+from omt_uv.solver.globe.exact_areas import correct_areas, equirectangular_areas
+from omt_uv.solver.globe.pole_vertices import CONES, POLES, move_vertices_onto, push
 from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
-from omt_uv.solver.globe.unfolding import Polygons, polygons_of, unfold
+from omt_uv.solver.globe.unfolding import Polygons, gather_polygons, unfold
+from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
 
@@ -64,7 +65,7 @@ def laid_out(P, F, projection):
     shares = spherical_areas(P, F) / (4 * np.pi)
     if projection == EQUIRECT:
         shares = equirectangular_areas(points, unfolded, polygons)
-    exact = drain(with_areas(unfolded, polygons, shares, projection))
+    exact = drain(correct_areas(unfolded, polygons, shares, projection))
     return exact.unfolding, polygons, points, shares
 
 
@@ -82,7 +83,7 @@ def test_corners_are_images_of_their_vertices(sphere, projection):
 def test_no_face_is_torn_or_folded(sphere, projection):
     unfolded, polygons, _, _ = laid_out(*sphere, projection)
     corners = unfolded.corners()[polygons.triangles]
-    assert (plane_areas(unfolded.corners(), polygons.triangles) > 0).all()
+    assert (signed_areas(unfolded.corners(), polygons.triangles) > 0).all()
     # A face that was torn would be as long as the square is wide.
     size = np.ptp(corners, axis=1)
     assert np.median(size) < 0.2 and size.max() < 0.75
@@ -91,9 +92,9 @@ def test_no_face_is_torn_or_folded(sphere, projection):
 @pytest.mark.parametrize("projection", [LAMBERT, OCTAHEDRAL])
 def test_straight_faces_get_the_areas_of_the_curved_ones(sphere, projection):
     unfolded, polygons, _, shares = laid_out(*sphere, projection)
-    areas = plane_areas(unfolded.corners(), polygons.triangles)
+    areas = signed_areas(unfolded.corners(), polygons.triangles)
     before, _ = unfold(sphere[0], polygons, projection)
-    off = plane_areas(before.corners(), polygons.triangles)
+    off = signed_areas(before.corners(), polygons.triangles)
     error, worse = (np.abs(a / a.sum() - shares).sum() for a in (areas, off))
     assert error < 0.5 * worse
     if len(shares) > 500:
@@ -128,7 +129,7 @@ def test_the_poles_are_vertices_and_their_corners_are_spread():
 
 def test_octahedral_cones_are_vertices():
     P, F = random_sphere(900, 1)
-    points, found = on_vertices(P, F, CONES)
+    points, found = move_vertices_onto(P, F, CONES)
     assert (found >= 0).all() and (points[found] == CONES).all()
     assert (signed_volumes(points, F) > 0).all()
 
@@ -173,13 +174,13 @@ def test_quads_stay_whole_and_the_seam_is_one_column():
     points, faces = uv_sphere()
     surface = polygon_surface(points, faces)
     triangles = surface.corner_vertex[surface.triangles]
-    polygons, corners = polygons_of(surface.triangles, triangles, surface.triangle_face)
+    polygons, corners = gather_polygons(surface.triangles, triangles, surface.triangle_face)
     assert (corners == np.arange(len(corners))).all()
     unfolded, placed = unfold(points, polygons, EQUIRECT)
     assert np.allclose(placed, points, atol=1e-12)
     uv = unfolded.corners()
     assert uv.min() >= -1e-6 and uv.max() <= 1 + 1e-6
-    assert plane_areas(uv, polygons.triangles).sum() == pytest.approx(1 - 1 / 12, abs=1e-9)
+    assert signed_areas(uv, polygons.triangles).sum() == pytest.approx(1 - 1 / 12, abs=1e-9)
     for face in range(len(faces)):
         mine = uv[polygons.polygon == face]
         assert np.ptp(mine[:, 0]) == pytest.approx(1 / 16, abs=1e-9)
@@ -190,11 +191,11 @@ def test_quads_across_the_seam_go_on_past_one(turn):
     points, faces = uv_sphere(turn=turn)
     surface = polygon_surface(points, faces)
     triangles = surface.corner_vertex[surface.triangles]
-    polygons, _ = polygons_of(surface.triangles, triangles, surface.triangle_face)
+    polygons, _ = gather_polygons(surface.triangles, triangles, surface.triangle_face)
     unfolded, _ = unfold(points, polygons, EQUIRECT)
     uv = unfolded.corners()
     assert uv[:, 0].min() >= 0 and 1 < uv[:, 0].max() < 1 + 1 / 16
-    assert plane_areas(uv, polygons.triangles).sum() == pytest.approx(1 - 1 / 12, abs=1e-9)
+    assert signed_areas(uv, polygons.triangles).sum() == pytest.approx(1 - 1 / 12, abs=1e-9)
 
 
 def test_a_pole_inside_a_face_is_counted_and_laid_out_flat():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omt_uv.solver.globe.pole_vertices import CONES, POLES, on_vertices
+from omt_uv.solver.globe.pole_vertices import CONES, POLES, move_vertices_onto
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
@@ -63,7 +63,7 @@ def test_limbs_get_their_areas_and_poles_their_vertices(name):
     rng = np.random.default_rng(0)
     for targets in (POLES, CONES):
         turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        placed, vertices = on_vertices(found @ (turn * np.linalg.det(turn)).T, F, targets)
+        placed, vertices = move_vertices_onto(found @ (turn * np.linalg.det(turn)).T, F, targets)
         assert signed_volumes(placed, F).min() > 0
         np.testing.assert_array_equal(placed[vertices], targets)
         assert (vertices >= 0).all() and len(set(vertices)) == len(targets)
