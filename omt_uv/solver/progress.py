@@ -1,4 +1,4 @@
-"""Long solvers are generators: they yield Progress and return their result.
+"""Run long solvers step by step: they are generators that yield Progress and return their result.
 
 One code path serves a script (`drain`), a progress bar (`drain` with a callback) and a modal
 operator, which steps the generator from a timer and closes it to cancel.
@@ -25,7 +25,7 @@ class Progress:
 
 
 class ThreadProgress(Progress):
-    """Progress of a solver that works on a thread of its own: there is nothing to gain by asking again at once."""
+    """Progress of a solver that works on a thread of its own: asking again at once gains nothing."""
 
 
 Steps: TypeAlias = Generator[Progress, None, T]

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh.geometry import angles_from_lengths, cotangent_laplacian, face_normals, halfedge_lengths, vertex_normals
-from ..mesh.topology import halfedges, pair_keys, pair_up
+from ..mesh.topology import halfedges, on_boundary, pair_keys, pair_up
 
 
 def gaussian_curvature(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Angle defect (n,) in radians: 2 pi minus the angles around a vertex, 0 on the rim (Gauss, Bonnet).
+    """Angle defect (n,) in radians: 2 pi minus the angles around a vertex, 0 on the boundary (Gauss, Bonnet).
 
     positions (n,3), triangles (m,3)
     """
@@ -24,7 +24,7 @@ def gaussian_curvature(positions: np.ndarray, triangles: np.ndarray) -> np.ndarr
 
 
 def mean_curvature(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Mean curvature times area (n,), a length, positive on a sphere seen from outside, 0 on the rim.
+    """Mean curvature times area (n,), a length, positive on a sphere seen from outside, 0 on the boundary.
 
     Half of the cotangent Laplacian of the positions along the normal (Meyer, Desbrun, Schroeder, Barr 2003, eq. 8).
     """
@@ -44,13 +44,3 @@ def sharpness(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     for ends in halfedges(triangles):
         np.maximum.at(sharpest, ends[first], angle)
     return sharpest
-
-
-def on_boundary(triangles: np.ndarray, n: int) -> np.ndarray:
-    """Vertices (n,) bool at an edge that does not have two faces."""
-    tail, head = halfedges(triangles)
-    _, index, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
-    open_edge = count[index.ravel()] != 2
-    rim = np.zeros(n, bool)
-    rim[tail[open_edge]] = rim[head[open_edge]] = True
-    return rim

@@ -1,4 +1,4 @@
-"""From a polygon mesh with seams to disk charts, with index maps back to the face corners.
+"""Make disk charts of a polygon surface with seams, with index maps back to the face corners.
 
 A chart vertex is a class of corners that are joined around a vertex by edges which are no seams, so a seam
 that ends inside a chart, and a vertex where two fans meet, are cut open for the map only.
@@ -10,10 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import (
-    NonManifoldEdgeError,
-    NotADiskError,
-)
+from ..errors import NonManifoldEdgeError, NotADiskError
 from .gluing import Gluing, components, corner_classes, groups
 from .surface import Surface, strict_gluing
 from .topology import boundary_loops, halfedges, pair_keys
@@ -43,7 +40,7 @@ class Chart:
 def strict_charts(surface: Surface, faces: np.ndarray | None = None) -> list[Chart]:
     """Charts of the polygons `faces` (f,) bool (all by default), each a topological disk.
 
-    Nothing is repaired: see `preparation.prepare` for meshes that need it.
+    Nothing is repaired: see `cutting.disk_charts` for meshes that need it.
 
     Raises
     ------
@@ -58,22 +55,30 @@ def strict_charts(surface: Surface, faces: np.ndarray | None = None) -> list[Cha
 
 
 def charts_of(surface: Surface, gluing: Gluing) -> list[Chart]:
-    """One chart per connected part of the sheets, in the order of their first triangles."""
+    """One chart per component of the glued triangles, in the order of their first triangles."""
     corner_class = corner_classes(gluing)
-    return [_make(surface, c, gluing, corner_class) for c in groups(components(gluing))]
+    return [_chart(surface, c, gluing, corner_class) for c in groups(components(gluing))]
 
 
-def _make(surface: Surface, members: np.ndarray, gluing: Gluing, corner_class: np.ndarray) -> Chart:
+def _chart(surface: Surface, members: np.ndarray, gluing: Gluing, corner_class: np.ndarray) -> Chart:
+    """The chart of the triangles `members` (k,), one of whose vertices is a class of corners, (c,)."""
     corners, owner = gluing.triangles[members], gluing.owner[members]
     _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
     vertex_ids = gluing.vertex[corners.ravel()[index]]
     local = inverse.reshape(-1, 3).astype(np.int64)
-    # Triangles of no polygon fill holes, see `holes.py`; vertices that only they use are no vertices of the mesh.
+    # Triangles of no polygon fill holes; vertices that only they use are no vertices of the mesh.
     real = owner >= 0
     own = np.zeros(len(vertex_ids), dtype=bool)
     own[local[real]] = True
     positions, ids = surface.positions[vertex_ids], np.where(own, vertex_ids, -1)
-    return Chart(positions, local[real], corners[real], owner[real], ids, local[~real])
+    return Chart(
+        vertices=positions,
+        triangles=local[real],
+        corners=corners[real],
+        faces=owner[real],
+        vertex_ids=ids,
+        patches=local[~real],
+    )
 
 
 def triangle_rows(surface: Surface, chart: Chart) -> np.ndarray:
@@ -82,7 +87,7 @@ def triangle_rows(surface: Surface, chart: Chart) -> np.ndarray:
     A triangle is known by the smaller two of its corners: no other triangle of its polygon has the same two as such.
     """
 
-    def key(triangles):
+    def key(triangles: np.ndarray) -> np.ndarray:
         ordered = np.sort(triangles, axis=1)
         return pair_keys(ordered[:, 0], ordered[:, 1])
 
@@ -92,7 +97,10 @@ def triangle_rows(surface: Surface, chart: Chart) -> np.ndarray:
 
 
 def check_edges(chart: Chart) -> None:
-    """Straight lines in the plane cannot tell apart two edges, or diagonals, between the same two vertices."""
+    """Raise NonManifoldEdgeError where two edges of a chart, or diagonals, have the same two vertices.
+
+    Straight lines in the plane could not tell them apart.
+    """
     tail, head = halfedges(chart.disk)
     unique, index, count = np.unique(pair_keys(tail, head), return_index=True, return_counts=True)
     wrong = index[count > 2]
@@ -128,9 +136,10 @@ def check_disk(chart: Chart) -> None:
         raise NotADiskError(f"A chart has {plural}", kind="face", elements=faces)
 
 
-def _boundary_remedy(chart: Chart, rim: np.ndarray) -> str:
+def _boundary_remedy(chart: Chart, boundary: np.ndarray) -> str:
+    """What to do about several boundaries, all of whose vertices are given (b,)."""
     remedy = "Mark seams that join the boundaries, or fill the holes"
     # Adding zero makes -0.0 and 0.0 the same.
-    if len(np.unique(chart.vertices[rim] + 0.0, axis=0)) < len(np.unique(chart.vertex_ids[rim])):
+    if len(np.unique(chart.vertices[boundary] + 0.0, axis=0)) < len(np.unique(chart.vertex_ids[boundary])):
         return f"Use Merge by Distance where they touch. {remedy}"
     return remedy

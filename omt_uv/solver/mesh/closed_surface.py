@@ -1,4 +1,4 @@
-"""Closed surfaces of genus 0: checked, moved into a unit box, and given area where they have none."""
+"""Check that a surface is closed and of genus 0, move it into a unit box, and give area to faces that have none."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def closed_surface(vertices: np.ndarray, triangles: np.ndarray) -> ClosedSurface
     Raises
     ------
     MeshError : EmptyMeshError, NonFiniteError, DuplicateFaceError, NonManifoldEdgeError, OrientationError;
-        NotASphereError for boundaries, handles, several parts, fans that meet at a vertex, and loose vertices;
+        NotASphereError for boundaries, handles, several components, fans that meet at a vertex, and loose vertices;
         ZeroAreaFaceError where no repair helps. Elements are indices of the input's vertices, edges and triangles.
     """
     vertices, triangles = np.asarray(vertices, float), np.asarray(triangles, np.int64)
@@ -45,7 +45,7 @@ def closed_surface(vertices: np.ndarray, triangles: np.ndarray) -> ClosedSurface
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
     _check_faces(triangles)
     _check_edges(triangles)
-    _check_parts(triangles, len(vertices))
+    _check_components(triangles, len(vertices))
     _check_genus(triangles)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     # Halves first: the difference of two huge numbers may be infinite.
@@ -55,10 +55,11 @@ def closed_surface(vertices: np.ndarray, triangles: np.ndarray) -> ClosedSurface
     if count:
         who = "A triangle has" if count == 1 else f"{count} triangles have"
         warnings = (f"{who} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve",)
-    return ClosedSurface(sound, triangles, extent, warnings)
+    return ClosedSurface(vertices=sound, triangles=triangles, extent=extent, warnings=warnings)
 
 
 def _check_faces(triangles: np.ndarray) -> None:
+    """Raise unless every triangle (m,3) has three vertices, and no other triangle has the same."""
     a, b, c = np.sort(triangles, axis=1).T
     repeating = np.flatnonzero((a == b) | (b == c))
     if len(repeating):
@@ -70,6 +71,7 @@ def _check_faces(triangles: np.ndarray) -> None:
 
 
 def _check_edges(triangles: np.ndarray) -> None:
+    """Raise unless every edge has two faces that agree about which side is out."""
     tail, head = halfedges(triangles)
     edges, inverse, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
     ends = np.stack([edges >> 32, edges & 0xFFFFFFFF], axis=1)
@@ -87,7 +89,8 @@ def _check_edges(triangles: np.ndarray) -> None:
         raise OrientationError("Neighbouring faces have opposite orientation", kind="edge", elements=ends[forward != 1])
 
 
-def _check_parts(triangles: np.ndarray, n: int) -> None:
+def _check_components(triangles: np.ndarray, n: int) -> None:
+    """Raise unless n vertices are connected by the faces, with one fan of them around each."""
     used = np.zeros(n, dtype=bool)
     used[triangles] = True
     if not used.all():
@@ -95,9 +98,9 @@ def _check_parts(triangles: np.ndarray, n: int) -> None:
             "A vertex belongs to no face", "Use Mesh > Clean Up > Delete Loose", "vertex", np.flatnonzero(~used)
         )
     tail, head = halfedges(triangles)
-    count, part = graph_components(tail, head, n)
+    count, component = graph_components(tail, head, n)
     if count > 1:
-        of_face = part[triangles[:, 0]]
+        of_face = component[triangles[:, 0]]
         largest = np.bincount(of_face).argmax()
         raise NotASphereError(
             f"The surface has {count} parts",
@@ -114,16 +117,17 @@ def _check_parts(triangles: np.ndarray, n: int) -> None:
     fans, fan = graph_components(rows, columns, 3 * m)
     if fans > n:
         pairs = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)
-        torn = np.flatnonzero(np.bincount(pairs[:, 0], minlength=n) > 1)
+        split = np.flatnonzero(np.bincount(pairs[:, 0], minlength=n) > 1)
         raise NotASphereError(
             "Several fans of faces meet in one vertex",
             "Split the vertex (Mesh > Split > Faces by Edges)",
             "vertex",
-            torn,
+            split,
         )
 
 
 def _check_genus(triangles: np.ndarray) -> None:
+    """Raise unless the closed surface has no handles, by Euler's formula."""
     n, m = int(triangles.max()) + 1, len(triangles)
     # Every edge has two faces: V - E + F = n - m / 2 = 2 - 2 genus.
     genus = (2 - (n - m // 2)) // 2

@@ -1,4 +1,4 @@
-"""Closest points on a triangle mesh, many queries at once, on the sheet of the surface that looks the right way.
+"""Find closest points on a triangle mesh, many at once, on the side of the surface that looks the right way.
 
 Candidates come from a k-d tree of points spread over the faces, each with its normal, so that a query on one side of
 a thin part is not answered from the other side; the exact distance to the candidates decides, and the answer walks
@@ -16,12 +16,17 @@ from scipy.spatial import cKDTree
 from .geometry import face_normals
 from .topology import twins
 
+# Samples whose faces are tried for a query.
 CANDIDATES = 4
-# Of nearest points whichever way the surface looks, but for those that look the opposite way by this cosine.
-MORE_CANDIDATES, OPPOSITE = 8, -0.5
+# Samples that are tried whichever way the surface looks there,
+MORE_CANDIDATES = 8
+# but for those that look the opposite way: cosine between the normals.
+OPPOSITE = -0.5
 # Points on the faces are this share of the spacing of queries apart.
 PITCH = 0.7
+# Points on the faces at most, for memory.
 MOST_SAMPLES = 600_000
+# Edges that a walk crosses at most.
 WALK_ROUNDS = 20
 
 
@@ -47,7 +52,7 @@ def closest_on_triangles(q: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndar
 def _in_frame(d1: np.ndarray, d2: np.ndarray, e: np.ndarray, f: np.ndarray, g: np.ndarray):
     """Second and third coordinate of the closest points, from the products of the sides ab, ac with the way to the
     point, and of ab with itself, with ac, and of ac with itself."""
-    va, vb, vc = _weights(d1, d2, e, f, g)
+    va, vb, vc = _scaled_coordinates(d1, d2, e, f, g)
     with np.errstate(divide="ignore", invalid="ignore"):
         total = va + vb + vc
         v, w = vb / total, vc / total
@@ -56,15 +61,15 @@ def _in_frame(d1: np.ndarray, d2: np.ndarray, e: np.ndarray, f: np.ndarray, g: n
     return v, w
 
 
-def _weights(d1, d2, e, f, g):
-    """Barycentric coordinates of the foot in the plane, times the square of twice the area."""
+def _scaled_coordinates(d1, d2, e, f, g):
+    """Barycentric coordinates of the nearest point of the plane, times the square of twice the area."""
     d3, d4, d5, d6 = d1 - e, d2 - f, d1 - f, d2 - g
     return d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
 
 
 def _on_triangle_boundary(d1, d2, e, f, g):
-    """As `_in_frame`, for points whose foot is not inside."""
-    va, vb, vc = _weights(d1, d2, e, f, g)
+    """As `_in_frame`, for points whose nearest point of the plane is outside of the triangle."""
+    va, vb, vc = _scaled_coordinates(d1, d2, e, f, g)
     d3, d4, d5, d6 = d1 - e, d2 - f, d1 - f, d2 - g
     with np.errstate(divide="ignore", invalid="ignore"):
         on_bc = (d4 - d3) / ((d4 - d3) + (d5 - d6))
@@ -90,6 +95,7 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _square(a: np.ndarray) -> np.ndarray:
+    """Squared lengths (...) of vectors (..., 3)."""
     return np.einsum("...i,...i->...", a, a)
 
 
@@ -105,14 +111,14 @@ class ClosestPoint:
         self._products = np.stack([_product(ab, ab), _product(ab, ac), _product(ac, ac)])
         self.neighbour = np.where((t := twins(triangles)) >= 0, t // 3, -1).reshape(-1, 3)
         # A normal to the opposite side counts as far as one spacing.
-        self.weight = 0.5 * spacing
+        self.normal_scale = 0.5 * spacing
         self.spacing = spacing
 
     def __call__(self, points: np.ndarray, normals: np.ndarray) -> SurfacePoints:
         """Closest points to points (k,3) where the surface looks about the way of normals (k,3)."""
         owner, _ = self._spread
         k = min(CANDIDATES, len(owner))
-        _, index = self._tree.query(np.column_stack([points, self.weight * normals]), k=k)
+        _, index = self._tree.query(np.column_stack([points, self.normal_scale * normals]), k=k)
         faces = owner[index.reshape(len(points), k)]
         _, distance = self.distance(points, faces)
         # The right side first, then the distance.
@@ -128,7 +134,7 @@ class ClosestPoint:
     @cached_property
     def _tree(self) -> cKDTree:
         owner, samples = self._spread
-        return cKDTree(np.column_stack([samples, self.weight * self.normals[owner]]))
+        return cKDTree(np.column_stack([samples, self.normal_scale * self.normals[owner]]))
 
     @cached_property
     def _plain(self) -> cKDTree:

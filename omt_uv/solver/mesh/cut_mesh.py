@@ -1,4 +1,4 @@
-"""The sides of seams: a triangle mesh cut open along edges, and descents on it that cannot cross them.
+"""Cut a triangle mesh open along seams, and walk on it to nearest points without crossing them.
 
 Values such as UVs jump across seams, also where both sides belong to one island. A point on a seam has a value for
 every side, and which one is meant is answered by walking to the point from a place that is on one side for certain.
@@ -15,7 +15,9 @@ from scipy.sparse.csgraph import dijkstra
 from .closest_point import closest_on_triangles
 from .topology import expand, graph_components, halfedges, next_halfedge, pair_keys, pair_up, twins
 
+# Steps of a walk at most, from one triangle to the next.
 MOST_ROUNDS = 200
+# Entries of the distances that are searched at a time, for memory.
 MOST_CELLS = 5_000_000
 # A way without a seam that is longer by this leads round the end of one.
 DETOUR = 1.2
@@ -53,7 +55,8 @@ def cut_open(positions: np.ndarray, triangles: np.ndarray, seams: np.ndarray) ->
     count, label = graph_components(rows, columns, c)
     owner = np.arange(c) // 3
     star = csr_matrix((np.ones(c), (label, owner)), shape=(count, len(triangles)))
-    return CutMesh(positions, triangles, label.reshape(-1, 3).astype(np.int64), seam, star)
+    sides = label.reshape(-1, 3).astype(np.int64)
+    return CutMesh(positions=positions, triangles=triangles, sides=sides, seam=seam, star=star)
 
 
 def seam_points(mesh: CutMesh, spacing: float) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +104,9 @@ def descend(mesh: CutMesh, points: np.ndarray, start: np.ndarray) -> tuple[np.nd
     return faces, distance
 
 
-def apart(mesh: CutMesh, start: np.ndarray, end: np.ndarray, limit: np.ndarray, slack: np.ndarray) -> np.ndarray:
+def are_across_seams(
+    mesh: CutMesh, start: np.ndarray, end: np.ndarray, limit: np.ndarray, slack: np.ndarray
+) -> np.ndarray:
     """Whether seams lie between triangles (k,) and (k,): a way over the faces without a seam is longer than one with.
 
     For descents that stopped in a valley: on a curved surface the way may first lead away. limit (k,): longest way
@@ -138,6 +143,7 @@ def _stars(mesh: CutMesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _distance(mesh: CutMesh, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Distance (k,) of points (k,3) from triangles (k,)."""
     corners = mesh.positions[mesh.triangles[faces]]
     b = closest_on_triangles(points, corners[:, 0], corners[:, 1], corners[:, 2])
     return np.linalg.norm(np.einsum("kc,kcj->kj", b, corners) - points, axis=1)

@@ -1,4 +1,4 @@
-"""Edge flips in flat arrays, many at once: the kernel of Delaunay and of regular triangulations.
+"""Flip edges of flat arrays, many at once, in rounds of independent sets (Lawson 1977).
 
             k                            k
           /   \\                        / | \\
@@ -56,7 +56,7 @@ def flip_until_none(
     """Flip edges in rounds until none wants to; the number of flips, and whether the rounds came to an end.
 
     `violation` gives of interior halfedges (e,) a number that is negative where the edge is to flip, the lower the
-    sooner; `flip` flips an independent set in place. A round takes the edges that are the worst in both of their
+    sooner; `flip` flips an independent set (k,) in place. A round takes the edges that are the worst in both of their
     triangles; the next one looks only at triangles that were touched and at edges that had to wait. The first one looks
     at all edges, or at those given as one halfedge each (e,).
     """

@@ -1,4 +1,4 @@
-"""Lengths, angles, areas and the cotangent Laplacian of triangle meshes."""
+"""Measure triangle meshes: lengths, angles, areas, normals, and the cotangent Laplacian (Pinkall, Polthier 1993)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.sparse import csr_matrix
 
-PART = 1 << 14
+# Rows of arrays that are worked on at a time, so few that what is computed from them stays in the cache.
+CHUNK = 1 << 14
 
 
 def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -32,7 +33,7 @@ def as_points(z: np.ndarray) -> np.ndarray:
 
 def in_parts(*arrays: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
     """Parts of arrays (k, ...), so small that what is computed from one of them stays in the cache."""
-    count = len(arrays[0]) // PART + 1
+    count = len(arrays[0]) // CHUNK + 1
     return zip(*(np.array_split(a, count) for a in arrays), strict=True)
 
 
@@ -104,7 +105,7 @@ def angles_from_lengths(length: np.ndarray) -> np.ndarray:
 
 
 def least_angles(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The least angle of every triangle, (m,)."""
+    """The least angle of every triangle, (m,) in radians, of positions (n,2) or (n,3)."""
     return angles_from_lengths(halfedge_lengths(positions, triangles).reshape(-1, 3)).min(axis=1)
 
 
@@ -119,23 +120,23 @@ def cotangents_from_lengths(length: np.ndarray) -> np.ndarray:
     return np.where(safe[:, None], numerator / np.where(safe, four_area, 1)[:, None], 0)
 
 
-def laplacian_from_weights(tail: np.ndarray, head: np.ndarray, weight: np.ndarray, n: int) -> csr_matrix:
-    """Positive semidefinite graph Laplacian (n,n) of edges with weights (each pair may repeat)."""
-    degree = np.bincount(tail, weight, n) + np.bincount(head, weight, n)
+def laplacian_from_weights(tail: np.ndarray, head: np.ndarray, stiffness: np.ndarray, n: int) -> csr_matrix:
+    """Positive semidefinite graph Laplacian (n,n) of edges tail, head (e,) of this stiffness (e,); pairs may repeat."""
+    degree = np.bincount(tail, stiffness, n) + np.bincount(head, stiffness, n)
     rows, columns = np.concatenate([tail, head, np.arange(n)]), np.concatenate([head, tail, np.arange(n)])
-    return csr_matrix((np.concatenate([-weight, -weight, degree]), (rows, columns)), shape=(n, n))
+    return csr_matrix((np.concatenate([-stiffness, -stiffness, degree]), (rows, columns)), shape=(n, n))
 
 
 def cotangent_laplacian(positions: np.ndarray, triangles: np.ndarray) -> csr_matrix:
     """Positive semidefinite cotangent Laplacian (n,n), entries -(cot + cot) / 2 (Pinkall, Polthier 1993)."""
     length = halfedge_lengths(positions, triangles).reshape(-1, 3)
     # The angle opposite to halfedge k is the one at vertex k + 2.
-    weight = 0.5 * cotangents_from_lengths(length)
-    return laplacian_from_weights(triangles.ravel(), triangles[:, [1, 2, 0]].ravel(), weight.ravel(), len(positions))
+    stiffness = 0.5 * cotangents_from_lengths(length)
+    return laplacian_from_weights(triangles.ravel(), triangles[:, [1, 2, 0]].ravel(), stiffness.ravel(), len(positions))
 
 
 def angle_defects(triangles: np.ndarray, angles: np.ndarray, boundary: np.ndarray, n: int) -> np.ndarray:
-    """Curvature per vertex, (n,): 2 pi (on the boundary, pi) minus the angles around it.
+    """Curvature per vertex, (n,) in radians: 2 pi (pi on the boundary (b,)) minus the angles around it.
 
     `angles` (m,3) holds the angle *opposite* to halfedge k, which lies at vertex k + 2.
     """

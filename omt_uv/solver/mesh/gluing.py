@@ -1,7 +1,7 @@
-"""Triangles of a polygon mesh and the halfedges across which they hang together.
+"""Glue triangles of a polygon mesh along pairs of halfedges; components, fans and orientations of the result.
 
-All topology that knows of corners is here: `charts.py` joins strictly, `repair.py` joins what can be joined, and
-`cutting.py` takes pairs away again. Orientation is a property of the pairs: two triangles agree when their common
+All topology that knows of corners is here: `surface.py` joins strictly, `repair.py` joins what can be joined, and
+`cutting` takes pairs away again. Orientation is a property of the pairs: two triangles agree when their common
 edge runs in opposite directions in them.
 """
 
@@ -45,6 +45,18 @@ class Gluing:
         return replace(self, first=self.first[~gone], second=self.second[~gone])
 
 
+def polygon_gluing(
+    triangles: np.ndarray, owner: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
+) -> Gluing:
+    """Triangles (m,3) of corners of the polygons owner (m,), joined across the diagonals of polygons alone.
+
+    corner_vertex (c,) is the vertex of every corner; polygon f owns the corners face_start[f]:face_start[f+1].
+    """
+    side = polygon_sides(len(corner_vertex), face_start, triangles)
+    first, second = diagonal_pairs(triangles, side)
+    return Gluing(triangles=triangles, owner=owner, vertex=corner_vertex, side=side, first=first, second=second)
+
+
 def polygon_sides(corner_count: int, face_start: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Whether each halfedge of the triangles of corners (m,3) is a side of its polygon, (3m,) bool."""
     after = np.arange(corner_count) + 1
@@ -74,15 +86,15 @@ def corner_classes(gluing: Gluing) -> np.ndarray:
 
 
 def components(gluing: Gluing) -> np.ndarray:
-    """Connected part (m,) of every triangle."""
+    """Component (m,) of every triangle."""
     return graph_components(gluing.first // 3, gluing.second // 3, len(gluing.triangles))[1]
 
 
 def orientations(gluing: Gluing, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (m,) bool to turn over so that neighbours agree, and those (m,) of parts where no choice does.
+    """Triangles (m,) bool to turn over so that neighbours agree, and those (m,) of components where no choice does.
 
-    Every triangle has two sides; joining those that look the same way leaves two components for a part that can be
-    oriented and one for a part that cannot. The winding of most of the `area` (m,) is kept.
+    Every triangle has two sides; joining those that look the same way leaves two copies of a component that can be
+    oriented and one of a component that cannot. The winding of most of the `area` (m,) is kept.
     """
     m = len(gluing.triangles)
     t, s = gluing.first // 3, gluing.second // 3
@@ -90,14 +102,14 @@ def orientations(gluing: Gluing, area: np.ndarray) -> tuple[np.ndarray, np.ndarr
     rows, columns = np.concatenate([t, t + m]), np.concatenate([s + shift, s + m - shift])
     label = graph_components(rows, columns, 2 * m)[1]
     front, back = label[:m], label[m:]
-    weight = np.bincount(front, area, label.max() + 1) if m else np.zeros(0)
-    turned = (weight[front] < weight[back]) | ((weight[front] == weight[back]) & (front > back))
+    total = np.bincount(front, area, label.max() + 1) if m else np.zeros(0)
+    turned = (total[front] < total[back]) | ((total[front] == total[back]) & (front > back))
     one_sided = front == back
     return turned & ~one_sided, one_sided
 
 
 def turn_over(gluing: Gluing, turned: np.ndarray) -> Gluing:
-    """The same sheets with the corners of the triangles `turned` (m,) bool in reverse order."""
+    """The same gluing with the corners of the triangles `turned` (m,) bool in reverse order."""
     if not turned.any():
         return gluing
     triangles = np.where(turned[:, None], gluing.triangles[:, [0, 2, 1]], gluing.triangles)

@@ -1,4 +1,4 @@
-"""Which triangle of a triangulation, in the plane or on the sphere, holds a point: walks, all points at once."""
+"""Locate points in triangulations of the plane or the sphere, by random walks (Devillers, Pion, Teillaud 2002)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from .geometry import cross2
 from .topology import twins
 
+# Edges that a walk crosses at most; far more than across a mesh of a million faces.
 MOST_STEPS = 2000
 
 
@@ -39,6 +40,7 @@ def locate(uv: np.ndarray, triangles: np.ndarray, points: np.ndarray, seed: int 
 
 
 def _barycentric(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (k,3) of points (k,d) in triangles (k,3,d); none is positive in a folded triangle."""
     a, b, c = (corners[:, k] - points for k in range(3))
     if points.shape[1] == 3:
         # Seen along the point itself.

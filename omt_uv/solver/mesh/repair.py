@@ -1,4 +1,4 @@
-"""Broken geometry made usable for the map alone: the mesh itself is never touched.
+"""Repair broken geometry for the map alone: the mesh itself is never touched.
 
 Edges where several faces meet are cut open, coincident faces come apart in layers, faces that look to the wrong side
 are turned over, and triangles without area are given a little.
@@ -12,24 +12,25 @@ import numpy as np
 
 from ..errors import ZeroAreaFaceError
 from .charts import Chart
-from .gluing import Gluing, corner_classes, diagonal_pairs, polygon_sides
+from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam
 from .topology import halfedges, pair_keys, pair_up
 
 # Vertices of a triangle without area move by this share of the height of the flattest sound triangle around them:
 # it has area then, and its neighbours keep theirs to within a few thousandths.
-NUDGE = 1e-3
-NUDGE_ROUNDS = 12
+PERTURBATION = 1e-3
+# A round moves four times as far as the one before.
+PERTURBATION_ROUNDS = 12
 # Triangles with less than this share of the square of their longest side have no area that a texture could show, but
 # their angles would cost the solvers half of their digits.
 NEEDLE = 1e-7
-# Share of the extent of the mesh that stands for the size of a part which has none.
-SPECK = 1e-5
+# Share of the extent of the mesh that stands for the size of a chart which has none.
+SHAPELESS_SIZE = 1e-5
 
 
 @dataclass(frozen=True)
 class Repaired:
-    """Gluing in which at most two faces meet at every edge, the edges (k,2) that were torn, and what was done."""
+    """Gluing in which at most two faces meet at every edge, the edges (k,2) where it was torn, and what was done."""
 
     gluing: Gluing
     torn: np.ndarray
@@ -39,11 +40,10 @@ class Repaired:
 def repaired_gluing(surface: Surface, faces: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> Repaired:
     """Join triangles (m,3) of corners of the polygons `faces` (f,) bool across every edge where two of them meet.
 
-    Faces are joined whichever way they look: see `sheets.orientations`. Raises nothing: what cannot be joined is
+    Faces are joined whichever way they look: see `gluing.orientations`. Raises nothing: what cannot be joined is
     cut open, and said.
     """
-    side = polygon_sides(len(surface.corner_vertex), surface.face_start, triangles)
-    gluing = Gluing(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
+    gluing = polygon_gluing(triangles, owner, surface.corner_vertex, surface.face_start)
     layer, warnings = _layers(surface, faces)
     joined, torn = _pair_sides(surface, gluing, layer)
     while len(folded := _folded_faces(joined, layer)):
@@ -146,7 +146,7 @@ def _healed(gluing: Gluing) -> Gluing:
 def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     """The chart with the vertices of triangles without area moved a little, and how many triangles these are.
 
-    See `nudged`. `extent` is that of the whole mesh, for charts without any size.
+    See `perturbed`. `extent` is that of the whole mesh, for charts without any size.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def perturbed(
 ) -> tuple[np.ndarray, int]:
     """Positions (n,3) with the vertices of triangles (m,3) without area moved a little, and how many these are.
 
-    The moves are random but always the same. faces (k,): the names of the first triangles for an error, which blames no
+    The moves are random but always the same. faces (k,): the names of the first triangles for an error, which names no
     others; their own numbers by default.
 
     Raises
@@ -181,14 +181,14 @@ def perturbed(
     # A chart without any area, or without a size that counts, has no shape to keep.
     shapeless = bad.all() or size < 1e-9 * extent
     scale = (extent if size < 1e-9 * extent else size) or 1.0
-    moving = SPECK * rng.random((len(vertices), 3)) if shapeless else vertices / scale - low / scale
-    for k in range(NUDGE_ROUNDS):
+    moving = SHAPELESS_SIZE * rng.random((len(vertices), 3)) if shapeless else vertices / scale - low / scale
+    for k in range(PERTURBATION_ROUNDS):
         bad = degenerate_triangles(moving, triangles, NEEDLE)
         if not bad.any():
             return moving * scale, count
         reach = _least_height(moving, triangles, bad)
         moved = np.unique(triangles[bad])
-        moving[moved] += NUDGE * 4.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
+        moving[moved] += PERTURBATION * 4.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
     names = np.arange(len(triangles)) if faces is None else faces
     raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(names[bad[: len(names)]]))
 
@@ -206,20 +206,22 @@ def _least_height(vertices: np.ndarray, triangles: np.ndarray, bad: np.ndarray) 
     return np.where(np.isfinite(reach), reach, usual)
 
 
-def coincident_boundary_vertices(surface: Surface, gluing: Gluing, part: np.ndarray, is_disk: np.ndarray) -> int:
-    """Boundary vertices that lie exactly on one of another part, or of the same part (m,) where it is no disk (k,).
+def coincident_boundary_vertices(surface: Surface, gluing: Gluing, component: np.ndarray, is_disk: np.ndarray) -> int:
+    """Number of boundary vertices that lie exactly on one of another component, or of the same where it is no disk.
+
+    component (m,): that of every triangle; is_disk (k,): which components are disks.
 
     A disk that touches itself was meant to be open there.
     """
     open_ = np.ones(3 * len(gluing.triangles), dtype=bool)
     open_[gluing.first] = open_[gluing.second] = False
-    rim = np.flatnonzero(open_)
-    rows = np.unique(np.stack([gluing.ends(rim)[0], part[rim // 3]], axis=1), axis=0)
-    vertex, piece = rows.T
+    boundary = np.flatnonzero(open_)
+    rows = np.unique(np.stack([gluing.ends(boundary)[0], component[boundary // 3]], axis=1), axis=0)
+    vertex, owner = rows.T
     # Adding zero makes -0.0 and 0.0 the same.
     place = np.unique(surface.positions[vertex] + 0.0, axis=0, return_inverse=True)[1].ravel()
     apart = _more_than_one(place, vertex)
-    return len(np.unique(vertex[apart & (_more_than_one(place, piece) | ~is_disk[piece])]))
+    return len(np.unique(vertex[apart & (_more_than_one(place, owner) | ~is_disk[owner])]))
 
 
 def _more_than_one(group: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -229,4 +231,5 @@ def _more_than_one(group: np.ndarray, value: np.ndarray) -> np.ndarray:
 
 
 def _count(number: int, what: str) -> str:
+    """A number of things in words, one or several."""
     return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,4 +1,4 @@
-"""Triangles on the unit sphere: orientation, area, and figures of maps to it."""
+"""Measure triangles on the unit sphere: orientation and area (van Oosterom, Strackee 1983)."""
 
 from __future__ import annotations
 

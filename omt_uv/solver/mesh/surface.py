@@ -17,7 +17,7 @@ from ..errors import (
     OrientationError,
     ZeroAreaFaceError,
 )
-from .gluing import Gluing, diagonal_pairs, polygon_sides
+from .gluing import Gluing, polygon_gluing
 from .topology import pair_keys, pair_up
 
 # A triangle whose area is below this share of its longest side squared is a line.
@@ -49,7 +49,12 @@ def triangle_surface(positions: np.ndarray, triangles: np.ndarray, seams=()) -> 
     corners = np.arange(3 * m).reshape(m, 3)
     seams = np.asarray(seams, dtype=np.int64).reshape(-1, 2)
     return Surface(
-        np.asarray(positions, dtype=float), triangles.ravel(), 3 * np.arange(m + 1), corners, np.arange(m), seams
+        positions=np.asarray(positions, dtype=float),
+        corner_vertex=triangles.ravel(),
+        face_start=3 * np.arange(m + 1),
+        triangles=corners,
+        triangle_face=np.arange(m),
+        seams=seams,
     )
 
 
@@ -108,6 +113,7 @@ def degenerate_triangles(positions: np.ndarray, triangles: np.ndarray, flat: flo
 
 
 def _check_areas(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> None:
+    """Raise ZeroAreaFaceError where triangles (m,3) of corners have no area, with the polygons (m,) that own them."""
     wrong = degenerate_triangles(surface.positions, surface.corner_vertex[triangles])
     if wrong.any():
         raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(owner[wrong]))
@@ -132,9 +138,8 @@ def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
 
 def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Gluing:
     """Triangles joined across every edge that is no seam; what cannot be joined is an error."""
-    side = polygon_sides(len(surface.corner_vertex), surface.face_start, triangles)
-    gluing = Gluing(triangles, owner, surface.corner_vertex, side, *diagonal_pairs(triangles, side))
-    sides = np.flatnonzero(side)
+    gluing = polygon_gluing(triangles, owner, surface.corner_vertex, surface.face_start)
+    sides = np.flatnonzero(gluing.side)
     a, b = gluing.ends(sides)
     key = pair_keys(a, b)
     keep = ~is_seam(surface, key)

@@ -1,4 +1,4 @@
-"""Halfedges, twins, boundary loops and components of triangle meshes, as flat arrays.
+"""Connect triangles by flat arrays: halfedges, twins, boundary loops and components.
 
 Halfedge ``3 t + k`` of triangle ``t`` goes from ``T[t, k]`` to ``T[t, (k + 1) % 3]``; the boundary
 has twin -1 and is walked with the surface on its left.
@@ -17,13 +17,13 @@ def halfedges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def pair_keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """One int64 key per unordered pair of non-negative integers below 2^31."""
+    """One int64 key (k,) per unordered pair of integers a, b (k,) from 0 to 2^31 - 1."""
     a, b = a.astype(np.int64), b.astype(np.int64)
     return (np.minimum(a, b) << 32) | np.maximum(a, b)
 
 
 def pair_up(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of the two members of every key that occurs exactly twice, (p,) and (p,)."""
+    """Positions of the two members of every key (k,) that occurs exactly twice, (p,) and (p,)."""
     order = np.argsort(keys)
     ordered = keys[order]
     start = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
@@ -50,12 +50,12 @@ def boundary_edges(triangles: np.ndarray) -> np.ndarray:
 
 
 def next_halfedge(h: np.ndarray) -> np.ndarray:
-    """The following halfedge within the same triangle."""
+    """The following halfedge (k,) of each (k,), within the same triangle."""
     return h + 1 - 3 * (h % 3 == 2)
 
 
 def previous_halfedge(h: np.ndarray) -> np.ndarray:
-    """The preceding halfedge within the same triangle."""
+    """The preceding halfedge (k,) of each (k,), within the same triangle."""
     return h - 1 + 3 * (h % 3 == 0)
 
 
@@ -70,19 +70,29 @@ def graph_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndar
     return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
 
 
+def on_boundary(triangles: np.ndarray, n: int) -> np.ndarray:
+    """Which of n vertices are at an edge that does not have two faces, (n,) bool, of any triangles (m,3)."""
+    tail, head = halfedges(triangles)
+    _, index, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
+    open_edge = count[index.ravel()] != 2
+    boundary = np.zeros(n, bool)
+    boundary[tail[open_edge]] = boundary[head[open_edge]] = True
+    return boundary
+
+
 def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
     """Vertices of every boundary loop in order, surface on the left; longest loop first.
 
     The mesh must be an oriented manifold with one fan per vertex (`charts.strict_charts` guarantees it).
     """
     tail, head = halfedges(triangles)
-    rim = np.flatnonzero(twins(triangles) < 0)
-    if len(rim) == 0:
+    boundary = np.flatnonzero(twins(triangles) < 0)
+    if len(boundary) == 0:
         return []
-    vertices = tail[rim]
+    vertices = tail[boundary]
     successor = np.full(int(triangles.max()) + 1, -1, dtype=np.int64)
-    successor[vertices] = head[rim]
-    label = graph_components(vertices, head[rim], len(successor))[1][vertices]
+    successor[vertices] = head[boundary]
+    label = graph_components(vertices, head[boundary], len(successor))[1][vertices]
     loops = [_walk(successor, vertices[label == c]) for c in np.unique(label)]
     return sorted(loops, key=len, reverse=True)
 

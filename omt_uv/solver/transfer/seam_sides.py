@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.cut_mesh import ON_EDGE, CutMesh, apart, descend, seam_points
+from ..mesh.cut_mesh import ON_EDGE, CutMesh, are_across_seams, descend, seam_points
 from ..mesh.topology import halfedges
 
 # Nearer than this share of the extent is the same point.
@@ -117,7 +117,7 @@ def _sought(
     corners = mesh.positions[mesh.triangles[start[stuck]]]
     size = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
     limit = LONGEST_WAY * np.linalg.norm(points[stuck] - corners.mean(axis=1), axis=1) + size
-    own[stuck] = ~apart(mesh, start[stuck], faces[stuck], limit, size)
+    own[stuck] = ~are_across_seams(mesh, start[stuck], faces[stuck], limit, size)
     return end, reached | own, own
 
 

@@ -19,6 +19,7 @@ from omt_uv.solver.analysis.density import (
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.errors import DensityError, ShareError, WeightError
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.topology import on_boundary
 
 FACTORS = [0.25, 0.5, 1.0, 2.0, 4.0, 16.0]
 
@@ -117,7 +118,7 @@ def test_gauss_bonnet():
     for (V, F), total in ((meshes.icosphere(2), 4 * np.pi), (meshes.torus(), 0.0)):
         assert curvature.gaussian_curvature(V, F).sum() == pytest.approx(total, abs=1e-9)
     V, F = meshes.bumpy()
-    rim = curvature.on_boundary(F, len(V))
+    rim = on_boundary(F, len(V))
     assert rim.sum() == 4 * 16 and not curvature.gaussian_curvature(V, F)[rim].any()
 
 

@@ -232,7 +232,7 @@ def test_what_no_repair_helps():
 def test_a_face_that_no_move_gives_an_area_is_named_by_its_number_in_the_mesh(monkeypatch):
     V = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [0, 1, 0], [0.5, 1, 0]], float)
     surface = meshes.polygon_surface(V, [[0, 1, 4, 5], [1, 2, 3, 4], [5, 4, 6]])
-    monkeypatch.setattr(repair, "NUDGE_ROUNDS", 0)
+    monkeypatch.setattr(repair, "PERTURBATION_ROUNDS", 0)
     with pytest.raises(errors.ZeroAreaFaceError) as caught:
         prepare(surface)
     assert caught.value.kind == "face" and caught.value.elements.tolist() == [2]

@@ -46,7 +46,7 @@ class Carrier:
     def around(self, points: np.ndarray, normals: np.ndarray) -> tuple[Share, Share]:
         """What of the surface is nearest to each of points (k,3) with normals (k,3), roughly, and what of its crests;
         see `surface_samples.crest_samples`."""
-        tree = cKDTree(np.column_stack([points, self.index.weight * normals]))
+        tree = cKDTree(np.column_stack([points, self.index.normal_scale * normals]))
         return self._share(self._samples, points, tree), self._share(self._crests, points, tree)
 
     @property
@@ -56,7 +56,7 @@ class Carrier:
 
     def nearest(self, points: np.ndarray, normals: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Which of points (k,3) with normals (k,3) is nearest to every sample, (s,), of those of its edge length."""
-        s, w = self._samples, self.index.weight
+        s, w = self._samples, self.index.normal_scale
         wanted = self.index.spacing / np.sqrt(self.density[s.faces])
         # A point across a jump of the density may be the nearest, but does not count as one of this side.
         tree = cKDTree(np.column_stack([points, w * normals, 2 * w * np.log(size)]))
@@ -64,7 +64,9 @@ class Carrier:
 
     def _share(self, samples: Samples, points: np.ndarray, tree: cKDTree) -> Share:
         k = len(points)
-        near = tree.query(np.column_stack([samples.points, self.index.weight * samples.normals]))[1].astype(np.int64)
+        near = tree.query(np.column_stack([samples.points, self.index.normal_scale * samples.normals]))[1].astype(
+            np.int64
+        )
         mass = samples.area * self.density[samples.faces] ** 2
         off = mass[:, None] * (samples.points - points[near])
         moment = np.stack([np.bincount(near, off[:, j], k) for j in range(3)], axis=1)
