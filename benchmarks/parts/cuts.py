@@ -37,14 +37,14 @@ def _row(name):
     extent = np.ptp(V, axis=0).max()
     surface = triangle_surface(V, F)
     cuts, seconds = timed(lambda: cut(surface))
-    (piece,) = cuts.pieces
-    cells = {"model": name, "faces": len(F), "handles": piece.handles, "boundaries": piece.boundaries,
-             "tips": len(piece.extremities), "length": cuts.length / extent, "seconds": seconds}  # fmt: skip
-    if piece.handles:
+    (component,) = cuts.pieces
+    cells = {"model": name, "faces": len(F), "handles": component.handles, "boundaries": component.boundaries,
+             "tips": len(component.extremities), "length": cuts.length / extent, "seconds": seconds}  # fmt: skip
+    if component.handles:
         cells["cotree"] = cotree_length(V, F) / extent
         cells["ratio"] = cut(surface, extremities=0).length / extent / cells["cotree"]
     else:
-        cells["tree"] = shortest_tree(V, F, piece.extremities) / extent
+        cells["tree"] = shortest_tree(V, F, component.extremities) / extent
         cells["ratio"] = cells["length"] / cells["tree"]
     return cells
 

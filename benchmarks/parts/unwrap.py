@@ -20,7 +20,7 @@ RIVALS = Option(
 )
 # What a free Standard map is to be faster than.
 FAST = "Minimum Stretch 10"
-# Faces from which medians have to be asked for: all methods together take minutes a run.
+# Faces from which only --methods brings medians: all methods together take minutes a run.
 LARGE = 20_000
 # What a map should reach, by (boundary is free, preset): area_l1. Draft has no goal.
 AREA_GOALS = {(True, "standard"): 0.01, (True, "exact"): 0.001, (False, "standard"): 0.02, (False, "exact"): 0.005}

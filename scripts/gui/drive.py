@@ -31,11 +31,13 @@ class Story:
         self.clicks = 0
 
     def pause(self, seconds=0.3):
+        """Let Blender go on for some seconds."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             yield
 
     def until(self, condition, patience=PATIENCE):
+        """Let Blender go on until a condition holds; the seconds that took."""
         begin = time.monotonic()
         while not condition():
             if time.monotonic() - begin > patience:
@@ -50,10 +52,12 @@ class Story:
             yield
 
     def move(self, x, y):
+        """Move the mouse to a place on the screen."""
         yield from self.x("mousemove", x, y)
         yield from self.pause(0.2)
 
     def click(self, x, y, button=1):
+        """Move there and click; clicks are counted."""
         self.clicks += 1
         yield from self.move(x, y)
         yield from self.x("click", button)
@@ -73,6 +77,7 @@ class Story:
         yield from self.pause()
 
     def key(self, name):
+        """Press and release a key."""
         yield from self.x("key", name)
         yield from self.pause()
 
@@ -85,6 +90,7 @@ class Story:
         yield from self.pause(0.1)
 
     def running(self):
+        """The run in the window, or None."""
         from omt_uv.omt_uv.session import run
 
         return run.current
@@ -97,6 +103,7 @@ class Story:
         return None if summary is None else [summary.title, *summary.rows]
 
     def forget(self):
+        """Let the panel say nothing."""
         from omt_uv.omt_uv.session import summary as last_run
 
         last_run.state.summary = None
@@ -110,6 +117,7 @@ class Story:
         return {name: getattr(found, name) for name in ("area_l1", "angle_mean", "folds", "overlap")}
 
     def area(self, kind):
+        """The first area of a kind, such as "VIEW_3D"."""
         return next(a for a in bpy.context.window_manager.windows[0].screen.areas if a.type == kind)
 
     def place(self, kind, from_right, from_top):
@@ -118,6 +126,7 @@ class Story:
         return area.x + area.width - from_right, window.height - (area.y + area.height - from_top)
 
     def window_region(self, area):
+        """The main region of an area."""
         return next(r for r in area.regions if r.type == "WINDOW")
 
     def look_at_it(self, view):
@@ -172,6 +181,7 @@ def _head(count):
 
 
 def main():
+    """Play the story, step by step from a timer, and write what it found."""
     story_path, out = map(Path, sys.argv[sys.argv.index("--") + 1 :])
     out.mkdir(parents=True, exist_ok=True)
     # Blender's own handler has no Python of other threads; the file stays open as long as Blender lives.

@@ -20,6 +20,7 @@ KEPT = {
 
 
 def main() -> None:
+    """Copy the pictures that the documentation shows."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--from", dest="source", type=Path, default=ROOT / "build" / "gui")
     parser.add_argument("--to", dest="target", type=Path, default=ROOT / "docs" / "pictures" / "ui")

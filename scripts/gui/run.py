@@ -30,12 +30,12 @@ def missing() -> str:
     absent = [name for name in PROGRAMS if shutil.which(name) is None]
     if absent:
         return f"{', '.join(absent)} not installed (Debian: apt-get install blender xvfb xdotool libgl1-mesa-dri)"
-    asked = subprocess.run(
+    answer = subprocess.run(
         ["blender", "-b", "--factory-startup", "--python-expr", "import sys; print('PY', *sys.version_info[:2])"],
         capture_output=True,
         text=True,
     )
-    python = next((line.split()[1:] for line in asked.stdout.splitlines() if line.startswith("PY ")), [])
+    python = next((line.split()[1:] for line in answer.stdout.splitlines() if line.startswith("PY ")), [])
     if python != [str(x) for x in sys.version_info[:2]]:
         return (
             f"Blender's Python is {'.'.join(python)}, and numpy is here for {sys.version_info[0]}.{sys.version_info[1]}"
@@ -44,6 +44,7 @@ def missing() -> str:
 
 
 def stories() -> list[Path]:
+    """Files of all stories."""
     return sorted((HERE / "stories").glob("*.py"))
 
 
@@ -94,6 +95,7 @@ def _display(log):
 
 
 def main() -> int:
+    """Play stories; 1 if one of them failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("stories", nargs="*", metavar="STORY", help=" ".join(s.stem for s in stories()))
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "gui")

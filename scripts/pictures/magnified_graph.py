@@ -23,7 +23,8 @@ from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.progress import drain
 
 CELLS = 100  # of the grid along one side: 101 * 101 vertices
-FACTOR, RADIUS = 4.0, 0.15
+FACTOR = 4.0
+RADIUS = 0.15  # of the centre that is magnified
 # Nodes of each ring about the root, and the ring's radius: the centre is crowded.
 RINGS = ((12, 0.055), (34, 0.105), (61, 0.27), (92, 0.43))
 PIXELS = 2048

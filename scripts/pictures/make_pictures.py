@@ -134,6 +134,7 @@ def globe_maps(V, F):
 
 
 def sphere_caption(V, F, points):
+    """Area error and shear of a map to the sphere (n,3)."""
     figures = sphere_figures(V, F, points)
     return f"area error {figures['area_l1']:.3f}   shear {figures['angle_mean']:.2f}"
 
@@ -202,15 +203,18 @@ def strategies_sheet(name, out, scratch, pixels):
 
 
 def caption(case, uv):
+    """Area error and shear of corner UVs (m,3,2)."""
     figures = distortion(case.V, case.F, uv)
     return f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}"
 
 
 def view_of(name):
+    """The camera of a model, or the usual one."""
     return renders.VIEWS.get(name, renders.View())
 
 
 def main():
+    """Make the sheets whose models are at hand."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     present = [n for n in GALLERY if meshes.model_path(n)]
     parser.add_argument("--models", nargs="*", default=present or ["head"])

@@ -14,6 +14,7 @@ SMALLEST_TYPE = 9  # pixels
 
 
 def typeface(size, bold=True):
+    """The font of all pictures, in pixels."""
     return ImageFont.truetype(
         str(Path(matplotlib.get_data_path()) / f"fonts/ttf/DejaVuSans{'-Bold' * bold}.ttf"), max(size, SMALLEST_TYPE)
     )

@@ -19,6 +19,7 @@ CONTENT = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "omt_uv")
 
 
 def this_platform() -> str:
+    """The platform this runs on, as the manifest names it."""
     system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}[platform.system()]
     return f"{system}-{'arm64' if platform.machine().lower() in {'arm64', 'aarch64'} else 'x64'}"
 
@@ -72,6 +73,6 @@ def _manifest_text(platforms: list[str], wheels: set[str]) -> str:
 
 if __name__ == "__main__":
     arguments = sys.argv[1:]
-    wanted = [this_platform()] if arguments == ["--here"] else arguments or manifest()["platforms"]
-    for path in build(wanted):
+    platforms = [this_platform()] if arguments == ["--here"] else arguments or manifest()["platforms"]
+    for path in build(platforms):
         print(f"{path.relative_to(ROOT)}  {path.stat().st_size / 1e6:.0f} MB")

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def manifest() -> dict:
+    """The manifest as a dict."""
     return tomllib.loads((ROOT / "blender_manifest.toml").read_text())
 
 
@@ -26,6 +27,7 @@ def platform_of(wheel: str) -> str:
 
 
 def wheels_for(platforms: list[str]) -> list[str]:
+    """File names of the wheels of platforms."""
     names = [Path(wheel).name for wheel in manifest()["wheels"]]
     return [name for name in names if platform_of(name) in platforms]
 

@@ -41,8 +41,8 @@ def environment(version: str) -> Path | None:
         if found.returncode:
             return None
         subprocess.run([found.stdout.strip(), "-m", "venv", str(python.parent.parent)], check=True)
-    wanted = [f"bpy=={bpy}", f"numpy=={numpy}", PYTEST]
-    subprocess.run([python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *wanted], check=True)
+    packages = [f"bpy=={bpy}", f"numpy=={numpy}", PYTEST]
+    subprocess.run([python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *packages], check=True)
     return python
 
 
@@ -57,6 +57,7 @@ def run(python: Path, archive: Path) -> tuple[int, float]:
 
 
 def main(versions: list[str]) -> int:
+    """Test the versions one after the other; 1 if one of them failed."""
     (archive,) = build([this_platform()])
     rows, failed = [], False
     for version in versions:

@@ -13,20 +13,24 @@ MODELS = ["cow", "spot", "homer", "suzanne", "teapot", "camel_b", "three_holes",
 
 
 def delete(rng, V, P):
+    """Up to a quarter of the faces go."""
     gone = set(rng.choice(len(P), rng.integers(1, max(2, len(P) // 4)), replace=False).tolist())
     return V, [p for i, p in enumerate(P) if i not in gone]
 
 
 def duplicate(rng, V, P):
+    """A face is there twice."""
     return V, [*P, list(P[rng.integers(len(P))])]
 
 
 def flip(rng, V, P):
+    """A face is turned over."""
     i = rng.integers(len(P))
     return V, [p[::-1] if k == i else p for k, p in enumerate(P)]
 
 
 def flip_half(rng, V, P):
+    """Half of the faces are turned over."""
     return V, [p[::-1] if k < len(P) // 2 else p for k, p in enumerate(P)]
 
 
@@ -44,6 +48,7 @@ def collapse(rng, V, P):
 
 
 def repeat_vertex(rng, V, P):
+    """A face of two different vertices."""
     p = list(P[rng.integers(len(P))])
     return V, [*P, [p[0], p[1], p[1]]]
 
@@ -56,29 +61,35 @@ def needle(rng, V, P):
 
 
 def not_a_number(rng, V, P):
+    """A coordinate that is none."""
     V[rng.integers(len(V)), rng.integers(3)] = rng.choice([np.nan, np.inf, -np.inf])
     return V, P
 
 
 def far_away(rng, V, P):
+    """A vertex as far as numbers reach."""
     V[rng.integers(len(V))] *= 10.0 ** rng.integers(2, 300)
     return V, P
 
 
 def scale(rng, V, P):
+    """Units from the smallest to the largest."""
     return V * 10.0 ** rng.uniform(-320, 308), P
 
 
 def offset(rng, V, P):
+    """Far from the origin."""
     return V + 10.0 ** rng.uniform(0, 18), P
 
 
 def flatten(rng, V, P):
+    """One direction is gone, or nearly."""
     V[:, rng.integers(3)] *= 10.0 ** rng.integers(-30, 1)
     return V, P
 
 
 def jitter(rng, V, P):
+    """Noise."""
     return V + 10.0 ** rng.uniform(-3, 1) * rng.normal(size=V.shape), P
 
 
@@ -95,10 +106,12 @@ def hole(rng, V, P):
 
 
 def stray_vertices(rng, V, P):
+    """Vertices without faces, and without positions."""
     return np.concatenate([V, np.full((3, 3), np.nan)]), P
 
 
-def second_part(rng, V, P):
+def second_component(rng, V, P):
+    """Another mesh beside the first."""
     W, Q = BASES[rng.integers(len(BASES))]()
     return np.concatenate([V, W + 3]), [*P, *[[v + len(V) for v in q] for q in _lists(Q)]]
 
@@ -153,10 +166,10 @@ def tunnel(rng, V, P):
 
 
 SURGERY = [delete, duplicate, flip, flip_half, weld, collapse, repeat_vertex, needle, not_a_number, far_away, scale,
-           offset, flatten, jitter, fin, hole, stray_vertices, second_part, shuffle]  # fmt: skip
+           offset, flatten, jitter, fin, hole, stray_vertices, second_component, shuffle]  # fmt: skip
 
 
-# On pieces of real models, which have more of everything.
+# On patches of real models, which have more of everything.
 OPERATIONS = [*SURGERY, swell, zip_open, crush, double, tunnel]
 
 
@@ -204,7 +217,7 @@ def broken_mesh(seed):
     return marked(rng, V, P, auto=0.6)
 
 
-def piece_of_a_model(rng):
+def patch_of_a_model(rng):
     """The faces around a vertex of a real model, a few to several hundred of them."""
     V, F = meshes.load_model(MODELS[rng.integers(len(MODELS))])
     far = np.linalg.norm(V - V[rng.integers(len(V))], axis=1)[F].max(axis=1)
@@ -214,9 +227,9 @@ def piece_of_a_model(rng):
 
 
 def broken_model(seed):
-    """As `broken_mesh`, from a piece of a real model."""
+    """As `broken_mesh`, from a patch of a real model."""
     rng = np.random.default_rng(seed)
-    V, P = piece_of_a_model(rng)
+    V, P = patch_of_a_model(rng)
     with np.errstate(all="ignore"):
         for _ in range(rng.integers(0, 5)):
             if P:

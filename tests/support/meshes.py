@@ -23,6 +23,7 @@ CLOSED_MODELS = ["max_planck", "bunny_small", "spot", "homer", "bunny", "david",
 
 
 def single_triangle():
+    """One triangle."""
     return np.array([[0.0, 0, 0], [2, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
 
 
@@ -71,10 +72,12 @@ def polar(radius, height, rings=8, sectors=24):
 
 
 def cone(rings=8, sectors=24, height=2.0):
+    """A cone without its base."""
     return polar(lambda t: t, lambda t: height * (1 - t), rings, sectors)
 
 
 def hemisphere(rings=10, sectors=32):
+    """The upper half of the unit sphere."""
     return polar(lambda t: np.sin(np.pi / 2 * t), lambda t: np.cos(np.pi / 2 * t), rings, sectors)
 
 
@@ -197,6 +200,7 @@ def subdivide(V, F):
 
 
 def torus(major=24, minor=12, radius=0.4):
+    """A torus around the z axis."""
     i, j = np.meshgrid(np.arange(major), np.arange(minor), indexing="ij")
     u, v = 2 * np.pi * i / major, 2 * np.pi * j / minor
     r = 1 + radius * np.cos(v)
@@ -231,6 +235,7 @@ def polygon_surface(V, polygons, seams=()):
 
 
 def models_folder():
+    """Where published models are looked for."""
     return Path(os.environ.get("OMT_UV_MODELS") or ROOT.parent / "shared" / "models")
 
 

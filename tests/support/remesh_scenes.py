@@ -26,6 +26,7 @@ def ball(name="Ball", rings=12, sectors=20, centre=(0.0, 0.0, 0.0)):
 
 
 def arrays(obj):
+    """Positions (n,3) and triangles (m,3) of an object."""
     mesh = obj.data
     co = np.zeros(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", co)
@@ -35,6 +36,7 @@ def arrays(obj):
 
 
 def values(mesh, name, key="value", width=1):
+    """Values (k,) or (k,width) of an attribute."""
     attribute = mesh.attributes[name]
     out = np.zeros(len(attribute.data) * width, np.float32)
     attribute.data.foreach_get(key, out)
@@ -42,15 +44,18 @@ def values(mesh, name, key="value", width=1):
 
 
 def fill(mesh, name, kind, domain, data, key="value"):
+    """Add an attribute with the given values."""
     attribute = mesh.attributes.new(name, kind, domain)
     attribute.data.foreach_set(key, np.ascontiguousarray(data).ravel())
 
 
 def made(before):
+    """Objects that were not there before."""
     return [obj for obj in bpy.data.objects if obj not in before]
 
 
 def remesh(**arguments):
+    """Run the operator; the objects that it made."""
     before = set(bpy.data.objects)
     assert bpy.ops.object.omt_remesh(**arguments) == {"FINISHED"}
     return made(before)
@@ -98,6 +103,7 @@ def dressed(name="Dressed"):
 
 
 def write_ball(path):
+    """Write the sphere, off its centre, as an OBJ file."""
     obj = ball(centre=(1.0, 2.0, 3.0))
     co = [tuple(v.co) for v in obj.data.vertices]
     lines = ["v {:.9g} {:.9g} {:.9g}".format(*p) for p in co]
@@ -106,5 +112,6 @@ def write_ball(path):
 
 
 def read_points(path):
+    """Positions (n,3) of an OBJ file."""
     lines = [line.split() for line in path.read_text().splitlines()]
     return np.array([list(map(float, line[1:4])) for line in lines if line[:1] == ["v"]])

@@ -25,6 +25,7 @@ def add(vertices, faces, name="Mesh", seams=(), edges=()):
 
 
 def select(objects):
+    """Select these objects alone, the last one active."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in objects)
     bpy.context.view_layer.objects.active = objects[-1] if objects else None
@@ -70,6 +71,7 @@ def _flag(mesh, name, domain, values):
 
 
 def leave_edit():
+    """Back to Object Mode."""
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
@@ -183,6 +185,7 @@ def error_of(operator, **arguments):
 
 
 def class_of(name):
+    """The registered class of an operator such as "uv.omt_unwrap"."""
     group, verb = name.split(".")
     return getattr(bpy.types, f"{group.upper()}_OT_{verb}")
 

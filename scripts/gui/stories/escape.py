@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 
 # Places in the 3D View, pixels from its upper right corner.
-TAB, UNWRAP = (10, 213), (127, 105)
+TAB = (10, 213)
+UNWRAP = (127, 105)
 
 
 def tell(story):
+    """Start, wait a moment, press Esc."""
     obj = story.head(200)
     yield from story.open_tab(TAB)
     yield from story.click(*story.place("VIEW_3D", *UNWRAP))

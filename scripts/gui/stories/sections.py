@@ -15,6 +15,7 @@ REMESH = (173, 437), (127, 725)
 
 
 def tell(story):
+    """Open every section once and click its button."""
     obj = closed_head(story)
     paint(obj)
     dress(obj)
@@ -52,6 +53,7 @@ def show_alone(story, obj):
 
 
 def closed_head(story):
+    """The bust with its neck closed."""
     obj = story.head(60)
     mesh = bmesh.new()
     mesh.from_mesh(obj.data)

@@ -5,13 +5,18 @@ from __future__ import annotations
 import bpy
 
 # Places in an editor, pixels from its upper right corner, before and after the box with figures has come.
-TAB, UNWRAP = (10, 213), (127, 105)
-AREA, SHEAR, OFF, HISTOGRAM = (127, 432), (68, 432), (185, 432), (81, 485)
+TAB = (10, 213)
+UNWRAP = (127, 105)
+AREA = (127, 432)
+SHEAR = (68, 432)
+OFF = (185, 432)
+HISTOGRAM = (81, 485)
 # The redo panel, pixels of the window from its lower left corner.
 REDO = (150, 104)
 
 
 def tell(story):
+    """Unwrap, look at it in colours, change a setting."""
     obj = story.head(60)
     yield from story.open_tab(TAB)
     yield from first_unwrap(story, obj)
@@ -20,6 +25,7 @@ def tell(story):
 
 
 def first_unwrap(story, obj):
+    """One click in the tab."""
     yield from story.shoot("tab")
     yield from story.click(*story.place("VIEW_3D", *UNWRAP))
     yield from story.until(lambda: not story.running() and obj.data.uv_layers)
@@ -29,6 +35,7 @@ def first_unwrap(story, obj):
 
 
 def colours(story):
+    """Both colourings and the histogram, on and off."""
     obj = bpy.context.object
     shading = story.area("VIEW_3D").spaces.active.shading
     for name, place in (("area", AREA), ("shear", SHEAR)):

@@ -5,12 +5,18 @@ from __future__ import annotations
 import bpy
 
 # Places in the editor, pixels from its upper right corner, before and after the box with the figures of a live session.
-TAB, UNWRAP, LIVE = (14, 168), (127, 105), (50, 136)
-SLIDER = (200, 136), (110, 136)
-AREA, SHEAR, OFF = (127, 415), (68, 415), (185, 415)
+TAB = (14, 168)
+UNWRAP = (127, 105)
+LIVE = (50, 136)
+SLIDER_START = (200, 136)
+SLIDER_END = (110, 136)
+AREA = (127, 415)
+SHEAR = (68, 415)
+OFF = (185, 415)
 
 
 def tell(story):
+    """Unwrap in the UV Editor, drag the slider, look at both colourings."""
     obj = story.head(60)
     window = bpy.context.window_manager.windows[0]
     window.workspace = bpy.data.workspaces["UV Editing"]
@@ -42,7 +48,7 @@ def live(story, obj):
     """Drag the slider; the UVs follow before the button is let go."""
     seen = []
     yield from story.click(*story.place("IMAGE_EDITOR", *LIVE))
-    start, end = (story.place("IMAGE_EDITOR", *place) for place in SLIDER)
+    start, end = (story.place("IMAGE_EDITOR", *place) for place in (SLIDER_START, SLIDER_END))
     yield from story.drag(start, end, steps=6, keep=lambda: seen.append(story.figures(obj)))
     yield from story.pause(2)
     yield from story.shoot("live")

@@ -1,0 +1,181 @@
+"""The rules of CONTRIBUTING.md that are no matter of layers: results, refusals, docstrings, loops, tools and tests."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import re
+import typing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from omt_uv.solver import errors
+from omt_uv.solver.errors import MeshError
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "omt_uv"
+SOLVER = PACKAGE / "solver"
+MODULES = sorted(p for p in PACKAGE.glob("**/*.py") if "presets" not in p.parts)
+TOOLS = sorted(p for name in ("benchmarks", "scripts", "tests/support") for p in (ROOT / name).glob("**/*.py"))
+TESTS = sorted((ROOT / "tests").glob("**/*.py"))
+MOST_FUNCTION_LINES = 60
+MOST_PARAMETERS = 8
+
+# Dataclasses that change, and why they may.
+CHANGING = {
+    "_Shown": "what an overlay shows of an object until the next change of its UVs",
+    "_LiveIsland": "an island that follows the slider: its UVs are those of the last step",
+    "State": "the last run's summary, which the panel draws",
+}
+# What the solver raises beside the classes of `errors.py`, and why.
+RAISED_BESIDE = {
+    "ValueError": "an argument that no mesh could make valid",
+    "AttributeError": "a name that a package does not have",
+    "StuckError": "caught within remeshing, where another way is tried",
+    "MarkerError": "markers that turn a globe, which are no elements of the mesh that is mapped",
+}
+# Classes of errors that stand neither in `solver/errors.py` nor below UserError.
+OTHER_ERRORS = {"StuckError", "MarkerError", "UserError", "Disturbed"}
+# Generators of faces whose result is no dataclass of its own, and why.
+PLAIN_RESULTS = {"multilevel_start": "positions and how many folds are left: a step of sphere_map alone"}
+# Names of arrays over vertices, edges or faces, whose elements no loop of Python visits.
+ARRAYS = "V|F|vertices|edges|faces|triangles|halfedges|corners|positions|polygons"
+LOOP = re.compile(rf"(range\(len\()?(enumerate\()?(\w+\.)*({ARRAYS})(\.tolist\(\))?\)*")
+SHAPE = re.compile(r"\(\w+(,\s?\w+)*,?\)")
+
+
+def nodes(paths, kind):
+    """Pairs (path, node) of every node of a kind."""
+    for path in paths:
+        yield from ((path, n) for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, kind))
+
+
+def place(path, node):
+    return f"{path.relative_to(ROOT)}:{node.lineno}"
+
+
+def solver_modules():
+    return [p for p in MODULES if p.is_relative_to(SOLVER)]
+
+
+def faces():
+    """Triples (package, name, object) of every name that a package of the solver shows."""
+    for init in sorted(SOLVER.glob("**/__init__.py")):
+        package = importlib.import_module(".".join(init.parent.relative_to(ROOT).parts))
+        for name in getattr(package, "__all__", ()):
+            yield package.__name__, name, getattr(package, name)
+
+
+FUNCTIONS = [pytest.param(f, id=f"{p.removeprefix('omt_uv.')}.{n}") for p, n, f in faces() if inspect.isfunction(f)]
+
+
+# ---- results and refusals -----------------------------------------------------------------------------------
+
+
+def test_dataclasses_are_frozen():
+    changing = {
+        n.name: place(path, n)
+        for path, n in nodes(MODULES, ast.ClassDef)
+        for d in map(ast.unparse, n.decorator_list)
+        if d.startswith("dataclass") and "frozen=True" not in d
+    }
+    assert changing.keys() == CHANGING.keys(), changing
+    assert not [where for where in changing.values() if "solver" in where]
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_solvers_return_frozen_dataclasses(function):
+    result = typing.get_type_hints(function).get("return")
+    if not str(result).startswith("collections.abc.Generator") or function.__name__ in PLAIN_RESULTS:
+        return
+    *_, result = typing.get_args(result)
+    assert dataclasses.is_dataclass(result) and result.__dataclass_params__.frozen
+
+
+def test_the_solver_raises_named_errors():
+    named = {name for name, cls in vars(errors).items() if inspect.isclass(cls)}
+    strange = [
+        f"{place(path, n)} {ast.unparse(n)}"
+        for path, n in nodes(solver_modules(), ast.Raise)
+        if isinstance(n.exc, ast.Call)
+        and ast.unparse(n.exc.func)[:1].isupper()
+        and ast.unparse(n.exc.func) not in named | RAISED_BESIDE.keys()
+    ]
+    assert not strange, "\n".join(strange)
+
+
+def test_errors_have_one_base_in_the_solver_and_one_above():
+    bases = {n.name: {ast.unparse(b) for b in n.bases} for _, n in nodes(MODULES, ast.ClassDef)}
+    exceptions = {"Exception", "ValueError", "RuntimeError"}
+    assert {name for name, above in bases.items() if above & exceptions} == OTHER_ERRORS | {"MeshError"}
+
+
+@pytest.mark.parametrize("cls", [c for c in vars(errors).values() if inspect.isclass(c) and issubclass(c, MeshError)])
+def test_a_refusal_names_cause_elements_and_remedy(cls):
+    refusal = cls("The cause", remedy="The remedy", kind="face", elements=[7, 9])
+    assert {"The cause", "faces: 7, 9", "The remedy"} <= set(
+        re.findall(r"The cause|faces: 7, 9|The remedy", str(refusal))
+    )
+    assert refusal.elements.dtype == np.int64
+    assert cls is MeshError or cls.__doc__
+
+
+# ---- functions ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_public_functions_state_shapes(function):
+    """Where an argument is an array, and no class of ours that states the shapes of its own."""
+    hints = {k: v for k, v in typing.get_type_hints(function).items() if k != "return"}
+    bare = [p for p in inspect.signature(function).parameters if p not in hints or hints[p] is np.ndarray]
+    assert not bare or SHAPE.search(function.__doc__ or ""), bare
+
+
+def test_no_loop_of_python_visits_vertices_edges_or_faces():
+    loops = [
+        f"{place(path, n.iter)} for ... in {ast.unparse(n.iter)}"
+        for path, n in nodes(solver_modules(), ast.For | ast.comprehension)
+        if LOOP.fullmatch(ast.unparse(n.iter))
+    ]
+    assert not loops, "\n".join(loops)
+
+
+# ---- benchmarks, scripts and what tests share ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", TOOLS, ids=lambda p: str(p.relative_to(ROOT)))
+def test_tools_keep_the_rules_of_the_package(path):
+    tree = ast.parse(path.read_text())
+    assert ast.get_docstring(tree)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            assert node.end_lineno - node.lineno < MOST_FUNCTION_LINES, node.name
+            assert len(node.args.args + node.args.kwonlyargs) <= MOST_PARAMETERS, node.name
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            assert ast.get_docstring(node), node.name
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
+            assert not isinstance(node.value, ast.Tuple), "one named constant a line"
+
+
+def test_no_code_stands_among_the_documents():
+    assert not list((ROOT / "docs").glob("**/*.py"))
+
+
+# ---- tests --------------------------------------------------------------------------------------------------
+
+
+def test_tests_find_what_they_share_without_changing_the_path():
+    assert not [p for p in TESTS if p != Path(__file__) and "sys.path" in p.read_text().replace("in sys.path", "")]
+
+
+def test_tests_assert_nothing_about_time():
+    """A machine that is busy would fail them. Only what plays in a real window has a patience."""
+    clocks = {"time", "timeit"}
+    found = [place(p, n) for p, n in nodes(TESTS, ast.Import) if {a.name for a in n.names} & clocks]
+    found += [place(p, n) for p, n in nodes(TESTS, ast.ImportFrom) if n.module in clocks]
+    assert not found
