@@ -1,0 +1,80 @@
+"""What a mesh carries, and the edges at which it jumps."""
+
+import itertools
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.pipelines.attributes import (
+    TYPES,
+    Attributes,
+    Layer,
+    Marks,
+    followed,
+    is_uv,
+    marked_sharp,
+    material_borders,
+    uv_seams,
+)
+from omt_uv.solver.mesh.surface import triangle_surface
+
+
+def carried(F, marks=None, layers=()):
+    none = np.zeros(0, bool)
+    marks = marks or Marks(np.zeros((0, 2), np.int64), none, none, np.zeros(0))
+    return Attributes(np.zeros(len(F), np.int32), np.zeros(len(F), bool), marks, tuple(layers))
+
+
+def middle(F, V):
+    """Edges of the line x = 1/2 of a grid of two columns."""
+    rows = np.flatnonzero(V[:, 0] == 0.5)
+    return {tuple(sorted(map(int, edge))) for edge in itertools.pairwise(rows)}
+
+
+def as_set(edges):
+    return {tuple(sorted(map(int, edge))) for edge in edges}
+
+
+def test_marks_are_sharp_by_any_of_three_names():
+    edges = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
+    bevel = Layer("bevel_weight_edge", "EDGE", "FLOAT", np.array([0, 0, 0.5, 0]))
+    other = Layer("freestyle", "EDGE", "BOOLEAN", np.array([0, 0, 0, 1], bool))
+    marks = Marks(edges, np.ones(4, bool), np.array([1, 0, 0, 0], bool), np.array([0, 0.3, 0, 0]), (bevel, other))
+    attributes = carried(np.zeros((1, 3)), marks)
+    assert np.array_equal(marked_sharp(attributes), edges[:3])
+
+
+def test_marks_away_from_the_lines_are_left_and_named():
+    edges = np.array([[0, 1], [2, 1]])
+    near = Layer("near", "EDGE", "INT", np.array([7, 0]))
+    far = Layer("far", "EDGE", "INT", np.array([7, 1]))
+    none = np.zeros(2, bool)
+    found = followed(carried(np.zeros((1, 3)), Marks(edges, none, none, none, (near, far))), np.array([[1, 0]]))
+    assert [layer.name for layer in found.marks.layers] == ["near"] and found.left == ("far",)
+
+
+def test_uv_seams_are_where_any_map_jumps():
+    V, F = meshes.grid(2, 3)
+    surface, uv = triangle_surface(V, F), V[F.ravel(), :2]
+    right = np.repeat(V[F, 0].mean(axis=1) > 0.5, 3)
+    cut = Layer("cut", "CORNER", "FLOAT2", uv + 5 * right[:, None])
+    whole = Layer("whole", "CORNER", "FLOAT2", uv)
+    colour = Layer("colour", "CORNER", "FLOAT_COLOR", np.random.default_rng(0).random((len(uv), 4)))
+    assert is_uv(cut) and not is_uv(colour)
+    assert len(uv_seams(carried(F, layers=[whole, colour]), surface)) == 0
+    assert as_set(uv_seams(carried(F, layers=[whole, cut, colour]), surface)) == middle(F, V)
+
+
+def test_borders_of_materials():
+    V, F = meshes.grid(2, 3)
+    attributes = carried(F)
+    assert len(material_borders(attributes, triangle_surface(V, F))) == 0
+    attributes.material_index[V[F, 0].mean(axis=1) > 0.5] = 3
+    assert as_set(material_borders(attributes, triangle_surface(V, F))) == middle(F, V)
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_only_numbers_that_mean_amounts_are_interpolated(name):
+    _, size, kind, smooth = TYPES[name]
+    assert size >= 1 and smooth == (kind is np.float32 and name not in ("QUATERNION", "FLOAT4X4"))

@@ -1,0 +1,96 @@
+"""Everything that a mesh carries, on a new mesh: constants stay, and a mesh carried to itself has what it had."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.pipelines.attributes import TYPES, Attributes, Layer, Marks, ShapeKey
+from omt_uv.pipelines.carry_attributes import carry
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.transfer.correspondence import correspond
+
+ELEMENTS = {"POINT": 0, "FACE": 1, "CORNER": 2}
+
+
+def layers_of(V, F, value):
+    """A layer of every type on every domain, its values made by `value(shape, type)`."""
+    counts = {"POINT": len(V), "FACE": len(F), "CORNER": F.size}
+    made = []
+    for domain, count in counts.items():
+        for name, (_, size, kind, _) in TYPES.items():
+            if (domain, name) != ("CORNER", "FLOAT2"):
+                made.append(Layer(f"{domain} {name}", domain, name, value((count, size), kind)))
+    return tuple(made)
+
+
+def mesh_and_coarser():
+    """A flat grid, and a coarser one whose vertices are all among its own."""
+    V, F = meshes.grid(8, 8)
+    W, G = meshes.grid(4, 4)
+    at = np.array([np.flatnonzero((w == V).all(axis=1))[0] for w in W])
+    face, corner = np.array([np.argwhere(v == F)[0] for v in at]).T
+    return V, F, W, G, correspond(V, F, np.zeros((0, 2), np.int64), W, G, face, np.eye(3)[corner])
+
+
+def to_itself(V, F, seams):
+    face, corner = np.array([np.argwhere(v == F)[0] for v in range(len(V))]).T
+    return correspond(V, F, seams, V, F, face, np.eye(3)[corner])
+
+
+def no_marks():
+    none = np.zeros(0, bool)
+    return Marks(np.zeros((0, 2), np.int64), none, none, np.zeros(0, np.float32))
+
+
+def test_constants_of_every_type_on_every_domain_stay_what_they_are():
+    V, F, W, G, at = mesh_and_coarser()
+    old = Attributes(
+        np.full(len(F), 3, np.int32),
+        np.ones(len(F), bool),
+        no_marks(),
+        layers_of(V, F, lambda shape, kind: np.full(shape, 1 if kind is bool else 5, kind)),
+        groups=("a", "b"),
+        weights=np.full((len(V), 2), 0.5),
+        member=np.ones((len(V), 2), bool),
+        keys=(ShapeKey("up", np.tile([0.0, 0.0, 2.0], (len(V), 1)), 0, {}),),
+    )
+    new = carry(old, triangle_surface(V, F), at)
+    counts = {"POINT": len(W), "FACE": len(G), "CORNER": G.size}
+    for layer, before in zip(new.layers, old.layers, strict=True):
+        assert len(layer.values) == counts[layer.domain] and (layer.values == before.values[0]).all(), layer.name
+    assert (new.material_index == 3).all() and new.smooth.all() and len(new.smooth) == len(G)
+    assert (new.weights == 0.5).all() and new.member.all() and len(new.weights) == len(W)
+    assert (new.keys[0].offsets == [0, 0, 2]).all() and new.folded == 0
+
+
+def test_a_linear_uv_map_is_carried_as_it_is():
+    V, F, W, G, at = mesh_and_coarser()
+    linear = np.array([[0.3, 0.1], [-0.2, 0.6]])
+    layer = Layer("UVMap", "CORNER", "FLOAT2", V[F.ravel(), :2] @ linear)
+    old = Attributes(np.zeros(len(F), np.int32), np.zeros(len(F), bool), no_marks(), (layer,))
+    new = carry(old, triangle_surface(V, F), at)
+    assert new.layers[0].values == pytest.approx(W[G.ravel(), :2] @ linear, abs=1e-7) and new.folded == 0
+
+
+def test_a_mesh_carried_to_itself_has_what_it_had():
+    rng = np.random.default_rng(0)
+    V, F = meshes.bumpy(6, 6)
+
+    def value(shape, kind):
+        return rng.integers(0, 2, shape).astype(bool) if kind is bool else rng.integers(-9, 9, shape).astype(kind)
+
+    # Edges with two faces; a boundary parts nothing.
+    edges, faces = np.unique(np.sort(F[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    edges = edges[faces == 2]
+    marks = Marks(edges, *(rng.integers(0, 2, len(edges)).astype(bool) for _ in "ab"), rng.random(len(edges)))
+    old = Attributes(rng.integers(0, 4, len(F)), rng.integers(0, 2, len(F)) > 0, marks, layers_of(V, F, value))
+    new = carry(old, triangle_surface(V, F), to_itself(V, F, edges))
+    for layer, before in zip(new.layers, old.layers, strict=True):
+        assert np.array_equal(layer.values, before.values), layer.name
+    assert np.array_equal(new.material_index, old.material_index) and np.array_equal(new.smooth, old.smooth)
+    known = {frozenset(map(int, e)): k for k, e in enumerate(edges)}
+    found = {frozenset(map(int, e)): k for k, e in enumerate(new.marks.edges)}
+    assert known.keys() <= found.keys()
+    for edge, k in known.items():
+        assert new.marks.seam[found[edge]] == marks.seam[k] and new.marks.sharp[found[edge]] == marks.sharp[k]
+        assert new.marks.crease[found[edge]] == marks.crease[k]

@@ -1,0 +1,91 @@
+"""Closed components to the plane: one globe each, all areas shared out, and errors by the indices of the surface."""
+
+import meshes
+import numpy as np
+import pytest
+from readings import reading, together
+
+from omt_uv.pipelines.globe import GlobeJob, Markers, closed_components, globe_jobs, project
+from omt_uv.pipelines.layout import Refusal
+from omt_uv.settings import GlobeSettings
+from omt_uv.solver.errors import MeshError
+from omt_uv.solver.globe.rotation import MarkerError
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.progress import drain
+
+LAMBERT = GlobeSettings(projection="lambert", quality="draft")
+
+
+def ellipsoid(subdivisions=1):
+    V, F = meshes.icosphere(subdivisions)
+    return V * [1.0, 0.8, 1.3], F
+
+
+def two():
+    V, F = meshes.icosphere(1)
+    return together((V, F), (ellipsoid()[0] + 5, F))
+
+
+def test_components_share_out_the_polygons_whatever_the_seams():
+    V, F = two()
+    for seams in ([], F[:20, :2]):
+        found = closed_components(triangle_surface(V, F, seams))
+        assert np.array_equal(np.sort(np.concatenate([c.faces for c in found])), np.arange(len(F)))
+        assert len(found) == 2
+        for c in found:
+            assert np.array_equal(c.vertex_ids[c.triangles], F[c.faces]) and np.array_equal(c.members, c.faces)
+            assert np.array_equal(V[c.vertex_ids], c.vertices)
+            assert np.array_equal(F.ravel()[c.corners], F[c.faces])
+
+
+def test_only_chosen_polygons_are_a_component():
+    V, F = two()
+    found = closed_components(triangle_surface(V, F), np.arange(len(F)) >= 80)
+    assert len(found) == 1 and found[0].faces.min() == 80 and found[0].vertex_ids.min() == 42
+
+
+def test_different_surfaces_each_get_a_whole_texture_and_their_own_shares():
+    rng = np.random.default_rng(0)
+    V, F = two()
+    W, G = ellipsoid()
+    density = 1 + 0.5 * rng.random(len(G))
+    jobs = globe_jobs([reading(V, F), reading(W, G)], [None, density], [None, None])
+    found = drain(project(jobs, LAMBERT))
+    assert [len(mine) for mine in found.globes] == [2, 1]
+    assert [text for index, text in found.warnings if index == -1]
+    for corners, uv, size in zip(found.corners, found.uv, (F.size, G.size), strict=True):
+        assert np.array_equal(np.sort(corners), np.arange(size)) and np.isfinite(uv).all()
+    for globe in (g for mine in found.globes for g in mine):
+        assert globe.shares.sum() == pytest.approx(1, abs=1e-12)
+        # Coarse faces around the poles leave some of the texture free.
+        assert (globe.areas >= 0).all() and 0.8 < globe.areas.sum() < 1 + 1e-9
+        assert globe.report()["area_l1"] < 0.1
+    (one,) = found.globes[1]
+    area = np.linalg.norm(np.cross(W[G[:, 1]] - W[G[:, 0]], W[G[:, 2]] - W[G[:, 0]]), axis=1)
+    assert one.shares == pytest.approx(area * density / (area @ density), rel=1e-12)
+
+
+def test_the_unit_of_length_does_not_matter():
+    V, F = ellipsoid()
+    one, other = (drain(project([GlobeJob(triangle_surface(s * V, F))], LAMBERT)) for s in (1.0, 4.0))
+    assert other.uv[0] == pytest.approx(one.uv[0], abs=1e-6)
+
+
+def test_a_marked_pole_is_the_north():
+    V, F = ellipsoid()
+    pole = np.zeros(len(V))
+    pole[7] = 1
+    found = drain(project([GlobeJob(triangle_surface(V, F), markers=Markers(pole))], LAMBERT))
+    assert found.uv[0][F.ravel()[found.corners[0]] == 7, 1] == pytest.approx(1, abs=1e-6)
+    with pytest.raises(MarkerError):
+        drain(project([GlobeJob(triangle_surface(V, F), markers=Markers(0 * pole))], LAMBERT))
+
+
+def test_an_open_surface_is_refused_by_its_index_and_its_own_elements():
+    closed, (V, F) = ellipsoid(), two()
+    keep = np.arange(len(F)) != 100
+    with pytest.raises(Refusal) as caught:
+        drain(project([GlobeJob(triangle_surface(*closed)), GlobeJob(triangle_surface(V, F), keep)], LAMBERT))
+    error = caught.value.error
+    assert caught.value.index == 1 and isinstance(error, MeshError)
+    assert error.kind and (error.elements >= (80 if error.kind == "face" else 42)).all()

@@ -1,0 +1,100 @@
+"""What pipelines share: packing into tiles, the way back to corners, and what is said of islands that overlap."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.errors import UserError
+from omt_uv.pipelines.layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together, pack_islands
+from omt_uv.pipelines.unwrap import lay_out
+from omt_uv.settings import FIRST_TILE, Settings
+from omt_uv.solver.editing.uv_islands import uv_islands
+from omt_uv.solver.errors import EmptyMeshError
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.progress import drain
+from omt_uv.xatlas import packing
+
+
+def square(shift=(0.0, 0.0), owner=0):
+    """A flat square as an island of its own, laid out where it lies and then moved."""
+    V, F = meshes.grid(2, 2)
+    island = uv_islands(triangle_surface(V, F), V[F.ravel(), :2]).islands[0]
+    return PlacedIsland(owner=owner, chart=island.chart, uv=island.uv + shift, before=island.uv)
+
+
+def test_every_udim_tile_has_its_own_origin_and_holds_what_the_first_holds():
+    island = square()
+    first, _ = pack_islands([island.uv], [island.chart.triangles], Settings(), None)
+    origins = set()
+    for tile in range(FIRST_TILE, FIRST_TILE + 100):
+        settings = Settings(tile=tile)
+        found, warning = pack_islands([island.uv], [island.chart.triangles], settings, None)
+        assert warning == "" and np.array_equal(found.islands[0], first.islands[0] + settings.tile_origin)
+        origins.add(settings.tile_origin)
+    assert origins == {(column, row) for column in range(10) for row in range(10)}
+
+
+def test_nothing_to_pack_is_packed_as_nothing():
+    found, warning = pack_islands([], [], Settings(), None)
+    assert found.islands == [] and warning == ""
+
+
+def test_the_spare_packer_takes_over_where_the_packer_fails_but_not_where_margins_do(monkeypatch):
+    island = square()
+    arguments = [island.uv], [island.chart.triangles], Settings(margin=5)
+
+    def fail(*_):
+        raise packing.PackingError("no packer")
+
+    def spare(islands, triangles, margin, texture_size):
+        assert margin == 5 and len(triangles) == 1
+        return packing.stack(islands)
+
+    monkeypatch.setattr(packing, "pack", fail)
+    found, warning = pack_islands(*arguments, spare)
+    assert warning == "no packer; packed with none instead" and len(found.islands) == 1
+    with pytest.raises(packing.PackingError):
+        pack_islands(*arguments, None)
+    monkeypatch.undo()
+    with pytest.raises(packing.MarginError):
+        pack_islands(*arguments[:2], Settings(margin=600), spare)
+
+
+def test_corners_come_once_and_in_order_also_where_a_surface_has_no_island():
+    islands = [square((3, 0), owner=2), square(), square((0, 5), owner=2)]
+    corners, uv = corner_uvs(3, islands)
+    assert [len(k) for k in corners] == [24, 0, 24]
+    for mine in corners:
+        assert (np.diff(mine) > 0).all()
+    assert uv[1].shape == (0, 2)
+    # Two islands that have the same corners: the first one counts.
+    assert np.array_equal(uv[2], uv[0] + (3, 0))
+
+
+def test_islands_that_grew_into_each_other_are_told():
+    apart = [square(), square((2, 0))]
+    apart = [PlacedIsland(owner=0, chart=i.chart, uv=i.uv, before=i.uv) for i in apart]
+    assert grown_together(apart) == "" and grown_together(apart[:1]) == ""
+    moved = [apart[0], PlacedIsland(owner=0, chart=apart[1].chart, uv=apart[1].uv - (1.5, 0), before=apart[1].uv)]
+    assert "Islands grew into each other, by 50." in grown_together(moved)
+
+
+def test_a_refusal_is_what_a_user_can_mend_and_names_the_surface():
+    V, F = meshes.grid(2, 2)
+    jobs = [UnwrapJob(triangle_surface(V, F)), UnwrapJob(triangle_surface(V, F), np.zeros(len(F), bool))]
+    with pytest.raises(Refusal) as caught:
+        drain(lay_out(jobs, Settings(quality="draft")))
+    assert caught.value.index == 1 and isinstance(caught.value.error, EmptyMeshError)
+    assert isinstance(caught.value, UserError) and str(caught.value) == str(caught.value.error)
+
+
+def test_different_surfaces_in_one_run_have_one_texel_density():
+    pytest.importorskip("xatlas")
+    surfaces = [meshes.grid(4, 4), meshes.hemisphere(5, 16), meshes.cone(4, 12)]
+    layout = drain(lay_out([UnwrapJob(triangle_surface(V, F)) for V, F in surfaces], Settings(quality="draft")))
+    ratio = []
+    for (V, F), corners, uv in zip(surfaces, layout.corners, layout.uv, strict=True):
+        assert np.array_equal(corners, np.arange(F.size)) and uv.min() >= 0 and uv.max() <= 1
+        ratio.append(np.abs(signed_areas(uv, np.arange(F.size).reshape(-1, 3))).sum() / face_areas(V, F).sum())
+    assert ratio == pytest.approx([layout.packing.scale**2] * 3, rel=1e-6)

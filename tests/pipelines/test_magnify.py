@@ -1,0 +1,139 @@
+"""Painted regions get their shares, over several different objects as well, and everything else stays."""
+
+import meshes
+import numpy as np
+import pytest
+from readings import reading
+
+from omt_uv.pipelines.layout import Refusal
+from omt_uv.pipelines.magnify import Magnified, Region, Shares, magnify, warped_picture, whole_factor
+from omt_uv.settings import MagnifySettings
+from omt_uv.solver.errors import ShareError, WeightError
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.parameterization.chart_pins import CornerPins
+from omt_uv.solver.progress import drain
+
+DRAFT = {"quality": "draft", "factor": 2.0}
+
+
+def region(V, F, weights, uv=None, kind="vertex"):
+    read = reading(V, F, uv)
+    return Region(read.surface, read.faces, weights, read.all_pins, kind)
+
+
+def spot(V, radius=0.6):
+    """Weights that fall off from the middle of the mesh."""
+    return np.clip(1.5 - np.linalg.norm(V[:, :2] - V[:, :2].mean(axis=0), axis=1) / radius, 0, 1)
+
+
+def dome():
+    V, F = meshes.hemisphere(6, 20)
+    return region(V, F, spot(V), V[:, :2])
+
+
+def plate(shift=0.0):
+    V, F = meshes.grid(10, 10)
+    return region(V, F, spot(V, 0.3), V[:, :2] + shift)
+
+
+def region_shares(regions, result):
+    """Weighted UV area of every region, over the UV area of all."""
+    inside, whole = [], 0.0
+    for mine, corners, uv in zip(regions, result.corners, result.uv, strict=True):
+        full = np.zeros((len(mine.surface.corner_vertex), 2))
+        full[corners] = uv
+        area = np.abs(signed_areas(full, mine.surface.triangles))
+        inside.append(area @ mine.of_triangles(np.arange(len(area))))
+        whole += area.sum()
+    return np.array(inside) / whole
+
+
+def test_different_objects_in_one_run_get_their_shares_together():
+    pytest.importorskip("xatlas")
+    regions = [dome(), plate()]
+    result = drain(magnify(regions, MagnifySettings(**DRAFT)))
+    shares = region_shares(regions, result)
+    assert shares.sum() == pytest.approx(result.shares.after, rel=1e-9)
+    assert result.shares.target == pytest.approx(2 * result.shares.before)
+    assert result.shares.after == pytest.approx(result.shares.target, rel=0.03)
+    swapped = drain(magnify(regions[::-1], MagnifySettings(**DRAFT)))
+    assert region_shares(regions[::-1], swapped)[::-1] == pytest.approx(shares, rel=1e-6)
+
+
+def test_different_objects_each_in_their_own_outline():
+    regions = [dome(), plate(2.0), region(*meshes.grid(3, 3), np.zeros(16), meshes.grid(3, 3)[0][:, :2] - 3)]
+    result = drain(magnify(regions, MagnifySettings(source="uv", boundary="own", **DRAFT)))
+    # The third is not painted and not written.
+    assert [len(k) for k in result.corners] == [*(len(r.surface.corner_vertex) for r in regions[:2]), 0]
+    assert [len(report) for report in result.reports] == [1, 1, 0]
+    for island, mine, uv in zip(result.reports, regions, result.uv, strict=False):
+        for figures in island:
+            assert figures["share_asked"] == pytest.approx(2 * figures["share_before"])
+            assert figures["share_after"] == pytest.approx(figures["share_asked"], rel=0.02)
+            assert figures["folds"] == 0
+        if len(uv):
+            # The outline is the one there was; vertices slide along it.
+            assert uv.min(axis=0) == pytest.approx(mine.pins.uv.min(axis=0), abs=1e-3)
+            assert uv.max(axis=0) == pytest.approx(mine.pins.uv.max(axis=0), abs=1e-3)
+
+
+def test_weights_of_faces_are_those_of_their_triangles():
+    V, F = meshes.grid(10, 10)
+    weights = spot(V, 0.3)[F].mean(axis=1)
+    by_faces, by_vertices = region(V, F, weights, kind="face"), region(V, F, spot(V, 0.3))
+    rows = np.arange(len(F))[::3]
+    assert by_faces.of_triangles(rows) == pytest.approx(by_vertices.of_triangles(rows))
+
+
+@pytest.mark.parametrize("value", [np.nan, -0.1, 1.1])
+def test_wrong_weights_are_refused_with_the_object_and_the_elements(value):
+    wrong = plate()
+    wrong.weights[5] = value
+    with pytest.raises(Refusal) as caught:
+        drain(magnify([dome(), wrong], MagnifySettings(**DRAFT)))
+    assert caught.value.index == 1 and isinstance(caught.value.error, WeightError)
+    assert caught.value.error.kind == "vertex" and caught.value.error.elements.tolist() == [5]
+
+
+@pytest.mark.parametrize("source", ["mesh", "uv"])
+def test_no_region_at_all_is_refused(source):
+    V, F = meshes.grid(3, 3)
+    with pytest.raises(Refusal):
+        drain(magnify([region(V, F, np.ones(16), V[:, :2])], MagnifySettings(source=source, **DRAFT)))
+
+
+def test_factors_of_a_cascade_multiply():
+    assert whole_factor(MagnifySettings(factor=3.0, cascade=4)) == 81.0
+    assert whole_factor(MagnifySettings(factor=1e300, cascade=2)) == np.inf
+    for factor in (-1.0, np.nan):
+        with pytest.raises(ShareError):
+            whole_factor(MagnifySettings(factor=factor))
+
+
+def test_shares_that_miss_their_target_are_told():
+    assert Shares(before=0.1, target=0.4, after=0.401, contrast=6.0).warnings() == ()
+    missed = Shares(before=0.1, target=0.4, after=0.3, contrast=6.0)
+    assert missed.warnings() == ("The region has 30 % of the texture instead of 40 %",)
+    assert missed.report() == {"before": 0.1, "asked": 0.4, "after": 0.3, "factor": 6.0}
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_picture_of_one_colour_stays_that(straight):
+    regions = [plate()]
+    result = drain(magnify(regions, MagnifySettings(source="uv", boundary="own", **DRAFT)))
+    picture = np.tile(np.array([0.25, 0.5, 0.75, 0.5], np.float32), (32, 32, 1))
+    assert np.array_equal(warped_picture(picture, regions, result, 4, straight), picture)
+
+
+def test_a_picture_follows_its_uvs():
+    """Red is u: after a move by half the texture the red of every pixel is that of half a texture before."""
+    V, F = meshes.grid(4, 4, 0.5, 1.0)
+    uv = V[F.ravel(), :2]
+    pins = CornerPins(np.zeros(F.size, bool), uv)
+    mine = Region(reading(V, F).surface, np.ones(len(F), bool), np.zeros(len(V)), pins)
+    shares = Shares(before=0.0, target=0.0, after=0.0, contrast=1.0)
+    moved = Magnified(corners=[np.arange(F.size)], uv=[uv + (0.5, 0.0)], reports=[[]], shares=shares, warnings=[])
+    picture = np.zeros((16, 16, 1))
+    picture[..., 0] = (np.arange(16) + 0.5) / 16
+    result = warped_picture(picture, [mine], moved, 0)
+    assert np.allclose(result[:, 8:], picture[:, :8])

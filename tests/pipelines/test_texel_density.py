@@ -1,0 +1,66 @@
+"""Pixels per metre: known for squares, and set where they shall be something else."""
+
+import meshes
+import numpy as np
+import pytest
+from readings import reading, together
+
+from omt_uv.pipelines.texel_density import Texels, texel_density, with_texel_density
+from omt_uv.solver.errors import EmptyMeshError, ZeroAreaFaceError
+
+TEXELS = Texels(1024)
+
+
+def two_squares():
+    """Squares of one metre, with a quarter of a metre and with half of one as the side in UV."""
+    V, F = together(meshes.grid(2, 2), meshes.grid(2, 2))
+    uv = V[:, :2] * np.repeat([0.25, 0.5], 9)[:, None] + np.repeat([0.0, 0.5], 9)[:, None]
+    return V, F, uv
+
+
+def test_a_unit_square_has_the_pixels_of_the_texture_in_every_unit():
+    V, F = meshes.grid(3, 3)
+    assert texel_density([reading(V, F, V[:, :2])], TEXELS) == pytest.approx(1024, rel=1e-6)
+    assert texel_density([reading(V, F, V[:, :2])], Texels(1024, 0.01)) == pytest.approx(102400, rel=1e-6)
+
+
+@pytest.mark.parametrize("scale", [0.25, 8.0])
+def test_it_goes_with_the_uvs_and_against_the_surface(scale):
+    V, F, uv = two_squares()
+    before = texel_density([reading(V, F, uv)], TEXELS)
+    assert texel_density([reading(scale * V, F, uv)], TEXELS) == before / scale
+    assert texel_density([reading(V, F, scale * uv)], TEXELS) == before * scale
+
+
+@pytest.mark.parametrize("each_island", [True, False])
+def test_what_was_set_is_what_is_measured(each_island):
+    V, F, uv = two_squares()
+    other = reading(*meshes.bumpy(4, 4), uv=meshes.bumpy(4, 4)[0][:, :2])
+    readings = [reading(V, F, uv), other]
+    scaled = with_texel_density(readings, 300.0, TEXELS, each_island)
+    after = []
+    for old, (corners, new) in zip(readings, scaled, strict=True):
+        assert np.array_equal(corners, np.arange(len(old.uv)))
+        after.append(reading(old.surface.positions, old.surface.corner_vertex.reshape(-1, 3), new))
+    assert texel_density(after, TEXELS) == pytest.approx(300, rel=1e-5)
+    first, second = (np.arange(len(F)) < 8), (np.arange(len(F)) >= 8)
+    halves = [texel_density([reading(V, F, after[0].uv, part)], TEXELS) for part in (first, second)]
+    # Islands alike, or as different as they were.
+    assert halves[1] / halves[0] == pytest.approx(1 if each_island else 2, rel=1e-5)
+
+
+def test_islands_stay_where_their_middle_is_and_keep_it_without_area():
+    V, F, uv = two_squares()
+    uv[9:] = 0.7
+    ((_, new),) = with_texel_density([reading(V, F, uv)], 2048.0, TEXELS, True)
+    assert np.array_equal(new[24:], uv[F.ravel()[24:]].astype(np.float32).astype(float))
+    assert (new[:24].min(axis=0) + new[:24].max(axis=0)) / 2 == pytest.approx([0.125, 0.125])
+
+
+def test_nothing_to_measure_is_an_error():
+    V, F, uv = two_squares()
+    for wrong in (reading(V, F), reading(V, F, uv, np.zeros(len(F), bool))):
+        with pytest.raises(EmptyMeshError):
+            texel_density([wrong], TEXELS)
+    with pytest.raises(ZeroAreaFaceError):
+        texel_density([reading(V, F, 0 * uv)], TEXELS)
