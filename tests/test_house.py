@@ -45,7 +45,7 @@ PLAIN_RESULTS = {"multilevel_start": "positions and how many folds are left: a s
 # Names of arrays over vertices, edges or faces, whose elements no loop of Python visits.
 ARRAYS = "V|F|vertices|edges|faces|triangles|halfedges|corners|positions|polygons"
 LOOP = re.compile(rf"(range\(len\()?(enumerate\()?(\w+\.)*({ARRAYS})(\.tolist\(\))?\)*")
-SHAPE = re.compile(r"\(\w+(,\s?\w+)*,?\)")
+SHAPE = re.compile(r"\((\d|[a-z]{1,2}|\.\.\.),[^)]*\)")
 
 
 def nodes(paths, kind):
