@@ -81,7 +81,7 @@ def on_boundary(triangles: np.ndarray, n: int) -> np.ndarray:
 
 
 def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
-    """Vertices of every boundary loop in order, surface on the left; longest loop first.
+    """Vertices of every boundary loop (k,) of triangles (m,3) in order, surface on the left; longest loop first.
 
     The mesh must be an oriented manifold with one fan per vertex (`charts.strict_charts` guarantees it).
     """
