@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import importlib
 import inspect
 import re
@@ -48,10 +49,15 @@ LOOP = re.compile(rf"(range\(len\()?(enumerate\()?(\w+\.)*({ARRAYS})(\.tolist\(\
 SHAPE = re.compile(r"\((\d|[a-z]{1,2}|\.\.\.),[^)]*\)")
 
 
+@functools.cache
+def tree_of(path):
+    return ast.parse(path.read_text())
+
+
 def nodes(paths, kind):
     """Pairs (path, node) of every node of a kind."""
     for path in paths:
-        yield from ((path, n) for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, kind))
+        yield from ((path, n) for n in ast.walk(tree_of(path)) if isinstance(n, kind))
 
 
 def place(path, node):
@@ -149,7 +155,7 @@ def test_no_loop_of_python_visits_vertices_edges_or_faces():
 
 @pytest.mark.parametrize("path", TOOLS, ids=lambda p: str(p.relative_to(ROOT)))
 def test_tools_keep_the_rules_of_the_package(path):
-    tree = ast.parse(path.read_text())
+    tree = tree_of(path)
     assert ast.get_docstring(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):

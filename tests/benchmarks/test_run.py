@@ -1,0 +1,52 @@
+"""The command of the benchmarks: parts with their own options, and a part that is the same on every machine."""
+
+from __future__ import annotations
+
+import meshes
+import pytest
+
+from benchmarks import run
+from benchmarks.part import BOUNDARIES
+
+
+def test_every_part_says_what_it_shows():
+    assert len(run.PARTS) == sum(len(module.PARTS) for module in run.MODULES), "no name is there twice"
+    for part in run.PARTS.values():
+        assert part.description and part.table.__doc__
+
+
+def test_an_option_is_one_option_wherever_it_is_taken():
+    for part in run.PARTS.values():
+        for option in part.options:
+            assert run.OPTIONS[option.name] is option
+
+
+def test_without_names_all_parts_run_but_those_that_say_otherwise():
+    _, parts = run.parse([])
+    assert {p.name for p in run.PARTS.values()} - {p.name for p in parts} == {"profile"}
+
+
+def test_options_that_are_not_given_have_their_defaults():
+    args, parts = run.parse(["counts", "--models", "cone"])
+    assert [p.name for p in parts] == ["counts"]
+    assert args.models == ["cone"] and args.boundaries == BOUNDARIES and args.runs == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"), [(["nothing"], "unknown part nothing"), (["counts", "--sites", "5"], "--sites")]
+)
+def test_what_no_part_can_use_is_refused(words, complaint, capsys):
+    with pytest.raises(SystemExit):
+        run.parse(words)
+    assert complaint in capsys.readouterr().err
+
+
+def test_counts_are_those_of_the_report_and_the_same_again(capsys):
+    args, (part,) = run.parse(["counts", "--models", "cone", "--boundaries", "free"])
+    first, again = part.table(args), part.table(args)
+    assert first.rows == again.rows
+    (row,) = first.rows
+    cells = dict(zip(first.columns, row, strict=True))
+    assert cells["model"] == "cone" and cells["faces"] == str(len(meshes.cone()[1]))
+    assert int(cells["Newton conformal"]) > 0 and int(cells["factorisations"]) > 0
+    assert "Counts of one unwrap" in capsys.readouterr().out
