@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from meshes import icosphere, polygon_surface
-from scipy.spatial import ConvexHull
+from sphere_shapes import random_sphere
 
 from omt_uv.solver.globe.exact_areas import correct_areas, equirectangular_areas
 from omt_uv.solver.globe.pole_vertices import CONES, POLES, move_vertices_onto, push
@@ -14,17 +14,6 @@ from omt_uv.solver.globe.unfolding import Polygons, gather_polygons, unfold
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
-
-
-def random_sphere(count=400, seed=0, towards=(0.0, 0, 0)):
-    """Random points of the unit sphere, denser in one direction, and their hull."""
-    P = np.random.default_rng(seed).normal(size=(count, 3))
-    P = P / np.linalg.norm(P, axis=1, keepdims=True) + towards
-    P /= np.linalg.norm(P, axis=1, keepdims=True)
-    F = ConvexHull(P).simplices.astype(np.int64)
-    inward = signed_volumes(P, F) < 0
-    F[inward] = F[inward][:, [0, 2, 1]]
-    return P, F
 
 
 def uv_sphere(rows=12, columns=16, turn=0.0):
@@ -48,7 +37,7 @@ def triangle_polygons(F):
 
 SPHERES = {
     "icosphere": lambda: icosphere(3),
-    "random": random_sphere,
+    "random": lambda: random_sphere(400),
     "dense": lambda: random_sphere(900, 1, (0.3, 0.2, 0.5)),
     "coarse": lambda: random_sphere(60, 2),
 }

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sphere_shapes import creature
 
 from omt_uv.solver.globe.pole_vertices import CONES, POLES, move_vertices_onto
 from omt_uv.solver.mesh.geometry import face_areas
@@ -10,34 +11,6 @@ from omt_uv.solver.progress import drain
 from omt_uv.solver.sphere.multilevel import multilevel_start
 from omt_uv.solver.sphere.newton import project_faces
 from omt_uv.solver.sphere.sphere_map import sphere_map
-
-
-def creature(body=3, length=12, width=1, limbs=6):
-    """The surface of a block of unit cubes with straight limbs, two triangles for each square."""
-    size = body + 2 * length + 2
-    solid = np.zeros((size,) * 3, bool)
-    middle = slice(size // 2 - body // 2, size // 2 - body // 2 + body)
-    solid[middle, middle, middle] = True
-    thin = slice(size // 2 - width // 2, size // 2 - width // 2 + width)
-    for limb in range(limbs):
-        place = [thin, thin, thin]
-        place[limb % 3] = (
-            slice(middle.stop, middle.stop + length) if limb < 3 else slice(middle.start - length, middle.start)
-        )
-        solid[tuple(place)] = True
-    squares = []
-    for axis in range(3):
-        u, v = np.eye(3, dtype=int)[[(axis + 1) % 3, (axis + 2) % 3]]
-        for side in (0, 1):
-            neighbour = np.roll(solid, -1 if side else 1, axis=axis)
-            base = np.argwhere(solid & ~neighbour) + side * np.eye(3, dtype=int)[axis]
-            square = np.stack([base, base + u, base + u + v, base + v], axis=1)
-            squares.append(square if side else square[:, ::-1])
-    corners = np.concatenate(squares)
-    V, index = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    quads = index.reshape(-1, 4)
-    return V.astype(float), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-
 
 BODIES = {"six limbs": creature(5, 20, 3), "thin limbs": creature(6, 14, 2), "one limb": creature(6, 24, 3, 1)}
 

@@ -1,0 +1,100 @@
+"""Conformal maps to the sphere: angles kept, mass centred, one map in any pose."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+from sphere_shapes import SHAPES, blob
+
+from omt_uv.solver import errors
+from omt_uv.solver.mesh.geometry import angles_from_lengths, halfedge_lengths, vertex_areas
+from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
+from omt_uv.solver.progress import drain
+from omt_uv.solver.sphere.conformal import conformal_sphere
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_conformal(name):
+    V, F = SHAPES[name]
+    found = drain(conformal_sphere(V, F))
+    p = found.positions
+    assert found.residual <= 1e-9 and found.iterations <= 15
+    np.testing.assert_allclose(np.linalg.norm(p, axis=1), 1, atol=1e-14)
+    np.testing.assert_allclose(spherical_areas(p, F).sum(), 4 * np.pi, rtol=1e-12)
+    assert (signed_volumes(p, F) > 0).all()
+    p = found.sites
+    mass = vertex_areas(V, F)
+    np.testing.assert_allclose(mass @ p / mass.sum(), 0, atol=1e-9)
+
+
+def test_conformal_keeps_angles():
+    V, F = blob(4)
+    p = drain(conformal_sphere(V, F)).positions
+    before, after = (angles_from_lengths(halfedge_lengths(x, F).reshape(-1, 3)) for x in (V, p))
+    assert np.degrees(np.abs(before - after)).mean() < 2
+
+
+def test_conformal_is_one_map_in_any_pose():
+    V, F = blob()
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    p, q = (drain(conformal_sphere(x, F)).positions for x in (V, 1e-3 * V @ turn.T + 1e3))
+    u, _, v = np.linalg.svd(q.T @ p)
+    np.testing.assert_allclose(q @ u @ v, p, atol=1e-6)
+
+
+def _without_face(V, F):
+    return V, F[1:]
+
+
+def _two(V, F):
+    return np.concatenate([V, V + 9]), np.concatenate([F, F + len(V)])
+
+
+def _kissing(V, F):
+    """Two copies that share vertex 0."""
+    second = np.where(F == 0, 0, F + len(V) - 1)
+    return np.concatenate([V, 2 * V[0] - V[1:]]), np.concatenate([F, second[:, ::-1]])
+
+
+def _turned(V, F):
+    F = F.copy()
+    F[3] = F[3, ::-1]
+    return V, F
+
+
+def _not_finite(V, F):
+    V = V.copy()
+    V[5] = np.nan
+    return V, F
+
+
+BAD = {
+    "open": (_without_face, errors.NotASphereError, 3),
+    "parts": (_two, errors.NotASphereError, 80),
+    "kissing": (_kissing, errors.NotASphereError, 1),
+    "turned": (_turned, errors.OrientationError, 3),
+    "nan": (_not_finite, errors.NonFiniteError, 1),
+    "loose": (lambda V, F: (np.concatenate([V, [[0, 0, 9.0]]]), F), errors.NotASphereError, 1),
+    "double": (lambda V, F: (V, np.concatenate([F, F[:1, ::-1]])), errors.DuplicateFaceError, 2),
+    "handle": (lambda V, F: meshes.torus(), errors.NotASphereError, 0),
+    "empty": (lambda V, F: (V, F[:0]), errors.EmptyMeshError, 0),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_refusals(name):
+    spoil, kind, count = BAD[name]
+    with pytest.raises(kind) as caught:
+        drain(conformal_sphere(*spoil(*meshes.icosphere(1))))
+    assert len(caught.value.elements) == count and caught.value.remedy
+
+
+def test_faces_without_area_get_a_little():
+    V, F = meshes.icosphere(1)
+    V = V.copy()
+    a, b = F[7, :2]
+    V[a] = V[b]
+    p = drain(conformal_sphere(V, F)).positions
+    assert (spherical_areas(p, F) > 0).all()
