@@ -18,9 +18,7 @@ def main() -> None:
     p, q, r = vertices[faces].transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(q - p, r - p), axis=1)
     error = np.abs(angle / angle.sum() - area / area.sum()).sum()
-    print(
-        f"{found.status} after {found.iterations} steps: whole sphere {angle.sum() / np.pi:.3f} pi, area error {error:.4f}"
-    )
+    print(f"{found.status}: the whole sphere is {angle.sum() / np.pi:.3f} pi, the area error {error:.4f}")
 
 
 if __name__ == "__main__":

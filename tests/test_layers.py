@@ -20,6 +20,7 @@ MOST_MODULES, MOST_LINES, MOST_FUNCTION_LINES, MOST_PARAMETERS = 14, 450, 60, 8
 ARROWS: dict[str, str] = {
     "settings": "",
     "errors": "",
+    # The names of the front door are looked up in solver.api when they are used.
     "solver": "",
     "solver.mesh": "solver",
     "solver.linalg": "solver solver.mesh",
@@ -43,6 +44,8 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.sphere solver.remeshing.components solver.remeshing.edits",
     "solver.remeshing": "solver solver.mesh solver.analysis solver.remeshing.components solver.remeshing.edits "
     "solver.remeshing.relaxation solver.remeshing.fitting solver.remeshing.initial",
+    "solver.api": "solver solver.mesh solver.analysis solver.maps solver.parameterization solver.editing solver.sphere "
+    "solver.remeshing",
     "xatlas": "errors solver solver.mesh",
     "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.transfer solver.refinement "
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing solver.remeshing.initial "

@@ -15,7 +15,7 @@ SAYS = {
     "magnify_region": "now",
     "measure_uvs": "refined: area error 0.00",
     "remesh_levels": "100 vertices",
-    "sphere_map": "whole sphere 4.000 pi",
+    "sphere_map": "whole sphere is 4.000 pi",
     "unwrap_mesh": "UVs (1600, 4, 2)",
 }
 

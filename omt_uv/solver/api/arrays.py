@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..mesh.charts import Surface
+from ..mesh.surface import Surface
 
 Faces: TypeAlias = np.ndarray | Sequence[Sequence[int]]
 
@@ -38,7 +38,7 @@ def polygon_surface(vertices: np.ndarray, faces: Faces, seams=()) -> Surface:
     if len(sides) and sides.min() < 3:
         raise ValueError(f"face {int(sides.argmin())} has fewer than three corners")
     corner_vertex = np.concatenate([np.zeros(0, np.int64), *(np.asarray(face, np.int64) for face in faces)])
-    if len(corner_vertex) and not (0 <= corner_vertex.min() and corner_vertex.max() < len(vertices)):
+    if len(corner_vertex) and not (corner_vertex.min() >= 0 and corner_vertex.max() < len(vertices)):
         raise ValueError(f"faces name vertices that are not among the {len(vertices)} given")
     start = np.concatenate([[0], np.cumsum(sides)])
     owner = np.repeat(np.arange(len(sides)), sides - 2)

@@ -39,7 +39,8 @@ def unwrap(
     pins : ((c,) bool, UVs in the shape of the result): corners that keep their places, with a free boundary
     progress : called with every `Progress`
     **options : fields of `UnwrapOptions`: boundary "free" (default), "disk" or "square"; quality "draft", "standard"
-        or "exact"; balance from 0, exact areas, to 1, least shear; seams_mode, fill_holes, avoid
+        or "exact"; balance from 0, exact areas, to 1, least shear; cuts "auto" or "existing", which
+        refuses what the seams do not cut into disks; fill_holes; max_shear, to cut further until the mean is below
 
     Returns
     -------
@@ -104,7 +105,7 @@ def refine(
     >>> from omt_uv import solver as omt
     >>> vertices = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [1, 0.5, 0.5]])
     >>> faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
-    >>> before = vertices[faces][:, :, :2] * [1, 3]
+    >>> before = vertices[faces][:, :, :2] ** 2
     >>> bool(omt.refine(vertices, faces, before).figures.area_l1 < omt.distortion(vertices, faces, before).area_l1)
     True
     """
@@ -151,7 +152,7 @@ def magnify(
     >>> faces = np.column_stack([corner, corner + 1, corner + 14, corner + 13])
     >>> weights = np.clip(1.5 - 3 * np.hypot(x, y).ravel(), 0, 1)
     >>> result = omt.magnify(vertices, faces, vertices[faces][:, :, :2], weights, factor=3)
-    >>> round(result.share_after / result.share_before, 2)
+    >>> round(result.share_after / result.share_before, 1)
     3.0
     """
     return drain(steps.magnify(vertices, faces, uv, weights, factor, **options), progress)

@@ -6,21 +6,21 @@ stand with the functions, in `omt_uv.solver.api.functions`.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..analysis.density import Target, from_vertices, region_share
 from ..analysis.region_density import target_density
 from ..editing.magnify import magnify_region
-from ..editing.refine_island import refine_island
+from ..editing.refine_island import improve
 from ..editing.uv_islands import uv_islands
 from ..maps.distortion import distortion
-from ..mesh.charts import Chart, Surface, triangle_rows
+from ..mesh.charts import triangle_rows
 from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.surface import Surface
 from ..parameterization import unwrap as unwrapping
 from ..parameterization.chart_pins import CornerPins
-from ..progress import Progress, Steps, part_of
+from ..parameterization.options import UnwrapOptions
+from ..progress import Steps, part_of
 from ..remeshing import remesh as remeshing
 from ..remeshing.remesh import Remesh
 from ..sphere import sphere_map as spheres
@@ -32,17 +32,21 @@ from .results import MagnifiedUVs, UVs
 GAP = 0.01
 
 
-def unwrap(vertices: np.ndarray, faces: Faces, *, seams=(), density=None, pins=None, **options) -> Steps[UVs]:
+def unwrap(
+    vertices: np.ndarray, faces: Faces, *, seams=(), density=None, pins=None, cuts: str = "auto", **options
+) -> Steps[UVs]:
     """Unwrap polygons step by step, see `functions.unwrap`."""
     surface = polygon_surface(vertices, faces, seams)
-    held = None if pins is None else CornerPins(np.asarray(pins[0], bool), to_corners(pins[1], surface))
+    corner_pins = None if pins is None else CornerPins(np.asarray(pins[0], bool), to_corners(pins[1], surface))
     target = None if density is None else Target(np.asarray(density, float)[surface.triangle_face], None)
-    found = yield from unwrapping.unwrap(surface, options=unwrapping.UnwrapOptions(**options), pins=held, target=target)
+    found = yield from unwrapping.unwrap(
+        surface, options=UnwrapOptions(seams=cuts, **options), pins=corner_pins, target=target
+    )
     corners, uv = found.corner_uv()
     corner_uv = np.zeros((len(surface.corner_vertex), 2))
     corner_uv[corners] = uv
-    loose = [chart for chart, chart_map in zip(found.charts, found.maps, strict=True) if not chart_map.pinned]
-    corner_uv = _side_by_side(corner_uv, [np.unique(chart.corners) for chart in loose]) if pins is None else corner_uv
+    if pins is None:
+        corner_uv = _side_by_side(corner_uv, [np.unique(chart.corners) for chart in found.charts])
     texts = [*found.warnings, *(text for chart_map in found.maps for text in chart_map.warnings)]
     return UVs(
         uv=from_corners(corner_uv, faces),
@@ -62,9 +66,7 @@ def refine(
     texts, sizes = list(found.warnings), [len(island.chart.triangles) for island in found.islands]
     refined, covered, space = [], [], []
     for k, island in enumerate(found.islands):
-        steps = refine_island(
-            island.chart.vertices, island.chart.triangles, island.uv, balance=balance, quality=quality
-        )
+        steps = improve(island.chart.vertices, island.chart.triangles, island.uv, balance=balance, quality=quality)
         done = yield from part_of(steps, sum(sizes[:k]) / sum(sizes), sizes[k] / sum(sizes))
         refined.append(done.uv)
         covered.append(abs(signed_areas(done.uv, island.chart.triangles).sum()))
