@@ -32,6 +32,7 @@ def shear_colours(shear: np.ndarray) -> np.ndarray:
 
 
 def _scale(anchors, t) -> np.ndarray:
+    """sRGB (m,3) in [0,1] of t (m,), linear between anchors at even steps from 0 to 1."""
     place = np.linspace(0, 1, len(anchors))
     t = np.clip(t, 0, 1)
     return np.column_stack([np.interp(t, place, channel) for channel in np.array(anchors, float).T]) / 255

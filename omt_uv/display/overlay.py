@@ -30,8 +30,8 @@ def kind() -> str:
     return _shown.kind
 
 
-def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
-    """Colour objects, pairs of object and Reading, by AREA or SHEAR.
+def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
+    """Colour objects, pairs of object and Reading, by a figure, AREA or SHEAR.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
 
     V, F, uv = triangles_of([reading for _, reading in pairs])
     octaves, shear = face_distortion(V, F, uv)
-    rgb = area_colours(octaves) if wanted == "AREA" else shear_colours(shear)
+    rgb = area_colours(octaves) if figure == "AREA" else shear_colours(shear)
     _paint_views(context)
     start = 0
     for obj, reading in pairs:
@@ -55,7 +55,7 @@ def show(context: bpy.types.Context, pairs: list, wanted: str) -> None:
         blender_colours.write_colours(obj, corners.ravel(), mine)
         start += len(corners)
     rgba = np.concatenate([np.repeat(rgb, 3, axis=0), np.full((3 * len(rgb), 1), OPACITY)], axis=1)
-    _shown.kind, _shown.places, _shown.colours = wanted, uv.reshape(-1, 2).tolist(), rgba.tolist()
+    _shown.kind, _shown.places, _shown.colours = figure, uv.reshape(-1, 2).tolist(), rgba.tolist()
     _shown.batch = None
     if _shown.handle is None and not bpy.app.background:
         _shown.handle = bpy.types.SpaceImageEditor.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
@@ -97,6 +97,7 @@ def refresh(context: bpy.types.Context, pairs: list) -> None:
 
 
 def _handlers() -> list:
+    """Blender's lists of handlers, and what each shall call."""
     handlers = bpy.app.handlers
     return [(handlers.undo_post, _after_undo), (handlers.redo_post, _after_undo), (handlers.load_pre, _before_load)]
 
@@ -110,10 +111,12 @@ def _after_undo(*_) -> None:
 
 
 def _before_load(*_) -> None:
+    """Stop drawing: the file whose faces are drawn goes."""
     forget()
 
 
 def _paint_views(context: bpy.types.Context) -> None:
+    """Let every 3D View show the attribute, and keep how it was shaded."""
     for space in _view_spaces(context):
         key = space.as_pointer()
         if key not in _shown.shading:
@@ -122,11 +125,13 @@ def _paint_views(context: bpy.types.Context) -> None:
 
 
 def _view_spaces(context: bpy.types.Context) -> list:
+    """The 3D Views of all windows."""
     areas = [area for window in context.window_manager.windows for area in window.screen.areas]
     return [area.spaces.active for area in areas if area.type == "VIEW_3D"]
 
 
 def _redraw(context: bpy.types.Context) -> None:
+    """Draw the 3D Views and image editors of all windows anew."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in {"VIEW_3D", "IMAGE_EDITOR"}:

@@ -142,6 +142,7 @@ def _render(image: bpy.types.Image, path: Path, file_format: str) -> None:
 
 
 def _new_image(name: str, pixels: np.ndarray, like: bpy.types.Image) -> bpy.types.Image:
+    """An image of the pixels (h,w,4), in colour space, depth and alpha like another."""
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=like.is_float)
     if not like.is_float:

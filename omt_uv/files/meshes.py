@@ -44,9 +44,9 @@ def load(path: Path) -> list[bpy.types.Object]:
         raise FileError(f"{path}: {_last_line(str(error)) or 'cannot be read'}") from error
     objects = [obj for obj in bpy.context.scene.objects if obj.type == "MESH"]
     if not objects:
-        told = _last_line(log())
+        printed = _last_line(log())
         # Readers that find nothing to read may say no more than how long that took.
-        raise FileError(f"{path}: {told if told and 'took' not in told else 'the file has no mesh'}")
+        raise FileError(f"{path}: {printed if printed and 'took' not in printed else 'the file has no mesh'}")
     bpy.context.view_layer.update()
     return objects
 
@@ -81,16 +81,19 @@ def save(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
 
 
 def _check_suffix(path: Path, known: tuple[str, ...]) -> None:
+    """Raise FileError unless the suffix of a path is a known one."""
     if path.suffix.lower() not in known:
         raise FileError(f"{path}: unknown format {path.suffix!r}. Use one of {' '.join(known)}.")
 
 
 def _last_line(text: str) -> str:
+    """The last line of what Blender printed that says anything."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     return lines[-1].removeprefix("Error: ") if lines else ""
 
 
 def _read_blend(path: str) -> None:
+    """Open a .blend file, in Object Mode."""
     bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
     if bpy.context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -127,6 +130,7 @@ def _read_off(path: str) -> None:
 
 
 def _read_fbx(path: str) -> None:
+    """Read an FBX file by the reader that this Blender has."""
     # Blender 4.5 and later have a reader of their own; the one in Python came before.
     if "fbx_import" in dir(bpy.ops.wm):
         bpy.ops.wm.fbx_import(filepath=path, validate_meshes=False, use_anim=False)
@@ -154,6 +158,7 @@ _READERS: dict[str, Callable[[str], None]] = {
 
 
 def _select_only(objects: Sequence[bpy.types.Object]) -> None:
+    """Select these objects and no others."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(False)
     for obj in objects:
@@ -164,6 +169,7 @@ def _select_only(objects: Sequence[bpy.types.Object]) -> None:
 
 
 def _write_obj(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
+    """Write an OBJ file; returns warnings."""
     _select_only(objects)
     # The exporter sorts faces by material, and only where it writes materials.
     ordered = all(_materials_ascend(obj.data) for obj in objects)
@@ -180,6 +186,7 @@ def _write_obj(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
 
 
 def _materials_ascend(mesh: bpy.types.Mesh) -> bool:
+    """Whether faces come in the order of their materials, by which the exporter sorts them."""
     index = np.zeros(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get("material_index", index)
     return bool((np.diff(index) >= 0).all())
@@ -238,6 +245,7 @@ def _cut_uv_seams(mesh: bpy.types.Mesh) -> None:
 
 
 def _is_uv_seam(edge: bmesh.types.BMEdge, layer) -> bool:
+    """Whether the UVs of a layer differ on the two sides of an edge."""
     if len(edge.link_loops) != 2:
         return False
     a, b = edge.link_loops
@@ -245,12 +253,14 @@ def _is_uv_seam(edge: bmesh.types.BMEdge, layer) -> bool:
 
 
 def _write_stl(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
+    """Write an STL file; returns warnings."""
     _select_only(objects)
     bpy.ops.wm.stl_export(filepath=str(path), export_selected_objects=True, apply_modifiers=False, **AXES)
     return ["STL files hold no UVs; write .blend, .obj, .ply, .glb or .fbx to keep them"]
 
 
 def _write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
+    """Write a binary glTF file; returns warnings."""
     _select_only(objects)
     bpy.ops.export_scene.gltf(
         filepath=str(path),
@@ -263,6 +273,7 @@ def _write_glb(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
 
 
 def _write_fbx(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
+    """Write an FBX file; returns warnings."""
     _select_only(objects)
     bpy.ops.export_scene.fbx(
         filepath=str(path), use_selection=True, object_types={"MESH"}, use_mesh_modifiers=False, bake_anim=False

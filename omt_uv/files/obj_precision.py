@@ -33,6 +33,7 @@ def restore_precision(path: Path, objects: Sequence[bpy.types.Object]) -> None:
 
 
 def _world_positions(obj: bpy.types.Object) -> np.ndarray:
+    """Positions (n,3) float32 of the vertices in the world."""
     co = np.zeros(3 * len(obj.data.vertices), np.float32)
     obj.data.vertices.foreach_get("co", co)
     matrix = np.array(obj.matrix_world, np.float32)
@@ -42,6 +43,7 @@ def _world_positions(obj: bpy.types.Object) -> np.ndarray:
 
 
 def _replace_uv(lines: list[str], faces: list[int], uv_lines: list[int], mesh: bpy.types.Mesh) -> None:
+    """Replace the vt lines that the corners of these faces name."""
     # A corner reads v/vt or v/vt/vn.
     corners = [word.split("/")[1] for i in faces for word in lines[i].split()[1:] if "/" in word]
     if len(corners) != len(mesh.loops) or not all(corners):
@@ -53,6 +55,7 @@ def _replace_uv(lines: list[str], faces: list[int], uv_lines: list[int], mesh: b
 
 
 def _replace(lines: list[str], where: list[int], values: np.ndarray) -> None:
+    """Replace the numbers of lines by rows of values (k,d), where they agree to the decimals written."""
     if len(where) != len(values):
         return
     for i, row in zip(where, values, strict=True):

@@ -105,7 +105,7 @@ def marked_sharp(attributes: Attributes) -> np.ndarray:
 def followed(attributes: Attributes, lines: np.ndarray) -> Attributes:
     """The attributes without those of edges that are marks elsewhere than on `lines` (k,2), which are left.
 
-    A line of marks that the new mesh does not follow would come out in pieces.
+    A line of marks that the new mesh does not follow would come out interrupted.
     """
     marks = attributes.marks
     off = ~np.isin(pair_keys(*marks.edges.T), pair_keys(*lines.T))

@@ -55,6 +55,7 @@ def _carried_uv(layer: Layer, surface: Surface, at: Correspondence) -> tuple[np.
 
 
 def _carried(layer: Layer, surface: Surface, triangles: np.ndarray, at: Correspondence) -> np.ndarray:
+    """Values of a layer on the new mesh: interpolated where they are amounts, else those that are nearest."""
     smooth = TYPES[layer.data_type][3]
     if layer.domain == "FACE":
         return transfer.to_faces(at, surface.triangle_face, layer.values)

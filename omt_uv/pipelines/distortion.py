@@ -59,4 +59,5 @@ def summary(figures: Distortion) -> str:
 
 
 def _number(value: float | None) -> str:
+    """A figure with three decimals, or none."""
     return "none" if value is None else f"{value:.3f}"

@@ -206,6 +206,7 @@ def _packed(refined: Sequence[_RefinedIsland], uvs, settings, spare_packer) -> t
 
 
 def _report(refined: _RefinedIsland, uv: np.ndarray) -> dict:
+    """Figures of an island for a report, before and after."""
     chart, done = refined.island.chart, refined.refinement
     before, after = (
         distortion(chart.vertices, chart.triangles, x[chart.triangles], overlap=False) for x in (refined.island.uv, uv)

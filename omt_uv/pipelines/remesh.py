@@ -192,28 +192,34 @@ def density_of(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) 
 
 
 def _curvature(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    """Density (m,) by mean curvature."""
     return mean_curvature_density(job.surface.positions, triangles, settings.amount)
 
 
 def _gaussian(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    """Density (m,) by Gaussian curvature."""
     return gaussian_curvature_density(job.surface.positions, triangles, settings.amount)
 
 
 def _saliency(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    """Density (m,) by saliency, up to the factor of the settings."""
     positions = job.surface.positions
     weights = soft_weights(vertex_score("saliency", positions, triangles), scaled_vertex_areas(positions, triangles))
     return painted_density(from_vertices(weights, triangles), settings.factor)
 
 
 def _painted(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    """Density (m,) by the weights of a vertex group, up to the factor of the settings."""
     return painted_density(_values(job), settings.factor)
 
 
 def _attribute(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
+    """Density (m,) that an attribute holds."""
     return checked_density(_values(job))
 
 
 def _values(job: RemeshJob) -> np.ndarray:
+    """The values (m,) of the job; raises DensityError if it has none."""
     if job.values is None:
         raise DensityError("There is nothing to read the density from", "Name a vertex group or an attribute")
     return job.values

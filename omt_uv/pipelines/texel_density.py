@@ -22,7 +22,7 @@ class Texels:
 
 
 @dataclass(frozen=True)
-class _Faces:
+class _MeasuredFaces:
     """UVs (c,2), triangles (m,3) of corners, of vertices, and their areas (m,) in space and in UV."""
 
     uv: np.ndarray
@@ -71,7 +71,7 @@ def with_texel_density(
     return result
 
 
-def _of_islands(face: _Faces, first, uv, target: float, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
+def _of_islands(face: _MeasuredFaces, first, uv, target: float, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
     """Factor (k,) and centre (k,2) of the islands of corners first (k,); islands without area stay as they are."""
     count, of_face = uv_charts(face.vertices, face.uv[face.corners])
     space, covered = np.bincount(of_face, face.space, count), np.bincount(of_face, face.uv_area, count)
@@ -85,7 +85,7 @@ def _of_islands(face: _Faces, first, uv, target: float, texels: Texels) -> tuple
     return factor[island], ((low + high) / 2)[island]
 
 
-def _faces(reading: Reading) -> _Faces:
+def _faces(reading: Reading) -> _MeasuredFaces:
     """Triangles of the chosen polygons, as they lie in space and in UV."""
     if reading.uv is None:
         raise EmptyMeshError("There are no UVs", remedy="Unwrap the mesh first")
@@ -94,7 +94,9 @@ def _faces(reading: Reading) -> _Faces:
     if not len(corners):
         raise EmptyMeshError("There are no faces to measure")
     uv, triangles = reading.uv.astype(float), surface.corner_vertex[corners]
-    return _Faces(uv, corners, triangles, face_areas(surface.positions, triangles), np.abs(signed_areas(uv, corners)))
+    return _MeasuredFaces(
+        uv, corners, triangles, face_areas(surface.positions, triangles), np.abs(signed_areas(uv, corners))
+    )
 
 
 def _texels_per_metre(space: float, covered: float, texels: Texels) -> float:

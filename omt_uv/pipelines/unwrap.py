@@ -91,5 +91,6 @@ def _connected_triangles(chart: Chart) -> np.ndarray:
 
 
 def _in_place(pinned: int, others: int) -> str:
+    """A warning that islands with pins are not packed."""
     text = "An island with pins stays" if pinned == 1 else f"{pinned} islands with pins stay"
     return f"{text} in place" + ("; the others were packed as if there were none" if others else "")

@@ -87,6 +87,7 @@ def _spread(points: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
 
 
 def _pack(islands: list[np.ndarray], triangles: list[np.ndarray], margin: float, texture_size: int) -> Packing:
+    """Pack islands all of whose vertices are used; see `pack`."""
     turned = [turn_upright(p) for p in islands]
     inner = texture_size - 2 * margin
     if len(islands) == 1:
