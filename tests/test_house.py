@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "omt_uv"
 SOLVER = PACKAGE / "solver"
 MODULES = sorted(p for p in PACKAGE.glob("**/*.py") if "presets" not in p.parts)
-TOOLS = sorted(p for name in ("benchmarks", "scripts", "tests/support") for p in (ROOT / name).glob("**/*.py"))
+TOOLS = sorted(p for name in ("benchmarks", "examples", "scripts", "tests/support") for p in (ROOT / name).glob("**/*.py"))
 TESTS = sorted((ROOT / "tests").glob("**/*.py"))
 MOST_FUNCTION_LINES = 60
 MOST_PARAMETERS = 8
@@ -43,6 +43,8 @@ RAISED_BESIDE = {
 OTHER_ERRORS = {"StuckError", "MarkerError", "UserError", "Disturbed"}
 # Generators of faces whose result is no dataclass of its own, and why.
 PLAIN_RESULTS = {"multilevel_start": "positions and how many folds are left: a step of sphere_map alone"}
+# Modules that may visit faces one by one, and why.
+VISITORS = {"omt_uv/solver/api/arrays.py": "polygons of any numbers of sides come as lists of Python"}
 # Names of arrays over vertices, edges or faces, whose elements no loop of Python visits.
 ARRAYS = "V|F|vertices|edges|faces|triangles|halfedges|corners|positions|polygons"
 LOOP = re.compile(rf"(range\(len\()?(enumerate\()?(\w+\.)*({ARRAYS})(\.tolist\(\))?\)*")
@@ -145,7 +147,7 @@ def test_no_loop_of_python_visits_vertices_edges_or_faces():
     loops = [
         f"{place(path, n.iter)} for ... in {ast.unparse(n.iter)}"
         for path, n in nodes(solver_modules(), ast.For | ast.comprehension)
-        if LOOP.fullmatch(ast.unparse(n.iter))
+        if LOOP.fullmatch(ast.unparse(n.iter)) and str(path.relative_to(ROOT)) not in VISITORS
     ]
     assert not loops, "\n".join(loops)
 
@@ -166,6 +168,15 @@ def test_tools_keep_the_rules_of_the_package(path):
             assert ast.get_docstring(node), node.name
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
             assert not isinstance(node.value, ast.Tuple), "one named constant a line"
+
+
+def test_contributing_names_every_folder_and_no_other():
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    named = set(re.findall(r"^\| `(omt_uv/\w+)` \|", text, re.MULTILINE))
+    there = {str(p.relative_to(ROOT)) for p in PACKAGE.iterdir() if p.is_dir() and p.name != "__pycache__"}
+    assert named == there
+    for path in re.findall(r"`((?:tests|docs|benchmarks|scripts)(?:/[\w.]+)*)`", text):
+        assert (ROOT / path).exists(), path
 
 
 def test_no_code_stands_among_the_documents():

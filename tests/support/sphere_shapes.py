@@ -43,6 +43,7 @@ def random_sphere(count=500, seed=0, towards=(0.0, 0, 0)):
 
 
 def random_rotation(seed=0):
+    """A random rotation (3,3)."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     return q * np.linalg.det(q)
