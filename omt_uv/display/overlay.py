@@ -39,7 +39,7 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
     """
     import numpy as np
 
-    from ..blender import colour_attributes as blender_colours
+    from ..blender import colour_attributes
     from ..pipelines.distortion import triangles_of
     from ..solver.maps.distortion import face_distortion
     from .colormaps import area_colours, shear_colours
@@ -52,7 +52,7 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
     for obj, reading in pairs:
         corners = reading.surface.triangles[reading.faces[reading.surface.triangle_face]]
         mine = np.repeat(rgb[start : start + len(corners)], 3, axis=0)
-        blender_colours.write_colours(obj, corners.ravel(), mine)
+        colour_attributes.write_colours(obj, corners.ravel(), mine)
         start += len(corners)
     rgba = np.concatenate([np.repeat(rgb, 3, axis=0), np.full((3 * len(rgb), 1), OPACITY)], axis=1)
     _shown.kind, _shown.places, _shown.colours = figure, uv.reshape(-1, 2).tolist(), rgba.tolist()
@@ -67,11 +67,11 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
 
 def hide(context: bpy.types.Context) -> None:
     """Take everything back: attributes, shading, drawing."""
-    from ..blender import colour_attributes as blender_colours
+    from ..blender import colour_attributes
 
     for obj in bpy.data.objects:
-        if obj.type == "MESH" and obj.data.library is None and blender_colours.has_colours(obj.data):
-            blender_colours.remove_colours(obj)
+        if obj.type == "MESH" and obj.data.library is None and colour_attributes.has_colours(obj.data):
+            colour_attributes.remove_colours(obj)
     for space in _view_spaces(context):
         kept = _shown.shading.get(space.as_pointer())
         if kept is not None and space.shading.type == "SOLID" and space.shading.color_type == "VERTEX":

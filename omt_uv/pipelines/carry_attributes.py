@@ -14,7 +14,7 @@ from ..solver.maps.local_untangle import straighten_folds
 from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import pair_keys
-from ..solver.transfer import interpolate as transfer
+from ..solver.transfer import interpolate
 from ..solver.transfer.correspondence import Correspondence
 from .attributes import TYPES, Attributes, Layer, Marks, is_uv
 
@@ -24,7 +24,7 @@ def carry(attributes: Attributes, surface: Surface, at: Correspondence) -> Attri
     triangles = surface.corner_vertex[surface.triangles]
 
     def at_vertices(values: np.ndarray) -> np.ndarray:
-        return transfer.to_vertices(at, triangles, values)
+        return interpolate.to_vertices(at, triangles, values)
 
     layers, folded = [], 0
     for layer in attributes.layers:
@@ -36,8 +36,8 @@ def carry(attributes: Attributes, surface: Surface, at: Correspondence) -> Attri
             layers.append(replace(layer, values=_carried(layer, surface, triangles, at)))
     return replace(
         attributes,
-        material_index=transfer.to_faces(at, surface.triangle_face, attributes.material_index),
-        smooth=transfer.to_faces(at, surface.triangle_face, attributes.smooth),
+        material_index=interpolate.to_faces(at, surface.triangle_face, attributes.material_index),
+        smooth=interpolate.to_faces(at, surface.triangle_face, attributes.smooth),
         marks=_carried_marks(attributes.marks, triangles, at),
         layers=tuple(layers),
         weights=at_vertices(attributes.weights) if attributes.groups else attributes.weights,
@@ -49,7 +49,7 @@ def carry(attributes: Attributes, surface: Surface, at: Correspondence) -> Attri
 
 def _carried_uv(layer: Layer, surface: Surface, at: Correspondence) -> tuple[np.ndarray, int]:
     """UVs of the new corners, and how many faces are folded though the map they come from is not."""
-    uv = transfer.to_corners(at, surface.triangles, layer.values, extend=True)
+    uv = interpolate.to_corners(at, surface.triangles, layer.values, extend=True)
     area = signed_areas(layer.values.astype(float), surface.triangles)
     return straighten_folds(at.triangles, uv, np.sign(area)[at.face_triangle])
 
@@ -58,11 +58,11 @@ def _carried(layer: Layer, surface: Surface, triangles: np.ndarray, at: Correspo
     """Values of a layer on the new mesh: interpolated where they are amounts, else those that are nearest."""
     smooth = TYPES[layer.data_type][3]
     if layer.domain == "FACE":
-        return transfer.to_faces(at, surface.triangle_face, layer.values)
+        return interpolate.to_faces(at, surface.triangle_face, layer.values)
     if layer.domain == "CORNER":
-        to_corners: Callable = transfer.to_corners if smooth else transfer.nearest_to_corners
+        to_corners: Callable = interpolate.to_corners if smooth else interpolate.nearest_to_corners
         return to_corners(at, surface.triangles, layer.values)
-    to_vertices: Callable = transfer.to_vertices if smooth else transfer.nearest_to_vertices
+    to_vertices: Callable = interpolate.to_vertices if smooth else interpolate.nearest_to_vertices
     return to_vertices(at, triangles, layer.values)
 
 

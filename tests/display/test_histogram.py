@@ -1,0 +1,51 @@
+"""Histograms and their colours: as many percent as there is surface, pale in the middle, dark at the ends."""
+
+import meshes
+import numpy as np
+import pytest
+from readings import reading
+
+from omt_uv.display import canvas
+from omt_uv.display.colormaps import AREA_OCTAVES, SHEAR_TOP, area_colours, shear_colours
+from omt_uv.display.histogram import HEIGHT, WIDTH, histogram, thumbnail
+from omt_uv.solver.errors import EmptyMeshError
+
+
+def bump():
+    V, F = meshes.bumpy(6, 6)
+    return reading(V, F, V[:, :2])
+
+
+def test_colours_stay_beyond_the_ends_of_the_scales():
+    for colours, low, high in ((area_colours, -AREA_OCTAVES, AREA_OCTAVES), (shear_colours, 1.0, SHEAR_TOP)):
+        ends = colours(np.array([low - 1, low, high, high + 1]))
+        assert np.array_equal(ends[0], ends[1]) and np.array_equal(ends[2], ends[3])
+        assert not np.array_equal(ends[0], ends[2]) and ends.min() >= 0 and ends.max() <= 1
+
+
+def test_too_little_is_blue_too_much_is_red_and_what_is_due_is_pale():
+    little, due, much = area_colours(np.array([-1.0, 0.0, 1.0]))
+    assert little[2] > little[0] and much[0] > much[2] and np.ptp(due) == 0 and due[0] > 0.9
+
+
+def test_the_picture_is_the_same_in_every_unit_of_length():
+    V, F = meshes.bumpy(6, 6)
+    one, other = (histogram([reading(s * V, F, V[:, :2])]) for s in (1.0, 4.0))
+    assert one.shape == (HEIGHT, WIDTH, 3) and one.min() >= 0 and one.max() <= 1
+    assert np.array_equal(one, other)
+
+
+def test_two_copies_of_a_mesh_have_the_histogram_of_one(monkeypatch):
+    monkeypatch.setattr(canvas, "_text", lambda text, size: (np.zeros((1, 1)), 0.0, 0.0))
+    assert np.abs(histogram([bump(), bump()]) - histogram([bump()])).max() < 1e-12
+
+
+def test_a_thumbnail_is_transparent_but_for_its_bars():
+    picture = thumbnail([bump()], 96)
+    assert picture.shape == (96, 96, 4) and set(np.unique(picture[..., 3])) == {0.0, 1.0}
+    assert 0.02 < picture[..., 3].mean() < 0.9
+
+
+def test_nothing_to_draw_is_an_error():
+    with pytest.raises(EmptyMeshError):
+        histogram([reading(*meshes.grid(2, 2))])
