@@ -37,7 +37,7 @@ def _row(name):
     extent = np.ptp(V, axis=0).max()
     surface = triangle_surface(V, F)
     cuts, seconds = timed(lambda: cut(surface))
-    (component,) = cuts.pieces
+    (component,) = cuts.components
     cells = {"model": name, "faces": len(F), "handles": component.handles, "boundaries": component.boundaries,
              "tips": len(component.extremities), "length": cuts.length / extent, "seconds": seconds}  # fmt: skip
     if component.handles:

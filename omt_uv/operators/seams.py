@@ -60,7 +60,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
 
         new = [mark_seams(obj, cuts.edges) for obj, cuts in result]
         warn(self, [obj for obj, _ in result], [(k, text) for k, (_, c) in enumerate(result) for text in c.warnings])
-        opened = sum(len(cuts.pieces) for _, cuts in result)
+        opened = sum(len(cuts.components) for _, cuts in result)
         if sum(new):
             self.report({"INFO"}, f"Opened {opened} part{'' if opened == 1 else 's'} along {sum(new)} edges")
         else:

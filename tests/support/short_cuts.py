@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, vstack
 from scipy.sparse.csgraph import dijkstra
 
-from omt_uv.solver.cutting.component import make_piece
+from omt_uv.solver.cutting.component import make_component
 from omt_uv.solver.cutting.cut_graph import greedy_arcs
 from omt_uv.solver.mesh.gluing import corner_classes
 from omt_uv.solver.mesh.repair import repaired_gluing
@@ -70,9 +70,9 @@ def cotree_length(V, F):
     surface = triangle_surface(V, F)
     faces, triangles, owner = chosen_triangles(surface, None)
     gluing = repaired_gluing(surface, faces, triangles, owner).gluing
-    ease = np.ones(len(gluing.first))
-    everything = np.arange(len(F)), np.arange(len(ease))
-    piece = make_piece(gluing, V, corner_classes(gluing), *everything, np.zeros(len(V)), ease)
-    piece.cost[:] = piece.length
-    root = np.array([0] if len(piece.rim) == 0 else [], np.int64)
-    return float(piece.length[greedy_arcs(piece, root)].sum())
+    factor = np.ones(len(gluing.first))
+    everything = np.arange(len(F)), np.arange(len(factor))
+    component = make_component(gluing, V, corner_classes(gluing), *everything, np.zeros(len(V)), factor)
+    component.cost[:] = component.length
+    root = np.array([0] if len(component.boundary) == 0 else [], np.int64)
+    return float(component.length[greedy_arcs(component, root)].sum())

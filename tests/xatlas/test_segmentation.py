@@ -20,7 +20,7 @@ def test_a_cube_falls_into_its_sides(scale):
     V, F = meshes.subdivide(V, F)
     mesh = triangle_surface(V * scale, F)
     prepared = prepare(replace(mesh, seams=chart_seams(mesh)))
-    assert len(prepared.charts) == 6 and not prepared.cuts.pieces
+    assert len(prepared.charts) == 6 and not prepared.cuts.components
     for chart in prepared.charts:
         assert (np.ptp(chart.vertices, axis=0) == 0).sum() == 1
 

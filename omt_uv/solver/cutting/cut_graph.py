@@ -1,4 +1,4 @@
-"""Shortest cuts that open a piece into a disk.
+"""Cut a component into a disk along shortest paths, by tree-cotree (Erickson, Whittlesey 2005) and local search.
 
 `greedy_arcs` finds the shortest system of arcs between given roots and boundaries (tree-cotree with geodesic
 lengths); `shorten` then replaces one stretch of the cut at a time by the shortest that does its work, which also lets
@@ -12,60 +12,61 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
 from ..mesh.topology import halfedges
-from .component import Piece, edge_graph
+from .component import CutComponent, edge_graph
 
+# Times that all stretches of a cut are tried again.
 SWEEPS = 3
 # Where there are many holes only so many of the most expensive stretches are tried again.
 MOST_STRETCHES = 64
 
 
-def greedy_arcs(piece: Piece, roots: np.ndarray) -> np.ndarray:
-    """Edges (e,) bool whose cut leaves a disk, with all of the boundary and the vertices `roots` (k,) on its rim.
+def greedy_arcs(component: CutComponent, roots: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool whose cut leaves a disk, with all of the boundary and the vertices `roots` (k,) on its boundary.
 
     A shortest-path forest grows from the roots and the boundary, and a spanning tree of the faces avoids it and crosses
     first what would be long cuts; each edge in neither closes an arc (Eppstein 2003; Erickson, Whittlesey 2005,
     "Greedy optimal homotopy and homology generators", section 3).
     """
-    start = piece.on_boundary()
+    start = component.on_boundary()
     start[roots] = True
-    everything = np.arange(len(piece.pair))
+    everything = np.arange(len(component.pair))
     distance, before, _ = dijkstra(
-        edge_graph(piece, everything, piece.ends, piece.count),
+        edge_graph(component, everything, component.ends, component.vertex_count),
         indices=np.flatnonzero(start), min_only=True, return_predecessors=True,
     )  # fmt: skip
-    above = _edge_above(piece, before)
-    forest = np.zeros(len(piece.pair), dtype=bool)
+    above = _edge_above(component, before)
+    forest = np.zeros(len(component.pair), dtype=bool)
     forest[above[above >= 0]] = True
-    arc = distance[piece.ends].sum(axis=1) + piece.cost
-    crossed = _spanning_cotree(piece, ~forest, arc)
+    arc = distance[component.ends].sum(axis=1) + component.cost
+    crossed = _spanning_cotree(component, ~forest, arc)
     closing = ~forest & ~crossed
-    chosen = _ancestors(before, piece.ends[closing].ravel())
+    chosen = _ancestors(before, component.ends[closing].ravel())
     cut = closing
     used = above[chosen]
     cut[used[used >= 0]] = True
     return cut
 
 
-def _edge_above(piece: Piece, before: np.ndarray) -> np.ndarray:
+def _edge_above(component: CutComponent, before: np.ndarray) -> np.ndarray:
     """Edge (n,) to the predecessor of every vertex, -1 where it has none."""
     child = np.flatnonzero(before >= 0)
-    above = np.full(piece.count, -1, dtype=np.int64)
-    above[child] = _edges_between(piece.ends, child, before[child].astype(np.int64), piece.count)
+    above = np.full(component.vertex_count, -1, dtype=np.int64)
+    above[child] = _edges_between(component.ends, child, before[child].astype(np.int64), component.vertex_count)
     return above
 
 
-def _spanning_cotree(piece: Piece, allowed: np.ndarray, arc: np.ndarray) -> np.ndarray:
+def _spanning_cotree(component: CutComponent, allowed: np.ndarray, arc: np.ndarray) -> np.ndarray:
     """Edges (e,) bool of the spanning tree of the faces that crosses the allowed edges of the longest arcs."""
     edges = np.flatnonzero(allowed)
     edges = edges[np.argsort(-arc[edges], kind="stable")]
-    t, s = piece.pair[edges].T // 3
-    m = len(piece.triangles)
+    t, s = component.pair[edges].T // 3
+    m = len(component.triangles)
     # Of several edges between two faces, the first in order stands for all.
     _, first = np.unique(np.minimum(t, s) * m + np.maximum(t, s), return_index=True)
     first = first[t[first] != s[first]]
     rank = first + 1.0
     tree = minimum_spanning_tree(coo_matrix((rank, (t[first], s[first])), shape=(m, m)).tocsr())
-    crossed = np.zeros(len(piece.pair), dtype=bool)
+    crossed = np.zeros(len(component.pair), dtype=bool)
     crossed[edges[tree.data.astype(np.int64) - 1]] = True
     return crossed
 
@@ -83,64 +84,64 @@ def _ancestors(before: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         found, jump = more, jump[jump]
 
 
-def shorten(piece: Piece, cut: np.ndarray, tips: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
+def shorten(component: CutComponent, cut: np.ndarray, tips: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
     """The cut (e,) bool with each stretch replaced by the shortest path that does the same; `tips` (k,) stay on it.
 
-    Without one stretch the open piece is an annulus. The shortest path between its two boundaries may take off
+    Without one stretch the open component is an annulus. The shortest path between its two boundaries may take off
     anywhere along them, so stretches branch off one another where that is shorter. `around` (e,) bool confines this
     to stretches that touch these edges, once.
     """
     for _ in range(SWEEPS if around is None else 1):
-        before = float(piece.cost[cut].sum())
-        for stretch in stretches(piece, cut, tips)[:MOST_STRETCHES]:
-            if not _is_stretch(piece, cut, stretch) or not _touches(piece, stretch, around):
+        before = float(component.cost[cut].sum())
+        for stretch in stretches(component, cut, tips)[:MOST_STRETCHES]:
+            if not _is_stretch(component, cut, stretch) or not _touches(component, stretch, around):
                 continue
             rest = cut.copy()
             rest[stretch] = False
-            path = _shortest_bridge(piece, rest, tips)
-            if path is not None and piece.cost[path].sum() < piece.cost[stretch].sum() * (1 - 1e-9):
+            path = _shortest_bridge(component, rest, tips)
+            if path is not None and component.cost[path].sum() < component.cost[stretch].sum() * (1 - 1e-9):
                 cut = rest
                 cut[path] = True
-        if piece.cost[cut].sum() >= before * (1 - 1e-3):
+        if component.cost[cut].sum() >= before * (1 - 1e-3):
             break
     return cut
 
 
-def _touches(piece: Piece, stretch: np.ndarray, around: np.ndarray | None) -> bool:
-    return around is None or bool(np.isin(piece.ends[stretch], piece.ends[around]).any())
+def _touches(component: CutComponent, stretch: np.ndarray, around: np.ndarray | None) -> bool:
+    return around is None or bool(np.isin(component.ends[stretch], component.ends[around]).any())
 
 
-def stretches(piece: Piece, cut: np.ndarray, tips: np.ndarray) -> list[np.ndarray]:
+def stretches(component: CutComponent, cut: np.ndarray, tips: np.ndarray) -> list[np.ndarray]:
     """The cut in paths of edges between tips, branchings and the boundary, the most expensive first."""
     edges = np.flatnonzero(cut)
     if len(edges) == 0:
         return []
-    ends = piece.ends[edges]
-    node = np.bincount(ends.ravel(), minlength=piece.count) != 2
-    node |= piece.on_boundary()
+    ends = component.ends[edges]
+    node = np.bincount(ends.ravel(), minlength=component.vertex_count) != 2
+    node |= component.on_boundary()
     node[tips] = True
     # Edges are joined through vertices that are no nodes; every edge has a place of its own for its ends at nodes.
     k = len(edges)
-    place = np.where(node[ends], piece.count + np.arange(2 * k).reshape(k, 2), ends)
-    size = piece.count + 2 * k
+    place = np.where(node[ends], component.vertex_count + np.arange(2 * k).reshape(k, 2), ends)
+    size = component.vertex_count + 2 * k
     graph = coo_matrix((np.ones(k), place.T), shape=(size, size))
     label = connected_components(graph, directed=False)[1][place[:, 0]]
-    total = np.bincount(label, piece.cost[edges])
+    total = np.bincount(label, component.cost[edges])
     return [edges[label == c] for c in np.argsort(-total, kind="stable")[: len(np.unique(label))]]
 
 
-def _is_stretch(piece: Piece, cut: np.ndarray, stretch: np.ndarray) -> bool:
+def _is_stretch(component: CutComponent, cut: np.ndarray, stretch: np.ndarray) -> bool:
     """Whether the edges (k,) are still in the cut and nothing has come to branch off between them."""
-    vertices, uses = np.unique(piece.ends[stretch], return_counts=True)
-    degree = np.bincount(piece.ends[cut].ravel(), minlength=piece.count)
+    vertices, uses = np.unique(component.ends[stretch], return_counts=True)
+    degree = np.bincount(component.ends[cut].ravel(), minlength=component.vertex_count)
     return bool(cut[stretch].all() and (degree[vertices[uses == 2]] == 2).all())
 
 
-def open_classes(piece: Piece, cut: np.ndarray) -> np.ndarray:
-    """Vertex (m,3) of every triangle corner in the piece opened along the cut (e,) bool, numbered from 0."""
-    flat = piece.triangles.ravel()
+def cut_classes(component: CutComponent, cut: np.ndarray) -> np.ndarray:
+    """Vertex (m,3) of every triangle corner in the component cut open along the cut (e,) bool, numbered from 0."""
+    flat = component.triangles.ravel()
     after = np.arange(len(flat)) + 1 - 3 * (np.arange(len(flat)) % 3 == 2)
-    f, s = piece.pair[~cut].T
+    f, s = component.pair[~cut].T
     same = flat[f] == flat[s]
     rows = np.concatenate([f, after[f]])
     columns = np.concatenate([np.where(same, s, after[s]), np.where(same, after[s], s)])
@@ -148,31 +149,31 @@ def open_classes(piece: Piece, cut: np.ndarray) -> np.ndarray:
     return connected_components(graph, directed=False)[1].reshape(-1, 3).astype(np.int64)
 
 
-def open_rim(piece: Piece, cut: np.ndarray) -> np.ndarray:
-    """Boundary halfedges of the piece opened along the cut (e,) bool."""
-    return np.concatenate([piece.rim, piece.pair[cut].ravel()])
+def cut_boundary(component: CutComponent, cut: np.ndarray) -> np.ndarray:
+    """Boundary halfedges of the component cut open along the cut (e,) bool."""
+    return np.concatenate([component.boundary, component.pair[cut].ravel()])
 
 
-def _shortest_bridge(piece: Piece, cut: np.ndarray, tips: np.ndarray) -> np.ndarray | None:
-    """Edges of the shortest path between the two boundaries of the piece opened along `cut`; None if not two."""
-    opened = open_classes(piece, cut)
-    n = int(opened.max()) + 1
-    tail, head = halfedges(opened)
-    rim = open_rim(piece, cut)
-    graph = coo_matrix((np.ones(len(rim)), (tail[rim], head[rim])), shape=(n, n))
+def _shortest_bridge(component: CutComponent, cut: np.ndarray, tips: np.ndarray) -> np.ndarray | None:
+    """Edges of the shortest path between the two boundaries of the component cut open along `cut`; None if not two."""
+    classes = cut_classes(component, cut)
+    n = int(classes.max()) + 1
+    tail, head = halfedges(classes)
+    boundary = cut_boundary(component, cut)
+    graph = coo_matrix((np.ones(len(boundary)), (tail[boundary], head[boundary])), shape=(n, n))
     label = connected_components(graph, directed=False)[1]
     on_boundary = np.zeros(n, dtype=bool)
-    on_boundary[tail[rim]] = on_boundary[head[rim]] = True
+    on_boundary[tail[boundary]] = on_boundary[head[boundary]] = True
     # A tip that the rest does not touch is a boundary of one point.
-    on_boundary[opened.ravel()[np.isin(piece.triangles.ravel(), tips)]] = True
+    on_boundary[classes.ravel()[np.isin(component.triangles.ravel(), tips)]] = True
     boundaries = np.unique(label[on_boundary])
     if len(boundaries) != 2:
         return None
     one, other = (on_boundary & (label == c) for c in boundaries)
     inner = np.flatnonzero(~cut)
-    ends = np.stack([tail[piece.pair[inner, 0]], head[piece.pair[inner, 0]]], axis=1)
+    ends = np.stack([tail[component.pair[inner, 0]], head[component.pair[inner, 0]]], axis=1)
     distance, before, _ = dijkstra(
-        edge_graph(piece, inner, ends, n), indices=np.flatnonzero(one), min_only=True, return_predecessors=True
+        edge_graph(component, inner, ends, n), indices=np.flatnonzero(one), min_only=True, return_predecessors=True
     )
     target = np.flatnonzero(other)
     if not np.isfinite(distance[target]).any():
@@ -192,13 +193,13 @@ def _edges_between(ends: np.ndarray, a: np.ndarray, b: np.ndarray, n: int) -> np
     return near[order[np.searchsorted(key[order], np.minimum(a, b) * n + np.maximum(a, b))]]
 
 
-def path_to(piece: Piece, start: np.ndarray, end: int) -> np.ndarray:
+def path_to(component: CutComponent, start: np.ndarray, end: int) -> np.ndarray:
     """Edges (e,) bool of the shortest path from any of the vertices `start` (k,) to the vertex `end`."""
-    n = piece.count
-    graph = edge_graph(piece, np.arange(len(piece.pair)), piece.ends, n)
+    n = component.vertex_count
+    graph = edge_graph(component, np.arange(len(component.pair)), component.ends, n)
     _, before, _ = dijkstra(graph, indices=start, min_only=True, return_predecessors=True)
     on_path = _ancestors(before, np.array([end]))
     on_path = on_path[before[on_path] >= 0]
-    path = np.zeros(len(piece.pair), dtype=bool)
-    path[_edges_between(piece.ends, on_path, before[on_path].astype(np.int64), n)] = True
+    path = np.zeros(len(component.pair), dtype=bool)
+    path[_edges_between(component.ends, on_path, before[on_path].astype(np.int64), n)] = True
     return path

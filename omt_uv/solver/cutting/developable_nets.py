@@ -1,7 +1,7 @@
-"""Nets: cuts through all corners of a body with flat or developable sides, which then unrolls without distortion.
+"""Cut bodies with flat or developable sides to nets, through all their corners: they unroll without distortion.
 
 A cube, a cylinder, a bracket: what curvature there is sits on vertices of hard edges, and a cut through all of these,
-along the hard edges where it can, leaves none. On smooth bodies no cut does that, see `extremities.py`.
+along the hard edges where it can, leaves none. On smooth bodies no cut does that, see `protrusions`.
 """
 
 from __future__ import annotations
@@ -11,46 +11,53 @@ from dataclasses import replace
 import numpy as np
 
 from ..mesh.geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
-from .component import Piece, fold_angles
+from .component import CutComponent, fold_angles
 from .cut_graph import greedy_arcs
 
 # An edge at which the normal turns by more is hard. Prisms with 4, 5, 6 and 8 sides are clear of it.
 HARD = np.radians(52)
-# A vertex with less curvature is flat. Vertices off the hard edges may count as corners if they have SPIKE, as the tip
-# of a cone has, and are SPIKES at most; what curvature is left, summed without sign, must not exceed LEFT.
-FLAT, SPIKE, SPIKES, LEFT = 1e-3, 0.75, 4, 0.3
+# A vertex with less curvature, in radians, is flat.
+FLAT = 1e-3
+# Vertices off the hard edges may count as corners if they have so much curvature, in radians, as the tip of a cone has,
+# and are so many at most.
+SPIKE = 0.75
+MOST_SPIKES = 4
+# Curvature that may be left, in radians, summed without sign.
+MOST_LEFT = 0.3
 # A net is worth its seams up to this many times the side of a square with the area of the surface.
 LONGEST = 5.0
-# Edges within flat or developable sides count so many times, which leaves these in one piece.
+# Edges within flat or developable sides count so many times, which leaves these in one component.
 ACROSS = 1.5
 
 
-def net(piece: Piece) -> tuple[np.ndarray, np.ndarray] | None:
-    """Edges (e,) bool whose cut unrolls the piece, and the corners (k,) they pass through.
+def net(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
+    """Edges (e,) bool whose cut unrolls the component, and the corners (k,) they pass through.
 
     None if there are none, or if seams would pass through vertices to be kept free of them.
     """
-    length = halfedge_lengths(piece.positions, piece.triangles).reshape(-1, 3)
-    on_boundary = piece.on_boundary()
+    length = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
+    on_boundary = component.on_boundary()
     curvature = np.abs(
-        angle_defects(piece.triangles, angles_from_lengths(length), np.flatnonzero(on_boundary), piece.count)
+        angle_defects(
+            component.triangles, angles_from_lengths(length), np.flatnonzero(on_boundary), component.vertex_count
+        )
     )
     curvature[on_boundary] = 0
-    folded = np.abs(fold_angles(piece.positions, piece.triangles, piece.pair)) > HARD
-    hard = np.zeros(piece.count, dtype=bool)
-    hard[piece.ends[folded]] = True
+    folded = np.abs(fold_angles(component.positions, component.triangles, component.pair)) > HARD
+    hard = np.zeros(component.vertex_count, dtype=bool)
+    hard[component.ends[folded]] = True
     spike = ~hard & (curvature > SPIKE)
     corner = (hard & (curvature > FLAT)) | spike
     tips = np.flatnonzero(corner)
-    curved = spike.sum() > SPIKES or curvature[~corner].sum() > LEFT
+    curved = spike.sum() > MOST_SPIKES or curvature[~corner].sum() > MOST_LEFT
     # A closed surface needs a cut of two edges at least.
-    if curved or len(tips) < 3 or (piece.avoid[tips] > 0).any():
+    if curved or len(tips) < 3 or (component.avoid[tips] > 0).any():
         return None
-    chosen = greedy_arcs(replace(piece, cost=np.where(folded, piece.cost, ACROSS * piece.cost)), tips)
+    chosen = greedy_arcs(replace(component, cost=np.where(folded, component.cost, ACROSS * component.cost)), tips)
     return chosen, tips
 
 
-def is_long(piece: Piece, cut: np.ndarray) -> bool:
+def is_long(component: CutComponent, cut: np.ndarray) -> bool:
     """Whether a cut (e,) bool is more than what a net should take."""
-    area = face_areas(piece.positions, piece.triangles).sum()
-    return bool(piece.length[cut].sum() > LONGEST * np.sqrt(area))
+    area = face_areas(component.positions, component.triangles).sum()
+    return bool(component.length[cut].sum() > LONGEST * np.sqrt(area))

@@ -1,4 +1,4 @@
-"""From any mesh an artist has to disk charts: repaired, cut open and filled, all for the map only."""
+"""Make disk charts of any mesh an artist has: repaired, cut and filled, all for the map only."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..errors import ZeroAreaFaceError
 from ..mesh.charts import Chart, charts_of, check_disk, check_edges, strict_charts
 from ..mesh.repair import repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
-from .cuts import MOST_EXTREMITIES, Cuts, open_sheets, sieved
+from .cuts import MOST_EXTREMITIES, Cuts, cut_gluing, sieved
 from .hole_filling import fill_holes as fill_holes_of
 
 SEAMS = ("existing", "auto")
@@ -41,12 +41,12 @@ def prepare(
     ----------
     seams : "existing" splits along the seams of the surface alone and refuses what is no disk, or broken;
         "auto" repairs and cuts, for the map only
-    fill_holes : fill all boundaries of a part but the longest, for the map only, instead of cutting to them; such
+    fill_holes : fill all boundaries of a component but the longest, for the map only, instead of cutting to them; such
         charts have `patches`
-    sieve : fill the holes of a part that has more than so many; with "auto" it is then cut to its extremities, and a
-        part that has many handles comes apart, see `apart.parting_pairs`
+    sieve : fill the holes of a component that has more than so many; with "auto" it is then cut to its extremities, and
+        one that has many handles comes apart, see `handle_partition.partition_pairs`
     avoid : (n,) in [0,1], vertices to keep free of seams
-    extremities : tips that a surface is opened through, at most, where "auto" cuts; 0 for the fastest cuts
+    extremities : tips that a surface is cut open through, at most, where "auto" cuts; 0 for the fastest cuts
 
     Raises
     ------
@@ -61,13 +61,13 @@ def prepare(
     if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     repaired = repaired_gluing(surface, faces, triangles, owner)
-    opened = open_sheets(surface, repaired, avoid=avoid, fill=fill_holes, sieve=sieve, extremities=extremities)
-    charts, flat = _sound(charts_of(opened.surface, opened.gluing), opened.extent)
-    warnings = list(opened.cuts.warnings)
+    found = cut_gluing(surface, repaired, avoid=avoid, fill=fill_holes, sieve=sieve, extremities=extremities)
+    charts, flat = _sound(charts_of(found.surface, found.gluing), found.extent)
+    warnings = list(found.cuts.warnings)
     if flat:
         who = "A triangle has" if flat == 1 else f"{flat} triangles have"
         warnings.append(f"{who} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve")
-    return Prepared(charts, opened.cuts, tuple(warnings))
+    return Prepared(charts, found.cuts, tuple(warnings))
 
 
 def _all_lines(points: np.ndarray) -> bool:

@@ -1,6 +1,6 @@
-"""Holes filled for the map only, so that eyes and nostrils do not tear a face apart.
+"""Fill holes with fans, for the map only, so that eyes and nostrils do not tear a face apart.
 
-Every hole gets a fan of triangles around a new vertex. In the sheets they are triangles of polygon -1, on corners and
+Every hole gets a fan of triangles around a new vertex. In the gluing they are triangles of polygon -1, on corners and
 vertices after those of the surface.
 """
 
@@ -18,15 +18,15 @@ from ..mesh.topology import halfedges
 from .component import NOISE
 
 NO_POLYGON = -1
-# Cuts to more holes than these make a chart of slits, for which there is hardly a map: such a part is a sieve.
+# Cuts to more holes than these make a chart of slits, for which there is hardly a map: such a component is a sieve.
 MANY = 32
-# Boundaries of a sieve that are so many times as long as most are no holes, but rims; at most MANY.
+# Boundaries of a sieve that are so many times as long as most are no holes, but outer boundaries; at most MANY.
 OUTSTANDING = 3.0
 
 
 @dataclass(frozen=True)
 class Filled:
-    """The surface with a vertex in the middle of every hole, the sheets with the fans, and the number of holes."""
+    """The surface with a vertex in the middle of every hole, the gluing with the fans, and the number of holes."""
 
     surface: Surface
     gluing: Gluing
@@ -34,46 +34,51 @@ class Filled:
 
 
 def fill_holes(surface: Surface, gluing: Gluing, one_sided: np.ndarray, sieve: int | None = None) -> Filled:
-    """Fill all boundaries but the longest of every part of oriented sheets; parts `one_sided` (m,) are left alone.
+    """Fill all boundaries but the longest of every component of an oriented gluing.
 
-    sieve : fill only where there are more than so many holes, and leave all that are rims rather than holes open
+    one_sided : (m,) triangles that are left alone
+    sieve : fill only where there are more than so many holes, and leave outer boundaries open
     """
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
-    rim, loop = hole_rims(surface.positions, gluing, one_sided, sieve)
-    if len(rim) == 0:
+    boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve)
+    if len(boundary) == 0:
         return Filled(surface, gluing, 0)
-    return _fans(surface, gluing, rim, loop, tail, head, int(max(tail.max(), head.max())) + 1)
+    return _fans(surface, gluing, boundary, loop, tail, head, int(max(tail.max(), head.max())) + 1)
 
 
-def hole_rims(
+def hole_boundaries(
     positions: np.ndarray, gluing: Gluing, one_sided: np.ndarray, sieve: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The halfedges (r,) around the holes that `fill_holes` fills, and the number (r,) of the hole of each."""
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
     open_ = np.ones(len(tail), dtype=bool)
     open_[gluing.first] = open_[gluing.second] = False
-    rim = np.flatnonzero(open_)
-    rim = rim[~one_sided[rim // 3]]
-    if len(rim) == 0:
-        return rim, rim
+    boundary = np.flatnonzero(open_)
+    boundary = boundary[~one_sided[boundary // 3]]
+    if len(boundary) == 0:
+        return boundary, boundary
     size = int(max(tail.max(), head.max())) + 1
-    loop = connected_components(coo_matrix((np.ones(len(rim)), (tail[rim], head[rim])), shape=(size, size)), False)[1]
-    loop = np.unique(loop[tail[rim]], return_inverse=True)[1].ravel()
-    hole = _holes(positions, gluing, rim, loop, sieve)
-    return rim[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
+    loop = connected_components(
+        coo_matrix((np.ones(len(boundary)), (tail[boundary], head[boundary])), shape=(size, size)), False
+    )[1]
+    loop = np.unique(loop[tail[boundary]], return_inverse=True)[1].ravel()
+    hole = _holes(positions, gluing, boundary, loop, sieve)
+    return boundary[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
 
 
-def _holes(positions: np.ndarray, gluing: Gluing, rim: np.ndarray, loop: np.ndarray, sieve: int | None) -> np.ndarray:
-    """Loops (l,) bool that are not the longest of their part, or that are holes of sieves."""
-    a, b = gluing.ends(rim)
+def _holes(
+    positions: np.ndarray, gluing: Gluing, boundary: np.ndarray, loop: np.ndarray, sieve: int | None
+) -> np.ndarray:
+    """Loops (l,) bool that are not the longest of their component, or that are holes of sieves."""
+    a, b = gluing.ends(boundary)
     # Halves: the difference of two huge numbers may be infinite.
     step = np.linalg.norm(positions[a] / 2 - positions[b] / 2, axis=1)
     around = np.bincount(loop, step)
     # Of many equal holes rounding shall not choose the one that stays open.
     length = around * (1 + NOISE * np.random.default_rng(0).random(len(around)))
-    part = components(gluing)[rim[np.unique(loop, return_index=True)[1]] // 3]
-    order = np.lexsort((-length, part))
-    _, first, place, count = np.unique(part[order], return_index=True, return_inverse=True, return_counts=True)
+    component_of = components(gluing)[boundary[np.unique(loop, return_index=True)[1]] // 3]
+    order = np.lexsort((-length, component_of))
+    _, first, place, count = np.unique(component_of[order], return_index=True, return_inverse=True, return_counts=True)
     hole = np.ones(len(length), dtype=bool)
     hole[order[first]] = False
     if sieve is not None:
@@ -82,15 +87,15 @@ def _holes(positions: np.ndarray, gluing: Gluing, rim: np.ndarray, loop: np.ndar
     return hole
 
 
-def _fans(surface, gluing, rim, loop, tail, head, size) -> Filled:
-    """A triangle (head, tail, centre of the hole) on every rim halfedge (k,), joined to it and to its neighbours."""
-    a, b = gluing.ends(rim)
-    n, c, m, k = len(surface.positions), len(gluing.vertex), len(gluing.triangles), len(rim)
+def _fans(surface, gluing, boundary, loop, tail, head, size) -> Filled:
+    """A triangle (head, tail, centre of the hole) on every boundary halfedge (k,), joined to its neighbours."""
+    a, b = gluing.ends(boundary)
+    n, c, m, k = len(surface.positions), len(gluing.vertex), len(gluing.triangles), len(boundary)
     count = np.bincount(loop)
     centre = np.stack([np.bincount(loop, x / count[loop]) for x in surface.positions[a].T], axis=1)
     successor = np.full(size, -1, dtype=np.int64)
-    successor[tail[rim]] = np.arange(k)
-    following = successor[head[rim]]
+    successor[tail[boundary]] = np.arange(k)
+    following = successor[head[boundary]]
     mine = 3 * (m + np.arange(k))
     extended = replace(
         gluing,
@@ -98,7 +103,7 @@ def _fans(surface, gluing, rim, loop, tail, head, size) -> Filled:
         owner=np.concatenate([gluing.owner, np.full(k, NO_POLYGON)]),
         vertex=np.concatenate([gluing.vertex, np.stack([b, a, n + loop], axis=1).ravel()]),
         side=np.concatenate([gluing.side, np.tile([True, False, False], k)]),
-        first=np.concatenate([gluing.first, rim, mine + 2]),
+        first=np.concatenate([gluing.first, boundary, mine + 2]),
         second=np.concatenate([gluing.second, mine, mine[following] + 1]),
     )
     positions = np.concatenate([surface.positions, centre])

@@ -1,4 +1,4 @@
-"""One more cut into a chart: from its boundary to where its map shears most."""
+"""Slit a chart from its boundary to where its map shears most, along a shortest path."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def slit(surface: Surface, chart: Chart, shear: np.ndarray, avoid: np.ndarray | 
     avoid : (n,) in [0,1], vertices of the surface to keep free of seams
     """
     n = len(chart.vertices)
-    rim, taboo = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    rim[boundary_loops(chart.disk)[0]] = True
+    on_boundary, taboo = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    on_boundary[boundary_loops(chart.disk)[0]] = True
     taboo[chart.patches.ravel()] = True
     local = _mean_at_vertices(chart, np.log(np.maximum(shear, 1)))
     a, b = _inner_sides(surface, chart)
-    usable = ~(taboo[a] | taboo[b]) & ~(rim[a] & rim[b])
+    usable = ~(taboo[a] | taboo[b]) & ~(on_boundary[a] & on_boundary[b])
     a, b = a[usable], b[usable]
     length = np.linalg.norm(chart.vertices[a] - chart.vertices[b], axis=1)
     noise = 1 + NOISE * np.random.default_rng(0).random(len(a))
@@ -42,7 +42,7 @@ def slit(surface: Surface, chart: Chart, shear: np.ndarray, avoid: np.ndarray | 
     cost *= 1 + (AVOIDED - 1) * (weight[a] + weight[b]) / 2
     cost[is_sharp(surface, pair_keys(chart.vertex_ids[a], chart.vertex_ids[b]))] *= SHARP
     graph = csr_matrix((np.tile(cost, 2), (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(n, n))
-    distance, before, _ = dijkstra(graph, indices=np.flatnonzero(rim), min_only=True, return_predecessors=True)
+    distance, before, _ = dijkstra(graph, indices=np.flatnonzero(on_boundary), min_only=True, return_predecessors=True)
     worth = np.where(np.isfinite(distance), distance, 0) * local * (1 - weight)
     worth *= 1 + NOISE * np.random.default_rng(1).random(n)
     end = int(np.argmax(worth))

@@ -1,5 +1,5 @@
-"""Where the branches of a short tree should meet (Zelikovsky 1993, "An 11/6-approximation algorithm for the network
-Steiner problem", section 2).
+"""Find where the branches of a short tree should meet, by Zelikovsky's relative greedy algorithm (1993, "An
+11/6-approximation algorithm for the network Steiner problem", section 2).
 
 A tree of direct paths between its ends may be a third too long. Three of them joined at the best vertex between them
 often take less than the paths they make superfluous.
@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 # Of k ends there are k^3 / 6 threes to try.
 MOST_ENDS = 16
+# A path of no length: to scipy an edge of length 0 is no edge.
 NOTHING = 1e-12
 
 

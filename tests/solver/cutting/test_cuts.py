@@ -99,7 +99,7 @@ def test_cuts_are_seams_that_split_accepts(name):
 
 
 def test_topology_is_told():
-    kinds = {name: cut(triangle_surface(*SURFACES[name]())).pieces[0] for name in SURFACES}
+    kinds = {name: cut(triangle_surface(*SURFACES[name]())).components[0] for name in SURFACES}
     figures = {name: (p.boundaries, p.handles, p.one_sided) for name, p in kinds.items()}
     assert figures == {
         "tetrahedron": (0, 0, False), "cube": (0, 0, False), "sphere": (0, 0, False), "annulus": (2, 0, False),
@@ -111,7 +111,7 @@ def test_topology_is_told():
 def test_disks_are_left_alone():
     for mesh in (meshes.bumpy(), meshes.hemisphere(), meshes.head(12)):
         cuts = cut(triangle_surface(*mesh))
-        assert len(cuts.edges) == 0 and not cuts.pieces
+        assert len(cuts.edges) == 0 and not cuts.components
 
 
 def test_an_annulus_is_cut_along_a_shortest_path():
@@ -155,7 +155,7 @@ def test_spheres_are_opened_along_short_trees():
     for stretch in ([1.0, 1.0, 1.0], [1.0, 1.0, 4.0], [1.0, 3.0, 3.0], [1.0, 2.0, 3.0]):
         V = sphere * stretch
         cuts = cut(triangle_surface(V, F))
-        assert cuts.length <= 1.3 * shortest_tree(V, F, cuts.pieces[0].extremities)
+        assert cuts.length <= 1.3 * shortest_tree(V, F, cuts.components[0].extremities)
 
 
 @pytest.mark.parametrize("name", ["torus", "holed torus", "double torus"])
@@ -167,8 +167,8 @@ def test_handles_are_opened_along_short_loops(name):
 
 def test_the_cut_of_a_long_body_ends_at_its_tips():
     V, F = meshes.icosphere(3)
-    (piece,) = cut(triangle_surface(V * [1.0, 1.0, 4.0], F), extremities=2).pieces
-    heights = np.sort(V[piece.extremities, 2])
+    (component,) = cut(triangle_surface(V * [1.0, 1.0, 4.0], F), extremities=2).components
+    heights = np.sort(V[component.extremities, 2])
     assert heights[0] < -0.95 and heights[-1] > 0.95
 
 
@@ -178,7 +178,7 @@ def test_seams_of_the_artist_are_kept_and_used():
     seam = np.column_stack([around, np.roll(around, -1)])
     cuts = cut(triangle_surface(V, F, seam), extremities=0)
     # The seam leaves a tube, which one path along it opens.
-    assert cuts.pieces[0].boundaries == 2 and cuts.pieces[0].handles == 0
+    assert cuts.components[0].boundaries == 2 and cuts.components[0].handles == 0
     (chart,) = strict_charts(triangle_surface(V, F, np.concatenate([seam, cuts.edges])))
     assert len(chart.triangles) == len(F)
 
@@ -266,7 +266,7 @@ def test_handles_are_cut_around_filled_holes():
     prepared = prepare(triangle_surface(V, F), fill_holes=True)
     (chart,) = prepared.charts
     assert len(chart.patches) > 0 and len(chart.triangles) == len(F)
-    assert prepared.cuts.pieces[0].boundaries == 1
+    assert prepared.cuts.components[0].boundaries == 1
 
 
 def test_a_path_is_really_shortest():
@@ -292,7 +292,7 @@ def boundary(F):
 def test_models_are_cut_along_short_trees(name):
     V, F = meshes.load_model(name)
     cuts = cut(triangle_surface(V, F), extremities=5)
-    assert cuts.length <= 1.3 * shortest_tree(V, F, cuts.pieces[0].extremities)
+    assert cuts.length <= 1.3 * shortest_tree(V, F, cuts.components[0].extremities)
 
 
 @meshes.models_missing
@@ -300,7 +300,7 @@ def test_models_are_cut_along_short_trees(name):
 def test_models_with_handles(name, handles):
     V, F = meshes.load_model(name)
     cuts = cut(triangle_surface(V, F), extremities=0)
-    assert cuts.pieces[0].handles == handles
+    assert cuts.components[0].handles == handles
     assert cuts.length <= cotree_length(V, F)
 
 
@@ -360,7 +360,7 @@ def test_bodies_with_flat_sides_unroll(name, scale, shift):
 
 def test_smooth_bodies_and_those_to_be_kept_free_of_seams_have_no_net():
     sphere = cut(triangle_surface(*meshes.icosphere(2)))
-    assert len(sphere.pieces[0].extremities) <= 8
+    assert len(sphere.components[0].extremities) <= 8
     V, polygons = prism(12)
     surface = meshes.polygon_surface(V, polygons)
     avoid = (V[:, 2] > 1).astype(float)

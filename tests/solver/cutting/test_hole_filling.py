@@ -122,7 +122,7 @@ def test_the_rims_of_a_tube_full_of_holes_stay_open():
     V, F = tube(32, 24, lattice(4, 2))
     result = check(V, F, 1.02)
     cuts = cut(triangle_surface(V, F))
-    assert cuts.pieces[0].boundaries == 2 and cuts.length == pytest.approx(4)
+    assert cuts.components[0].boundaries == 2 and cuts.length == pytest.approx(4)
     assert len(boundary_loops(result.charts[0].disk)) == 1
 
 
@@ -133,7 +133,7 @@ def test_a_tube_that_is_not_flat_is_cut_to_its_extremities():
 def test_a_box_full_of_holes_has_its_net():
     V, F = box()
     result = check(V, F, 1 + 1e-6)
-    assert len(cut(triangle_surface(V, F)).pieces[0].extremities) == 8
+    assert len(cut(triangle_surface(V, F)).components[0].extremities) == 8
     assert result.maps[0].area_l1 < 1e-6
 
 
