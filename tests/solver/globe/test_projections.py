@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshes import cube, head, icosphere
 
 from omt_uv.solver.globe.projections import (
     EQUIRECT,
@@ -16,7 +15,6 @@ from omt_uv.solver.globe.projections import (
     to_sphere,
     wrap_octahedral,
 )
-from omt_uv.solver.globe.rotation import MarkerError, along_axes, by_markers
 
 
 def random_points(count=4000, seed=0):
@@ -30,12 +28,6 @@ def near_poles(count=400):
     r = np.geomspace(1e-9, 1e-2, count)
     z = np.sqrt(1 - r**2) * np.where(np.arange(count) % 2, 1, -1)
     return np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
-
-
-def random_rotation(seed=0):
-    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    q *= np.sign(np.diag(r))
-    return q * np.linalg.det(q)
 
 
 @pytest.mark.parametrize("projection", PROJECTIONS)
@@ -90,60 +82,3 @@ def test_the_octahedral_layout_goes_on_beyond_its_sides():
     side = np.column_stack([np.ones(50), np.linspace(-0.99, 0.99, 50)])
     assert np.allclose(to_sphere(0.5 * (side + 1), OCTAHEDRAL), to_sphere(0.5 * (side * [1, -1] + 1), OCTAHEDRAL))
     assert np.allclose(np.abs(octahedral_to_plane(np.array([[0.0, 0, -1]]))), 1)
-
-
-@pytest.mark.parametrize("make", [head, cube, lambda: icosphere(2)])
-def test_axes_undo_any_rotation_of_the_map(make):
-    V, F = make()
-    direction = V - V.mean(axis=0)
-    points = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    wanted = along_axes(points, V, F)
-    R = random_rotation()
-    assert np.linalg.det(wanted) == pytest.approx(1)
-    assert np.allclose(along_axes(points @ R.T, 7 * V + 3, F) @ R, wanted, atol=1e-9)
-
-
-def test_axes_of_a_sphere_are_its_own():
-    V, F = icosphere(3)
-    assert np.allclose(along_axes(V, V, F), np.eye(3), atol=1e-12)
-
-
-def test_a_surface_that_looks_inwards_has_north_up_and_the_front_in_the_middle():
-    V, F = head()
-    direction = V - V.mean(axis=0)
-    points = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    outside = along_axes(points, V, F)
-    # Turned inside out it maps to the mirror image.
-    inside = along_axes(points * [-1, 1, 1], V, F[:, ::-1]) * [-1, 1, 1]
-    assert np.allclose((points @ inside.T)[:, 1:], (points @ outside.T)[:, 1:], atol=0.05)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_markers_give_pole_meridian_and_side(seed):
-    pole, meridian, side = random_points(3, seed)
-    if np.linalg.det([pole, meridian, side]) < 0:
-        meridian, side = side, meridian
-    R = by_markers(pole, meridian)
-    assert np.allclose(R @ R.T, np.eye(3)) and np.linalg.det(R) == pytest.approx(1)
-    assert np.allclose(R @ pole, [0, 0, 1])
-    assert np.allclose(to_plane(R @ meridian, EQUIRECT)[0], 0.5)
-    R = by_markers(pole, meridian, side)
-    assert np.allclose(R @ pole, [0, 0, 1])
-    west, east = to_plane(np.stack([R @ meridian, R @ side]), EQUIRECT)[:, 0]
-    assert 0.25 < west <= 0.5 + 1e-12 or 0.5 < west < 0.75
-    assert 0 < (east - west) % 1 < 0.5
-
-
-@pytest.mark.parametrize("pole", [[0.0, 0, 1], [0, 0, -1], [1, 0, 0]])
-def test_a_pole_alone_comes_to_the_north(pole):
-    assert np.allclose(by_markers(np.array(pole)) @ pole, [0, 0, 1])
-
-
-def test_markers_without_a_direction_are_refused():
-    x, y, z = np.eye(3)
-    with pytest.raises(MarkerError, match="meridian"):
-        by_markers(z, -z)
-    with pytest.raises(MarkerError, match="west"):
-        by_markers(z, -y, -x)
-    with pytest.raises(MarkerError, match="no middle"):
-        by_markers(0 * x)

@@ -8,11 +8,11 @@ from meshes import icosphere, polygon_surface
 from sphere_shapes import random_sphere
 
 from omt_uv.solver.globe.exact_areas import correct_areas, equirectangular_areas
-from omt_uv.solver.globe.pole_vertices import CONES, POLES, move_vertices_onto, push
+from omt_uv.solver.globe.pole_vertices import POLES
 from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
 from omt_uv.solver.globe.unfolding import Polygons, gather_polygons, unfold
 from omt_uv.solver.mesh.geometry import signed_areas
-from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
+from omt_uv.solver.mesh.spherical_geometry import spherical_areas
 from omt_uv.solver.progress import drain
 
 
@@ -116,13 +116,6 @@ def test_the_poles_are_vertices_and_their_corners_are_spread():
         assert width.sum() == pytest.approx(1, abs=1e-9)
 
 
-def test_octahedral_cones_are_vertices():
-    P, F = random_sphere(900, 1)
-    points, found = move_vertices_onto(P, F, CONES)
-    assert (found >= 0).all() and (points[found] == CONES).all()
-    assert (signed_volumes(points, F) > 0).all()
-
-
 def test_copies_of_an_edge_differ_by_a_motion_of_the_layout():
     """A seam of the layout is one cut: both sides of it have the same shape."""
     P, F = icosphere(3)
@@ -141,22 +134,6 @@ def _pole_vertices(unfolded):
     used = np.zeros(len(unfolded.uv), bool)
     used[unfolded.index] = True
     return np.flatnonzero(~used)
-
-
-@pytest.mark.parametrize("distance", [1e-7, 0.02, 0.4])
-def test_a_push_moves_one_point_and_keeps_areas(distance):
-    P, _ = icosphere(4)
-    end = np.array([0.0, 0, 1])
-    start = np.array([np.sin(distance), 0, np.cos(distance)])
-    # Tiny triangles, whose sides stay straight.
-    corners = P[:, None] + 1e-5 * np.random.default_rng(0).normal(size=(len(P), 3, 3))
-    corners = (corners / np.linalg.norm(corners, axis=2, keepdims=True)).reshape(-1, 3)
-    moved = push(np.concatenate([corners, [start]]), start, end, 12.0, np.pi / 2)
-    assert np.allclose(moved[-1], end, atol=1e-6 * distance)
-    assert (moved[:-1][corners[:, 2] < -1e-3] == corners[corners[:, 2] < -1e-3]).all()
-    tiny = np.arange(len(corners)).reshape(-1, 3)
-    before, after = (signed_volumes(p, tiny) for p in (corners, moved))
-    assert np.abs(after / before - 1)[np.abs(before) > 1e-11].max() < 5e-3
 
 
 def test_quads_stay_whole_and_the_seam_is_one_column():

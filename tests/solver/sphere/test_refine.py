@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from sphere_shapes import blob
+import pytest
+from sphere_shapes import blob, lopsided, random_rotation, random_sphere
 
 from omt_uv.solver.mesh.geometry import face_areas
-from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes
+from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
 from omt_uv.solver.sphere.multilevel import multilevel_start
-from omt_uv.solver.sphere.refine import sphere_refine
+from omt_uv.solver.sphere.refine import relax, sphere_refine
 from omt_uv.solver.sphere.sphere_map import sphere_map
 
 
@@ -31,3 +32,45 @@ def test_folds_are_straightened():
     assert not (signed_volumes(tangled, F) > 0).all()
     found = drain(sphere_refine(V, F, tangled, face_areas(V, F)))
     assert found.untangling > 0 and (signed_volumes(found.positions, F) > 0).all()
+
+
+def test_a_start_that_is_turned_leads_to_the_map_turned():
+    P, F = random_sphere(200)
+    target, R = lopsided(P, F, 1.0), random_rotation()
+    found, turned = (drain(sphere_refine(P, F, start, target)) for start in (P, P @ R.T))
+    np.testing.assert_allclose(turned.positions, found.positions @ R.T, atol=1e-7)
+    assert turned.iterations == found.iterations
+
+
+def test_units_of_length_and_of_area_do_not_count():
+    P, F = random_sphere(200)
+    target = lopsided(P, F, 1.0)
+    found, other = (drain(sphere_refine(s * P, F, P, s * target)).positions for s in (1.0, 4.0))
+    np.testing.assert_allclose(other, found, atol=1e-9)
+
+
+def test_the_error_that_is_reported_is_that_of_the_map():
+    P, F = random_sphere(200)
+    target = lopsided(P, F, 1.0)
+    found = drain(sphere_refine(P, F, P, target))
+    share = target / target.sum()
+    ratio = spherical_areas(found.positions, F) / (4 * np.pi * share)
+    error = max(share @ np.abs(ratio - 1), np.sqrt(share @ (ratio - 1) ** 2))
+    np.testing.assert_allclose(found.area_error, error, rtol=1e-9)
+    assert found.status == "converged" and found.untangling == 0
+
+
+def test_relaxing_folds_nothing_and_brings_areas_nearer():
+    P, F = random_sphere(200)
+    target = lopsided(P, F, 1.0)
+    relaxed, steps = drain(relax(P, F, P, target))
+    share = target / target.sum()
+    before, after = (np.abs(spherical_areas(p, F) / (4 * np.pi) - share).sum() for p in (P, relaxed))
+    assert steps > 0 and after < before and signed_volumes(relaxed, F).min() > 0
+
+
+@pytest.mark.parametrize("balance", [-0.1, 1.1, np.nan])
+def test_a_balance_lies_between_0_and_1(balance):
+    P, F = random_sphere(60)
+    with pytest.raises(ValueError, match="balance"):
+        drain(sphere_refine(P, F, P, spherical_areas(P, F), balance=balance))

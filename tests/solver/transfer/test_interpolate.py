@@ -126,8 +126,8 @@ def test_a_seam_that_is_kept_is_followed_and_both_sides_are_exact(scale, offset)
 def test_a_mesh_that_is_cut_open_keeps_its_two_boundaries_apart_though_they_touch():
     """As files without shared vertices have it: every point of the cut is a point of both boundaries."""
     V, F, corners, uv, W, G, coarse = coarse_seam()
-    V, F = opened(V, F, value_jumps(F, corners, uv, 1e-6))
-    W, G = opened(W, G, coarse)
+    V, F = cut_along(V, F, value_jumps(F, corners, uv, 1e-6))
+    W, G = cut_along(W, G, coarse)
     on = ClosestPoint(V, F, 0.2)(W, vertex_normals(W, G))
     at = laid(V, F, np.zeros((0, 2), np.int64), W, G, on)
     assert np.abs(transfer.to_corners(at, corners, uv, extend=True) - meridian(W, G)[0]).max() < 1e-6
@@ -139,7 +139,7 @@ def test_a_mesh_that_is_cut_open_keeps_its_two_boundaries_apart_though_they_touc
     assert at.extended == 0
 
 
-def opened(V, F, seams):
+def cut_along(V, F, seams):
     """A mesh whose vertices on seams are one for every side."""
     sides = cut_open(V, F, seams).sides
     points = np.zeros((sides.max() + 1, 3))

@@ -1,0 +1,57 @@
+"""Folds on the sphere straightened: where there are some, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+from sphere_shapes import random_sphere
+
+from omt_uv.solver.maps.energy import elements
+from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
+from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.projected_newton import Assembly
+from omt_uv.solver.sphere.untangle import straighten_around, untangle_locally, untangle_on_sphere, with_rings
+
+
+def folded_sphere():
+    """A mesh of the sphere, and a map of it to itself in which one vertex lies beyond its neighbours."""
+    P, F = random_sphere(400)
+    tangled = P.copy()
+    neighbours = np.setdiff1d(np.unique(F[(F == 7).any(axis=1)]), 7)
+    tangled[7] = 2.2 * P[neighbours[0]] - 1.2 * P[7]
+    tangled[7] /= np.linalg.norm(tangled[7])
+    assert signed_volumes(tangled, F).min() < 0
+    return P, F, tangled
+
+
+def test_folds_are_straightened_and_all_else_stays_to_the_bit():
+    P, F, tangled = folded_sphere()
+    found = drain(untangle_locally(P, F, tangled))
+    assert signed_volumes(found, F).min() > 0
+    touched = with_rings(F, signed_volumes(tangled, F) <= 0, len(P))
+    np.testing.assert_array_equal(found[~touched], tangled[~touched])
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-14)
+    np.testing.assert_allclose(spherical_areas(found, F).sum(), 4 * np.pi, rtol=1e-12)
+
+
+def test_only_free_vertices_move():
+    P, F, tangled = folded_sphere()
+    free = np.arange(len(P)) == 7
+    found = drain(straighten_around(P, F, tangled, spherical_areas(P, F), free))
+    np.testing.assert_array_equal(found[~free], P[~free])
+    assert signed_volumes(found, F).min() > 0
+
+
+def test_without_folds_nothing_is_done():
+    P, F = random_sphere(100)
+    area = spherical_areas(P, F)
+    found, steps = drain(untangle_on_sphere(elements(P, F, area), Assembly(F, len(P)), P))
+    assert steps == 0 and found is P
+
+
+def test_rings_grow_by_neighbours():
+    _, F = random_sphere(400)
+    distance = np.full(400, 99)
+    distance[F[0]] = 0
+    for _ in range(400):
+        np.minimum.at(distance, F.ravel(), np.repeat(distance[F].min(axis=1) + 1, 3))
+    np.testing.assert_array_equal(with_rings(F, np.arange(len(F)) == 0, 400), distance <= 4)
