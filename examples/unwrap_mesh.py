@@ -21,6 +21,7 @@ def main() -> None:
 
 
 def show(progress: omt.Progress) -> None:
+    """Print where each stage begins and ends."""
     if progress.fraction in (0.0, 1.0):
         print(f"{progress.stage}: {100 * progress.fraction:.0f} %")
 
