@@ -1,4 +1,4 @@
-"""Curvature of triangle meshes, integrated over the area of each vertex, and how sharp their edges are.
+"""Integrate curvature over the area of every vertex (Meyer, Desbrun, Schroeder, Barr 2003), and tell sharp edges.
 
 Integrated values add up: the Gaussian ones of a closed surface to 2 pi times its Euler characteristic. They
 need no orientation (Gaussian, sharpness) or a consistent one (mean), and may be taken of any triangles.
@@ -35,7 +35,10 @@ def mean_curvature(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def sharpness(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The largest angle (n,) in [0, pi] between the normals of two faces that share an edge at a vertex."""
+    """The largest angle (n,) in [0, pi] between the normals of two faces that share an edge at a vertex.
+
+    positions (n,3), triangles (m,3)
+    """
     first, second = pair_up(pair_keys(*halfedges(triangles)))
     normal = face_normals(positions, triangles)
     a, b = normal[first // 3], normal[second // 3]

@@ -1,4 +1,4 @@
-"""Target measures: how much of the domain every face shall get, as densities relative to its area.
+"""Make target densities: how much of the domain every face shall get, relative to its area.
 
 A density (m,) has one positive number per triangle; only ratios count, so densities compose by multiplication. The
 target measure of a face is its area times its density. `area` (m,) below is always that of the surface.
@@ -17,9 +17,9 @@ from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.topology import halfedges
 from . import curvature
 
-# A density may not vary more than this over a surface: faces with less would have no place in double precision.
+# Ratio by which a density may vary at most over a surface: faces with less would have no place in double precision.
 CONTRAST = 1e6
-# Area errors so many times the goal are said.
+# An area error above so many times its goal is worth a warning.
 INEXACT = 2.0
 
 
@@ -32,22 +32,24 @@ class Target:
     region: np.ndarray | None = None
 
     def of(self, rows: np.ndarray) -> Target:
-        """The target of some triangles (k,)."""
+        """The target of some triangles (k,), given by their numbers or as a mask (m,)."""
         return Target(self.density[rows], None if self.region is None else self.region[rows])
 
 
-def painted_density(weights: np.ndarray, factor: float) -> np.ndarray:
-    """Density 1 + (factor - 1) w (m,) of weights (m,) in [0, 1]: what has weight 1 gets `factor` times what has 0.
+def painted_density(region: np.ndarray, factor: float) -> np.ndarray:
+    """Density 1 + (factor - 1) w (m,) of a painted region w (m,): weight 1 gets `factor` times what weight 0 gets.
 
     Raises
     ------
     WeightError, ShareError : see `check_region` and `check_factor`
     """
     check_factor(factor)
-    return 1 + (factor - 1) * check_region(weights)
+    return 1 + (factor - 1) * check_region(region)
 
 
-def curved(area: np.ndarray, triangles: np.ndarray, curvature_at: np.ndarray, c: float, whole: float) -> np.ndarray:
+def _curvature_density(
+    area: np.ndarray, triangles: np.ndarray, vertex_curvature: np.ndarray, c: float, whole: float
+) -> np.ndarray:
     """Density (m,) of the measure area + c |K|, K (n,) integrated over the vertices (B. Gu 2018, eq. 17).
 
     whole : value of the integral of |K| that with c = 1 counts as much as the whole area, so that c means the same
@@ -55,8 +57,8 @@ def curved(area: np.ndarray, triangles: np.ndarray, curvature_at: np.ndarray, c:
     """
     if not (np.isfinite(c) and c >= 0):
         raise DensityError(f"The weight of curvature is {c}", remedy="Give it a number that is not negative")
-    at = np.bincount(triangles.ravel(), np.repeat(area / 3, 3), len(curvature_at))
-    amount = np.abs(curvature_at) * (area.sum() / whole)
+    at = np.bincount(triangles.ravel(), np.repeat(area / 3, 3), len(vertex_curvature))
+    amount = np.abs(vertex_curvature) * (area.sum() / whole)
     return 1 + c * from_vertices(amount / np.where(at > 0, at, 1), triangles)
 
 
@@ -66,17 +68,19 @@ def gaussian_curvature_density(positions: np.ndarray, triangles: np.ndarray, c: 
     positions (n,3), triangles (m,3)
     """
     area = face_areas(positions, triangles)
-    return curved(area, triangles, curvature.gaussian_curvature(positions, triangles), c, 4 * np.pi)
+    return _curvature_density(area, triangles, curvature.gaussian_curvature(positions, triangles), c, 4 * np.pi)
 
 
 def mean_curvature_density(positions: np.ndarray, triangles: np.ndarray, c: float = 1.0) -> np.ndarray:
     """Density (m,) of area + c |H| with H the mean curvature; with c = 1 half of a sphere's measure is curvature.
 
+    positions (n,3), triangles (m,3)
+
     Mean curvature is one over a length: the surface is measured by the radius of the sphere that has its area.
     """
     area = face_areas(positions, triangles)
     whole = np.sqrt(4 * np.pi * area.sum())
-    return curved(area, triangles, curvature.mean_curvature(positions, triangles), c, whole)
+    return _curvature_density(area, triangles, curvature.mean_curvature(positions, triangles), c, whole)
 
 
 def from_vertices(values: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -108,14 +112,16 @@ def normalised_density(density: np.ndarray, area: np.ndarray) -> np.ndarray:
     return density * (area.sum() / (area @ density))
 
 
-def region_share(weights: np.ndarray, measure: np.ndarray) -> float:
-    """Share sum(w a) / sum(a) of a softly painted region (m,) in a measure (m,): areas in space, or in a UV map."""
-    return float(weights @ measure / measure.sum())
+def region_share(region: np.ndarray, area: np.ndarray) -> float:
+    """Share sum(w a) / sum(a) of a softly painted region w (m,) in areas a (m,), in space or in a UV map."""
+    return float(region @ area / area.sum())
 
 
 def area_error_warnings(error: float, goal: float) -> tuple[str, ...]:
-    """A warning where the area error of a map against its density is much above the goal, as it is where the density
-    varies more from face to face than shear can make up for."""
+    """Warn where the area error of a map against its density is much above the goal.
+
+    It is where the density varies more from face to face than shear can make up for.
+    """
     if error <= INEXACT * goal:
         return ()
     return (
@@ -127,8 +133,8 @@ def area_error_warnings(error: float, goal: float) -> tuple[str, ...]:
 def relative_entropy(target: np.ndarray, area: np.ndarray) -> float:
     """Relative entropy sum(p log(p / q)) of a target measure (m,) against the areas (m,): 0 if all densities are 1."""
     p, q = target / target.sum(), area / area.sum()
-    held = (p > 0) & (q > 0)
-    return float(p[held] @ np.log(p[held] / q[held]))
+    positive = (p > 0) & (q > 0)
+    return float(p[positive] @ np.log(p[positive] / q[positive]))
 
 
 def graded_density(
@@ -152,7 +158,7 @@ def graded_density(
     spacing = np.sqrt(area.sum() / (samples * np.where(at > 0, mean, 1)))
     tail, head = halfedges(triangles)
     length = limit * np.linalg.norm(positions[tail] - positions[head], axis=1)
-    # From one more node, whose edges are as long as the spacing asked, every vertex is as far as its spacing may be.
+    # From one more node, whose edges are as long as the spacing given, every vertex is as far as its spacing may be.
     rows = np.concatenate([tail, head, np.full(n, n)])
     columns = np.concatenate([head, tail, np.arange(n)])
     key, first = np.unique(rows * (n + 1) + columns, return_index=True)
@@ -163,25 +169,25 @@ def graded_density(
     return density * from_vertices(finer, triangles)
 
 
-def check_region(weights: np.ndarray, kind: str = "face") -> np.ndarray:
-    """Weights as float64, all of them in [0, 1] and not the same everywhere.
+def check_region(region: np.ndarray, kind: str = "face") -> np.ndarray:
+    """The weights (m,) of a painted region as float64, all of them in [0, 1] and not the same everywhere.
 
     Raises
     ------
     WeightError : anything else, with the indices of what is wrong as elements of this kind
     """
-    weights = np.asarray(weights, float)
-    wrong = np.flatnonzero(~np.isfinite(weights))
+    region = np.asarray(region, float)
+    wrong = np.flatnonzero(~np.isfinite(region))
     if len(wrong):
         raise WeightError("A weight is not a finite number", kind=kind, elements=wrong)
-    wrong = np.flatnonzero((weights < 0) | (weights > 1))
+    wrong = np.flatnonzero((region < 0) | (region > 1))
     if len(wrong):
         raise WeightError("A weight is not between 0 and 1", kind=kind, elements=wrong)
-    if not weights.any():
+    if not region.any():
         raise WeightError("All weights are zero: there is no region", "Paint the region first")
-    if np.ptp(weights) == 0:
+    if np.ptp(region) == 0:
         raise WeightError("All weights are the same: there is nothing around the region", "Paint a part only")
-    return weights
+    return region
 
 
 def check_factor(factor: float) -> None:

@@ -1,4 +1,4 @@
-"""Edges of a triangle mesh that stand out: sharp ones, borders of regions, jumps of values between the two sides."""
+"""Find edges of a triangle mesh that stand out: sharp ones, borders of regions, jumps of values across them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from ..mesh.geometry import face_areas, face_normals, halfedge_lengths
 from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up, twins
 
 NO_EDGES = np.zeros((0, 2), np.int64)
-# A region of fewer new triangles than this, or narrower than this share of a new edge, has no shape of its own.
-FEWEST_TRIANGLES, NARROWEST = 0.7, 0.25
+# A region of fewer new triangles than this has no shape of its own,
+LEAST_TRIANGLES = 0.7
+# nor one that is narrower than this share of a new edge.
+LEAST_WIDTH = 0.25
 
 
 def sharp_edges(positions: np.ndarray, triangles: np.ndarray, angle: float) -> np.ndarray:
@@ -57,29 +59,31 @@ def resolved_features(
 ) -> tuple[np.ndarray, int]:
     """The features (e,2) of a mesh (n,3), (m,3) without the borders of regions too small to show.
 
-    size (m,): how long the edges of a new mesh are to be on every triangle. Regions are the connected pieces between
+    size (m,): how long the edges of a new mesh are to be on every triangle. Regions are the components between
     features. One with too few new triangles, or too narrow, joins the neighbour with which it has most of its border in
     common. Returns the remaining features, and how many regions joined another.
     """
     first, second, edges = _pairs(triangles)
     keys = pair_keys(*features.T)
-    parts = np.isin(pair_keys(*edges.T), keys)
-    count, label = graph_components(first[~parts] // 3, second[~parts] // 3, len(triangles))
-    own, other = label[first[parts] // 3], label[second[parts] // 3]
+    is_feature = np.isin(pair_keys(*edges.T), keys)
+    count, label = graph_components(first[~is_feature] // 3, second[~is_feature] // 3, len(triangles))
+    own, other = label[first[is_feature] // 3], label[second[is_feature] // 3]
     length = halfedge_lengths(positions, triangles) / np.repeat(size, 3)
     open_ = np.flatnonzero(twins(triangles) < 0)
     area = np.bincount(label, face_areas(positions, triangles) / size**2, count)
-    rim = np.bincount(label[open_ // 3], length[open_], count)
-    group = _merged(area, rim, own, other, (length[first] + length[second])[parts] / 2)
-    lost = edges[parts][(own != other) & (group[own] == group[other])]
+    boundary = np.bincount(label[open_ // 3], length[open_], count)
+    group = _merged(area, boundary, own, other, (length[first] + length[second])[is_feature] / 2)
+    lost = edges[is_feature][(own != other) & (group[own] == group[other])]
     return features[~np.isin(keys, pair_keys(*lost.T))], count - len(np.unique(group))
 
 
-def _merged(area: np.ndarray, rim: np.ndarray, own: np.ndarray, other: np.ndarray, length: np.ndarray) -> np.ndarray:
+def _merged(
+    area: np.ndarray, boundary: np.ndarray, own: np.ndarray, other: np.ndarray, length: np.ndarray
+) -> np.ndarray:
     """Group (r,) of every region after small ones have joined others, as often as it takes.
 
-    area (r,) and rim (r,), the length of the mesh's boundary, in units of new edges; own, other (e,): regions on the
-    two sides of every border edge, length (e,).
+    area (r,) and boundary (r,), the length of the mesh's boundary, in units of new edges; own, other (e,): regions on
+    the two sides of every border edge, length (e,).
     """
     group, count = np.arange(len(area)), len(area)
     while True:
@@ -87,9 +91,9 @@ def _merged(area: np.ndarray, rim: np.ndarray, own: np.ndarray, other: np.ndarra
         between = a != b
         a, b, shared = a[between], b[between], np.tile(length[between], 2)
         side = np.concatenate([a, b])
-        border = np.bincount(side, shared, count) + np.bincount(group, rim, count)
+        border = np.bincount(side, shared, count) + np.bincount(group, boundary, count)
         inside = np.bincount(group, area, count)
-        small = (inside < FEWEST_TRIANGLES * np.sqrt(3) / 4) | (2 * inside < NARROWEST * border)
+        small = (inside < LEAST_TRIANGLES * np.sqrt(3) / 4) | (2 * inside < LEAST_WIDTH * border)
         pair, index = np.unique(side * count + np.concatenate([b, a]), return_inverse=True)
         total = np.bincount(index, shared, len(pair))
         pair, total = pair[small[pair // count]], total[small[pair // count]]

@@ -1,4 +1,4 @@
-"""Gaussian smoothing along a surface: the heat that a function becomes after several times, from one factorisation."""
+"""Average functions along a surface with Gaussian weights, by the heat equation in one Krylov space for all scales."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COMPLETE = 1e-12
 
 
 class HeatMeans:
-    """Gaussian means on the surface (n,3), (m,3), for sigmas about `sigma`."""
+    """Gaussian means on a surface (n,3), (m,3), for standard deviations about `sigma`, a length."""
 
     def __init__(self, positions: np.ndarray, triangles: np.ndarray, sigma: float):
         n = len(positions)
@@ -24,9 +24,9 @@ class HeatMeans:
         # Vertices of no area are in no triangle, or all but: they are left alone.
         mass = np.maximum(self.area, 1e-12 * self.area.max())
         length = halfedge_lengths(positions, triangles).reshape(-1, 3)
-        # Negative weights would let heat flow from cold to hot across obtuse triangles.
-        weight = np.maximum(0.5 * cotangents_from_lengths(length).ravel(), 0)
-        laplacian = laplacian_from_weights(*halfedges(triangles), weight, n)
+        # Negative stiffness would let heat flow from cold to hot across obtuse triangles.
+        stiffness = np.maximum(0.5 * cotangents_from_lengths(length).ravel(), 0)
+        laplacian = laplacian_from_weights(*halfedges(triangles), stiffness, n)
         self._root = np.sqrt(mass)
         self._step = sigma**2 / 2
         self._factor = Factor(sp.diags(mass) + self._step * laplacian)

@@ -1,4 +1,4 @@
-"""Mesh saliency (Lee, Varshney, Jacobs 2005): where mean curvature differs from its surroundings, at several scales.
+"""Measure saliency, mean curvature that differs from its surroundings, at several scales (Lee, Varshney, Jacobs 2005).
 
 Gaussian means are taken along the surface, by heat, and not within balls in space: they do not leak across thin parts,
 and all scales come from one factorisation. Sizes are relative to the spread of the surface about its centroid, which,
@@ -17,9 +17,10 @@ from .heat_means import HeatMeans
 # Scales, in multiples of EPSILON times the diagonal (section 3.1 and 4: epsilon is 0.3 % of it).
 SCALES = np.array([2.0, 3.0, 4.0, 5.0, 6.0])
 EPSILON = 0.003
-# A map that is nowhere larger, over the diagonal, is the mesh and not the shape: a sphere has 3.5. Smaller
-# maxima than this share of the greatest are no maxima.
-NOTHING, MINOR = 0.25, 1e-3
+# A map that is nowhere larger, over the diagonal, is the mesh and not the shape: a sphere has 3.5.
+NOISE = 0.25
+# Maxima below this share of the greatest are none.
+MINOR = 1e-3
 # Neighbours that differ by less are equal, whichever is greater in the last digit.
 EQUAL = 1e-9
 
@@ -32,9 +33,9 @@ def saliency(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     with G the Gaussian mean and H the mean curvature. Zero on planes and round spheres.
     """
     positions = unit_size(positions, triangles)
-    around = HeatMeans(positions, triangles, 6 * EPSILON)
+    heat = HeatMeans(positions, triangles, 6 * EPSILON)
     sigmas = np.unique(np.concatenate([SCALES, 2 * SCALES]))
-    means = around.means(mean_curvature(positions, triangles), EPSILON * sigmas)
+    means = heat.means(mean_curvature(positions, triangles), EPSILON * sigmas)
     at = {s: means[k] for k, s in enumerate(sigmas.tolist())}
     total = np.zeros(len(positions))
     for scale in SCALES.tolist():
@@ -63,7 +64,7 @@ def unit_size(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def _suppressed(x: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """A map (n,) scaled to 1 at most and weakened the more the more peaks of the same height it has."""
     top = float(x.max())
-    if not top > NOTHING:
+    if not top > NOISE:
         return np.zeros(len(x))
     x = x / top
     highest = np.zeros(len(x))

@@ -1,4 +1,4 @@
-"""Scores of vertices to paint with: saliency, curvature, sharp edges, distance; and soft weights from them."""
+"""Score vertices to paint with: saliency, curvature, sharp edges, distance; and make soft weights of scores."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from . import curvature
 from .heat_means import HeatMeans
 from .saliency import EPSILON, saliency, unit_size
 
+# Scores there are.
 KINDS = ("saliency", "gaussian", "mean", "sharpness", "distance")
 # Curvature is averaged over so much of the diagonal: single vertices are noise.
 SMOOTH = 3 * EPSILON
@@ -76,7 +77,7 @@ def soft_weights(
     below = np.cumsum(a[order]) / a.sum()
     first, last = (float(v[order][min(np.searchsorted(below, q), len(v) - 1)]) for q in (low, high))
     if not last > first:
-        # Most of the surface has one score, such as the flat faces of a machine part.
+        # Most of the surface has one score, such as the flat faces of a machine.
         first, last = (first, float(v.max())) if v.max() > first else (float(v.min()), last)
     t = np.clip((np.where(np.isfinite(values), values, v.min()) - first) / (last - first), 0, 1)
     weights = t * t * (3 - 2 * t)
@@ -101,7 +102,7 @@ def distance(positions: np.ndarray, triangles: np.ndarray, sources: np.ndarray) 
     return dijkstra(graph, directed=False, indices=sources, min_only=True)
 
 
-def _across(positions, triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _across(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs of vertices opposite to a common edge, (p,), (p,), and their distance when both triangles are laid flat,
     where the straight line crosses the edge."""
     tail, head = halfedges(triangles)
@@ -123,5 +124,5 @@ def _across(positions, triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def scaled_vertex_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Area (n,) of every vertex, finite at any scale."""
+    """Area (n,) of every vertex of a surface (n,3), (m,3) scaled to unit size, finite at any scale."""
     return vertex_areas(unit_size(positions, triangles), triangles)

@@ -1,26 +1,33 @@
-"""Newton's equations of large meshes by conjugate gradients, preconditioned part by part (two-level additive Schwarz).
+"""Solve Newton's equations of large meshes by two-level additive Schwarz (Toselli, Widlund 2005).
 
-The mesh falls into parts of about a thousand vertices that overlap by a few rings. Their equations are factored one by
-one, which takes time and memory in proportion to the size of the mesh, and what is left, how parts move as a whole, by
-the affine maps of every part together (Toselli, Widlund, Domain Decomposition Methods, 2005, section 3). Stiff area
-terms do no harm, as they would to smoothers that see one vertex at a time: the parts know all of their equations.
+Conjugate gradients are preconditioned part by part. The mesh falls into parts of about a thousand vertices that overlap
+by a few rings. Their equations are factored one by one, which takes time and memory in proportion to the size of the
+mesh, and what is left, how parts move as a whole, by the affine maps of every part together (Domain Decomposition
+Methods, section 3). Stiff area terms do no harm, as they would to smoothers that see one vertex at a time: the parts
+know all of their equations.
 """
 
 from __future__ import annotations
+
+from itertools import islice
 
 import numpy as np
 import scipy.sparse as sp
 
 from .nested_dissection import kd_parts, vertex_graph
-from .sparse import Factor, minimum_degree
+from .sparse import Factor, gradient_steps, minimum_degree
 
 # Meshes of fewer vertices are factored at once.
 LARGE = 50_000
-# Vertices of a part without its overlap, and rings of vertices that it overlaps by.
-SIZE, OVERLAP = 1000, 2
-# The end: so many iterations on, the quadratic model has fallen by less than this share of its fall so far. A step that
-# is not the last needs no more.
-WINDOW, ENOUGH = 3, 0.03
+# Vertices of a part without its overlap.
+PART_SIZE = 1000
+# Rings of vertices that parts overlap by.
+OVERLAP = 2
+# Iterations in which the quadratic model must fall
+WINDOW = 3
+# by more than this share of its fall so far, or they end: a step that is not the last needs no more.
+ENOUGH = 0.03
+# Iterations at most; the equations are factored where these are not enough.
 MOST = 100
 # Added to the diagonal of the coarse equations, relative to its greatest entry: a part may have hardly a free vertex.
 SHIFT = 1e-12
@@ -32,7 +39,7 @@ class AdditiveSchwarz:
     Unknown 2 i and 2 i + 1 are those of vertex i.
     """
 
-    def __init__(self, points: np.ndarray, triangles: np.ndarray, size: int = SIZE):
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, size: int = PART_SIZE):
         n = len(points)
         self._part = kd_parts(points, max(0, round(np.log2(n / size))))
         self._count = int(self._part.max()) + 1
@@ -105,20 +112,9 @@ def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_ma
 
 def _by_gradients(matrix, b, precondition) -> np.ndarray | None:
     """Conjugate gradients until x.matrix.x / 2 - b.x hardly falls any more; None where that takes too long."""
-    x, residual = np.zeros(len(b)), b.copy()
-    direction, power = 0.0, 1.0
-    fallen = np.zeros(MOST + 1)
-    for k in range(MOST):
-        z = precondition(residual)
-        power, before = residual @ z, power
-        if power <= 0:
+    falls: list[float] = []
+    for x, _, fallen in islice(gradient_steps(matrix, b, precondition), MOST + 1):
+        falls.append(fallen)
+        if len(falls) > WINDOW and fallen - falls[-1 - WINDOW] <= ENOUGH * fallen:
             return x
-        direction = z + (power / before) * direction
-        image = matrix @ direction
-        step = power / (direction @ image)
-        x += step * direction
-        residual -= step * image
-        fallen[k + 1] = fallen[k] + step * power
-        if k + 1 >= WINDOW and fallen[k + 1] - fallen[k + 1 - WINDOW] <= ENOUGH * fallen[k + 1]:
-            return x
-    return None
+    return x if len(falls) <= MOST else None

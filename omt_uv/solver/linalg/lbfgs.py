@@ -1,4 +1,4 @@
-"""Directions of L-BFGS for many vertices at once (Nocedal, Wright 2006, algorithm 7.4)."""
+"""Find directions of descent for many vertices at once, by L-BFGS (Nocedal, Wright 2006, algorithm 7.4)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections import deque
 
 import numpy as np
 
+# Steps that are remembered.
 MEMORY = 7
 
 
 class LBFGS:
-    """Remembers steps and changes of the gradient; `reset` where these no longer tell anything."""
+    """Steps and changes of the gradient that are remembered; `reset` where these no longer tell anything."""
 
     def __init__(self):
         self.pairs: deque = deque(maxlen=MEMORY)

@@ -1,4 +1,4 @@
-"""Laplacians by conjugate gradients, preconditioned by smoothed aggregation (Vanek, Mandel, Brezina 1996).
+"""Solve Laplacians by conjugate gradients, preconditioned by smoothed aggregation (Vanek, Mandel, Brezina 1996).
 
 Unknowns lie at points, and eight that follow each other in the order of a kd-tree make one of the next level. No
 factorisation but that of the coarsest level is needed, so that time and memory grow with the number of unknowns.
@@ -6,16 +6,20 @@ factorisation but that of the coarsest level is needed, so that time and memory 
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import scipy.sparse as sp
 
-from .sparse import Factor, solve_spd
+from .sparse import Factor, gradient_steps, solve_spd
 
+# Unknowns of a level that make one of the next.
 BLOCK = 8
 # Up to this many unknowns are factored.
 COARSEST = 1000
-# Of Jacobi's method: 4/3 over the largest eigenvalue of D^-1 A, which is at most 2.
+# Damping of Jacobi's method: 4/3 over the largest eigenvalue of D^-1 A, which is at most 2.
 DAMPING = 2 / 3
+# Cycles at most; the matrix is factored where these are not enough.
 MOST = 200
 # A hierarchy of an older matrix serves while it takes at most so many times the cycles it took for its own.
 SLOWER = 1.5
@@ -74,17 +78,8 @@ class LaplacianSolver:
 
 def _by_gradients(A, b, scale, tolerance, hierarchy: Multigrid) -> tuple[np.ndarray, int]:
     """Conjugate gradients: the solution and the number of cycles. Where they do not converge, A is factored."""
-    residual, x = b.copy(), np.zeros(len(b))
     enough = tolerance * np.abs(b / scale).max()
-    direction, power = 0.0, 1.0
-    for cycles in range(MOST):
+    for cycles, (x, residual, _) in enumerate(islice(gradient_steps(A, b, hierarchy.cycle), MOST)):
         if np.abs(residual / scale).max() <= enough:
             return x, cycles
-        z = hierarchy.cycle(residual)
-        power, before = residual @ z, power
-        direction = z + (power / before) * direction
-        image = A @ direction
-        step = power / (direction @ image)
-        x += step * direction
-        residual -= step * image
     return np.concatenate([[0.0], solve_spd(A[1:, 1:], b[1:])]), MOST

@@ -1,4 +1,4 @@
-"""Nested dissection: elimination orders of little fill for meshes, from the places of their vertices (George 1973).
+"""Order the elimination of meshes' vertices for little fill, by nested dissection of their places (George 1973).
 
 Every part is halved across its longest side; the vertices of the upper half that have neighbours in the lower one
 separate the two, and are eliminated after both. The halves stay when edges flip, only the separators are found anew. On
@@ -61,7 +61,7 @@ def vertex_graph(triangles: np.ndarray, n: int) -> coo_matrix:
     return coo_matrix((np.ones(len(pairs[0])), pairs), shape=(n, n))
 
 
-def _upper_half(points, part, count) -> np.ndarray:
+def _upper_half(points: np.ndarray, part: np.ndarray, count: int) -> np.ndarray:
     """Which points (k,d) lie in the upper half of their part (k,), by number, along the longest side of its box."""
     size = np.bincount(part, minlength=count)
     order = np.argsort(part, kind="stable")

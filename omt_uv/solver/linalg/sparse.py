@@ -1,4 +1,4 @@
-"""The one place that factors and solves sparse systems.
+"""Factor and solve sparse systems, by SuperLU or conjugate gradients.
 
 Factors are SuperLU's (scipy). Orders: "mmd" (minimum degree on A + A^T) has the least fill, but takes
 long on large meshes and on several unknowns a vertex; "colamd" does not; a permutation array brings an order from
@@ -7,7 +7,7 @@ outside: `minimum_degree` of the vertices' graph, for any number of unknowns a v
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,8 +17,11 @@ from ..errors import PrecisionError
 
 # Below this many unknowns minimum degree is the faster order of the two.
 SMALL = 50_000
-# Columns of SuperLU's panels, up to this many unknowns; beyond, its own default is faster.
-PANEL, FEW = 4, 100_000
+# Columns of SuperLU's panels where there are few unknowns; beyond, its own default is faster.
+PANEL = 4
+# Up to this many unknowns are few.
+FEW = 100_000
+# Names of elimination orders, and SuperLU's for them.
 _ORDERS = {"mmd": "MMD_AT_PLUS_A", "colamd": "COLAMD", "natural": "NATURAL"}
 
 
@@ -74,6 +77,30 @@ def solve_general(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray = "cola
     return Factor(A, order, spd=False).solve(b)
 
 
+def gradient_steps(
+    A: sp.spmatrix, b: np.ndarray, precondition: Callable[[np.ndarray], np.ndarray]
+) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
+    """Iterates of preconditioned conjugate gradients for A x = b (n,), A symmetric positive definite.
+
+    Each is x (n,), the residual b - A x (n,), and how far x.A.x / 2 - b.x has fallen, times two; x and the residual are
+    overwritten by the next. Ends where the residual leads nowhere any more, to the precision of the preconditioner.
+    """
+    x, residual = np.zeros(len(b)), b.copy()
+    direction, power, fallen = 0.0, 1.0, 0.0
+    while True:
+        yield x, residual, fallen
+        z = precondition(residual)
+        power, before = residual @ z, power
+        if power <= 0:
+            return
+        direction = z + (power / before) * direction
+        image = A @ direction
+        step = power / (direction @ image)
+        x += step * direction
+        residual -= step * image
+        fallen += step * power
+
+
 def solve_conjugate_gradients(A: sp.spmatrix, b: np.ndarray, tolerance: float = 1e-6, most: int = 200) -> np.ndarray:
     """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite and close to its diagonal."""
     return conjugate_gradients(lambda x: A @ x, b, sp.diags(1 / A.diagonal()), tolerance, most)
@@ -101,6 +128,7 @@ def minimum_degree(A: sp.spmatrix) -> np.ndarray:
 
 
 def _splu(A: sp.spmatrix, spec: str):
+    """SuperLU's factors in an order of its own (`spec`), without pivoting."""
     # No larger panels than SuperLU's own, and no other relaxation: it sizes work arrays by its defaults.
     panel = PANEL if A.shape[0] <= FEW else None
     options = {"SymmetricMode": True}

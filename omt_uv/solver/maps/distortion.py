@@ -1,4 +1,4 @@
-"""How far a UV map is from keeping areas and angles: per face, and in figures for a whole mesh.
+"""Measure how far a UV map is from keeping areas and angles, per face and for a whole mesh (Floater, Hormann 2005).
 
 All area figures compare *shares*: a face's share of the UV area with its share of the surface, so that one scale for
 the whole mesh does not count. All angle figures come from the singular values s1 >= s2 of the face's Jacobian.
@@ -58,7 +58,7 @@ class Distortion:
 
 
 @dataclass(frozen=True)
-class _Faces:
+class _FaceFigures:
     """Per measured face: share of the surface, UV share / surface share (negative where folded), s1/s2, chart."""
 
     weight: np.ndarray
@@ -92,8 +92,8 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None) -> Distortion:
     """
     V, F, uv = _checked(V, F, uv)
     area, real = _surface_area(V, F)
-    wanted = area if density is None else area * np.asarray(density, float)
-    faces = _measure_faces(V, F[real], uv[real], wanted[real])
+    target = area if density is None else area * np.asarray(density, float)
+    faces = _measure_faces(V, F[real], uv[real], target[real])
     w, ratio, good = faces.weight, faces.ratio, ~faces.folded
     octaves = np.abs(np.log2(np.maximum(ratio, RATIO_FLOOR)))
     w_good, r_good, s_good = w[good], ratio[good], faces.shear[good]
@@ -135,6 +135,7 @@ def face_distortion(V, F, uv) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _checked(V, F, uv):
+    """Positions, triangles and UVs as arrays; raises what `distortion` raises."""
     V, F, uv = np.asarray(V, float), np.asarray(F, np.int64), np.asarray(uv, float)
     if uv.shape != (*F.shape, 2) or F.ndim != 2 or F.shape[1] != 3:
         raise ValueError(f"expected F (m,3) and uv (m,3,2), got {F.shape} and {uv.shape}")
@@ -159,14 +160,15 @@ def _surface_area(V, F):
     return area, real
 
 
-def _measure_faces(V, F, uv, area):
+def _measure_faces(V, F, uv, area) -> _FaceFigures:
+    """Figures of the faces of a map (m,3,2) with the areas (m,) that they are to have."""
     charts, chart = uv_charts(F, uv)
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     uv_area = 0.5 * cross2(a, b)
     mirrored = np.bincount(chart, uv_area, charts) < 0
     weight = area / area.sum()
     share = np.where(mirrored[chart], -uv_area, uv_area) / max(np.abs(uv_area).sum(), np.finfo(float).tiny)
-    return _Faces(weight, share / weight, shear_of(V, F, a, b), charts)
+    return _FaceFigures(weight=weight, ratio=share / weight, shear=shear_of(V, F, a, b), charts=charts)
 
 
 def shear_of(V, F, a, b):
@@ -205,6 +207,7 @@ def uv_charts(F, uv):
 
 
 def _weighted_quantile(values, weights, q):
+    """The least of the values (m,) that a share q of the weights (m,) does not exceed."""
     order = np.argsort(values)
     total = np.cumsum(weights[order]) / weights.sum()
     return float(values[order][min(np.searchsorted(total, q), len(values) - 1)])

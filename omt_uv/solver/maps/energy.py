@@ -1,8 +1,8 @@
-"""The energy of a piecewise linear map to the plane: shear plus weighted area error, infinite at a fold.
+"""Evaluate the energy of a piecewise linear map to the plane: shear plus weighted area error, infinite at a fold.
 
-    E = sum_f M_f [ (s1/s2 + s2/s1)/2 - 1 ] + balance * sum_f M_f [ (r + 1/r)/2 - 1 ],   r = s1 s2 / target ratio
+    E = sum_f M_f [ (s1/s2 + s2/s1)/2 - 1 ] + area_weight sum_f M_f [ (r + 1/r)/2 - 1 ],   r = s1 s2 / target ratio
 
-with M_f the greater of a face's shares of the surface and of the target area, so that neither a magnified part nor
+with M_f the greater of a face's shares of the surface and of the target area, so that neither a magnified region nor
 the rest is neglected, and s1 >= s2 the singular values of a face's Jacobian: MIPS (Hormann, Greiner 2000) plus its
 area counterpart (Degener, Meseth, Klein 2003). In complex notation the map is w and its derivatives
 a = dw/dz, b = dw/dconj(z); det J = |a|^2 - |b|^2 and the shear term is 2 |b|^2 / det J. The energy depends on
@@ -16,9 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-# Relative errors of a region count as so much area error: where the areas may be off by 0.8 % its share may be by
-# 0.3 %, and single faces of the region, or of the rest, by 1.8 %.
-SHARE, SINGLE = 2.7, 0.45
+# A relative error of a region's share counts as so much area error: where areas may be off by 0.8 % it may be by 0.3 %;
+SHARE_ERROR = 2.7
+# and so much that of single faces of the region, or of the rest: they may be off by 1.8 %.
+FACE_ERROR = 0.45
 
 
 @dataclass(frozen=True)
@@ -69,40 +70,48 @@ def elements(
     # The gradient of a hat function is the opposite side, turned by a quarter, over twice the area.
     gradient = 1j * (local[:, [2, 0, 1]] - local[:, [1, 2, 0]]) / (2 * area)[:, None]
     weight = np.maximum(area / area.sum(), target / target.sum())
-    return Elements(triangles, area / area.sum(), gradient, target / area, weight / weight.sum(), region)
+    return Elements(
+        triangles=triangles,
+        area=area / area.sum(),
+        gradient=gradient,
+        ratio=target / area,
+        weight=weight / weight.sum(),
+        region=region,
+    )
 
 
-def energy(faces: Elements, w: np.ndarray, balance: float) -> float:
+def energy(faces: Elements, w: np.ndarray, area_weight: float) -> float:
     """The energy of a map w (n,) complex; infinity where a face is folded."""
-    return energy_of(faces, *faces.derivatives(w), balance)
+    return energy_of(faces, *faces.derivatives(w), area_weight)
 
 
-def energy_of(faces: Elements, a: np.ndarray, b: np.ndarray, balance: float) -> float:
+def energy_of(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float) -> float:
     """The energy of the derivatives a, b (m,) complex; infinity where a face is folded."""
-    return float(_energies(faces, a, b, balance).sum())
+    return float(_energies(faces, a, b, area_weight).sum())
 
 
-def energies(faces: Elements, w: np.ndarray, balance: float | np.ndarray) -> np.ndarray:
-    """The energy of every face (m,) of a map w (n,) complex, infinite where it is folded; balance: one, or (m,)."""
-    return _energies(faces, *faces.derivatives(w), balance)
+def energies(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
+    """The energy of every face (m,) of a map w (n,) complex, infinite at a fold; area_weight: one, or (m,)."""
+    return _energies(faces, *faces.derivatives(w), area_weight)
 
 
-def _energies(faces, a, b, balance):
+def _energies(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
+    """The energy of every face (m,) from the derivatives a, b (m,) complex."""
     outer, inner = squared(a), squared(b)
     det = outer - inner
     good = det > 0
     safe = np.where(good, det, 1)
     r = safe / faces.ratio
-    return np.where(good, faces.weight * (2 * inner / safe + balance * ((r + 1 / r) / 2 - 1)), np.inf)
+    return np.where(good, faces.weight * (2 * inner / safe + area_weight * ((r + 1 / r) / 2 - 1)), np.inf)
 
 
-def gradient(faces: Elements, w: np.ndarray, balance: float | np.ndarray) -> np.ndarray:
+def gradient(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
     """Gradient (n,) complex: real part by u, imaginary part by v."""
-    return scatter(faces, face_derivatives(faces, w, balance).gradient, len(w))
+    return scatter(faces, face_derivatives(faces, w, area_weight).gradient, len(w))
 
 
 def scatter(faces: Elements, corner: np.ndarray, n: int) -> np.ndarray:
-    """Sum of corner values (m,3) complex per vertex, (n,)."""
+    """Sum of corner values (m,3) complex at each of n vertices, (n,)."""
     flat = faces.triangles.ravel()
     return np.bincount(flat, corner.real.ravel(), n) + 1j * np.bincount(flat, corner.imag.ravel(), n)
 
@@ -119,7 +128,7 @@ class FaceDerivatives:
 
 
 def face_derivatives(
-    faces: Elements, w: np.ndarray, balance: float | np.ndarray, pressure: float | np.ndarray = 1.0
+    faces: Elements, w: np.ndarray, area_weight: float | np.ndarray, pressure: float | np.ndarray = 1.0
 ) -> FaceDerivatives:
     """Gradients and projected Hessians of all faces of a map w (n,) complex without folds.
 
@@ -128,14 +137,14 @@ def face_derivatives(
     pressure on all faces has no effect inside), but not once it is projected face by face: then it only holds the
     faces back. `pressure` in [0, 1] is the share of it that the Hessian keeps; at 0 the term is Gauss-Newton's.
     """
-    return derivatives_of(faces, *faces.derivatives(w), balance, pressure)
+    return derivatives_of(faces, *faces.derivatives(w), area_weight, pressure)
 
 
 def derivatives_of(
-    faces: Elements, a: np.ndarray, b: np.ndarray, balance: float | np.ndarray, pressure: float | np.ndarray
+    faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float | np.ndarray, pressure: float | np.ndarray
 ) -> FaceDerivatives:
     """As `face_derivatives`, from the derivatives a, b (m,) complex of the map."""
-    return face_derivatives_of(faces, a, b, *_by_squares(faces, a, b, balance, pressure))
+    return face_derivatives_of(faces, a, b, *_by_squares(faces, a, b, area_weight, pressure))
 
 
 def face_derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, kept, block) -> FaceDerivatives:
@@ -158,12 +167,12 @@ def face_derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, ke
     return FaceDerivatives(corner, np.stack([turn_a, turn_b, radial1, radial2], axis=1))
 
 
-def _by_squares(faces, a, b, balance, pressure):
+def _by_squares(faces, a, b, area_weight, pressure):
     """Derivatives by |a|^2 and |b|^2, the same for the Hessian, and the Hessian's entries by |a| and |b|."""
     outer, inner = squared(a), squared(b)
     det = outer - inner
-    slope = balance / 2 * (1 / faces.ratio - faces.ratio / det**2)
-    bend = balance * faces.ratio / det**3 + 4 * inner / det**3
+    slope = area_weight / 2 * (1 / faces.ratio - faces.ratio / det**2)
+    bend = area_weight * faces.ratio / det**3 + 4 * inner / det**3
     weight, shear_outer, shear_inner = faces.weight, -2 * inner / det**2, 2 / det + 2 * inner / det**2
     first = weight * (shear_outer + slope), weight * (shear_inner - slope)
     kept = weight * (shear_outer + pressure * slope), weight * (shear_inner - pressure * slope)
@@ -181,12 +190,13 @@ def _split(aa, ab, bb):
     return (c, s, np.maximum(mean + half, 0)), (-s, c, np.maximum(mean - half, 0))
 
 
-def squared(z):
+def squared(z: np.ndarray) -> np.ndarray:
     """|z|^2 of complex numbers, in their shape, without the root that `abs` takes."""
     return z.real**2 + z.imag**2
 
 
-def _unit(z):
+def _unit(z: np.ndarray) -> np.ndarray:
+    """Complex numbers (m,) of length one, 1 for 0."""
     size = np.abs(z)
     return np.where(size > 0, z, 1) / np.where(size > 0, size, 1)
 
@@ -196,7 +206,8 @@ def area_error(faces: Elements, w: np.ndarray) -> float:
     return _area_error(faces, faces.areas(w))
 
 
-def _area_error(faces, area):
+def _area_error(faces: Elements, area: np.ndarray) -> float:
+    """As `area_error`, from the UV areas (m,)."""
     target = faces.area * faces.ratio
     return float(np.abs(area / area.sum() - target / target.sum()).sum())
 
@@ -209,15 +220,15 @@ def _region_error(faces: Elements, area: np.ndarray) -> tuple[float, float]:
     target = faces.area * faces.ratio
     error, target = area / area.sum() - target / target.sum(), target / target.sum()
     whole, single = 0.0, 0.0
-    for part in (faces.region, 1 - faces.region):
-        share = max(float(part @ target), float(np.finfo(float).tiny))
-        whole = max(whole, abs(float(part @ error)) / share)
-        single = max(single, float(part @ np.abs(error)) / share)
+    for side in (faces.region, 1 - faces.region):
+        share = max(float(side @ target), float(np.finfo(float).tiny))
+        whole = max(whole, abs(float(side @ error)) / share)
+        single = max(single, float(side @ np.abs(error)) / share)
     return whole, single
 
 
 def tilted(faces: Elements, tilt: float) -> Elements:
-    """The faces with exp(tilt * weight) times their targets in the region; the targets sum to what they did."""
+    """The faces with exp(tilt * region) times their targets; the targets sum to what they did."""
     if tilt == 0 or faces.region is None:
         return faces
     ratio = faces.ratio * np.exp(tilt * faces.region)
@@ -236,7 +247,7 @@ def missing_tilt(faces: Elements, w: np.ndarray) -> float:
 
 def target_error(faces: Elements, w: np.ndarray) -> float:
     """What is left to do: the area error of a map (n,), or as much for a region or a rest that are not exact yet."""
-    return _shortfall(faces, faces.areas(w))
+    return _target_error(faces, faces.areas(w))
 
 
 def target_error_but_share(faces: Elements, w: np.ndarray) -> float:
@@ -244,9 +255,10 @@ def target_error_but_share(faces: Elements, w: np.ndarray) -> float:
     area = faces.areas(w)
     if faces.region is not None:
         area = area * np.exp(missing_tilt(faces, w) * faces.region)
-    return _shortfall(faces, area)
+    return _target_error(faces, area)
 
 
-def _shortfall(faces, area):
+def _target_error(faces: Elements, area: np.ndarray) -> float:
+    """As `target_error`, from the UV areas (m,)."""
     share, single = _region_error(faces, area)
-    return max(_area_error(faces, area), SHARE * share, SINGLE * single)
+    return max(_area_error(faces, area), SHARE_ERROR * share, FACE_ERROR * single)

@@ -1,8 +1,8 @@
-"""Folded faces of a carried map straightened where they are, and nothing else moved.
+"""Straighten folds of a carried map where they are, by local Tutte systems and least steps, and move nothing else.
 
 A map sampled at the vertices of another mesh may turn a face over where the map shears much within one face, or where
-its outline is crooked. Vertices around such faces are placed anew as averages of their neighbours with everything
-around them fixed; the patch grows by a ring where that is not enough. Faces that only have vertices on outlines
+its boundary is crooked. Vertices around such faces are placed anew as averages of their neighbours with everything
+around them fixed; the patch grows by a ring where that is not enough. Faces that only have vertices on boundaries
 are pushed open.
 """
 
@@ -17,11 +17,13 @@ from ..mesh.geometry import halfedge_lengths, signed_areas
 from ..mesh.topology import halfedges, pair_keys, pair_up
 from .tutte import mean_value_weights
 
+# Rings of vertices around folds that are placed anew, at most.
 MOST_RINGS = 6
 # A face with less area than this share of the square of its longest side is as good as folded.
 LEAST_AREA = 1e-6
-# What is pushed open gets this share of the area of the faces around it, in as many rounds at most.
+# What is pushed open gets this share of the area of the faces around it.
 PUSHED_AREA = 0.05
+# Rounds of that, at most.
 PUSH_ROUNDS = 30
 
 
@@ -35,9 +37,9 @@ def straighten_folds(triangles: np.ndarray, uv: np.ndarray, side: np.ndarray) ->
     extent = np.ptp(uv, axis=0).max(initial=0.0)
     if not (extent > 0 and np.isfinite(uv).all()):
         return uv, 0
-    points, faces, outline = uv_vertices(triangles, uv, 1e-7 * extent)
+    points, faces, boundary = uv_vertices(triangles, uv, 1e-7 * extent)
     side = _agreed(faces, np.sign(side).astype(np.int64))
-    moved = _pushed(_averaged(points, faces, side, outline), faces, side)
+    moved = _pushed(_averaged(points, faces, side, boundary), faces, side)
     left = int(_folded(moved, faces, side).sum())
     return np.where((moved != points).any(axis=1)[faces.ravel(), None], moved[faces.ravel()], uv), left
 
@@ -45,17 +47,17 @@ def straighten_folds(triangles: np.ndarray, uv: np.ndarray, side: np.ndarray) ->
 def uv_vertices(triangles: np.ndarray, uv: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners (3t,2) of a mesh (t,3) joined where they are one vertex and about `tolerance` apart at most.
 
-    Returns the map (u,2), its faces (t,3), and which of its vertices (u,) are on an outline.
+    Returns the map (u,2), its faces (t,3), and which of its vertices (u,) are on an boundary.
     """
     key = np.column_stack([triangles.ravel(), np.round(uv / tolerance).astype(np.int64)])
     _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
     faces = inverse.reshape(-1, 3).astype(np.int64)
     tail, head = halfedges(faces)
     _, index, count = np.unique(pair_keys(tail, head), return_index=True, return_counts=True)
-    rim = index[count == 1]
-    outline = np.zeros(len(first), dtype=bool)
-    outline[tail[rim]] = outline[head[rim]] = True
-    return uv[first], faces, outline
+    open_edges = index[count == 1]
+    boundary = np.zeros(len(first), dtype=bool)
+    boundary[tail[open_edges]] = boundary[head[open_edges]] = True
+    return uv[first], faces, boundary
 
 
 def _agreed(faces: np.ndarray, side: np.ndarray) -> np.ndarray:
@@ -67,6 +69,7 @@ def _agreed(faces: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 
 def _folded(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """Faces (t,) bool that lie another way than `side` (t,) says, or have hardly an area; none where that is 0."""
     longest = halfedge_lengths(uv, faces).reshape(-1, 3).max(axis=1)
     return (side * signed_areas(uv, faces) <= LEAST_AREA * longest**2) & (side != 0)
 
@@ -89,7 +92,7 @@ def _averaged(uv: np.ndarray, faces: np.ndarray, side: np.ndarray, fixed: np.nda
     if not folded.any():
         return uv
     fewest, chosen = int(folded.sum()), np.zeros(len(uv), dtype=bool)
-    weights = _weights(uv, faces)
+    weights = _mean_value_matrix(uv, faces)
     for rings in range(MOST_RINGS):
         chosen |= _around(folded, faces, len(uv), rings)
         candidate = _solved(uv, weights, np.flatnonzero(chosen & ~fixed))
@@ -101,7 +104,7 @@ def _averaged(uv: np.ndarray, faces: np.ndarray, side: np.ndarray, fixed: np.nda
     return best
 
 
-def _weights(uv: np.ndarray, faces: np.ndarray) -> csr_matrix:
+def _mean_value_matrix(uv: np.ndarray, faces: np.ndarray) -> csr_matrix:
     """Mean value weights (u,u), every row with the sum 1."""
     at_tail, at_head = mean_value_weights(halfedge_lengths(uv, faces).reshape(-1, 3))
     tail, head = halfedges(faces)
@@ -136,7 +139,7 @@ def _solved(uv: np.ndarray, weights: csr_matrix, free: np.ndarray) -> np.ndarray
 
 
 def _pushed(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
-    """The map with the vertices of folded faces, on outlines too, moved until each of these has a little area.
+    """The map with the vertices of folded faces, on boundaries too, moved until each of these has a little area.
 
     Every round takes, for each such face by itself, the least step that gives it the area.
     """
@@ -151,7 +154,7 @@ def _pushed(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
         low = np.flatnonzero(pushed & (area < goal / 2))
         current = current.copy()
         np.add.at(
-            current, faces[low].ravel(), _opening(current[faces[low]], side[low], (goal - area)[low]).reshape(-1, 2)
+            current, faces[low].ravel(), _area_steps(current[faces[low]], side[low], (goal - area)[low]).reshape(-1, 2)
         )
         folded = _folded(current, faces, side)
         pushed = pushed | folded
@@ -160,8 +163,8 @@ def _pushed(uv: np.ndarray, faces: np.ndarray, side: np.ndarray) -> np.ndarray:
     return best
 
 
-def _opening(corners: np.ndarray, side: np.ndarray, lack: np.ndarray) -> np.ndarray:
-    """Least steps (k,3,2) of the corners (k,3,2) of faces that add `lack` (k,) to their areas, to first order."""
+def _area_steps(corners: np.ndarray, side: np.ndarray, missing: np.ndarray) -> np.ndarray:
+    """Least steps (k,3,2) of the corners (k,3,2) of faces that add the missing areas (k,) to first order."""
     across = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     gradient = 0.5 * side[:, None, None] * np.stack([-across[..., 1], across[..., 0]], axis=-1)
-    return gradient * (lack / np.maximum((gradient**2).sum(axis=(1, 2)), 1e-300))[:, None, None]
+    return gradient * (missing / np.maximum((gradient**2).sum(axis=(1, 2)), 1e-300))[:, None, None]

@@ -1,4 +1,4 @@
-"""Where a UV map covers itself: the share of its area that lies under more than one face, by sampling."""
+"""Measure how much of a UV map lies under more than one face, by samples and a grid of its faces."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import numpy as np
 from ..mesh.geometry import cross2
 from ..mesh.topology import expand
 
-SAMPLES = 200_000
+SAMPLES = 200_000  # points by default: a standard error of 0.1 % of the area
 CHUNK = 2_000_000  # pairs of a sample and a face tested at once, for memory
 MOST_PAIRS = 100_000_000  # a map that lies many times over itself is judged by fewer samples, for time
 ENTRIES_PER_FACE = 40  # the grid is coarsened until its lists are no longer than this on average
 INSIDE = 1e-9  # a point this close to a face's border, relative to the squared extent, is not inside
 
 
-def overlap_share(uv, *, samples: int = SAMPLES, seed: int = 0) -> float:
+def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> float:
     """Share of the area of the triangles `uv` (m,3,2) that lies inside more than one of them.
 
     Points are drawn uniformly by area, so the standard error is sqrt(share / samples); the same seed gives the same
@@ -29,12 +29,12 @@ def overlap_share(uv, *, samples: int = SAMPLES, seed: int = 0) -> float:
     points = _draw(tri, area, samples, seed)
     pairs = np.cumsum(grid.candidates(points))
     points = points[: max(1, int(np.searchsorted(pairs, MOST_PAIRS)))]
-    pieces = np.searchsorted(pairs[: len(points)], np.arange(CHUNK, pairs[len(points) - 1], CHUNK))
-    covered = [grid.cover(piece) for piece in np.split(points, np.unique(pieces)) if len(piece)]
+    chunks = np.searchsorted(pairs[: len(points)], np.arange(CHUNK, pairs[len(points) - 1], CHUNK))
+    covered = [grid.cover(chunk) for chunk in np.split(points, np.unique(chunks)) if len(chunk)]
     return float((np.concatenate(covered) > 1).mean())
 
 
-def _draw(tri, area, samples, seed):
+def _draw(tri: np.ndarray, area: np.ndarray, samples: int, seed: int) -> np.ndarray:
     """Points (samples,2) distributed uniformly over the triangles."""
     rng = np.random.default_rng(seed)
     owner = rng.choice(len(tri), samples, p=area / area.sum())
@@ -65,13 +65,16 @@ class _Grid:
         self.start = np.searchsorted(cell[order], np.arange(self.side**2 + 1))
 
     def _boxes(self, low, high):
+        """First cell (m,2) of every bounding box, and how many columns and rows it touches (m,2)."""
         first = self._cells(low)
         return first, self._cells(high) - first + 1
 
     def _cells(self, points):
+        """Column and row (k,2) of points (k,2)."""
         return np.clip(((points - self.origin) / self.extent * self.side).astype(np.int64), 0, self.side - 1)
 
     def _cell(self, points):
+        """Number (k,) of the cell of points (k,2)."""
         column, row = self._cells(points).T
         return column * self.side + row
 

@@ -1,4 +1,4 @@
-"""Embeddings by positive weights: Tutte's theorem with a convex boundary (Tutte 1963, Floater 2003)."""
+"""Embed a disk in the plane by mean value weights, its boundary convex (Tutte 1963, Floater 2003)."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def mean_value_weights(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return at_tail / safe, at_head / safe
 
 
-def tutte(positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Mean value embedding (n,2) of a disk mesh (n,3), (m,3) with its boundary loop (b,) at target (b,2)."""
+def tutte(positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, boundary: np.ndarray) -> np.ndarray:
+    """Mean value embedding (n,2) of a disk mesh (n,3), (m,3) with its loop (b,) at points boundary (b,2)."""
     n = len(positions)
     length = halfedge_lengths(positions, triangles).reshape(-1, 3)
     at_tail, at_head = mean_value_weights(length)
@@ -36,18 +36,18 @@ def tutte(positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, target
     inside = np.ones(n, dtype=bool)
     inside[loop] = False
     uv = np.zeros((n, 2))
-    uv[loop] = target
+    uv[loop] = boundary
     if inside.any():
         rows = weight[inside]
         total = np.asarray(rows.sum(axis=1)).ravel()
         rows = csr_matrix((rows.data / np.repeat(total, np.diff(rows.indptr)), rows.indices, rows.indptr), rows.shape)
         matrix = csr_matrix((np.ones(inside.sum()), (np.arange(inside.sum()),) * 2)) - rows[:, inside]
         order = "colamd" if n < LARGE else _inner_order(positions, triangles, inside)
-        uv[inside] = solve_general(matrix.tocsc(), rows[:, loop] @ target, order)
+        uv[inside] = solve_general(matrix.tocsc(), rows[:, loop] @ boundary, order)
     return uv
 
 
-def _inner_order(positions, triangles, inside) -> np.ndarray:
+def _inner_order(positions: np.ndarray, triangles: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """Elimination order of the vertices `inside` (n,) bool, numbered among themselves."""
     order = Dissection(positions).order(*halfedges(triangles))
     return (np.cumsum(inside) - 1)[order[inside[order]]]

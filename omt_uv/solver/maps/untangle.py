@@ -1,4 +1,4 @@
-"""Straighten a map that has folded faces, by one Tutte system (Tutte 1963, Floater 2003).
+"""Untangle a map that has folds, by one Tutte system (Tutte 1963, Floater 2003).
 
 Mean value weights taken from the folded map's own geometry reproduce it where its stars are valid; with all angles
 taken as positive the weights are positive everywhere, and with a convex boundary they make an embedding.
@@ -17,21 +17,23 @@ USABLE = 100.0
 
 
 def count_folds(uv: np.ndarray, triangles: np.ndarray) -> int:
-    """Faces of a map (n,2) that are not counter-clockwise."""
+    """Number of faces (m,3) of a map (n,2) that are not counter-clockwise."""
     return int((~(signed_areas(uv, triangles) > 0)).sum())
 
 
-def untangle(uv: np.ndarray, positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, rim: np.ndarray):
-    """An embedding near uv (n,2) with the boundary loop (b,) on the convex curve rim (b,2), and what had to be done.
+def untangle(
+    uv: np.ndarray, positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, boundary: np.ndarray
+) -> tuple[np.ndarray, str | None]:
+    """An embedding near uv (n,2) with the loop (b,) at points boundary (b,2) of a convex curve, and what was done.
 
-    Two systems are tried: weights of the map itself, and where that folds or squeezes faces beyond use, weights of the
-    surface. The second return value is None after the first and a warning after the second.
+    Two systems are tried: mean value weights of the map itself, and where that folds or squeezes faces beyond use,
+    those of the surface. The second return value is None after the first and a warning after the second.
     """
-    straight = tutte(uv, triangles, loop, rim)
+    straight = tutte(uv, triangles, loop, boundary)
     first = map_energy(straight, positions, triangles)
     if first <= USABLE:
         return straight, None
-    fresh = tutte(positions, triangles, loop, rim)
+    fresh = tutte(positions, triangles, loop, boundary)
     fewer = count_folds(fresh, triangles) < count_folds(straight, triangles)
     if fewer or map_energy(fresh, positions, triangles) < first:
         return fresh, "The start could not be untangled; the refinement starts from a mean value map of the surface"

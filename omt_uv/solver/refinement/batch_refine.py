@@ -14,7 +14,7 @@ import numpy as np
 
 from ..linalg.nested_dissection import vertex_graph
 from ..linalg.sparse import minimum_degree
-from ..maps.energy import SHARE, SINGLE, Elements, elements, energies, gradient
+from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, elements, energies, gradient
 from ..maps.tutte import arc_length_parameters, tutte
 from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
 from ..mesh.topology import boundary_loops
@@ -231,8 +231,8 @@ class _Group:
         for part in () if region is None else (region, 1 - region):
             share = self._sums(part * target)
             held = np.where(share > 0, share, np.inf)
-            single = SINGLE * self._sums(part * np.abs(error)) / held
-            worst = np.maximum.reduce([worst, SHARE * np.abs(self._sums(part * error)) / held, single])
+            single = FACE_ERROR * self._sums(part * np.abs(error)) / held
+            worst = np.maximum.reduce([worst, SHARE_ERROR * np.abs(self._sums(part * error)) / held, single])
         return worst
 
     def _sums(self, face_values):

@@ -71,7 +71,7 @@ def elements_of(V, F, rng=None):
 def test_energy_of_a_triangle_by_hand():
     V, F = meshes.single_triangle()
     w = 3 * V[:, 0] + 1j * V[:, 1]  # singular values 3 and 1, area ratio 3
-    value = E.energy(elements_of(V, F), w, balance=2.0)
+    value = E.energy(elements_of(V, F), w, area_weight=2.0)
     assert value == pytest.approx((3 + 1 / 3) / 2 - 1 + 2 * ((3 + 1 / 3) / 2 - 1))
 
 
