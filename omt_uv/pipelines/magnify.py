@@ -22,7 +22,7 @@ from ..solver.analysis.density import (
     region_share,
 )
 from ..solver.analysis.region_density import RegionDensity, target_density
-from ..solver.editing.image_warp import warped
+from ..solver.editing.image_warp import warp_image
 from ..solver.editing.magnify import OUTLINES, RegionMagnification, magnify_region, placed_like_outside, refuse_folds
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, MeshError, WeightError
@@ -359,7 +359,7 @@ def warped_picture(
 ) -> np.ndarray:
     """Warp a picture (h,w,c) of the UVs there were to those that the result has, islands continued by the margin.
 
-    straight : see `solver.editing.image_warp.warped`
+    straight : see `solver.editing.image_warp.warp_image`
     """
     old, new = [], []
     for region, corners, uv in zip(regions, result.corners, result.uv, strict=True):
@@ -370,4 +370,4 @@ def warped_picture(
         triangles = region.surface.triangles[moved]
         old.append(before[triangles])
         new.append(after[triangles])
-    return warped(picture, np.concatenate(old), np.concatenate(new), int(margin), straight)
+    return warp_image(picture, np.concatenate(old), np.concatenate(new), int(margin), straight)

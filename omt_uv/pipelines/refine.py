@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..settings import RefineSettings
-from ..solver.editing.refine_island import improve
+from ..solver.editing.refine_island import refine_island
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
 from ..solver.maps.distortion import distortion
@@ -146,7 +146,7 @@ def _improve(island: Island, pins: ChartPins | None, settings: RefineSettings) -
         outline = np.setdiff1d(boundary_edges(chart.triangles), vertices)
         vertices, places = np.concatenate([vertices, outline]), np.concatenate([places, island.uv[outline]])
     try:
-        refinement = yield from improve(
+        refinement = yield from refine_island(
             chart.vertices,
             chart.triangles,
             island.uv,

@@ -12,7 +12,7 @@ import numpy as np
 from ..blender import mesh as blender_mesh
 from ..pipelines.layout import Refusal
 from ..pipelines.refine import found_islands
-from ..solver.editing.live_map import Follower
+from ..solver.editing.live_map import LiveMap
 from ..solver.errors import MeshError
 from ..solver.parameterization.chart_indices import located
 from .run import Disturbed
@@ -29,7 +29,7 @@ class _LiveIsland:
     corners: np.ndarray
     vertices: np.ndarray
     pin_corners: np.ndarray
-    follower: Follower
+    live_map: LiveMap
 
 
 class Session:
@@ -68,10 +68,10 @@ class Session:
             at = (at[0][order], at[1][order])
         free = ~np.isin(vertices, pinned)
         try:
-            follower = Follower(chart.vertices, chart.triangles, island.uv, at)
+            live_map = LiveMap(chart.vertices, chart.triangles, island.uv, at)
         except MeshError as error:
             raise Refusal(owner, located(error, chart)) from error
-        return _LiveIsland(owner, corners[free], vertices[free], pin_corners, follower)
+        return _LiveIsland(owner, corners[free], vertices[free], pin_corners, live_map)
 
     def follow(self, balance: float, seconds: float = SLICE) -> bool:
         """Work for about so long, and write what has moved; whether anything has.
@@ -84,15 +84,15 @@ class Session:
         end, moved = time.monotonic() + seconds, False
         for island in self._islands:
             places = self._places(island)
-            before = island.follower.uv
-            uv = island.follower.follow(balance, places, max(end - time.monotonic(), 0.0))
+            before = island.live_map.uv
+            uv = island.live_map.follow(balance, places, max(end - time.monotonic(), 0.0))
             if not np.array_equal(before, uv):
                 moved = True
                 self._write(island, uv)
             if time.monotonic() > end:
                 break
         # Those that are not at rest come first next time.
-        self._islands.sort(key=lambda island: island.follower.at_rest)
+        self._islands.sort(key=lambda island: island.live_map.at_rest)
         return moved
 
     def _places(self, island: _LiveIsland) -> np.ndarray | None:

@@ -17,7 +17,7 @@ from textures import typeface
 
 from benchmarks.cases import meshes
 from omt_uv.solver.analysis.density import from_vertices, region_share
-from omt_uv.solver.editing.image_warp import warped
+from omt_uv.solver.editing.image_warp import warp_image
 from omt_uv.solver.editing.magnify import magnify_region
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.progress import drain
@@ -90,7 +90,7 @@ def make(path: Path, pixels=720):
     sheet = Image.new("RGB", (2 * pixels + 30, pixels + 56), "white")
     draw = ImageDraw.Draw(sheet)
     captions = (f"centre {100 * before:.1f} % of the picture", f"magnified {FACTOR:g} x: {100 * after:.1f} %")
-    for k, (image, caption) in enumerate(zip((picture, warped(picture, old, new)), captions, strict=True)):
+    for k, (image, caption) in enumerate(zip((picture, warp_image(picture, old, new)), captions, strict=True)):
         small = Image.fromarray(image[::-1]).resize((pixels, pixels), Image.Resampling.LANCZOS)
         sheet.paste(small, (k * (pixels + 30), 0))
         middle = k * (pixels + 30) + pixels / 2, pixels + 28

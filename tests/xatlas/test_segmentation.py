@@ -6,7 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.cutting.disk_charts import prepare
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.errors import EmptyMeshError
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.xatlas.segmentation import chart_seams
@@ -19,7 +19,7 @@ def test_a_cube_falls_into_its_sides(scale):
     V, F = meshes.cube()
     V, F = meshes.subdivide(V, F)
     mesh = triangle_surface(V * scale, F)
-    prepared = prepare(replace(mesh, seams=chart_seams(mesh)))
+    prepared = cut_to_disks(replace(mesh, seams=chart_seams(mesh)))
     assert len(prepared.charts) == 6 and not prepared.cuts.components
     for chart in prepared.charts:
         assert (np.ptp(chart.vertices, axis=0) == 0).sum() == 1
@@ -37,7 +37,7 @@ def test_polygons_stay_whole():
 def test_closed_surfaces_become_disks():
     V, F = meshes.torus()
     mesh = triangle_surface(V, F)
-    charts = prepare(replace(mesh, seams=chart_seams(mesh))).charts
+    charts = cut_to_disks(replace(mesh, seams=chart_seams(mesh))).charts
     assert len(charts) > 1 and sum(len(c.triangles) for c in charts) == len(F)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..analysis.density import Target, from_vertices, region_share
 from ..analysis.region_density import target_density
 from ..editing.magnify import magnify_region
-from ..editing.refine_island import improve
+from ..editing.refine_island import refine_island
 from ..editing.uv_islands import uv_islands
 from ..maps.distortion import distortion
 from ..mesh.charts import triangle_rows
@@ -66,7 +66,9 @@ def refine(
     texts, sizes = list(found.warnings), [len(island.chart.triangles) for island in found.islands]
     refined, covered, space = [], [], []
     for k, island in enumerate(found.islands):
-        steps = improve(island.chart.vertices, island.chart.triangles, island.uv, balance=balance, quality=quality)
+        steps = refine_island(
+            island.chart.vertices, island.chart.triangles, island.uv, balance=balance, quality=quality
+        )
         done = yield from part_of(steps, sum(sizes[:k]) / sum(sizes), sizes[k] / sum(sizes))
         refined.append(done.uv)
         covered.append(abs(signed_areas(done.uv, island.chart.triangles).sum()))

@@ -17,7 +17,7 @@ SEAMS = ("existing", "auto")
 
 
 @dataclass(frozen=True)
-class Prepared:
+class DiskCharts:
     """Charts, each a disk; the cuts (None where only existing seams were allowed) and what was repaired."""
 
     charts: list[Chart]
@@ -25,7 +25,7 @@ class Prepared:
     warnings: tuple[str, ...]
 
 
-def prepare(
+def cut_to_disks(
     surface: Surface,
     faces: np.ndarray | None = None,
     *,
@@ -34,7 +34,7 @@ def prepare(
     sieve: int | None = None,
     avoid: np.ndarray | None = None,
     extremities: int = MOST_EXTREMITIES,
-) -> Prepared:
+) -> DiskCharts:
     """Disk charts of the polygons `faces` (f,) bool, all by default.
 
     Parameters
@@ -67,7 +67,7 @@ def prepare(
     if flat:
         who = "A triangle has" if flat == 1 else f"{flat} triangles have"
         warnings.append(f"{who} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve")
-    return Prepared(charts, found.cuts, tuple(warnings))
+    return DiskCharts(charts, found.cuts, tuple(warnings))
 
 
 def _all_lines(points: np.ndarray) -> bool:
@@ -78,17 +78,17 @@ def _all_lines(points: np.ndarray) -> bool:
     return not (np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1) > 0).any()
 
 
-def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int | None) -> Prepared:
+def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int | None) -> DiskCharts:
     if not fill and sieve is None:
-        return Prepared(strict_charts(surface, faces), None, ())
+        return DiskCharts(strict_charts(surface, faces), None, ())
     gluing = strict_gluing(surface, faces)
     filled = fill_holes_of(surface, gluing, np.zeros(len(gluing.triangles), dtype=bool), None if fill else sieve)
     if not fill and not filled.holes:
-        return Prepared(strict_charts(surface, faces), None, ())
+        return DiskCharts(strict_charts(surface, faces), None, ())
     positions = surface.positions[surface.corner_vertex[gluing.triangles]] / 2
     # Faces have areas, but what fills a hole that is a line has none.
     charts, _ = _sound(charts_of(filled.surface, filled.gluing), 2 * float(np.ptp(positions, axis=(0, 1)).max()))
-    return Prepared(charts, None, () if fill else (sieved(filled.holes),))
+    return DiskCharts(charts, None, () if fill else (sieved(filled.holes),))
 
 
 def _sound(charts: list[Chart], extent: float) -> tuple[list[Chart], int]:

@@ -14,7 +14,7 @@ from ..mesh.topology import expand
 ROWS = 64
 
 
-def warped(
+def warp_image(
     picture: np.ndarray, old: np.ndarray, new: np.ndarray, margin: int = 4, straight: bool = False
 ) -> np.ndarray:
     """The picture (h,w,c) of the layout `old` as a picture of the same size for the layout `new`, (m,3,2) each.

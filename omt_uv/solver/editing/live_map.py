@@ -22,7 +22,7 @@ STIFFNESS = 1e6
 AT_REST = 1e-3
 
 
-class Follower:
+class LiveMap:
     """An island whose map can be asked for at any balance and with its pins anywhere.
 
     Parameters
@@ -36,7 +36,7 @@ class Follower:
 
     Raises
     ------
-    FoldedUVError, PinError : see `improve.improve`
+    FoldedUVError, PinError : see `refine_island.refine_island`
     """
 
     def __init__(self, vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | None = None):

@@ -23,7 +23,7 @@ from ..progress import Progress, Steps, part_of
 from ..refinement.continuation import QUALITIES, ContinuationResult, MapProblem, minimise_in_stages
 from ..refinement.elimination_order import Renumbered, renumbered
 from ..refinement.projected_newton import Assembly
-from .outline import Outline, centroid, free, recognised
+from .outline import Outline, centroid, free, recognise_outline
 from .refine_island import meets_itself
 
 OUTLINES = ("own", "free")
@@ -178,7 +178,7 @@ def _magnified(
     mesh: Renumbered, density, region, boundary: str, settings
 ) -> Steps[tuple[ContinuationResult, Outline, float]]:
     given = mesh.uv @ [1, 1j]
-    outline = recognised(given, _outer(given, mesh.triangles))
+    outline = recognise_outline(given, _outer(given, mesh.triangles))
     if boundary == "free":
         outline = Outline("free", free(len(given)), given, 0j)
     # The surface is the map as it is on its exact outline: nothing is sheared there.

@@ -27,7 +27,7 @@ class Outline:
     centre: complex
 
 
-def recognised(w: np.ndarray, loop: np.ndarray) -> Outline:
+def recognise_outline(w: np.ndarray, loop: np.ndarray) -> Outline:
     """The outline of a map w (n,) complex with the boundary loop (b,), counter-clockwise."""
     rim = w[loop]
     centre, area = centroid(rim)

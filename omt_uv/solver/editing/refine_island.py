@@ -33,7 +33,7 @@ TOUCHING = 1e-3
 PARTING = (0.0, 0.01, 0.03, 0.1)
 
 
-def improve(
+def refine_island(
     vertices: np.ndarray,
     triangles: np.ndarray,
     uv: np.ndarray,

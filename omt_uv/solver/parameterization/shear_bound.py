@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..cutting.disk_charts import Prepared, prepare
+from ..cutting.disk_charts import DiskCharts, cut_to_disks
 from ..cutting.hole_filling import MANY
 from ..cutting.shear_slit import slit
 from ..maps.distortion import face_distortion
@@ -35,7 +35,7 @@ class BoundedShear:
     reached : every chart keeps the bound; otherwise this is the round of the least shear
     """
 
-    prepared: Prepared
+    prepared: DiskCharts
     maps: list[ChartMap]
     slits: np.ndarray
     history: tuple[tuple[float, float], ...]
@@ -73,11 +73,11 @@ def bound_shear(
 ) -> Steps[BoundedShear]:
     """Map all charts, and slit those whose mean shear s1/s2 is above `bound` > 1, until none is or `rounds` are over.
 
-    Parameters and errors are those of `disk_charts.prepare`, and errors of `map_one`, a solver for one chart.
+    Parameters and errors are those of `disk_charts.cut_to_disks`, and errors of `map_one`, a solver for one chart.
     """
     if not bound > 1:
         raise ValueError(f"no map shears less than 1; the bound must be greater, not {bound}")
-    first = prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
+    first = prepared = cut_to_disks(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
     cuts = np.zeros((0, 2), np.int64) if first.cuts is None else first.cuts.edges
     slits = np.zeros((0, 2), dtype=np.int64)
     maps: list[ChartMap] = []
@@ -99,9 +99,9 @@ def bound_shear(
             break
         slits = np.concatenate([slits, *new])
         slit_surface = replace(surface, seams=np.concatenate([surface.seams, cuts, slits]))
-        prepared = prepare(slit_surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
+        prepared = cut_to_disks(slit_surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
     charts, maps, slits, reached = best
-    prepared = Prepared(charts, first.cuts, first.warnings)
+    prepared = DiskCharts(charts, first.cuts, first.warnings)
     return BoundedShear(prepared=prepared, maps=maps, slits=slits, history=tuple(history), bound=bound, reached=reached)
 
 

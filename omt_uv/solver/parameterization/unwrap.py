@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.density import Target
-from ..cutting.disk_charts import prepare
+from ..cutting.disk_charts import cut_to_disks
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError
 from ..mesh.charts import Chart
@@ -65,7 +65,7 @@ def unwrap(
 
     Raises
     ------
-    MeshError : see `disk_charts.prepare` and `chart_map.map_chart`; element indices are those of the surface
+    MeshError : see `disk_charts.cut_to_disks` and `chart_map.map_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
     task = _Task(surface, options or UnwrapOptions(), pins, target)
@@ -78,7 +78,7 @@ def unwrap(
         charts, maps, cuts, warnings = found.prepared.charts, found.maps, found.cuts, found.warnings
         chart_pins = [pins_of_chart(pins, chart) for chart in charts]
     else:
-        prepared = prepare(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
+        prepared = cut_to_disks(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
         charts, warnings = prepared.charts, prepared.warnings
         chart_pins = [pins_of_chart(pins, chart) for chart in charts]
         maps = yield from task.map_all(charts, chart_pins)

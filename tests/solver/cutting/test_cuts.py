@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 from short_cuts import cotree_length, shortest_tree
 
 from omt_uv.solver.cutting.cuts import cut
-from omt_uv.solver.cutting.disk_charts import prepare
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_pins import CornerPins
@@ -79,7 +79,7 @@ SURFACES = {
 def test_every_surface_becomes_one_disk(name):
     V, F = SURFACES[name]()
     before = V.copy(), F.copy()
-    prepared = prepare(triangle_surface(V, F))  # refuses anything that is no disk
+    prepared = cut_to_disks(triangle_surface(V, F))  # refuses anything that is no disk
     (chart,) = prepared.charts
     assert len(chart.triangles) == len(F) and not prepared.warnings
     np.testing.assert_array_equal(V, before[0])
@@ -199,7 +199,7 @@ def test_a_sphere_is_opened_beside_its_painted_half():
     edges = cut(triangle_surface(V, F), avoid=front.astype(float)).edges
     assert not front[edges].all(axis=1).any()
     # Where everything is painted there is still a way.
-    prepare(triangle_surface(V, F), avoid=np.ones(len(V)))
+    cut_to_disks(triangle_surface(V, F), avoid=np.ones(len(V)))
 
 
 def test_cuts_hide_in_creases():
@@ -217,7 +217,7 @@ def test_polygons_are_cut_along_their_sides():
     mesh = meshes.polygon_surface(V, side.tolist())
     cuts = cut(mesh)
     assert np.allclose(np.linalg.norm(V[cuts.edges[:, 0]] - V[cuts.edges[:, 1]], axis=1), 1)
-    (chart,) = prepare(mesh).charts
+    (chart,) = cut_to_disks(mesh).charts
     assert len(np.unique(chart.faces)) == 6
 
 
@@ -246,12 +246,12 @@ def _fan(F):
 
 def test_holes_are_filled_and_the_longest_boundary_stays():
     V, F = meshes.annulus()
-    (chart,) = prepare(triangle_surface(V, F), fill_holes=True).charts
+    (chart,) = cut_to_disks(triangle_surface(V, F), fill_holes=True).charts
     assert len(chart.patches) == 24 and len(chart.triangles) == len(F)
     assert (chart.vertex_ids == -1).sum() == 1 and np.allclose(chart.vertices[chart.vertex_ids == -1], 0)
     rim = np.linalg.norm(chart.vertices[_loop(chart.disk)], axis=1)
     assert np.allclose(rim, rim.max())
-    (strict,) = prepare(triangle_surface(V, F), seams="existing", fill_holes=True).charts
+    (strict,) = cut_to_disks(triangle_surface(V, F), seams="existing", fill_holes=True).charts
     np.testing.assert_array_equal(strict.disk, chart.disk)
 
 
@@ -263,7 +263,7 @@ def _loop(triangles):
 
 def test_handles_are_cut_around_filled_holes():
     V, F = holed_torus()
-    prepared = prepare(triangle_surface(V, F), fill_holes=True)
+    prepared = cut_to_disks(triangle_surface(V, F), fill_holes=True)
     (chart,) = prepared.charts
     assert len(chart.patches) > 0 and len(chart.triangles) == len(F)
     assert prepared.cuts.components[0].boundaries == 1
@@ -308,7 +308,7 @@ def test_models_with_handles(name, handles):
 @pytest.mark.parametrize("name, parts", [("suzanne", 5), ("teapot", 19), ("beetle", 1)])
 def test_models_of_many_parts(name, parts):
     V, F = meshes.load_model(name)
-    prepared = prepare(triangle_surface(V, F))
+    prepared = cut_to_disks(triangle_surface(V, F))
     assert len(prepared.charts) == parts
     assert sum(len(c.triangles) for c in prepared.charts) == len(F)
 

@@ -7,7 +7,7 @@ import pytest
 
 from omt_uv.pipelines.unwrap import _connected_triangles
 from omt_uv.solver.cutting.cuts import cut
-from omt_uv.solver.cutting.disk_charts import prepare
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.errors import NotADiskError
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -139,7 +139,7 @@ def test_a_box_full_of_holes_has_its_net():
 
 def test_few_holes_are_cut_to():
     V, F = wavy_sheet(12, lattice(3, 1))
-    (chart,) = prepare(triangle_surface(V, F), sieve=32).charts
+    (chart,) = cut_to_disks(triangle_surface(V, F), sieve=32).charts
     assert len(chart.patches) == 0
 
 
@@ -159,7 +159,7 @@ def test_a_lattice_without_sides_falls_into_fragments():
     """28 handles: cut open into one chart, it is sheared twice as much."""
     V, F = lattice_body(3)
     assert len(V) - len(F) // 2 == 2 - 2 * 28
-    parts = len(prepare(triangle_surface(V, F), sieve=32).charts)
+    parts = len(cut_to_disks(triangle_surface(V, F), sieve=32).charts)
     assert 4 <= parts <= 60
     check(V, F, 1.5, parts)
 
@@ -173,8 +173,8 @@ def test_the_marked_seams_of_a_sieve_are_enough(body):
     """What Seams marks, Unwrap with existing seams takes; it fills the same holes but those that seams open."""
     V, F = body[0](*body[1:])
     marked = triangle_surface(V, F, cut(triangle_surface(V, F)).edges)
-    charts = prepare(marked, seams="existing", sieve=32).charts
-    own = prepare(triangle_surface(V, F), sieve=32).charts
+    charts = cut_to_disks(marked, seams="existing", sieve=32).charts
+    own = cut_to_disks(triangle_surface(V, F), sieve=32).charts
     assert len(charts) == len(own) and max(len(c.patches) for c in charts) >= 0.9 * max(len(c.patches) for c in own)
     assert sum(len(c.triangles) for c in charts) == len(F)
 
@@ -182,11 +182,11 @@ def test_the_marked_seams_of_a_sieve_are_enough(body):
 def test_seams_of_a_sieve_that_leave_a_tube_are_refused():
     V, F = tube(32, 24, lattice(4, 2))
     with pytest.raises(NotADiskError):
-        prepare(triangle_surface(V, F), seams="existing", sieve=32)
+        cut_to_disks(triangle_surface(V, F), seams="existing", sieve=32)
 
 
 def test_who_prepares_without_asking_for_it_gets_no_patches():
-    charts = prepare(triangle_surface(*wavy_sheet(25, lattice(3, 1)))).charts
+    charts = cut_to_disks(triangle_surface(*wavy_sheet(25, lattice(3, 1)))).charts
     assert not any(len(c.patches) for c in charts)
 
 
@@ -201,7 +201,7 @@ def test_marked_seams_are_kept_in_sieves():
 
 
 def test_what_hangs_by_a_vertex_is_packed_with_what_fills_its_holes():
-    chart = prepare(triangle_surface(*wavy_sheet(25, lattice(3, 1))), sieve=32).charts[0]
+    chart = cut_to_disks(triangle_surface(*wavy_sheet(25, lattice(3, 1))), sieve=32).charts[0]
     assert _connected_triangles(chart) is chart.triangles
     half = len(chart.triangles) // 2
     quad, two = (replace(chart, triangles=chart.triangles[[0, k]]) for k in (half, half - 1))

@@ -6,8 +6,8 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.editing.live_map import Follower
-from omt_uv.solver.editing.refine_island import improve
+from omt_uv.solver.editing.live_map import LiveMap
+from omt_uv.solver.editing.refine_island import refine_island
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.progress import drain
@@ -17,10 +17,10 @@ def seen_from_above(V):
     return V[:, :2] * [1.0, 0.6]
 
 
-def at_rest(follower, balance, places=None):
+def at_rest(live, balance, places=None):
     for _ in range(200):
-        uv = follower.follow(balance, places, seconds=0.0)
-        if follower.at_rest:
+        uv = live.follow(balance, places, seconds=0.0)
+        if live.at_rest:
             return uv
     raise AssertionError("it never comes to rest")
 
@@ -29,17 +29,17 @@ def at_rest(follower, balance, places=None):
 def test_no_fold_on_the_way_and_in_place(mirror):
     V, F = meshes.bumpy(14, 14)
     start = seen_from_above(V) * [mirror, 1] + [5, -2]
-    follower, area = Follower(V, F, start), face_areas(V, F)
+    live, area = LiveMap(V, F, start), face_areas(V, F)
     centre = area @ start[F].mean(1) / area.sum()
     errors = []
     for balance in np.concatenate([np.linspace(0, 1, 12), np.linspace(1, 0, 7)]):
-        uv = follower.follow(balance, seconds=0.0)
+        uv = live.follow(balance, seconds=0.0)
         signed = signed_areas(uv, F)
         assert (np.sign(signed) == np.sign(mirror)).all()
         assert np.abs(signed).sum() == pytest.approx(np.abs(signed_areas(start, F)).sum())
         assert area @ uv[F].mean(1) / area.sum() == pytest.approx(centre)
     for balance in (0.0, 0.5, 1.0):
-        figures = distortion(V, F, at_rest(follower, balance)[F])
+        figures = distortion(V, F, at_rest(live, balance)[F])
         errors.append((figures.area_l1, -figures.angle_mean))
     assert errors == sorted(errors)  # along the slider areas get worse and angles better
 
@@ -47,9 +47,9 @@ def test_no_fold_on_the_way_and_in_place(mirror):
 def test_at_rest_it_is_where_refine_area_ends():
     V, F = meshes.bumpy(12, 12)
     uv = seen_from_above(V)
-    follower = Follower(V, F, uv)
-    at_rest(follower, 0.9)
-    mine, theirs = at_rest(follower, 0.4), drain(improve(V, F, uv, balance=0.4)).uv
+    live = LiveMap(V, F, uv)
+    at_rest(live, 0.9)
+    mine, theirs = at_rest(live, 0.4), drain(refine_island(V, F, uv, balance=0.4)).uv
     assert np.abs(mine - theirs).max() < 0.01 * np.ptp(uv)
 
 
@@ -58,12 +58,12 @@ def test_pins_are_where_they_are_dragged_to():
     uv = seen_from_above(V)
     pins = np.array([0, 12, 84])
     places = uv[pins].copy()
-    follower = Follower(V, F, uv, (pins, places))
+    live = LiveMap(V, F, uv, (pins, places))
     for _ in range(6):
         places = places + [[0, 0], [0, 0], [0.01, 0.02]]
-        moved = follower.follow(0.2, places, seconds=0.0)
+        moved = live.follow(0.2, places, seconds=0.0)
         assert (signed_areas(moved, F) > 0).all()
-    moved = at_rest(follower, 0.2, places)
+    moved = at_rest(live, 0.2, places)
     assert np.abs(moved[pins] - places).max() < 1e-5
 
 
@@ -71,6 +71,6 @@ def test_a_start_with_folds_is_straightened_and_said():
     V, F = meshes.bumpy(10, 10)
     uv = seen_from_above(V)
     uv[60] += [0.4, 0.1]
-    follower = Follower(V, F, uv)
-    assert follower.warnings
-    assert (signed_areas(follower.uv, F) > 0).all()
+    live = LiveMap(V, F, uv)
+    assert live.warnings
+    assert (signed_areas(live.uv, F) > 0).all()

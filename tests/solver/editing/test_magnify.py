@@ -8,7 +8,7 @@ from omt_uv.solver.analysis import vertex_scores as scores
 from omt_uv.solver.analysis.density import Target, from_vertices, normalised_density, region_share
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.analysis.saliency import saliency
-from omt_uv.solver.editing.image_warp import warped
+from omt_uv.solver.editing.image_warp import warp_image
 from omt_uv.solver.editing.magnify import magnify_map, magnify_region
 from omt_uv.solver.errors import EmptyMeshError, FoldedUVError, WeightError
 from omt_uv.solver.maps.overlap import overlap_share
@@ -151,18 +151,18 @@ def test_a_warped_picture_shows_the_same_on_the_mesh():
     n = 256
     y, x = (np.mgrid[0:n, 0:n] + 0.5) / n
     picture = np.stack([x, y, x * y, np.ones_like(x)], axis=2)
-    after = warped(picture, uv[F], result.uv[F])
+    after = warp_image(picture, uv[F], result.uv[F])
     inner = (np.abs(uv - 0.5) < 0.45).all(axis=1)
     column, row = (np.clip(result.uv[inner] * n, 0, n - 1).astype(int)).T
     expected = np.column_stack([uv, uv.prod(1), np.ones(len(uv))])[inner]
     assert np.abs(after[row, column] - expected).max() < 3 / n * 3
-    np.testing.assert_allclose(warped(picture, uv[F], uv[F])[1:-1, 1:-1], picture[1:-1, 1:-1], atol=1e-9)
+    np.testing.assert_allclose(warp_image(picture, uv[F], uv[F])[1:-1, 1:-1], picture[1:-1, 1:-1], atol=1e-9)
 
 
 def test_pixels_beyond_the_margin_stay():
     picture = np.random.default_rng(0).integers(0, 255, (64, 64, 3), dtype=np.uint8)
     uv, F = square(4)
-    after = warped(picture, 0.25 * uv[F], 0.25 * uv[F] + 0.5, margin=2)
+    after = warp_image(picture, 0.25 * uv[F], 0.25 * uv[F] + 0.5, margin=2)
     assert after.dtype == np.uint8
     np.testing.assert_array_equal(after[:28], picture[:28])
     np.testing.assert_array_equal(after[34:46, 34:46], picture[2:14, 2:14])
@@ -230,7 +230,7 @@ def test_transparent_pixels_do_not_darken_what_is_beside_them():
     picture = np.zeros((32, 32, 4))
     picture[:, 16:] = [0.8, 0.6, 0.4, 1.0]
     uv, F = square(8)
-    after = warped(picture, uv[F], 0.93 * uv[F] + 0.03, straight=True)
+    after = warp_image(picture, uv[F], 0.93 * uv[F] + 0.03, straight=True)
     seen = after[..., 3] > 0
     assert (after[..., 3][seen] < 1).any()
     np.testing.assert_allclose(after[seen][:, :3], np.tile([0.8, 0.6, 0.4], (seen.sum(), 1)), atol=1e-12)

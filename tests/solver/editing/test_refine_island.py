@@ -7,7 +7,7 @@ import pytest
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.refine import refine_islands
 from omt_uv.settings import RefineSettings
-from omt_uv.solver.editing.refine_island import STRAIGHTENED, improve
+from omt_uv.solver.editing.refine_island import STRAIGHTENED, refine_island
 from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, PinError
 from omt_uv.solver.maps.distortion import distortion
@@ -43,7 +43,7 @@ def bump():
 
 
 def run(V, F, uv, **options):
-    return drain(improve(V, F, uv, **options))
+    return drain(refine_island(V, F, uv, **options))
 
 
 def figures(V, F, uv):

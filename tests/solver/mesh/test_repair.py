@@ -7,7 +7,7 @@ from broken_meshes import broken_mesh
 
 from omt_uv.solver import errors
 from omt_uv.solver.cutting.cuts import cut
-from omt_uv.solver.cutting.disk_charts import prepare
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh import repair
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.gluing import corner_classes
@@ -22,7 +22,7 @@ def prepared(V, F, seams=(), **options):
     """The preparation of a surface; the input must stay as it was."""
     V, F = np.array(V, dtype=float), np.array(F)
     before = V.copy(), F.copy()
-    result = prepare(triangle_surface(V, F, seams), **options)
+    result = cut_to_disks(triangle_surface(V, F, seams), **options)
     np.testing.assert_array_equal(V, before[0])
     np.testing.assert_array_equal(F, before[1])
     corners = np.sort(np.concatenate([c.corners.ravel() for c in result.charts]))
@@ -166,7 +166,7 @@ def test_polygons_that_share_two_edges_in_a_row_come_apart():
     """Two quads around a vertex that only they use: their diagonals are one line in every plane map."""
     V = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, -1, 0.0]])
     mesh = meshes.polygon_surface(V, [[0, 1, 2, 3], [2, 1, 0, 4]])
-    result = prepare(mesh)
+    result = cut_to_disks(mesh)
     assert [len(c.triangles) for c in result.charts] == [2, 2]
     assert any("several edges in a row" in w for w in result.warnings)
 
@@ -222,10 +222,10 @@ def test_vertices_that_nothing_uses_do_not_matter():
 def test_what_no_repair_helps():
     V, F = meshes.bumpy(4, 4)
     with pytest.raises(errors.EmptyMeshError):
-        prepare(triangle_surface(V, F[:0]))
+        cut_to_disks(triangle_surface(V, F[:0]))
     V[7] = np.nan
     with pytest.raises(errors.NonFiniteError) as caught:
-        prepare(triangle_surface(V, F))
+        cut_to_disks(triangle_surface(V, F))
     assert caught.value.elements.tolist() == [7]
 
 
@@ -234,14 +234,14 @@ def test_a_face_that_no_move_gives_an_area_is_named_by_its_number_in_the_mesh(mo
     surface = meshes.polygon_surface(V, [[0, 1, 4, 5], [1, 2, 3, 4], [5, 4, 6]])
     monkeypatch.setattr(repair, "PERTURBATION_ROUNDS", 0)
     with pytest.raises(errors.ZeroAreaFaceError) as caught:
-        prepare(surface)
+        cut_to_disks(surface)
     assert caught.value.kind == "face" and caught.value.elements.tolist() == [2]
 
 
 @pytest.mark.parametrize("mesh", [fin, meshes.icosphere, meshes.annulus])
 def test_existing_seams_alone_refuse_what_they_did(mesh):
     with pytest.raises(errors.MeshError):
-        prepare(triangle_surface(*mesh()), seams="existing")
+        cut_to_disks(triangle_surface(*mesh()), seams="existing")
 
 
 def test_touching_boundaries_are_offered_a_weld():
@@ -260,7 +260,7 @@ def test_a_refused_chart_that_touches_itself_is_offered_a_weld():
     around = np.arange(12)
     W, G = opened(V, F, np.column_stack([around, np.roll(around, -1)]))
     with pytest.raises(errors.NotADiskError, match="Merge by Distance"):
-        prepare(triangle_surface(W, G), seams="existing")
+        cut_to_disks(triangle_surface(W, G), seams="existing")
 
 
 def opened(V, F, seams):
@@ -275,19 +275,19 @@ def opened(V, F, seams):
 def test_only_the_chosen_faces_are_looked_at():
     V, F = meshes.icosphere(1)
     half = V[F].mean(1)[:, 2] > 0
-    result = prepare(triangle_surface(V, F), half)
+    result = cut_to_disks(triangle_surface(V, F), half)
     assert sum(len(c.triangles) for c in result.charts) == half.sum()
 
 
 def test_seams_must_be_known():
     with pytest.raises(ValueError, match="seams"):
-        prepare(triangle_surface(*meshes.cube()), seams="none")
+        cut_to_disks(triangle_surface(*meshes.cube()), seams="none")
 
 
 def test_a_diagonal_between_two_corners_on_one_vertex():
     """A pentagon that passes through two vertices twice: its diagonals have equal ends."""
     V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
-    (chart,) = prepare(meshes.polygon_surface(V, [[0, 1, 0, 1, 2]])).charts
+    (chart,) = cut_to_disks(meshes.polygon_surface(V, [[0, 1, 0, 1, 2]])).charts
     assert len(chart.vertices) == 5
     mapped(chart)
 
@@ -295,11 +295,11 @@ def test_a_diagonal_between_two_corners_on_one_vertex():
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("chunk", range(8))
 def test_every_mesh_becomes_disks_or_has_a_named_fault(chunk):
-    """`prepare` checks every chart itself; only what has no numbers, no faces or no area at all may stop it."""
+    """`cut_to_disks` checks every chart itself; only what has no numbers, no faces or no area at all may stop it."""
     for seed in range(100 * chunk, 100 * (chunk + 1)):
         surface, faces, _ = broken_mesh(seed)
         try:
-            result = prepare(surface, faces, fill_holes=seed % 3 == 0)
+            result = cut_to_disks(surface, faces, fill_holes=seed % 3 == 0)
         except (errors.EmptyMeshError, errors.NonFiniteError):
             continue
         except errors.ZeroAreaFaceError as error:

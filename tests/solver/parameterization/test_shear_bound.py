@@ -4,7 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.cutting.disk_charts import prepare
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.cutting.shear_slit import slit
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -45,7 +45,7 @@ def test_only_the_bad_chart_is_slit():
 def test_a_slit_starts_on_the_rim_and_ends_in_the_worst_place():
     V, F = meshes.grid(10, 10)
     mesh = triangle_surface(V, F)
-    (chart,) = prepare(mesh).charts
+    (chart,) = cut_to_disks(mesh).charts
     centre = np.linalg.norm(V[F].mean(1)[:, :2] - 0.5, axis=1)
     edges = slit(mesh, chart, 1 + 5 * np.exp(-((centre / 0.1) ** 2)))
     ends, uses = np.unique(edges, return_counts=True)
@@ -58,7 +58,7 @@ def test_a_slit_starts_on_the_rim_and_ends_in_the_worst_place():
 def test_the_slit_leaves_painted_vertices_free():
     V, F = meshes.grid(10, 10)
     mesh = triangle_surface(V, F)
-    (chart,) = prepare(mesh).charts
+    (chart,) = cut_to_disks(mesh).charts
     shear = 1 + 5 * np.exp(-((np.linalg.norm(V[F].mean(1)[:, :2] - [0.5, 0.3], axis=1) / 0.1) ** 2))
     plain, steered = slit(mesh, chart, shear), slit(mesh, chart, shear, avoid=(V[:, 1] < 0.25).astype(float))
     assert V[plain, 1].min() < 0.25 < V[steered, 1].min()

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...cutting.disk_charts import prepare
+from ...cutting.disk_charts import cut_to_disks
 from ...errors import MeshError
 from ...mesh.charts import Chart
 from ...mesh.surface import triangle_surface
@@ -59,7 +59,7 @@ class PartMaps:
         """The part cut into disks along its features, and further where that takes more cuts: the fastest ones, since
         they leave no trace."""
         surface = triangle_surface(self.part.vertices, self.part.triangles, self.part.features)
-        return prepare(surface, extremities=0).charts
+        return cut_to_disks(surface, extremities=0).charts
 
     def of_sphere(self, density: np.ndarray) -> Steps[Maps | None]:
         """Maps to the sphere; None, and a warning from then on, where there are none in double precision."""
