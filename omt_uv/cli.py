@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 from . import __version__
 from .commands import magnify, measure, refine, remesh, seams, sphere, unwrap, weights
-from .commands.common import PROGRAM, CommandError
+from .commands.common import PROGRAM
+from .errors import UserError
 
 COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, remesh)
 FAILURE = 1
@@ -22,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return stop.code if isinstance(stop.code, int) else FAILURE
     try:
         options.run(options)
-    except CommandError as error:
+    except UserError as error:
         print(f"{PROGRAM}: error: {' '.join(str(error).split())}", file=sys.stderr)
         return FAILURE
     return 0

@@ -6,10 +6,9 @@ import bpy
 
 from .blender.versions import register_command, unregister_command
 from .display import overlay
-from .operators.distortion import UV_OT_omt_measure
+from .operators.distortion import UV_OT_omt_histogram, UV_OT_omt_measure, UV_OT_omt_overlay
 from .operators.live import UV_OT_omt_live
 from .operators.magnify import UV_OT_omt_magnify
-from .operators.overlay import UV_OT_omt_histogram, UV_OT_omt_overlay
 from .operators.preset import UV_OT_omt_preset
 from .operators.refine import UV_OT_omt_refine
 from .operators.remesh import OBJECT_OT_omt_remesh

@@ -46,6 +46,7 @@ ARROWS: dict[str, str] = {
     "solver.remeshing.relaxation solver.remeshing.fitting solver.remeshing.initial",
     "solver.api": "solver solver.mesh solver.analysis solver.maps solver.parameterization solver.editing solver.sphere "
     "solver.remeshing",
+    "remedies": "solver",
     "xatlas": "errors solver solver.mesh",
     "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.transfer solver.refinement "
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing solver.remeshing.initial "
@@ -55,10 +56,10 @@ ARROWS: dict[str, str] = {
     "files": "errors solver blender",
     "display": "solver solver.mesh solver.maps pipelines blender",
     "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
-    "commands": "errors settings solver solver.cutting solver.globe solver.parameterization xatlas pipelines blender "
-    "files display",
-    "operators": "errors settings solver solver.mesh solver.cutting solver.globe solver.parameterization xatlas "
-    "pipelines blender files display session",
+    "commands": "errors remedies settings solver solver.cutting solver.globe solver.parameterization xatlas pipelines "
+    "blender files display",
+    "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
+    "xatlas pipelines blender files display session",
     "panels": "settings blender display session operators",
 }
 SOLVER_LIBRARIES = {"numpy", "scipy"}

@@ -67,7 +67,7 @@ def globe_densities(pairs: Sequence, name: str, factor: float) -> list[np.ndarra
 
     Raises
     ------
-    GroupError, ScoreError : no such group or score; MeshError : a factor that is not positive
+    GroupError, Refusal : no such group or score; MeshError : a factor that is not positive
     """
     if not name:
         return [None] * len(pairs)

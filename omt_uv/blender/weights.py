@@ -10,7 +10,7 @@ import bpy
 import bmesh
 import numpy as np
 
-from ..errors import UserError
+from ..pipelines.layout import Refusal
 from ..pipelines.reading import Reading
 from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
 from ..solver.errors import MeshError
@@ -28,14 +28,6 @@ class Weights:
     kind: str = "vertex"
 
 
-class ScoreError(UserError):
-    """A mesh that has no such score: the object and the MeshError."""
-
-    def __init__(self, obj: bpy.types.Object, error: MeshError):
-        super().__init__(f"{obj.name}: {error}")
-        self.obj, self.error = obj, error
-
-
 def region_weights(pairs: Sequence[tuple[bpy.types.Object, Reading]], name: str) -> list[np.ndarray]:
     """Weights (n,) of the region `name` for each object: a vertex group, 0 where an object has none; or one of
     COMPUTED, where no object has a group of this name.
@@ -43,12 +35,12 @@ def region_weights(pairs: Sequence[tuple[bpy.types.Object, Reading]], name: str)
     Raises
     ------
     GroupError : no object has this group, or no name is given
-    ScoreError : a mesh that has no such score
+    Refusal : a mesh that has no such score
     """
     weights = [group_weights(obj, name) if name else None for obj, _ in pairs]
     if all(w is None for w in weights):
         if name in COMPUTED:
-            return [computed_weights(obj, reading, COMPUTED[name]) for obj, reading in pairs]
+            return _scores(pairs, COMPUTED[name])
         names = ", ".join(obj.name for obj, _ in pairs)
         raise GroupError(
             f"{names}: There is no vertex group {name!r}. Paint one, or choose {' or '.join(COMPUTED)}."
@@ -57,6 +49,16 @@ def region_weights(pairs: Sequence[tuple[bpy.types.Object, Reading]], name: str)
         )
     sizes = [len(reading.surface.positions) for _, reading in pairs]
     return [np.zeros(n) if w is None else w for w, n in zip(weights, sizes, strict=True)]
+
+
+def _scores(pairs: Sequence[tuple[bpy.types.Object, Reading]], kind: str) -> list[np.ndarray]:
+    found = []
+    for k, (_, reading) in enumerate(pairs):
+        try:
+            found.append(computed_weights(reading, kind))
+        except MeshError as error:
+            raise Refusal(k, error) from error
+    return found
 
 
 def attribute_weights(
@@ -121,7 +123,7 @@ def named_weights(
 
     Raises
     ------
-    GroupError, ScoreError : see there
+    GroupError, Refusal : see there
     """
     grouped = any(name in obj.vertex_groups for obj, _ in pairs)
     has = [obj.name for obj, _ in pairs if name and obj.data.attributes.get(name) is not None]
@@ -132,7 +134,6 @@ def named_weights(
 
 
 def computed_weights(
-    obj: bpy.types.Object,
     reading: Reading,
     kind: str,
     low: float = 0.5,
@@ -140,14 +141,11 @@ def computed_weights(
     invert: bool = False,
     selected: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Weights (n,) from a score of the whole mesh; see `solver.scores.soft_weights`. Raises ScoreError."""
+    """Weights (n,) from a score of the whole mesh; see `vertex_scores.soft_weights`. Raises MeshError."""
     surface = reading.surface
     triangles = surface.corner_vertex[surface.triangles]
-    try:
-        values = vertex_score(kind, surface.positions, triangles, selected)
-        return soft_weights(values, scaled_vertex_areas(surface.positions, triangles), low, high, invert)
-    except MeshError as error:
-        raise ScoreError(obj, error) from error
+    values = vertex_score(kind, surface.positions, triangles, selected)
+    return soft_weights(values, scaled_vertex_areas(surface.positions, triangles), low, high, invert)
 
 
 def selected_vertices(obj: bpy.types.Object) -> np.ndarray:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from .. import __version__
@@ -17,37 +19,52 @@ class CommandError(UserError):
     """Told on one line, with a status that is not zero."""
 
 
-def blender():
-    """The modules that need Blender, which the help and a misspelt option do not; says what is missing."""
+def require_blender() -> None:
+    """Import what needs Blender, which the help and a misspelt option do not; CommandError says what is missing."""
     from ..files.silence import silence
 
     try:
         with silence():
-            from ..blender import mesh as blender_mesh
-            from ..blender import uv_packer as blender_pack
-            from ..files import meshes as files
+            from ..blender import mesh, uv_packer  # noqa: F401
+            from ..files import meshes  # noqa: F401
     except ModuleNotFoundError as error:
         raise CommandError(f"{error}. Install bpy, numpy, scipy and xatlas, or run inside Blender.") from error
-    return files, blender_mesh, blender_pack
 
 
-def read(path: Path, files, blender_mesh, layer: str = "") -> list:
-    """Pairs of object and Reading of a UV layer (the active one by default) of all meshes with faces."""
+@contextmanager
+def refusals(objects: Sequence = (), name: str = "", others: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Turn errors of the solver into CommandErrors; what the user can mend passes as it is.
+
+    objects : those that the index of a Refusal counts
+    name : what a MeshError of the block is about, if it is about one thing
+    others : errors that tell the user what to do, too, although they are no UserErrors
+    """
+    from ..pipelines.layout import Refusal
+    from ..remedies import explain
     from ..solver.errors import MeshError
 
     try:
-        objects = files.load(path)
-    except files.FileError as error:
+        yield
+    except Refusal as refusal:
+        raise CommandError(f"{objects[refusal.index].name}: {explain(refusal.error)}") from refusal
+    except MeshError as error:
+        raise CommandError(f"{name}: {explain(error)}" if name else explain(error)) from error
+    except others as error:
         raise CommandError(str(error)) from error
-    unique = {obj.data: obj for obj in reversed(objects)}
+
+
+def read_file(path: Path, layer: str = "") -> list:
+    """Pairs of object and Reading of a UV layer (the active one by default) of all meshes with faces."""
+    from ..blender.mesh import read, weld_split_vertices
+    from ..files.meshes import load
+
+    unique = {obj.data: obj for obj in reversed(load(path))}
     pairs = []
     for obj in reversed(unique.values()):
-        try:
-            reading = blender_mesh.read(obj, layer)
-        except MeshError as error:
-            raise CommandError(f"{obj.name}: {error}") from error
+        with refusals(name=obj.name):
+            reading = read(obj, layer)
         if path.suffix.lower() == ".glb":
-            reading = blender_mesh.weld_split_vertices(reading)
+            reading = weld_split_vertices(reading)
         if reading.faces.any():
             pairs.append((obj, reading))
         elif len(unique) > 1:
@@ -57,9 +74,12 @@ def read(path: Path, files, blender_mesh, layer: str = "") -> list:
     return pairs
 
 
-def check_output(path: Path, files) -> None:
-    if path.suffix.lower() not in files.WRITABLE:
-        raise CommandError(f"{path}: unknown format. Use one of {' '.join(files.WRITABLE)}.")
+def check_output(path: Path) -> None:
+    """Raise CommandError unless meshes can be written to a file of this name."""
+    from ..files.meshes import WRITABLE
+
+    if path.suffix.lower() not in WRITABLE:
+        raise CommandError(f"{path}: unknown format. Use one of {' '.join(WRITABLE)}.")
     if not path.resolve().parent.is_dir():
         raise CommandError(f"{path}: there is no such folder")
 
@@ -82,9 +102,11 @@ def _show_progress(progress) -> None:
 
 def warn(objects: list, solver_warnings: list[tuple[int, str]], warnings: list[str]) -> list[str]:
     """Print and return the warnings of the writer and of the solver, each once."""
+    from ..remedies import advise
+
     told = list(warnings)
     for index, text in dict.fromkeys(solver_warnings):
-        told.append(f"{objects[index].name}: {text}" if index >= 0 else text)
+        told.append(f"{objects[index].name}: {advise(text)}" if index >= 0 else advise(text))
     for text in told:
         print(f"{PROGRAM}: warning: {text}", file=sys.stderr)
     return told

@@ -18,8 +18,8 @@ from ..settings import (
     SOURCES,
     MagnifySettings,
 )
-from .common import CommandError, blender, drain_shown, write_report
-from .layers import read_layers, refusals, write_layers
+from .common import CommandError, drain_shown, refusals, require_blender, write_report
+from .layers import read_layers, write_layers
 from .options import FORMATS, add_files, add_report, margin, names, texture_size
 
 
@@ -76,11 +76,10 @@ def times(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> None:
-    _, _, blender_pack = blender()
-    from ..blender.seams import GroupError
-    from ..blender.weights import ScoreError, named_weights
+    require_blender()
+    from ..blender.uv_packer import pack
+    from ..blender.weights import named_weights
     from ..pipelines.magnify import Region, magnify, warped_picture
-    from ..xatlas.packing import PackingError
 
     picture = _picture(options)
     settings = MagnifySettings(
@@ -93,14 +92,13 @@ def run(options: argparse.Namespace) -> None:
         source=options.source,
         cascade=options.cascade,
     )
-    pairs = read_layers(options)
-    objects = [obj for obj, _ in pairs]
-    with refusals(objects, PackingError, GroupError, ScoreError):
-        weights, told = named_weights(pairs, options.weights)
+    objects, readings = read_layers(options)
+    with refusals(objects):
+        weights, told = named_weights(list(zip(objects, readings, strict=True)), options.weights)
         regions = [
-            Region(r.surface, r.faces, w.values, r.all_pins, w.kind) for (_, r), w in zip(pairs, weights, strict=True)
+            Region(r.surface, r.faces, w.values, r.all_pins, w.kind) for r, w in zip(readings, weights, strict=True)
         ]
-        result = drain_shown(magnify(regions, settings, blender_pack.pack))
+        result = drain_shown(magnify(regions, settings, pack))
         result = replace(result, warnings=[*told, *result.warnings])
         warnings = write_layers(options, objects, result)
     if picture is not None:

@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from .common import CommandError, blender, read
+from .common import CommandError, read_file, refusals, require_blender
 from .options import FORMATS
 
 
@@ -22,17 +22,14 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    files, blender_mesh, _ = blender()
+    require_blender()
     from ..pipelines.distortion import measure_readings, summary
-    from ..solver.errors import MeshError
 
-    try:
-        readings = [reading for _, reading in read(options.input, files, blender_mesh)]
+    with refusals(name=str(options.input)):
+        readings = [reading for _, reading in read_file(options.input)]
         figures = measure_readings(readings)
         if options.histogram:
             _draw(options.histogram, readings)
-    except MeshError as error:
-        raise CommandError(f"{options.input}: {error}") from error
     print(json.dumps(asdict(figures), indent=1) if options.json else summary(figures))
 
 

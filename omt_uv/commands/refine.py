@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 
 from ..settings import RefineSettings
-from .common import CommandError, blender, drain_shown, write_report
-from .layers import read_layers, refusals, write_layers
+from .common import CommandError, drain_shown, refusals, write_report
+from .layers import read_layers, write_layers
 from .options import FORMATS, add_area_options, add_files, add_report
 
 
@@ -21,17 +21,15 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    blender()
+    objects, readings = read_layers(options)
     from ..pipelines.refine import refine_islands
 
-    pairs = read_layers(options)
-    objects = [obj for obj, _ in pairs]
     for obj in objects:
         if options.uv_layer and options.uv_layer not in obj.data.uv_layers:
             raise CommandError(f"{obj.name} has no UV map {options.uv_layer!r}. Name one that it has.")
     settings = RefineSettings(quality=options.quality, balance=options.balance, keep_boundary=options.keep_boundary)
     with refusals(objects):
-        refined = drain_shown(refine_islands([(r.surface, r.faces, r.all_pins) for _, r in pairs], settings))
+        refined = drain_shown(refine_islands([(r.surface, r.faces, r.all_pins) for r in readings], settings))
         warnings = write_layers(options, objects, refined)
     if options.report:
         write_report(options, {"keep_boundary": options.keep_boundary}, objects, refined.reports, warnings)

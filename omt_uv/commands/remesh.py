@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
-from .common import CommandError, blender, check_output, drain_shown, read, warn
+from .common import CommandError, check_output, drain_shown, read_file, refusals, require_blender, warn
 from .options import add_files, names
 
 KINDS = ("uniform", "curvature", "gaussian", "saliency")
@@ -75,35 +75,28 @@ def _ratio(text: str) -> float:
 
 
 def run(options: argparse.Namespace) -> None:
-    files, blender_mesh, _ = blender()
-    from ..blender.remesh_objects import SourceError, carried_attributes, lost, new_objects, read_request, source_of
+    require_blender()
+    from ..blender.remesh_objects import carried_attributes, lost, new_objects, read_request, source_of
     from ..pipelines.remesh import remesh_series
-    from ..solver.errors import MeshError
 
-    check_output(options.output, files)
+    check_output(options.output)
     if options.input.resolve() in [path.resolve() for path in _targets(options.output, options.levels)]:
         raise CommandError(f"{options.input}: the new mesh would replace the input. Give another name.")
     common = _settings(options)
-    objects = [obj for obj, _ in read(options.input, files, blender_mesh)]
+    objects = [obj for obj, _ in read_file(options.input)]
     results = []
     for obj in objects:
-        try:
+        with refusals(name=obj.name):
             settings = replace(common, density=source_of(obj, common))
             request = read_request(obj, settings, weld=_is_split(options.input, obj))
             series = drain_shown(remesh_series(request.job, settings))
-        except (SourceError, MeshError) as error:
-            raise CommandError(f"{obj.name}: {error}".replace(f"{obj.name}: {obj.name}", obj.name)) from error
         results.append((obj, request, series, carried_attributes(request, series)))
     told, made = [], []
     by_hand = options.input.suffix.lower() == ".blend"
     for k, (obj, request, series, carried) in enumerate(results):
         told += [(k, text) for text in (*lost(obj, request, carried, by_hand), *series.warnings)]
         made.append(new_objects([obj], request, series, carried))
-    try:
-        warnings = _save(options.output, made, files)
-    except files.FileError as error:
-        raise CommandError(str(error)) from error
-    warn(objects, told, warnings)
+    warn(objects, told, _save(options.output, made))
 
 
 def _is_split(path: Path, obj) -> bool:
@@ -136,15 +129,17 @@ def _settings(options: argparse.Namespace) -> RemeshSettings:
     )
 
 
-def _save(path: Path, made: list[list[str]], files) -> list[str]:
+def _save(path: Path, made: list[list[str]]) -> list[str]:
     """A .blend with everything in it; other files hold the new objects alone, every level a file of its own."""
     import bpy
 
+    from ..files.meshes import save
+
     if path.suffix.lower() == ".blend":
-        return files.save(path, [])
+        return save(path, [])
     warnings: list[str] = []
     for k, target in enumerate(_targets(path, len(made[0]))):
-        warnings += files.save(target, [bpy.data.objects[names[k]] for names in made])
+        warnings += save(target, [bpy.data.objects[names[k]] for names in made])
     return list(dict.fromkeys(warnings))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from .common import CommandError, blender, read, warn
+from .common import CommandError, read_file, refusals, require_blender, warn
 from .options import add_cut_options, add_files
 
 
@@ -16,28 +16,23 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    files, blender_mesh, _ = blender()
-    from ..blender.seams import GroupError, avoided, mark_seams
+    require_blender()
+    from ..blender.seams import avoided, mark_seams
+    from ..files.meshes import save
     from ..solver.cutting.cuts import cut
-    from ..solver.errors import MeshError
     from ..solver.parameterization.chart_pins import clear_of_pins
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")
-    pairs = read(options.input, files, blender_mesh)
+    pairs = read_file(options.input)
     objects = [obj for obj, _ in pairs]
     told = []
-    try:
-        free = avoided(objects, options.keep_free)
-        for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
+    free = avoided(objects, options.keep_free)
+    for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
+        with refusals(name=obj.name):
             avoid = clear_of_pins(reading.surface, reading.pins, avoid)
             cuts = cut(reading.surface, reading.faces, avoid=avoid, fill=options.fill_holes)
-            told += [(k, text) for text in cuts.warnings]
-            mark_seams(obj, cuts.edges)
-            print(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")
-        warnings = files.save(options.output, objects)
-    except MeshError as error:
-        raise CommandError(f"{obj.name}: {error}") from error
-    except (GroupError, files.FileError) as error:
-        raise CommandError(str(error)) from error
-    warn(objects, told, warnings)
+        told += [(k, text) for text in cuts.warnings]
+        mark_seams(obj, cuts.edges)
+        print(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")
+    warn(objects, told, save(options.output, objects))

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
-from .common import CommandError, blender, drain_shown, write_report
-from .layers import read_layers, refusals, write_layers
+from .common import CommandError, drain_shown, refusals, require_blender, write_report
+from .layers import read_layers, write_layers
 from .options import add_area_options, add_files, add_report, names
 
 
@@ -38,23 +38,19 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    blender()
+    require_blender()
     from ..blender.markers import globe_densities, group_markers
-    from ..blender.seams import GroupError
-    from ..blender.weights import ScoreError
-    from ..files.images import ImageError
     from ..pipelines.globe import globe_jobs, project
-    from ..solver.errors import MeshError
     from ..solver.globe.rotation import MarkerError
 
     _check_image(options)
     settings = GlobeSettings(options.projection, options.quality, options.balance, options.method)
-    pairs = read_layers(options)
-    objects = [obj for obj, _ in pairs]
-    with refusals(objects, GroupError, MarkerError, ImageError, ScoreError, MeshError):
+    objects, readings = read_layers(options)
+    with refusals(objects, others=(MarkerError,)):
         markers = group_markers(objects, options.pole, options.meridian, options.east)
+        pairs = list(zip(objects, readings, strict=True))
         densities = globe_densities(pairs, options.weights, options.weight_factor)
-        jobs = globe_jobs([reading for _, reading in pairs], densities, markers)
+        jobs = globe_jobs(readings, densities, markers)
         globes = drain_shown(project(jobs, settings))
         image = _redrawn(options)
         warnings = write_layers(options, objects, globes)
@@ -68,16 +64,13 @@ def run(options: argparse.Namespace) -> None:
 
 def _check_image(options: argparse.Namespace) -> None:
     """Refuse what cannot be written before the long work."""
-    from ..files.images import ImageError, check_target
+    from ..files.images import check_target
 
     if (options.image is None) != (options.image_out is None):
         raise CommandError("--image and --image-out go together. Give both.")
     if options.image_out is None:
         return
-    try:
-        check_target(options.image_out)
-    except ImageError as error:
-        raise CommandError(str(error)) from error
+    check_target(options.image_out)
     if not options.image.is_file():
         raise CommandError(f"{options.image}: there is no such file")
 

@@ -14,8 +14,8 @@ from ..settings import (
     SEAMS,
     Settings,
 )
-from .common import blender, drain_shown, write_report
-from .layers import read_layers, refusals, write_layers
+from .common import drain_shown, refusals, write_report
+from .layers import read_layers, write_layers
 from .options import add_area_options, add_cut_options, add_files, add_report, margin, names, shear, texture_size, tile
 
 
@@ -47,11 +47,11 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    _, _, blender_pack = blender()
-    from ..blender.seams import GroupError, avoided
+    objects, readings = read_layers(options)
+    from ..blender.seams import avoided
+    from ..blender.uv_packer import pack
     from ..pipelines.layout import UnwrapJob
     from ..pipelines.unwrap import lay_out
-    from ..xatlas.packing import PackingError
 
     settings = Settings(
         boundary=options.boundary,
@@ -65,12 +65,10 @@ def run(options: argparse.Namespace) -> None:
         fill_holes=options.fill_holes,
         max_shear=options.max_shear,
     )
-    pairs = read_layers(options)
-    objects = [obj for obj, _ in pairs]
-    with refusals(objects, PackingError, GroupError):
+    with refusals(objects):
         free = avoided(objects, options.keep_free)
-        jobs = [UnwrapJob(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
-        layout = drain_shown(lay_out(jobs, settings, blender_pack.pack))
+        jobs = [UnwrapJob(r.surface, r.faces, r.pins, avoid) for r, avoid in zip(readings, free, strict=True)]
+        layout = drain_shown(lay_out(jobs, settings, pack))
         warnings = write_layers(options, objects, layout)
     if options.report:
         charts = [surface_map.report() for surface_map in layout.maps]

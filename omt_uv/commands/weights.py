@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
-from .common import CommandError, blender, read, warn
+from .common import CommandError, read_file, refusals, require_blender, warn
 from .options import add_files, names, share
 
 
@@ -21,25 +21,19 @@ def add(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    files, blender_mesh, _ = blender()
-    from ..blender.seams import GroupError
-    from ..blender.weights import ScoreError, check_group_target, computed_weights, selected_vertices, write_group
+    require_blender()
+    from ..blender.weights import check_group_target, computed_weights, selected_vertices, write_group
+    from ..files.meshes import save
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep vertex groups. Write one of these.")
-    pairs = read(options.input, files, blender_mesh)
-    try:
-        found = []
-        for obj, reading in pairs:
-            check_group_target(obj, options.group)
-            found.append(
-                computed_weights(
-                    obj, reading, options.kind, options.low, options.high, options.invert, selected_vertices(obj)
-                )
-            )
-        for (obj, _), weights in zip(pairs, found, strict=True):
-            write_group(obj, options.group, weights)
-        warnings = files.save(options.output, [obj for obj, _ in pairs])
-    except (GroupError, ScoreError, files.FileError) as error:
-        raise CommandError(str(error)) from error
-    warn([obj for obj, _ in pairs], [], warnings)
+    pairs = read_file(options.input)
+    objects, found = [obj for obj, _ in pairs], []
+    for obj, reading in pairs:
+        check_group_target(obj, options.group)
+        with refusals(name=obj.name):
+            selected = selected_vertices(obj)
+            found.append(computed_weights(reading, options.kind, options.low, options.high, options.invert, selected))
+    for obj, weights in zip(objects, found, strict=True):
+        write_group(obj, options.group, weights)
+    warn(objects, [], save(options.output, objects))

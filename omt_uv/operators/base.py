@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import bpy
 
 from ..display import overlay
 from ..errors import UserError
-from ..session import run as running
-from ..session import summary as last_run
+from ..session import last_run, run
 from ..settings import DEFAULT_TEXTURE_SIZE
 
 
@@ -50,15 +51,12 @@ def read_objects(context: bpy.types.Context, layer: str = "") -> list:
     ------
     Complaint : no object has any
     """
-    from ..blender import mesh as blender_mesh
-    from ..solver.errors import MeshError
+    from ..blender.mesh import read
 
     pairs = []
     for obj in mesh_objects(context):
-        try:
-            pairs.append((obj, blender_mesh.read(obj, layer)))
-        except MeshError as error:
-            raise Complaint(f"{obj.name}: {error}", obj, error) from error
+        with complaints(obj):
+            pairs.append((obj, read(obj, layer)))
     full = [(obj, reading) for obj, reading in pairs if reading.faces.any()]
     if full:
         return full
@@ -66,6 +64,60 @@ def read_objects(context: bpy.types.Context, layer: str = "") -> list:
     if context.mode == "EDIT_MESH":
         raise Complaint(f"{names}: No face is selected. Select the faces to work on.")
     raise Complaint(f"{names}: The mesh has no faces. Select a mesh with faces.")
+
+
+def read_writable(context: bpy.types.Context, layer: str = "") -> tuple[list[bpy.types.Object], list]:
+    """Objects and their Readings, as `read_objects`, where UVs can be written to the layer.
+
+    Raises
+    ------
+    Complaint : no object has a face to work on, or one cannot be written
+    """
+    from ..blender.mesh import check_target
+
+    pairs = read_objects(context, layer)
+    objects = [obj for obj, _ in pairs]
+    with complaints():
+        for obj in objects:
+            check_target(obj.data, layer)
+    return objects, [reading for _, reading in pairs]
+
+
+def write_layers(objects: list[bpy.types.Object], layer: str, result) -> None:
+    """Write `result.uv` to `result.corners` of the layer of every object (the active one if empty)."""
+    from ..blender.mesh import target_layer, write_uv
+
+    for obj, corners, uv in zip(objects, result.corners, result.uv, strict=True):
+        write_uv(obj, target_layer(obj.data, layer), corners, uv)
+
+
+@contextmanager
+def complaints(about=None, objects: Sequence = (), others: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Turn what a block raises for the user to mend into a Complaint.
+
+    about : the object that a MeshError of the block is about, if it is about one
+    objects : those that the index of a Refusal counts
+    others : errors that tell the user what to do, too, although they are no UserErrors
+    """
+    from ..pipelines.layout import Refusal
+    from ..remedies import explain
+    from ..solver.errors import MeshError
+
+    try:
+        yield
+    except Complaint:
+        raise
+    except Refusal as refusal:
+        obj = objects[refusal.index]
+        raise Complaint(f"{obj.name}: {explain(refusal.error)}", obj, refusal.error) from refusal
+    except MeshError as error:
+        if about is None:
+            raise Complaint(explain(error)) from error
+        raise Complaint(f"{about.name}: {explain(error)}", about, error) from error
+    except UserError as error:
+        raise Complaint(str(error)) from error
+    except others as error:
+        raise Complaint(str(error)) from error
 
 
 def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Complaint) -> set[str]:
@@ -81,7 +133,9 @@ def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Co
 
 def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, str]]) -> None:
     """Report warnings, pairs of an index into objects (-1: of none) and a text, each once."""
-    for (index, text), count in Counter(warnings).items():
+    from ..remedies import advise
+
+    for (index, text), count in Counter((index, advise(text)) for index, text in warnings).items():
         name = f"{objects[index].name}: " if index >= 0 else ""
         several = f" ({count} islands)" if count > 1 else ""
         last_run.state.warnings.append(text + several)
@@ -158,15 +212,13 @@ class SolverOperator:
 
     def start(self, context: bpy.types.Context) -> set[str]:
         """Run the first slice, which is all for small meshes, and go on from a timer."""
-        if running.current is not None:
-            return tell(
-                self, context, Complaint(f"{running.current.label} is still running. Wait, or cancel it by Esc.")
-            )
+        if run.current is not None:
+            return tell(self, context, Complaint(f"{run.current.label} is still running. Wait, or cancel it by Esc."))
         try:
             objects = mesh_objects(context)
         except Complaint as complaint:
             return tell(self, context, complaint)
-        running.current = running.Run(self.bl_label, context, objects, self.steps(context))
+        run.current = run.Run(self.bl_label, context, objects, self.steps(context))
         self._timer = None
         state = self._advance(context)
         if "RUNNING_MODAL" in state and not bpy.app.background:
@@ -176,7 +228,7 @@ class SolverOperator:
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
-            seconds = running.current.seconds if running.current else 0.0
+            seconds = run.current.seconds if run.current else 0.0
             self.cancel(context)
             self.report({"INFO"}, f"Cancelled after {seconds:.1f} s; nothing was changed")  # type: ignore[attr-defined]
             return {"CANCELLED"}
@@ -186,10 +238,10 @@ class SolverOperator:
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Throw the solver away; Blender calls this when it loads another file."""
-        if running.current is not None:
-            running.current.close()
-            running.current = None
-            running.serve()
+        if run.current is not None:
+            run.current.close()
+            run.current = None
+            run.serve()
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
@@ -211,32 +263,54 @@ class SolverOperator:
         last_run.state.error = ""
 
     def _advance(self, context: bpy.types.Context) -> set[str]:
-        run, ended = running.current, True
-        if run is None:
+        current, ended = run.current, True
+        if current is None:
             return {"CANCELLED"}
         try:
-            ended = run.advance()
+            ended = current.advance()
             if not ended:
                 # Drawing takes its time as well, the more so without a graphics card.
                 if time.monotonic() - self._shown > SHOW_EVERY:
-                    show_progress(context, run.text())
+                    show_progress(context, current.text())
                     self._shown = time.monotonic()
                 return {"RUNNING_MODAL"}
-            self._finish(context, run.result, run.seconds)
+            self._finish(context, current.result, current.seconds)
         except Complaint as complaint:
             return tell(self, context, complaint)
-        except running.Disturbed as reason:
-            return tell(self, context, Complaint(f"{run.label} was cancelled: {reason}. Run it again."))
+        except run.Disturbed as reason:
+            return tell(self, context, Complaint(f"{current.label} was cancelled: {reason}. Run it again."))
         finally:
             if ended:
                 self.cancel(context)
         return {"FINISHED"}
 
 
+class QuickOperator:
+    """An operator without a long solver behind it: subclasses give `act`, which does all at once.
+
+    `act(context)` may raise Complaint, UserError and MeshError; what they say is reported.
+    """
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return ready(cls, context)
+
+    def act(self, context: bpy.types.Context) -> None:
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            with complaints():
+                self.act(context)
+        except Complaint as complaint:
+            return tell(self, context, complaint)
+        return {"FINISHED"}
+
+
 def ready(cls, context: bpy.types.Context, modes: tuple[str, ...] = ("OBJECT", "EDIT_MESH")) -> bool:
     """Whether an operator on meshes can run; the tooltip of the greyed button says why not."""
-    if running.current is not None:
-        cls.poll_message_set(f"{running.current.label} is still running. Esc cancels it")
+    if run.current is not None:
+        cls.poll_message_set(f"{run.current.label} is still running. Esc cancels it")
         return False
     if context.mode in modes:
         return True

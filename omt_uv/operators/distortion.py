@@ -1,36 +1,74 @@
-"""uv.omt_measure: how far the active UVs are from keeping areas and angles."""
+"""Measure, colour and draw the distortion of the active UVs: uv.omt_measure, uv.omt_overlay, uv.omt_histogram."""
 
 from __future__ import annotations
 
 import bpy
+from bpy.props import EnumProperty
 
-from ..session import summary as last_run
+from ..display import overlay
+from ..session import last_run
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .base import Complaint, read_objects, ready, tell
+from .base import QuickOperator, read_objects
+
+KINDS = (
+    ("NONE", "Off", "No colours; attributes and shading are as before", "X", 0),
+    ("AREA", "Area", "Blue: less texture than is due to the face, white: as due, red: more", "FACESEL", 1),
+    ("SHEAR", "Shear", "Dark: angles are kept. Light: the texture is pulled four times and more", "MOD_LATTICE", 2),
+)
+HISTOGRAM = "OMT UV Histogram"
 
 
-class UV_OT_omt_measure(bpy.types.Operator):
+class UV_OT_omt_measure(QuickOperator, bpy.types.Operator):
     """Report area error, shear, folds and overlap of the active UVs, of the selected faces in Edit Mode"""
 
     bl_idname = "uv.omt_measure"
     bl_label = "Measure UV Distortion"
     bl_options = {"REGISTER"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return ready(cls, context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         from ..pipelines.distortion import measure_readings, summary
-        from ..solver.errors import MeshError
 
-        try:
-            readings = [reading for _, reading in read_objects(context)]
-            self.report({"INFO"}, summary(measure_readings(readings)))
-            rows = last_run.figures(readings, DEFAULT_TEXTURE_SIZE, context.scene.unit_settings.scale_length)
-            last_run.state.summary = last_run.Summary(self.bl_label, rows)
-        except Complaint as complaint:
-            return tell(self, context, complaint)
-        except MeshError as error:
-            return tell(self, context, Complaint(str(error)))
-        return {"FINISHED"}
+        readings = [reading for _, reading in read_objects(context)]
+        self.report({"INFO"}, summary(measure_readings(readings)))
+        rows = last_run.figures(readings, DEFAULT_TEXTURE_SIZE, context.scene.unit_settings.scale_length)
+        last_run.state.summary = last_run.Summary(self.bl_label, rows)
+
+
+class UV_OT_omt_overlay(QuickOperator, bpy.types.Operator):
+    """Colour the faces by the distortion of their UVs, in the 3D View and in the UV editor"""
+
+    bl_idname = "uv.omt_overlay"
+    bl_label = "Show UV Distortion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    show: EnumProperty(name="Show", description="What the colours tell", items=KINDS, default="AREA")
+
+    @classmethod
+    def description(cls, _context, properties) -> str:
+        return next(text for name, _, text, *_ in KINDS if name == properties.show)
+
+    def act(self, context: bpy.types.Context) -> None:
+        if self.show == "NONE":
+            overlay.hide(context)
+        else:
+            overlay.show(context, read_objects(context), self.show)
+
+
+class UV_OT_omt_histogram(QuickOperator, bpy.types.Operator):
+    """Draw how area error and shear are spread over the surface, as an image for the UV or image editor"""
+
+    bl_idname = "uv.omt_histogram"
+    bl_label = "UV Distortion Histogram"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def act(self, context: bpy.types.Context) -> None:
+        from ..display.canvas import set_preview, show
+        from ..display.histogram import histogram, thumbnail
+
+        readings = [reading for _, reading in read_objects(context)]
+        image = show(HISTOGRAM, histogram(readings))
+        set_preview(image, thumbnail(readings))
+        if context.space_data is not None and context.space_data.type == "IMAGE_EDITOR":
+            context.space_data.image = image
+        else:
+            self.report({"INFO"}, f"Drawn as the image {image.name!r}; choose it in an image editor")

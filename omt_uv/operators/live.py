@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ..display import overlay
-from ..session import run as running
-from ..session import summary as last_run
+from ..session import last_run
+from ..session.run import Disturbed
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .base import Complaint, read_objects, ready, tell
+from .base import Complaint, complaints, read_objects, ready, tell
 
 if TYPE_CHECKING:
     from ..session.live import Session
@@ -37,7 +37,7 @@ class UV_OT_omt_live(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if current is not None:
             # The session sees it at its next tick, and ends.
-            current.wanted = False
+            current.is_on = False
             return {"CANCELLED"}
         state = self.start(context)
         if "RUNNING_MODAL" in state and not bpy.app.background:
@@ -56,16 +56,14 @@ class UV_OT_omt_live(bpy.types.Operator):
 
     def start(self, context: bpy.types.Context) -> set[str]:
         global current
-        from ..session.live import Refusal, Session
+        from ..session.live import Session
 
         try:
             pairs = read_objects(context)
-            current = Session(context, pairs)
+            with complaints(objects=[obj for obj, _ in pairs]):
+                current = Session(context, pairs)
         except Complaint as complaint:
             return tell(self, context, complaint)
-        except Refusal as refusal:
-            obj = pairs[refusal.index][0]
-            return tell(self, context, Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error))
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -80,17 +78,17 @@ class UV_OT_omt_live(bpy.types.Operator):
             return {"PASS_THROUGH"}
         try:
             self._tick(context)
-        except running.Disturbed as reason:
+        except Disturbed as reason:
             self.report({"INFO"}, f"Live Balance ended: {reason}")
             return self._end(context, {"FINISHED"})
-        return {"PASS_THROUGH"} if current.wanted else self._end(context, {"FINISHED"})
+        return {"PASS_THROUGH"} if current.is_on else self._end(context, {"FINISHED"})
 
     def cancel(self, context: bpy.types.Context) -> None:
         self._end(context, {"CANCELLED"})
 
     def _tick(self, context: bpy.types.Context) -> bool:
-        wanted = context.window_manager.operator_properties_last(UNWRAP).balance
-        moved = current is not None and current.follow(wanted)
+        balance = context.window_manager.operator_properties_last(UNWRAP).balance
+        moved = current is not None and current.follow(balance)
         if moved:
             for area in (a for w in context.window_manager.windows for a in w.screen.areas):
                 if area.type in {"VIEW_3D", "IMAGE_EDITOR"}:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..session import run
 from ..settings import (
     BOUNDARIES,
     DEFAULT_FACTOR,
@@ -19,7 +20,7 @@ from ..settings import (
     SOURCES,
     MagnifySettings,
 )
-from .base import Complaint, SolverOperator, read_objects, warn
+from .base import SolverOperator, complaints, read_writable, warn, write_layers
 from .properties import MarginSettings, choose_attribute, choose_group, draw_margin
 
 
@@ -97,46 +98,25 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender import mesh as blender_mesh
-        from ..blender import uv_packer as blender_pack
-        from ..blender.seams import GroupError
-        from ..blender.weights import ScoreError
+        from ..blender.uv_packer import pack
         from ..files import images
-        from ..pipelines.layout import Refusal
         from ..pipelines.magnify import Region, magnify, warped_picture
-        from ..session import run as running
-        from ..xatlas import packing
 
-        pairs = read_objects(context)
-        try:
-            for obj, _ in pairs:
-                blender_mesh.check_target(obj.data, "")
+        objects, readings = read_writable(context)
+        with complaints(objects=objects):
             picture = images.pixels_of(images.named(self.image)) if self.image and self.source == "UV" else None
-            weights, warnings = self._weights(context, pairs)
-        except (blender_mesh.TargetError, GroupError, images.ImageError) as error:
-            raise Complaint(str(error)) from error
-        except ScoreError as error:
-            raise Complaint(str(error), error.obj, error.error) from error
-        regions = [
-            Region(r.surface, r.faces, w.values, r.all_pins, w.kind) for (_, r), w in zip(pairs, weights, strict=True)
-        ]
-        pack = running.in_front(blender_pack.pack)
-        try:
-            result = yield from running.aside(magnify(regions, self.settings(), pack))
-        except Refusal as refusal:
-            obj = pairs[refusal.index][0]
-            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
-        except packing.PackingError as error:
-            raise Complaint(str(error)) from error
+            weights, warnings = self._weights(context, list(zip(objects, readings, strict=True)))
+            regions = [
+                Region(r.surface, r.faces, w.values, r.all_pins, w.kind) for r, w in zip(readings, weights, strict=True)
+            ]
+            result = yield from run.aside(magnify(regions, self.settings(), run.in_front(pack)))
         if picture is not None:
-            picture = warped_picture(
-                picture, regions, result, self.margin, images.has_straight_alpha(images.named(self.image))
-            )
-        result = replace(result, warnings=[*warnings, *result.warnings])
-        return [obj for obj, _ in pairs], result, picture
+            straight = images.has_straight_alpha(images.named(self.image))
+            picture = warped_picture(picture, regions, result, self.margin, straight)
+        return objects, replace(result, warnings=[*warnings, *result.warnings]), picture
 
     def _weights(self, context: bpy.types.Context, pairs):
-        """Weights of each object, and warnings. Raises GroupError, ScoreError."""
+        """Weights of each object, and warnings. Raises GroupError, Refusal."""
         from ..blender.weights import Weights, attribute_weights, region_weights
 
         if self.region == "ATTRIBUTE":
@@ -144,12 +124,10 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         return [Weights(w) for w in region_weights(pairs, self.weight_group or _active_group(context))], []
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender import mesh as blender_mesh
         from ..files import images
 
         objects, magnified, picture = result
-        for obj, corners, uv in zip(objects, magnified.corners, magnified.uv, strict=True):
-            blender_mesh.write_uv(obj, blender_mesh.target_layer(obj.data, ""), corners, uv)
+        write_layers(objects, "", magnified)
         shares = magnified.shares
         worst = max((island["area_l1"] for mine in magnified.reports for island in mine), default=0.0)
         self.said = (

@@ -19,11 +19,11 @@ class UV_OT_omt_preset(bpy.types.Operator):
     filepath: StringProperty(name="File", description="File of the preset", subtype="FILE_PATH")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from ..session import presets as preset_files
+        from ..session import presets
 
         path = Path(self.filepath)
         try:
-            preset_files.choose(path, context.window_manager.operator_properties_last(self.operator))
+            presets.choose(path, context.window_manager.operator_properties_last(self.operator))
         except (OSError, SyntaxError, ValueError, TypeError) as error:
             self.report({"ERROR"}, f"{path.name} cannot be used: {error}")
             return {"CANCELLED"}

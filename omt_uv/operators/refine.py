@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty
 
+from ..session import run
 from ..settings import RefineSettings
-from .base import Complaint, SolverOperator, read_objects, warn
+from .base import SolverOperator, complaints, read_writable, warn, write_layers
 from .properties import AreaSettings, MarginSettings, draw_balance, draw_margin
 
 
@@ -42,36 +43,18 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender import mesh as blender_mesh
-        from ..blender import uv_packer as blender_pack
-        from ..pipelines.layout import Refusal
+        from ..blender.uv_packer import pack
         from ..pipelines.refine import refine_islands
-        from ..session import run as running
-        from ..xatlas import packing
 
-        pairs = read_objects(context)
-        try:
-            for obj, _ in pairs:
-                blender_mesh.check_target(obj.data, "")
-        except blender_mesh.TargetError as error:
-            raise Complaint(str(error)) from error
-        surfaces = [(reading.surface, reading.faces, reading.all_pins) for _, reading in pairs]
-        try:
-            steps = refine_islands(surfaces, self.settings(), running.in_front(blender_pack.pack))
-            refined = yield from running.aside(steps)
-        except Refusal as refusal:
-            obj = pairs[refusal.index][0]
-            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
-        except packing.PackingError as error:
-            raise Complaint(str(error)) from error
-        return [obj for obj, _ in pairs], refined
+        objects, readings = read_writable(context)
+        surfaces = [(reading.surface, reading.faces, reading.all_pins) for reading in readings]
+        with complaints(objects=objects):
+            refined = yield from run.aside(refine_islands(surfaces, self.settings(), run.in_front(pack)))
+        return objects, refined
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender import mesh as blender_mesh
-
         objects, refined = result
-        for obj, corners, uv in zip(objects, refined.corners, refined.uv, strict=True):
-            blender_mesh.write_uv(obj, obj.data.uv_layers.active.name, corners, uv)
+        write_layers(objects, "", refined)
         warn(self, objects, refined.warnings)
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..session import run
 from ..settings import COUNTS, DEFAULT_STRATEGY, DENSITIES, STRATEGIES, RemeshSettings
-from .base import Complaint, SolverOperator, mesh_objects, ready, warn
+from .base import Complaint, SolverOperator, complaints, mesh_objects, ready, warn
 from .properties import choose_attribute, choose_group
 
 
@@ -147,10 +148,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.remesh_objects import SourceError, alike, read_request
-        from ..pipelines.layout import Refusal
-        from ..session import run as running
-        from ..solver.errors import MeshError
+        from ..blender.remesh_objects import alike, read_request
 
         groups = alike(mesh_objects(context, shared=True), self.use_modifiers)
         objects = [group[0] for group in groups]
@@ -158,19 +156,16 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         requests = []
         try:
             for obj in objects:
-                requests.append(read_request(obj, self.settings(), depsgraph))
-            results = yield from running.aside(_remesh_all(requests, self.settings()))
-        except SourceError as error:
-            raise Complaint(str(error)) from error
-        except MeshError as error:
-            raise self._complaint(obj, error) from error
-        except Refusal as refusal:
-            raise self._complaint(objects[refusal.index], refusal.error) from refusal
+                with complaints(obj):
+                    requests.append(read_request(obj, self.settings(), depsgraph))
+            with complaints(objects=objects):
+                results = yield from run.aside(_remesh_all(requests, self.settings()))
+        except Complaint as complaint:
+            if self.use_modifiers:
+                # Elements of a mesh with modifiers are none of the object's.
+                complaint.error = None
+            raise
         return [(group, request, *result) for group, request, result in zip(groups, requests, results, strict=True)]
-
-    def _complaint(self, obj: bpy.types.Object, error) -> Complaint:
-        # Elements of a mesh with modifiers are none of the object's.
-        return Complaint(f"{obj.name}: {error}", obj, None if self.use_modifiers else error)
 
     def finish(self, context: bpy.types.Context, result) -> None:
         from ..blender.remesh_objects import lost, new_objects

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import __version__
-from ..session import summary as last_run
+from ..session import last_run
 
 
 class WM_OT_omt_copy_report(bpy.types.Operator):

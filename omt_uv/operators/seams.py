@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
-from .base import Complaint, SolverOperator, read_objects, warn
+from ..session import run
+from .base import SolverOperator, complaints, read_objects, warn
 from .properties import choose_group
 
 
@@ -37,23 +38,15 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
         draw_settings(self.layout, self)
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.seams import GroupError, avoided
-        from ..pipelines.layout import Refusal
-        from ..session import run as running
+        from ..blender.seams import avoided
 
         pairs = read_objects(context)
-        try:
-            free = avoided([obj for obj, _ in pairs], self.keep_free)
-        except GroupError as error:
-            raise Complaint(str(error)) from error
-        readings = [reading for _, reading in pairs]
+        objects = [obj for obj, _ in pairs]
         options = {"fill": self.fill_holes, "extremities": self.extremities}
-        try:
-            cuts = yield from running.aside(_cut_all(readings, free, options))
-        except Refusal as refusal:
-            obj = pairs[refusal.index][0]
-            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
-        return [(obj, found) for (obj, _), found in zip(pairs, cuts, strict=True)]
+        with complaints(objects=objects):
+            free = avoided(objects, self.keep_free)
+            cuts = yield from run.aside(_cut_all([reading for _, reading in pairs], free, options))
+        return list(zip(objects, cuts, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
         from ..blender.seams import mark_seams

@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
+from ..session import run
 from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
-from .base import Complaint, SolverOperator, read_objects, warn
+from .base import SolverOperator, complaints, read_writable, warn, write_layers
 from .properties import AreaSettings, choose_group, choose_layer, draw_balance
 
 ORIENTATIONS = (
@@ -69,45 +70,23 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender import mesh as blender_mesh
         from ..blender.markers import globe_densities
-        from ..blender.seams import GroupError
-        from ..blender.weights import ScoreError
+        from ..files import images
         from ..pipelines.globe import globe_jobs, project
-        from ..pipelines.layout import Refusal
         from ..pipelines.panorama_redraw import redraw
-        from ..session import run as running
-        from ..solver.errors import MeshError
         from ..solver.globe.rotation import MarkerError
 
-        pairs = read_objects(context, self.uv_layer)
-        try:
-            for obj, _ in pairs:
-                blender_mesh.check_target(obj.data, self.uv_layer)
-            markers = self._markers(context, [obj for obj, _ in pairs])
+        objects, readings = read_writable(context, self.uv_layer)
+        with complaints(objects=objects, others=(MarkerError,)):
+            markers = self._markers(context, objects)
+            pairs = list(zip(objects, readings, strict=True))
             densities = globe_densities(pairs, self.weight_group, self.weight_factor)
-            jobs = globe_jobs([reading for _, reading in pairs], densities, markers)
-            pixels = self._pixels()
-            globes = yield from running.aside(project(jobs, self.settings()))
-        except Refusal as refusal:
-            obj = pairs[refusal.index][0]
-            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
-        except (blender_mesh.TargetError, GroupError, ScoreError, MarkerError, MeshError) as error:
-            raise Complaint(str(error)) from error
+            jobs = globe_jobs(readings, densities, markers)
+            pixels = images.pixels_of(images.named(self.image)) if self.image else None
+            globes = yield from run.aside(project(jobs, self.settings()))
         if pixels is not None:
-            pixels = yield from running.aside(redraw(pixels, "equirect", self.projection.lower()))
-        return [obj for obj, _ in pairs], globes, pixels
-
-    def _pixels(self):
-        """The pixels of the image to redraw, None without one."""
-        from ..files import images
-
-        if not self.image:
-            return None
-        try:
-            return images.pixels_of(images.named(self.image))
-        except images.ImageError as error:
-            raise Complaint(str(error)) from error
+            pixels = yield from run.aside(redraw(pixels, "equirect", self.projection.lower()))
+        return objects, globes, pixels
 
     def _markers(self, context: bpy.types.Context, objects: list) -> list:
         from ..blender.markers import group_markers, picked_markers
@@ -123,16 +102,13 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         return [picked_markers(obj) if obj == active else None for obj in objects]
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender import mesh as blender_mesh
         from ..files import images
 
         objects, globes, pixels = result
         # A layout of the whole globe cannot keep areas; the map to the sphere does.
         worst = max(globe.report()["area_l1_sphere"] for mine in globes.globes for globe in mine)
         self.said = (("Area error", f"{100 * worst:.2f} %"),)
-        for obj, corners, uv in zip(objects, globes.corners, globes.uv, strict=True):
-            layer = blender_mesh.target_layer(obj.data, self.uv_layer)
-            blender_mesh.write_uv(obj, layer, corners, uv)
+        write_layers(objects, self.uv_layer, globes)
         if pixels is not None:
             source = images.named(self.image)
             images.packed_image(f"{source.name} {self.projection.lower()}", pixels, source)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
+from ..session import run
 from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_SEAMS, SEAMS, Settings
-from .base import Complaint, SolverOperator, read_objects, warn
+from .base import SolverOperator, complaints, read_writable, warn, write_layers
 from .properties import AreaSettings, MarginSettings, choose_group, choose_layer, draw_balance, draw_margin
 
 
@@ -67,39 +68,21 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender import mesh as blender_mesh
-        from ..blender import uv_packer as blender_pack
-        from ..blender.seams import GroupError, avoided
-        from ..pipelines.layout import Refusal, UnwrapJob
+        from ..blender.seams import avoided
+        from ..blender.uv_packer import pack
+        from ..pipelines.layout import UnwrapJob
         from ..pipelines.unwrap import lay_out
-        from ..session import run as running
-        from ..xatlas import packing
 
-        pairs = read_objects(context, self.uv_layer)
-        try:
-            for obj, _ in pairs:
-                blender_mesh.check_target(obj.data, self.uv_layer)
-            free = avoided([obj for obj, _ in pairs], self.keep_free)
-        except (blender_mesh.TargetError, GroupError) as error:
-            raise Complaint(str(error)) from error
-        jobs = [UnwrapJob(r.surface, r.faces, r.pins, avoid) for (_, r), avoid in zip(pairs, free, strict=True)]
-        try:
-            steps = lay_out(jobs, self.settings(), running.in_front(blender_pack.pack))
-            layout = yield from running.aside(steps)
-        except Refusal as refusal:
-            obj = pairs[refusal.index][0]
-            raise Complaint(f"{obj.name}: {refusal.error}", obj, refusal.error) from refusal
-        except packing.PackingError as error:
-            raise Complaint(str(error)) from error
-        return [obj for obj, _ in pairs], layout
+        objects, readings = read_writable(context, self.uv_layer)
+        with complaints(objects=objects):
+            free = avoided(objects, self.keep_free)
+            jobs = [UnwrapJob(r.surface, r.faces, r.pins, avoid) for r, avoid in zip(readings, free, strict=True)]
+            layout = yield from run.aside(lay_out(jobs, self.settings(), run.in_front(pack)))
+        return objects, layout
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender import mesh as blender_mesh
-
         objects, layout = result
-        for obj, corners, uv in zip(objects, layout.corners, layout.uv, strict=True):
-            layer = blender_mesh.target_layer(obj.data, self.uv_layer)
-            blender_mesh.write_uv(obj, layer, corners, uv)
+        write_layers(objects, self.uv_layer, layout)
         warn(self, objects, layout.warnings)
 
 

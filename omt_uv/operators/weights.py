@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
+from ..session import run
 from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
-from .base import Complaint, SolverOperator, mesh_objects, ready
+from .base import SolverOperator, complaints, mesh_objects, ready
 from .properties import choose_group
 
 
@@ -49,28 +50,19 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         draw_settings(self.layout, self)
 
     def steps(self, context: bpy.types.Context):
-        from ..blender import mesh as blender_mesh
-        from ..blender.seams import GroupError
-        from ..blender.weights import ScoreError, check_group_target, selected_vertices
-        from ..session import run as running
-        from ..solver.errors import MeshError
+        from ..blender.mesh import read
+        from ..blender.weights import check_group_target, selected_vertices
 
         objects = [context.object] if context.mode == "PAINT_WEIGHT" else mesh_objects(context)
         jobs = []
         for obj in objects:
-            try:
+            with complaints(obj):
                 check_group_target(obj, self.weight_group)
                 selected = selected_vertices(obj) if self.kind == "DISTANCE" else None
-                jobs.append((obj, blender_mesh.read(obj), selected))
-            except GroupError as error:
-                raise Complaint(str(error)) from error
-            except MeshError as error:
-                raise Complaint(f"{obj.name}: {error}", obj, error) from error
+                jobs.append((read(obj), selected))
         options = {"low": self.low, "high": self.high, "invert": self.invert}
-        try:
-            weights = yield from running.aside(_weigh_all(jobs, self.kind.lower(), options))
-        except ScoreError as error:
-            raise Complaint(str(error), error.obj, error.error) from error
+        with complaints(objects=objects):
+            weights = yield from run.aside(_weigh_all(jobs, self.kind.lower(), options))
         return list(zip(objects, weights, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
@@ -82,14 +74,19 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
 
 
 def _weigh_all(jobs: list, kind: str, options: dict):
-    """Weights (n,) for every object, reading and selection; the object is for messages alone."""
+    """Weights (n,) for every reading and selection; Refusal says which one has none."""
     from ..blender.weights import computed_weights
+    from ..pipelines.layout import Refusal
+    from ..solver.errors import MeshError
     from ..solver.progress import Progress
 
     found = []
-    for k, (obj, reading, selected) in enumerate(jobs):
+    for k, (reading, selected) in enumerate(jobs):
         yield Progress("Weights", k / len(jobs))
-        found.append(computed_weights(obj, reading, kind, selected=selected, **options))
+        try:
+            found.append(computed_weights(reading, kind, selected=selected, **options))
+        except MeshError as error:
+            raise Refusal(k, error) from error
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ..session import run as running
+from ..session import run
 from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, QUALITIES
 
 # The package that Blender knows as the add-on contains this one.
@@ -74,7 +74,7 @@ def get(context: bpy.types.Context) -> OMTUVPreferences | None:
 
 def apply(preferences, context: bpy.types.Context) -> None:
     """Let operators start from the preferences, as if they had been chosen in the panel."""
-    running.threads = preferences.own_thread
+    run.threads = preferences.own_thread
     for name in OPERATORS:
         if not hasattr(bpy.types, name):
             continue

@@ -13,10 +13,9 @@ import bpy
 from ..blender.versions import progress_bar
 from ..display import overlay
 from ..operators import live
-from ..operators.overlay import HISTOGRAM, KINDS
+from ..operators.distortion import HISTOGRAM, KINDS
 from ..operators.unwrap import draw_main, draw_more
-from ..session import run as running
-from ..session import summary as last_run
+from ..session import last_run, run
 
 TAB = "OMT"
 WITH_PRESETS = ("uv.omt_unwrap", "uv.omt_sphere", "uv.omt_magnify", "object.omt_remesh")
@@ -82,8 +81,8 @@ class MainPanel(TabPanel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        if running.current is not None:
-            draw_run(layout, running.current)
+        if run.current is not None:
+            draw_run(layout, run.current)
         else:
             row = layout.row()
             row.scale_y = 1.5
@@ -163,9 +162,9 @@ def draw_live(layout: bpy.types.UILayout, properties) -> None:
     row.operator("uv.omt_live", text="", icon="PLAY", depress=live.current is not None)
 
 
-def draw_run(layout: bpy.types.UILayout, run: running.Run) -> None:
+def draw_run(layout: bpy.types.UILayout, current: run.Run) -> None:
     box = layout.box().column(align=True)
-    progress_bar(box, run.fraction, f"{run.stage}, {run.seconds:.1f} s")
+    progress_bar(box, current.fraction, f"{current.stage}, {current.seconds:.1f} s")
     box.label(text="Esc or right click: cancel", icon="CANCEL")
 
 

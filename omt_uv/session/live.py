@@ -41,8 +41,8 @@ class Session:
     """
 
     def __init__(self, context: bpy.types.Context, pairs: list):
-        # The artist has not ended it yet.
-        self.wanted = True
+        # Until the artist ends it.
+        self.is_on = True
         self._mode = context.mode
         self.objects = [obj for obj, _ in pairs]
         self._names = [obj.name for obj in self.objects]

@@ -1,4 +1,8 @@
-"""Named errors: what is wrong, where it is, and what to do about it."""
+"""Name what is wrong with an input, where it is, and what to do about it.
+
+The class of an error is its key: front ends may know better words for its remedy than the solver, which knows no menus
+(see `remedies.py` beside this package). A remedy given where an error is raised is about that very case, and stands.
+"""
 
 from __future__ import annotations
 
@@ -23,22 +27,29 @@ class MeshError(ValueError):
         self.remedy = remedy or type(self).remedy
         self.kind = kind
         self.elements = np.asarray(elements, dtype=np.int64)
-        super().__init__(self._message())
+        super().__init__(self.text(self.remedy))
 
-    def _message(self) -> str:
+    def text(self, remedy: str) -> str:
+        """Cause, number and first few elements, and a remedy, as sentences."""
         text = self.cause
         count = len(self.elements)
         if self.kind and count:
             first = ", ".join(str(e.tolist()) for e in self.elements[:5])
             plural = {"vertex": "vertices"}.get(self.kind, self.kind + "s")
             text += f" ({count} {self.kind if count == 1 else plural}: {first}{', ...' if count > 5 else ''})"
-        return f"{text}. {self.remedy}." if self.remedy else f"{text}."
+        return f"{text}. {remedy}." if remedy else f"{text}."
 
 
 class EmptyMeshError(MeshError):
     """There is nothing to unwrap."""
 
-    remedy = "Select at least one face"
+    remedy = "Give at least one face"
+
+
+class NoSelectionError(EmptyMeshError):
+    """Distances need vertices to start from."""
+
+    remedy = "Choose one or more vertices"
 
 
 class NonFiniteError(MeshError):
@@ -50,7 +61,7 @@ class NonFiniteError(MeshError):
 class ZeroAreaFaceError(MeshError):
     """A face has no area."""
 
-    remedy = "Use Mesh > Clean Up > Degenerate Dissolve, or Merge by Distance"
+    remedy = "Dissolve these faces, or merge vertices that coincide"
 
 
 class DuplicateFaceError(MeshError):
@@ -68,13 +79,25 @@ class NonManifoldEdgeError(MeshError):
 class OrientationError(MeshError):
     """Neighbouring faces disagree about which side is out."""
 
-    remedy = "Use Mesh > Normals > Recalculate Outside"
+    remedy = "Turn faces over until all look outside"
 
 
 class NotADiskError(MeshError):
     """A chart is closed, or has several boundaries or handles."""
 
-    remedy = "Mark seams that cut it open into a disk"
+    remedy = "Add seams that cut it open into a disk"
+
+
+class SeveralBoundariesError(NotADiskError):
+    """A chart has more boundary loops than one."""
+
+    remedy = "Add seams that join the boundaries, or fill the holes"
+
+
+class TouchingBoundariesError(SeveralBoundariesError):
+    """A chart has several boundary loops, and vertices of them coincide."""
+
+    remedy = f"Merge vertices that coincide. {SeveralBoundariesError.remedy}"
 
 
 class NotASphereError(MeshError):
@@ -83,10 +106,52 @@ class NotASphereError(MeshError):
     remedy = "Only one closed part without handles maps to a sphere"
 
 
+class RepeatedVertexError(NotASphereError):
+    """A face of a surface for the sphere uses a vertex twice."""
+
+    remedy = "Dissolve the face"
+
+
+class OpenSurfaceError(NotASphereError):
+    """A surface for the sphere has boundary edges."""
+
+    remedy = "Fill the holes, or unwrap it as a chart"
+
+
+class LooseVertexError(NotASphereError):
+    """A vertex of a surface for the sphere belongs to no face."""
+
+    remedy = "Delete the vertex"
+
+
+class SeveralComponentsError(NotASphereError):
+    """A surface for the sphere is not connected."""
+
+    remedy = "Map them one by one"
+
+
+class PinchedVertexError(NotASphereError):
+    """Several fans of faces meet in one vertex of a surface for the sphere."""
+
+    remedy = "Split the vertex"
+
+
 class PrecisionError(MeshError):
     """A map leaves double precision."""
 
     remedy = "Cut the chart into less elongated pieces with seams"
+
+
+class CrowdedError(PrecisionError):
+    """Vertices of a remesh do not fit into a chart in double precision."""
+
+    remedy = "Merge vertices that coincide and dissolve faces without area, or delete it"
+
+
+class CoarseningError(MeshError):
+    """A closed mesh has no edge that collapses without harm."""
+
+    remedy = "Look for vertices that coincide and faces without area"
 
 
 class TransportError(MeshError):
@@ -104,13 +169,37 @@ class DensityError(MeshError):
 class WeightError(MeshError):
     """Weights that mark no region."""
 
-    remedy = "Paint weights between 0 and 1, not the same everywhere"
+    remedy = "Give weights between 0 and 1, not the same everywhere"
+
+
+class NoRegionError(WeightError):
+    """All weights are zero."""
+
+    remedy = "Mark the region first"
+
+
+class UniformWeightsError(WeightError):
+    """All weights are the same."""
+
+    remedy = "Mark a part only"
 
 
 class ShareError(MeshError):
     """A factor or a share of the texture that no map can have."""
 
     remedy = "Choose a smaller factor, or paint a smaller region"
+
+
+class EmptyRegionError(ShareError):
+    """A region has no area."""
+
+    remedy = "Mark a region with area"
+
+
+class SoftRegionError(ShareError):
+    """Weights in between 0 and 1 do not let a region have its share."""
+
+    remedy = "Mark the region with weight 1 and the rest with 0"
 
 
 class PinError(MeshError):
@@ -129,6 +218,13 @@ class CountError(MeshError):
     """A remesh was asked for fewer vertices or faces than its topology and features take."""
 
     remedy = "Ask for more, or keep fewer features"
+
+
+# What warnings advise, in the solver's words: front ends replace these by where their users find it.
+MERGE = "merge vertices that coincide"
+MERGING = "merging vertices that coincide"
+DISSOLVE = "dissolve faces without area"
+TURN_OUTSIDE = OrientationError.remedy
 
 
 def positive_density(density: np.ndarray) -> np.ndarray:

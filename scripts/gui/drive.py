@@ -97,14 +97,14 @@ class Story:
 
     def said(self):
         """What the panel says about the last run: title and rows, None before the first."""
-        from omt_uv.omt_uv.session import summary as last_run
+        from omt_uv.omt_uv.session import last_run
 
         summary = last_run.state.summary
         return None if summary is None else [summary.title, *summary.rows]
 
     def forget(self):
         """Let the panel say nothing."""
-        from omt_uv.omt_uv.session import summary as last_run
+        from omt_uv.omt_uv.session import last_run
 
         last_run.state.summary = None
 

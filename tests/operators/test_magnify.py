@@ -105,7 +105,7 @@ def test_other_islands_stay_to_the_bit():
 def test_the_panel_says_the_shares(package):
     painted()
     magnify(factor=2.0)
-    rows = dict(package("session.summary").state.summary.rows)
+    rows = dict(package("session.last_run").state.summary.rows)
     asked, now = (float(rows[name].split()[0]) for name in ("Region asked", "Region now"))
     assert now == pytest.approx(asked, rel=5e-3)
     assert float(rows["Region before"].split()[0]) == pytest.approx(asked / 2, rel=1e-3)

@@ -36,7 +36,7 @@ def test_a_new_object_beside_the_old_one():
 def test_the_panel_says_what_was_made(package):
     ball()
     (new,) = remesh(target_vertices=300)
-    rows = dict(package("session.summary").state.summary.rows)
+    rows = dict(package("session.last_run").state.summary.rows)
     assert (int(rows["Vertices"]), int(rows["Triangles"])) == (len(new.data.vertices), len(new.data.polygons))
     assert 30 < float(rows["Angles, 99 %"].removeprefix("above ").removesuffix("°")) < 60
 

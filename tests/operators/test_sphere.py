@@ -61,7 +61,7 @@ def test_every_face_has_its_share_of_the_texture(projection):
 def test_the_panel_says_how_exact_the_sphere_is(package):
     ball()
     project(projection="EQUIRECT")
-    rows = package("session.summary").state.summary.rows
+    rows = package("session.last_run").state.summary.rows
     assert [name for name, _ in rows].count("Area error") == 1
     assert float(dict(rows)["Area error"].split()[0]) < 1
 

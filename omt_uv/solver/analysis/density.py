@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..errors import DensityError, ShareError, WeightError, positive_density
+from ..errors import DensityError, NoRegionError, ShareError, UniformWeightsError, WeightError, positive_density
 from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.topology import halfedges
 from . import curvature
@@ -184,9 +184,9 @@ def check_region(region: np.ndarray, kind: str = "face") -> np.ndarray:
     if len(wrong):
         raise WeightError("A weight is not between 0 and 1", kind=kind, elements=wrong)
     if not region.any():
-        raise WeightError("All weights are zero: there is no region", "Paint the region first")
+        raise NoRegionError("All weights are zero: there is no region")
     if np.ptp(region) == 0:
-        raise WeightError("All weights are the same: there is nothing around the region", "Paint a part only")
+        raise UniformWeightsError("All weights are the same: there is nothing around the region")
     return region
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ShareError
+from ..errors import EmptyRegionError, ShareError, SoftRegionError
 from .density import CONTRAST, check_factor, check_region, painted_density, region_share
 
 # A factor so many times what a region with a hard border would need is said: the rest gets little of the texture.
@@ -75,7 +75,7 @@ def exact_density(region: np.ndarray, area: np.ndarray, factor: float, base: np.
 def _check_share(region: np.ndarray, before: float, target: float, factor: float) -> None:
     """Raise ShareError unless a map can give the region `factor` times the share it has before, the target."""
     if not before > 0:
-        raise ShareError("The region has no area", "Paint a region with area")
+        raise EmptyRegionError("The region has no area")
     least, most = float(region.min()), float(region.max())
     if target >= 1:
         raise ShareError(
@@ -84,9 +84,8 @@ def _check_share(region: np.ndarray, before: float, target: float, factor: float
             f"Choose a factor below {1 / before:.3g}, or paint a smaller region",
         )
     if not least < target < most:
-        raise ShareError(
-            f"With weights from {least:.3g} to {most:.3g} the region cannot have {100 * target:.3g} % of the texture",
-            "Paint the region with weight 1 and the rest with 0",
+        raise SoftRegionError(
+            f"With weights from {least:.3g} to {most:.3g} the region cannot have {100 * target:.3g} % of the texture"
         )
 
 

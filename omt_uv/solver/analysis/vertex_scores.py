@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..errors import EmptyMeshError, WeightError
+from ..errors import EmptyMeshError, NoSelectionError, WeightError
 from ..mesh.geometry import vertex_areas
 from ..mesh.surface import check_finite
 from ..mesh.topology import halfedges, pair_keys, pair_up, previous_halfedge
@@ -46,7 +46,7 @@ def vertex_score(
         return curvature.sharpness(positions, triangles)
     if kind == "distance":
         if selected is None or not selected[triangles].any():
-            raise EmptyMeshError("No vertex is selected to be near to", "Select one or more vertices in Edit Mode")
+            raise NoSelectionError("No vertex is selected to be near to")
         return -distance(positions, triangles, np.flatnonzero(selected))
     positions = unit_size(positions, triangles)
     amount = {"gaussian": curvature.gaussian_curvature, "mean": curvature.mean_curvature}[kind](positions, triangles)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
+from ..errors import MERGING, TURN_OUTSIDE
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups, orientations, turn_over
 from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluing
@@ -174,7 +175,7 @@ def _warnings(parting: int, backwards: int, holes: int, touching: int) -> Iterat
     if holes:
         yield sieved(holes)
     if touching:
-        yield f"{touching} boundary vertices lie on one another; Merge by Distance joins the parts there"
+        yield f"{touching} boundary vertices lie on one another; {MERGING} joins the parts there"
 
 
 def _cut_components(
@@ -245,7 +246,7 @@ def _turned_warning(count: int) -> str:
     who = "A face looks" if count == 1 else f"{count} faces look"
     return (
         f"{who} to the other side than the faces around; mapped with them, so that the texture is mirrored there. "
-        "Use Mesh > Normals > Recalculate Outside"
+        f"{TURN_OUTSIDE}"
     )
 
 

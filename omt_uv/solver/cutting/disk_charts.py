@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ZeroAreaFaceError
+from ..errors import DISSOLVE, ZeroAreaFaceError
 from ..mesh.charts import Chart, charts_of, check_disk, check_edges, strict_charts
 from ..mesh.repair import repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
@@ -66,7 +66,7 @@ def cut_to_disks(
     warnings = list(found.cuts.warnings)
     if flat:
         who = "A triangle has" if flat == 1 else f"{flat} triangles have"
-        warnings.append(f"{who} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve")
+        warnings.append(f"{who} no area and got a little for the map; {DISSOLVE}")
     return DiskCharts(charts, found.cuts, tuple(warnings))
 
 

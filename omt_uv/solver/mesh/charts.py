@@ -10,7 +10,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import NonManifoldEdgeError, NotADiskError
+from ..errors import (
+    NonManifoldEdgeError,
+    NotADiskError,
+    SeveralBoundariesError,
+    TouchingBoundariesError,
+)
 from .gluing import Gluing, components, corner_classes, groups
 from .surface import Surface, strict_gluing
 from .topology import boundary_loops, halfedges, pair_keys
@@ -125,21 +130,14 @@ def check_disk(chart: Chart) -> None:
         raise NotADiskError(f"A chart is a closed {shape} without a boundary", kind="face", elements=faces)
     if len(loops) > 1:
         rest = np.concatenate([np.stack([x, np.roll(x, -1)], axis=1) for x in loops[1:]])
-        raise NotADiskError(
-            f"A chart has {len(loops)} boundaries instead of one",
-            remedy=_boundary_remedy(chart, np.concatenate(loops)),
-            kind="edge",
-            elements=chart.vertex_ids[rest],
-        )
+        error = TouchingBoundariesError if _touch(chart, np.concatenate(loops)) else SeveralBoundariesError
+        raise error(f"A chart has {len(loops)} boundaries instead of one", kind="edge", elements=chart.vertex_ids[rest])
     if handles:
         plural = "a handle" if handles == 1 else f"{handles} handles"
         raise NotADiskError(f"A chart has {plural}", kind="face", elements=faces)
 
 
-def _boundary_remedy(chart: Chart, boundary: np.ndarray) -> str:
-    """What to do about several boundaries, all of whose vertices are given (b,)."""
-    remedy = "Mark seams that join the boundaries, or fill the holes"
+def _touch(chart: Chart, boundary: np.ndarray) -> bool:
+    """Whether different vertices of the boundary (k,) lie in one place."""
     # Adding zero makes -0.0 and 0.0 the same.
-    if len(np.unique(chart.vertices[boundary] + 0.0, axis=0)) < len(np.unique(chart.vertex_ids[boundary])):
-        return f"Use Merge by Distance where they touch. {remedy}"
-    return remedy
+    return len(np.unique(chart.vertices[boundary] + 0.0, axis=0)) < len(np.unique(chart.vertex_ids[boundary]))

@@ -7,12 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import (
+    DISSOLVE,
     DuplicateFaceError,
     EmptyMeshError,
+    LooseVertexError,
     NonFiniteError,
     NonManifoldEdgeError,
     NotASphereError,
+    OpenSurfaceError,
     OrientationError,
+    PinchedVertexError,
+    RepeatedVertexError,
+    SeveralComponentsError,
 )
 from .repair import perturbed
 from .topology import graph_components, halfedges, next_halfedge, pair_keys
@@ -54,7 +60,7 @@ def closed_surface(vertices: np.ndarray, triangles: np.ndarray) -> ClosedSurface
     warnings: tuple[str, ...] = ()
     if count:
         who = "A triangle has" if count == 1 else f"{count} triangles have"
-        warnings = (f"{who} no area and got a little for the map; use Mesh > Clean Up > Degenerate Dissolve",)
+        warnings = (f"{who} no area and got a little for the map; {DISSOLVE}",)
     return ClosedSurface(vertices=sound, triangles=triangles, extent=extent, warnings=warnings)
 
 
@@ -63,7 +69,7 @@ def _check_faces(triangles: np.ndarray) -> None:
     a, b, c = np.sort(triangles, axis=1).T
     repeating = np.flatnonzero((a == b) | (b == c))
     if len(repeating):
-        raise NotASphereError("A face uses a vertex twice", "Use Degenerate Dissolve", "face", repeating)
+        raise RepeatedVertexError("A face uses a vertex twice", kind="face", elements=repeating)
     _, inverse, count = np.unique(np.stack([a, b, c], axis=1), axis=0, return_inverse=True, return_counts=True)
     double = np.flatnonzero(count[inverse.ravel()] > 1)
     if len(double):
@@ -78,11 +84,8 @@ def _check_edges(triangles: np.ndarray) -> None:
     if (count > 2).any():
         raise NonManifoldEdgeError("More than two faces meet at an edge", kind="edge", elements=ends[count > 2])
     if (count < 2).any():
-        raise NotASphereError(
-            "The surface is not closed: it has boundary edges",
-            "Fill the holes (Select > Non Manifold, then Fill), or unwrap it as a chart",
-            "edge",
-            ends[count < 2],
+        raise OpenSurfaceError(
+            "The surface is not closed: it has boundary edges", kind="edge", elements=ends[count < 2]
         )
     forward = np.bincount(inverse.ravel(), tail < head, len(edges))
     if (forward != 1).any():
@@ -94,19 +97,14 @@ def _check_components(triangles: np.ndarray, n: int) -> None:
     used = np.zeros(n, dtype=bool)
     used[triangles] = True
     if not used.all():
-        raise NotASphereError(
-            "A vertex belongs to no face", "Use Mesh > Clean Up > Delete Loose", "vertex", np.flatnonzero(~used)
-        )
+        raise LooseVertexError("A vertex belongs to no face", kind="vertex", elements=np.flatnonzero(~used))
     tail, head = halfedges(triangles)
     count, component = graph_components(tail, head, n)
     if count > 1:
         of_face = component[triangles[:, 0]]
         largest = np.bincount(of_face).argmax()
-        raise NotASphereError(
-            f"The surface has {count} parts",
-            "Map them one by one (Separate by Loose Parts)",
-            "face",
-            np.flatnonzero(of_face != largest),
+        raise SeveralComponentsError(
+            f"The surface has {count} parts", kind="face", elements=np.flatnonzero(of_face != largest)
         )
     # Corners of one fan follow each other across edges.
     m = len(triangles)
@@ -117,13 +115,8 @@ def _check_components(triangles: np.ndarray, n: int) -> None:
     fans, fan = graph_components(rows, columns, 3 * m)
     if fans > n:
         pairs = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)
-        split = np.flatnonzero(np.bincount(pairs[:, 0], minlength=n) > 1)
-        raise NotASphereError(
-            "Several fans of faces meet in one vertex",
-            "Split the vertex (Mesh > Split > Faces by Edges)",
-            "vertex",
-            split,
-        )
+        torn = np.flatnonzero(np.bincount(pairs[:, 0], minlength=n) > 1)
+        raise PinchedVertexError("Several fans of faces meet in one vertex", kind="vertex", elements=torn)
 
 
 def _check_genus(triangles: np.ndarray) -> None:

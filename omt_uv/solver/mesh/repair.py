@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import ZeroAreaFaceError
+from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError
 from .charts import Chart
 from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam
@@ -74,7 +74,7 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
     if copies:
         warnings.append(
             f"{_count(copies, 'face')} with the same vertices as another, mapped apart; "
-            "delete what is double, or use Merge by Distance"
+            f"delete what is double, or {MERGE}"
         )
     polygon = np.repeat(np.arange(f), np.diff(surface.face_start))
     key = np.sort((polygon << 32) | surface.corner_vertex)
@@ -82,10 +82,7 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
     layer[repeating] = -1
     repeating = repeating[faces[repeating]]
     if len(repeating):
-        warnings.append(
-            f"{_count(len(repeating), 'face')} with a vertex used twice, mapped apart; "
-            "use Mesh > Clean Up > Degenerate Dissolve"
-        )
+        warnings.append(f"{_count(len(repeating), 'face')} with a vertex used twice, mapped apart; {DISSOLVE}")
     return layer, warnings
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..errors import MeshError
+from ..errors import CoarseningError
 from ..mesh.geometry import face_areas
 from ..mesh.topology import halfedges, next_halfedge
 
@@ -87,7 +87,7 @@ def _level(vertices, triangles, mass, rng) -> tuple[SphereLevel, np.ndarray, np.
     for _ in range(MAX_ROUNDS):
         removed, parent = _choose(vertices, faces, rng)
         if len(removed) == 0:
-            raise MeshError("The mesh cannot be made coarser", "Check it with Mesh > Clean Up")
+            raise CoarseningError("The mesh cannot be made coarser")
         # At the coarse end no more may go than a tetrahedron can spare.
         removed, parent = removed[: left - 4], parent[: left - 4]
         step, faces, face_mass = _collapse(vertices, faces, face_mass, removed, parent)

@@ -115,13 +115,17 @@ def test_orientation():
     assert np.sort(rejected(errors.OrientationError, V, [F[0], F[1][::-1]]).elements).tolist() == [[0, 2]]
 
 
-NO_DISKS = [("icosphere", "closed sphere"), ("torus", "genus 1"), ("annulus", "2 boundaries")]
+NO_DISKS = [
+    ("icosphere", errors.NotADiskError, "closed sphere"),
+    ("torus", errors.NotADiskError, "genus 1"),
+    ("annulus", errors.SeveralBoundariesError, "2 boundaries"),
+]
 
 
-@pytest.mark.parametrize("shape, words", NO_DISKS)
-def test_what_is_no_disk(shape, words):
+@pytest.mark.parametrize("shape, kind, words", NO_DISKS)
+def test_what_is_no_disk(shape, kind, words):
     V, F = getattr(meshes, shape)()
-    error = rejected(errors.NotADiskError, V, F)
+    error = rejected(kind, V, F)
     assert words in error.cause and len(error.elements)
 
 
@@ -132,7 +136,7 @@ def test_a_handle_with_a_rim():
 
 def test_error_message_names_place_and_remedy():
     error = errors.ZeroAreaFaceError("Faces have no area", kind="face", elements=[4])
-    assert str(error).startswith("Faces have no area (1 face: 4). Use Mesh")
+    assert str(error).startswith("Faces have no area (1 face: 4). Dissolve")
     error = errors.NonFiniteError("Bad", kind="vertex", elements=range(9))
     assert "(9 vertices: 0, 1, 2, 3, 4, ...)" in str(error)
 

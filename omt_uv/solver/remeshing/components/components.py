@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import OrientationError, ZeroAreaFaceError
+from ...errors import MERGING, OrientationError, ZeroAreaFaceError
 from ...mesh.charts import Chart, charts_of
 from ...mesh.geometry import face_areas
 from ...mesh.gluing import orientations, turn_over
@@ -112,7 +112,7 @@ def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarra
         warnings.append(f"{int(turned.sum())} triangles looked to the wrong side and were turned over")
     if len(joined.slits):
         touching = int(np.isin(joined.same, joined.slits).sum())
-        warnings.append(f"{touching} boundary vertices lie on one another and stay apart; Merge by Distance joins them")
+        warnings.append(f"{touching} boundary vertices lie on one another and stay apart; {MERGING} joins them")
     charts = charts_of(surface, turn_over(repaired.gluing, turned))
     slits = np.sort(pair_keys(joined.slits[:, 0], joined.slits[:, 1]))
     features = joined.same[features]

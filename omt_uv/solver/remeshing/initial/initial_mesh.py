@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...errors import PrecisionError
+from ...errors import CrowdedError, PrecisionError
 from ...mesh.charts import Chart
 from ...mesh.geometry import face_areas
 from ...mesh.topology import pair_keys
@@ -291,11 +291,10 @@ def _patch(
     if options.rounds:
         return None, ()
     elements = maps.part.faces[chart.faces]
-    raise PrecisionError(
+    raise CrowdedError(
         f"A piece of {len(elements)} triangles leaves no room for {number} vertices in double precision",
-        "Use Merge by Distance and Degenerate Dissolve on it, or delete it",
-        "face",
-        elements,
+        kind="face",
+        elements=elements,
     )
 
 

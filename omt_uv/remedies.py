@@ -1,0 +1,54 @@
+"""Name remedies in the words of Blender's menus, for operators and commands.
+
+The solver says what is wrong and what would help, but knows no menus. Here the class of an error is the key to where
+a user of Blender finds that help; what is not here is said in the solver's own words.
+"""
+
+from __future__ import annotations
+
+from .solver import errors
+
+_JOIN = "Mark seams that join the boundaries, or fill the holes"
+
+REMEDIES: dict[type[errors.MeshError], str] = {
+    errors.EmptyMeshError: "Select at least one face",
+    errors.NoSelectionError: "Select one or more vertices in Edit Mode",
+    errors.ZeroAreaFaceError: "Use Mesh > Clean Up > Degenerate Dissolve, or Merge by Distance",
+    errors.OrientationError: "Use Mesh > Normals > Recalculate Outside",
+    errors.NotADiskError: "Mark seams that cut it open into a disk",
+    errors.SeveralBoundariesError: _JOIN,
+    errors.TouchingBoundariesError: f"Use Merge by Distance where they touch. {_JOIN}",
+    errors.RepeatedVertexError: "Use Degenerate Dissolve",
+    errors.OpenSurfaceError: "Fill the holes (Select > Non Manifold, then Fill), or unwrap it as a chart",
+    errors.LooseVertexError: "Use Mesh > Clean Up > Delete Loose",
+    errors.SeveralComponentsError: "Map them one by one (Separate by Loose Parts)",
+    errors.PinchedVertexError: "Split the vertex (Mesh > Split > Faces by Edges)",
+    errors.CrowdedError: "Use Merge by Distance and Degenerate Dissolve on it, or delete it",
+    errors.CoarseningError: "Check it with Mesh > Clean Up",
+    errors.WeightError: "Paint weights between 0 and 1, not the same everywhere",
+    errors.NoRegionError: "Paint the region first",
+    errors.UniformWeightsError: "Paint a part only",
+    errors.EmptyRegionError: "Paint a region with area",
+    errors.SoftRegionError: "Paint the region with weight 1 and the rest with 0",
+}
+
+# What warnings advise in the middle of a sentence.
+ADVICE: dict[str, str] = {
+    errors.MERGE: "use Merge by Distance",
+    errors.MERGING: "Merge by Distance",
+    errors.DISSOLVE: "use Mesh > Clean Up > Degenerate Dissolve",
+    errors.TURN_OUTSIDE: "Use Mesh > Normals > Recalculate Outside",
+}
+
+
+def explain(error: errors.MeshError) -> str:
+    """Say cause, place and remedy of an error, the remedy by the table unless it was given for this very case."""
+    special = error.remedy != type(error).remedy
+    return error.text(error.remedy if special else REMEDIES.get(type(error), error.remedy))
+
+
+def advise(warning: str) -> str:
+    """Say a warning of the solver with its advice in Blender's words."""
+    for neutral, words in ADVICE.items():
+        warning = warning.replace(neutral, words)
+    return warning
