@@ -11,9 +11,10 @@ from itertools import product
 import numpy as np
 
 from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
+from ..mesh.topology import vertices_around
 from ..progress import drain
 from ..sphere.stream_functions import runge_kutta_slopes
-from ..sphere.untangle import straighten_around, with_rings
+from ..sphere.untangle import RINGS, straighten_around
 from .projections import is_cylindrical
 
 POLES = np.array([[0.0, 0, 1], [0, 0, -1]])
@@ -83,7 +84,7 @@ def _put_and_straighten(
         moved = points.copy()
         moved[vertex] = target
         wrong = before & ~(signed_volumes(moved, triangles) > 0)
-        free = with_rings(triangles, wrong | (triangles == vertex).any(axis=1), len(points))
+        free = vertices_around(triangles, wrong | (triangles == vertex).any(axis=1), len(points), RINGS)
         free[[vertex, *taken[taken >= 0]]] = False
         found = drain(straighten_around(points, triangles, moved, area, free))
         if found is not None and (signed_volumes(found, triangles)[before] > 0).all():

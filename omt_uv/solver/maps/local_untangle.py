@@ -14,7 +14,7 @@ from scipy.sparse import csr_matrix, identity
 from ..errors import PrecisionError
 from ..linalg.sparse import solve_general
 from ..mesh.geometry import halfedge_lengths, signed_areas
-from ..mesh.topology import halfedges, pair_keys, pair_up
+from ..mesh.topology import halfedges, pair_keys, pair_up, vertices_around
 from .tutte import mean_value_weights
 
 # Rings of vertices around folds that are placed anew, at most.
@@ -94,7 +94,7 @@ def _averaged(uv: np.ndarray, faces: np.ndarray, side: np.ndarray, fixed: np.nda
     fewest, chosen = int(folded.sum()), np.zeros(len(uv), dtype=bool)
     weights = _mean_value_matrix(uv, faces)
     for rings in range(MOST_RINGS):
-        chosen |= _around(folded, faces, len(uv), rings)
+        chosen |= vertices_around(faces, folded, len(uv), rings)
         candidate = _solved(uv, weights, np.flatnonzero(chosen & ~fixed))
         folded = _folded(candidate, faces, side)
         if folded.sum() < fewest:
@@ -112,15 +112,6 @@ def _mean_value_matrix(uv: np.ndarray, faces: np.ndarray) -> csr_matrix:
     data = np.concatenate([at_tail.ravel(), at_head.ravel()])
     total = np.bincount(rows, data, len(uv))
     return csr_matrix((data / total[rows], (rows, columns)), shape=(len(uv),) * 2)
-
-
-def _around(chosen: np.ndarray, faces: np.ndarray, count: int, rings: int) -> np.ndarray:
-    """Vertices (u,) bool at most `rings` edges away from the faces `chosen` (t,) bool."""
-    near = np.zeros(count, dtype=bool)
-    near[faces[chosen]] = True
-    for _ in range(rings):
-        near[faces[near[faces].any(axis=1)]] = True
-    return near
 
 
 def _solved(uv: np.ndarray, weights: csr_matrix, free: np.ndarray) -> np.ndarray:

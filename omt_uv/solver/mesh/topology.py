@@ -49,6 +49,15 @@ def boundary_edges(triangles: np.ndarray) -> np.ndarray:
     return np.column_stack([tail[boundary], head[boundary]])
 
 
+def vertices_around(triangles: np.ndarray, chosen: np.ndarray, n: int, rings: int) -> np.ndarray:
+    """Vertices (n,) bool at most `rings` edges away from the chosen triangles, (m,) bool, of (m,3)."""
+    near = np.zeros(n, dtype=bool)
+    near[triangles[chosen]] = True
+    for _ in range(rings):
+        near[triangles[near[triangles].any(axis=1)]] = True
+    return near
+
+
 def next_halfedge(h: np.ndarray) -> np.ndarray:
     """The following halfedge (k,) of each (k,), within the same triangle."""
     return h + 1 - 3 * (h % 3 == 2)

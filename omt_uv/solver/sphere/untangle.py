@@ -12,6 +12,7 @@ import numpy as np
 
 from ..maps.energy import Elements, FaceDerivatives, elements, face_derivatives_of, squared
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
+from ..mesh.topology import vertices_around
 from ..progress import Progress, Steps
 from ..refinement.projected_newton import ARMIJO, Assembly
 from .newton import derivatives, newton_direction, project_faces, retract, tangents
@@ -121,7 +122,7 @@ def untangle_locally(surface: np.ndarray, triangles: np.ndarray, positions: np.n
     surface (n,3): shapes that the faces (m,3) are to keep; their areas are those that they have on the sphere, folded
     or not. Where that fails the map is returned as it was.
     """
-    touched = with_rings(triangles, ~(signed_volumes(positions, triangles) > 0), len(positions))
+    touched = vertices_around(triangles, ~(signed_volumes(positions, triangles) > 0), len(positions), RINGS)
     area = np.abs(spherical_areas(positions, triangles))
     straight = yield from straighten_around(surface, triangles, positions, area, touched)
     return positions if straight is None else straight
@@ -146,12 +147,3 @@ def straighten_around(
     result = positions.copy()
     result[vertices] = straight
     return result
-
-
-def with_rings(triangles: np.ndarray, faces: np.ndarray, n: int) -> np.ndarray:
-    """Vertices (n,) bool of the faces (m,) bool and of a few rings around them."""
-    touched = np.zeros(n, dtype=bool)
-    touched[triangles[faces]] = True
-    for _ in range(RINGS):
-        touched[triangles[touched[triangles].any(axis=1)]] = True
-    return touched

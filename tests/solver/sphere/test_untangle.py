@@ -7,9 +7,10 @@ from sphere_shapes import random_sphere
 
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
+from omt_uv.solver.mesh.topology import vertices_around
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.projected_newton import Assembly
-from omt_uv.solver.sphere.untangle import straighten_around, untangle_locally, untangle_on_sphere, with_rings
+from omt_uv.solver.sphere.untangle import RINGS, straighten_around, untangle_locally, untangle_on_sphere
 
 
 def folded_sphere():
@@ -27,7 +28,7 @@ def test_folds_are_straightened_and_all_else_stays_to_the_bit():
     P, F, tangled = folded_sphere()
     found = drain(untangle_locally(P, F, tangled))
     assert signed_volumes(found, F).min() > 0
-    touched = with_rings(F, signed_volumes(tangled, F) <= 0, len(P))
+    touched = vertices_around(F, signed_volumes(tangled, F) <= 0, len(P), RINGS)
     np.testing.assert_array_equal(found[~touched], tangled[~touched])
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-14)
     np.testing.assert_allclose(spherical_areas(found, F).sum(), 4 * np.pi, rtol=1e-12)
@@ -54,4 +55,6 @@ def test_rings_grow_by_neighbours():
     distance[F[0]] = 0
     for _ in range(400):
         np.minimum.at(distance, F.ravel(), np.repeat(distance[F].min(axis=1) + 1, 3))
-    np.testing.assert_array_equal(with_rings(F, np.arange(len(F)) == 0, 400), distance <= 4)
+    for rings in (0, 1, 4):
+        found = vertices_around(F, np.arange(len(F)) == 0, 400, rings)
+        np.testing.assert_array_equal(found, distance <= rings)
