@@ -49,7 +49,7 @@ ARROWS: dict[str, str] = {
     "remedies": "solver",
     "xatlas": "errors solver solver.mesh",
     "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.transfer solver.refinement "
-    "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing solver.remeshing.initial "
+    "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization xatlas "
     "pipelines",

@@ -20,9 +20,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import halfedges, pair_keys
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remeshing.initial.component_maps import Original
-from omt_uv.solver.remeshing.initial.disk_samples import STRATEGIES
-from omt_uv.solver.remeshing.remesh import remesh
+from omt_uv.solver.remeshing import STRATEGIES, RemeshOptions, RemeshSource, remesh
 
 DEFAULT_MODELS = ("lion", "face", "max_planck", "rocker_arm")
 VERTEX_COUNT = 5000
@@ -96,7 +94,7 @@ def decimate(V, F):
 
 def ours(V, F):
     """Our remeshing; the mesh and its processor seconds."""
-    result, seconds = timed(lambda: drain(remesh(V, F, VERTEX_COUNT)))
+    result, seconds = timed(lambda: drain(remesh(RemeshSource(V, F), VERTEX_COUNT)))
     return (result.vertices, result.triangles), seconds
 
 
@@ -145,8 +143,8 @@ def strategies_table(args) -> Table:
         | {"best": 6},
     )
     for name in args.models or DEFAULT_MODELS:
-        original = Original(*_model(name))
-        rows = {strategy: _strategy(original, strategy) for strategy in STRATEGIES}
+        source = RemeshSource(*_model(name))
+        rows = {strategy: _strategy(source, strategy) for strategy in STRATEGIES}
         for strategy, row in rows.items():
             others = [other for key, other in rows.items() if key != strategy]
             best = all(row["angle_p1 relaxed"] > other["angle_p1 relaxed"] for other in others)
@@ -156,13 +154,11 @@ def strategies_table(args) -> Table:
     return table
 
 
-def _strategy(original, strategy):
+def _strategy(source, strategy):
     """Figures of one strategy, raw and relaxed."""
     row = {}
     for when, options in {"raw": {"rounds": 0, "fit": False}, "relaxed": {}}.items():
-        found = drain(
-            remesh(original.vertices, original.triangles, VERTEX_COUNT, strategy=strategy, original=original, **options)
-        )
+        found = drain(remesh(source, VERTEX_COUNT, RemeshOptions(strategy=strategy, **options)))
         row |= {f"{c} {when}": v for c, v in shape(found.vertices, found.triangles).items() if c in STRATEGY_FIGURES}
     return row
 

@@ -25,8 +25,7 @@ from ..solver.mesh.repair import repaired_gluing
 from ..solver.mesh.surface import Surface, chosen_triangles
 from ..solver.mesh.topology import halfedges
 from ..solver.progress import Progress, Steps, part_of
-from ..solver.remeshing.initial.component_maps import Original
-from ..solver.remeshing.remesh import Remesh, remesh
+from ..solver.remeshing import Remesh, RemeshOptions, RemeshSource, remesh
 from ..solver.transfer.correspondence import Correspondence, correspond
 
 # Share of the work on one level that its mesh takes; the rest is where it lies on the surface.
@@ -78,7 +77,7 @@ def remesh_series(job: RemeshJob, settings: RemeshSettings) -> Steps[Series]:
     chosen_triangles(surface, None)
     triangles = surface.corner_vertex[surface.triangles]
     count_of, counts = _counts(surface, triangles, settings)
-    originals: dict[bytes, Original] = {}
+    sources: dict[bytes, RemeshSource] = {}
     with _located(surface, ""):
         density = density_of(job, triangles, settings)
     levels: list[LevelOfDetail] = []
@@ -87,8 +86,14 @@ def remesh_series(job: RemeshJob, settings: RemeshSettings) -> Steps[Series]:
         name = f"LOD{k}: " if len(counts) > 1 else ""
         features, joined = _features(job, triangles, density, count if count_of == "vertices" else count // 2)
         # As a rule all levels can show the same features, and then one set of maps serves them all.
-        original = originals.setdefault(features.tobytes(), Original(surface.positions, triangles, features))
-        steps = _level(job, original, density, count_of, count, settings)
+        source = sources.setdefault(features.tobytes(), RemeshSource(surface.positions, triangles, features))
+        options = RemeshOptions(
+            count_of=count_of,
+            preserve_boundary=settings.preserve_boundary,
+            strategy=settings.strategy,
+            grading=settings.grading,
+        )
+        steps = _level(job, source, count, options, density)
         with _located(surface, name):
             level = yield from part_of(steps, k / len(counts), 1 / len(counts))
         levels.append(level)
@@ -131,29 +136,13 @@ def _features(
 
 
 def _level(
-    job: RemeshJob,
-    original: Original,
-    density: np.ndarray | None,
-    count_of: str,
-    count: int,
-    settings: RemeshSettings,
+    job: RemeshJob, source: RemeshSource, count: int, options: RemeshOptions, density: np.ndarray | None
 ) -> Steps[LevelOfDetail]:
     """One remesh of so many vertices or faces, and where it lies on the surface."""
-    positions, triangles = original.vertices, original.triangles
-    steps = remesh(
-        positions,
-        triangles,
-        count,
-        count_of=count_of,
-        density=density,
-        preserve_boundary=settings.preserve_boundary,
-        strategy=settings.strategy,
-        grading=settings.grading,
-        original=original,
-    )
-    found = yield from part_of(steps, 0.0, REMESHING)
+    positions, triangles = source.vertices, source.triangles
+    found = yield from part_of(remesh(source, count, options, density), 0.0, REMESHING)
     yield Progress("Attributes", REMESHING)
-    seams = edge_union(original.features, job.jumps)
+    seams = edge_union(source.features, job.jumps)
     at = correspond(positions, triangles, seams, found.vertices, found.triangles, found.faces, found.barycentric)
     return LevelOfDetail(positions=found.vertices, triangles=found.triangles, correspondence=at, found=found)
 

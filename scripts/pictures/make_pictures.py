@@ -33,9 +33,7 @@ from omt_uv.solver.globe.unfolding import gather_polygons, unfold
 from omt_uv.solver.maps.distortion import distortion, face_distortion
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remeshing.initial.component_maps import Original
-from omt_uv.solver.remeshing.initial.disk_samples import STRATEGIES
-from omt_uv.solver.remeshing.remesh import remesh
+from omt_uv.solver.remeshing import STRATEGIES, RemeshOptions, RemeshSource, remesh
 
 CELLS = {"lilium": 120}  # how many checker cells cover the model
 CIRCLES = {"max_planck": 260}  # likewise, in squares as large as those of the checker
@@ -184,16 +182,16 @@ def remesh_sheet(names, out, scratch, pixels):
 
 
 def _remeshed(V, F, density):
-    found = drain(remesh(V, F, VERTEX_COUNT, density=density))
+    found = drain(remesh(RemeshSource(V, F), VERTEX_COUNT, density=density))
     return found.vertices, found.triangles
 
 
 def strategies_sheet(name, out, scratch, pixels):
     """Wireframes of the four pairs of maps to sample and to triangulate on (B. Gu 2018, figure 5)."""
     V, F = meshes.load_model(name)
-    original, drawn, captions = Original(V, F), [], []
+    source, drawn, captions = RemeshSource(V, F), [], []
     for strategy in STRATEGIES:
-        found = drain(remesh(V, F, VERTEX_COUNT, strategy=strategy, original=original))
+        found = drain(remesh(source, VERTEX_COUNT, RemeshOptions(strategy=strategy)))
         drawn.append(scratch / f"{name}_{strategy}.png")
         renders.render_wires(found.vertices, found.triangles, view_of(name), drawn[-1], pixels)
         figures = shape(found.vertices, found.triangles)

@@ -9,7 +9,7 @@ import pytest
 from omt_uv.solver.analysis.feature_edges import region_borders, resolved_features, sharp_edges
 from omt_uv.solver.mesh.topology import pair_keys
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remeshing.remesh import remesh
+from omt_uv.solver.remeshing import RemeshSource, remesh
 
 
 def gear(teeth=8):
@@ -35,7 +35,7 @@ def test_hard_edges_stay_straight_and_corners_where_they_are():
     V, F = gear()
     edges = sharp_edges(V, F, np.radians(30))
     assert len(edges) == 3 * 32
-    found = drain(remesh(V, F, 500, features=edges))
+    found = drain(remesh(RemeshSource(V, F, edges), 500))
     new = sharp_edges(found.vertices, found.triangles, np.radians(30))
     points = found.vertices[new]
     assert off_lines(points.mean(axis=1), V, edges).max() < 1e-12

@@ -1,1 +1,14 @@
+"""Components of a triangle mesh: what can be remeshed, apart or as a batch, and boundaries that lie on one another.
 
+Imports solver and solver.mesh.
+Main names: split_components, Component, batched, join_coincident, reopened.
+"""
+
+from ...lazy import lazy
+
+__getattr__, __all__ = lazy(
+    __name__,
+    coincident_boundaries="JoinedBoundaries join_coincident reopened reopened_copies",
+    component_batch="batched",
+    components="Component Components split_components",
+)

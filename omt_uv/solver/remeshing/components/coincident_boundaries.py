@@ -1,6 +1,6 @@
-"""Boundaries that lie on one another, as where a mesh was cut open: joined for remeshing, and opened again afterwards.
+"""Join boundaries that lie on one another, as where a mesh was cut, for remeshing, and reopen them afterwards.
 
-Sampled apart, the two sides of a slit would cross each other or gape; joined along a line that is kept they cannot.
+Sampled apart, the two sides would cross each other or gape; joined along a line that is kept they cannot.
 """
 
 from __future__ import annotations
@@ -16,23 +16,24 @@ from ...mesh.topology import halfedges, pair_keys, pair_up
 
 
 @dataclass(frozen=True)
-class Joined:
-    """Triangles (m,3) without the slits; same (n,): the vertex that stands for each; slits (s,2): edges joined."""
+class JoinedBoundaries:
+    """Triangles (m,3) joined along boundaries; same (n,): the vertex that stands for each; to_reopen (s,2): edges that
+    were two before."""
 
     triangles: np.ndarray
     same: np.ndarray
-    slits: np.ndarray
+    to_reopen: np.ndarray
 
 
-def join_touching(positions: np.ndarray, triangles: np.ndarray) -> Joined:
+def join_coincident(positions: np.ndarray, triangles: np.ndarray) -> JoinedBoundaries:
     """Join boundary edges of a mesh (n,3), (m,3) that lie on exactly one other, run against it and can be joined.
 
     Where anything else would meet in one edge, nothing is joined.
     """
     n, (tail, head) = len(positions), halfedges(triangles)
-    none = Joined(triangles, np.arange(n), np.zeros((0, 2), np.int64))
-    rim = _only_once(pair_keys(tail, head))
-    a, b = tail[rim], head[rim]
+    none = JoinedBoundaries(triangles, np.arange(n), np.zeros((0, 2), np.int64))
+    boundary = _only_once(pair_keys(tail, head))
+    a, b = tail[boundary], head[boundary]
     # Adding zero makes -0.0 and 0.0 the same.
     place = np.zeros(n, np.int64)
     used = np.union1d(a, b)
@@ -49,21 +50,21 @@ def join_touching(positions: np.ndarray, triangles: np.ndarray) -> Joined:
     tail, head = halfedges(result)
     if (np.unique(pair_keys(tail, head), return_counts=True)[1] > 2).any() or (tail == head).any():
         return none
-    return Joined(result, same, np.stack([same[a[first]], same[b[first]]], axis=1))
+    return JoinedBoundaries(result, same, np.stack([same[a[first]], same[b[first]]], axis=1))
 
 
-def opened(points: np.ndarray, triangles: np.ndarray, slits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A mesh (n,3), (m,3) cut open along the edges with the sorted keys `slits` (k,)."""
-    if len(slits) == 0:
+def reopened(points: np.ndarray, triangles: np.ndarray, to_reopen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cut a mesh (n,3), (m,3) along the edges with the sorted keys `to_reopen` (k,): points (p,3), triangles (m,3)."""
+    if len(to_reopen) == 0:
         return points, triangles
-    sides = cut_open(points, triangles, np.stack([slits >> 32, slits & 0xFFFFFFFF], axis=1)).sides
+    sides = cut_open(points, triangles, np.stack([to_reopen >> 32, to_reopen & 0xFFFFFFFF], axis=1)).sides
     return points[triangles.ravel()[np.unique(sides, return_index=True)[1]]], sides
 
 
-def copies(ends: np.ndarray, on_boundary: np.ndarray) -> int:
-    """How many vertices an opening adds, of slit edges with the ends (2s,) and vertices (n,) bool on a boundary.
+def reopened_copies(ends: np.ndarray, on_boundary: np.ndarray) -> int:
+    """Count the vertices that reopening adds: of edges with the ends (2s,), and vertices (n,) bool on a boundary.
 
-    So many edges of slits as meet inside of the surface part it into as many fans, or on a boundary into one more.
+    As many edges as meet inside of the surface part it into as many fans, or on a boundary into one more.
     """
     meeting = np.bincount(ends, minlength=len(on_boundary))
     return int(np.maximum(meeting - ~on_boundary, 0).sum())

@@ -1,34 +1,37 @@
-"""Many small parts as one, moved apart: the solvers take as long for one part as for a hundred of them."""
+"""Batch many small components as one, moved apart: the solvers take as long for one of them as for a hundred."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .components import Part
+from .components import Component
 
-# Boxes of the parts lie on a grid with so many times the extent of the largest from one to the next: farther apart than
-# what is opposite to a vertex on its own part.
-APART = 3.0
+# Boxes lie on a grid with a pitch of so many extents of the largest component: farther apart than what is opposite to a
+# vertex on its own component.
+PITCH = 3.0
 
 
-def piled(parts: list[Part]) -> Part:
-    """One part of several components: the parts next to each other, `shift` of each triangle how far it was moved."""
-    corner = np.array([p.vertices.min(axis=0) for p in parts])
-    extent = max(float(np.ptp(p.vertices, axis=0).max()) for p in parts)
-    side = int(np.ceil(len(parts) ** (1 / 3)))
-    k = np.arange(len(parts))
+def batched(components: list[Component]) -> Component:
+    """One `Component` of all components (c,), next to each other on a cubic grid.
+
+    Its `shift` (m,3) says of every triangle how far it was moved, its `members` are the components.
+    """
+    corner = np.array([p.vertices.min(axis=0) for p in components])
+    extent = max(float(np.ptp(p.vertices, axis=0).max()) for p in components)
+    side = int(np.ceil(len(components) ** (1 / 3)))
+    k = np.arange(len(components))
     place = np.stack([k % side, k // side % side, k // side**2], axis=1)
-    shift = APART * extent * (place - (side - 1) / 2) - corner
-    first = np.cumsum([0] + [len(p.vertices) for p in parts])[:-1]
-    pairs = list(zip(parts, first, strict=True))
-    return Part(
-        vertices=np.concatenate([p.vertices + s for p, s in zip(parts, shift, strict=True)]),
+    shift = PITCH * extent * (place - (side - 1) / 2) - corner
+    first = np.cumsum([0] + [len(p.vertices) for p in components])[:-1]
+    pairs = list(zip(components, first, strict=True))
+    return Component(
+        vertices=np.concatenate([p.vertices + s for p, s in zip(components, shift, strict=True)]),
         triangles=np.concatenate([p.triangles + b for p, b in pairs]),
-        faces=np.concatenate([p.faces for p in parts]),
-        within=np.concatenate([p.within for p in parts]),
+        faces=np.concatenate([p.faces for p in components]),
+        input_barycentric=np.concatenate([p.input_barycentric for p in components]),
         features=np.concatenate([p.features + b for p, b in pairs]),
         # Both halves of a key are vertices.
-        slits=np.sort(np.concatenate([p.slits + (b << 32 | b) for p, b in pairs])),
-        shift=np.repeat(shift, [len(p.triangles) for p in parts], axis=0),
-        members=tuple(parts),
+        to_reopen=np.sort(np.concatenate([p.to_reopen + (b << 32 | b) for p, b in pairs])),
+        shift=np.repeat(shift, [len(p.triangles) for p in components], axis=0),
+        members=tuple(components),
     )

@@ -1,4 +1,7 @@
-"""The connected, oriented, manifold parts of a triangle mesh: what can be remeshed."""
+"""Split a triangle mesh into connected, oriented, manifold components: what can be remeshed.
+
+Vertices and edges that are no manifold are taken apart, faces that look to the wrong side are turned over.
+"""
 
 from __future__ import annotations
 
@@ -13,26 +16,26 @@ from ...mesh.gluing import orientations, turn_over
 from ...mesh.repair import repaired_gluing
 from ...mesh.surface import chosen_triangles, triangle_surface
 from ...mesh.topology import halfedges, pair_keys, twins
-from .coincident_boundaries import join_touching
+from .coincident_boundaries import join_coincident
 
 
 @dataclass(frozen=True)
-class Part:
-    """One part in a unit box: vertices (n,3), triangles (m,3).
+class Component:
+    """One component in the common unit box: vertices (n,3), triangles (m,3).
 
-    faces (m,): the input's triangle in which each lies; within (m,3,3): barycentric coordinates there of its corners;
-    features (e,2): pairs of its vertices that are edges to keep; slits: sorted keys of those to be opened afterwards;
-    shift (m,3): how far each triangle was moved from its place; members: the parts of a pile, see `piles.py`.
+    faces (m,): the input's triangle in which each lies; input_barycentric (m,3,3): where there its corners are;
+    features (e,2): pairs of its vertices that are edges to keep; to_reopen: sorted keys of those to be cut afterwards;
+    shift (m,3): how far each triangle was moved from its place; members: of a batch, see `component_batch`.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     faces: np.ndarray
-    within: np.ndarray
+    input_barycentric: np.ndarray
     features: np.ndarray
-    slits: np.ndarray
+    to_reopen: np.ndarray
     shift: np.ndarray
-    members: tuple[Part, ...] = ()
+    members: tuple[Component, ...] = ()
 
     @property
     def area(self) -> np.ndarray:
@@ -40,53 +43,53 @@ class Part:
         return face_areas(self.vertices, self.triangles)
 
     @property
-    def rim(self) -> np.ndarray:
+    def boundary_edges(self) -> np.ndarray:
         """Keys of the boundary edges, sorted."""
         tail, head = halfedges(self.triangles)
-        open_ = twins(self.triangles) < 0
-        return np.sort(pair_keys(tail[open_], head[open_]))
+        single = twins(self.triangles) < 0
+        return np.sort(pair_keys(tail[single], head[single]))
 
     @property
     def euler(self) -> int:
         """Euler characteristic: vertices - edges + triangles."""
-        edges = (3 * len(self.triangles) + len(self.rim)) // 2
+        edges = (3 * len(self.triangles) + len(self.boundary_edges)) // 2
         return len(self.vertices) - edges + len(self.triangles)
 
     @property
-    def lined(self) -> bool:
+    def has_lines(self) -> bool:
         """Whether it has boundaries or features."""
-        return len(self.rim) > 0 or len(self.features) > 0
+        return len(self.boundary_edges) > 0 or len(self.features) > 0
 
     @property
-    def disk(self) -> bool:
+    def is_disk(self) -> bool:
         """Whether it has one boundary, no handle and no features."""
-        return self.euler == 1 and len(self.rim) > 0 and len(self.features) == 0 and not self.members
+        return self.euler == 1 and len(self.boundary_edges) > 0 and len(self.features) == 0 and not self.members
 
     @property
-    def spherical(self) -> bool:
+    def is_sphere(self) -> bool:
         """Whether it is closed and has no handle."""
-        return len(self.rim) == 0 and self.euler == 2
+        return len(self.boundary_edges) == 0 and self.euler == 2
 
 
 @dataclass(frozen=True)
-class Parts:
-    """The parts, their common unit box (position = centre + size * part position), and what was repaired."""
+class Components:
+    """Components, their unit box (position = centre + size * position in the box), and what was repaired."""
 
-    parts: list[Part]
+    components: list[Component]
     centre: np.ndarray
     size: float
     warnings: tuple[str, ...]
 
 
-def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarray) -> Parts:
-    """Parts of a mesh (n,3), (m,3) with edges (e,2) to keep; what only slits part is one.
+def split_components(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarray) -> Components:
+    """Split a mesh (n,3), (m,3) with edges (e,2) to keep; what lies on one another along a boundary is not apart.
 
     Raises
     ------
     EmptyMeshError, NonFiniteError, ZeroAreaFaceError : nothing that could be remeshed
-    OrientationError : a part has only one side
+    OrientationError : a component has only one side
     """
-    joined = join_touching(vertices, triangles)
+    joined = join_coincident(vertices, triangles)
     surface = triangle_surface(vertices, joined.triangles)
     faces, corners, owner = chosen_triangles(surface, None)
     used = surface.positions[np.unique(surface.corner_vertex)]
@@ -110,28 +113,35 @@ def split_parts(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarra
     warnings = [w.replace(", mapped apart", ", remeshed apart").replace(" for the map", "") for w in repaired.warnings]
     if turned.any():
         warnings.append(f"{int(turned.sum())} triangles looked to the wrong side and were turned over")
-    if len(joined.slits):
-        touching = int(np.isin(joined.same, joined.slits).sum())
+    if len(joined.to_reopen):
+        touching = int(np.isin(joined.same, joined.to_reopen).sum())
         warnings.append(f"{touching} boundary vertices lie on one another and stay apart; {MERGING} joins them")
     charts = charts_of(surface, turn_over(repaired.gluing, turned))
-    slits = np.sort(pair_keys(joined.slits[:, 0], joined.slits[:, 1]))
+    to_reopen = np.sort(pair_keys(joined.to_reopen[:, 0], joined.to_reopen[:, 1]))
     features = joined.same[features]
-    kept = np.union1d(pair_keys(features[:, 0], features[:, 1]), slits)
-    parts = [_part(chart, boxed, kept, slits) for chart in charts]
-    sound = [p for p in parts if p.area.sum() > 1e-12 * area.sum()]
-    if len(sound) < len(parts):
-        warnings.append(f"{len(parts) - len(sound)} parts without area were left out")
-    return Parts(sound, centre, size, tuple(warnings))
+    kept = np.union1d(pair_keys(features[:, 0], features[:, 1]), to_reopen)
+    components = [_component(chart, boxed, kept, to_reopen) for chart in charts]
+    sound = [p for p in components if p.area.sum() > 1e-12 * area.sum()]
+    if len(sound) < len(components):
+        warnings.append(f"{len(components) - len(sound)} parts without area were left out")
+    return Components(sound, centre, size, tuple(warnings))
 
 
-def _part(chart: Chart, boxed: np.ndarray, features: np.ndarray, slits: np.ndarray) -> Part:
+def _component(chart: Chart, boxed: np.ndarray, features: np.ndarray, to_reopen: np.ndarray) -> Component:
     tail, head = halfedges(chart.triangles)
     key = pair_keys(chart.vertex_ids[tail], chart.vertex_ids[head])
     kept = np.isin(key, features)
     rows = np.unique(np.sort(np.stack([tail[kept], head[kept]], axis=1), axis=1), axis=0)
-    open_ = np.isin(key, slits)
-    mine = np.unique(pair_keys(tail[open_], head[open_]))
+    cut = np.isin(key, to_reopen)
+    mine = np.unique(pair_keys(tail[cut], head[cut]))
     m = len(chart.triangles)
-    within, shift = np.tile(np.eye(3), (m, 1, 1)), np.zeros((m, 3))
-    positions = boxed[chart.vertex_ids]
-    return Part(positions, chart.triangles, chart.faces, within, rows.reshape(-1, 2), mine, shift)
+    corners, shift = np.tile(np.eye(3), (m, 1, 1)), np.zeros((m, 3))
+    return Component(
+        vertices=boxed[chart.vertex_ids],
+        triangles=chart.triangles,
+        faces=chart.faces,
+        input_barycentric=corners,
+        features=rows.reshape(-1, 2),
+        to_reopen=mine,
+        shift=shift,
+    )

@@ -1,4 +1,8 @@
-"""Edge flips of triangle meshes in space: towards Delaunay, and never to a mesh that folds or touches itself."""
+"""Flip edges of triangle meshes in space, towards Delaunay, and never to a mesh that folds or touches itself.
+
+An edge is Delaunay where the angles opposite to it sum up to pi at most (Bobenko, Springborn 2007), measured on the
+triangles in space.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,13 @@ from ...mesh.edge_flips import flip_in_place, flip_until_none
 from ...mesh.geometry import unit
 from ...mesh.topology import halfedges, pair_keys, previous_halfedge, twins
 
-# The new faces of a flip may lean against the old ones by this cosine at most.
-LEAST_COSINE = 0.5
+# Cosine by which the new faces of a flip may lean against the old ones at most.
+MIN_COSINE = 0.5
+# The same between the two new faces.
+MIN_COSINE_BETWEEN = 0.0
+# Rounds of independent flips.
 MAX_ROUNDS = 30
+# Sum of cotangents below which an edge counts as Delaunay: rounding must not flip for ever.
 TOLERANCE = 1e-9
 
 
@@ -22,10 +30,10 @@ def make_delaunay_embedded(
     max_rounds: int = MAX_ROUNDS,
     outer: np.ndarray | None = None,
 ) -> int:
-    """Flip edges whose opposite angles exceed pi together, overwriting triangles (m,3) and twin (3m,).
+    """Flip edges whose opposite angles exceed pi together, overwriting triangles (m,3) and twin (3m,); count the flips.
 
     points (n,3); locked: sorted keys (`topology.pair_keys`) of edges to keep. An edge also stays where its flip would
-    join two vertices twice, or two of the `outer` ones (n,) bool, or lean a face over. Returns the number of flips.
+    join two vertices twice, or two of the `outer` ones (n,) bool, or lean a face over.
     """
     flat = triangles.reshape(-1)
     cotangent = _cotangents(points, triangles)
@@ -35,7 +43,7 @@ def make_delaunay_embedded(
         bad = np.flatnonzero(value < 0)
         e, g = h[bad], twin[h[bad]]
         i, j, k, far = flat[e], flat[g], flat[previous_halfedge(e)], flat[previous_halfedge(g)]
-        ok = _allowed(points, i, j, k, far) & ~_joined(triangles, k, far) & ~_is_in(pair_keys(i, j), locked)
+        ok = _unfolded(points, i, j, k, far) & ~_already_joined(triangles, k, far) & ~_is_in(pair_keys(i, j), locked)
         if outer is not None:
             ok &= ~(outer[k] & outer[far])
         value[bad[~ok]] = 0.0
@@ -53,36 +61,36 @@ def make_delaunay_embedded(
     return flips
 
 
-def flip_where_sound(
+def flip_if_valid(
     points: np.ndarray, triangles: np.ndarray, h: np.ndarray, keep: np.ndarray, outer: np.ndarray
 ) -> np.ndarray:
-    """Flip interior halfedges h (k,), no two of which share a triangle, overwriting triangles (m,3).
+    """Flip interior halfedges h (k,), no two of which share a triangle, overwriting triangles (m,3); keys of new edges.
 
-    Not those of `keep` (3m,) bool, nor where a face would turn over, or vertices be joined that are so already, or that
-    both are `outer` (n,) bool.
-    Returns the sorted keys of the new edges.
+    Not those of `keep` (3m,) bool, nor where a face would fold, or vertices be joined that are so already, or that both
+    are `outer` (n,) bool. The keys are sorted.
     """
     twin, flat = twins(triangles), triangles.reshape(-1)
     h = h[(twin[h] >= 0) & ~keep[h]]
     i, j, k, far = flat[h], flat[twin[h]], flat[previous_halfedge(h)], flat[previous_halfedge(twin[h])]
-    ok = _allowed(points, i, j, k, far) & ~_joined(triangles, k, far) & ~(outer[k] & outer[far])
+    ok = _unfolded(points, i, j, k, far) & ~_already_joined(triangles, k, far) & ~(outer[k] & outer[far])
     flip_in_place(triangles, twin, h[ok])
     return np.sort(pair_keys(k[ok], far[ok]))
 
 
-def _joined(triangles: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _already_joined(triangles: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Whether edges of triangles (m,3) join the vertices a (k,) and b (k,), (k,) bool."""
     if len(a) == 0:
         return np.zeros(0, dtype=bool)
-    asked = np.zeros(int(triangles.max()) + 1, dtype=bool)
-    asked[a] = asked[b] = True
-    at = asked.take(triangles)
+    ends = np.zeros(int(triangles.max()) + 1, dtype=bool)
+    ends[a] = ends[b] = True
+    at = ends.take(triangles)
     tail, head = halfedges(triangles)
     both = np.flatnonzero((at & at[:, [1, 2, 0]]).ravel())
     return _is_in(pair_keys(a, b), np.sort(pair_keys(tail[both], head[both])))
 
 
 def _is_in(keys: np.ndarray, ordered: np.ndarray) -> np.ndarray:
+    """As np.isin, for keys in ascending order: a fifth of its time."""
     if len(ordered) == 0:
         return np.zeros(len(keys), dtype=bool)
     return ordered[np.minimum(np.searchsorted(ordered, keys), len(ordered) - 1)] == keys
@@ -100,11 +108,11 @@ def _cotangents(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return -(np.einsum("ikm,ikm->mk", e[:, [1, 2, 0]], e[:, [2, 0, 1]]) / double[:, None])
 
 
-def _allowed(points, i, j, k, far) -> np.ndarray:
-    """Whether the faces i, far, k and j, k, far look the same way as i, j, k and j, i, far."""
+def _unfolded(points, i, j, k, far) -> np.ndarray:
+    """Whether the faces i, far, k and j, k, far look the same way as i, j, k and j, i, far, (e,) bool."""
     a, b, c, d = points[i], points[j], points[k], points[far]
     old = unit(np.cross(b - a, c - a)) + unit(np.cross(a - b, d - b))
     first, second = unit(np.cross(d - a, c - a)), unit(np.cross(c - b, d - b))
-    reach = LEAST_COSINE * np.sqrt(np.einsum("ij,ij->i", old, old))
+    reach = MIN_COSINE * np.sqrt(np.einsum("ij,ij->i", old, old))
     ahead = (np.einsum("ij,ij->i", old, first) > reach) & (np.einsum("ij,ij->i", old, second) > reach)
-    return ahead & (np.einsum("ij,ij->i", first, second) > LEAST_COSINE - 0.5)
+    return ahead & (np.einsum("ij,ij->i", first, second) > MIN_COSINE_BETWEEN)

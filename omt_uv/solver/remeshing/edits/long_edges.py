@@ -1,4 +1,4 @@
-"""Parts with long edges cut up for their maps: large triangles are mapped coarsely, and samples carried by them fold.
+"""Split the long edges of a component at their middles, for its maps: samples carried by large triangles fold.
 
 What a surface is made of then does not matter: a cylinder of twelve sides is mapped as one of many triangles is.
 """
@@ -10,62 +10,66 @@ from dataclasses import replace
 import numpy as np
 
 from ...mesh.topology import halfedges, next_halfedge, pair_keys, previous_halfedge, twins
-from ..components.components import Part
+from ..components.components import Component
 from .split_collapse import independent_splits, split_edges
-from .vertex_count import edge_size
+from .vertex_count import edge_length
 
-# No edge is longer than so many times that of as many equilateral triangles as so many vertices have.
-LONGEST, VERTICES = 2.5, 1000
-# Needles may take many halvings: no more than so many times as many.
-MOST = 4
-# Rounds: a needle is halved in each of them.
-MOST_ROUNDS = 60
-
-
-def fine_enough(part: Part) -> Part:
-    """The part with its long edges halved, so that its maps are not too coarse; the surface is the same."""
-    longest = LONGEST * edge_size(float(part.area.sum()), 0.0, VERTICES)
-    return bisected(part, np.full(len(part.vertices), longest), MOST * VERTICES)
+# Vertices whose maps are fine enough.
+MAP_VERTICES = 1000
+# No edge is longer than so many times that of a mesh of equilateral triangles with as many vertices.
+MAX_LENGTH = 2.5
+# Needles may take many halvings: no more than so many new vertices next to MAP_VERTICES.
+MAX_NEW = 4
+# A needle is halved in each of these rounds.
+MAX_ROUNDS = 60
 
 
-def bisected(part: Part, longest: np.ndarray, most: float = np.inf) -> Part:
-    """The part with edges halved, the longest first, until none is longer than `longest` (n,) at its ends, or there
-    are `most` new vertices or more."""
-    first = len(part.vertices)
-    for _ in range(MOST_ROUNDS):
-        tail, head = halfedges(part.triangles)
-        length = np.linalg.norm(part.vertices[tail] - part.vertices[head], axis=1)
+def refine_for_maps(component: Component) -> Component:
+    """Halve the long edges of a component, so that its maps are not too coarse; the surface is the same."""
+    longest = MAX_LENGTH * edge_length(float(component.area.sum()), 0.0, MAP_VERTICES)
+    return split_long_edges(component, np.full(len(component.vertices), longest), MAX_NEW * MAP_VERTICES)
+
+
+def split_long_edges(component: Component, longest: np.ndarray, most: float = np.inf) -> Component:
+    """Halve edges of a component, the longest first, until none is longer than `longest` (n,) at its ends.
+
+    Or until there are `most` new vertices or more.
+    """
+    first = len(component.vertices)
+    for _ in range(MAX_ROUNDS):
+        tail, head = halfedges(component.triangles)
+        length = np.linalg.norm(component.vertices[tail] - component.vertices[head], axis=1)
         length /= (longest[tail] + longest[head]) / 2
-        twin = twins(part.triangles)
+        twin = twins(component.triangles)
         long = np.flatnonzero((length > 1) & (twin < np.arange(len(twin))))
-        if not len(long) or len(part.vertices) - first >= most:
+        if not len(long) or len(component.vertices) - first >= most:
             break
         order = np.argsort(-length[long], kind="stable")
-        chosen = independent_splits(part.triangles, long[order])
+        chosen = independent_splits(component.triangles, long[order])
         longest = np.concatenate([longest, (longest[tail[chosen]] + longest[head[chosen]]) / 2])
-        part = split_part(part, chosen)
-    return part
+        component = split_component(component, chosen)
+    return component
 
 
-def split_part(part: Part, h: np.ndarray) -> Part:
-    """The part with a vertex in the middle of the edges of halfedges h (k,), no two of which share a triangle."""
-    edit = split_edges(part.vertices, part.triangles, h)
-    both = np.concatenate([h, twins(part.triangles)[h]])
+def split_component(component: Component, h: np.ndarray) -> Component:
+    """Put a vertex in the middle of the edges of halfedges h (k,) of a component; no two share a triangle."""
+    edit = split_edges(component.vertices, component.triangles, h)
+    both = np.concatenate([h, twins(component.triangles)[h]])
     both = both[both >= 0]
     t = both // 3
-    a, b, c = (part.within[t, k % 3] for k in (both, next_halfedge(both), previous_halfedge(both)))
+    a, b, c = (component.input_barycentric[t, k % 3] for k in (both, next_halfedge(both), previous_halfedge(both)))
     middle = (a + b) / 2
-    within = np.concatenate([part.within, np.stack([middle, b, c], axis=1)])
-    within[t] = np.stack([a, middle, c], axis=1)
+    input_barycentric = np.concatenate([component.input_barycentric, np.stack([middle, b, c], axis=1)])
+    input_barycentric[t] = np.stack([a, middle, c], axis=1)
     return replace(
-        part,
+        component,
         vertices=edit.points,
         triangles=edit.triangles,
-        faces=np.concatenate([part.faces, part.faces[t]]),
-        within=within,
-        shift=np.concatenate([part.shift, part.shift[t]]),
-        features=_halved(part.features, edit.between, len(part.vertices)),
-        slits=np.sort(pair_keys(*_halved(_ends(part.slits), edit.between, len(part.vertices)).T)),
+        faces=np.concatenate([component.faces, component.faces[t]]),
+        input_barycentric=input_barycentric,
+        shift=np.concatenate([component.shift, component.shift[t]]),
+        features=_halved(component.features, edit.split_ends, len(component.vertices)),
+        to_reopen=np.sort(pair_keys(*_halved(_ends(component.to_reopen), edit.split_ends, len(component.vertices)).T)),
     )
 
 
@@ -73,9 +77,9 @@ def _ends(keys: np.ndarray) -> np.ndarray:
     return np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
 
 
-def _halved(edges: np.ndarray, between: np.ndarray, n: int) -> np.ndarray:
-    """Edges (e,2) with both halves in the place of those `between` (k,2) whose middle is the vertex n + row."""
-    keys, split = pair_keys(*edges.T), pair_keys(*between.T)
+def _halved(edges: np.ndarray, split_ends: np.ndarray, n: int) -> np.ndarray:
+    """Edges (e,2) with both halves in the place of those in `split_ends` (k,2), whose middle is the vertex n + row."""
+    keys, split = pair_keys(*edges.T), pair_keys(*split_ends.T)
     order = np.argsort(split)
     place = order[np.minimum(np.searchsorted(split, keys, sorter=order), len(split) - 1)]
     cut = split[place] == keys

@@ -1,4 +1,7 @@
-"""Edges split and collapsed, many at once: another number of vertices, the same topology."""
+"""Split and collapse edges, many at once: another number of vertices, the same topology.
+
+Collapses keep the link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999).
+"""
 
 from __future__ import annotations
 
@@ -10,22 +13,27 @@ from scipy.sparse import csr_matrix
 from ...mesh.geometry import unit
 from ...mesh.topology import halfedges, pair_keys, previous_halfedge, twins
 
-# A face may turn by this cosine at most when an edge at it collapses.
-LEAST_COSINE, ANY_COSINE = 0.3, -2.0
+# Cosine by which a face may turn at most when an edge at it collapses.
+MIN_COSINE = 0.3
+# Below every cosine: faces may turn as they will.
+ANY_COSINE = -2.0
+# Rounds of choosing collapses that are apart from each other; what they leave is for the next call.
 PASSES = 8
 
 
 @dataclass(frozen=True)
 class Edit:
-    """A mesh after an edit, points (n,3) and triangles (m,3); origin (n,): the vertex each one was, -1 for new ones;
-    between (k,2): the old ends of the edges at whose middles the new vertices are; became (old,): the vertex that each
-    old one is now."""
+    """A mesh after an edit, points (n,3) and triangles (m,3).
+
+    origin (n,): the vertex each one was, -1 for new ones; split_ends (k,2): the old ends of the edges at whose middles
+    the new vertices are; new_number (old,): the vertex that each old one is now
+    """
 
     points: np.ndarray
     triangles: np.ndarray
     origin: np.ndarray
-    between: np.ndarray
-    became: np.ndarray
+    split_ends: np.ndarray
+    new_number: np.ndarray
 
 
 def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray) -> Edit:
@@ -43,11 +51,17 @@ def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray) -> Edi
     result[t] = np.stack([a, vertex, c], axis=1)
     middle = (points[tail[h]] + points[head[h]]) / 2
     origin = np.concatenate([np.arange(n), np.full(k, -1)])
-    return Edit(np.concatenate([points, middle]), result, origin, np.stack([tail[h], head[h]], axis=1), np.arange(n))
+    return Edit(
+        points=np.concatenate([points, middle]),
+        triangles=result,
+        origin=origin,
+        split_ends=np.stack([tail[h], head[h]], axis=1),
+        new_number=np.arange(n),
+    )
 
 
 def independent_splits(triangles: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """Those of the halfedges h (k,), most wanted first, whose triangles no more wanted one has."""
+    """Choose those of the halfedges h (k,), in order of preference, whose triangles none before them has."""
     twin = twins(triangles)
     rank = np.arange(len(h))
     t, s = h // 3, np.where(twin[h] >= 0, twin[h], h) // 3
@@ -63,29 +77,29 @@ def collapse_edges(
     h: np.ndarray,
     fixed: np.ndarray,
     most: int,
-    least_cosine: float = LEAST_COSINE,
+    min_cosine: float = MIN_COSINE,
     along: bool = False,
 ) -> Edit:
-    """Collapse up to `most` of the edges of interior halfedges h (k,), most wanted first; see `_possible`.
+    """Collapse up to `most` of the edges of interior halfedges h (k,), in order, as far as the topology allows.
 
     The two ends meet in the middle, or where the one is that is `fixed` (n,) bool or on a boundary. No face turns by
     more than `least_cosine`. Edges `along` lines may be on boundaries, and their ends meet in one of them.
     """
     n = len(points)
     tail, head = halfedges(triangles)
-    rim = np.zeros(n, dtype=bool)
-    rim[tail[twins(triangles) < 0]] = True
-    held = fixed if along else fixed | rim
-    h = h[~(held[tail[h]] & held[head[h]])]
-    keep, gone = np.where(held[tail[h]], tail[h], head[h]), np.where(held[tail[h]], head[h], tail[h])
+    boundary = np.zeros(n, dtype=bool)
+    boundary[tail[twins(triangles) < 0]] = True
+    fixed_ends = fixed if along else fixed | boundary
+    h = h[~(fixed_ends[tail[h]] & fixed_ends[head[h]])]
+    keep, gone = np.where(fixed_ends[tail[h]], tail[h], head[h]), np.where(fixed_ends[tail[h]], head[h], tail[h])
     neighbours = csr_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n)) + csr_matrix(
         (np.ones(len(tail)), (head, tail)), shape=(n, n)
     )
     neighbours.data[:] = 1
-    place = np.where(held[keep][:, None] | along, points[keep], (points[keep] + points[gone]) / 2)
-    ok = _possible(points, triangles, h, neighbours, rim)
+    place = np.where(fixed_ends[keep][:, None] | along, points[keep], (points[keep] + points[gone]) / 2)
+    ok = _keeps_topology(points, triangles, h, neighbours, boundary)
     keep, gone, place = keep[ok], gone[ok], place[ok]
-    chosen = _chosen(points, triangles, neighbours, keep, gone, place, most, least_cosine)
+    chosen = _chosen(points, triangles, neighbours, keep, gone, place, most, min_cosine)
     keep, gone, place = keep[chosen], gone[chosen], place[chosen]
     moved, target = points.copy(), np.arange(n)
     moved[keep] = place
@@ -96,49 +110,55 @@ def collapse_edges(
     stay = np.ones(n, dtype=bool)
     stay[gone] = False
     number = np.cumsum(stay) - 1
-    return Edit(moved[stay], number[result], np.flatnonzero(stay), np.zeros((0, 2), np.int64), number[target])
+    return Edit(
+        points=moved[stay],
+        triangles=number[result],
+        origin=np.flatnonzero(stay),
+        split_ends=np.zeros((0, 2), np.int64),
+        new_number=number[target],
+    )
 
 
-def _possible(points, triangles, h, neighbours, rim) -> np.ndarray:
+def _keeps_topology(points, triangles, h, neighbours, boundary) -> np.ndarray:
     """Edges (k,) bool whose ends share two neighbours and no more (the link condition), none of valence three."""
     tail, head = halfedges(triangles)
     common = np.asarray(neighbours[tail[h]].multiply(neighbours[head[h]]).sum(axis=1)).ravel()
     valence = np.diff(neighbours.indptr)
     twin = twins(triangles)
-    open_ = twin[h] < 0
+    single = twin[h] < 0
     left = tail[previous_halfedge(h)]
-    right = np.where(open_, left, tail[previous_halfedge(twin[h])])
-    thick = (valence[left] > 3 + ~rim[left] - 1) & (valence[right] > 3 + ~rim[right] - 1)
+    right = np.where(single, left, tail[previous_halfedge(twin[h])])
+    thick = (valence[left] > 3 + ~boundary[left] - 1) & (valence[right] > 3 + ~boundary[right] - 1)
     # Between two boundaries, or two places of one, a collapse would pinch the surface.
-    across = ~open_ & rim[tail[h]] & rim[head[h]]
-    return (common == 2 - open_) & thick & (open_ | (left != right)) & ~across
+    across = ~single & boundary[tail[h]] & boundary[head[h]]
+    return (common == 2 - single) & thick & (single | (left != right)) & ~across
 
 
-def _chosen(points, triangles, neighbours, keep, gone, place, most: int, least_cosine: float) -> np.ndarray:
-    """Up to `most` of the collapses (k,), most wanted first, none of which folds, or has neighbours of another one's.
+def _chosen(points, triangles, neighbours, keep, gone, place, most: int, min_cosine: float) -> np.ndarray:
+    """Choose up to `most` of the collapses (k,), in order, none of which folds, or has neighbours of another one's.
 
     What folds only shows when it is chosen, and others that it kept away take its place in the next pass.
     """
     owner, member = _rings(neighbours, keep, gone)
     chosen = np.zeros(0, np.int64)
-    open_ = np.ones(len(keep), dtype=bool)
+    undecided = np.ones(len(keep), dtype=bool)
     for _ in range(PASSES):
-        free = open_[owner]
+        free = undecided[owner]
         owner, member = owner[free], member[free]
         first = np.full(len(points), len(keep))
         np.minimum.at(first, member, owner)
-        apart = open_.copy()
+        apart = undecided.copy()
         apart[owner[first[member] != owner]] = False
         mine = np.flatnonzero(apart)
-        sound = _unfolded(points, triangles, keep[mine], gone[mine], place[mine], least_cosine)
+        sound = _unfolded(points, triangles, keep[mine], gone[mine], place[mine], min_cosine)
         chosen = np.concatenate([chosen, mine[sound]])
-        open_[mine] = False
+        undecided[mine] = False
         busy = np.zeros(len(points), dtype=bool)
         taken = np.zeros(len(keep), dtype=bool)
         taken[mine[sound]] = True
         busy[member[taken[owner]]] = True
-        open_[owner[busy[member]]] = False
-        if len(chosen) >= most or not open_.any():
+        undecided[owner[busy[member]]] = False
+        if len(chosen) >= most or not undecided.any():
             break
     return np.sort(chosen)[:most]
 
@@ -153,8 +173,8 @@ def _rings(neighbours: csr_matrix, keep: np.ndarray, gone: np.ndarray) -> tuple[
     return np.concatenate(owners), np.concatenate(members)
 
 
-def _unfolded(points, triangles, keep, gone, place, least_cosine: float) -> np.ndarray:
-    """Collapses (k,) bool that turn no face around them over."""
+def _unfolded(points, triangles, keep, gone, place, min_cosine: float) -> np.ndarray:
+    """Collapses (k,) bool that fold no face around them."""
     n = len(points)
     moved, target, owner = points.copy(), np.arange(n), np.full(n, -1)
     moved[keep] = moved[gone] = place
@@ -167,7 +187,7 @@ def _unfolded(points, triangles, keep, gone, place, least_cosine: float) -> np.n
     old, new = points[t], moved[t]
     before = unit(np.cross(old[:, 1] - old[:, 0], old[:, 2] - old[:, 0]))
     after = unit(np.cross(new[:, 1] - new[:, 0], new[:, 2] - new[:, 0]))
-    folded = stays & (np.einsum("ij,ij->i", before, after) < least_cosine)
+    folded = stays & (np.einsum("ij,ij->i", before, after) < min_cosine)
     sound = np.ones(len(keep), dtype=bool)
     sound[mine[folded]] = False
     return sound

@@ -1,4 +1,4 @@
-"""A mesh in the making."""
+"""Hold a mesh in the making, and what must not change about it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Draft:
-    """points (n,3), triangles (m,3), fixed (n,) bool: vertices that stay, which come first; locked: sorted keys
-    (`topology.pair_keys`) of edges that stay; delaunay: whether edges flip to Delaunay as vertices move."""
+class WorkingMesh:
+    """A mesh in the making: points (n,3), triangles (m,3).
+
+    fixed (n,) bool: vertices that stay, which come first; locked: sorted keys (`topology.pair_keys`) of edges that
+    stay; delaunay: whether edges flip to Delaunay as vertices move
+    """
 
     points: np.ndarray
     triangles: np.ndarray

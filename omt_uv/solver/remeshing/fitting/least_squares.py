@@ -1,10 +1,12 @@
-"""The linear least squares problem of a fit: distances vanish along the lines between pairs of closest points, while
-vertices stay near the centroids of their cells and triangles in shape.
+"""Solve the linear least squares problem of a fit: distances vanish along the lines between pairs of closest points.
 
-Hoppe, DeRose, Duchamp, McDonald, Stuetzle 1993; Chen, Medioni 1992.
+Vertices stay near the centroids of their cells meanwhile, and triangles in shape (Hoppe, DeRose, Duchamp, McDonald,
+Stuetzle 1993; distances along lines, as in Chen, Medioni 1992).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,23 +14,40 @@ import scipy.sparse as sp
 from ...linalg.sparse import conjugate_gradients
 from ...mesh.geometry import face_normals, vertex_normals
 from ...mesh.topology import halfedges
-from .closest_pairs import Pairs
+from .closest_pairs import ClosestPairs
 from .shape_terms import Fairness, equilateral, smallness
 
-# Weights next to the distances: of even displacements, of the centroids along the surface, of no displacement at all.
+# Weight of even displacements next to the distances,
 FAIRNESS = 0.02
+# of the centroids along the surface,
 CENTROID = 0.35
-STILL = 1e-3
-# Distances of this many times their mean count double, and up to 1 + FARTHEST^2 times.
-FAR, FARTHEST = 3.0, 3.0
-# The centroid's weight rises by PRESS where angles are small, and falls by half where a point around is EASY times the
-# mean distance away: to come closer to a crest, vertices have to slide onto it.
-PRESS = 3.0
-EASY, EASIEST = 6.0, 0.05
+# and of no displacement at all.
+STILLNESS = 1e-3
+# Distances of this many times the root of their mean square count double,
+FAR = 3.0
+# and farther ones up to 1 + this squared times.
+FARTHEST = 3.0
+# Factor by which the centroid's weight rises, besides 1, where angles are small.
+SMALL_ANGLES = 3.0
+# It falls by half where a point around is so many times the usual distance away: to come closer to a crest, vertices
+# have to slide onto it;
+EASY = 6.0
+# and down to this share.
+EASIEST = 0.05
 # Relative residual of the moves.
 TOLERANCE = 1e-6
 # Where the entries of a symmetric matrix (3,3) are in a list of the six that differ.
 SYMMETRIC = ((0, 1, 2), (1, 3, 4), (2, 4, 5))
+
+
+@dataclass(frozen=True)
+class DistanceWeighting:
+    """How distances count: below `close` they have no direction but the normal's, many times `rms` they weigh more, and
+    centroids less, unless `keep_centroids`."""
+
+    close: float
+    rms: float
+    keep_centroids: bool = False
 
 
 def displacements(
@@ -36,33 +55,30 @@ def displacements(
     triangles: np.ndarray,
     twin: np.ndarray,
     fixed: np.ndarray,
-    pairs: Pairs,
-    pull: np.ndarray,
-    close: float,
-    usual: float,
-    firm: bool = False,
+    pairs: ClosestPairs,
+    to_centroid: np.ndarray,
+    weighting: DistanceWeighting,
 ) -> np.ndarray:
     """Moves (n,3) of the vertices of a mesh (n,3), (m,3), but for the `fixed` (n,) bool, that bring pairs together.
 
-    pull (n,3): from every vertex to the centroid of its cell; distances below `close` have no direction but the
-        normal's, and those many times the `usual` one weigh more; firm: centroids count whatever the distances are
+    twin (3m,): opposite halfedges; to_centroid (n,3): from every vertex to the centroid of its cell
     """
     n, normals = len(points), vertex_normals(points, triangles)
     along = np.eye(3) - normals[:, :, None] * normals[:, None]
     bad = smallness(points, triangles)
-    hold = CENTROID * (1 + PRESS * _worst_around(triangles, bad, n))
-    if not firm:
-        hold *= _ease(triangles, pairs, usual, n)
-    diagonal, between, right = _distances(triangles, n, pairs, face_normals(points, triangles), close, usual)
-    springs = equilateral(points, triangles, bad)
+    centroid_weight = CENTROID * (1 + SMALL_ANGLES * _largest_around(triangles, bad, n))
+    if not weighting.keep_centroids:
+        centroid_weight *= _eased(triangles, pairs, weighting.rms, n)
+    diagonal, between, right = _distances(triangles, n, pairs, face_normals(points, triangles), weighting)
+    forces = equilateral(points, triangles, bad)
     # Shapes change along the surface alone.
     tail, head = halfedges(triangles)
-    tense = np.flatnonzero(springs.between)
+    tense = np.flatnonzero(forces.between)
     between = np.stack([between, between])
-    there = springs.between[tense, None, None] * (along[tail[tense]] @ along[head[tense]])
+    there = forces.between[tense, None, None] * (along[tail[tense]] @ along[head[tense]])
     between[:, tense] += np.stack([there, there.transpose(0, 2, 1)])
-    diagonal += (hold + springs.diagonal)[:, None, None] * along + STILL * np.eye(3)
-    right += np.einsum("nij,nj->ni", along, hold[:, None] * pull + springs.force)
+    diagonal += (centroid_weight + forces.diagonal)[:, None, None] * along + STILLNESS * np.eye(3)
+    right += np.einsum("nij,nj->ni", along, centroid_weight[:, None] * to_centroid + forces.force)
     system = _matrix(triangles, twin, diagonal, between)
     even, free = Fairness(triangles, twin, n), np.repeat(~fixed, 3)
 
@@ -75,16 +91,16 @@ def displacements(
 
 
 def _distances(
-    triangles: np.ndarray, n: int, pairs: Pairs, normals: np.ndarray, close: float, usual: float
+    triangles: np.ndarray, n: int, pairs: ClosestPairs, normals: np.ndarray, weighting: DistanceWeighting
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of the pairs' squared distances, the blocks (n,3,3) of their matrix on the diagonal and (3m,3,3) at halfedges,
     and the right side (n,3)."""
     m, flat = len(triangles), triangles.ravel()
-    direction = pairs.way / np.maximum(pairs.distance, 1e-300)[:, None]
-    near = np.flatnonzero(pairs.distance < close)
+    direction = pairs.offset / np.maximum(pairs.distance, 1e-300)[:, None]
+    near = np.flatnonzero(pairs.distance < weighting.close)
     direction[near] = normals[pairs.faces[near]]
-    weight = pairs.weight * (1 + np.minimum(pairs.distance / (FAR * usual), FARTHEST) ** 2)
-    off = weight * np.einsum("ki,ki->k", direction, pairs.way)
+    weight = pairs.weight * (1 + np.minimum(pairs.distance / (FAR * weighting.rms), FARTHEST) ** 2)
+    off = weight * np.einsum("ki,ki->k", direction, pairs.offset)
     b, u = np.ascontiguousarray(pairs.barycentric.T), np.ascontiguousarray(direction.T)
     squares = [weight * u[i] * u[j] for i in range(3) for j in range(i, 3)]
 
@@ -107,25 +123,25 @@ def _matrix(triangles: np.ndarray, twin: np.ndarray, diagonal: np.ndarray, betwe
     """The matrix (3n,3n) with blocks (n,3,3) on the diagonal, and between the ends of the edges the sums of those of
     their halfedges, from tail to head and back (2,3m,3,3)."""
     n, (tail, head) = len(diagonal), halfedges(triangles)
-    inner, rim = np.flatnonzero(twin >= 0), np.flatnonzero(twin < 0)
+    inner, boundary = np.flatnonzero(twin >= 0), np.flatnonzero(twin < 0)
     there = between[0]
     there[inner] += between[1, twin[inner]]
-    rows = np.concatenate([np.arange(n), tail, head[rim]])
-    columns = np.concatenate([np.arange(n), head, tail[rim]])
+    rows = np.concatenate([np.arange(n), tail, head[boundary]])
+    columns = np.concatenate([np.arange(n), head, tail[boundary]])
     order = np.argsort(rows, kind="stable")
     first = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
-    blocks = np.concatenate([diagonal, there, between[1, rim]])
+    blocks = np.concatenate([diagonal, there, between[1, boundary]])
     return sp.bsr_matrix((blocks[order], columns[order], first), shape=(3 * n, 3 * n))
 
 
-def _ease(triangles: np.ndarray, pairs: Pairs, usual: float, n: int) -> np.ndarray:
+def _eased(triangles: np.ndarray, pairs: ClosestPairs, rms: float, n: int) -> np.ndarray:
     """Share of the centroid's weight that is left at every vertex, (n,)."""
-    farthest = _worst_around(triangles, pairs.worst(len(triangles)), n) / usual
+    farthest = _largest_around(triangles, pairs.largest_distance(len(triangles)), n) / rms
     return np.maximum(1 / (1 + (farthest / EASY) ** 2), EASIEST)
 
 
-def _worst_around(triangles: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
+def _largest_around(triangles: np.ndarray, values: np.ndarray, n: int) -> np.ndarray:
     """The largest of the values (m,) of the triangles around every vertex, (n,)."""
-    worst = np.zeros(n)
-    np.maximum.at(worst, triangles.ravel(), np.repeat(values, 3))
-    return worst
+    largest = np.zeros(n)
+    np.maximum.at(largest, triangles.ravel(), np.repeat(values, 3))
+    return largest

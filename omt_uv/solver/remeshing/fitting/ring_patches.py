@@ -1,4 +1,4 @@
-"""Small pieces cut out of a mesh, several copies of each, to try something else on every one."""
+"""Cut small patches out of a mesh, disjoint rings around faces, to try something on copies of each."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Patches:
-    """Disjoint pieces of a mesh, the vertices within some edges of a face in the middle of each.
+class RingPatches:
+    """Disjoint patches of a mesh, the vertices within some edges of a face in the middle of each.
 
-    vertices (v,) and faces (f,) of the mesh; triangles (f,3) of the pieces' own vertices; outer (v,) bool: the last
-    ring of vertices; of_vertex (v,), of_face (f,): which piece; middle (p,): the face of every piece in the middle.
+    vertices (v,) and faces (f,) of the mesh; triangles (f,3) of the patches' own vertices; outer (v,) bool: the last
+    ring of vertices; of_vertex (v,), of_face (f,): which patch; middle (p,): the face of every patch in the middle.
     """
 
     vertices: np.ndarray
@@ -27,8 +27,8 @@ class Patches:
         return len(self.middle)
 
 
-def cut_out(triangles: np.ndarray, middle: np.ndarray, n: int, rings: int) -> Patches:
-    """Pieces of a mesh (m,3) with n vertices around faces (p,) that are more than 2 `rings` + 2 edges apart."""
+def cut_patches(triangles: np.ndarray, middle: np.ndarray, n: int, rings: int) -> RingPatches:
+    """Cut patches out of a mesh (m,3) with n vertices, around faces (p,) more than 2 `rings` + 2 edges apart."""
     label = np.full(n, -1)
     label[triangles[middle].ravel()] = np.repeat(np.arange(len(middle)), 3)
     inner = _grown(triangles, label, rings)
@@ -38,10 +38,18 @@ def cut_out(triangles: np.ndarray, middle: np.ndarray, n: int, rings: int) -> Pa
     number = np.zeros(len(triangles), np.int64)
     number[faces] = np.arange(len(faces))
     of_face = label[triangles[faces, 0]]
-    return Patches(vertices, faces, own.reshape(-1, 3), inner[vertices] < 0, label[vertices], of_face, number[middle])
+    return RingPatches(
+        vertices=vertices,
+        faces=faces,
+        triangles=own.reshape(-1, 3),
+        outer=inner[vertices] < 0,
+        of_vertex=label[vertices],
+        of_face=of_face,
+        middle=number[middle],
+    )
 
 
-def grown(triangles: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
+def within_rings(triangles: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
     """Vertices (n,) bool within so many edges of those of a mask (n,)."""
     return _grown(triangles, np.where(mask, 0, -1), rings) >= 0
 
@@ -61,8 +69,8 @@ def _spread(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
     return label
 
 
-def apart(triangles: np.ndarray, faces: np.ndarray, n: int, rings: int, most: int) -> np.ndarray:
-    """Those of the faces (k,), most wanted first, with no more wanted one within so many edges; up to `most`."""
+def spaced_faces(triangles: np.ndarray, faces: np.ndarray, n: int, rings: int, most: int) -> np.ndarray:
+    """Choose those of the faces (k,), in order of preference, with none before within so many edges; up to `most`."""
     chosen = np.zeros(0, np.int64)
     while len(faces) and len(chosen) < most:
         rank = np.full(n, len(faces))
@@ -73,6 +81,6 @@ def apart(triangles: np.ndarray, faces: np.ndarray, n: int, rings: int, most: in
         chosen = np.concatenate([chosen, first])
         near = np.zeros(n, dtype=bool)
         near[triangles[first]] = True
-        near = grown(triangles, near, rings)
+        near = within_rings(triangles, near, rings)
         faces = faces[~near[triangles[faces]].any(axis=1)]
     return chosen[:most]

@@ -1,4 +1,4 @@
-"""What keeps triangles in shape while a mesh is fitted."""
+"""Keep triangles in shape while a mesh is fitted: forces to equilateral triangles, and even displacements."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import scipy.sparse as sp
 from ...mesh.geometry import face_normals, least_angles
 from ...mesh.topology import halfedges
 
-# Where angles fall below the first, springs set in, and are twice as strong as STRENGTH at most where they are smaller
-# than twice the way to the second.
-SMALL, SMALLER = np.radians(44.0), np.radians(36.0)
+# Angle, radians, below which forces set in,
+SMALL = np.radians(44.0)
+# and at which they have their full strength; at most they have twice as much.
+SMALLER = np.radians(36.0)
+# Full strength, next to the distances.
 STRENGTH = 0.5
 
 
@@ -22,8 +24,8 @@ def smallness(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Springs:
-    """A matrix of scalars: its diagonal (n,), and what every halfedge adds between its ends, both ways, (3m,); and a
+class ShapeForces:
+    """A matrix of scalars, its diagonal (n,), and what every halfedge adds between its ends, both ways, (3m,); and a
     force (n,3)."""
 
     diagonal: np.ndarray
@@ -31,8 +33,8 @@ class Springs:
     force: np.ndarray
 
 
-def equilateral(points: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> Springs:
-    """Springs of triangles (m,3), in proportion to `bad` (m,), to the equilateral ones nearest to them.
+def equilateral(points: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> ShapeForces:
+    """Forces of triangles (m,3), in proportion to `bad` (m,), to the equilateral ones nearest to them.
 
     The squared differences of their corners from their targets, both about their centroids. With R the rotation by a
     third about the normal, the target of the first corner is (o_0 + R^-1 o_1 + R o_2) / 3 for the corners' offsets o
@@ -53,7 +55,7 @@ def equilateral(points: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> S
     # The squares of three offsets from their mean are a third of those of their differences.
     between = np.zeros((len(triangles), 3))
     between[mine] = -weight[:, None] / 3
-    return Springs(np.bincount(t.ravel(), np.repeat(2 * weight / 3, 3), n), between.ravel(), force)
+    return ShapeForces(np.bincount(t.ravel(), np.repeat(2 * weight / 3, 3), n), between.ravel(), force)
 
 
 class Fairness:
@@ -64,8 +66,8 @@ class Fairness:
 
     def __init__(self, triangles: np.ndarray, twin: np.ndarray, n: int):
         tail, head = halfedges(triangles)
-        rim = twin < 0
-        rows, columns = np.concatenate([tail, head[rim]]), np.concatenate([head, tail[rim]])
+        boundary = twin < 0
+        rows, columns = np.concatenate([tail, head[boundary]]), np.concatenate([head, tail[boundary]])
         weight = 1 / np.maximum(np.bincount(rows, minlength=n), 1)
         self._mean = sp.csr_matrix((weight[rows], (rows, columns)), shape=(n, n))
         self._back = self._mean.T.tocsr()

@@ -1,4 +1,4 @@
-"""Samples on boundaries that need not be kept: they slide until they are evenly apart, on a curve without frays."""
+"""Slide samples on boundaries that need not be kept until they are evenly apart, on a curve without frays."""
 
 from __future__ import annotations
 
@@ -6,43 +6,44 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...mesh.topology import boundary_loops, pair_keys
-from ..components.components import Part
-from .arc_network import ArcSamples, Network
+from ...mesh.topology import boundary_loops
+from ..components.components import Component
+from .arc_network import ArcNetwork, ArcSamples
 
-# A sample is the mean of its part of the boundary, at so many points, those near to it weighing more: frays that the
-# new edges are too long to show vanish, and what they can show stays.
-SHARE = (np.arange(16) + 0.5) / 16
-WEIGHT = 1 - np.abs(2 * SHARE - 1)
+# A sample is the mean of its part of the boundary, at these shares of it: frays that the new edges are too long to show
+# vanish, and what they can show stays.
+PLACES = (np.arange(16) + 0.5) / 16
+# Weights of these, a hat: those near to the sample weigh more.
+PLACE_WEIGHT = 1 - np.abs(2 * PLACES - 1)
+# Rounds of sliding.
 ROUNDS = 8
 
 
-def smooth_rims(part: Part, lines: Network, samples: ArcSamples, size: np.ndarray) -> ArcSamples:
-    """The samples with those of the part's boundaries moved along these, about `size` (n,) at every vertex apart.
+def slide_boundaries(component: Component, network: ArcNetwork, samples: ArcSamples, size: np.ndarray) -> ArcSamples:
+    """Move the samples of a component's boundaries along these, about `size` (n,) at every vertex apart.
 
     What a feature ends in stays where it is.
     """
-    rim = [bool(np.isin(pair_keys(*arc.vertices[:2, None]), part.rim)[0]) for arc in lines.arcs]
-    ends = [samples.along[k][[0, -1]] for k, arc in enumerate(lines.arcs) if arc.held and not rim[k]]
+    on = network.along(component.boundary_edges)
+    ends = [samples.along[k][[0, -1]] for k, arc in enumerate(network.arcs) if arc.kept and k not in on]
     pinned = np.zeros(len(samples.points), dtype=bool)
     pinned[np.concatenate([np.zeros(0, np.int64), *ends])] = True
-    on = [k for k, open_ in enumerate(rim) if open_]
     if not on:
         return samples
     # Every arc without its end, which the next one begins with.
     mine = np.concatenate([samples.along[k][:-1] for k in on])
-    vertex = np.concatenate([lines.arcs[k].vertices[samples.edge[k][:-1]] for k in on])
+    vertex = np.concatenate([network.arcs[k].vertices[samples.edge[k][:-1]] for k in on])
     share = np.concatenate([samples.share[k][:-1] for k in on])
     points = samples.points.copy()
-    for loop in boundary_loops(part.triangles):
-        place = np.full(len(part.vertices), -1)
+    for loop in boundary_loops(component.triangles):
+        place = np.full(len(component.vertices), -1)
         place[loop] = np.arange(len(loop))
         here = np.flatnonzero(place[vertex] >= 0)
         where = place[vertex[here]] + share[here]
         order = np.argsort(where, kind="stable")
         chosen = mine[here[order]]
         closed = np.append(loop, loop[0])
-        curve = _Curve(part.vertices[closed], size[closed])
+        curve = _Curve(component.vertices[closed], size[closed])
         points[chosen] = _settled(curve, where[order], pinned[chosen])
     return replace(samples, points=points)
 
@@ -64,7 +65,7 @@ class _Curve:
         around = np.concatenate([[s[-1] - self.length[-1]], s, [s[0] + self.length[-1]]])
         middle = (around[1:] + around[:-1]) / 2
         low, high = middle[:-1, None], middle[1:, None]
-        return np.einsum("p,kpi->ki", WEIGHT / WEIGHT.sum(), self.at(low + (high - low) * SHARE))
+        return np.einsum("p,kpi->ki", PLACE_WEIGHT / PLACE_WEIGHT.sum(), self.at(low + (high - low) * PLACES))
 
 
 def _settled(curve: _Curve, where: np.ndarray, pinned: np.ndarray) -> np.ndarray:

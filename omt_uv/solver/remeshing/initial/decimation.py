@@ -1,4 +1,4 @@
-"""The first mesh of a part without maps: its own triangles, long edges halved and short ones collapsed.
+"""Decimate a component's own triangles, for a first mesh without maps: long edges halved, short ones collapsed.
 
 It needs no cut, lies on the surface from the beginning, and does not fold, of whatever topology and however thin.
 """
@@ -11,72 +11,81 @@ import numpy as np
 
 from ...mesh.closest_point import ClosestPoint
 from ...mesh.topology import pair_keys, twins
-from ..components.components import Part
+from ..components.components import Component
 from ..edits.delaunay_flips import make_delaunay_embedded
-from ..edits.long_edges import bisected
-from ..edits.vertex_count import EdgeSize, StuckError, adjust_count
-from ..edits.working_mesh import Draft
+from ..edits.long_edges import split_long_edges
+from ..edits.vertex_count import SizingField, StuckError, reach_vertex_count
+from ..edits.working_mesh import WorkingMesh
 from .arc_network import Arc, ArcSamples
-from .feature_lines import Lined, only_between, with_samples, without_short
+from .feature_lines import LineMesh, collapse_along_lines, collapse_short_edges, insert_samples
 
-# Edges up to so many times as long as wanted need not be halved, and shorter ones than so many collapse before.
-LONGEST, SHORTEST = 1.3, 0.3
+# Edges up to so many times as long as their target need not be halved,
+LONGEST = 1.3
+# and shorter ones than so many collapse before.
+SHORTEST = 0.3
 # Needles may take many halvings: no more than so many times as many as there are to be vertices.
-MOST = 3
+MAX_NEW = 3
 
 
-def simplified(part: Part, count: int, density: np.ndarray, size: float) -> Draft:
-    """A mesh of a closed part with `count` vertices, or a few more where no edge collapses any more.
+def decimated(component: Component, count: int, density: np.ndarray, size: float) -> WorkingMesh:
+    """Decimate a closed component to `count` vertices, or a few more where no edge collapses any more.
 
-    density (m,) of the part's triangles, of mean 1; size: edge length at density 1
+    density (m,) of the component's triangles, of mean 1; size: edge length at density 1
     """
     none = np.zeros((0, 2), np.int64)
-    mesh = Lined(part.vertices, part.triangles, none, none, none.ravel())
-    return _brought_to(part, mesh, count, _wanted(part, density, size))[0]
+    mesh = LineMesh(component.vertices, component.triangles, none, none, none.ravel())
+    return _reached(component, mesh, count, _sizing(component, density, size))[0]
 
 
-def simplified_between(
-    part: Part, arcs: list[Arc], samples: ArcSamples, count: int, density: np.ndarray, size: float
-) -> tuple[Draft, np.ndarray]:
-    """The same with the samples of held arcs fixed and edges between them locked; and the sorted keys of slits."""
-    cut, vertex = with_samples(part, arcs, samples)
-    mesh = only_between(cut, vertex[samples.fixed])
+def decimated_between_lines(
+    component: Component, arcs: list[Arc], samples: ArcSamples, count: int, density: np.ndarray, size: float
+) -> tuple[WorkingMesh, np.ndarray]:
+    """Decimate between the samples of kept arcs, which are fixed, and edges between them locked; and the keys of edges
+    to reopen, sorted."""
+    cut, vertex = insert_samples(component, arcs, samples)
+    mesh = collapse_along_lines(cut, vertex[samples.fixed])
     mesh.points[mesh.vertices] = samples.points[samples.fixed]
-    return _brought_to(part, mesh, count, _wanted(part, density, size))
+    return _reached(component, mesh, count, _sizing(component, density, size))
 
 
-def _wanted(part: Part, density: np.ndarray, size: float) -> EdgeSize:
-    return EdgeSize(ClosestPoint(part.vertices, part.triangles, size), density, size)
+def _sizing(component: Component, density: np.ndarray, size: float) -> SizingField:
+    return SizingField(ClosestPoint(component.vertices, component.triangles, size), density, size)
 
 
-def _brought_to(part: Part, mesh: Lined, count: int, wanted: EdgeSize) -> tuple[Draft, np.ndarray]:
+def _reached(component: Component, mesh: LineMesh, count: int, sizing: SizingField) -> tuple[WorkingMesh, np.ndarray]:
     # Needles would be halved again and again.
-    mesh = without_short(mesh, lambda points: SHORTEST * wanted(points))
-    fine = bisected(_as_part(part, mesh), LONGEST * wanted(mesh.points), MOST * count)
-    draft, slits = _draft(only_between(fine, mesh.vertices))
+    mesh = collapse_short_edges(mesh, lambda points: SHORTEST * sizing(points))
+    fine = split_long_edges(_as_component(component, mesh), LONGEST * sizing(mesh.points), MAX_NEW * count)
+    working, to_reopen = _working_mesh(collapse_along_lines(fine, mesh.vertices))
     try:
-        return adjust_count(draft, count, wanted), slits
+        return reach_vertex_count(working, count, sizing), to_reopen
     except StuckError as error:
-        return error.draft, slits
+        return error.mesh, to_reopen
 
 
-def _as_part(part: Part, mesh: Lined) -> Part:
-    """The mesh with lines as features; where its triangles lie in the input is of no interest any more."""
+def _as_component(component: Component, mesh: LineMesh) -> Component:
+    """The mesh with its lines as features; where its triangles lie in the input is of no interest any more."""
     m = len(mesh.triangles)
-    slits = np.sort(pair_keys(*mesh.slits.T))
-    nowhere = {"faces": np.zeros(m, np.int64), "within": np.zeros((m, 3, 3)), "shift": np.zeros((m, 3))}
+    to_reopen = np.sort(pair_keys(*mesh.to_reopen.T))
+    nowhere = {"faces": np.zeros(m, np.int64), "input_barycentric": np.zeros((m, 3, 3)), "shift": np.zeros((m, 3))}
     return replace(
-        part, vertices=mesh.points, triangles=mesh.triangles, features=mesh.lines, slits=slits, members=(), **nowhere
+        component,
+        vertices=mesh.points,
+        triangles=mesh.triangles,
+        features=mesh.lines,
+        to_reopen=to_reopen,
+        members=(),
+        **nowhere,
     )
 
 
-def _draft(mesh: Lined) -> tuple[Draft, np.ndarray]:
-    """The mesh, Delaunay, with all vertices on lines fixed, and its slits; those that stay come first."""
+def _working_mesh(mesh: LineMesh) -> tuple[WorkingMesh, np.ndarray]:
+    """The mesh, Delaunay, with all vertices on lines fixed and first, and the keys of edges to reopen."""
     fixed = np.zeros(len(mesh.points), dtype=bool)
     fixed[mesh.lines] = fixed[mesh.vertices] = True
     order = np.argsort(~fixed, kind="stable")
     number = np.argsort(order, kind="stable")
     triangles, points = number[mesh.triangles], mesh.points[order]
-    locked, slits = (np.sort(pair_keys(*number[pairs].T)) for pairs in (mesh.lines, mesh.slits))
+    locked, to_reopen = (np.sort(pair_keys(*number[pairs].T)) for pairs in (mesh.lines, mesh.to_reopen))
     make_delaunay_embedded(points, triangles, twins(triangles), locked)
-    return Draft(points, triangles, fixed[order], locked), slits
+    return WorkingMesh(points, triangles, fixed[order], locked), to_reopen

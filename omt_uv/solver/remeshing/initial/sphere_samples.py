@@ -1,7 +1,7 @@
-"""Samples of a closed surface of genus 0, evenly by measure, and their triangulation, by way of the sphere.
+"""Sample a closed surface of genus 0 evenly by measure, and triangulate the samples, by way of the sphere (B. Gu 2018).
 
-As `sampling.py`, without a cut: points that are uniform on the measure-preserving sphere are uniform on the surface,
-and the convex hull of their conformal images is a Delaunay triangulation (B. Gu 2018).
+As `disk_samples`, without a cut: points that are uniform on the measure-preserving sphere are uniform on the surface,
+and the convex hull of their conformal images is a Delaunay triangulation.
 """
 
 from __future__ import annotations
@@ -28,12 +28,14 @@ ROUNDS = 5
 TOLERANCE = 1e-2
 # Transport that takes more steps than this takes longer than doing without.
 MOST_STEPS = 40
-# Share of the samples that may lie too close together for the hull, in so many attempts without them.
-LOST, ATTEMPTS = 0.05, 5
+# Share of the samples that may lie too close together for the hull,
+MAX_LOST = 0.05
+# in so many attempts without them.
+ATTEMPTS = 5
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SphereSamples:
     """Points (k,3) on a surface, and triangles (2k-4,3) between them."""
 
     points: np.ndarray
@@ -43,7 +45,7 @@ class Sampled:
 def sphere_image(
     vertices: np.ndarray, triangles: np.ndarray, conformal: ConformalSphere, density: np.ndarray
 ) -> Steps[np.ndarray]:
-    """Map (n,3) of a closed surface (n,3), (m,3) to the sphere by optimal transport, areas times density (m,).
+    """Map a closed surface (n,3), (m,3) to the sphere, (n,3), by optimal transport, areas times density (m,) kept.
 
     A few faces may be folded. Raises TransportError, or PrecisionError, where the transport fails.
     """
@@ -57,9 +59,9 @@ def sphere_image(
 
 def sample_sphere(
     vertices: np.ndarray, triangles: np.ndarray, from_map: np.ndarray, to_map: np.ndarray, count: int
-) -> Sampled:
-    """About `count` points of a closed surface (n,3), (m,3), uniform in one of its images on the sphere (n,3), joined
-    by the convex hull of where they lie in the other (n,3).
+) -> SphereSamples:
+    """Sample a closed surface (n,3), (m,3) about `count` times, uniformly in one of its images on the sphere (n,3), and
+    join the samples by the convex hull of where they lie in the other (n,3).
 
     Raises PrecisionError where too many of them coincide there.
     """
@@ -72,16 +74,16 @@ def sample_sphere(
     for _ in range(ATTEMPTS):
         try:
             hull = by_hull(images[kept], np.zeros(len(kept)))
-            return Sampled(np.einsum("kc,kcj->kj", bary, vertices[corners])[kept], hull.triangles)
+            return SphereSamples(np.einsum("kc,kcj->kj", bary, vertices[corners])[kept], hull.triangles)
         except TransportError as error:
             kept = np.delete(kept, error.elements)
-            if not len(error.elements) or len(kept) < (1 - LOST) * count:
+            if not len(error.elements) or len(kept) < (1 - MAX_LOST) * count:
                 break
     raise PrecisionError("Samples come too close together on the sphere")
 
 
 def spread_on_sphere(count: int, rounds: int = ROUNDS) -> np.ndarray:
-    """Unit vectors (count,3) that spread evenly: a spiral of equal steps in height, and what centroids make of it."""
+    """Spread unit vectors (count,3) evenly: a spiral of equal steps in height, and what centroids make of it."""
     k = np.arange(count) + 0.5
     height, turn = 1 - 2 * k / count, k * np.pi * (3 - np.sqrt(5))
     radius = np.sqrt(1 - height**2)

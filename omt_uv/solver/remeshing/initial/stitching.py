@@ -1,4 +1,4 @@
-"""Triangulated charts glued along their common samples to one mesh that has the topology of the surface."""
+"""Stitch triangulated charts along their common samples to one mesh that has the topology of the surface."""
 
 from __future__ import annotations
 
@@ -6,37 +6,40 @@ import numpy as np
 
 from ...mesh.topology import halfedges, pair_keys, twins
 from ..edits.split_collapse import independent_splits, split_edges
-from .arc_network import Border
-from .disk_samples import Patch
+from .arc_network import ChartBoundary
+from .disk_samples import ChartMesh
 
-MOST_ROUNDS = 50
+# Rounds of splits of edges without a triangle in common.
+MAX_ROUNDS = 50
 
 
-def glue(shared: np.ndarray, borders: list[Border], patches: list[Patch]) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n,3), the samples on arcs `shared` (s,3) first, and triangles (m,3).
+def stitch(
+    shared: np.ndarray, boundaries: list[ChartBoundary], charts: list[ChartMesh]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stitch charts to a mesh: points (n,3), the samples on arcs `shared` (s,3) first, and triangles (m,3).
 
     Edges inside of charts that join the same two samples on arcs as another edge does, or one with itself, get a
     vertex in the middle, so that two vertices have at most one edge.
     """
     number, points, triangles = [], [], []
     total, local = len(shared), 0
-    for border, patch in zip(borders, patches, strict=True):
-        number.append(np.concatenate([border.samples, total + np.arange(len(patch.points))]))
-        points.append(np.concatenate([shared[border.samples], patch.points]))
-        triangles.append(patch.triangles + local)
-        total, local = total + len(patch.points), local + len(number[-1])
+    for chart_boundary, chart in zip(boundaries, charts, strict=True):
+        number.append(np.concatenate([chart_boundary.samples, total + np.arange(len(chart.points))]))
+        points.append(np.concatenate([shared[chart_boundary.samples], chart.points]))
+        triangles.append(chart.triangles + local)
+        total, local = total + len(chart.points), local + len(number[-1])
     p, t, n = np.concatenate(points), np.concatenate(triangles), np.concatenate(number)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         repeated = _repeated(t, n)
         if len(repeated) == 0:
             break
         edit = split_edges(p, t, independent_splits(t, repeated))
         n = np.concatenate([n, total + np.arange(len(edit.points) - len(p))])
         p, t, total = edit.points, edit.triangles, total + len(edit.points) - len(p)
-    glued = np.empty((total, 3))
-    glued[n] = p
-    glued[: len(shared)] = shared
-    return glued, n[t]
+    stitched = np.empty((total, 3))
+    stitched[n] = p
+    stitched[: len(shared)] = shared
+    return stitched, n[t]
 
 
 def _repeated(triangles: np.ndarray, number: np.ndarray) -> np.ndarray:
@@ -44,8 +47,8 @@ def _repeated(triangles: np.ndarray, number: np.ndarray) -> np.ndarray:
     twin = twins(triangles)
     tail, head = halfedges(triangles)
     a, b = number[tail], number[head]
-    inner, rim = np.flatnonzero(twin > np.arange(len(twin))), np.flatnonzero(twin < 0)
-    keys = np.concatenate([pair_keys(a[inner], b[inner]), np.unique(pair_keys(a[rim], b[rim]))])
+    inner, boundary = np.flatnonzero(twin > np.arange(len(twin))), np.flatnonzero(twin < 0)
+    keys = np.concatenate([pair_keys(a[inner], b[inner]), np.unique(pair_keys(a[boundary], b[boundary]))])
     _, place, count = np.unique(keys, return_inverse=True, return_counts=True)
     again = count[place.ravel()[: len(inner)]] > 1
     return inner[again | (a[inner] == b[inner])]

@@ -1,4 +1,4 @@
-"""Centroidal Voronoi tessellation of a surface, without cuts: every vertex to the centroid of its cell.
+"""Relax a mesh to a centroidal Voronoi tessellation of a surface, without cuts, by L-BFGS.
 
 The energy is the integral of density^2 |x - x_i|^2 over the cells (Du, Faber, Gunzburger 1999): with the square of the
 density, cells in the plane get areas inverse to the density. Cells are read off the Delaunay triangulation of the
@@ -17,69 +17,77 @@ from ...mesh.geometry import vertex_areas, vertex_normals
 from ...mesh.topology import twins
 from ...progress import Progress, Steps
 from ..edits.delaunay_flips import make_delaunay_embedded
-from ..edits.working_mesh import Draft
-from .surface_carrier import Carrier
-from .voronoi_cells import Cells, voronoi_cells
+from ..edits.working_mesh import WorkingMesh
+from .surface_carrier import SurfaceCarrier
+from .voronoi_cells import VoronoiCells, voronoi_cells
 
-# No vertex moves farther in one step, in shares of its shortest edge's length.
-REACH = 0.4
-# Rounds after which the surface is looked at again.
-LOOK_EVERY = 15
-# Area of the surface over area of the mesh from which, and at which fully, samples of the surface are trusted.
-UNSEEN = (1.1, 1.3)
-# Weight of crests.
-CREST = 4.0
+# No vertex moves farther in one step, in shares of the shortest side of a triangle around it.
+MAX_STEP = 0.4
+# Rounds after which cells are compared with samples of the surface again.
+SAMPLE_EVERY = 15
+# Area of the surface over area of the mesh from which on samples of the surface are trusted,
+TRUST_FROM = 1.1
+# and at which they are alone.
+TRUST_FULLY = 1.3
+# Weight of crests, next to the area around them.
+CREST_WEIGHT = 4.0
+# Relative rise of the energy at which the descent begins anew: triangles flipped.
+RISE = 1e-6
 
 
-def relax(draft: Draft, rounds: int, carrier: Carrier) -> Steps[tuple[Draft, float]]:
-    """Relax a mesh on a surface; the mesh, and the mean step of the last round in edge lengths.
+def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[tuple[WorkingMesh, float]]:
+    """Relax a mesh on a surface; steps of the mesh, and the mean step of the last round in edge lengths.
 
     Boundary vertices should be fixed.
     """
-    triangles, fixed = draft.triangles.copy(), draft.fixed
+    triangles, fixed = mesh.triangles.copy(), mesh.fixed
     twin = twins(triangles)
     descent = LBFGS()
-    best, moved = np.inf, 0.0
-    normal = vertex_normals(draft.points, triangles)
-    carrier.forget()
-    points, density = carrier.onto(draft.points, normal)
-    points[fixed] = draft.points[fixed]
+    best, residual = np.inf, 0.0
+    normal = vertex_normals(mesh.points, triangles)
+    carrier.search_again()
+    points, density = carrier.closest(mesh.points, normal)
+    points[fixed] = mesh.points[fixed]
     for k in range(rounds):
-        if draft.delaunay:
-            make_delaunay_embedded(points, triangles, twin, draft.locked)
-        if k % LOOK_EVERY == 0:
-            pull = _pull(points, triangles, normal, carrier)
+        if mesh.delaunay:
+            make_delaunay_embedded(points, triangles, twin, mesh.locked)
+        if k % SAMPLE_EVERY == 0:
+            correction = _sample_correction(points, triangles, normal, carrier)
             descent.reset()
-        cells = pull.correct(points, voronoi_cells(points, triangles, density**2, draft.delaunay))
-        if cells.energy > best * (1 + 1e-6):
+        cells = correction.correct(points, voronoi_cells(points, triangles, density**2, mesh.delaunay))
+        if cells.energy > best * (1 + RISE):
             descent.reset()
         best = cells.energy
         gradient = _tangential(-2 * cells.moment, normal, fixed)
         step = descent.direction(points, gradient, 1 / (2 * np.maximum(cells.mass, 1e-300))[:, None])
         step = _tangential(step, normal, fixed)
-        step, moved = _within_reach(step, points, triangles)
+        step, residual = _bounded(step, points, triangles)
         trial = points + step
         normal = vertex_normals(trial, triangles)
-        trial, density = carrier.onto(trial, normal)
+        trial, density = carrier.closest(trial, normal)
         # A vertex that found no place stays where it is.
         found = ~fixed & np.isfinite(trial).all(axis=1)
         points = np.where(found[:, None], trial, points)
         yield Progress("Relaxation", (k + 1) / rounds)
-    if draft.delaunay:
-        make_delaunay_embedded(points, triangles, twin, draft.locked)
-    return replace(draft, points=points, triangles=triangles), moved
+    if mesh.delaunay:
+        make_delaunay_embedded(points, triangles, twin, mesh.locked)
+    return replace(mesh, points=points, triangles=triangles), residual
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """The share of vectors (n,3) along the surface, 0 at fixed vertices."""
     along = vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
     along[fixed] = 0
     return along
 
 
 @dataclass(frozen=True)
-class Pull:
-    """What samples of the surface say of the cells: share (n,) in which they are trusted, their mass (n,) and centroid
-    (n,3); mass (n,) and centroid (n,3) of the crests to add."""
+class SampleCorrection:
+    """What samples of the surface say of the cells.
+
+    share (n,) in which they are trusted; their mass (n,) and centroid (n,3); crest_mass (n,) and crest_centroid (n,3)
+    of the crests to add
+    """
 
     share: np.ndarray
     mass: np.ndarray
@@ -87,49 +95,51 @@ class Pull:
     crest_mass: np.ndarray
     crest_centroid: np.ndarray
 
-    def correct(self, points: np.ndarray, cells: Cells) -> Cells:
-        """The cells of points (n,3), those of samples where these see more, and crests weighing more."""
+    def correct(self, points: np.ndarray, cells: VoronoiCells) -> VoronoiCells:
+        """Replace cells of points (n,3) by those of samples where these see more, and add the crests."""
         b = self.share
         to_crest = self.crest_centroid - points
         moment = (1 - b)[:, None] * cells.moment + (b * self.mass)[:, None] * (self.centroid - points)
-        return Cells(
+        return VoronoiCells(
             (1 - b) * cells.mass + b * self.mass + self.crest_mass,
             moment + self.crest_mass[:, None] * to_crest,
             cells.energy + float(self.crest_mass @ np.einsum("ij,ij->i", to_crest, to_crest)),
         )
 
 
-def _pull(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray, carrier: Carrier) -> Pull:
-    """Cells of samples of the surface against those of the mesh.
+def _sample_correction(
+    points: np.ndarray, triangles: np.ndarray, normals: np.ndarray, carrier: SurfaceCarrier
+) -> SampleCorrection:
+    """Compare the cells of samples of the surface with those of the mesh.
 
     A tip or a ridge that the triangles cut off weighs too little in their cells, and would lose its vertices more and
-    more. The samples are too few for exact cells, but enough to find these places, and to pull there.
+    more. The samples are too few for exact cells, but enough to find these places, and to correction there.
     """
-    seen, crest = carrier.around(points, normals)
+    seen, crest = carrier.nearest_sums(points, normals)
     n = len(points)
     covered = vertex_areas(points, triangles)
     tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
     # A few samples a cell are a rough measure; the mean with the neighbours is a better one.
     seen_area = np.bincount(tail, seen.area[head], n) + 2 * seen.area
     ratio = seen_area / np.maximum(np.bincount(tail, covered[head], n) + 2 * covered, 1e-300)
-    share = np.clip((ratio - UNSEEN[0]) / (UNSEEN[1] - UNSEEN[0]), 0, 1) * (seen.mass > 0)
-    return Pull(
-        share,
-        seen.mass,
-        points + seen.moment / np.maximum(seen.mass, 1e-300)[:, None],
-        CREST * crest.mass,
-        points + crest.moment / np.maximum(crest.mass, 1e-300)[:, None],
+    share = np.clip((ratio - TRUST_FROM) / (TRUST_FULLY - TRUST_FROM), 0, 1) * (seen.mass > 0)
+    return SampleCorrection(
+        share=share,
+        mass=seen.mass,
+        centroid=points + seen.moment / np.maximum(seen.mass, 1e-300)[:, None],
+        crest_mass=CREST_WEIGHT * crest.mass,
+        crest_centroid=points + crest.moment / np.maximum(crest.mass, 1e-300)[:, None],
     )
 
 
-def _within_reach(step: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, float]:
-    """Steps (n,3), none longer than REACH of the shortest side of a triangle around, and their mean in such sides."""
+def _bounded(step: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, float]:
+    """Steps (n,3) no longer than MAX_STEP of the shortest side of a triangle around, and their mean in such sides."""
     size = np.sqrt(np.einsum("ij,ij->i", step, step))
     p = np.take(points.T, triangles.T, axis=1)
     x, y, z = p - p[:, [1, 2, 0]]
     shortest = np.sqrt(np.minimum.reduce(x * x + y * y + z * z))
     shortest = np.maximum(shortest, 1e-6 * shortest.mean())
-    share = REACH * shortest / np.maximum(size.take(triangles.T), 1e-300)
+    share = MAX_STEP * shortest / np.maximum(size.take(triangles.T), 1e-300)
     corner, far = np.nonzero(share < 1)
     least = np.ones(len(points))
     np.minimum.at(least, triangles[far, corner], share[corner, far])

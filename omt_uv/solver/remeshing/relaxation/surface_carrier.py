@@ -1,4 +1,4 @@
-"""Vertices that move on a surface: where they are, and which part of the surface is nearest to each."""
+"""Carry vertices along a surface: closest points on it, and which of its samples are nearest to each vertex."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...mesh.closest_point import ClosestPoint, ClosestPointTracker
-from .surface_samples import Samples, area_samples, crest_samples
+from .surface_samples import SurfaceSamples, area_samples, crest_samples
 
+# Samples of the surface for every vertex on it: few, but enough to find what a mesh cuts off.
 SAMPLES_PER_POINT = 6
-# Rounds after which closest points are searched for again; see `closest.Memory`.
+# Rounds after which closest points are searched for again; see `closest_point.ClosestPointTracker`.
 SEARCH_EVERY = 12
 
 
 @dataclass(frozen=True)
-class Share:
+class SampleSums:
     """Of the samples nearest to every point: their area (k,), their mass, which is area times squared density, (k,),
     and their first moment about it (k,3)."""
 
@@ -25,8 +26,8 @@ class Share:
     moment: np.ndarray
 
 
-class Carrier:
-    """A surface with a density (m,) per triangle, and `count` points on it."""
+class SurfaceCarrier:
+    """A surface with a density (m,) per triangle of its index, on which about `count` points move."""
 
     def __init__(self, index: ClosestPoint, density: np.ndarray, count: int):
         self.index, self.density = index, density
@@ -34,20 +35,25 @@ class Carrier:
         self._crests = crest_samples(index)
         self._memory = ClosestPointTracker(SEARCH_EVERY)
 
-    def forget(self) -> None:
-        """Search for the next points, whichever they are."""
+    def search_again(self) -> None:
+        """Search for the next points from the start: they are others than the last ones."""
         self._memory = ClosestPointTracker(SEARCH_EVERY)
 
-    def onto(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Closest points (k,3) to points (k,3) with normals (k,3), and the density there; the same points each time."""
+    def closest(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Closest points (k,3) to points (k,3) with normals (k,3), and the density there (k,).
+
+        The points are to be the same each time, moved a little: the search begins at the last ones.
+        """
         found = self._memory(self.index, points, normals)
         return found.points, self.density[found.faces]
 
-    def around(self, points: np.ndarray, normals: np.ndarray) -> tuple[Share, Share]:
-        """What of the surface is nearest to each of points (k,3) with normals (k,3), roughly, and what of its crests;
-        see `surface_samples.crest_samples`."""
+    def nearest_sums(self, points: np.ndarray, normals: np.ndarray) -> tuple[SampleSums, SampleSums]:
+        """Sum up the samples nearest to each of points (k,3) with normals (k,3): those of the area, and of crests.
+
+        See `surface_samples.area_samples` and `crest_samples`.
+        """
         tree = cKDTree(np.column_stack([points, self.index.normal_scale * normals]))
-        return self._share(self._samples, points, tree), self._share(self._crests, points, tree)
+        return self._summed(self._samples, points, tree), self._summed(self._crests, points, tree)
 
     @property
     def measure(self) -> np.ndarray:
@@ -55,14 +61,15 @@ class Carrier:
         return self._samples.area * self.density[self._samples.faces]
 
     def nearest(self, points: np.ndarray, normals: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Which of points (k,3) with normals (k,3) is nearest to every sample, (s,), of those of its edge length."""
+        """Which of points (k,3) with normals (k,3) is nearest to every sample, (s,), among those with an edge length,
+        `size` (k,), like its own."""
         s, w = self._samples, self.index.normal_scale
-        wanted = self.index.spacing / np.sqrt(self.density[s.faces])
+        target = self.index.spacing / np.sqrt(self.density[s.faces])
         # A point across a jump of the density may be the nearest, but does not count as one of this side.
         tree = cKDTree(np.column_stack([points, w * normals, 2 * w * np.log(size)]))
-        return tree.query(np.column_stack([s.points, w * s.normals, 2 * w * np.log(wanted)]))[1].astype(np.int64)
+        return tree.query(np.column_stack([s.points, w * s.normals, 2 * w * np.log(target)]))[1].astype(np.int64)
 
-    def _share(self, samples: Samples, points: np.ndarray, tree: cKDTree) -> Share:
+    def _summed(self, samples: SurfaceSamples, points: np.ndarray, tree: cKDTree) -> SampleSums:
         k = len(points)
         near = tree.query(np.column_stack([samples.points, self.index.normal_scale * samples.normals]))[1].astype(
             np.int64
@@ -70,4 +77,4 @@ class Carrier:
         mass = samples.area * self.density[samples.faces] ** 2
         off = mass[:, None] * (samples.points - points[near])
         moment = np.stack([np.bincount(near, off[:, j], k) for j in range(3)], axis=1)
-        return Share(np.bincount(near, samples.area, k), np.bincount(near, mass, k), moment)
+        return SampleSums(np.bincount(near, samples.area, k), np.bincount(near, mass, k), moment)

@@ -1,4 +1,4 @@
-"""Samples of a surface that stand for its area, and samples of its crests."""
+"""Sample a surface: points that stand for its area, its crests, and its tips."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ from ...linalg.sparse import solve_spd
 from ...mesh.closest_point import ClosestPoint, closest_on_triangles, spread_points
 from ...mesh.geometry import cotangent_laplacian, face_areas
 
-# Normals are smoothed over this share of an edge of the new mesh; where they then cancel by more than BLUNT there is
-# a crest or a hollow that is sharp at this scale.
+# Normals are smoothed over this share of an edge of the new mesh.
 BLUR = 0.2
+# Where they then cancel by more than this there is a crest or a hollow that is sharp at this scale.
 BLUNT = 0.03
-# Samples of crests are this share of an edge apart.
+# Distance of the samples of crests, in edges of the new mesh.
 PITCH = 0.4
 # Length of a vertex's mean normal below which it is a tip, or lies on an edge.
 POINTED = 0.9
+# Share of the largest weight below which a sample of a crest is left out.
+NEGLIGIBLE = 0.01
 
 
 @dataclass(frozen=True)
-class Samples:
+class SurfaceSamples:
     """Points (s,3) of a surface with its normals (s,3), the area each stands for (s,) and its triangle (s,)."""
 
     points: np.ndarray
@@ -31,8 +33,11 @@ class Samples:
     faces: np.ndarray
 
 
-def area_samples(index: ClosestPoint, count: int, density: np.ndarray) -> Samples:
-    """About `count` samples, at most twice as many, in proportion to the area times the density (m,), of mean 1."""
+def area_samples(index: ClosestPoint, count: int, density: np.ndarray) -> SurfaceSamples:
+    """Sample a surface about `count` times, at most twice as often, by its area times the density (m,), of mean 1.
+
+    The areas that the samples stand for sum to the surface's where there are no more than twice as many.
+    """
     area = face_areas(index.vertices, index.triangles)
     spacing = np.sqrt(2 * area.sum() / (count * density.max()))
     owner, points = spread_points(index.vertices, index.triangles, spacing)
@@ -43,11 +48,11 @@ def area_samples(index: ClosestPoint, count: int, density: np.ndarray) -> Sample
         pick = np.searchsorted(measure, (np.arange(count) + 0.5) / count * measure[-1])
         owner, points = owner[pick], points[pick]
         share = measure[-1] / count / density[owner]
-    return Samples(points, index.normals[owner], share, owner)
+    return SurfaceSamples(points=points, normals=index.normals[owner], area=share, faces=owner)
 
 
-def tip_samples(index: ClosestPoint, most: int) -> Samples:
-    """The vertices around which the normals differ most, `most` at the most; each counts as much as a usual triangle.
+def tip_samples(index: ClosestPoint, most: int) -> SurfaceSamples:
+    """The vertices around which the normals differ most, `most` at the most, each with a quarter of the mean area.
 
     Few as they are, samples spread over the area would miss the points that stick out.
     """
@@ -62,24 +67,29 @@ def tip_samples(index: ClosestPoint, most: int) -> Samples:
     face = np.empty(n, np.int64)
     face[corner] = np.repeat(np.arange(len(T)), 3)
     weight = np.full(len(tips), area.sum() / (4 * most))
-    return Samples(V[tips], normal[tips] / np.maximum(length[tips], 1e-300)[:, None], weight, face[tips])
+    return SurfaceSamples(
+        points=V[tips],
+        normals=normal[tips] / np.maximum(length[tips], 1e-300)[:, None],
+        area=weight,
+        faces=face[tips],
+    )
 
 
-def joined(a: Samples, b: Samples) -> Samples:
+def join_samples(a: SurfaceSamples, b: SurfaceSamples) -> SurfaceSamples:
     """All samples of both."""
-    return Samples(*(np.concatenate([getattr(a, f.name), getattr(b, f.name)]) for f in fields(Samples)))
+    return SurfaceSamples(*(np.concatenate([getattr(a, f.name), getattr(b, f.name)]) for f in fields(SurfaceSamples)))
 
 
-def picked(samples: Samples, number: np.ndarray) -> Samples:
-    """Those with these numbers (k,)."""
-    return Samples(*(getattr(samples, f.name)[number] for f in fields(Samples)))
+def select_samples(samples: SurfaceSamples, rows: np.ndarray) -> SurfaceSamples:
+    """Those of the samples in these rows (k,)."""
+    return SurfaceSamples(*(getattr(samples, f.name)[rows] for f in fields(SurfaceSamples)))
 
 
 def sharpness(index: ClosestPoint) -> np.ndarray:
     """How much the normals around every vertex cancel, (n,) in [0,1]: 1 - |normal after a little diffusion|.
 
     The diffusion is one implicit step of the heat equation along the surface, so that the two sides of a thin plate
-    do not see each other but around its rim.
+    do not see each other but around its edge.
     """
     V, T = index.vertices, index.triangles
     corner, n, third = T.ravel(), len(V), face_areas(V, T) / 3
@@ -91,18 +101,18 @@ def sharpness(index: ClosestPoint) -> np.ndarray:
     return np.clip(1 - np.sqrt(np.einsum("ni,ni->n", normal, normal)), 0, 1)
 
 
-def crest_samples(index: ClosestPoint) -> Samples:
-    """Samples around crests and hollows, their area times how sharp the surface is there."""
+def crest_samples(index: ClosestPoint) -> SurfaceSamples:
+    """Sample crests and hollows; the area of a sample is weighed by how sharp the surface is there."""
     V, T = index.vertices, index.triangles
     sharp = np.maximum(sharpness(index) - BLUNT, 0)
     mine = np.flatnonzero(sharp[T].max(axis=1) > 0)
     if len(mine) == 0:
-        return Samples(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), mine)
+        return SurfaceSamples(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), mine)
     place, points = spread_points(V, T[mine], PITCH * index.spacing)
     share = (face_areas(V, T[mine]) / np.bincount(place, minlength=len(mine)))[place]
     faces = mine[place]
     corners = T[faces]
     bary = closest_on_triangles(points, V[corners[:, 0]], V[corners[:, 1]], V[corners[:, 2]])
     weight = share * np.einsum("sk,sk->s", bary, sharp[corners])
-    kept = weight > 0.01 * weight.max()
-    return Samples(points[kept], index.normals[faces[kept]], weight[kept], faces[kept])
+    kept = weight > NEGLIGIBLE * weight.max()
+    return SurfaceSamples(points=points[kept], normals=index.normals[faces[kept]], area=weight[kept], faces=faces[kept])

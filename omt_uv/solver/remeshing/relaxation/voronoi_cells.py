@@ -1,4 +1,8 @@
-"""Voronoi cells of the vertices of a Delaunay mesh in space, read off its triangles."""
+"""Measure the Voronoi cells of a Delaunay mesh in space, read off its triangles.
+
+The parts into which perpendicular bisectors cut a triangle are those of Meyer, Desbrun, Schroeder, Barr 2003, with
+signs.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Share of a third of the adjacent area that a cell has at least.
-LEAST = 0.2
+# Share of a third of the adjacent mass that a cell has at least.
+MIN_SHARE = 0.2
 
 
 @dataclass(frozen=True)
-class Cells:
+class VoronoiCells:
     """Mass (n,), first moment about the vertex (n,3) and energy of the Voronoi cells."""
 
     mass: np.ndarray
@@ -19,8 +23,10 @@ class Cells:
     energy: float
 
 
-def voronoi_cells(points: np.ndarray, triangles: np.ndarray, density: np.ndarray, delaunay: bool = True) -> Cells:
-    """Cells of a Delaunay mesh (n,3), (m,3) with density (n,) at the vertices, geometric means in between.
+def voronoi_cells(
+    points: np.ndarray, triangles: np.ndarray, density: np.ndarray, delaunay: bool = True
+) -> VoronoiCells:
+    """Measure the cells of a Delaunay mesh (n,3), (m,3) with density (n,) at the vertices, geometric means in between.
 
     Every triangle is parted by the lines from its circumcentre to the middles of its sides, with signs where the
     circumcentre lies outside: each end of a side has half of the side's triangle with the circumcentre. Where the mesh
@@ -37,23 +43,25 @@ def voronoi_cells(points: np.ndarray, triangles: np.ndarray, density: np.ndarray
     rho = density.take(corner)
     # Geometric means: where a long edge leads from many small cells to a few large ones, the arithmetic mean
     # would say that half of it belongs to the small ones, and these would draw vertices from the large.
-    between, middle = np.sqrt(rho[[1, 2, 0]] * rho[[2, 0, 1]]), np.cbrt(rho[0] * rho[1] * rho[2])
+    split_ends, middle = np.sqrt(rho[[1, 2, 0]] * rho[[2, 0, 1]]), np.cbrt(rho[0] * rho[1] * rho[2])
     half = w * (double / 4)
     mass, moment, energy = np.zeros_like(square), np.zeros_like(p), 0.0
     for i in range(3):
         v = centre - p[i]
         far = _dot(v, v)
         for k, sign in (((i + 1) % 3, -0.5), ((i + 2) % 3, 0.5)):
-            u, area, total = sign * side[k], half[k], rho[i] + between[k] + middle
+            u, area, total = sign * side[k], half[k], rho[i] + split_ends[k] + middle
             mass[i] += area * total / 3
-            moment[i] += area / 12 * ((total + between[k]) * u + (total + middle) * v)
+            moment[i] += area / 12 * ((total + split_ends[k]) * u + (total + middle) * v)
             energy += float((area / 18 * total) @ (square[k] / 4 + _dot(u, v) + far))
     flat = corner.ravel()
     sums = [np.bincount(flat, moment[:, k].ravel(), n) for k in range(3)]
     # Where flips could not reach Delaunay cells may be small, or less than nothing: a step must not divide by that.
-    usual = np.bincount(flat, np.tile(double / 6 * middle, 3), n)
+    typical = np.bincount(flat, np.tile(double / 6 * middle, 3), n)
     cells = np.bincount(flat, mass.ravel(), n)
-    return Cells(np.maximum(cells, np.maximum(LEAST * usual, 1e-9 * usual.mean())), np.stack(sums, axis=1), energy)
+    return VoronoiCells(
+        np.maximum(cells, np.maximum(MIN_SHARE * typical, 1e-9 * typical.mean())), np.stack(sums, axis=1), energy
+    )
 
 
 def _circumcentre(square: np.ndarray) -> np.ndarray:

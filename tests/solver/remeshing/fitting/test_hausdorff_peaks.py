@@ -10,9 +10,11 @@ from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, vertex_normals
 from omt_uv.solver.mesh.topology import boundary_loops, twins
 from omt_uv.solver.progress import drain
+from omt_uv.solver.remeshing import RemeshOptions, RemeshSource, remesh
 from omt_uv.solver.remeshing.fitting import hausdorff_peaks as peaks
-from omt_uv.solver.remeshing.fitting.ring_patches import apart, cut_out, grown
-from omt_uv.solver.remeshing.remesh import remesh
+from omt_uv.solver.remeshing.fitting.ring_patches import cut_patches, spaced_faces, within_rings
+
+FEW_ROUNDS = RemeshOptions(rounds=5)
 
 
 def farthest(V, F, result) -> float:
@@ -38,7 +40,7 @@ def errors(V, F, counts):
     of_surface = curvature_in(V, F, centres, radius)
     distances, curvatures = [], []
     for count in counts:
-        result = drain(remesh(V, F, count))
+        result = drain(remesh(RemeshSource(V, F), count))
         assert len(result.vertices) == count
         distances.append(farthest(V, F, result))
         of_mesh = curvature_in(result.vertices, result.triangles, centres, radius)
@@ -72,7 +74,7 @@ def test_grooves_narrower_than_an_edge_are_reached(monkeypatch):
     result = {}
     for passes in (0, peaks.PASSES):
         monkeypatch.setattr(peaks, "PASSES", passes)
-        result[passes] = drain(remesh(V, F, 900, rounds=5))
+        result[passes] = drain(remesh(RemeshSource(V, F), 900, FEW_ROUNDS))
     without, lowered = result[0], result[peaks.PASSES]
     assert len(lowered.vertices) == 900 and len(boundary_loops(lowered.triangles)) == 1
     assert farthest(V, F, lowered) < 0.85 * farthest(V, F, without)
@@ -88,10 +90,10 @@ def test_random_moves_go_on_where_steps_end(monkeypatch):
     V, F = groove()
     monkeypatch.setattr(peaks, "PASSES", 0)
     monkeypatch.setattr(peaks, "HIGH", 5.0)
-    first, again = (drain(remesh(V, F, 600, rounds=5)) for _ in range(2))
+    first, again = (drain(remesh(RemeshSource(V, F), 600, FEW_ROUNDS)) for _ in range(2))
     np.testing.assert_array_equal(first.vertices, again.vertices)
     monkeypatch.setattr(peaks, "SEARCHES", 0)
-    without = drain(remesh(V, F, 600, rounds=5))
+    without = drain(remesh(RemeshSource(V, F), 600, FEW_ROUNDS))
     np.testing.assert_array_equal(first.triangles, without.triangles)
     assert farthest(V, F, first) < 0.7 * farthest(V, F, without)
 
@@ -100,8 +102,8 @@ def test_random_moves_go_on_where_steps_end(monkeypatch):
 def test_patches_are_disjoint_and_know_their_ring(rings):
     V, F = meshes.icosphere(4)
     n = len(V)
-    middle = apart(F, np.random.default_rng(1).permutation(len(F)), n, 2 * rings + 2, 50)
-    patches = cut_out(F, middle, n, rings)
+    middle = spaced_faces(F, np.random.default_rng(1).permutation(len(F)), n, 2 * rings + 2, 50)
+    patches = cut_patches(F, middle, n, rings)
     assert len(patches) > 3 and (patches.faces[patches.middle] == middle).all()
     assert (patches.vertices[patches.triangles] == F[patches.faces]).all()
     # No vertex is of two pieces, and what is not on the outer ring has all its triangles in its own.
@@ -112,6 +114,6 @@ def test_patches_are_disjoint_and_know_their_ring(rings):
     assert ((inside == whole) == ~patches.outer).all()
     core = np.zeros(n, dtype=bool)
     core[F[middle]] = True
-    assert set(patches.vertices[~patches.outer]) == set(np.flatnonzero(grown(F, core, rings)))
+    assert set(patches.vertices[~patches.outer]) == set(np.flatnonzero(within_rings(F, core, rings)))
     open_ = twins(patches.triangles) < 0
     assert patches.outer[patches.triangles.ravel()[open_]].all()

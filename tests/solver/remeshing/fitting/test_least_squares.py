@@ -7,38 +7,40 @@ import numpy as np
 
 from omt_uv.solver.mesh.geometry import face_normals
 from omt_uv.solver.mesh.topology import twins
-from omt_uv.solver.remeshing.fitting import least_squares as displacement
-from omt_uv.solver.remeshing.fitting.closest_pairs import Pairs
-from omt_uv.solver.remeshing.fitting.least_squares import displacements
+from omt_uv.solver.remeshing.fitting import least_squares
+from omt_uv.solver.remeshing.fitting.closest_pairs import ClosestPairs
+from omt_uv.solver.remeshing.fitting.least_squares import DistanceWeighting, displacements
 
 
 def some_pairs(V, F, k=400):
     rng = np.random.default_rng(4)
-    way, bary = rng.standard_normal((k, 3)), rng.dirichlet(np.ones(3), k)
-    return Pairs(rng.integers(0, len(F), k), bary, way, np.linalg.norm(way, axis=1), np.full(k, len(V) / k), (k, 0, 0))
+    offset, bary = rng.standard_normal((k, 3)), rng.dirichlet(np.ones(3), k)
+    return ClosestPairs(
+        rng.integers(0, len(F), k), bary, offset, np.linalg.norm(offset, axis=1), np.full(k, len(V) / k), k, 0
+    )
 
 
 def test_moves_are_those_of_the_dense_problem(monkeypatch):
     """With distances alone, a little stillness and fairness: the same as written out row by row."""
     V, F = meshes.grid(5, 4)
     n, pairs = len(V), some_pairs(V, F)
-    monkeypatch.setattr(displacement, "CENTROID", 0.0)
-    monkeypatch.setattr(displacement, "FAIRNESS", 0.0)
-    monkeypatch.setattr(displacement, "smallness", lambda points, triangles: np.zeros(len(triangles)))
+    monkeypatch.setattr(least_squares, "CENTROID", 0.0)
+    monkeypatch.setattr(least_squares, "FAIRNESS", 0.0)
+    monkeypatch.setattr(least_squares, "smallness", lambda points, triangles: np.zeros(len(triangles)))
     fixed = np.arange(n) < 3
-    usual = pairs.usual
-    found = displacements(V, F, twins(F), fixed, pairs, np.zeros((n, 3)), 0.1, usual)
+    rms = pairs.rms
+    found = displacements(V, F, twins(F), fixed, pairs, np.zeros((n, 3)), DistanceWeighting(0.1, rms))
     rows, right = np.zeros((len(pairs.faces), 3 * n)), np.zeros(len(pairs.faces))
     normals = face_normals(V, F)
     for k, face in enumerate(pairs.faces):
         d = pairs.distance[k]
-        u = normals[face] if d < 0.1 else pairs.way[k] / d
-        root = np.sqrt(pairs.weight[k] * (1 + min(d / (displacement.FAR * usual), displacement.FARTHEST) ** 2))
+        u = normals[face] if d < 0.1 else pairs.offset[k] / d
+        root = np.sqrt(pairs.weight[k] * (1 + min(d / (least_squares.FAR * rms), least_squares.FARTHEST) ** 2))
         for c in range(3):
             rows[k, 3 * F[face, c] + np.arange(3)] += root * pairs.barycentric[k, c] * u
-        right[k] = root * (u @ pairs.way[k])
+        right[k] = root * (u @ pairs.offset[k])
     free = np.repeat(~fixed, 3)
-    A, b = (rows.T @ rows + displacement.STILL * np.eye(3 * n)), rows.T @ right
+    A, b = (rows.T @ rows + least_squares.STILLNESS * np.eye(3 * n)), rows.T @ right
     expected = np.zeros(3 * n)
     expected[free] = np.linalg.solve(A[np.ix_(free, free)], b[free])
     assert np.abs(found.ravel() - expected).max() < 1e-4 * np.abs(expected).max()
@@ -47,7 +49,7 @@ def test_moves_are_those_of_the_dense_problem(monkeypatch):
 def test_fixed_vertices_stay():
     V, F = meshes.grid(5, 4)
     fixed = np.arange(len(V)) % 3 == 0
-    moves = displacements(V, F, twins(F), fixed, some_pairs(V, F), np.zeros_like(V), 1e-3, 1.0)
+    moves = displacements(V, F, twins(F), fixed, some_pairs(V, F), np.zeros_like(V), DistanceWeighting(1e-3, 1.0))
     assert (moves[fixed] == 0).all() and np.abs(moves[~fixed]).min() > 0
 
 
@@ -56,9 +58,9 @@ def test_the_matrix_is_symmetric_where_the_surface_bends(monkeypatch):
     V, F = meshes.bumpy(7, 6)
     n, rng = len(V), np.random.default_rng(1)
     asked = []
-    monkeypatch.setattr(displacement, "conjugate_gradients", lambda times, b, *_: asked.append(times) or b)
-    monkeypatch.setattr(displacement, "smallness", lambda points, triangles: rng.random(len(triangles)))
-    displacements(V, F, twins(F), np.zeros(n, bool), some_pairs(V, F), np.zeros((n, 3)), 1e-3, 1.0)
+    monkeypatch.setattr(least_squares, "conjugate_gradients", lambda times, b, *_: asked.append(times) or b)
+    monkeypatch.setattr(least_squares, "smallness", lambda points, triangles: rng.random(len(triangles)))
+    displacements(V, F, twins(F), np.zeros(n, bool), some_pairs(V, F), np.zeros((n, 3)), DistanceWeighting(1e-3, 1.0))
     matrix = np.stack([asked[0](e) for e in np.eye(3 * n)])
     assert np.abs(matrix - matrix.T).max() < 1e-14 * np.abs(matrix).max()
     assert np.linalg.eigvalsh(matrix).min() > 0

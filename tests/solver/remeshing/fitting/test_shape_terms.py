@@ -22,10 +22,10 @@ def test_any_triangle_comes_to_rest_equilateral():
     rng = np.random.default_rng(5)
     for _ in range(5):
         V = rng.standard_normal((3, 3))
-        springs = equilateral(V, ONE, np.ones(1))
-        K = laplacian_from_weights(*halfedges(ONE), -springs.between, 3)
-        assert np.abs(K.diagonal() - springs.diagonal).max() < 1e-14
-        W = V + np.linalg.lstsq(K.toarray(), springs.force, rcond=None)[0]
+        forces = equilateral(V, ONE, np.ones(1))
+        K = laplacian_from_weights(*halfedges(ONE), -forces.between, 3)
+        assert np.abs(K.diagonal() - forces.diagonal).max() < 1e-14
+        W = V + np.linalg.lstsq(K.toarray(), forces.force, rcond=None)[0]
         assert np.ptp(halfedge_lengths(W, ONE)) < 1e-12
         assert np.abs(W.mean(axis=0) - V.mean(axis=0)).max() < 1e-12
         # In its plane, and turned as little as can be: the moves have no moment.

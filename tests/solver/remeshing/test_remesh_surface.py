@@ -20,14 +20,15 @@ from omt_uv.solver.errors import (
 from omt_uv.solver.mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
 from omt_uv.solver.mesh.topology import boundary_loops, halfedges, pair_keys, twins
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remeshing.components.coincident_boundaries import opened
-from omt_uv.solver.remeshing.components.components import split_parts
-from omt_uv.solver.remeshing.edits.long_edges import fine_enough
-from omt_uv.solver.remeshing.initial import component_maps as part_maps
-from omt_uv.solver.remeshing.initial.component_maps import Original, PartMaps
+from omt_uv.solver.remeshing import STRATEGIES, RemeshOptions, RemeshSource, remesh
+from omt_uv.solver.remeshing.components.coincident_boundaries import reopened
+from omt_uv.solver.remeshing.components.components import split_components
+from omt_uv.solver.remeshing.edits.long_edges import refine_for_maps
+from omt_uv.solver.remeshing.initial import component_maps
+from omt_uv.solver.remeshing.initial.component_maps import ComponentMaps
 from omt_uv.solver.remeshing.initial.sphere_samples import sample_sphere
 from omt_uv.solver.remeshing.relaxation.voronoi_cells import voronoi_cells
-from omt_uv.solver.remeshing.remesh import STRATEGIES, remesh, summed_up
+from omt_uv.solver.remeshing.remesh_surface import summed_up
 
 CASES = {
     "disk": lambda: meshes.bumpy(24, 24),
@@ -38,8 +39,8 @@ CASES = {
 }
 
 
-def run(V, F, count, **options):
-    return drain(remesh(V, F, count, **options))
+def run(V, F, count, density=None, features=None, source=None, **options):
+    return drain(remesh(source or RemeshSource(V, F, features), count, RemeshOptions(**options), density))
 
 
 def topology(F):
@@ -99,10 +100,10 @@ def along_the_equator(half):
     above = V[F].mean(axis=1)[:, 2] > 0
     tail, head = halfedges(F)
     twin = twins(F)
-    border = above[np.arange(len(tail)) // 3] & ~above[twin // 3]
+    chart_boundary = above[np.arange(len(tail)) // 3] & ~above[twin // 3]
     if half:
-        border &= (V[tail, 0] > 0) & (V[head, 0] > 0)
-    return opened(V, F, np.sort(pair_keys(tail[border], head[border])))
+        chart_boundary &= (V[tail, 0] > 0) & (V[head, 0] > 0)
+    return reopened(V, F, np.sort(pair_keys(tail[chart_boundary], head[chart_boundary])))
 
 
 @pytest.mark.parametrize(
@@ -160,9 +161,9 @@ def test_sampling_by_measure_and_triangles_by_angles_make_the_best_meshes(name):
     """B. Gu 2018, figure 5: of the four pairs of maps this one has the best angles, the most even edges and areas."""
     V, F = meshes.bumpy(32, 32, height=1.0) if name == "bump" else meshes.load_model(name)
     count = 600 if name == "bump" else 1200
-    original, angle, edge, area = Original(V, F), {}, {}, {}
+    source, angle, edge, area = RemeshSource(V, F), {}, {}, {}
     for strategy in STRATEGIES:
-        result = run(V, F, count, strategy=strategy, original=original)
+        result = run(V, F, count, strategy=strategy, source=source)
         W, G = result.vertices, result.triangles
         assert len(W) == count and topology(G) == topology(F)
         length, areas = halfedge_lengths(W, G), face_areas(W, G)
@@ -344,8 +345,8 @@ def test_cells_of_flat_triangles_have_mass():
 
 
 def test_spheres_go_by_the_sphere_and_others_by_charts():
-    parts = {name: split_parts(*CASES[name](), np.zeros((0, 2), int)).parts[0] for name in CASES}
-    assert {name for name, part in parts.items() if PartMaps(part).spherical} == {"sphere", "cube"}
+    components = {name: split_components(*CASES[name](), np.zeros((0, 2), int)).components[0] for name in CASES}
+    assert {name for name, component in components.items() if ComponentMaps(component).by_sphere} == {"sphere", "cube"}
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
@@ -353,9 +354,9 @@ def test_samples_on_the_sphere_are_as_the_strategy_says(strategy):
     """Uniform on the surface where they were uniform on the measure-preserving map, else on the conformal one."""
     V, F = meshes.icosphere(4)
     V = V * (1 + 0.8 * np.maximum(V[:, 2:], 0) ** 4) * [1, 1, 2]
-    part = split_parts(V, F, np.zeros((0, 2), int)).parts[0]
-    maps = drain(PartMaps(part).of_sphere(np.ones(len(F))))
-    found = sample_sphere(part.vertices, part.triangles, *maps.pair(strategy), 500)
+    component = split_components(V, F, np.zeros((0, 2), int)).components[0]
+    maps = drain(ComponentMaps(component).of_sphere(np.ones(len(F))))
+    found = sample_sphere(component.vertices, component.triangles, *maps.pair(strategy), 500)
     assert len(found.points) == 500 and topology(found.triangles) == (2, 0)
     area = vertex_areas(found.points, found.triangles)
     assert (area.std() / area.mean() < 0.35) == strategy.startswith("app")
@@ -369,7 +370,7 @@ def test_what_has_no_map_to_the_sphere_is_cut_open(monkeypatch):
 
     V, F = meshes.icosphere(2)
     assert run(V, F, 120, rounds=5).warnings == ()
-    monkeypatch.setattr(part_maps, "conformal_sphere", fails)
+    monkeypatch.setattr(component_maps, "conformal_sphere", fails)
     result = run(V, F, 120, rounds=5)
     assert len(result.vertices) == 120 and topology(result.triangles) == (2, 0)
     assert any("No room" in w for w in result.warnings)
@@ -379,21 +380,21 @@ def test_maps_serve_again_with_other_counts(monkeypatch):
     calls = []
 
     def counted(name):
-        whole = getattr(part_maps, name)
+        whole = getattr(component_maps, name)
 
         def once(*given):
             calls.append(name)
             return (yield from whole(*given))
 
-        monkeypatch.setattr(part_maps, name, once)
+        monkeypatch.setattr(component_maps, name, once)
 
     for name in ("conformal_sphere", "sphere_image", "conformal_image", "preserving_image"):
         counted(name)
     for V, F, kinds in ((*meshes.icosphere(3), 2), (*meshes.bumpy(12, 12), 2)):
         calls.clear()
-        original = Original(V, F)
+        source = RemeshSource(V, F)
         options = {"rounds": 0, "fit": False}
-        again = [run(V, F, count, original=original, **options) for count in (200, 120)]
+        again = [run(V, F, count, source=source, **options) for count in (200, 120)]
         assert len(calls) == kinds
         for result in again:
             alone = run(V, F, len(result.vertices), **options)
@@ -465,14 +466,14 @@ def test_faces_without_area_leave_the_mesh_in_its_place():
 def test_halved_edges_are_the_same_surface():
     V, F = meshes.cube()
     lines = np.array([[0, 1], [1, 3]])
-    part = split_parts(V, F, lines).parts[0]
-    fine = fine_enough(part)
-    assert len(fine.vertices) > 300 and fine.euler == part.euler
-    np.testing.assert_allclose(np.bincount(fine.faces, fine.area), part.area)
-    places = np.einsum("mkc,mcj->mkj", fine.within, part.vertices[part.triangles[fine.faces]])
+    component = split_components(V, F, lines).components[0]
+    fine = refine_for_maps(component)
+    assert len(fine.vertices) > 300 and fine.euler == component.euler
+    np.testing.assert_allclose(np.bincount(fine.faces, fine.area), component.area)
+    places = np.einsum("mkc,mcj->mkj", fine.input_barycentric, component.vertices[component.triangles[fine.faces]])
     np.testing.assert_allclose(fine.vertices[fine.triangles], places, atol=1e-12)
     lengths = [
-        np.linalg.norm(p.vertices[p.features[:, 0]] - p.vertices[p.features[:, 1]], axis=1) for p in (part, fine)
+        np.linalg.norm(p.vertices[p.features[:, 0]] - p.vertices[p.features[:, 1]], axis=1) for p in (component, fine)
     ]
     assert len(lengths[1]) > len(lengths[0]) and abs(lengths[1].sum() - lengths[0].sum()) < 1e-12
 
@@ -486,19 +487,19 @@ def test_many_small_parts_go_together_and_stay_apart():
     first = np.cumsum([0] + [len(V) for V, _ in bodies])
     V = np.concatenate([V for V, _ in bodies])
     F = np.concatenate([F + k for (_, F), k in zip(bodies, first[:-1], strict=True)])
-    original = Original(V, F)
-    result = run(V, F, 700, original=original)
+    source = RemeshSource(V, F)
+    result = run(V, F, 700, source=source)
     assert len(result.vertices) == 700 and topology(result.triangles) == (10 * 2 + 4, 4)
     owner = np.searchsorted(first, F[result.faces][:, 0], side="right") - 1
     assert (owner[result.triangles] == owner[result.triangles[:, :1]]).all()
     assert np.percentile(angles(result.vertices, result.triangles).min(axis=1), 1) > 30
-    closed, open_ = original.maps_with_pile(np.ones(14, bool))
-    assert len(closed.part.members) == 10 and len(open_.part.members) == 4
+    closed, open_ = source.maps_with_batches(np.ones(14, bool))
+    assert len(closed.component.members) == 10 and len(open_.component.members) == 4
 
 
 def test_closed_bodies_with_handles_need_no_maps(monkeypatch):
     """And get the density that they are asked for."""
-    monkeypatch.delattr(part_maps, "conformal_image")
+    monkeypatch.delattr(component_maps, "conformal_image")
     V, F = meshes.torus()
     dense = V[F].mean(axis=1)[:, 0] > 0
     result = run(V, F, 1200, density=np.where(dense, 9.0, 1.0))
@@ -512,7 +513,7 @@ def test_closed_bodies_with_handles_need_no_maps(monkeypatch):
 
 def test_features_and_boundaries_hold_without_maps(monkeypatch):
     """Samples on lines are where they would be between charts, exactly, and edges join them."""
-    monkeypatch.delattr(part_maps, "conformal_image")
+    monkeypatch.delattr(component_maps, "conformal_image")
     V, F = meshes.annulus()
     E = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
     straight = E[(np.abs(V[E][:, :, 1]) < 1e-9).all(axis=1)]
