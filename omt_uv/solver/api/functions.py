@@ -14,7 +14,7 @@ import numpy as np
 from ..maps import distortion as figures
 from ..maps.distortion import Distortion
 from ..progress import Progress, drain
-from ..remeshing.remesh import Remesh
+from ..remeshing import Remesh
 from ..sphere.sphere_map import SphereMap
 from . import steps
 from .arrays import Faces, polygon_surface, to_corners

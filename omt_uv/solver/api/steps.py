@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import remeshing
 from ..analysis.density import Target, from_vertices, region_share
 from ..analysis.region_density import target_density
 from ..editing.magnify import magnify_region
@@ -21,8 +22,7 @@ from ..parameterization import unwrap as unwrapping
 from ..parameterization.chart_pins import CornerPins
 from ..parameterization.options import UnwrapOptions
 from ..progress import Steps, part_of
-from ..remeshing import remesh as remeshing
-from ..remeshing.remesh import Remesh
+from ..remeshing import Remesh
 from ..sphere import sphere_map as spheres
 from ..sphere.sphere_map import SphereMap
 from .arrays import Faces, from_corners, polygon_surface, to_corners
@@ -129,11 +129,11 @@ def sphere_map(vertices: np.ndarray, faces: Faces, **options) -> Steps[SphereMap
 def remesh(vertices: np.ndarray, faces: Faces, count: int, **options) -> Steps[Remesh]:
     """Remesh a surface step by step, see `functions.remesh`."""
     surface = polygon_surface(vertices, faces)
-    density = options.pop("density", None)
+    density, features = options.pop("density", None), options.pop("features", None)
     if density is not None:
         density = np.asarray(density, float)[surface.triangle_face]
-    triangles = surface.corner_vertex[surface.triangles]
-    return (yield from remeshing.remesh(surface.positions, triangles, count, density=density, **options))
+    source = remeshing.RemeshSource(surface.positions, surface.corner_vertex[surface.triangles], features)
+    return (yield from remeshing.remesh(source, count, remeshing.RemeshOptions(**options), density))
 
 
 def _figures(surface: Surface, corner_uv: np.ndarray, density=None):
