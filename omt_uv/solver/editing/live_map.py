@@ -10,7 +10,8 @@ import numpy as np
 from ..maps.energy import elements
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_edges
-from ..refinement.continuation import FIRST_PRESSURE, NO_ENERGY, QUALITIES, MapProblem, final_weight, rescaled
+from ..refinement.continuation import MapProblem, rescaled
+from ..refinement.continuation_rules import FIRST_PRESSURE, NO_ENERGY, QUALITIES, final_weight
 from ..refinement.elimination_order import renumbered
 from ..refinement.pins import PinEnergy, Pins, placed_like
 from ..refinement.projected_newton import Assembly, FreeMotion, NewtonProblem, newton_step

@@ -20,7 +20,8 @@ from ..maps.similarity import fit_similarity
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_edges, boundary_loops
 from ..progress import Progress, Steps, part_of
-from ..refinement.continuation import QUALITIES, ContinuationResult, MapProblem, minimise_in_stages
+from ..refinement.continuation import ContinuationResult, MapProblem, minimise_in_stages
+from ..refinement.continuation_rules import QUALITIES
 from ..refinement.elimination_order import Renumbered, renumbered
 from ..refinement.projected_newton import Assembly
 from .outline import Outline, centroid, free, recognise_outline

@@ -18,7 +18,8 @@ from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_edges, boundary_loops, halfedges
 from ..progress import Progress, Steps
 from ..refinement.boundary_barrier import crossings, make_barrier
-from ..refinement.continuation import QUALITIES, MapProblem, minimise_in_stages
+from ..refinement.continuation import MapProblem, minimise_in_stages
+from ..refinement.continuation_rules import QUALITIES
 from ..refinement.elimination_order import renumbered
 from ..refinement.initial_maps import disk_initial_map
 from ..refinement.pins import aligned_to_pins, move_pins, placed_like

@@ -17,7 +17,7 @@ from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
-from ..refinement.continuation import QUALITIES
+from ..refinement.continuation_rules import QUALITIES
 from ..refinement.initial_maps import unroll
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..transport.convex_domain import Disk

@@ -14,7 +14,7 @@ from ..mesh.charts import Chart
 from ..mesh.geometry import signed_areas
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops
-from ..refinement.continuation import QUALITIES
+from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import chart_target
 from .chart_map import ChartMap, in_unit_box
 from .chart_pins import ChartPins

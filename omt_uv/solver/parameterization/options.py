@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..cutting.disk_charts import SEAMS
-from ..refinement.continuation import QUALITIES
+from ..refinement.continuation_rules import QUALITIES
 from ..refinement.refine import BOUNDARIES
 
 

@@ -92,5 +92,5 @@ def _of_many(maps: BatchMaps, k: int, uv: np.ndarray, seconds: float) -> ChartMa
         folds=0,
         warnings=(),
         seconds={"refinement": seconds},
-        area_weight=float(maps.weight[k]),
+        area_weight=float(maps.area_weight[k]),
     )

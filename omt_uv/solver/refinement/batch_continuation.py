@@ -1,4 +1,4 @@
-"""What `stages.py` decides for one chart from step to step, for many charts that take their steps together."""
+"""Decide for many charts, which take their steps together, how each goes on, by the rules of `continuation_rules`."""
 
 from __future__ import annotations
 
@@ -7,96 +7,103 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .continuation import (
+from .continuation_rules import (
     FIRST_PRESSURE,
-    LEAST_PRESSURE,
-    LOOSE,
-    NO_ENERGY,
     QUALITIES,
-    SQUEEZED,
+    SQUEEZED_WEIGHT,
     STAGE_STEPS,
-    STRICT,
-    STUCK,
+    is_enough,
+    is_futile,
+    is_squeezed,
+    judge_step,
+    next_pressure,
+    next_weight,
     planned_weights,
-    weight_growth,
+    promised,
+    stage_tolerances,
 )
 
-Energies = Callable[[np.ndarray], np.ndarray]  # of each chart (c,), by the weights of the area term (c,)
+Energies = Callable[[np.ndarray], np.ndarray]  # of each chart (c,), by the area weights (c,)
 
 
 @dataclass(frozen=True)
 class AreaErrors:
-    """What the map of every chart lacks (c,): `energy.target_error`, the same but for the share of its region, and the
-    tilt that this share lacks."""
+    """What the map of every chart lacks of its areas, (c,) each.
+
+    Attributes
+    ----------
+    error : see `energy.target_error`
+    error_but_share : the same, the share of the region aside
+    tilt : of the targets, which the share of the region lacks, see `energy.missing_tilt`
+    """
 
     error: np.ndarray
-    but_share: np.ndarray
+    error_but_share: np.ndarray
     tilt: np.ndarray
 
 
 class BatchContinuation:
-    """Weight of the area term, `pressure` of the Hessian, energy and fate of every chart, (c,) each.
+    """The stages of every chart of a batch, (c,) each.
 
-    live: on its way; solved: arrived where the quality asks for; steps: Newton steps; residual: see
-    `continuation.StageResult`; multiplier: see `continuation.ContinuationResult`.
+    Attributes
+    ----------
+    live : on its way
+    solved : arrived where the quality asks for
+    steps : Newton steps
+    area_weight, value : weight of the area term, and the energy with it
+    pressure : of the Hessian, see `continuation_rules.next_pressure`
+    residual, multiplier : see `continuation.ContinuationResult`
     """
 
-    def __init__(self, count: int, quality: str, balance: float, energies: Energies):
-        self.settings, self.balance = QUALITIES[quality], balance
-        self.weights = np.array(planned_weights(balance, self.settings))
-        self.level, self.weight = np.zeros(count, np.int64), np.full(count, self.weights[0])
-        squeezed = (energies(self.weight) > SQUEEZED) & (self.weights[0] > 1)
-        self.level[squeezed], self.weight[squeezed] = -1, 1.0
-        self.multiplier, self.error = np.zeros(count), np.full(count, np.inf)
-        self.value = energies(self.weight)
+    def __init__(self, count: int, quality: str, balance: float, energies: Energies, with_region: bool = False):
+        self.quality, self.balance, self.with_region = QUALITIES[quality], balance, with_region
+        self._planned = np.array(planned_weights(balance, self.quality))
+        self._level, self.area_weight = np.zeros(count, np.int64), np.full(count, self._planned[0])
+        squeezed = is_squeezed(energies(self.area_weight), self._planned[0])
+        self._level[squeezed], self.area_weight[squeezed] = -1, SQUEEZED_WEIGHT
+        self._weight_before, self._error_before = self.area_weight, np.full(count, np.inf)
+        self.multiplier = np.zeros(count)
+        self.value = energies(self.area_weight)
         self.live = np.isfinite(self.value)
         self.solved = np.zeros(count, bool)
-        self.steps, self.stage_steps = np.zeros_like(self.level), np.zeros_like(self.level)
+        self.steps, self._stage_steps = np.zeros_like(self._level), np.zeros_like(self._level)
         self.pressure, self.residual = np.full(count, FIRST_PRESSURE), np.full(count, np.inf)
 
-    def update(self, value, decrement, share, lack: AreaErrors, energies: Energies) -> None:
+    def update(self, value, decrement, share, errors: AreaErrors, energies: Energies) -> None:
         """After a step: new energies, decreases promised, shares of the step taken, (c,) each; what is left to do."""
-        live, used, error = self.live, self.pressure, lack.error
-        gain = self.value - value
-        self.value = np.where(live, value, self.value)
-        self.residual = np.where(live, decrement / np.maximum(value, NO_ENERGY), self.residual)
-        self.steps += live
-        self.stage_steps += live
-        self.pressure = _next_pressure(used, share, gain, decrement)
-        tolerance = self.settings.tolerance if self.balance == 0 else STRICT
-        goal = np.where(self.level >= len(self.weights) - 1, self.settings.area_error, np.inf)
-        stalled = (share == 0) & (used == 1)
-        met = (self.residual < LOOSE) & (error <= goal)
-        low = self.residual < tolerance
-        self.pressure[low & (used > LEAST_PRESSURE)] = 0.0
-        spent = self.steps >= self.settings.max_steps
-        long = (self.stage_steps >= STAGE_STEPS) & (self.balance == 0)
-        self._next_stage(
-            live & (stalled | met | (low & (used <= LEAST_PRESSURE)) | spent | long), stalled | spent, lack
-        )
-        self.value = np.where(self.live & (self.stage_steps == 0), energies(self.weight), self.value)
+        used, gain = self.pressure, self.value - value
+        self.value = np.where(self.live, value, self.value)
+        self.residual = np.where(self.live, promised(decrement, value), self.residual)
+        self.steps += self.live
+        self._stage_steps += self.live
+        self.pressure = next_pressure(used, share, gain, decrement)
+        on_the_way = self._level < len(self._planned) - 1
+        tolerance, loose = stage_tolerances(self.quality, self.balance, on_the_way=False, early=False)
+        met = (self.residual < loose) & (errors.error <= np.where(on_the_way, np.inf, self.quality.area_error))
+        verdict = judge_step(share, used, self.residual, met, tolerance)
+        self.pressure[verdict.sharpen] = 0.0
+        spent = self.steps >= self.quality.max_steps
+        long = (self._stage_steps >= STAGE_STEPS) & (self.balance == 0)
+        ended = self.live & (verdict.stalled | verdict.converged | spent | long)
+        self._next_stage(ended, verdict.stalled | spent, verdict.converged, errors)
+        self.value = np.where(self.live & (self._stage_steps == 0), energies(self.area_weight), self.value)
 
-    def _next_stage(self, ended, failed, lack: AreaErrors) -> None:
-        settings, last = self.settings, len(self.weights)
-        self.level += ended
-        enough = (lack.error <= settings.area_error) | (self.balance > 0) | (self.weight >= settings.greatest_weight)
-        enough |= (lack.error > STUCK * self.error) & (self.stage_steps < STAGE_STEPS)
-        self.error = np.where(ended, lack.error, self.error)
-        finished = ended & (failed | (enough & (self.level >= last)))
+    def _next_stage(self, ended, failed, converged, errors: AreaErrors) -> None:
+        """A greater area weight where a stage has ended and it was not the last."""
+        quality, weight, planned = self.quality, self.area_weight, len(self._planned)
+        self._level += ended
+        grown = weight / self._weight_before
+        enough = is_enough(quality, self.balance, errors.error, weight)
+        enough |= converged & is_futile(quality, errors.error, self._error_before, grown, self.with_region)
+        self._error_before = np.where(ended, errors.error, self._error_before)
+        self._weight_before = np.where(ended, weight, self._weight_before)
+        finished = ended & (failed | (enough & (self._level >= planned)))
         self.solved |= finished & ~failed
         self.live = self.live & ~finished
         further = ended & ~finished
         if self.balance == 0:
-            self.multiplier = np.where(further, self.multiplier + self.weight * lack.tilt, self.multiplier)
-        more = self.weight * weight_growth(lack.but_share / settings.area_error)
-        planned = self.weights[np.clip(self.level, 0, last - 1)]
-        self.weight = np.where(further, np.where(self.level < last, planned, more), self.weight)
-        self.pressure[further], self.stage_steps[further] = FIRST_PRESSURE, 0
-
-
-def _next_pressure(pressure, share, gain, decrement):
-    """See `stages._next_pressure`."""
-    full, poor = (share == 1) & (gain > 0.7 * decrement), (share < 0.5) | (gain < 0.3 * decrement)
-    more = np.minimum(1.0, np.maximum(3 * pressure, 3 * LEAST_PRESSURE))
-    less = np.where(pressure > LEAST_PRESSURE, pressure / 3, 0.0)
-    return np.where(full, less, np.where(share == 0, 1.0, np.where(poor, more, pressure)))
+            self.multiplier = np.where(further, self.multiplier + weight * errors.tilt, self.multiplier)
+        following = self._planned[np.clip(self._level, 0, planned - 1)]
+        following = np.where(self._level < planned, following, next_weight(weight, errors.error_but_share, quality))
+        self.area_weight = np.where(further, following, weight)
+        self.pressure[further], self._stage_steps[further] = FIRST_PRESSURE, 0

@@ -1,4 +1,4 @@
-"""Pins: vertices that must come to lie exactly where they are told."""
+"""Move pinned vertices exactly to their places without a fold, by forces of growing stiffness (a penalty method)."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from ..errors import PinError
 from ..maps.energy import Elements, squared
 from ..maps.similarity import fit_similarity
 from ..progress import Progress, Steps
-from .continuation import MapProblem, rescaled
-from .continuation import minimise as minimise_energy
+from .continuation import MapProblem, StageLimits, minimise, rescaled
 from .projected_newton import FreeMotion, NewtonProblem
 
-# Weight of the area term while pins are dragged, and stiffness of the springs that drag them: from soft to hard.
-DRAG_WEIGHT = 10.0
+AREA_WEIGHT = 10.0  # while pins are on their way
+# Stiffness of the forces that draw them, from soft to hard: energy per squared distance over the extent of the pins.
 STIFFNESS = tuple(10.0**k for k in range(0, 11, 2))
+MAX_STEPS = 40  # of Newton's method for each stiffness
 # A pin this near to its place, relative to the extent of the pins, is put there if that folds nothing.
 NEAR = 1e-3
 
@@ -56,7 +56,7 @@ def check_pins(vertices: np.ndarray, places: np.ndarray, n: int) -> Pins:
 
 @dataclass(frozen=True)
 class PinEnergy:
-    """An energy that draws pins to their places: stiffness times the squared distance, in the given length unit."""
+    """An energy that draws pins to their places p: stiffness * |w - p|^2 / unit^2, summed over the pins."""
 
     pins: Pins
     stiffness: float
@@ -75,7 +75,7 @@ class PinEnergy:
         return gradient, np.tile(self.pins.vertices, 2)[:, None], rows
 
     def limit(self, w, step):
-        """Infinity: springs allow every step."""
+        """Infinity: the forces allow every step."""
         return np.inf
 
 
@@ -99,11 +99,11 @@ def placed_like(
     return placed if pins is None else placed + (pins.places[0] - placed[pins.vertices[0]])
 
 
-def move_pins(task: MapProblem, w: np.ndarray, pins: Pins) -> Steps[tuple[MapProblem, np.ndarray]]:
-    """The map w (n,), moved until all pins (two or more) are in place, and the task that keeps them there.
+def move_pins(problem: MapProblem, w: np.ndarray, pins: Pins) -> Steps[tuple[MapProblem, np.ndarray]]:
+    """The map w (n,) complex, moved until all pins (two or more) are in place, and the problem that keeps them there.
 
-    Springs of growing stiffness draw the pins; the barriers against folds and against a boundary that crosses itself
-    hold. Once near, a pin is put where it belongs.
+    Forces of growing stiffness draw the pins, a penalty method; the barriers against folds and against a boundary that
+    crosses itself hold. Once near, a pin is put where it belongs.
 
     Raises
     ------
@@ -115,19 +115,19 @@ def move_pins(task: MapProblem, w: np.ndarray, pins: Pins) -> Steps[tuple[MapPro
         snapped = w.copy()
         snapped[pins.vertices] = pins.places
         near = np.abs(snapped - w).max() <= NEAR * extent or k == 0
-        if near and (task.faces.areas(snapped) > 0).all() and not task.boundary_crosses(snapped):
-            return replace(rescaled(task, snapped), motion=_held(len(w), pins), scale_free=True), snapped
-        task = rescaled(task, w)
-        guard = task.barrier(w)
-        springs = PinEnergy(pins, stiffness, extent)
-        problem = NewtonProblem(task.faces, task.assembly, task.motion, DRAG_WEIGHT, (springs, guard))
+        if near and (problem.faces.areas(snapped) > 0).all() and not problem.boundary_crosses(snapped):
+            fixed = replace(rescaled(problem, snapped), motion=_fixed(len(w), pins), scale_free=True)
+            return fixed, snapped
+        problem = rescaled(problem, w)
+        terms = (PinEnergy(pins, stiffness, extent), problem.barrier(w))
+        newton = NewtonProblem(problem.faces, problem.assembly, problem.motion, AREA_WEIGHT, terms)
         yield Progress("Pins", k / len(STIFFNESS))
-        w = (yield from minimise_energy(problem, w, np.inf, 40, k)).w
+        w = (yield from minimise(newton, w, StageLimits(np.inf, MAX_STEPS), k)).w
     far = pins.vertices[np.abs(w[pins.vertices] - pins.places) > NEAR * extent]
     raise PinError("Pins cannot reach their places without a fold", kind="vertex", elements=far)
 
 
-def _held(n, pins):
+def _fixed(n: int, pins: Pins) -> FreeMotion:
     pinned = np.zeros(n, bool)
     pinned[pins.vertices] = True
     return FreeMotion(pinned)

@@ -170,14 +170,14 @@ class NewtonProblem:
     faces: Elements
     assembly: Assembly
     motion: Motion
-    weight: float | np.ndarray
+    area_weight: float | np.ndarray
     terms: tuple[EnergyTerm, ...] = ()
     aim: Elements | None = None
     smoother: Smoother | None = None
 
     def energy(self, w: np.ndarray) -> float:
         """Energy of the faces and of all extras at a map w (n,) complex; infinity where a face is folded."""
-        value = float(energies(self.faces, w, self.weight).sum())
+        value = float(energies(self.faces, w, self.area_weight).sum())
         return value + sum(e.energy(w) for e in self.terms) if np.isfinite(value) else value
 
     def area_error(self, w: np.ndarray) -> float:
@@ -189,7 +189,7 @@ class NewtonProblem:
         step = newton_step(self, w, value, pressure)
         if self.smoother is None:
             return step
-        smooth = self.smoother.smoothed(self.faces, step.w, float(self.weight))
+        smooth = self.smoother.smoothed(self.faces, step.w, float(self.area_weight))
         return NewtonStep(smooth, self.energy(smooth), step.decrement, step.share)
 
 
@@ -209,7 +209,7 @@ def newton_direction(
     """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
     frame, free = problem.motion.frame(w), problem.motion.free.astype(float)
     matrix, slopes, scale = _equations(problem, w, pressure, frame, free)
-    parts = problem.assembly.parts if np.max(problem.weight) <= STIFF else None
+    parts = problem.assembly.parts if np.max(problem.area_weight) <= STIFF else None
     step = -_solution(matrix, slopes, scale, parts, w, frame[:, None] * [1, 1j] * free)
     return step.view(complex), float(step @ slopes)
 
@@ -217,7 +217,7 @@ def newton_direction(
 def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> tuple[sp.spmatrix, np.ndarray, float]:
     """Hessian (2n,2n) and slopes (2n,) along the axes of the frame, and the mean of the Hessian's diagonal."""
     n, faces = len(w), problem.faces
-    local = face_derivatives(faces, w, problem.weight, pressure)
+    local = face_derivatives(faces, w, problem.area_weight, pressure)
     gradient = scatter(faces, local.gradient, n)
     rows = np.ascontiguousarray((local.rows * frame[faces.triangles][:, None, :]).conj()).view(float)
     rows *= free[faces.triangles].reshape(-1, 1, 6)

@@ -16,7 +16,8 @@ from ..maps.energy import Elements, area_error, elements
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps, part_of
-from .continuation import QUALITIES, ContinuationResult, MapProblem, minimise_in_stages, planned_weights
+from .continuation import ContinuationResult, MapProblem, minimise_in_stages
+from .continuation_rules import QUALITIES, planned_weights
 from .elimination_order import Renumbered, renumbered
 from .initial_maps import InitialMap, disk_initial_map, free_initial_map, is_far, notched_disk, square_initial_map
 from .pins import move_pins, placed_like
@@ -209,7 +210,7 @@ def _eased(task: MapProblem, w: np.ndarray, weight: float) -> Steps[np.ndarray]:
     Triangles of three boundary vertices are slivers in a disk. They hold up Newton's first steps, and have lost the
     digits that say whither.
     """
-    tense = len(task.faces.triangles) > FEW and task.problem(w, weight, False).energy(w) > TENSE
+    tense = len(task.faces.triangles) > FEW and task.newton_problem(w, weight, False).energy(w) > TENSE
     if tense and not task.boundary_crosses(w):
         w = yield from smoothed(task.faces, w, weight, SWEEPS, task.loop)
     return w

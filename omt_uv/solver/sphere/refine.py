@@ -15,14 +15,16 @@ from ..linalg.nested_dissection import mesh_order
 from ..maps.energy import Elements, elements, squared
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..progress import Progress, Steps
-from ..refinement.continuation import (
+from ..refinement.continuation import StageLimits, minimise
+from ..refinement.continuation_rules import (
     LOOSE,
     QUALITIES,
-    SQUEEZED,
+    SQUEEZED_WEIGHT,
     STAGE_STEPS,
     STRICT,
     Quality,
-    minimise,
+    is_enough,
+    is_squeezed,
     planned_weights,
 )
 from ..refinement.projected_newton import Assembly
@@ -145,8 +147,8 @@ def _in_order(positions: np.ndarray, order: np.ndarray) -> np.ndarray:
 def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Quality) -> Steps[SphereRefinement]:
     """Newton in stages of growing area weight, as `refinement.continuation.minimise_in_stages`."""
     weights = planned_weights(balance, settings)
-    if with_projected_targets(problem, p, weights[0]).energy(p) > SQUEEZED and weights[0] > 1:
-        weights = [1.0, *weights]
+    if is_squeezed(with_projected_targets(problem, p, weights[0]).energy(p), weights[0]):
+        weights = [SQUEEZED_WEIGHT, *weights]
     steps, k, error = 0, 0, np.inf
     while True:
         current = with_projected_targets(problem, p, weights[k])
@@ -154,10 +156,10 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
         tolerance = TOLERANCE if balance == 0 else STRICT
-        stage = yield from minimise(current, p, goal, allowed, k, None, tolerance)
+        stage = yield from minimise(current, p, StageLimits(goal, allowed, tolerance), k)
         p, steps, weight, k = stage.w, steps + stage.steps, weights[k], k + 1
         before, error = error, problem.area_error(p)
-        enough = balance > 0 or error <= settings.area_error or weights[-1] >= settings.greatest_weight
+        enough = is_enough(settings, balance, error, weights[-1])
         if steps >= settings.max_steps or stage.status == "stalled" or (enough and k >= len(weights)):
             return SphereRefinement(
                 positions=p,

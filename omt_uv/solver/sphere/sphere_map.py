@@ -16,7 +16,7 @@ from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.spherical_geometry import spherical_areas
 from ..mesh.topology import twins
 from ..progress import Steps, part_of
-from ..refinement.continuation import QUALITIES
+from ..refinement.continuation_rules import QUALITIES
 from ..transport.semidiscrete_sphere import sphere_transport
 from ..transport.spherical_power_diagram import Hull
 from .conformal import ConformalSphere, conformal_sphere

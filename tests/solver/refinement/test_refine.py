@@ -13,7 +13,7 @@ from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import Progress, drain
 from omt_uv.solver.refinement.boundary_barrier import box_pairs, crossings, make_barrier
-from omt_uv.solver.refinement.continuation import QUALITIES
+from omt_uv.solver.refinement.continuation_rules import QUALITIES
 from omt_uv.solver.refinement.projected_newton import (
     Assembly,
     CircleMotion,

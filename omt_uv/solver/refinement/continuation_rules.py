@@ -1,0 +1,201 @@
+"""Decide from step to step how a refinement goes on, by one table of rules for single charts and for batches.
+
+A refinement minimises shear + area weight * area error, in stages of growing area weight (a penalty method: Nocedal,
+Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entry a chart:
+
+    start a stage            `planned_weights`, `is_squeezed`, `next_weight`
+    within a stage           `next_pressure`
+    end a stage              `stage_tolerances`, `judge_step`
+    end the refinement       `is_enough`, `is_futile`
+
+A batch differs from a chart by itself in this: it takes no `early` end of a stage, since its steps are those of all
+charts; it knows no barrier and no sweeps, and gives a chart back that would need one of them; and it starts cold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..analysis.density import INEXACT
+
+# A number, or one for each chart of a batch.
+Number = float | np.ndarray
+Truth = bool | np.ndarray
+
+# A stage that reaches the goal ends when Newton promises less than this share of the energy.
+LOOSE = 3e-2
+# One on the way ends sooner where the boundary is free; vertices on a circle or on sides do not make up for it later.
+ON_THE_WAY = 0.05
+# The same where sweeps follow every step: what Newton promises then is in few faces, and sweeps do it for less. Share
+# of the energy where the goal is not reached, where it is, and on the way.
+SWEPT_TOLERANCE = 0.1
+SWEPT_LOOSE = 0.15
+SWEPT_ON_THE_WAY = 0.1
+# With a balance the weight alone decides, and neighbouring balances must not differ by chance.
+STRICT = 1e-4
+# Area weight at balance 1. Without it the map of least shear has no scale; and much below this the mean shear, which is
+# not quite the energy's, no longer falls.
+LEAST_WEIGHT = 1e-2
+# Area weight for an initial map that is so squeezed that its shear must relax before its areas, and the mean energy
+# that says so.
+SQUEEZED_WEIGHT = 1.0
+SQUEEZED = 50.0
+# Where the error is not reached, the weight grows by a factor of at least and at most so much.
+LEAST_GROWTH = 1.3
+MOST_GROWTH = 10.0
+# The factor for weights of a start that has nearly its areas, of a target that will need more than the first ones.
+NEAR = 2.0
+# Where a greater weight leaves more than this share of the error, some faces have no room in the domain, and still
+# greater ones would only shear the rest.
+STUCK = 0.98
+# The same for magnified regions that are still far from the goal, by the power of the weight's growth that the error is
+# to fall with, where it has grown by so much: a density that varies more from face to face than the mesh can show has
+# no exact areas, only shear.
+SLUGGISH = 0.25
+GROWN = 3.0
+# Newton steps: a stage that takes longer gives way to the next, which may find a way around.
+STAGE_STEPS = 40
+# Share of the area term's indefinite Hessian kept ("pressure"): at the start of a stage, and the least before it is
+# dropped.
+FIRST_PRESSURE = 0.3
+LEAST_PRESSURE = 0.01
+# A full step keeps its promise where it gains more than this share of it, and a poor one gains less than that.
+KEPT_PROMISE = 0.7
+POOR_PROMISE = 0.3
+# Of a step that is poor because a fold is near: the share of it that was taken.
+POOR_SHARE = 0.5
+# The energy is a mean over the surface: below this it is rounding.
+NO_ENERGY = 1e-12
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How exact areas become.
+
+    Attributes
+    ----------
+    area_error : share of the area in the wrong place that is to be reached
+    area_weights : on the way
+    greatest_weight : at which the refinement ends in any case
+    max_steps : Newton steps in all
+    tolerance : where the area error is not reached, a weight is left for a greater one when Newton promises less than
+        this share of the energy. A small one costs steps and saves shear.
+    loose_tolerance : the same where it is reached, at the end
+    """
+
+    area_error: float
+    area_weights: tuple[float, ...]
+    greatest_weight: float
+    max_steps: int
+    tolerance: float
+    loose_tolerance: float = LOOSE
+
+
+QUALITIES = {
+    # For the start of a finer mesh: little shear alone, or areas about right, too.
+    "relaxed": Quality(0.1, (30.0,), 1e4, 80, 3e-2, 1e-2),
+    "rough": Quality(0.03, (30.0, 500.0), 1e4, 80, 1e-2),
+    "draft": Quality(0.05, (10.0, 100.0), 1e3, 40, 1e-2),
+    "standard": Quality(0.008, (30.0, 500.0), 1e6, 150, 3e-2),
+    "exact": Quality(0.0003, (30.0, 1000.0, 3e4), 1e8, 300, 1e-2),
+}
+
+
+def planned_weights(balance: float, quality: Quality) -> list[float]:
+    """Area weights of a quality; with a balance, those on the way to one between the last of them and LEAST_WEIGHT."""
+    if balance == 0:
+        return list(quality.area_weights)
+    last = final_weight(balance, quality)
+    return [*(weight for weight in quality.area_weights if weight < last), last]
+
+
+def final_weight(balance: float, quality: Quality) -> float:
+    """Area weight at a balance from 0 to 1: a geometric mean of the quality's last one and of LEAST_WEIGHT."""
+    return quality.area_weights[-1] ** (1 - balance) * LEAST_WEIGHT**balance
+
+
+def is_squeezed(energy: Number, first_weight: Number) -> Truth:
+    """Whether a start of this energy at the first area weight needs a stage at SQUEEZED_WEIGHT before it."""
+    return (energy > SQUEEZED) & (first_weight > SQUEEZED_WEIGHT)
+
+
+def weight_growth(excess: Number) -> Number:
+    """Factors for area weights that leave area errors so many times as large as they are to be."""
+    return np.clip(np.square(excess), LEAST_GROWTH, MOST_GROWTH)
+
+
+def next_weight(weight: Number, error: Number, quality: Quality) -> Number:
+    """The area weight after one that left this area error, the share of a region aside, beyond the planned ones."""
+    return weight * weight_growth(error / quality.area_error)
+
+
+def promised(decrement: Number, energy: Number) -> Number:
+    """Residual: the decrease that Newton's method promises, over the energy."""
+    return decrement / np.maximum(energy, NO_ENERGY)
+
+
+def next_pressure(pressure: Number, share: Number, gain: Number, decrement: Number) -> np.ndarray:
+    """Share of the Hessian's indefinite part to keep after a step: less while full steps keep their promise.
+
+    share: of the step that was taken; gain: by how much the energy fell; decrement: by how much it was to fall
+    """
+    full = (share == 1) & (gain > KEPT_PROMISE * decrement)
+    poor = (share < POOR_SHARE) | (gain < POOR_PROMISE * decrement)
+    more = np.minimum(1.0, np.maximum(3 * pressure, 3 * LEAST_PRESSURE))
+    less = np.where(pressure > LEAST_PRESSURE, pressure / 3, 0.0)
+    return np.where(full, less, np.where(share == 0, 1.0, np.where(poor, more, pressure)))
+
+
+def stage_tolerances(
+    quality: Quality, balance: float, on_the_way: bool, early: bool, swept: bool = False
+) -> tuple[float, float]:
+    """Tolerance of a stage where its goal is not reached, and where it is; see `judge_step`.
+
+    on_the_way: its weight is not the last of those planned; early: it may end sooner for that, see ON_THE_WAY;
+    swept: sweeps follow every step
+    """
+    if balance > 0:
+        return STRICT, LOOSE
+    if swept:
+        return max(quality.tolerance, SWEPT_TOLERANCE), SWEPT_ON_THE_WAY if on_the_way else SWEPT_LOOSE
+    return quality.tolerance, ON_THE_WAY if on_the_way and early else quality.loose_tolerance
+
+
+class Verdict(NamedTuple):
+    """stalled: no step helps; converged: the stage is done; sharpen: only the true Hessian can tell."""
+
+    stalled: Truth
+    converged: Truth
+    sharpen: Truth
+
+
+def judge_step(share: Number, pressure: Number, residual: Number, met: Truth, tolerance: float) -> Verdict:
+    """What follows from a step taken to this share, with a Hessian of this pressure and this residual after it.
+
+    met: the residual is below the loose tolerance, and the goal reached. A Hessian stiffer than the true one promises
+    too little, so that a stage which has not met its goal ends on a promise of the true one only.
+    """
+    low = residual < tolerance
+    true_hessian = pressure <= LEAST_PRESSURE
+    return Verdict(
+        stalled=(share == 0) & (pressure == 1.0),
+        converged=met | (low & true_hessian),
+        sharpen=low & (pressure > LEAST_PRESSURE),
+    )
+
+
+def is_enough(quality: Quality, balance: float, error: Number, weight: Number) -> Truth:
+    """Whether a stage of this area weight may be the last: it left this area error."""
+    return (balance > 0) | (error <= quality.area_error) | (weight >= quality.greatest_weight)
+
+
+def is_futile(quality: Quality, error: Number, before: Number, grown: Number, with_region: bool) -> Truth:
+    """Whether a stage that converged left so much of the error before it that greater weights are of no use.
+
+    grown: by how many times its area weight exceeded the one before
+    """
+    far = with_region & (grown >= GROWN) & (error / quality.area_error > INEXACT)
+    return error > np.where(far, np.minimum(STUCK, grown**-SLUGGISH), STUCK) * before
