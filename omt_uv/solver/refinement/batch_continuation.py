@@ -55,14 +55,13 @@ class BatchContinuation:
     residual, multiplier : see `continuation.ContinuationResult`
     """
 
-    def __init__(self, count: int, quality: str, balance: float, energies: Energies, with_region: bool = False):
-        self.quality, self.balance, self.with_region = QUALITIES[quality], balance, with_region
+    def __init__(self, count: int, quality: str, balance: float, energies: Energies):
+        self.quality, self.balance = QUALITIES[quality], balance
         self._planned = np.array(planned_weights(balance, self.quality))
         self._level, self.area_weight = np.zeros(count, np.int64), np.full(count, self._planned[0])
         squeezed = is_squeezed(energies(self.area_weight), self._planned[0])
         self._level[squeezed], self.area_weight[squeezed] = -1, SQUEEZED_WEIGHT
-        self._weight_before, self._error_before = self.area_weight, np.full(count, np.inf)
-        self.multiplier = np.zeros(count)
+        self.multiplier, self._error_before = np.zeros(count), np.full(count, np.inf)
         self.value = energies(self.area_weight)
         self.live = np.isfinite(self.value)
         self.solved = np.zeros(count, bool)
@@ -92,11 +91,9 @@ class BatchContinuation:
         """A greater area weight where a stage has ended and it was not the last."""
         quality, weight, planned = self.quality, self.area_weight, len(self._planned)
         self._level += ended
-        grown = weight / self._weight_before
         enough = is_enough(quality, self.balance, errors.error, weight)
-        enough |= converged & is_futile(quality, errors.error, self._error_before, grown, self.with_region)
+        enough |= converged & is_futile(quality, errors.error, self._error_before)
         self._error_before = np.where(ended, errors.error, self._error_before)
-        self._weight_before = np.where(ended, weight, self._weight_before)
         finished = ended & (failed | (enough & (self._level >= planned)))
         self.solved |= finished & ~failed
         self.live = self.live & ~finished

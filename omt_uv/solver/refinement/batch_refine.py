@@ -86,10 +86,15 @@ def refine_batch(
     density: np.ndarray | None = None,
     region: np.ndarray | None = None,
 ) -> Steps[BatchMaps]:
-    """Area-preserving maps with free boundaries of disks, vertices (n,3) of unit extent and triangles (m,3) each.
+    """Refine maps with free boundaries of disks, vertices (n,3) of unit extent and triangles (m,3) each.
 
-    density, region : of the triangles of all disks, one after the other, see `chart_map.map_chart`. Every map has
-        the area of its disk
+    Every map has the area of its disk.
+
+    Parameters
+    ----------
+    quality, balance : see `refine.RefinementOptions`
+    density : (m,) target area over area of the triangles of all disks, one after the other; 1 by default
+    region : (m,) in [0, 1], weights of a region whose share of every disk's target is to be exact
 
     Raises
     ------
@@ -109,7 +114,6 @@ def refine_batch(
         quality,
         balance,
         lambda area_weight: union.sums(energies(faces, w, area_weight[union.of_face])) / share,
-        region is not None,
     )
     while continuation.live.any():
         active = _ActiveCharts(union, faces, order, continuation.live)
@@ -254,9 +258,9 @@ class _ActiveCharts:
         region = self.faces.region
         for part in () if region is None else (region, 1 - region):
             share = self._sums(part * target)
-            held = np.where(share > 0, share, np.inf)
-            single = FACE_ERROR * self._sums(part * np.abs(error)) / held
-            worst = np.maximum.reduce([worst, SHARE_ERROR * np.abs(self._sums(part * error)) / held, single])
+            present = np.where(share > 0, share, np.inf)
+            single = FACE_ERROR * self._sums(part * np.abs(error)) / present
+            worst = np.maximum.reduce([worst, SHARE_ERROR * np.abs(self._sums(part * error)) / present, single])
         return worst
 
     def _sums(self, face_values):

@@ -1,7 +1,7 @@
-"""Keep a boundary from crossing itself: find crossings, and a barrier between its vertices and edges.
+"""Keep a boundary from crossing itself, by a barrier between its vertices and edges (Smith, Schaefer 2015).
 
-A map without folds whose boundary does not cross itself is one to one. The barrier follows Smith, Schaefer 2015:
-it acts where a boundary vertex is nearer to a boundary edge than a small reach, is infinite at contact, and a step is
+A map without folds whose boundary does not cross itself is one to one. The barrier strength * (reach / distance - 1)^2
+acts where a boundary vertex is nearer to a boundary edge than a small reach, is infinite at contact, and a step is
 never taken past the first contact. Its Hessian knows that an edge turns while a vertex slides past it: where they
 nearly touch that is most of what a step changes, and without it one such pair holds up the whole map.
 """
@@ -53,7 +53,14 @@ def _passes(a, b, p, q, depth: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class BoundaryBarrier:
-    """Barrier of the boundary edges tail, head (b,); reach (b,) of the vertex tail and of the edge."""
+    """The energy of boundary vertices that are near to boundary edges.
+
+    Attributes
+    ----------
+    tail, head : (b,) vertices of the boundary edges
+    vertex_reach, edge_reach : (b,) of the vertex `tail` and of the edge; of a pair, the smaller one counts
+    strength : see `energy`
+    """
 
     tail: np.ndarray
     head: np.ndarray
@@ -161,7 +168,7 @@ def _contact_times(p, dp, e, de):
 
 
 def box_pairs(low1, high1, low2, high2) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (i, j) of boxes (k,2) and (l,2), by corners, that meet: found by a uniform grid."""
+    """Pairs i, j (p,) of boxes that meet, by a uniform grid: their corners are (k,2) each, and (l,2) each."""
     low = np.minimum(low1.min(0), low2.min(0))
     extent = np.maximum(high1.max(0), high2.max(0)) - low
     cells = int(np.clip(np.sqrt(len(low1) + len(low2)), 1, 512))

@@ -8,8 +8,10 @@ Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entr
     end a stage              `stage_tolerances`, `judge_step`
     end the refinement       `is_enough`, `is_futile`
 
-A batch differs from a chart by itself in this: it takes no `early` end of a stage, since its steps are those of all
-charts; it knows no barrier and no sweeps, and gives a chart back that would need one of them; and it starts cold.
+A batch differs from a chart by itself in four ways. It takes no `early` end of a stage, since its steps are those of
+all charts. It does not tell `is_futile` of regions: a chart with a region that has no exact areas uses up its steps,
+is given back, and says alone what it did not reach. It knows no barrier and no sweeps, and gives a chart back that
+would need them. And it starts cold.
 """
 
 from __future__ import annotations
@@ -192,10 +194,11 @@ def is_enough(quality: Quality, balance: float, error: Number, weight: Number) -
     return (balance > 0) | (error <= quality.area_error) | (weight >= quality.greatest_weight)
 
 
-def is_futile(quality: Quality, error: Number, before: Number, grown: Number, with_region: bool) -> Truth:
+def is_futile(quality: Quality, error: Number, before: Number, grown: Number = 1.0, with_region: bool = False) -> Truth:
     """Whether a stage that converged left so much of the error before it that greater weights are of no use.
 
-    grown: by how many times its area weight exceeded the one before
+    before: the error before it; grown: by how many times its area weight exceeded the one before; with_region: see
+    SLUGGISH
     """
     far = with_region & (grown >= GROWN) & (error / quality.area_error > INEXACT)
     return error > np.where(far, np.minimum(STUCK, grown**-SLUGGISH), STUCK) * before

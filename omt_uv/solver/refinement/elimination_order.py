@@ -1,4 +1,7 @@
-"""A mesh in the order in which its unknowns are eliminated: neighbours in the order are neighbours in memory."""
+"""Renumber a mesh in the order in which its unknowns are eliminated, by nested dissection (George 1973).
+
+Neighbours in the order are neighbours in memory.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,11 @@ from .pins import Pins, check_pins
 class Renumbered:
     """A mesh and its map, vertex order[k] as vertex k, and mirrored if need be so that most of it is not.
 
-    vertices (n,3), triangles (m,3), uv (n,2) and pins, all renumbered; order (n,); mirror (2,) signs of u and v.
+    Attributes
+    ----------
+    vertices, triangles, uv, pins : (n,3), (m,3), (n,2), renumbered
+    order : (n,)
+    mirror : (2,) signs of u and v
     """
 
     vertices: np.ndarray
@@ -52,8 +59,15 @@ def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | No
     order = mesh_order(vertices, triangles)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
-    held = None
+    renumbered_pins = None
     if pins is not None and len(pins[0]):
         checked = check_pins(np.asarray(pins[0]), np.asarray(pins[1], float).reshape(-1, 2) * mirror, len(order))
-        held = Pins(place[checked.vertices], checked.places)
-    return Renumbered(vertices[order], place[triangles], uv[order] * mirror, held, order, mirror)
+        renumbered_pins = Pins(place[checked.vertices], checked.places)
+    return Renumbered(
+        vertices=vertices[order],
+        triangles=place[triangles],
+        uv=uv[order] * mirror,
+        pins=renumbered_pins,
+        order=order,
+        mirror=mirror,
+    )

@@ -1,6 +1,6 @@
-"""Where the refinement starts: a map without folds whose boundary lies where it shall move.
+"""Find an initial map for the refinement: one without folds whose boundary lies where it shall move.
 
-Every start is one of these, in this order: the given map; the given map untangled; a mean value map of the surface
+Every one is one of these, in this order: the given map; the given map untangled; a mean value map of the surface
 with the boundary spread by its length. Whatever replaces the given map is said in a warning.
 """
 
@@ -43,8 +43,16 @@ USELESS = 1e-3
 
 @dataclass(frozen=True)
 class InitialMap:
-    """A map uv (n,2) without folds, the motion of its vertices, and what was replaced; may_cross: its boundary
-    might come to cross itself; guarded: it would, in ways that `crossings` cannot see."""
+    """A map without folds.
+
+    Attributes
+    ----------
+    uv : (n,2)
+    motion : of its vertices
+    warnings : what was replaced
+    may_cross : its boundary might come to cross itself
+    with_barrier : it would, in ways that `crossings` cannot see
+    """
 
     uv: np.ndarray
     motion: Motion
@@ -63,11 +71,11 @@ def disk_initial_map(vertices, triangles, uv, loop) -> InitialMap:
     radius = np.sqrt(face_areas(vertices, triangles).sum() / np.pi)
     warnings = []
     uv = uv * (radius / np.linalg.norm(uv[loop], axis=1).mean())
-    rim = circle_boundary(uv, loop, radius)
-    if rim is None:
+    places = circle_boundary(uv, loop, radius)
+    if places is None:
         warnings.append(SPREAD)
-        rim = arc_length_boundary(vertices, loop, radius)
-    straight = _straighten(uv, vertices, triangles, loop, rim, warnings)
+        places = arc_length_boundary(vertices, loop, radius)
+    straight = _straighten(uv, vertices, triangles, loop, places, warnings)
     return InitialMap(straight, CircleMotion(loop, radius, len(vertices)), tuple(warnings))
 
 
@@ -158,12 +166,12 @@ def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> InitialMap:
     """
     warnings = list(reasons)
     s, corner = _snap_corners(s)
-    rim = _on_square(s) * half
+    places = _on_square(s) * half
     side = np.floor(s).astype(int)
     released = _released(triangles, loop, side, corner, len(vertices))
     if released.any():
         warnings.append(f"{released.sum()} boundary vertices leave the square, where a face would lie along a side")
-    straight = _straighten(uv, vertices, triangles, loop[~released], rim[~released], warnings)
+    straight = _straighten(uv, vertices, triangles, loop[~released], places[~released], warnings)
     slide = ~corner & ~released
     motion = LineMotion(loop[slide], np.where(side[slide] % 2 == 0, 1.0, 1j), loop[corner], len(vertices))
     # Vertices of a side could pass each other where a released one between them leaves the side.
@@ -187,10 +195,10 @@ def unroll(vertices, triangles, loop) -> np.ndarray | None:
     far = np.linalg.norm(vertices[loop] - vertices[first], axis=1)
     # On a symmetric boundary rounding shall not decide between two.
     second = loop[np.argmax(far >= FARTHEST * far.max())]
-    held = np.array([2 * first, 2 * first + 1, 2 * second, 2 * second + 1])
+    fixed = np.array([2 * first, 2 * first + 1, 2 * second, 2 * second + 1])
     x = np.zeros(2 * n)
-    x[held[2]] = np.linalg.norm(vertices[second] - vertices[first])
-    others = np.setdiff1d(np.arange(2 * n), held)
+    x[fixed[2]] = np.linalg.norm(vertices[second] - vertices[first])
+    others = np.setdiff1d(np.arange(2 * n), fixed)
     free = linear[:, others]
     factor = Factor(free.T @ free)
     for _ in range(POLISH):
@@ -216,12 +224,12 @@ def check_initial_map(uv: np.ndarray, triangles: np.ndarray) -> None:
         raise FoldedUVError("The UVs to refine are folded beyond repair", kind="face", elements=folded)
 
 
-def _straighten(uv, vertices, triangles, loop, rim, warnings):
-    """The map uv with its boundary loop on rim, untangled where that folds it."""
+def _straighten(uv, vertices, triangles, loop, places, warnings):
+    """The map uv with its boundary loop on places, untangled where that folds it."""
     pushed = uv.copy()
-    pushed[loop] = rim
+    pushed[loop] = places
     if count_folds(pushed, triangles):
-        pushed, warning = untangle(uv, vertices, triangles, loop, rim)
+        pushed, warning = untangle(uv, vertices, triangles, loop, places)
         warnings.extend([warning] if warning else [])
     left = np.flatnonzero(~(signed_areas(pushed, triangles) > 0))
     if len(left):

@@ -1,9 +1,9 @@
-"""A coarser mesh of the same disk, and the way back without folds.
+"""Coarsen the mesh of a disk, and prolong maps without folds, by half-edge collapses (Hoppe 1996).
 
-Vertices are removed by half-edge collapses, an independent set in every round (Hoppe 1996; the rounds after Kirkpatrick
-1983). The mesh is carried along as an embedding in the plane: a collapse that keeps all its triangles positive there
-keeps the mesh a disk. On the way back every vertex returns into the star that it left: the vertex it was collapsed to
-sees all of that star, so near it there is always a place where no face folds (Shen, Jiang, Zorin, Panozzo 2019).
+An independent set of vertices is removed in every round (Kirkpatrick 1983). The mesh is carried along as an embedding
+in the plane: a collapse that keeps all its triangles positive there keeps the mesh a disk. On the way back every vertex
+returns into the star that it left: the vertex it was collapsed to sees all of that star, so near it there is always a
+place where no face folds (Shen, Jiang, Zorin, Panozzo 2019).
 """
 
 from __future__ import annotations
@@ -20,25 +20,34 @@ from .vertex_sweeps import independent_set, relax, stars
 
 # A vertex with more faces stays: comparing all its collapses costs the square of their number.
 MOST_FACES = 9
-# Shape (1: equilateral) that new faces need in space, unless the old ones were worse, and in the plane.
-LEAST_SHAPE, LEAST_FLAT_SHAPE = 0.15, 1e-7
+# Shape (1: equilateral) that new faces need in space, unless the old ones were worse.
+LEAST_SHAPE = 0.15
+# The same in the plane.
+LEAST_FLAT_SHAPE = 1e-7
 # Rounds end when one removes a smaller share of the vertices.
 LEAST_PROGRESS = 0.03
 # Vertices whose stars hold so many times the mean of what is to be spread evenly stay, too.
 HEAVY = 1.0
 # Vertices of the boundary stay while they are at most this share of those that are left.
-RIM_SHARE = 0.25
+BOUNDARY_SHARE = 0.25
 # Share of the area at a safe place that every returning face keeps.
 KEPT_AREA = 0.1
-# Newton steps of a returning vertex, and the weight of the area term in them.
-RELAX_STEPS, RELAX_WEIGHT = 6, 10.0
+# Newton steps of a returning vertex.
+RELAX_STEPS = 6
+# Area weight in them.
+RELAX_WEIGHT = 10.0
 
 
 @dataclass(frozen=True)
 class CollapseRound:
-    """One round: vertex (k,) went to `into` (k,); it returns to the mean of corner (k,3) with the weights share (k,3).
+    """Vertices that were removed in one round.
 
-    Its star was the triangles (vertex[row], after, before), all (s,), and is kept as `faces` with their target areas.
+    Attributes
+    ----------
+    vertex, into : (k,) each went to the place of another
+    corner, share : (k,3) it returns to the mean of these vertices with these weights
+    row, after, before : (s,) its star was the triangles (vertex[row], after, before)
+    faces : these, with their target areas
     """
 
     vertex: np.ndarray
@@ -52,14 +61,22 @@ class CollapseRound:
 
     @property
     def on_boundary(self) -> np.ndarray:
-        """Which vertices (k,) bool return to a chord of the rim."""
+        """Which vertices (k,) bool return to a chord of the boundary."""
         return self.corner[:, 1] == self.corner[:, 2]
 
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """Vertices kept (c,), triangles (t,3) of them, mass (t,) of the triangles and the weights (t,) of a region, if
-    there is one, and the rounds that led there."""
+    """A coarse mesh.
+
+    Attributes
+    ----------
+    kept : (c,) vertices of the fine mesh
+    triangles : (t,3) of them
+    mass : (t,) target area of the triangles
+    region : (t,) weights of a region, if there is one
+    rounds : of collapses that led there
+    """
 
     kept: np.ndarray
     triangles: np.ndarray
@@ -74,7 +91,7 @@ class CoarseMesh:
         for k, removal in enumerate(reversed(self.rounds)):
             yield Progress("Coarser mesh", k / len(self.rounds))
             w[removal.vertex] = _returned(removal, w)
-            # On the rim they stay on the chords: where the coarse boundary does not cross itself, neither does this.
+            # Boundary vertices stay on the chords: where the coarse boundary does not cross itself, neither does this.
             relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS, removal.on_boundary)
         return np.column_stack([w.real, w.imag])
 
@@ -89,25 +106,25 @@ def coarsen_disk(vertices, triangles, flat, mass, goal: int, region=None, densit
     mass = np.column_stack([mass] if region is None else [mass, mass * region])
     rounds: list[CollapseRound] = []
     left = count = len(vertices)
-    rim = boundary_loops(triangles)[0]
+    boundary = boundary_loops(triangles)[0]
     while left > goal:
         yield Progress("Coarser mesh", np.log(count / left) / np.log(count / goal))
         rank = np.random.default_rng(len(rounds)).permutation(count)
-        if len(rim) <= RIM_SHARE * left:
-            rank[rim] = -1
+        if len(boundary) <= BOUNDARY_SHARE * left:
+            rank[boundary] = -1
         if density is not None:
             rank[_heavy(vertices, triangles, density)] = -1
         triangles, mass, removal = _round(vertices, triangles, flat, mass, rank)
         rounds.append(removal)
         left -= len(removal.vertex)
-        rim = rim[~np.isin(rim, removal.vertex)]
+        boundary = boundary[~np.isin(boundary, removal.vertex)]
         if len(removal.vertex) < LEAST_PROGRESS * left:
             break
     kept = np.unique(triangles)
     place = np.full(count, -1)
     place[kept] = np.arange(len(kept))
     region = None if region is None else mass[:, 1] / mass[:, 0]
-    return CoarseMesh(kept, place[triangles], mass[:, 0], region, rounds)
+    return CoarseMesh(kept=kept, triangles=place[triangles], mass=mass[:, 0], region=region, rounds=rounds)
 
 
 def _heavy(V, F, density):
@@ -119,9 +136,9 @@ def _heavy(V, F, density):
 def _round(V, F, flat, mass, rank):
     """Collapse an independent set: triangles and mass afterwards, and the removal."""
     tail, head = halfedges(F)
-    rim = twins(F) < 0
+    boundary = twins(F) < 0
     ahead = np.full(len(V), -1)
-    ahead[tail[rim]] = head[rim]
+    ahead[tail[boundary]] = head[boundary]
     count = np.bincount(F.ravel(), minlength=len(V))
     star, turned = stars(F, independent_set(F, np.where((count > MOST_FACES) | (count < 2), -1, rank)))
     v, after, before = np.take_along_axis(F[star], turned, 1).T
@@ -133,7 +150,14 @@ def _round(V, F, flat, mass, rank):
     corner, share = _places(V, flat, vertex, row[stays], new, ahead)
     faces = elements(V, np.column_stack([v, after, before]), mass[star, 0])
     removal = CollapseRound(
-        vertex, new[np.searchsorted(row[stays], np.arange(len(vertex))), 0], corner, share, row, after, before, faces
+        vertex=vertex,
+        into=new[np.searchsorted(row[stays], np.arange(len(vertex))), 0],
+        corner=corner,
+        share=share,
+        row=row,
+        after=after,
+        before=before,
+        faces=faces,
     )
     size = np.sqrt(_squared(_normals(V, new)[0]))
     part = size / np.maximum(np.bincount(row[stays], size, len(vertex)), 1e-300)[row[stays]]
@@ -147,7 +171,7 @@ def _round(V, F, flat, mass, rank):
 def _best_collapses(V, flat, v, after, before, ahead):
     """For every face (s,) of the stars: the best vertex that its own may collapse to, and whether it is good enough.
 
-    A vertex of the rim may only go to the next one.
+    A vertex of the boundary may only go to the next one.
     """
     if not len(v):
         return v, np.zeros(0, bool)
@@ -165,7 +189,7 @@ def _best_collapses(V, flat, v, after, before, ahead):
     begin = np.searchsorted(candidate, np.arange(len(v)))
     score = np.minimum.reduceat(np.where(gone, np.inf, shape), begin)
     bad = np.logical_or.reduceat(~gone & (turned | (_flat_shape(flat, new) < LEAST_FLAT_SHAPE)), begin)
-    # Nor does an inner vertex go to the rim: edges across would cut off parts that have no room in a domain.
+    # Nor does an inner vertex go to the boundary: edges across would cut off parts that have no room in a domain.
     bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ((ahead[v] < 0) & (ahead[after] >= 0)) | ~np.isfinite(score)
     bad |= score < np.minimum(LEAST_SHAPE, np.minimum.reduceat(old, first)[row] / 2)
     # Coarse marks, so that rounding does not choose among equals.
@@ -176,7 +200,7 @@ def _best_collapses(V, flat, v, after, before, ahead):
 
 
 def _places(V, flat, vertex, row, new, ahead):
-    """Corners and weights (k,3) to return to: of the new triangle around the vertex; on the rim, of its chord."""
+    """Corners and weights (k,3) to return to: of the new triangle around the vertex; on the boundary, of its chord."""
     a, b, c = flat[new].transpose(1, 0, 2)
     p = flat[vertex[row]]
     weights = np.column_stack([cross2(b - p, c - p), cross2(c - p, a - p), cross2(a - p, b - p)])
@@ -185,8 +209,8 @@ def _places(V, flat, vertex, row, new, ahead):
     around = order[np.searchsorted(row[order], np.arange(len(vertex)))]
     corner, share = new[around], weights[around]
     back = np.full(len(V), -1)
-    rim = np.flatnonzero(ahead >= 0)
-    back[ahead[rim]] = rim
+    boundary = np.flatnonzero(ahead >= 0)
+    back[ahead[boundary]] = boundary
     on_boundary = np.flatnonzero(ahead[vertex] >= 0)
     v = vertex[on_boundary]
     forth, past = (np.linalg.norm(V[v] - V[x[v]], axis=1) for x in (ahead, back))
@@ -204,7 +228,7 @@ def _returned(removal: CollapseRound, w: np.ndarray) -> np.ndarray:
     touching = (removal.after == removal.into[row]) | (removal.before == removal.into[row])
     inward = np.where(touching, _left(b - a), 0)
     heading = np.bincount(row, inward.real, count) + 1j * np.bincount(row, inward.imag, count)
-    # On the rim, between the one edge and the chord: beyond the chord may be another part of the map.
+    # On the boundary, between the one edge and the chord: beyond the chord may be another part of the map.
     heading = heading + np.where(removal.on_boundary, _left(w[removal.corner[:, 0]] - w[removal.corner[:, 1]]), 0)
     slope, room = _cross(b - a, heading[row]), _cross(a - base[row], b - base[row])
     reach = np.where(touching | (slope >= 0), np.inf, room / np.maximum(-slope, 1e-300))

@@ -1,4 +1,7 @@
-"""Projected Newton for energies of piecewise linear maps, with vertices that are free, slide on a curve or stay."""
+"""Minimise energies of piecewise linear maps, by projected Newton (Teran, Sifakis, Irving, Fedkiw 2005).
+
+Vertices are free, slide on a curve, or stay. No step folds a face (Smith, Schaefer 2015).
+"""
 
 from __future__ import annotations
 
@@ -14,15 +17,15 @@ from ..linalg.sparse import Factor
 from ..maps.energy import Elements, energies, face_derivatives, scatter, squared, target_error
 from .vertex_sweeps import Smoother
 
-ARMIJO = 1e-4
-MAX_HALVINGS = 40
+ARMIJO = 1e-4  # least share of the promised decrease that a step must gain
+MAX_HALVINGS = 40  # of one step
 # A step goes at most this share of the way to the first fold.
 FOLD_SHARE = 0.9
 # Added to the diagonal, relative to its mean: a free map has no place and no direction of its own.
 SHIFT = 1e-10
 # So many times as much where that is not enough.
 SHIFT_GROWTH = 1e3
-# Weight of the area term above which equations are factored at once: steps that are nearly right are too short there.
+# Area weight above which equations are factored at once: steps that are nearly right are too short there.
 STIFF = 5e3
 
 
@@ -162,9 +165,16 @@ class EnergyTerm(Protocol):
 
 @dataclass(frozen=True)
 class NewtonProblem:
-    """What Newton minimises: faces, the weight of their area term, one or (m,), the motion, further energies.
+    """What Newton minimises.
 
-    aim: faces with the targets that count, where those minimised lead to them; smoother: what follows every step.
+    Attributes
+    ----------
+    faces, area_weight : see `maps.energy`; one weight, or (m,)
+    assembly : of the Hessian
+    motion : how vertices may move
+    terms : further energies
+    aim : faces with the targets that count, where those minimised lead to them
+    smoother : what follows every step
     """
 
     faces: Elements

@@ -1,7 +1,7 @@
-"""Authalic refinement: every face gets its area, none folds, and the shear is the least that this allows.
+"""Refine a map until every face has its area, none folds, and the shear is the least that allows, by Newton's method.
 
-Minimises the energy of `energy.py` by projected Newton in stages of growing weight of the area term. The weight
-ends where the area error is small enough for the quality asked for.
+Minimises MIPS (Hormann, Greiner 2000) plus an area term (Degener, Meseth, Klein 2003), see `maps.energy`, in stages of
+growing area weight (`continuation`). The weight ends where the area error is small enough for the quality.
 """
 
 from __future__ import annotations
@@ -30,11 +30,14 @@ BOUNDARIES = tuple(INITIAL_MAPS)
 SWEPT_ABOVE = 2000
 # Area error of a disk above which vertices without room may leave the circle.
 NO_ROOM = 0.005
-# Mean energy, and number of triangles, above which a start with a free boundary is smoothed, in so many sweeps: small
-# charts have the same way whether they are solved alone or together (`batches.SMALL`).
-TENSE, FEW, SWEEPS = 3.0, 1000, 4
+# An initial map with a free boundary is smoothed above this mean energy and this number of triangles, in so many
+# sweeps: small charts have the same way whether they are solved alone or together (`parameterization.small_charts`).
+TENSE = 3.0
+FEW = 1000
+SWEEPS = 4
 # Where the time goes, roughly, as start and width.
-EASING, STAGES = (0.0, 0.1), (0.1, 0.9)
+SMOOTHING = (0.0, 0.1)
+STAGES = (0.1, 0.9)
 
 
 @dataclass(frozen=True)
@@ -169,56 +172,62 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
 def _refined(
     mesh: Renumbered, faces: Elements, options: RefinementOptions
 ) -> Steps[tuple[ContinuationResult, tuple[str, ...]]]:
-    """Stages on a renumbered chart: what was found, and the warnings of the start it was found from."""
+    """Stages on a renumbered chart: what was found, and the warnings of the initial map it was found from."""
     boundary, balance, quality = options.boundary, options.balance, QUALITIES[options.quality]
     pins, loop, n = mesh.pins, boundary_loops(mesh.triangles)[0], len(mesh.vertices)
     # A map to areas far from the surface's is sheared by right.
     far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
-    start = INITIAL_MAPS[boundary](mesh.vertices, mesh.triangles, mesh.uv, loop, **({"relaxed": np.inf} if far else {}))
+    given = (mesh.vertices, mesh.triangles, mesh.uv, loop)
+    initial = INITIAL_MAPS[boundary](*given, **({"relaxed": np.inf} if far else {}))
     assembly = Assembly(mesh.triangles, n, schwarz_solver(mesh.vertices, mesh.triangles))
-    # Sweeps know of no springs, and of no balance.
+    # Sweeps know of no pins, and of no balance.
     swept = faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
     smoother = Smoother(mesh.triangles, n) if swept else None
-    task = _task(faces, assembly, start, loop, boundary, smoother)
-    w, given = start.uv @ [1, 1j], mesh.uv @ [1, 1j]
-    placed = boundary == "free"
-    if pins is not None and len(pins.vertices) > 1:
-        task, w = yield from move_pins(task, w, pins)
-        placed = False
+    problem = _map_problem(faces, assembly, initial, loop, boundary, smoother)
+    w, several_pins = initial.uv @ [1, 1j], pins is not None and len(pins.vertices) > 1
+    if pins is not None and several_pins:
+        problem, w = yield from move_pins(problem, w, pins)
     elif boundary == "free":
-        w = yield from part_of(_eased(task, w, planned_weights(balance, quality)[0]), *EASING)
-    way = minimise_in_stages(task, w, balance, quality, options.warm_start, options.multiplier)
+        w = yield from part_of(_smoothed_if_tense(problem, w, planned_weights(balance, quality)[0]), *SMOOTHING)
+    way = minimise_in_stages(problem, w, balance, quality, options.warm_start, options.multiplier)
     found = yield from part_of(way, *STAGES)
     error = area_error(faces, found.w)
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):
-        notched = notched_disk(start, mesh.triangles, loop)
+        notched = notched_disk(initial, mesh.triangles, loop)
         if notched is not None:
-            again = yield from minimise_in_stages(
-                _task(faces, assembly, notched, loop, boundary, smoother), w, balance, quality
-            )
-            if area_error(faces, again.w) < error:
-                found, start = again, notched
-    if placed:
+            problem = _map_problem(faces, assembly, notched, loop, boundary, smoother)
+            with_notches = yield from minimise_in_stages(problem, w, balance, quality)
+            if area_error(faces, with_notches.w) < error:
+                found, initial = with_notches, notched
+    if boundary == "free" and not several_pins:
         area = faces.area @ faces.ratio if pins is None else None
-        found = replace(found, w=placed_like(found.w, given, faces, pins, area))
-    return found, start.warnings
+        found = replace(found, w=placed_like(found.w, mesh.uv @ [1, 1j], faces, pins, area))
+    return found, initial.warnings
 
 
-def _eased(task: MapProblem, w: np.ndarray, weight: float) -> Steps[np.ndarray]:
-    """A start w (n,) whose vertices, those of the boundary too, have moved within their stars, if it is tense.
+def _smoothed_if_tense(problem: MapProblem, w: np.ndarray, area_weight: float) -> Steps[np.ndarray]:
+    """An initial map w (n,) whose vertices, those of the boundary too, have moved within their stars, if it is tense.
 
     Triangles of three boundary vertices are slivers in a disk. They hold up Newton's first steps, and have lost the
     digits that say whither.
     """
-    tense = len(task.faces.triangles) > FEW and task.newton_problem(w, weight, False).energy(w) > TENSE
-    if tense and not task.boundary_crosses(w):
-        w = yield from smoothed(task.faces, w, weight, SWEEPS, task.loop)
+    faces = problem.faces
+    tense = len(faces.triangles) > FEW and problem.newton_problem(w, area_weight, False).energy(w) > TENSE
+    if tense and not problem.boundary_crosses(w):
+        w = yield from smoothed(faces, w, area_weight, SWEEPS, problem.loop)
     return w
 
 
-def _task(faces: Elements, assembly: Assembly, start: InitialMap, loop, boundary: str, smoother) -> MapProblem:
-    # A polygon in a circle, or a notched square, has less area than the surface: the targets follow it.
-    follows = boundary != "free"
+def _map_problem(
+    faces: Elements, assembly: Assembly, initial: InitialMap, loop, boundary: str, smoother: Smoother | None
+) -> MapProblem:
     return MapProblem(
-        faces, assembly, start.motion, loop if start.may_cross else None, start.with_barrier, follows, smoother
+        faces=faces,
+        assembly=assembly,
+        motion=initial.motion,
+        loop=loop if initial.may_cross else None,
+        with_barrier=initial.with_barrier,
+        # A polygon in a circle, or a notched square, has less area than the surface: the targets follow it.
+        scale_free=boundary != "free",
+        smoother=smoother,
     )

@@ -1,4 +1,4 @@
-"""Newton steps of single vertices within their stars: what is wrong between neighbours goes, at little cost.
+"""Smooth a map by Newton steps of single vertices within their stars: a coloured Gauss-Seidel method.
 
 Vertices without a common face move together, one such set after the other (a coloured Gauss-Seidel sweep, the smoother
 of multigrid methods). A sweep takes a tenth of the time of a Newton step on the whole mesh, which is at its worst with
@@ -14,28 +14,34 @@ from ..mesh.topology import halfedges, twins
 from ..progress import Progress, Steps
 from .boundary_barrier import crossings, loop_edges
 
-# Least eigenvalue of a vertex's Hessian over the greatest, halvings of a step.
-CONVEX, HALVINGS = 0.01, 5
-# Passes that add to an independent set, and sets that make a sweep; what is in none of them waits for Newton.
-PASSES, SETS = 3, 8
+# Least eigenvalue of a vertex's Hessian over the greatest.
+CONVEX = 0.01
+# Of a step, at most.
+HALVINGS = 5
+# Passes that add to an independent set.
+PASSES = 3
+# Independent sets that make a sweep; what is in none of them waits for Newton.
+SETS = 8
 # A boundary vertex moves only where it might go so many times as far before edges cross.
 ROOM = 6.0
-# Stars with so many times the mean energy are smoothed after a step, with so many sweeps.
-WORST, AFTER_STEP = 2.0, 4
+# Stars with so many times the mean energy are smoothed after a step of Newton's method.
+WORST = 2.0
+# With so many sweeps.
+AFTER_STEP = 4
 
 
-def smoothed(faces: Elements, w: np.ndarray, weight: float, sweeps: int, loop=None) -> Steps[np.ndarray]:
+def smoothed(faces: Elements, w: np.ndarray, area_weight: float, sweeps: int, loop=None) -> Steps[np.ndarray]:
     """A map w (n,) complex without folds after sweeps over all its vertices, without folds.
 
-    weight: that of the area term; loop: a boundary, see `boundary_barrier.loop_edges`, that moves, too, and does not
-    come to cross itself. Without it the boundary stays.
+    loop: a boundary, see `boundary_barrier.loop_edges`, that moves, too, and does not come to cross itself. Without it
+    the boundary stays.
     """
     w = w.copy()
     sets = list(_sets(faces, len(w), loop is not None))
     for k in range(sweeps):
         for vertex, row, star in sets:
             before = None if loop is None else w.copy()
-            relax(vertex, row, star, w, weight, 1)
+            relax(vertex, row, star, w, area_weight, 1)
             if before is not None:
                 _uncross(w, before, loop)
         yield Progress("Smoothing", (k + 1) / sweeps)
@@ -64,9 +70,9 @@ class Smoother:
     def __init__(self, triangles: np.ndarray, n: int):
         self._sets = list(_stars(triangles, n))
 
-    def smoothed(self, faces: Elements, w: np.ndarray, weight: float, sweeps: int = AFTER_STEP) -> np.ndarray:
+    def smoothed(self, faces: Elements, w: np.ndarray, area_weight: float, sweeps: int = AFTER_STEP) -> np.ndarray:
         """A map w (n,) complex without folds after sweeps over the vertices whose stars have most of the energy."""
-        star = np.bincount(faces.triangles.ravel(), np.repeat(energies(faces, w, weight), 3), len(w))
+        star = np.bincount(faces.triangles.ravel(), np.repeat(energies(faces, w, area_weight), 3), len(w))
         bad = star > WORST * star.mean()
         sets = []
         for vertex, row, around, corner in self._sets:
@@ -76,7 +82,7 @@ class Smoother:
         w = w.copy()
         for _ in range(sweeps):
             for vertex, row, around in sets:
-                relax(vertex, row, around, w, weight, 1)
+                relax(vertex, row, around, w, area_weight, 1)
         return w
 
 
@@ -92,8 +98,8 @@ def _stars(F: np.ndarray, n: int, whole=False):
     inner = np.ones(n, bool)
     if not whole:
         tail, head = halfedges(F)
-        rim = twins(F) < 0
-        inner[tail[rim]] = inner[head[rim]] = False
+        boundary = twins(F) < 0
+        inner[tail[boundary]] = inner[head[boundary]] = False
     for _ in range(SETS):
         chosen = independent_set(F, np.where(inner, random.permutation(n), -1))
         inner &= ~chosen
@@ -131,21 +137,21 @@ def take_faces(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Element
 
 
 def relax(
-    vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, weight: float, steps: int, held=False
+    vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, area_weight: float, steps: int, held=False
 ) -> None:
     """Newton steps of every vertex (k,) within its star, in place, each only as far as its own energy falls.
 
     row (s,): which of the vertices is the first corner of a face of the stars; held: vertices (k,) bool that stay.
     """
     k = len(vertex)
-    value = np.bincount(row, energies(faces, w, weight), k)
+    value = np.bincount(row, energies(faces, w, area_weight), k)
     for _ in range(steps):
-        step = _directions(row, faces, w, weight, k)
+        step = _directions(row, faces, w, area_weight, k)
         moving = np.ones(k, bool) & ~np.asarray(held)
         for _ in range(HALVINGS):
             trial = w.copy()
             trial[vertex[moving]] += step[moving]
-            new = np.bincount(row, energies(faces, trial, weight), k)
+            new = np.bincount(row, energies(faces, trial, area_weight), k)
             better = moving & (new < value)
             w[vertex[better]] += step[better]
             value = np.where(better, new, value)
@@ -155,7 +161,7 @@ def relax(
             step *= 0.5
 
 
-def _directions(row, faces: Elements, w, weight: float, k: int) -> np.ndarray:
+def _directions(row, faces: Elements, w, area_weight: float, k: int) -> np.ndarray:
     """Newton steps (k,) of single vertices, with their whole Hessian.
 
     By the place of its first corner a face's area changes linearly, so that there is no need of eigensystems.
@@ -164,8 +170,8 @@ def _directions(row, faces: Elements, w, weight: float, k: int) -> np.ndarray:
     g, inner = faces.gradient[:, 0], squared(b)
     det = squared(a) - inner
     by_area, by_shear = a * g - b * g.conj(), b * g.conj()
-    slope = faces.weight * (weight / 2 * (1 / faces.ratio - faces.ratio / det**2) - 2 * inner / det**2)
-    bend = faces.weight * (4 * inner + weight * faces.ratio) / det**3
+    slope = faces.weight * (area_weight / 2 * (1 / faces.ratio - faces.ratio / det**2) - 2 * inner / det**2)
+    bend = faces.weight * (4 * inner + area_weight * faces.ratio) / det**3
     mixed, even = -2 * faces.weight / det**2, faces.weight * squared(g) / det
     down = slope * by_area + 2 * faces.weight / det * by_shear
     xx = bend * by_area.real**2 + 2 * mixed * by_area.real * by_shear.real + even
