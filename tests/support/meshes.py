@@ -55,6 +55,14 @@ def bumpy(columns=16, rows=16, height=0.4, waves=2.0):
     return V, F
 
 
+def single_bump(columns=60):
+    """A flat unit square but for one bump around (0.4, 0.5), and the distance (n,) of its vertices from there."""
+    V, F = grid(columns, columns)
+    r = np.linalg.norm(V[:, :2] - [0.4, 0.5], axis=1)
+    V[:, 2] = 0.06 * np.exp(-((r / 0.06) ** 2))
+    return V, F, r
+
+
 def polar(radius, height, rings=8, sectors=24):
     """A disk of rings around one apex vertex: ring k has the given radius and height (callables of k / rings)."""
     t = np.arange(1, rings + 1) / rings

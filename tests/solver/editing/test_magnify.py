@@ -1,19 +1,17 @@
-"""Existing maps magnified, pictures warped with them, and weights from scores."""
+"""Existing maps magnified, and pictures warped with them."""
 
 import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.analysis import vertex_scores as scores
 from omt_uv.solver.analysis.density import Target, from_vertices, normalised_density, region_share
 from omt_uv.solver.analysis.region_density import exact_density
-from omt_uv.solver.analysis.saliency import saliency
 from omt_uv.solver.editing.image_warp import warp_image
 from omt_uv.solver.editing.magnify import magnify_map, magnify_region
-from omt_uv.solver.errors import EmptyMeshError, FoldedUVError, WeightError
+from omt_uv.solver.errors import FoldedUVError
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.charts import strict_charts
-from omt_uv.solver.mesh.geometry import face_areas, signed_areas, vertex_areas
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.options import MapOptions
@@ -171,61 +169,6 @@ def test_pixels_beyond_the_margin_stay():
 # ---- scores -------------------------------------------------------------------------------------------------
 
 
-def bump(n=60):
-    V, F = meshes.grid(n, n)
-    r = np.linalg.norm(V[:, :2] - [0.4, 0.5], axis=1)
-    V[:, 2] = 0.06 * np.exp(-((r / 0.06) ** 2))
-    return V, F, r
-
-
-def test_saliency_finds_a_bump_and_nothing_on_spheres_and_planes():
-    V, F, r = bump()
-    s = saliency(V, F)
-    assert s[r < 0.03].min() > 10 * s[r > 0.3].max() and (s >= 0).all()
-    assert not saliency(*meshes.icosphere(3)).any()
-    assert not saliency(*meshes.grid(20, 20)).any()
-
-
-@pytest.mark.parametrize("kind", ["saliency", "gaussian", "mean", "sharpness"])
-def test_scores_do_not_depend_on_place_direction_or_size(kind):
-    V, F, _ = bump(40)
-    q, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
-    q = q * np.sign(np.linalg.det(q))
-    before, after = scores.score(kind, V, F), scores.score(kind, 137 * V @ q.T + 20, F)
-    np.testing.assert_allclose(after, before, atol=1e-6 * before.max())
-
-
-def test_distance_along_the_surface():
-    V, F = meshes.grid(40, 40)
-    d = scores.distance(V, F, np.array([0]))
-    straight = np.linalg.norm(V, axis=1)
-    assert (d >= straight - 1e-12).all()
-    assert (d <= 1.09 * straight + 1e-12).all()
-
-
-@pytest.mark.parametrize("invert", [False, True])
-def test_soft_weights_by_area(invert):
-    V, F, _ = bump()
-    area = vertex_areas(V, F)
-    w = scores.soft_weights(V[:, 0], area, 0.4, 0.8, invert)
-    assert (w.min(), w.max()) == (0, 1)
-    assert area[w == (1 if invert else 0)].sum() / area.sum() == pytest.approx(0.4, abs=0.03)
-    assert area[w == (0 if invert else 1)].sum() / area.sum() == pytest.approx(0.2, abs=0.03)
-
-
-def test_weights_of_nothing():
-    V, F = meshes.grid(10, 10)
-    area = vertex_areas(V, F)
-    with pytest.raises(WeightError, match="same everywhere"):
-        scores.soft_weights(scores.score("saliency", V, F), area)
-    with pytest.raises(WeightError, match="no range"):
-        scores.soft_weights(V[:, 0], area, 0.9, 0.1)
-    with pytest.raises(EmptyMeshError, match="selected"):
-        scores.score("distance", V, F, np.zeros(len(V), bool))
-    cube = scores.soft_weights(np.where(np.arange(100) < 95, 0.0, 1.0), np.ones(100))
-    assert cube.sum() == 5
-
-
 def test_transparent_pixels_do_not_darken_what_is_beside_them():
     picture = np.zeros((32, 32, 4))
     picture[:, 16:] = [0.8, 0.6, 0.4, 1.0]
@@ -247,11 +190,3 @@ def test_areas_that_cannot_be_are_said():
         options = {"density": normalised_density(found.density, area), "region": weights}
         result = drain(map_chart(chart, target=Target(**options)))
         assert any("Areas are" in text for text in result.warnings) == said == (result.area_l1 > 0.016)
-
-
-@pytest.mark.parametrize("kind", ["gaussian", "mean"])
-def test_planes_have_no_curvature_in_single_precision(kind):
-    V, F = meshes.grid(60, 60)
-    q, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
-    assert not scores.score(kind, (V @ q + 5).astype(np.float32).astype(float), F).any()
-    assert scores.score(kind, *meshes.bumpy(60, 60, height=0.02)).any()

@@ -1,0 +1,64 @@
+"""Scores of vertices: what they do not depend on, and weights from them by area."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.analysis.vertex_scores import distance, scaled_vertex_areas, soft_weights, vertex_score
+from omt_uv.solver.errors import EmptyMeshError, WeightError
+from omt_uv.solver.mesh.geometry import vertex_areas
+
+
+@pytest.mark.parametrize("kind", ["saliency", "gaussian", "mean", "sharpness"])
+def test_scores_do_not_depend_on_place_direction_or_size(kind):
+    V, F, _ = meshes.single_bump(40)
+    q, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    q = q * np.sign(np.linalg.det(q))
+    before, after = vertex_score(kind, V, F), vertex_score(kind, 137 * V @ q.T + 20, F)
+    np.testing.assert_allclose(after, before, atol=1e-6 * before.max())
+
+
+def test_distance_along_the_surface():
+    V, F = meshes.grid(40, 40)
+    d = distance(V, F, np.array([0]))
+    straight = np.linalg.norm(V, axis=1)
+    assert (d >= straight - 1e-12).all()
+    assert (d <= 1.09 * straight + 1e-12).all()
+
+
+@pytest.mark.parametrize("invert", [False, True])
+def test_soft_weights_by_area(invert):
+    V, F, _ = meshes.single_bump()
+    area = vertex_areas(V, F)
+    w = soft_weights(V[:, 0], area, 0.4, 0.8, invert)
+    assert (w.min(), w.max()) == (0, 1)
+    assert area[w == (1 if invert else 0)].sum() / area.sum() == pytest.approx(0.4, abs=0.03)
+    assert area[w == (0 if invert else 1)].sum() / area.sum() == pytest.approx(0.2, abs=0.03)
+
+
+def test_weights_of_nothing():
+    V, F = meshes.grid(10, 10)
+    area = vertex_areas(V, F)
+    with pytest.raises(WeightError, match="same everywhere"):
+        soft_weights(vertex_score("saliency", V, F), area)
+    with pytest.raises(WeightError, match="no range"):
+        soft_weights(V[:, 0], area, 0.9, 0.1)
+    with pytest.raises(EmptyMeshError, match="selected"):
+        vertex_score("distance", V, F, np.zeros(len(V), bool))
+    cube = soft_weights(np.where(np.arange(100) < 95, 0.0, 1.0), np.ones(100))
+    assert cube.sum() == 5
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "mean"])
+def test_planes_have_no_curvature_in_single_precision(kind):
+    V, F = meshes.grid(60, 60)
+    q, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
+    assert not vertex_score(kind, (V @ q + 5).astype(np.float32).astype(float), F).any()
+    assert vertex_score(kind, *meshes.bumpy(60, 60, height=0.02)).any()
+
+
+def test_scaled_areas_are_areas_at_any_scale():
+    V, F = meshes.bumpy()
+    area = scaled_vertex_areas(V, F)
+    np.testing.assert_allclose(area / area.sum(), vertex_areas(V, F) / vertex_areas(V, F).sum(), rtol=1e-12)
+    np.testing.assert_allclose(scaled_vertex_areas(1e200 * V, F), area, rtol=1e-9)
