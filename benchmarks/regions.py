@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -65,6 +66,7 @@ def figures(V, F, uv, density, weights) -> Figures:
     error = np.abs(has - target)
     # Every face belongs to one of them, those of the soft border, too.
     region, context = (float(error[part].sum() / target[part].sum()) for part in (weights > 0.5, weights <= 0.5))
+    judged: dict[str, Any]
     judge = _judge()
     if judge is None:
         d = distortion(V, F, uv, density=density)

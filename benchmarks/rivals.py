@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 
 import numpy as np
 
-METHODS = {
+METHODS: dict[str, dict[str, Any]] = {
     "Angle Based": {"method": "ANGLE_BASED"},
     "Conformal": {"method": "CONFORMAL"},
     "Minimum Stretch 10": {"method": "MINIMUM_STRETCH", "iterations": 10},

@@ -89,7 +89,7 @@ def _add(table, size, mode, name):
 
 def _add_live(table, size, mode):
     """The slider dragged from area to angle in steps of a twentieth: the longest wait for the UVs to follow one."""
-    from omt_uv import operators
+    from omt_uv.operators import base
     from omt_uv.session import live as following
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -97,7 +97,7 @@ def _add_live(table, size, mode):
     bpy.ops.uv.omt_unwrap(quality="DRAFT")
     if mode == "EDIT":
         scenes.edit(obj)
-    session = following.Session(bpy.context, operators.common.read_objects(bpy.context))
+    session = following.Session(bpy.context, base.read_objects(bpy.context))
     waits, works = [], []
     for balance in np.linspace(0, 1, 21):
         wall, own = time.perf_counter(), time.thread_time()
@@ -123,7 +123,8 @@ def _slices(operator):
     """Wall-clock milliseconds, those of the main thread, and the stage, of every slice."""
     from omt_uv.session import run as running
 
-    found, state = [], {"RUNNING_MODAL"}
+    found: list[tuple[float, float, str]] = []
+    state = {"RUNNING_MODAL"}
     while "RUNNING_MODAL" in state:
         wall, own = time.perf_counter(), time.thread_time()
         stage = running.current.stage if running.current else "Reading"

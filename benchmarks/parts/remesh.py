@@ -5,6 +5,8 @@ Shapes are of triangles, quads cut along a diagonal. Distances are both ways, in
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
 import numpy as np
@@ -156,8 +158,9 @@ def strategies_table(args) -> Table:
 
 def _strategy(source, strategy):
     """Figures of one strategy, raw and relaxed."""
-    row = {}
-    for when, options in {"raw": {"rounds": 0, "fit": False}, "relaxed": {}}.items():
+    row: dict[str, float] = {}
+    ways: dict[str, dict[str, Any]] = {"raw": {"rounds": 0, "fit": False}, "relaxed": {}}
+    for when, options in ways.items():
         found = drain(remesh(source, VERTEX_COUNT, RemeshOptions(strategy=strategy, **options)))
         row |= {f"{c} {when}": v for c, v in shape(found.vertices, found.triangles).items() if c in STRATEGY_FIGURES}
     return row

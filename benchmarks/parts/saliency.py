@@ -30,18 +30,18 @@ def saliency_table(args) -> Table:
             q, _ = np.linalg.qr(random.normal(size=(3, 3)))
             turned = saliency(137 * V @ (q * np.sign(np.linalg.det(q))) + 20, F)
             change = float(np.abs(turned - s).max() / s.max())
-            contrast = "" if r is None else float(s[r < 0.03].min() / max(s[r > 0.3].max(), 1e-300))
+            contrast = None if r is None else float(s[r < 0.03].min() / max(s[r > 0.3].max(), 1e-300))
             goals = {
                 "time": seconds > TIME_GOAL * len(V) / SIZES[0],
                 "change": change > INVARIANCE_GOAL,
-                "bump": r is not None and contrast <= 1,
+                "bump": contrast is not None and contrast <= 1,
             }
             table.add(
                 model=name,
                 vertices=len(V),
                 time=seconds,
                 change=change,
-                **{"bump / plane": contrast},
+                **{"bump / plane": "" if contrast is None else contrast},
                 **missed(**goals),
             )
     return table

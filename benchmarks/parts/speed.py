@@ -52,7 +52,7 @@ def growth_table(args) -> Table:
             (uv, result), seconds = timed(lambda c=case: our_uv(c, "free", "standard"))
             sizes.append(np.log(len(case.V)))
             times.append(np.log(seconds))
-            exponent = np.polyfit(sizes, times, 1)[0] if len(sizes) > 1 else ""
+            exponent = float(np.polyfit(sizes, times, 1)[0]) if len(sizes) > 1 else None
             table.add(
                 model=case.name,
                 faces=len(case.F),
@@ -60,11 +60,12 @@ def growth_table(args) -> Table:
                 Newton=result.report()[0]["newton_refinement"],
                 **_figures(case, uv),
                 time=seconds,
-                exponent=exponent,
+                exponent="" if exponent is None else exponent,
                 **{"peak MiB": peak_mib()},
-                **missed(growth=len(sizes) > 1 and exponent > GROWTH_GOAL),
+                **missed(growth=exponent is not None and exponent > GROWTH_GOAL),
             )
-            case = Case(case.name, *subdivide(case.V, case.F), case.seams)
+            V, F = subdivide(case.V, case.F)
+            case = Case(case.name, V, F, case.seams)
     return table
 
 
