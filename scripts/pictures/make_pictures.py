@@ -61,7 +61,11 @@ def gallery(name, out, scratch, pixels):
     V, F = case.V, case.F
     view = view_of(name)
     texture = textures.checker(scratch / "checker.png")
-    checks, areas, shears, layouts, captions = [], [], [], [], []
+    captions = []
+    checks: list[Path] = []
+    areas: list[Path] = []
+    shears: list[Path] = []
+    layouts: list[Path] = []
     uvs = maps(case)
     for k, uv in enumerate(uvs.values()):
         octaves, shear = face_distortion(V, F, uv)
