@@ -1,4 +1,4 @@
-"""Bake a picture from an old UV layout to a new one: every pixel looks up where its place was."""
+"""Warp an image from an old UV layout to a new one: every pixel looks up where its place was."""
 
 from __future__ import annotations
 

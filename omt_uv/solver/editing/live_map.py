@@ -1,4 +1,4 @@
-"""A map that follows: a few Newton steps at a time from where it is, while a balance or a pin is being dragged."""
+"""Let a map follow a balance or a pin that is being dragged, by a few Newton steps at a time from where it is."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from ..refinement.pins import PinEnergy, Pins, placed_like
 from ..refinement.projected_newton import Assembly, FreeMotion, NewtonProblem, newton_step
 from .refine_island import island_start, meets_itself
 
-# Of the springs between pins and where they are dragged to: stiff, as the barrier against folds must only just win.
+# Of the springs between pins and where they are dragged to, energy per squared length in units of the map: stiff, as
+# the barrier against folds must only just win.
 STIFFNESS = 1e6
 # Newton promises less than this share of the energy: nothing is left to see.
 AT_REST = 1e-3
@@ -45,9 +46,9 @@ class LiveMap:
         self._given = given = mesh.uv @ [1, 1j]
         vertices = mesh.vertices / np.sqrt(face_areas(mesh.vertices, mesh.triangles).sum())
         self._faces = elements(vertices, mesh.triangles, face_areas(vertices, mesh.triangles))
-        rim = boundary_edges(mesh.triangles)
-        start, self.warnings = island_start(vertices, mesh.triangles, given, rim, mesh.pins is not None)
-        guard = None if meets_itself(start, rim) else rim
+        boundary = boundary_edges(mesh.triangles)
+        start, self.warnings = island_start(vertices, mesh.triangles, given, boundary, mesh.pins is not None)
+        guard = None if meets_itself(start, boundary) else boundary
         motion = FreeMotion(np.zeros(len(given), bool))
         self._task = MapProblem(self._faces, Assembly(mesh.triangles, len(given)), motion, guard, False)
         self._w, self._pins, self._guarded = start, mesh.pins, False
@@ -73,14 +74,14 @@ class LiveMap:
     @property
     def uv(self) -> np.ndarray:
         """The map (n,2) as it is; without pins it lies as the given one did."""
-        held = self._pins is not None
-        return self._mesh.original(self._w if held else placed_like(self._w, self._given, self._faces))
+        pinned = self._pins is not None
+        return self._mesh.original(self._w if pinned else placed_like(self._w, self._given, self._faces))
 
     def _pull(self, pins: Pins, places: np.ndarray) -> None:
         # `renumbered` sorts pins by vertex, which `_pins` keeps.
-        wanted = (places * self._mesh.mirror) @ [1, 1j]
-        if not np.array_equal(wanted, pins.places):
-            self._pins, self.at_rest = replace(pins, places=wanted), False
+        target = (places * self._mesh.mirror) @ [1, 1j]
+        if not np.array_equal(target, pins.places):
+            self._pins, self.at_rest = replace(pins, places=target), False
 
     def _step(self) -> None:
         """One Newton step; where the boundary would cross itself, the next goes on with a barrier."""

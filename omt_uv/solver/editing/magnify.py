@@ -1,4 +1,4 @@
-"""Magnify a map that exists: the map itself is the planar surface, and a density is applied in its own domain.
+"""Magnify a map that exists, by a density in its own domain: the map itself is the planar surface (Zhao et al. 2013).
 
 The outline stays what it is if it is a circle or has straight sides, and its vertices slide along it; else it is
 free, as when a surface is unwrapped. Outside of the region content stays where it was as far as room is left, since the
@@ -24,7 +24,7 @@ from ..refinement.continuation import ContinuationResult, MapProblem, minimise_i
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.elimination_order import Renumbered, renumbered
 from ..refinement.projected_newton import Assembly
-from .outline import Outline, centroid, free, recognise_outline
+from .outline import Outline, centroid, free_motion, recognise_outline
 from .refine_island import meets_itself
 
 OUTLINES = ("own", "free")
@@ -181,15 +181,15 @@ def _magnified(
     given = mesh.uv @ [1, 1j]
     outline = recognise_outline(given, _outer(given, mesh.triangles))
     if boundary == "free":
-        outline = Outline("free", free(len(given)), given, 0j)
+        outline = Outline(kind="free", motion=free_motion(len(given)), w=given, centre=0j)
     # The surface is the map as it is on its exact outline: nothing is sheared there.
     flat = np.column_stack([outline.w.real, outline.w.imag, np.zeros(len(given))])
     faces = elements(flat, mesh.triangles, face_areas(flat, mesh.triangles) * density, region)
-    rim = boundary_edges(mesh.triangles)
+    edges = boundary_edges(mesh.triangles)
     if outline.kind != "free":
         # Holes are free all the same.
-        rim = rim[~np.isin(rim[:, 0], _outer(given, mesh.triangles))]
-    guard = rim if len(rim) and not meets_itself(outline.w, rim) else None
+        edges = edges[~np.isin(edges[:, 0], _outer(given, mesh.triangles))]
+    guard = edges if len(edges) and not meets_itself(outline.w, edges) else None
     assembly = Assembly(mesh.triangles, len(given), schwarz_solver(mesh.vertices, mesh.triangles))
     task = MapProblem(faces, assembly, outline.motion, guard, False, outline.kind != "free")
     found = yield from minimise_in_stages(task, outline.w, 0.0, settings)

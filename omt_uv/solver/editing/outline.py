@@ -1,5 +1,4 @@
-"""What an outline in the plane is, so that it can be kept while everything inside moves: a circle, straight sides, or
-neither."""
+"""Recognise an outline in the plane as a circle or as straight sides, so that it can be kept while all inside moves."""
 
 from __future__ import annotations
 
@@ -9,17 +8,27 @@ import numpy as np
 
 from ..refinement.projected_newton import CircleMotion, FreeMotion, LineMotion, Motion
 
-# Distances of the outline from a circle, relative to its radius, and fewest vertices that make one.
-ROUND, FEWEST = 2e-3, 12
-# A vertex where the outline turns by less than this, in radians, lies on a side; of the outline's vertices at least
-# this share has to.
-STRAIGHT, MOSTLY = 0.02, 0.6
+# Greatest difference between distances from the middle of a circle, relative to its radius.
+ROUND = 2e-3
+# Fewest vertices that make a circle.
+FEWEST = 12
+# A vertex where the outline turns by less than this, in radians, lies on a side.
+STRAIGHT = 0.02
+# Of the outline's vertices at least this share has to lie on sides, where it has more than four corners.
+MOSTLY = 0.6
 
 
 @dataclass(frozen=True)
 class Outline:
-    """How a map's vertices may move; kind "circle", "sides" or "free"; w (n,) complex, the map with its outline exactly
-    on the circle, about 0, or the sides; centre: what has to be added to w."""
+    """How a map's vertices may move.
+
+    Attributes
+    ----------
+    kind : "circle", "sides" or "free"
+    motion : of the vertices
+    w (n,) complex : the map with its outline exactly on the circle, about 0, or the sides
+    centre : what has to be added to w
+    """
 
     kind: str
     motion: Motion
@@ -28,38 +37,38 @@ class Outline:
 
 
 def recognise_outline(w: np.ndarray, loop: np.ndarray) -> Outline:
-    """The outline of a map w (n,) complex with the boundary loop (b,), counter-clockwise."""
-    rim = w[loop]
-    centre, area = centroid(rim)
-    radius = np.abs(rim - centre).mean()
-    if len(loop) >= FEWEST and np.ptp(np.abs(rim - centre)) < ROUND * radius:
+    """Recognise the outline of a map w (n,) complex with the boundary loop (b,), counter-clockwise."""
+    polygon = w[loop]
+    centre, area = centroid(polygon)
+    radius = np.abs(polygon - centre).mean()
+    if len(loop) >= FEWEST and np.ptp(np.abs(polygon - centre)) < ROUND * radius:
         moved = w - centre
         moved[loop] *= radius / np.abs(moved[loop])
-        return Outline("circle", CircleMotion(loop, radius, len(w)), moved, centre)
-    corner = np.abs(_turns(rim)) >= STRAIGHT
+        return Outline(kind="circle", motion=CircleMotion(loop, radius, len(w)), w=moved, centre=centre)
+    corner = np.abs(_turns(polygon)) >= STRAIGHT
     if corner.sum() >= 3 and (corner.sum() <= 4 or corner.mean() <= 1 - MOSTLY):
         return _on_sides(w, loop, corner)
-    return Outline("free", free(len(w)), w, 0j)
+    return Outline(kind="free", motion=free_motion(len(w)), w=w, centre=0j)
 
 
-def free(n: int) -> FreeMotion:
+def free_motion(n: int) -> FreeMotion:
     """Every one of n vertices may go anywhere."""
     return FreeMotion(np.zeros(n, bool))
 
 
-def centroid(rim: np.ndarray) -> tuple[complex, float]:
-    """Centroid and area of a polygon (b,) complex. Raises nothing: without area it is the mean, and 0."""
-    a, b = rim - rim[0], np.roll(rim, -1) - rim[0]
+def centroid(polygon: np.ndarray) -> tuple[complex, float]:
+    """Centroid and area of a polygon (b,) complex. Without area it is the mean, and 0."""
+    a, b = polygon - polygon[0], np.roll(polygon, -1) - polygon[0]
     twice = a.real * b.imag - a.imag * b.real
     total = twice.sum()
     if total == 0:
-        return complex(rim.mean()), 0.0
-    return complex(rim[0] + (twice @ (a + b)) / (3 * total)), float(total / 2)
+        return complex(polygon.mean()), 0.0
+    return complex(polygon[0] + (twice @ (a + b)) / (3 * total)), float(total / 2)
 
 
-def _turns(rim: np.ndarray) -> np.ndarray:
+def _turns(polygon: np.ndarray) -> np.ndarray:
     """Turning angle (b,) of a closed polygon at its vertices."""
-    ahead, behind = np.roll(rim, -1) - rim, rim - np.roll(rim, 1)
+    ahead, behind = np.roll(polygon, -1) - polygon, polygon - np.roll(polygon, 1)
     return np.angle(ahead * behind.conj())
 
 
@@ -70,11 +79,11 @@ def _on_sides(w: np.ndarray, loop: np.ndarray, corner: np.ndarray) -> Outline:
     at = np.flatnonzero(corner)
     first = at[np.cumsum(corner) - 1]
     following = np.append(at[1:], 0)[np.cumsum(corner) - 1]
-    rim = w[loop]
-    direction = rim[following] - rim[first]
+    polygon = w[loop]
+    direction = polygon[following] - polygon[first]
     direction = direction / np.abs(direction)
-    along = ((rim - rim[first]) * direction.conj()).real
+    along = ((polygon - polygon[first]) * direction.conj()).real
     moved = w.copy()
-    moved[loop] = np.where(corner, rim, rim[first] + along * direction)
+    moved[loop] = np.where(corner, polygon, polygon[first] + along * direction)
     motion = LineMotion(loop[~corner], direction[~corner], loop[corner], len(w))
-    return Outline("sides", motion, moved, 0j)
+    return Outline(kind="sides", motion=motion, w=moved, centre=0j)

@@ -1,4 +1,4 @@
-"""Improve a map that exists: any island, however many boundaries it has, with the refinement's energy.
+"""Refine a map that exists, by Newton's method on the energy of the refinement, however many boundaries it has.
 
 The refinement of charts knows only disks, because its fallbacks are disks. A map without folds needs no fallback; one
 that is folded or crosses itself is straightened first, its holes filled for that purpose.
@@ -67,16 +67,16 @@ def refine_island(
     mesh = renumbered(vertices, triangles, uv, pins)
     given = mesh.uv @ [1, 1j]
     try:
-        found, error, warnings = yield from _improved(
+        found, error, warnings = yield from _refined(
             mesh.vertices, mesh.triangles, given, balance, QUALITIES[quality], mesh.pins
         )
     except MeshError as problem:
         raise mesh.original_error(problem) from problem
-    improved = mesh.original(found.w)
+    refined = mesh.original(found.w)
     if pins is not None:
-        improved[pins[0]] = pins[1]
+        refined[pins[0]] = pins[1]
     return Refinement(
-        uv=improved,
+        uv=refined,
         iterations=found.steps,
         residual=found.residual,
         area_error=error,
@@ -88,18 +88,18 @@ def refine_island(
     )
 
 
-def _improved(vertices, triangles, given, balance, settings, pins):
+def _refined(vertices, triangles, given, balance, settings, pins):
     """What was found from the map given (n,) complex, in its place; its area error; warnings."""
     # The energy weighs lengths: surface and map are measured in the same unit, in which both have the area 1.
     vertices = vertices / np.sqrt(face_areas(vertices, triangles).sum())
     faces = elements(vertices, triangles, face_areas(vertices, triangles))
     several = pins if pins is not None and len(pins.vertices) > 2 else None
     fixed = several is not None
-    rim = boundary_edges(triangles)
-    start, warnings = island_start(vertices, triangles, given, rim, fixed)
+    boundary = boundary_edges(triangles)
+    start, warnings = island_start(vertices, triangles, given, boundary, fixed)
     # Pins may ask for a map that meets itself, as the given one does, and so may handles.
-    guard = None if meets_itself(start, rim) else rim
-    if guard is None and not (pins is not None and np.isin(rim, pins.vertices).all()):
+    guard = None if meets_itself(start, boundary) else boundary
+    if guard is None and not (pins is not None and np.isin(boundary, pins.vertices).all()):
         warnings = (*warnings, UNGUARDED)
     task = MapProblem(
         faces,
@@ -119,20 +119,20 @@ def _improved(vertices, triangles, given, balance, settings, pins):
     return found, error, (*warnings, *found.warnings)
 
 
-def meets_itself(w: np.ndarray, rim: np.ndarray) -> bool:
+def meets_itself(w: np.ndarray, boundary: np.ndarray) -> bool:
     """Whether boundary edges (b,2) of a map (n,) cross, or come so near to others that they all but touch."""
     with np.errstate(over="ignore"):
-        nearest = make_barrier(w, rim, 1.0).energy(w)
-    return not nearest < (1 / TOUCHING) ** 2 or len(crossings(w, rim)) > 0
+        nearest = make_barrier(w, boundary, 1.0).energy(w)
+    return not nearest < (1 / TOUCHING) ** 2 or len(crossings(w, boundary)) > 0
 
 
-def island_start(vertices, triangles, given, rim, fixed: bool) -> tuple[np.ndarray, tuple[str, ...]]:
+def island_start(vertices, triangles, given, boundary, fixed: bool) -> tuple[np.ndarray, tuple[str, ...]]:
     """A map (n,) without folds, the given one if it will do, and a warning if it will not."""
     uv = np.column_stack([given.real, given.imag])
     folds = count_folds(uv, triangles)
     scale = 1.0 if fixed else np.sqrt(1 / np.abs(signed_areas(uv, triangles)).sum())
     if folds == 0:
-        apart = given if fixed else _parted(given, triangles, rim)
+        apart = given if fixed else _parted(given, triangles, boundary)
         if apart is not None:
             return apart * scale, ()
     straight = _straightened(vertices, triangles, uv)
@@ -144,7 +144,7 @@ def island_start(vertices, triangles, given, rim, fixed: bool) -> tuple[np.ndarr
     raise FoldedUVError("The UVs to refine are folded beyond repair", kind="face", elements=folded)
 
 
-def _parted(w: np.ndarray, triangles: np.ndarray, rim: np.ndarray) -> np.ndarray | None:
+def _parted(w: np.ndarray, triangles: np.ndarray, boundary: np.ndarray) -> np.ndarray | None:
     """The map w (n,), its boundary drawn in a little if it touches itself; None where that does not part it.
 
     Fans that share a place in the UV map, and sides of a slit, touch without crossing.
@@ -155,9 +155,9 @@ def _parted(w: np.ndarray, triangles: np.ndarray, rim: np.ndarray) -> np.ndarray
     inward = total / np.bincount(ends, minlength=len(w)) - w
     for share in PARTING:
         drawn = w.copy()
-        drawn[rim[:, 0]] += share * inward[rim[:, 0]]
+        drawn[boundary[:, 0]] += share * inward[boundary[:, 0]]
         uv = np.column_stack([drawn.real, drawn.imag])
-        if not meets_itself(drawn, rim) and count_folds(uv, triangles) == 0:
+        if not meets_itself(drawn, boundary) and count_folds(uv, triangles) == 0:
             return drawn
     return None
 

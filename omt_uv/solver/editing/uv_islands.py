@@ -1,4 +1,4 @@
-"""UV islands as charts: faces joined by edges that have equal UVs at both ends, whatever the seams say.
+"""Find UV islands as charts: faces joined by edges that have equal UVs at both ends, whatever the seams say.
 
 An island may have several boundaries, unlike the charts that are unwrapped.
 """

@@ -1,4 +1,4 @@
-"""The map of one chart: conformal map -> transport -> refinement.
+"""Map one chart: conformal map -> optimal transport -> refinement.
 
 Each stage may be replaced by a milder one where its mathematics leaves double precision; the result says so.
 """
@@ -21,7 +21,7 @@ from ..refinement.continuation_rules import QUALITIES
 from ..refinement.initial_maps import unroll
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..transport.convex_domain import Disk
-from .chart_pins import ChartPins, anchored, facing, refuse_outline
+from .chart_pins import ChartPins, mirrored_to_pins, moved_to_pins, refuse_pins_on_outline
 from .initial_map import COARSE_ABOVE, DiskMesh, InitialChartMap, coarse_initial_map, initial_map, mean_value_sites
 from .options import MapOptions
 
@@ -93,14 +93,14 @@ def map_chart(
     DensityError : a density that is not positive and finite
     """
     options = options or MapOptions()
-    refuse_outline(pins, options.boundary)
+    refuse_pins_on_outline(pins, options.boundary)
     log = RunLog()
     density = None if target is None else target.density
     vertices, unit = in_unit_box(chart.vertices)
     disk = _disk_mesh(vertices, chart, options.boundary, target, log)
     initial = yield from part_of(_initial_map(disk, options.balance, log), *INITIAL)
     with log.timed("refinement"):
-        start, places = facing(initial.uv, pins)
+        start, places = mirrored_to_pins(initial.uv, pins)
         refinement_options = RefinementOptions(
             boundary=disk.boundary,
             balance=options.balance,
@@ -118,7 +118,7 @@ def map_chart(
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
     uv = refined.uv
     if places is None:
-        uv = in_place(uv, vertices, chart.triangles, density, unit, pins, disk.boundary == "free")
+        uv = placed_chart(uv, vertices, chart.triangles, density, unit, pins, disk.boundary == "free")
     return _chart_map(uv, initial, refined, figures, log, pins is not None)
 
 
@@ -203,7 +203,7 @@ def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: 
     return (yield from refine(disk.vertices, disk.triangles, uv, free, **given))
 
 
-def in_place(
+def placed_chart(
     uv: np.ndarray, vertices, triangles, density, unit: float, pins: ChartPins | None, centred: bool = True
 ) -> np.ndarray:
     """A map uv (n,2) of a chart in a unit box, as large as its target really is, or where its one or two pins are.
@@ -215,7 +215,7 @@ def in_place(
     area = face_areas(vertices, triangles)
     uv = uv * np.sqrt((area.sum() if density is None else area @ density) / covered)
     if pins is not None:
-        return anchored(uv, triangles, pins)
+        return moved_to_pins(uv, triangles, pins)
     return (_about_zero(uv, triangles) if centred else uv) * unit
 
 

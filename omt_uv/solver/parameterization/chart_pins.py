@@ -1,4 +1,4 @@
-"""From pinned corners of a surface to pins of its charts, and pinned charts to their places."""
+"""Turn pinned corners of a surface into pins of its charts, and lay pinned charts where these are."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def pins_of_chart(pins: CornerPins | None, chart: Chart) -> ChartPins | None:
 def clear_of_pins(surface: Surface, pins: CornerPins | None, avoid: np.ndarray | None) -> np.ndarray | None:
     """Vertices (n,) in [0,1] to keep free of cuts: those to `avoid`, and all with a pin; None for none.
 
-    A cut through a pinned vertex would give one point of the surface two places in the texture, both held.
+    A cut through a pinned vertex would give one point of the surface two places in the texture.
     """
     if pins is None or not pins.pinned.any():
         return avoid
@@ -63,7 +63,7 @@ def clear_of_pins(surface: Surface, pins: CornerPins | None, avoid: np.ndarray |
     return free
 
 
-def refuse_outline(pins: ChartPins | None, boundary: str) -> None:
+def refuse_pins_on_outline(pins: ChartPins | None, boundary: str) -> None:
     """Raise PinError for pins in a disk or a square, which has its own place for every vertex."""
     if pins is not None and boundary != "free":
         raise PinError(
@@ -74,22 +74,22 @@ def refuse_outline(pins: ChartPins | None, boundary: str) -> None:
         )
 
 
-def facing(uv: np.ndarray, pins: ChartPins | None) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray] | None]:
-    """Start uv (n,2) and pins for `refine`, which takes three or more here; None for fewer, see `anchored`.
+def mirrored_to_pins(uv: np.ndarray, pins: ChartPins | None) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray] | None]:
+    """Start uv (n,2) and pins for `refine`, which takes three or more here; None for fewer, see `moved_to_pins`.
 
     The start is mirrored where that comes nearer to the pins once it is moved, turned and scaled.
     """
     if pins is None or len(pins.vertices) < 3:
         return uv, None
-    held = Pins(pins.vertices, pins.places @ [1, 1j])
+    pinned = Pins(pins.vertices, pins.places @ [1, 1j])
     maps = uv @ [1, 1j], uv @ [1, -1j]
-    miss, mirrored = (np.abs(aligned_to_pins(w, held)[held.vertices] - held.places).sum() for w in maps)
+    miss, mirrored = (np.abs(aligned_to_pins(w, pinned)[pinned.vertices] - pinned.places).sum() for w in maps)
     # Pins in a row fit either way: then the map is not mirrored.
-    turn_over = miss - mirrored > 1e-4 * np.abs(held.places - held.places.mean()).sum()
+    turn_over = miss - mirrored > 1e-4 * np.abs(pinned.places - pinned.places.mean()).sum()
     return uv * [1, -1 if turn_over else 1], (pins.vertices, pins.places)
 
 
-def anchored(uv: np.ndarray, triangles: np.ndarray, pins: ChartPins) -> np.ndarray:
+def moved_to_pins(uv: np.ndarray, triangles: np.ndarray, pins: ChartPins) -> np.ndarray:
     """The map uv (n,2) moved, turned and scaled to its pins, one or two: its shape is what it would be without them.
 
     With one pin it is as large as the UVs that the chart has now and turned like them, or one unit wide where those

@@ -1,4 +1,4 @@
-"""Patches of a map whose polygons get their corners opened, each for itself: an interior point method."""
+"""Make polygon corners convex in patches of a map, each for itself, by an interior point method."""
 
 from __future__ import annotations
 
@@ -20,44 +20,66 @@ from ..refinement.projected_newton import (
     fold_shares,
     newton_direction,
 )
-from .polygon_corners import OPEN, Barrier, Corners
+from .polygon_corners import CONVEX, CornerBarrier, PolygonCorners
 
+# Strength of the barrier of a corner, per share that its polygon has of the target's area.
 STRENGTH = 30.0
-# Rounds that open and that settle, of so many Newton steps; corners that are shut start a round at this r.
-OPENING, SETTLING, STEPS, LEAST = 6, 4, 3, 0.1
-# A patch whose area error grew by more than GROWTH gets a weight of the area term so many times as large.
-GROWTH, HEAVIER = 1.25, 1.5
-PRESSURE, HALVINGS = 0.3, 12
+# Rounds that make corners convex, and rounds in which the barrier then weakens.
+CONVEXIFYING = 6
+SETTLING = 4
+# Newton steps of a round.
+STEPS = 3
+# Corners that are reflex start a round at this r, the area over the target, both with a slack.
+LEAST = 0.1
+# A patch whose area error grew by more than this factor gets an area weight so many times as large.
+GROWTH = 1.25
+HEAVIER = 1.5
+# See `projected_newton.newton_direction`.
+PRESSURE = 0.3
+# Halvings of a step until a patch stays where it is.
+HALVINGS = 12
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """Positions (n,3), triangles (m,3), the areas (m,) they shall have, weights (m,) of the area term.
+class CornerMesh:
+    """The charts side by side.
 
-    chart (m,): the chart of each; spare (c,): by how much the areas of a chart may be further off, in sum.
+    Attributes
+    ----------
+    positions (n,3), triangles (m,3)
+    target (m,) : areas that the triangles shall have
+    area_weight (m,) : weight of the area term
+    chart (m,) : the chart of each triangle
+    spare (c,) : by how much the areas of a chart may be further off, in sum
     """
 
     positions: np.ndarray
     triangles: np.ndarray
     target: np.ndarray
-    weight: np.ndarray
+    area_weight: np.ndarray
     chart: np.ndarray
     spare: np.ndarray
 
-    def of(self, vertices: np.ndarray, faces: np.ndarray, place: np.ndarray) -> Mesh:
+    def of(self, vertices: np.ndarray, faces: np.ndarray, place: np.ndarray) -> CornerMesh:
         """Some of the vertices (k,) and faces (m,) bool, vertex v as place[v]."""
-        target, weight, chart = (x[faces] for x in (self.target, self.weight, self.chart))
-        return Mesh(self.positions[vertices], place[self.triangles[faces]], target, weight, chart, self.spare)
+        return CornerMesh(
+            positions=self.positions[vertices],
+            triangles=place[self.triangles[faces]],
+            target=self.target[faces],
+            area_weight=self.area_weight[faces],
+            chart=self.chart[faces],
+            spare=self.spare,
+        )
 
 
-class Patches:
+class CornerPatches:
     """Patches of a mesh, each of which goes its own way; unknowns in the order of their elimination."""
 
-    def __init__(self, mesh: Mesh, corners: Corners, free: np.ndarray):
+    def __init__(self, mesh: CornerMesh, corners: PolygonCorners, free: np.ndarray):
         n, triangles = len(free), mesh.triangles
         self.faces = elements(mesh.positions, triangles, mesh.target)
         self.assembly, self.motion = Assembly(triangles, n), FreeMotion(~free)
-        self.weight, self.corners = mesh.weight, corners
+        self.area_weight, self.corners = mesh.area_weight, corners
         self.strength = STRENGTH * corners.whole / mesh.target.sum()
         every = np.concatenate([triangles, corners.triangles])
         tail, head = halfedges(every)
@@ -71,36 +93,36 @@ class Patches:
         # As `Elements` measures areas.
         self.spare = mesh.spare / face_areas(mesh.positions, triangles).sum()
 
-    def opened(self, w: np.ndarray) -> np.ndarray:
-        """The map w (n,) with corners opened in those patches where fewer are shut afterwards, and areas kept."""
-        given, strength, weight = w, self.strength, self.weight
-        for _ in range(OPENING):
-            shut = self.corners.shut(w)
-            if not shut.any():
+    def convexified(self, w: np.ndarray) -> np.ndarray:
+        """The map w (n,) with corners made convex in those patches where fewer are reflex then, and areas kept."""
+        given, strength, weight = w, self.strength, self.area_weight
+        for _ in range(CONVEXIFYING):
+            reflex = self.corners.reflex(w)
+            if not reflex.any():
                 break
             w = self._stepped(w, weight, self._barrier(w, strength))
-            strength = np.where(shut, 2 * strength, strength)
+            strength = np.where(reflex, 2 * strength, strength)
         for k in range(SETTLING):
-            worse = (self._lack(w) > GROWTH * self._lack(given)) & (k > 1)
+            worse = (self._area_errors(w) > GROWTH * self._area_errors(given)) & (k > 1)
             weight = np.where(worse[self.of_face], HEAVIER * weight, weight)
             w = self._stepped(w, weight, self._barrier(w, self.strength * 0.1**k))
-        gain, cost = self._shut(given) - self._shut(w), self._lack(w) - self._lack(given)
+        gain, cost = self._reflex_count(given) - self._reflex_count(w), self._area_errors(w) - self._area_errors(given)
         good = affordable(gain, cost, self.chart, self.spare)
         return np.where(good[self.of_vertex], w, given)
 
-    def _barrier(self, w, strength) -> Barrier:
-        wanted = self.corners.wanted
-        slack = np.maximum(LEAST * wanted - self.corners.areas(w), 0) / (1 - LEAST)
-        # What is open stays so.
-        return Barrier(self.corners, np.where(self.corners.open(w), -OPEN * wanted, slack), strength)
+    def _barrier(self, w, strength) -> CornerBarrier:
+        target = self.corners.target
+        slack = np.maximum(LEAST * target - self.corners.areas(w), 0) / (1 - LEAST)
+        # What is convex stays so.
+        return CornerBarrier(self.corners, np.where(self.corners.convex(w), -CONVEX * target, slack), strength)
 
-    def _shut(self, w):
-        return np.bincount(self.of_corner, self.corners.shut(w), self.count)
+    def _reflex_count(self, w):
+        return np.bincount(self.of_corner, self.corners.reflex(w), self.count)
 
-    def _lack(self, w):
+    def _area_errors(self, w):
         return np.bincount(self.of_face, np.abs(self.faces.areas(w) - self.faces.area * self.faces.ratio), self.count)
 
-    def _stepped(self, w, weight, barrier: Barrier) -> np.ndarray:
+    def _stepped(self, w, weight, barrier: CornerBarrier) -> np.ndarray:
         """The map after some Newton steps, of which every patch takes as much as it may."""
         problem = NewtonProblem(self.faces, self.assembly, self.motion, weight, (barrier,))
         value = self._values(w, weight, barrier)
@@ -121,7 +143,7 @@ class Patches:
             w, value = w + share[self.of_vertex] * step, np.where(waiting, value, trial)
         return w
 
-    def _values(self, w, weight, barrier: Barrier) -> np.ndarray:
+    def _values(self, w, weight, barrier: CornerBarrier) -> np.ndarray:
         of_faces = np.bincount(self.of_face, energies(self.faces, w, weight), self.count)
         return of_faces + np.bincount(self.of_corner, barrier.energies(w), self.count)
 

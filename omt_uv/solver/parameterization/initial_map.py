@@ -1,6 +1,6 @@
-"""The map that the refinement starts from: conformal map and transport, for large charts those of a coarser mesh.
+"""Map a chart before its refinement, by a conformal map and optimal transport, for large charts of a coarser mesh.
 
-A refined map of a coarser mesh is carried back vertex by vertex (`disk_coarsening`) and leaves the refinement little to
+A refined map of a coarser mesh is carried back vertex by vertex (`mesh_hierarchy`) and leaves the refinement little to
 do. Coarsening goes on until the chart is small.
 """
 
@@ -27,26 +27,37 @@ from ..transport.convex_domain import Disk, Domain, Rectangle
 from ..transport.semidiscrete import Transport, transport
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
-CONFORMAL, TRANSPORT = (0.0, 0.4), (0.4, 0.6)
-COARSENING, COARSE_MAP, COARSE_REFINEMENT = (0.0, 0.3), (0.3, 0.2), (0.5, 0.3)
-RETURN, SMOOTHING = (0.8, 0.1), (0.9, 0.1)
+CONFORMAL = (0.0, 0.4)
+TRANSPORT = (0.4, 0.6)
+COARSENING = (0.0, 0.3)
+COARSE_MAP = (0.3, 0.2)
+COARSE_REFINEMENT = (0.5, 0.3)
+RETURN = (0.8, 0.1)
+SMOOTHING = (0.9, 0.1)
 # Sites closer than this share of the domain are lost when they are lifted to the paraboloid, where their
 # distance counts squared.
 SITE_RESOLUTION = 1e-7
 # A mean this near to the middle of the unit disk is there.
 CENTRED = 1e-3
-# Charts with more vertices than this come by way of one with an eighth of their vertices, or at most a quarter.
-COARSE_ABOVE, COARSER, COARSE_ENOUGH = 5000, 8, 0.25
+# Charts with more vertices than this come by way of a coarser one.
+COARSE_ABOVE = 5000
+# That has the vertices divided by this, and at most this share of them: otherwise it does not pay.
+COARSER = 8
+COARSE_ENOUGH = 0.25
 # Where the target is far from the surface's areas, coarser meshes say less: they are taken in smaller steps, and mapped
-# at once up to a larger size.
-COARSER_FAR, COARSE_ENOUGH_FAR, DIRECT_FAR = 5, 0.4, 20000
+# at once up to a larger number of vertices.
+COARSER_FAR = 5
+COARSE_ENOUGH_FAR = 0.4
+DIRECT_FAR = 20000
 # Their edges grow by at most the root of this over the number of vertices for a length: as they do around a disk that
 # gets most of the map, and meets its ring with as many edges as the ring has around it.
 AROUND = 4.0
 # Vertices are at most so much denser in one place than in another.
 LEAST_DENSITY = 1e-4
-# What comes back is smoothed so many times, with these weights of the area term.
-SWEEPS, SMOOTH_WEIGHT, SMOOTH_WEIGHT_FAR = 8, 30.0, 500.0
+# What comes back is smoothed so many times, with these area weights.
+SWEEPS = 8
+SMOOTH_WEIGHT = 30.0
+SMOOTH_WEIGHT_FAR = 500.0
 
 
 @dataclass(frozen=True)
@@ -158,9 +169,9 @@ def _smoothed(disk: DiskMesh, uv: np.ndarray, far: bool) -> Steps[np.ndarray]:
 def _density(vertices, triangles, target, goal: int) -> np.ndarray:
     """Density (n,) of the vertices of a coarse mesh: as the map stretches what is to get the areas target (m,)."""
     area = face_areas(vertices, triangles)
-    wanted = target / area
-    wanted = np.maximum(wanted, LEAST_DENSITY * wanted.max())
-    density = area * graded_density(wanted, vertices, triangles, np.sqrt(AROUND / goal), goal)
+    stretch = target / area
+    stretch = np.maximum(stretch, LEAST_DENSITY * stretch.max())
+    density = area * graded_density(stretch, vertices, triangles, np.sqrt(AROUND / goal), goal)
     has, all_of_it = (np.bincount(triangles.ravel(), np.repeat(x, 3), len(vertices)) for x in (density, area))
     return has / all_of_it
 

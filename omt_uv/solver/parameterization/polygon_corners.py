@@ -1,4 +1,4 @@
-"""Corners of polygons: the triangle of a vertex and its two neighbours, and a barrier for its area."""
+"""Find the corners of polygons, triangles of a vertex and its two neighbours, and bar their areas from 0."""
 
 from __future__ import annotations
 
@@ -8,21 +8,30 @@ import numpy as np
 
 from ..mesh.surface import Surface
 
-# A corner counts where it has the share SHARP of its polygon's area on the surface, and is open where it has more
-# than the share OPEN of that in the map.
-SHARP, OPEN = 1e-3, 0.02
-# Straight ones, and slightly reflex ones, of less than the share STRAIGHT, shall be open as if they had that, but
-# are shut only where they have lost DENTED of the area: straight lines may stay so.
-STRAIGHT, DENTED = 0.02, 0.01
+# A corner counts where it has this share of its polygon's area on the surface.
+SHARP = 1e-3
+# It is convex in the map where it has more than this share of its target area.
+CONVEX = 0.02
+# Straight ones, and slightly reflex ones, of less than this share of the polygon, shall be convex as if they had it.
+STRAIGHT = 0.02
+# They are reflex only where they have lost this share of the area: straight lines may stay so.
+DENTED = 0.01
 
 
 @dataclass(frozen=True)
-class Corners:
-    """Corners of polygons: triangles (k,3) of vertices, areas wanted (k,), those of the polygons, whole (k,), and
-    least areas (k,) of corners that are not shut."""
+class PolygonCorners:
+    """Corners of polygons.
+
+    Attributes
+    ----------
+    triangles (k,3) : of vertices
+    target (k,) : areas they shall have
+    whole (k,) : areas of their polygons
+    least (k,) : areas below which they are reflex
+    """
 
     triangles: np.ndarray
-    wanted: np.ndarray
+    target: np.ndarray
     whole: np.ndarray
     least: np.ndarray
 
@@ -31,24 +40,29 @@ class Corners:
         a, b, c = w[self.triangles].T
         return 0.5 * ((b - a).conj() * (c - a)).imag
 
-    def shut(self, w: np.ndarray) -> np.ndarray:
-        """Which corners (k,) are shut in a map w (n,) complex."""
+    def reflex(self, w: np.ndarray) -> np.ndarray:
+        """Which corners (k,) are reflex in a map w (n,) complex."""
         return ~(self.areas(w) > self.least)
 
-    def open(self, w: np.ndarray) -> np.ndarray:
-        """Which corners (k,) are open in a map w (n,) complex; straight ones may be neither open nor shut."""
-        return self.areas(w) > OPEN * self.wanted
+    def convex(self, w: np.ndarray) -> np.ndarray:
+        """Which corners (k,) are convex in a map w (n,) complex; straight ones may be neither convex nor reflex."""
+        return self.areas(w) > CONVEX * self.target
 
-    def of(self, chosen: np.ndarray, place: np.ndarray) -> Corners:
+    def of(self, chosen: np.ndarray, place: np.ndarray) -> PolygonCorners:
         """Some of the corners, (k,) bool, with the vertices renumbered, vertex v as place[v]."""
-        return Corners(place[self.triangles[chosen]], self.wanted[chosen], self.whole[chosen], self.least[chosen])
+        return PolygonCorners(
+            triangles=place[self.triangles[chosen]],
+            target=self.target[chosen],
+            whole=self.whole[chosen],
+            least=self.least[chosen],
+        )
 
 
 @dataclass(frozen=True)
-class Barrier:
+class CornerBarrier:
     """The energy of corners with slack (k,) and strength (k,); one of the extras of `newton.NewtonProblem`."""
 
-    corners: Corners
+    corners: PolygonCorners
     slack: np.ndarray
     strength: np.ndarray
 
@@ -64,7 +78,7 @@ class Barrier:
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Gradient (n,) complex; vertices and rows (k,3) of linear forms whose squares are the Gauss-Newton Hessian."""
-        r, unit, t = self._ratio(w), self.corners.wanted + self.slack, self.corners.triangles
+        r, unit, t = self._ratio(w), self.corners.target + self.slack, self.corners.triangles
         q = w[t]
         across = 0.5j * (q[:, [2, 0, 1]] - q[:, [1, 2, 0]])
         slope = self.strength * (1 - 1 / r**2) / 2 / unit
@@ -77,11 +91,11 @@ class Barrier:
         return np.inf
 
     def _ratio(self, w):
-        return (self.corners.areas(w) + self.slack) / (self.corners.wanted + self.slack)
+        return (self.corners.areas(w) + self.slack) / (self.corners.target + self.slack)
 
 
 def convex_corners(surface: Surface, straight: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners of the polygons, of four and more, that have no reflex corner; the straight ones left out.
+    """PolygonCorners of the polygons, of four and more, that have no reflex corner; the straight ones left out.
 
     straight : these, too, and those of polygons whose reflex corners are nearly straight.
     Triangles (k,3) of a corner of the surface, the next and the one before it; their polygons (k,), and their shares

@@ -11,7 +11,7 @@ from ..errors import MeshError, positive_density
 from ..mesh.charts import Chart
 from ..progress import Steps, part_of
 from ..refinement.batch_refine import BatchMaps, refine_batch
-from .chart_map import ChartMap, in_place, in_unit_box
+from .chart_map import ChartMap, in_unit_box, placed_chart
 from .options import MapOptions
 
 # Most triangles of a chart that is solved together with others.
@@ -22,7 +22,7 @@ MANY = 8
 BATCH = 50_000
 
 
-def small(chart: Chart) -> bool:
+def is_small(chart: Chart) -> bool:
     """Whether a chart is small enough to be solved together with others, and has no patches over holes."""
     return len(chart.triangles) <= SMALL and not len(chart.patches)
 
@@ -61,7 +61,7 @@ def _map_batch(charts: list[Chart], targets: list[Target | None], options: MapOp
     found: list[ChartMap | None] = []
     for k, ((vertices, unit), chart, uv) in enumerate(zip(boxes, charts, coordinates, strict=True)):
         density = None if (target := targets[k]) is None else target.density
-        placed = in_place(uv, vertices, chart.triangles, density, unit, None) if maps.solved[k] else None
+        placed = placed_chart(uv, vertices, chart.triangles, density, unit, None) if maps.solved[k] else None
         found.append(None if placed is None else _of_many(maps, k, placed, seconds))
     return found
 

@@ -19,7 +19,7 @@ from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons
 from .options import UnwrapOptions
 from .shear_bound import bound_shear
-from .small_charts import map_together, small
+from .small_charts import is_small, map_together
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class _Task:
         """Maps of all charts, small ones without pins together."""
         total = sum(len(c.triangles) for c in charts)
         free = self.options.boundary == "free"
-        alike = [k for k, c in enumerate(charts) if free and pins[k] is None and small(c)]
+        alike = [k for k, c in enumerate(charts) if free and pins[k] is None and is_small(c)]
         done = sum(len(charts[k].triangles) for k in alike) / total
         targets = [chart_target(self.target, self.surface, charts[k]) for k in alike]
         found = yield from part_of(map_together([charts[k] for k in alike], targets, self.options), 0.0, done)

@@ -11,7 +11,7 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.convexity import keep_convex
 from omt_uv.solver.parameterization.corner_solver import affordable
-from omt_uv.solver.parameterization.polygon_corners import Barrier, Corners, convex_corners
+from omt_uv.solver.parameterization.polygon_corners import CornerBarrier, PolygonCorners, convex_corners
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
@@ -47,8 +47,8 @@ def test_only_corners_of_convex_polygons_count_and_no_straight_ones():
 def test_the_barrier_is_the_integral_of_its_gradient():
     rng = np.random.default_rng(0)
     w = rng.normal(size=6) + 1j * rng.normal(size=6)
-    corners = Corners(np.array([[0, 1, 2], [2, 3, 4], [5, 1, 0]]), np.ones(3), np.ones(3), np.zeros(3))
-    barrier = Barrier(corners, np.full(3, 9.0), np.array([1.0, 2, 3]))
+    corners = PolygonCorners(np.array([[0, 1, 2], [2, 3, 4], [5, 1, 0]]), np.ones(3), np.ones(3), np.zeros(3))
+    barrier = CornerBarrier(corners, np.full(3, 9.0), np.array([1.0, 2, 3]))
     direction = rng.normal(size=6) + 1j * rng.normal(size=6)
     difference = (barrier.energy(w + 1e-6 * direction) - barrier.energy(w - 1e-6 * direction)) / 2e-6
     slope, vertices, rows = barrier.derivatives(w)
@@ -57,7 +57,7 @@ def test_the_barrier_is_the_integral_of_its_gradient():
 
 
 def darts():
-    """A flat square of quads, and a map of it in which two quads are darts, one of them with a corner at the rim."""
+    """A flat square of quads, and a map of it with two quads that are darts, one with a corner at the boundary."""
     surface = quads()
     (chart,) = strict_charts(surface)
     uv = chart.vertices[:, :2].copy()
@@ -72,11 +72,11 @@ def test_darts_open_and_what_is_fixed_stays():
     vertex = np.empty(len(surface.corner_vertex), int)
     vertex[chart.corners] = chart.triangles
     assert (signed_areas(uv, vertex[corner]) < 0).sum() >= 2
-    for held in (np.zeros(len(uv), bool), chart.vertex_ids == 30):
-        found = keep_convex(surface, [chart], [uv], [held], [None], [500.0], [np.inf])[0]
+    for fixed in (np.zeros(len(uv), bool), chart.vertex_ids == 30):
+        found = keep_convex(surface, [chart], [uv], [fixed], [None], [500.0], [np.inf])[0]
         area = signed_areas(found, chart.triangles)
         assert (signed_areas(found, vertex[corner]) > 0).all() and (area > 0).all()
-        np.testing.assert_array_equal(found[held], uv[held])
+        np.testing.assert_array_equal(found[fixed], uv[fixed])
 
 
 @pytest.mark.parametrize("seed", range(5))
