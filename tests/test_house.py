@@ -43,7 +43,10 @@ RAISED_BESIDE = {
 # Classes of errors that stand neither in `solver/errors.py` nor below UserError.
 OTHER_ERRORS = {"StuckError", "MarkerError", "UserError", "Disturbed"}
 # Generators of faces whose result is no dataclass of its own, and why.
-PLAIN_RESULTS = {"multilevel_start": "positions and how many folds are left: a step of sphere_map alone"}
+PLAIN_RESULTS = {
+    "multilevel_start": "positions and how many folds are left: a step of sphere_map alone",
+    "relax_cvt": "the working mesh that it was given, moved, and its last step: a step of remesh alone",
+}
 # Modules that may visit faces one by one, and why.
 VISITORS = {"omt_uv/solver/api/arrays.py": "polygons of any numbers of sides come as lists of Python"}
 # Names of arrays over vertices, edges or faces, whose elements no loop of Python visits.

@@ -40,8 +40,8 @@ def decimated(component: Component, count: int, density: np.ndarray, size: float
 def decimated_between_lines(
     component: Component, arcs: list[Arc], samples: ArcSamples, count: int, density: np.ndarray, size: float
 ) -> tuple[WorkingMesh, np.ndarray]:
-    """Decimate between the samples of kept arcs, which are fixed, and edges between them locked; and the keys of edges
-    to reopen, sorted."""
+    """Decimate between the samples of kept arcs, which are fixed, and edges between them locked, for a density (m,) of
+    the component's triangles; and the keys (k,) of edges to reopen, sorted."""
     cut, vertex = insert_samples(component, arcs, samples)
     mesh = collapse_along_lines(cut, vertex[samples.fixed])
     mesh.points[mesh.vertices] = samples.points[samples.fixed]
