@@ -1,4 +1,4 @@
-"""The command line: `python -m omt_uv ...` and `blender -b --command omt_uv ...`."""
+"""Run the command line: `python -m omt_uv ...` and `blender -b --command omt_uv ...`."""
 
 from __future__ import annotations
 

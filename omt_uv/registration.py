@@ -1,4 +1,4 @@
-"""Everything the extension adds to Blender, in order, and its exact reverse."""
+"""Register everything that the extension adds to Blender, in order, and take it back in reverse."""
 
 from __future__ import annotations
 

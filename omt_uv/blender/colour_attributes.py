@@ -1,4 +1,4 @@
-"""Colour attributes that show distortion, and what they cover up; see `blender_mesh.py`."""
+"""Write colour attributes that show distortion, and give back what they covered."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a mesh is still what it was; see `blender_mesh.py`."""
+"""Tell whether a mesh is still what it was, by a hash of what operators read."""
 
 from __future__ import annotations
 

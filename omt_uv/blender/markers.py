@@ -1,4 +1,4 @@
-"""What turns a globe and what it gives more room: vertex groups by name, or the vertices picked last in Edit Mode."""
+"""Read what turns a globe and what it gives more room, from vertex groups or the vertices picked last in Edit Mode."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from ..pipelines.globe import Markers
 from ..solver.analysis.density import from_vertices, painted_density
 from ..solver.globe.rotation import MarkerError
-from .seams import GroupError, group_weights
+from .vertex_groups import GroupError, group_weights
 from .weights import region_weights
 
 PICKED = 3
@@ -63,7 +63,7 @@ def globe_densities(pairs: Sequence, name: str, factor: float) -> list[np.ndarra
     """Densities (m,) of the triangles for each pair of object and Reading: `factor` where the weight is 1, 1 where it
     is 0.
 
-    name : a vertex group, "saliency" or "curvature", see `blender_weights.region_weights`; empty for no densities
+    name : a vertex group, "saliency" or "curvature", see `weights.region_weights`; empty for no densities
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Blender meshes to arrays and back; nothing else in the project reads or writes a mesh.
+"""Read Blender meshes as arrays and write UVs back, in bulk.
 
 Edit Mode is read from a copy of the flushed mesh, in bulk, and written through BMesh, which touches nothing
 but the corners it is told to.

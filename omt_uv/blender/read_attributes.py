@@ -1,4 +1,4 @@
-"""Everything that Blender stores on a mesh besides its shape, read as arrays; see `blender_mesh.py`."""
+"""Read everything that Blender stores on a mesh besides its shape, as arrays."""
 
 from __future__ import annotations
 
@@ -90,12 +90,6 @@ def _groups(mesh: bpy.types.Mesh, count: int) -> tuple[np.ndarray, np.ndarray]:
                     weights[vertex.index, element.group] = element.weight
                     member[vertex.index, element.group] = True
     return weights, member
-
-
-def group_weights(mesh: bpy.types.Mesh, obj: bpy.types.Object, name: str) -> np.ndarray | None:
-    """Weights (n,) of a vertex group of the object on a mesh, 0 outside of it; None if there is none of this name."""
-    group = obj.vertex_groups.get(name)
-    return None if group is None else _groups(mesh, group.index + 1)[0][:, group.index]
 
 
 def _keys(mesh: bpy.types.Mesh) -> tuple[ShapeKey, ...]:

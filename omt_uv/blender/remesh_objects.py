@@ -1,4 +1,4 @@
-"""A mesh object to a job for remeshing, and new objects beside it; see `blender_mesh.py`."""
+"""Turn a mesh object into a job for remeshing, and make the new objects beside it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from ..solver.analysis.feature_edges import edge_union, sharp_edges
 from ..solver.errors import EmptyMeshError, MeshError
 from ..solver.mesh.surface import Surface
 from . import mesh as blender_mesh
-from .read_attributes import group_weights, read_attributes
+from .read_attributes import read_attributes
+from .vertex_groups import group_weights
 from .write_attributes import write_attributes
 
 # Modifiers that keep data for the very vertices of a mesh and are of no use on another.
@@ -42,7 +43,7 @@ class SourceError(UserError):
 
 @dataclass(frozen=True)
 class Request:
-    """What to remesh, what it carries, and the stretch (3,3) of its positions, see `blender_mesh.stretch`."""
+    """What to remesh, what it carries, and the stretch (3,3) of its positions, see `mesh.stretch`."""
 
     job: RemeshJob
     attributes: Attributes
@@ -121,7 +122,7 @@ def _density_values(
     """Weights or attribute (m,) per triangle, None where the density needs neither."""
     triangles = surface.corner_vertex[surface.triangles]
     if settings.density == "weights":
-        weights = group_weights(mesh, obj, settings.source)
+        weights = group_weights(obj, settings.source, mesh)
         if weights is None:
             raise SourceError(f"{obj.name}: There is no vertex group {settings.source!r}. Choose one that it has.")
         return from_vertices(weights, triangles)

@@ -1,4 +1,4 @@
-"""Seams and vertex groups of Blender meshes, in Object Mode and in Edit Mode; see `blender_mesh.py`."""
+"""Mark seams of Blender meshes, in Object Mode and in Edit Mode."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import bpy
 
 import bmesh
 import numpy as np
-
-from ..errors import UserError
 
 
 def mark_seams(obj: bpy.types.Object, edges: np.ndarray) -> int:
@@ -37,36 +35,3 @@ def _mark_bmesh(mesh: bpy.types.Mesh, edges: np.ndarray) -> int:
         edge.seam = True
     bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
     return len(new)
-
-
-class GroupError(UserError):
-    """No object has a vertex group of this name."""
-
-
-def avoided(objects: list, name: str) -> list:
-    """Weights (n,) of the vertex group for each object, None where it has none; without a name for none.
-
-    Raises
-    ------
-    GroupError : no object has this group
-    """
-    weights = [group_weights(obj, name) if name else None for obj in objects]
-    if name and all(w is None for w in weights):
-        names = ", ".join(obj.name for obj in objects)
-        raise GroupError(f"{names}: There is no vertex group {name!r}. Choose one, or leave it empty.")
-    return weights
-
-
-def group_weights(obj: bpy.types.Object, name: str) -> np.ndarray | None:
-    """Weights (n,) in [0,1] of a vertex group, 0 outside of it; None if the object has none of this name."""
-    group = obj.vertex_groups.get(name)
-    if group is None:
-        return None
-    if obj.mode == "EDIT":
-        obj.update_from_editmode()
-    weights = np.zeros(len(obj.data.vertices))
-    for vertex in obj.data.vertices:
-        for element in vertex.groups:
-            if element.group == group.index:
-                weights[vertex.index] = element.weight
-    return weights

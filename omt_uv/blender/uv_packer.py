@@ -1,4 +1,4 @@
-"""Blender's own packer behind the interface of `packing.pack`, for where xatlas cannot be used."""
+"""Pack islands by Blender's own packer, behind the interface of `xatlas.packing.pack`, where xatlas cannot be used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What differs between versions of Blender, said once; see `blender_mesh.py`.
+"""Do what differs between versions of Blender, in one place.
 
 Extensions need 4.2. Version 3.4 is kept alive for one thing: it is the Blender that Linux distributions package, so its
 window can be driven in tests.

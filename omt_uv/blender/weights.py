@@ -1,4 +1,4 @@
-"""Vertex groups and attributes of Blender meshes: the region that is magnified, and weights written to repaint."""
+"""Read the region that is magnified from vertex groups, attributes or scores of the shape."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..pipelines.layout import Refusal
 from ..pipelines.reading import Reading
 from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
 from ..solver.errors import MeshError
-from .seams import GroupError, group_weights
+from .vertex_groups import GroupError, group_weights
 
 # Regions that need no vertex group, and the score they are made from.
 COMPUTED = {"saliency": "saliency", "curvature": "gaussian"}
@@ -146,54 +146,3 @@ def computed_weights(
     triangles = surface.corner_vertex[surface.triangles]
     values = vertex_score(kind, surface.positions, triangles, selected)
     return soft_weights(values, scaled_vertex_areas(surface.positions, triangles), low, high, invert)
-
-
-def selected_vertices(obj: bpy.types.Object) -> np.ndarray:
-    """Which vertices (n,) bool are selected, in any mode."""
-    if obj.mode == "EDIT":
-        obj.update_from_editmode()
-    selected = np.zeros(len(obj.data.vertices), bool)
-    obj.data.vertices.foreach_get("select", selected)
-    return selected
-
-
-def write_group(obj: bpy.types.Object, name: str, weights: np.ndarray) -> None:
-    """Write weights (n,) into a vertex group, made if there is none of this name, and make it the active one.
-
-    Vertices of weight 0 are not in the group.
-    """
-    group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)
-    obj.vertex_groups.active_index = group.index
-    weights = weights.astype(np.float32)
-    if obj.mode == "EDIT":
-        _write_bmesh(obj.data, group.index, weights)
-        return
-    group.remove(np.flatnonzero(weights <= 0).tolist())
-    order = np.argsort(weights, kind="stable")
-    order = order[weights[order] > 0]
-    values, first = np.unique(weights[order], return_index=True)
-    for value, members in zip(values.tolist(), np.split(order, first[1:]), strict=True):
-        group.add(members.tolist(), value, "REPLACE")
-    obj.data.update()
-
-
-def _write_bmesh(mesh: bpy.types.Mesh, index: int, weights: np.ndarray) -> None:
-    edit = bmesh.from_edit_mesh(mesh)
-    layer = edit.verts.layers.deform.verify()
-    for vertex, weight in zip(edit.verts, weights.tolist(), strict=True):
-        if weight > 0:
-            vertex[layer][index] = weight
-        elif index in vertex[layer]:
-            del vertex[layer][index]
-    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
-
-
-def check_group_target(obj: bpy.types.Object, name: str) -> None:
-    """Raise GroupError if weights cannot be written to the vertex group `name`."""
-    if not name:
-        raise GroupError(f"{obj.name}: The vertex group has no name. Name the one to write.")
-    if obj.library is not None or obj.data.library is not None:
-        raise GroupError(f"{obj.name} is linked from a library. Make it local first.")
-    group = obj.vertex_groups.get(name)
-    if group is not None and group.lock_weight:
-        raise GroupError(f"{obj.name}: The vertex group {name!r} is locked. Unlock it, or choose another name.")

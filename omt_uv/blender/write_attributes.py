@@ -1,4 +1,4 @@
-"""What a new mesh object shall carry, written to it; see `blender_mesh.py`."""
+"""Write what a new mesh object shall carry."""
 
 from __future__ import annotations
 

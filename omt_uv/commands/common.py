@@ -1,4 +1,4 @@
-"""What all commands share: errors, files in and out, progress, warnings, reports."""
+"""Read files, show progress, print warnings and write reports, for all commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""magnify: a region gets a chosen number of times its share of the texture."""
+"""Give a region a chosen number of times its share of the texture: the command magnify."""
 
 from __future__ import annotations
 

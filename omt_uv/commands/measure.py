@@ -1,4 +1,4 @@
-"""measure: area error, shear, folds and overlap of the active UV maps."""
+"""Measure area error, shear, folds and overlap of the active UV maps: the command measure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options that several commands share, and the types of their values."""
+"""Declare the options that several commands share, and check their values."""
 
 from __future__ import annotations
 

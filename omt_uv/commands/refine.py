@@ -1,4 +1,4 @@
-"""refine: existing UVs of every mesh of a file, whatever unwrapped them."""
+"""Refine existing UVs of every mesh of a file, whatever unwrapped them: the command refine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""remesh: a new mesh of a chosen size for every mesh of a file, or a series of them."""
+"""Make a new mesh of a chosen size for every mesh of a file, or a series of them: the command remesh."""
 
 from __future__ import annotations
 

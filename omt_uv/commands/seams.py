@@ -1,4 +1,4 @@
-"""seams: mark the seams that unwrapping needs, and stop."""
+"""Mark the seams that unwrapping needs, and stop: the command seams."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ..blender.seams import avoided, mark_seams
+    from ..blender.seams import mark_seams
+    from ..blender.vertex_groups import avoided
     from ..files.meshes import save
     from ..solver.cutting.cuts import cut
     from ..solver.parameterization.chart_pins import clear_of_pins

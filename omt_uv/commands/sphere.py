@@ -1,4 +1,4 @@
-"""sphere: closed meshes of a file mapped to the sphere and laid out as a globe."""
+"""Map closed meshes of a file to the sphere and lay them out as a globe: the command sphere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""unwrap: every mesh of a file, all at one texel density."""
+"""Unwrap every mesh of a file, all at one texel density: the command unwrap."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     objects, readings = read_layers(options)
-    from ..blender.seams import avoided
     from ..blender.uv_packer import pack
+    from ..blender.vertex_groups import avoided
     from ..pipelines.layout import UnwrapJob
     from ..pipelines.unwrap import lay_out
 

@@ -1,4 +1,4 @@
-"""weights: what stands out, curves or is sharp, written into a vertex group."""
+"""Write what stands out, curves or is sharp into a vertex group: the command weights."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ..blender.weights import check_group_target, computed_weights, selected_vertices, write_group
+    from ..blender.vertex_groups import check_group_target, selected_vertices, write_group
+    from ..blender.weights import computed_weights
     from ..files.meshes import save
 
     if options.output.suffix.lower() != ".blend":

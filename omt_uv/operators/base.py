@@ -1,4 +1,4 @@
-"""What all operators on meshes share: which objects, how errors are told, how a long solver is run.
+"""Choose objects, tell errors and run long solvers, for all operators on meshes.
 
 numpy and scipy load when an operator runs, so that Blender does not wait for them at startup.
 """

@@ -1,4 +1,4 @@
-"""uv.omt_live: UVs that follow the slider and their pins while these are being dragged."""
+"""Let UVs follow the slider and their pins while these are being dragged: uv.omt_live."""
 
 from __future__ import annotations
 

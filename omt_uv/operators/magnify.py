@@ -1,4 +1,4 @@
-"""uv.omt_magnify: a painted region gets a chosen number of times its share of the texture."""
+"""Give a painted region a chosen number of times its share of the texture: uv.omt_magnify."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""uv.omt_preset: settings of an operator from a preset file, before it runs."""
+"""Take the settings of an operator from a preset file, before it runs: uv.omt_preset."""
 
 from __future__ import annotations
 

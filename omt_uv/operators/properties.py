@@ -1,4 +1,4 @@
-"""Settings that several operators share, said once, and how they are drawn."""
+"""Declare and draw the settings that several operators share."""
 
 from __future__ import annotations
 

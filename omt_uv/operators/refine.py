@@ -1,4 +1,4 @@
-"""uv.omt_refine: better areas for UVs that exist, whatever unwrapped them."""
+"""Refine the areas of UVs that exist, whatever unwrapped them: uv.omt_refine."""
 
 from __future__ import annotations
 

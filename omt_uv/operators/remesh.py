@@ -1,4 +1,4 @@
-"""object.omt_remesh: a new mesh of a chosen size beside the old one, with everything that it carries."""
+"""Make a new mesh of a chosen size beside the old one, with everything that it carries: object.omt_remesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""wm.omt_copy_report: what a bug report needs, in the clipboard."""
+"""Copy what a bug report needs into the clipboard: wm.omt_copy_report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""uv.omt_seams: mark the seams that unwrapping needs, and stop, so that they can be seen and edited."""
+"""Mark the seams that unwrapping needs, and stop, so that they can be seen and edited: uv.omt_seams."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
         draw_settings(self.layout, self)
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.seams import avoided
+        from ..blender.vertex_groups import avoided
 
         pairs = read_objects(context)
         objects = [obj for obj, _ in pairs]

@@ -1,4 +1,4 @@
-"""uv.omt_sphere: closed parts to the sphere without a seam, and from there to a layout of the globe."""
+"""Map closed parts to the sphere without a seam, and from there to a layout of the globe: uv.omt_sphere."""
 
 from __future__ import annotations
 

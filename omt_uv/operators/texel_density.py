@@ -1,4 +1,4 @@
-"""uv.omt_density_get and uv.omt_density_set: pixels of the texture for every metre of the surface."""
+"""Measure and set pixels of the texture for every metre of the surface: uv.omt_density_get, uv.omt_density_set."""
 
 from __future__ import annotations
 

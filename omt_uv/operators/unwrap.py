@@ -1,4 +1,4 @@
-"""uv.omt_unwrap: area-preserving UVs for whole objects or for selected faces."""
+"""Unwrap whole objects or selected faces, area preserving: uv.omt_unwrap."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.seams import avoided
         from ..blender.uv_packer import pack
+        from ..blender.vertex_groups import avoided
         from ..pipelines.layout import UnwrapJob
         from ..pipelines.unwrap import lay_out
 

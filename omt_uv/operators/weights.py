@@ -1,4 +1,4 @@
-"""object.omt_weights: saliency, curvature, sharp edges or distance as a vertex group, to be seen and repainted."""
+"""Write saliency, curvature, sharp edges or distance into a vertex group, to be repainted: object.omt_weights."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context):
         from ..blender.mesh import read
-        from ..blender.weights import check_group_target, selected_vertices
+        from ..blender.vertex_groups import check_group_target, selected_vertices
 
         objects = [context.object] if context.mode == "PAINT_WEIGHT" else mesh_objects(context)
         jobs = []
@@ -66,7 +66,7 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         return list(zip(objects, weights, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender.weights import write_group
+        from ..blender.vertex_groups import write_group
 
         for obj, weights in result:
             write_group(obj, self.weight_group, weights)

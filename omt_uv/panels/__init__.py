@@ -1,1 +1,14 @@
-"""Menus and sidebar."""
+"""Menus, the sidebar's tab and the preferences: they draw, and run nothing themselves.
+
+Imports operators, session, display and blender.
+Main names: OMTUVPreferences, MainPanel, SectionPanel, draw_unwrap.
+"""
+
+from ..solver.lazy import lazy
+
+__getattr__, __all__ = lazy(
+    __name__,
+    menus="draw_unwrap",
+    preferences="OMTUVPreferences",
+    sidebar="MainPanel SectionPanel",
+)

@@ -1,4 +1,4 @@
-"""Entries in Blender's own menus; the search finds only what is in a menu."""
+"""Put entries into Blender's own menus; the search finds only what is in a menu."""
 
 from __future__ import annotations
 

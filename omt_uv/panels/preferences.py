@@ -1,4 +1,4 @@
-"""What is chosen once for all files: Edit > Preferences > Add-ons > OMT UV."""
+"""Keep what is chosen once for all files: Edit > Preferences > Add-ons > OMT UV."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ def _changed(self, context: bpy.types.Context) -> None:
 
 
 class OMTUVPreferences(bpy.types.AddonPreferences):
+    """What operators start with in a new session, and on how many cores they solve."""
+
     bl_idname = ADDON
 
     boundary: EnumProperty(

@@ -1,4 +1,4 @@
-"""The sidebar's tab OMT, in the 3D View and in the UV editor: settings before the first run, and what the last one did.
+"""Draw the sidebar's tab OMT, in the 3D View and the UV editor: settings for the next run, and what the last one did.
 
 Panels only draw. A click runs an operator with the settings shown here, which are the operator's own last ones.
 """
@@ -67,12 +67,16 @@ def draw_settings(layout: bpy.types.UILayout, operator: str, properties) -> None
 
 
 class TabPanel:
+    """What all panels of the tab share."""
+
     bl_category = TAB
     bl_region_type = "UI"
     layout: bpy.types.UILayout
 
 
 class MainPanel(TabPanel):
+    """The button, the slider, the main settings, and what the last run did."""
+
     bl_label = "OMT UV"
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
@@ -95,6 +99,8 @@ class MainPanel(TabPanel):
 
 
 class MorePanel(TabPanel):
+    """Where unwrapping cuts islands, and where they go."""
+
     bl_label = "Unwrap Options"
     bl_options = {"DEFAULT_CLOSED"}
 
@@ -103,6 +109,8 @@ class MorePanel(TabPanel):
 
 
 class SectionPanel(TabPanel):
+    """The settings of one operator and its button."""
+
     bl_options = {"DEFAULT_CLOSED"}
     section: Section
 
@@ -119,6 +127,8 @@ class SectionPanel(TabPanel):
 
 
 class DistortionPanel(TabPanel):
+    """Colours, figures and histogram of distortion."""
+
     bl_label = "Distortion"
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -139,6 +149,8 @@ class DistortionPanel(TabPanel):
 
 
 class DensityPanel(TabPanel):
+    """Texel density, to get and to set."""
+
     bl_label = "Texel Density"
     bl_options = {"DEFAULT_CLOSED"}
 

@@ -1,4 +1,4 @@
-"""What the last run did, for the panel and for reports of bugs."""
+"""Remember what the last run did, for the panel and for reports of bugs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""UV islands of several objects that follow a balance and their pins while these are being dragged."""
+"""Let UV islands of several objects follow a balance and their pins while these are being dragged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Presets of operators: Blender's own files, for the sidebar before the first run and the redo panel after it."""
+"""Find and apply presets of operators: Blender's own files, for the sidebar and for the redo panel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One solver at a time in Blender's window: stepped in slices, watched, and thrown away without a trace.
+"""Run one solver at a time in Blender's window: stepped in slices, watched, and thrown away without a trace.
 
 The operators' base class drives it; the panels look at `current`. What knows nothing of Blender may run on a thread of
 its own (`aside`); whatever touches Blender stays in front.
