@@ -7,6 +7,7 @@ import re
 import meshes
 import numpy as np
 import pytest
+from mesh_checks import angles, topology
 
 from omt_uv.solver.errors import (
     MERGING,
@@ -17,7 +18,7 @@ from omt_uv.solver.errors import (
     OrientationError,
     PrecisionError,
 )
-from omt_uv.solver.mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths, vertex_areas
+from omt_uv.solver.mesh.geometry import face_areas, halfedge_lengths, vertex_areas
 from omt_uv.solver.mesh.topology import boundary_loops, halfedges, pair_keys, twins
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing import STRATEGIES, RemeshOptions, RemeshSource, remesh
@@ -41,20 +42,6 @@ CASES = {
 
 def run(V, F, count, density=None, features=None, source=None, **options):
     return drain(remesh(source or RemeshSource(V, F, features), count, RemeshOptions(**options), density))
-
-
-def topology(F):
-    """Euler number, boundary loops; the mesh must be an oriented manifold."""
-    tail, head = halfedges(F)
-    _, count = np.unique(pair_keys(tail, head), return_counts=True)
-    assert count.max() <= 2
-    directed = tail.astype(np.int64) << 32 | head
-    assert len(np.unique(directed)) == len(directed)
-    return len(np.unique(F)) - len(count) + len(F), len(boundary_loops(F))
-
-
-def angles(V, F):
-    return np.degrees(angles_from_lengths(halfedge_lengths(V, F).reshape(-1, 3)))
 
 
 @pytest.mark.parametrize("name", CASES)
