@@ -1,8 +1,8 @@
-"""Convex domains that clip a power diagram exactly: the disk by its circle arcs, polygons by their sides.
+"""Clip cells by a convex domain exactly, the disk by its arcs, polygons by their sides, with Green's theorem.
 
-A domain has its centroid at 0. Green's theorem turns area, first and second moment of a cell into integrals
-along its boundary: straight segments (`segment_integrals`) and pieces of the domain's own boundary, given
-by antiderivatives along the boundary parameter s (`boundary_integrals`). The four integrals are, as rows,
+A domain has its centroid at 0. Area, first and second moment of a cell are integrals along its boundary: straight
+segments (`segment_integrals`) and stretches of the domain's own boundary, given by antiderivatives along the boundary
+parameter s (`boundary_integrals`). The four integrals are, as rows,
 
     2 area = int x dy - y dx,  int x = int x^2/2 dy,  int y = -int y^2/2 dx,  int x^2+y^2 = int (x^3 dy - y^3 dx)/3
 """

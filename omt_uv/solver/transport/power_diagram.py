@@ -1,7 +1,7 @@
-"""Power diagrams clipped to a convex domain: areas, moments and dual edges, all cells at once.
+"""Clip a power diagram to a convex domain: areas, moments and dual edges of all cells at once (Aurenhammer 1987).
 
-The cell of site i is where |x - y_i|^2 - w_i is least (Aurenhammer 1987). The dual is the regular triangulation of
-`regular.py`.
+The cell of site y_i with site weight h_i is where |x - y_i|^2 - h_i is least. The dual is the regular triangulation
+(`regular_triangulation`).
 """
 
 from __future__ import annotations
@@ -20,9 +20,14 @@ from .regular_triangulation import RegularTriangulation, by_hull, power_centres
 class PowerDiagram:
     """Cells of n sites in a domain.
 
-    area (n,), moment (n,2) the integral of x over the cell, second (n,) the integral of |x|^2;
-    edges (k,2) pairs of sites whose cells share a side, length (k,) of these sides inside the domain;
-    dual: the regular triangulation.
+    Attributes
+    ----------
+    area : (n,)
+    moment : (n,2) integral of x over the cell
+    second : (n,) integral of |x|^2
+    edges : (k,2) pairs of sites whose cells share a side
+    length : (k,) of these sides inside the domain
+    dual : the regular triangulation
     """
 
     area: np.ndarray
@@ -51,7 +56,7 @@ class PowerDiagram:
 def power_diagram(
     sites: np.ndarray, site_weights: np.ndarray, domain: Domain, dual: RegularTriangulation | None = None
 ) -> PowerDiagram:
-    """Power diagram of sites (n,2) with power weights (n,) inside the domain; hidden sites have area 0.
+    """Power diagram of sites (n,2) with site weights (n,) inside the domain; hidden sites have area 0.
 
     `dual` is the regular triangulation of these sites and weights, if it is known already.
 

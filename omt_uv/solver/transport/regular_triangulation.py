@@ -1,6 +1,7 @@
-"""Regular triangulations of weighted sites: by one convex hull, or repaired by flips when only the weights changed.
+"""Triangulate weighted sites regularly, by one convex hull, or by flips where only the weights changed.
 
-The regular triangulation is the lower convex hull of the lifted points (y, |y|^2 - w) (Aurenhammer 1987).
+The regular triangulation is the lower convex hull of the lifted points (y, |y|^2 - h) (Aurenhammer 1987); flips that
+come to an end prove it (Edelsbrunner, Shah 1996).
 """
 
 from __future__ import annotations
@@ -15,19 +16,25 @@ from ..mesh.edge_flips import flip_in_place, flip_until_none
 from ..mesh.geometry import as_complex, dot2, in_parts
 from ..mesh.topology import previous_halfedge, twins
 
-# A facet this steep stands on the rim of the hull; its power centre is far out of any domain.
+# A facet this steep (third component of its normal) stands on the boundary of the hull; its power centre is far out of
+# any domain.
 STEEP = 1e-9
 # Edges flip only where the lifted point is below the plane by more than rounding can explain.
 ROUNDING = 1e-14
-MAX_ROUNDS = 200
+MAX_ROUNDS = 200  # of flips
 
 
 @dataclass(frozen=True)
 class RegularTriangulation:
-    """Triangles (k,3) of sites, counter-clockwise, and their twin halfedges (3k,), -1 on the hull.
+    """A regular triangulation.
 
-    whole: the triangles fill the convex hull of all sites, so that edges which are regular one by one prove that the
-    triangulation is. Not so where sites lie on a straight rim, or are hidden. flips: of edges that led here.
+    Attributes
+    ----------
+    triangles : (k,3) sites, counter-clockwise
+    twin : (3k,) halfedges, -1 on the hull
+    whole : the triangles fill the convex hull of all sites, so that edges which are regular one by one prove that the
+        triangulation is. Not so where sites lie on a straight boundary, or are hidden
+    flips : of edges that led here
     """
 
     triangles: np.ndarray

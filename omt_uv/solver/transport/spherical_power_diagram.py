@@ -1,8 +1,8 @@
-"""Power diagrams on the sphere: the cells of unit vectors with weights.
+"""Divide the sphere into the cells of unit vectors with site weights, by a convex hull (Oliker 2007).
 
 The cell of site y_i with weight h_i is {x : x . q_i >= x . q_j for all j}, q_i = exp(h_i) y_i: the outer normals of the
 convex hull of all q at the corner q_i, a spherical polygon whose corners are the normals of the facets around q_i
-(Aleksandrov's polyhedron; Oliker 2007; Cui, Qi, Wen, Lei, Li, Zhang, Gu 2019). The cost is -log cos of the distance.
+(Aleksandrov's polyhedron; Cui, Qi, Wen, Lei, Li, Zhang, Gu 2019). The cost is -log cos of the distance.
 
 Sites may lie so close together that their hull is lost to rounding. So a known hull is repaired by flips, and all
 that matters is computed from differences: with d = y_j - y_i and s = exp(h_j - h_i), q_j - q_i over exp(h_i) has the
@@ -23,7 +23,7 @@ from ..mesh.topology import halfedges, previous_halfedge, twins
 
 # Edges flip only where the hull is hollow by more than rounding can explain.
 ROUNDING = 1e-13
-MAX_ROUNDS = 200
+MAX_ROUNDS = 200  # of flips
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,15 @@ class Hull:
 
 @dataclass(frozen=True)
 class SphericalCells:
-    """Cells of n sites: area (n,), summing to 4 pi; moment (n,3), the integral of x over each cell.
+    """Cells of n sites on the sphere.
 
-    edges (e,2): pairs of neighbours; conductance (e,): derivative of the area of either by the weight of the other,
-    times -1.
+    Attributes
+    ----------
+    area : (n,), summing to 4 pi
+    moment : (n,3) integral of x over the cell
+    edges : (e,2) pairs of neighbours
+    conductance : (e,) derivative of the area of either by the site weight of the other, times -1
+    hull : of the weighted sites
     """
 
     area: np.ndarray

@@ -1,50 +1,64 @@
-"""Power diagrams on the sphere: cells that tile it, and the derivatives of their areas."""
+"""Power diagrams on the sphere: exact sums, and what they do not depend on."""
 
-from __future__ import annotations
-
-import meshes
 import numpy as np
+import pytest
 
-from omt_uv.solver.mesh.spherical_geometry import normalized
+from omt_uv.solver.errors import TransportError
 from omt_uv.solver.transport.spherical_power_diagram import by_flips, by_hull, spherical_cells
 
 
-def random_sites(seed=0):
-    """162 unit vectors, well apart."""
-    V, _ = meshes.icosphere(2)
-    return normalized(V + 0.05 * np.random.default_rng(seed).normal(size=V.shape))
+@pytest.fixture
+def sites():
+    points = np.random.default_rng(0).normal(size=(90, 3))
+    return points / np.linalg.norm(points, axis=1)[:, None]
 
 
-def test_cells_tile_the_sphere_whatever_the_weights():
-    sites = random_sites()
-    h = 2e-3 * np.random.default_rng(1).normal(size=162)
-    cells = spherical_cells(sites, h, by_hull(sites, h))
-    np.testing.assert_allclose(cells.area.sum(), 4 * np.pi, rtol=1e-13)
+@pytest.fixture
+def site_weights():
+    return 2e-4 * np.random.default_rng(1).normal(size=90)
+
+
+def cells_of(sites, site_weights):
+    return spherical_cells(sites, site_weights, by_hull(sites, site_weights))
+
+
+def test_cells_fill_the_sphere(sites, site_weights):
+    cells = cells_of(sites, site_weights)
+    assert cells.area.sum() == pytest.approx(4 * np.pi)
     np.testing.assert_allclose(cells.moment.sum(axis=0), 0, atol=1e-12)
-    # Sampling: a point belongs to the site whose plane is farthest out.
-    points = normalized(np.random.default_rng(2).normal(size=(100_000, 3)))
-    share = np.bincount((points @ (sites * np.exp(h)[:, None]).T).argmax(axis=1), minlength=162) / 100_000
-    np.testing.assert_allclose(share, cells.area / (4 * np.pi), atol=2e-3)
+    assert len(cells.edges) == 3 * 90 - 6
 
 
-def test_derivative_of_the_areas():
-    sites, rng = random_sites(), np.random.default_rng(3)
-    h, d = 2e-3 * rng.normal(size=162), rng.normal(size=162)
-    cells = spherical_cells(sites, h, by_hull(sites, h))
-    i, j = cells.edges.T
-    slope = np.zeros(162)
-    np.add.at(slope, i, cells.conductance * (d[i] - d[j]))
-    np.add.at(slope, j, cells.conductance * (d[j] - d[i]))
-    step = 1e-6
-    before, after = (spherical_cells(sites, h + s * d, by_hull(sites, h + s * d)).area for s in (-step, step))
-    np.testing.assert_allclose((after - before) / (2 * step), slope, atol=1e-5)
+def test_cells_of_an_octahedron_are_equal():
+    sites = np.vstack([np.eye(3), -np.eye(3)])
+    cells = cells_of(sites, np.zeros(6))
+    np.testing.assert_allclose(cells.area, 4 * np.pi / 6, rtol=1e-12)
+    np.testing.assert_allclose(cells.centroids(), sites, atol=1e-12)
 
 
-def test_flips_reach_the_hull():
-    sites, rng = random_sites(), np.random.default_rng(4)
-    hull = by_hull(sites, np.zeros(162))
-    h = 2e-3 * rng.normal(size=162)
-    flipped, hidden = by_flips(hull, sites, h)
-    assert flipped is not None and not hidden
-    a, b = (spherical_cells(sites, h, x).area for x in (flipped, by_hull(sites, h)))
-    np.testing.assert_allclose(a, b, atol=1e-13)
+def test_a_common_weight_and_a_turn_change_no_area(sites, site_weights):
+    plain = cells_of(sites, site_weights)
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    for moved in (cells_of(sites, site_weights + 0.3), cells_of(sites @ turn.T, site_weights)):
+        np.testing.assert_allclose(moved.area, plain.area, atol=1e-12)
+
+
+def test_every_direction_belongs_to_its_greatest_support(sites, site_weights):
+    """The centroid of a cell lies in it: x . q_i is greatest for its own site."""
+    cells = cells_of(sites, site_weights)
+    support = cells.centroids() @ (sites * np.exp(site_weights)[:, None]).T
+    assert (support.argmax(axis=1) == np.arange(90)).all()
+
+
+def test_flips_and_hull_agree(sites, site_weights):
+    flipped, hidden = by_flips(by_hull(sites, np.zeros(90)), sites, site_weights)
+    assert not hidden
+    np.testing.assert_allclose(
+        spherical_cells(sites, site_weights, flipped).area, cells_of(sites, site_weights).area, atol=1e-12
+    )
+
+
+def test_sites_on_half_of_the_sphere_have_no_cells(sites):
+    with pytest.raises(TransportError):
+        by_hull(np.abs(sites), np.zeros(90))

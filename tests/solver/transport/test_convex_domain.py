@@ -1,0 +1,71 @@
+"""Convex domains: their integrals, their boundary, and where lines cross it."""
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.transport.convex_domain import ConvexPolygon, Disk, Rectangle, segment_integrals
+
+DOMAINS = {
+    "disk": Disk(2.0),
+    "rectangle": Rectangle(3.0, 0.5),
+    "pentagon": ConvexPolygon(np.array([[0, 0], [2, 0], [3, 1], [1, 3], [-1, 1.0]])),
+}
+
+
+@pytest.fixture(params=DOMAINS, ids=str)
+def domain(request):
+    return DOMAINS[request.param]
+
+
+def test_the_integrals_once_around_are_area_and_moments(domain):
+    twice, x, y, _ = domain.total_integrals()
+    assert twice == pytest.approx(2 * domain.area)
+    np.testing.assert_allclose([x, y], 0, atol=1e-12)
+
+
+def test_integrals_along_arcs_add_up(domain):
+    s = np.linspace(0, domain.period, 37)
+    np.testing.assert_allclose(domain.boundary_integrals(s[-1:])[:, 0], domain.total_integrals(), atol=1e-12)
+    np.testing.assert_allclose(domain.boundary_integrals(np.zeros(1)), 0, atol=1e-12)
+
+
+def test_many_chords_approach_the_arc(domain):
+    s = np.linspace(0, domain.period, 200_001)
+    points = domain.boundary_point(s)
+    np.testing.assert_allclose(
+        segment_integrals(points[:-1], points[1:]).sum(axis=1), domain.total_integrals(), atol=1e-8
+    )
+
+
+def test_parameters_and_points_of_the_boundary_are_inverse(domain):
+    s = np.random.default_rng(0).uniform(0, domain.period, 100)
+    points = domain.boundary_point(s)
+    np.testing.assert_allclose(domain.boundary_parameter(points), s, atol=1e-12)
+    assert domain.contains(points * (1 - 1e-9)).all()
+    assert not domain.contains(points * (1 + 1e-9)).any()
+
+
+def test_lines_enter_and_leave_at_the_boundary(domain):
+    random = np.random.default_rng(1)
+    origin, turn = random.normal(size=(50, 2)), random.uniform(0, 2 * np.pi, 50)
+    direction = np.column_stack([np.cos(turn), np.sin(turn)])
+    enter, leave = domain.clip(origin, direction)
+    hit = enter < leave
+    assert hit.any()
+    for t in (enter, leave):
+        points = (origin + t[:, None] * direction)[hit]
+        np.testing.assert_allclose(domain.boundary_point(domain.boundary_parameter(points)), points, atol=1e-9)
+    samples = origin + np.linspace(-9, 9, 400)[:, None, None] * direction
+    assert not domain.contains(samples[:, ~hit].reshape(-1, 2)).any()
+
+
+def test_shares_of_the_boundary_are_of_its_length(domain):
+    points = domain.map_boundary(np.arange(4000) / 4000)
+    step = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    assert step.max() == pytest.approx(np.median(step), rel=1e-6)
+
+
+def test_a_polygon_has_its_centroid_at_0_wherever_it_was():
+    corners = np.array([[0, 0], [2, 0], [3, 1], [1, 3], [-1, 1.0]])
+    a, b = ConvexPolygon(corners), ConvexPolygon(corners + [5, -3])
+    np.testing.assert_allclose(a.corners, b.corners, atol=1e-12)

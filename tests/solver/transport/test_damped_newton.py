@@ -1,0 +1,85 @@
+"""Damped Newton on a dual whose cells are known: areas that are exponentials of their weights."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.errors import TransportError
+from omt_uv.solver.progress import drain
+from omt_uv.solver.transport.damped_newton import check_mass, largest_error, solve_dual
+
+
+@dataclass(frozen=True)
+class Areas:
+    area: np.ndarray
+
+
+class SoftMax:
+    """Areas exp(h) / sum exp(h), a concave dual with one common weight as its kernel."""
+
+    growth, small_step, good_residual = 4.0, 0.0, 0.0
+
+    def __init__(self, blind_below=0.0):
+        self.tried, self.blind_below = [], blind_below
+
+    def near(self, site_weights, cells):
+        area = np.exp(site_weights) / np.exp(site_weights).sum()
+        self.tried.append(area.min())
+        return None if area.min() < self.blind_below else Areas(area)
+
+    def confirmed(self, site_weights, cells):
+        return cells
+
+    def direction(self, cells, mass):
+        return (mass - cells.area) / cells.area
+
+    def first_step(self, cells, direction):
+        return 1.0
+
+
+MASS = np.array([0.1, 0.2, 0.3, 0.4])
+
+
+def run(dual, **options):
+    start = np.zeros(4)
+    return drain(solve_dual(dual, start, dual.near(start, None), MASS, **options))
+
+
+def test_the_areas_become_the_masses():
+    found = run(SoftMax())
+    np.testing.assert_allclose(found.cells.area, MASS, rtol=5e-7)
+    np.testing.assert_allclose(np.diff(found.site_weights), np.diff(np.log(MASS)), atol=1e-6)
+    assert found.residual == largest_error(found.cells, MASS)
+
+
+def test_cells_keep_half_of_the_least_area_on_the_way():
+    """Algorithm 1 takes no step to where a cell is smaller."""
+    dual = SoftMax()
+    kept = run(dual)
+    assert kept.cells.area.min() >= 0.5 * MASS.min()
+
+
+def test_steps_to_where_a_cell_has_vanished_are_halved():
+    found = run(SoftMax(blind_below=0.09))
+    np.testing.assert_allclose(found.cells.area, MASS, rtol=5e-7)
+
+
+def test_a_search_that_is_stuck_or_too_short_is_an_error():
+    with pytest.raises(TransportError, match="stuck"):
+        run(SoftMax(blind_below=0.25))
+    with pytest.raises(TransportError, match="did not converge in 1 steps"):
+        run(SoftMax(), max_steps=1)
+
+
+def test_a_good_residual_is_enough_where_only_small_steps_are_left():
+    dual = SoftMax(blind_below=0.2)
+    dual.small_step, dual.good_residual = 0.05, 2.0
+    assert run(dual).iterations < 100
+
+
+def test_masses_are_positive_and_finite():
+    for wrong in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(TransportError) as caught:
+            check_mass(np.array([1, wrong, 1]))
+        np.testing.assert_array_equal(caught.value.elements, [1])
