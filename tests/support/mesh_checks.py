@@ -19,5 +19,5 @@ def topology(F):
 
 
 def angles(V, F):
-    """Angles (m,3), degrees."""
+    """Angles (m,3) opposite to the halfedges, degrees."""
     return np.degrees(angles_from_lengths(halfedge_lengths(V, F).reshape(-1, 3)))
