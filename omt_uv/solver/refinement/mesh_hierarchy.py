@@ -39,7 +39,7 @@ RELAX_WEIGHT = 10.0
 
 
 @dataclass(frozen=True)
-class CollapseRound:
+class RemovalRound:
     """Vertices that were removed in one round.
 
     Attributes
@@ -82,7 +82,7 @@ class CoarseMesh:
     triangles: np.ndarray
     mass: np.ndarray
     region: np.ndarray | None
-    rounds: list[CollapseRound]
+    rounds: list[RemovalRound]
 
     def prolonged(self, uv: np.ndarray, n: int) -> Steps[np.ndarray]:
         """A map uv (c,2) of the coarse mesh without folds, carried to all n vertices, without folds."""
@@ -104,7 +104,7 @@ def coarsen_disk(vertices, triangles, flat, mass, goal: int, region=None, densit
     how many vertices are to be left there for an area, relative to elsewhere; by default that is left to chance.
     """
     mass = np.column_stack([mass] if region is None else [mass, mass * region])
-    rounds: list[CollapseRound] = []
+    rounds: list[RemovalRound] = []
     left = count = len(vertices)
     boundary = boundary_loops(triangles)[0]
     while left > goal:
@@ -149,7 +149,7 @@ def _round(V, F, flat, mass, rank):
     new = np.column_stack([into, after, before])[stays]
     corner, share = _places(V, flat, vertex, row[stays], new, ahead)
     faces = elements(V, np.column_stack([v, after, before]), mass[star, 0])
-    removal = CollapseRound(
+    removal = RemovalRound(
         vertex=vertex,
         into=new[np.searchsorted(row[stays], np.arange(len(vertex))), 0],
         corner=corner,
@@ -220,7 +220,7 @@ def _places(V, flat, vertex, row, new, ahead):
     return corner, share
 
 
-def _returned(removal: CollapseRound, w: np.ndarray) -> np.ndarray:
+def _returned(removal: RemovalRound, w: np.ndarray) -> np.ndarray:
     """Places (k,) of the vertices that return: where they belong, or as near to it as their stars allow."""
     target = (removal.share * w[removal.corner]).sum(1)
     row, count, base = removal.row, len(removal.vertex), w[removal.into]
