@@ -18,19 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 FORMATS = [".blend", ".obj", ".ply", ".stl", ".glb", ".fbx"]
 
 
-@pytest.fixture
-def run(package, capfd):
-    """Run the command in this process: exit status, standard output, standard error."""
-
-    def command(*arguments):
-        capfd.readouterr()
-        status = package("cli").main([str(a) for a in arguments])
-        out, err = capfd.readouterr()
-        return status, out, err
-
-    return command
-
-
 def shuffled_patch(seed=0, triangles=True):
     """A bumpy patch in an order of its own, at awkward coordinates: (n,3) float32 and faces."""
     rng = np.random.default_rng(seed)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from uv_scenes import plain, ring
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 JUDGE = Path(os.environ.get("OMT_UV_JUDGE", SHARED / "tools" / "judge_uv.py"))
@@ -24,13 +24,6 @@ def refine(**arguments):
 def error(obj):
     space, uv = scenes.areas(obj)
     return np.abs(uv / uv.sum() - space / space.sum()).sum()
-
-
-def plain(name="Bump", **options):
-    """A bump with the UVs seen from above, in the unit square."""
-    obj = scenes.bump(name=name, **options)
-    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.5, (0.1, 0.2)))
-    return obj
 
 
 def two_islands():
@@ -48,19 +41,6 @@ def corners_of(obj, faces):
     for index in np.flatnonzero(faces):
         corners[list(obj.data.polygons[index].loop_indices)] = True
     return corners
-
-
-def ring():
-    """A bumpy ring of quads, seen from above: an island with two boundaries."""
-    t, r = 2 * np.pi * np.arange(24) / 24, np.linspace(0.5, 1.5, 6)
-    x, y = np.outer(r, np.cos(t)).ravel(), np.outer(r, np.sin(t)).ravel()
-    k = np.arange(5 * 24)
-    after = k - k % 24 + (k + 1) % 24
-    obj = scenes.add(
-        np.stack([x, y, 0.5 * np.sin(3 * x)], axis=1), np.stack([k, after, after + 24, k + 24], axis=1)[:, ::-1]
-    )
-    scenes.set_uv(obj, scenes.seen_from_above(obj, 0.3, (0.5, 0.5)))
-    return obj
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
@@ -357,61 +337,6 @@ def test_unwrap_refuses_pins_it_cannot_keep(mode, boundary, spoil):
 
 
 # ---- command ------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def run(package, capfd):
-    def call(*arguments):
-        capfd.readouterr()
-        status = package("cli").main([str(a) for a in arguments])
-        out, err = capfd.readouterr()
-        return status, out, err
-
-    return call
-
-
-@pytest.mark.parametrize("suffix", [".blend", ".obj", ".ply", ".glb"])
-def test_command(package, run, tmp_path, suffix):
-    ring()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
-    if suffix != ".blend":
-        status, _, err = run("refine", tmp_path / "in.blend", "-o", tmp_path / f"in{suffix}", "--balance", "1")
-        assert status == 0, err
-    report = tmp_path / "r.json"
-    status, out, err = run("refine", tmp_path / f"in{suffix}", "-o", tmp_path / f"out{suffix}", "--report", report)
-    assert (status, out) == (0, ""), err
-    told = json.loads(report.read_text())
-    (island,) = told["charts"]
-    assert island["area_l1"] < 0.01 < island["before"]["area_l1"]
-    assert (island["folds"], island["faces"] in (120, 240)) == (0, True)
-    status, out, _ = run("measure", tmp_path / f"out{suffix}", "--json")
-    figures = json.loads(out)
-    assert figures["area_l1"] == pytest.approx(island["area_l1"], abs=1e-4)
-    assert figures["folds"] == 0
-
-
-def test_command_keeps_what_is_pinned_and_names_layers(package, run, tmp_path):
-    obj = plain()
-    pinned, before = scenes.pin(obj, {0, 8, 54, 62}), scenes.uv_of(obj)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
-    for command in ("refine", "unwrap"):
-        assert run(command, tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--uv-layer", "UVMap")[0] == 0
-        (obj,) = package("files.meshes").load(tmp_path / "out.blend")
-        assert scenes.uv_of(obj)[pinned].tobytes() == before[pinned].tobytes()
-    status, _, err = run("refine", tmp_path / "in.blend", "-o", tmp_path / "no.blend", "--uv-layer", "None")
-    assert status == 1
-    assert len(err.splitlines()) == 1
-    assert not (tmp_path / "no.blend").exists()
-
-
-def test_command_without_uvs(run, tmp_path):
-    scenes.bump()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
-    status, _, err = run("refine", tmp_path / "in.blend", "-o", tmp_path / "out.blend")
-    assert status == 1
-    assert "no UVs" in err
-    assert len(err.splitlines()) == 1
-    assert not (tmp_path / "out.blend").exists()
 
 
 # ---- judged -------------------------------------------------------------------------------------------------

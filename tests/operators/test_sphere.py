@@ -2,51 +2,17 @@
 
 from __future__ import annotations
 
-import json
-
 import bpy
 
 import meshes
 import numpy as np
 import pytest
 import scenes
-
-ARGUMENTS = {"projection": "LAMBERT"}
-
-
-@pytest.fixture
-def run(package, capfd):
-    def command(*arguments):
-        capfd.readouterr()
-        status = package("cli").main([str(a) for a in arguments])
-        out, err = capfd.readouterr()
-        return status, out, err
-
-    return command
-
-
-def ball(name="Ball", squash=(1.0, 0.8, 1.3), offset=0.0, turn=0.3):
-    """A closed, slightly lopsided ellipsoid of triangles, turned so that no vertex is on an axis."""
-    V, F = meshes.icosphere(2)
-    c, s = np.cos(turn), np.sin(turn)
-    V = V @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-    return scenes.add(V * squash * (1 + V @ [[0.1], [0.07], [0.05]]) + offset, F, name)
+from globe_scenes import assert_lambert, ball, corner_vertices, open_ball, panorama, positions, project, red_of
 
 
 def torus():
     return scenes.add(*meshes.torus(12, 8), "Torus")
-
-
-def project(**arguments):
-    assert bpy.ops.uv.omt_sphere(**{**ARGUMENTS, **arguments}) == {"FINISHED"}
-
-
-def positions(obj):
-    return np.array([tuple(v.co) for v in obj.data.vertices])
-
-
-def corner_vertices(obj):
-    return np.array([loop.vertex_index for loop in obj.data.loops])
 
 
 @pytest.mark.parametrize("projection", ["LAMBERT", "OCTAHEDRAL"])
@@ -172,11 +138,6 @@ def test_undo_takes_back_all():
     assert scenes.state(bpy.data.objects["Ball"]) == before
 
 
-def open_ball():
-    V, F = meshes.icosphere(2)
-    return scenes.add(V, F[5:], "Open")
-
-
 def two_fans():
     V, F = meshes.icosphere(1)
     far = V - 2 * V[0]
@@ -239,28 +200,6 @@ def test_markers_that_say_nothing_are_refused(arguments, message):
 # ---- images -------------------------------------------------------------------------------------------------
 
 
-def panorama(name="World", rows=16, columns=32):
-    """A smooth image: red goes with the latitude."""
-    image = bpy.data.images.new(name, columns, rows, alpha=True)
-    values = np.ones((rows, columns, 4), np.float32)
-    values[..., 0] = ((np.arange(rows) + 0.5) / rows)[:, None]
-    image.pixels.foreach_set(values.ravel())
-    image.update()
-    return image
-
-
-def red_of(image):
-    values = np.empty(image.size[0] * image.size[1] * 4, np.float32)
-    image.pixels.foreach_get(values)
-    return values.reshape(image.size[1], image.size[0], 4)[..., 0]
-
-
-def assert_lambert(red):
-    rows = len(red)
-    latitude = np.arcsin(2 * (np.arange(rows) + 0.5) / rows - 1) / np.pi + 0.5
-    assert np.abs(red - latitude[:, None]).max() < 0.03
-
-
 def test_the_operator_redraws_an_image_beside_the_old_one():
     obj, image = ball(), panorama()
     before = red_of(image).copy()
@@ -273,92 +212,7 @@ def test_the_operator_redraws_an_image_beside_the_old_one():
     assert scenes.state(obj) == state
 
 
-def test_the_command_redraws_an_image_file(run, tmp_path):
-    image = panorama()
-    image.filepath_raw, image.file_format = str(tmp_path / "world.png"), "PNG"
-    image.save()
-    save(ball(), tmp_path / "in.blend")
-    arguments = ("sphere", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--projection", "lambert")
-    pictures = ("--image", tmp_path / "world.png", "--image-out", tmp_path / "flat.png")
-    assert run(*arguments, *pictures)[0] == 0
-    assert_lambert(red_of(bpy.data.images.load(str(tmp_path / "flat.png"))))
-    (tmp_path / "out.blend").unlink()
-    for bad, message in (
-        (("--image", tmp_path / "none.png", "--image-out", tmp_path / "x.png"), "no such file"),
-        (("--image", tmp_path / "world.png", "--image-out", tmp_path / "x.doc"), "unknown image format"),
-        (("--image", tmp_path / "in.blend", "--image-out", tmp_path / "x.png"), "cannot be read as an image"),
-        (("--image", tmp_path / "world.png"), "go together"),
-    ):
-        status, _, err = run(*arguments, *bad)
-        assert status == 1 and message in err
-    assert not (tmp_path / "out.blend").exists()
-
-
 # ---- the command --------------------------------------------------------------------------------------------
-
-
-def save(obj, path):
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False)
-    return obj.name
-
-
-@pytest.mark.parametrize("projection", ["equirect", "lambert", "octahedral"])
-def test_the_command_writes_what_the_operator_writes(run, tmp_path, projection):
-    obj = ball()
-    save(obj, tmp_path / "in.blend")
-    project(projection=projection.upper())
-    expected = scenes.uv_of(obj)
-    report = tmp_path / "report.json"
-    arguments = ("-o", tmp_path / "out.blend", "--projection", projection, "--report", report)
-    assert run("sphere", tmp_path / "in.blend", *arguments)[0] == 0
-    assert (scenes.uv_of(bpy.data.objects["Ball"]) == expected).all()
-    told = json.loads(report.read_text())
-    assert told["projection"] == projection and told["charts"][0]["faces"] == 320
-    assert told["charts"][0]["area_l1_sphere"] < 0.05
-
-
-def test_the_command_takes_markers_and_refuses_what_is_open(run, tmp_path):
-    obj = ball()
-    obj.vertex_groups.new(name="pole").add([5], 1.0, "REPLACE")
-    save(obj, tmp_path / "in.blend")
-    assert run("sphere", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--pole", "pole")[0] == 0
-    obj = bpy.data.objects["Ball"]
-    assert np.allclose(scenes.uv_of(obj)[corner_vertices(obj) == 5, 1], 1, atol=1e-6)
-    status, _, err = run("sphere", tmp_path / "in.blend", "-o", tmp_path / "x.blend", "--meridian", "pole")
-    assert status == 1 and "needs one of the pole" in err
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    save(open_ball(), tmp_path / "open.blend")
-    status, _, err = run("sphere", tmp_path / "open.blend", "-o", tmp_path / "no.blend")
-    assert status == 1 and "not closed" in err and "Open: " in err
-    assert not (tmp_path / "no.blend").exists()
-
-
-def test_a_painted_part_gets_more_of_the_texture(run, tmp_path):
-    obj = ball()
-    V = positions(obj)
-    top = np.flatnonzero(V[:, 2] > 0.6)
-    obj.vertex_groups.new(name="face").add(top.tolist(), 1.0, "REPLACE")
-    save(obj, tmp_path / "in.blend")
-    project()
-    space, _ = scenes.areas(obj)
-    whole = np.isin(corner_vertices(obj).reshape(-1, 3), top).all(axis=1)
-    plain = space[whole].sum() / space.sum()
-    project(weight_group="face", weight_factor=4.0)
-    _, uv = scenes.areas(obj)
-    share = uv[whole].sum() / uv.sum()
-    rest = ~np.isin(corner_vertices(obj).reshape(-1, 3), top).any(axis=1)
-    density = (uv[whole].sum() / space[whole].sum()) / (uv[rest].sum() / space[rest].sum())
-    assert share > 1.5 * plain and density == pytest.approx(4, rel=0.1)
-    expected = scenes.uv_of(obj)
-    arguments = ("-o", tmp_path / "out.blend", "--projection", "lambert", "--weights", "face", "--weight-factor", "4")
-    assert run("sphere", tmp_path / "in.blend", *arguments)[0] == 0
-    assert (scenes.uv_of(bpy.data.objects["Ball"]) == expected).all()
-    for bad, message in (
-        (("--weights", "none"), "no vertex group"),
-        (("--weights", "face", "--weight-factor", "-1"), ""),
-    ):
-        status, _, err = run("sphere", tmp_path / "in.blend", "-o", tmp_path / "x.blend", *bad)
-        assert status == 1 and message in err
 
 
 def test_the_flow_gives_the_same_areas():

@@ -1,0 +1,114 @@
+"""magnify and weights on the command line: what the operators do, pictures of any depth, refusals on one line."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+
+import pytest
+import scenes
+from region_scenes import of_group, painted, picture_file, with_attribute
+
+
+def test_commands(run, tmp_path):
+    scenes.bump(height=1.0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    status, out, err = run(
+        "weights", tmp_path / "in.blend", "-o", tmp_path / "w.blend", "--kind", "mean", "--group", "w"
+    )
+    assert (status, out) == (0, ""), err
+    report = tmp_path / "r.json"
+    files = (tmp_path / "w.blend", "-o", tmp_path / "m.blend", "--weights", "w", "--report", report)
+    status, out, err = run("magnify", *files, "--factor", 2)
+    assert status == 0 and "asked" in out, err
+    told = json.loads(report.read_text())["share"]
+    assert told["asked"] == pytest.approx(2 * told["before"])
+    assert told["after"] == pytest.approx(told["asked"], rel=5e-3)
+    again = (tmp_path / "m.blend", "-o", tmp_path / "n.blend", "--weights", "w", "--report", report)
+    status, out, err = run("magnify", *again, "--factor", 0.7, "--source", "uv", "--cascade", 2)
+    assert status == 0, err
+    lens = json.loads(report.read_text())
+    assert lens["share"]["before"] == pytest.approx(told["after"], rel=1e-3)
+    assert lens["share"]["after"] == pytest.approx(0.49 * told["after"], rel=5e-3)
+    assert lens["charts"][0]["folds"] == 0
+
+
+def test_command_warps_a_picture(run, tmp_path):
+    painted()
+    image = bpy.data.images.new("map", 32, 32)
+    image.filepath_raw, image.file_format = str(tmp_path / "map.png"), "PNG"
+    image.save()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    files = (tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "region", "--factor", 2)
+    pictures = ("--image", tmp_path / "map.png", "--image-output", tmp_path / "new.png")
+    status, _, err = run("magnify", *files, "--source", "uv", *pictures)
+    assert status == 0 and (tmp_path / "new.png").is_file(), err
+    assert run("magnify", *files, *pictures)[0] == 1
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--weights", "none", "--factor", 2),
+        ("--weights", "region", "--factor", -1),
+        ("--weights", "saliency", "--factor", 99),
+    ],
+)
+def test_commands_refuse_on_one_line(run, tmp_path, options):
+    painted()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    status, _, err = run("magnify", tmp_path / "in.blend", "-o", tmp_path / "out.blend", *options)
+    assert status == 1 and len(err.splitlines()) == 1
+    assert not (tmp_path / "out.blend").exists()
+
+
+def test_command_finds_groups_first_then_attributes(run, tmp_path):
+    with_attribute(of_group)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    report = tmp_path / "r.json"
+    files = (tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--factor", 2, "--report", report)
+    shares = {}
+    for name in ("region", "heat"):
+        status, _, err = run("magnify", *files, "--weights", name)
+        assert (status, err) == (0, "")
+        shares[name] = json.loads(report.read_text())["share"]["after"]
+    assert shares["heat"] == pytest.approx(shares["region"], rel=1e-3)
+
+
+def test_command_says_where_a_name_is_both(run, tmp_path):
+    obj = with_attribute(lambda obj: 1 - of_group(obj))
+    obj.vertex_groups["region"].name = "heat"
+    if "heat" not in obj.vertex_groups or "heat" not in obj.data.attributes:
+        pytest.skip("this Blender keeps the names of groups and attributes apart")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    status, _, err = run("magnify", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "heat")
+    assert status == 0 and "a vertex group and an attribute" in err
+
+
+@pytest.mark.parametrize(
+    ("suffix", "kind", "depth"),
+    [(".png", "PNG", "8"), (".png", "PNG", "16"), (".exr", "OPEN_EXR", "32"), (".jpg", "JPEG", "8")],
+)
+def test_pictures_keep_their_colours_whatever_their_depth(run, tmp_path, suffix, kind, depth):
+    painted()
+    picture_file(tmp_path / f"map{suffix}", kind, depth, depth != "8")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    files = (tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "region", "--factor", 2)
+    pictures = ("--image", tmp_path / f"map{suffix}", "--image-output", tmp_path / f"new{suffix}")
+    status, _, err = run("magnify", *files, "--source", "uv", *pictures)
+    assert status == 0, err
+    before, after = (bpy.data.images.load(str(tmp_path / f"{name}{suffix}")) for name in ("map", "new"))
+    assert tuple(after.size) == tuple(before.size) and after.alpha_mode == before.alpha_mode
+    assert after.pixels[:] == pytest.approx(before.pixels[:], abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["new.xyz", "nowhere/new.png"])
+def test_pictures_that_cannot_be_written_are_refused_first(run, tmp_path, name):
+    painted()
+    picture_file(tmp_path / "map.png", "PNG", "8", False)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    files = (tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--weights", "region", "--factor", 2)
+    pictures = ("--image", tmp_path / "map.png", "--image-output", tmp_path / name)
+    status, _, err = run("magnify", *files, "--source", "uv", *pictures)
+    assert status == 1 and len(err.splitlines()) == 1 and not (tmp_path / "out.blend").exists()
