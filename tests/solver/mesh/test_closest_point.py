@@ -1,0 +1,99 @@
+"""Closest points against brute force, and samples that cover the faces."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.mesh.closest_point import (
+    ClosestPoint,
+    ClosestPointTracker,
+    closest_on_triangles,
+    spread_points,
+    subdivision_centroids,
+)
+from omt_uv.solver.mesh.geometry import face_areas, vertex_normals
+
+
+def distances(V, F, points):
+    """Distance (k,) of points from a mesh, all faces tried."""
+    a, b, c = (V[F[:, k]] for k in range(3))
+    coordinates = closest_on_triangles(points[:, None], a, b, c)
+    near = np.einsum("kmc,mcd->kmd", coordinates, V[F])
+    return np.linalg.norm(near - points[:, None], axis=2).min(axis=1)
+
+
+def test_coordinates_are_barycentric_and_nothing_is_nearer():
+    rng = np.random.default_rng(0)
+    q, a, b, c = rng.normal(size=(4, 200, 3))
+    found = closest_on_triangles(q, a, b, c)
+    assert (found >= 0).all() and np.allclose(found.sum(axis=1), 1)
+    near = np.einsum("kc,kcd->kd", found, np.stack([a, b, c], axis=1))
+    for other in rng.dirichlet([1, 1, 1], (50, 200)):
+        point = np.einsum("kc,kcd->kd", other, np.stack([a, b, c], axis=1))
+        assert (np.linalg.norm(q - near, axis=1) <= np.linalg.norm(q - point, axis=1) + 1e-12).all()
+
+
+@pytest.mark.parametrize("mesh", [meshes.grid(), meshes.torus(16, 8), meshes.icosphere(2)])
+def test_points_near_a_surface_find_it(mesh):
+    V, F = mesh
+    index = ClosestPoint(V, F, 0.1)
+    owner, points = spread_points(V, F, 0.1)
+    normals = index.normals[owner]
+    away = points + 0.02 * normals
+    found = index(away, normals)
+    np.testing.assert_allclose(np.linalg.norm(found.points - away, axis=1), distances(V, F, away), atol=1e-9)
+    np.testing.assert_allclose(index.at(found.faces, found.barycentric), found.points)
+    on_it = index(points, normals)
+    np.testing.assert_allclose(on_it.points, points, atol=1e-12)
+
+
+def test_answers_are_never_farther_than_the_place_they_come_from():
+    """In a valley the nearest point may be that of the other slope; it is not promised, but nothing is worse."""
+    V, F = meshes.bumpy(8, 8)
+    index = ClosestPoint(V, F, 0.1)
+    owner, points = spread_points(V, F, 0.1)
+    away = points + 0.05 * index.normals[owner]
+    distance = np.linalg.norm(index(away, index.normals[owner]).points - away, axis=1)
+    assert (distance <= 0.05 + 1e-12).all() and (distance >= distances(V, F, away) - 1e-12).all()
+
+
+def test_the_side_that_looks_the_right_way_answers():
+    """Two sides closer to each other than the query is to the right one."""
+    V, F = meshes.grid()
+    double = np.concatenate([V, V + [0, 0, 0.1]]), np.concatenate([F, F[:, ::-1] + len(V)])
+    index = ClosestPoint(*double, 0.1)
+    query = np.array([[0.5, 0.5, 0.09]])
+    for direction, height in ((1.0, 0.0), (-1.0, 0.1)):
+        found = index(query, np.array([[0, 0, direction]]))
+        assert found.points[0, 2] == pytest.approx(height)
+
+
+def test_a_tracker_follows_small_steps():
+    V, F = meshes.icosphere(2)
+    index, tracker = ClosestPoint(V, F, 0.2), ClosestPointTracker(3)
+    points = 1.05 * V
+    normals = vertex_normals(V, F)
+    for _ in range(5):
+        points = points @ np.array([[np.cos(0.05), -np.sin(0.05), 0], [np.sin(0.05), np.cos(0.05), 0], [0, 0, 1]])
+        found = tracker(index, points, normals)
+        np.testing.assert_allclose(np.linalg.norm(found.points - points, axis=1), distances(V, F, points), atol=1e-9)
+
+
+@pytest.mark.parametrize("spacing", [0.5, 0.11, 0.05])
+def test_samples_lie_on_their_faces_in_number_of_their_size(spacing):
+    V, F = meshes.bumpy(8, 8)
+    owner, points = spread_points(V, F, spacing)
+    np.testing.assert_allclose(distances(V, F, points), 0, atol=1e-12)
+    assert (np.bincount(owner, minlength=len(F)) >= 1).all()
+    count = np.bincount(owner, minlength=len(F))
+    centre = np.stack([np.bincount(owner, x, len(F)) for x in points.T], axis=1) / count[:, None]
+    np.testing.assert_allclose(centre, V[F].mean(axis=1), atol=1e-12)
+    assert face_areas(V, F).sum() / len(points) <= spacing**2
+
+
+@pytest.mark.parametrize("k", [1, 2, 5])
+def test_centroids_of_a_subdivided_triangle(k):
+    found = subdivision_centroids(k)
+    assert len(found) == k**2 and (found > 0).all()
+    np.testing.assert_allclose(found.sum(axis=1), 1)
+    np.testing.assert_allclose(found.mean(axis=0), 1 / 3)

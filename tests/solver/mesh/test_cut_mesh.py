@@ -1,0 +1,58 @@
+"""Meshes cut open along seams: vertices come apart where they must, and walks stay on their side."""
+
+import meshes
+import numpy as np
+
+from omt_uv.solver.mesh.cut_mesh import are_across_seams, cut_open, descend, on_seam, seam_points
+from omt_uv.solver.mesh.topology import boundary_loops
+
+
+def strip():
+    """A grid with a seam along its middle column of vertices that ends one edge before the upper boundary."""
+    V, F = meshes.grid(8, 8)
+    middle = np.flatnonzero(np.isclose(V[:, 0], 0.5))[:-1]
+    return V, F, np.column_stack([middle[:-1], middle[1:]])
+
+
+def test_a_slit_doubles_its_vertices_but_the_last():
+    V, F, seams = strip()
+    mesh = cut_open(V, F, seams)
+    assert len(np.unique(mesh.sides)) == len(V) + len(seams)
+    assert mesh.seam.sum() == 2 * len(seams)
+    assert len(boundary_loops(mesh.sides)) == 1
+    assert mesh.star.sum() == F.size
+
+
+def test_without_seams_nothing_comes_apart():
+    V, F = meshes.torus(16, 8)
+    mesh = cut_open(V, F, np.zeros((0, 2), np.int64))
+    assert len(np.unique(mesh.sides)) == len(V) and not mesh.seam.any()
+
+
+def test_points_along_seams_are_on_them():
+    V, F, seams = strip()
+    mesh = cut_open(V, F, seams)
+    points, h = seam_points(mesh, 0.02)
+    np.testing.assert_allclose(points[:, 0], 0.5)
+    assert mesh.seam[h].all()
+    faces = h // 3
+    # The corner opposite to halfedge k is k + 2.
+    b = np.full((len(h), 3), 0.5)
+    b[np.arange(len(h)), (h + 2) % 3] = 0
+    assert on_seam(mesh, faces, b).all()
+    assert not on_seam(mesh, faces, np.full((len(h), 3), 1 / 3)).any()
+
+
+def test_walks_do_not_cross_seams():
+    V, F, seams = strip()
+    mesh = cut_open(V, F, seams)
+    centre = V[F].mean(axis=1)
+    start = np.array([np.linalg.norm(centre - [0.3, 0.1, 0], axis=1).argmin()])
+    there = np.array([[0.9, 0.1, 0.0]])
+    end, distance = descend(mesh, there, start)
+    assert centre[end[0], 0] < 0.5 and np.isclose(distance[0], 0.4)
+    free, none = descend(cut_open(V, F, seams[:0]), there, start)
+    assert np.isclose(none[0], 0, atol=1e-9)
+    limit, slack = np.array([10.0]), np.array([0.0])
+    assert are_across_seams(mesh, start, free, limit, slack)[0]
+    assert not are_across_seams(mesh, start, end, limit, slack)[0]

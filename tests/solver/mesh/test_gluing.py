@@ -1,0 +1,85 @@
+"""Triangles of corners: what is glued hangs together, and turns over as one."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.gluing import (
+    components,
+    corner_classes,
+    groups,
+    orientations,
+    polygon_gluing,
+    polygon_sides,
+    turn_over,
+)
+from omt_uv.solver.mesh.repair import repaired_gluing
+from omt_uv.solver.mesh.surface import strict_gluing, triangle_surface
+
+
+def glued(V, F, seams=()):
+    surface = triangle_surface(V, F, seams)
+    return repaired_gluing(surface, np.ones(len(F), bool), surface.triangles, surface.triangle_face).gluing
+
+
+@pytest.mark.parametrize(("mesh", "vertices"), [(meshes.grid(), 81), (meshes.torus(24, 12), 288)])
+def test_classes_of_corners_are_vertices(mesh, vertices):
+    gluing = glued(*mesh)
+    assert len(np.unique(corner_classes(gluing))) == vertices
+    np.testing.assert_array_equal(components(gluing), 0)
+
+
+def test_seams_are_not_glued():
+    V, F = meshes.grid(2, 1)
+    # The middle column of edges cuts the grid in two, and doubles its vertices.
+    middle = np.flatnonzero(np.isclose(V[:, 0], 0.5))
+    gluing = glued(V, F, [middle])
+    assert components(gluing).max() == 1 and len(np.unique(corner_classes(gluing))) == len(V) + 2
+
+
+def test_cut_open_again():
+    V, F = meshes.grid()
+    gluing = glued(V, F)
+    apart = gluing.without(np.ones(len(gluing.first), bool))
+    assert components(apart).max() + 1 == len(F)
+    assert len(np.unique(corner_classes(apart))) == F.size
+
+
+def test_some_turned_faces_are_turned_back():
+    V, F = meshes.icosphere(2)
+    wrong = np.random.default_rng(0).random(len(F)) < 0.3
+    gluing = glued(V, np.where(wrong[:, None], F[:, ::-1], F))
+    area = face_areas(V, F)
+    turned, one_sided = orientations(gluing, area)
+    np.testing.assert_array_equal(turned, wrong)
+    assert not one_sided.any()
+    right = turn_over(gluing, turned)
+    assert gluing.parallel().any() and not right.parallel().any()
+    assert not orientations(right, area)[0].any()
+
+
+def test_a_moebius_strip_has_one_side():
+    n = 12
+    a, b = np.arange(n), n + np.arange(n)
+    following = np.r_[np.arange(1, n), 0]
+    c, d = a[following], b[following]
+    c[-1], d[-1] = b[0], a[0]
+    F = np.concatenate([np.column_stack([a, c, b]), np.column_stack([c, d, b])])
+    gluing = glued(np.random.default_rng(0).random((2 * n, 3)), F)
+    turned, one_sided = orientations(gluing, np.ones(len(F)))
+    assert one_sided.all() and not turned.any()
+
+
+def test_diagonals_are_no_sides():
+    surface = meshes.polygon_surface(*meshes.quad_grid(3, 3))
+    gluing = polygon_gluing(surface.triangles, surface.triangle_face, surface.corner_vertex, surface.face_start)
+    assert gluing.side.sum() == 4 * 9 and len(gluing.first) == 9
+    np.testing.assert_array_equal(components(gluing), surface.triangle_face)
+    backwards = polygon_sides(len(surface.corner_vertex), surface.face_start, surface.triangles[:, ::-1])
+    assert backwards.sum() == gluing.side.sum()
+    assert components(strict_gluing(surface)).max() == 0
+
+
+def test_groups_of_labels():
+    assert [g.tolist() for g in groups(np.array([2, 0, 2, 1, 0]))] == [[1, 4], [3], [0, 2]]

@@ -1,0 +1,64 @@
+"""Surfaces: what is wrong with them is named, and nothing else."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.errors import DuplicateFaceError, EmptyMeshError, NonFiniteError, ZeroAreaFaceError
+from omt_uv.solver.mesh.surface import (
+    chosen_triangles,
+    degenerate_triangles,
+    duplicate_faces,
+    is_seam,
+    strict_gluing,
+    triangle_surface,
+)
+from omt_uv.solver.mesh.topology import pair_keys
+
+
+def test_triangles_are_their_polygons():
+    V, F = meshes.bumpy()
+    surface = triangle_surface(V, F)
+    np.testing.assert_array_equal(surface.corner_vertex[surface.triangles], F)
+    np.testing.assert_array_equal(surface.triangle_face, np.arange(len(F)))
+    assert not len(surface.seams) and not len(surface.sharp)
+
+
+@pytest.mark.parametrize("scale", [1e-150, 1.0, 1e150])
+def test_needles_are_degenerate_at_any_scale(scale):
+    V = scale * np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 1e-12, 0], [0, 1, 0]])
+    np.testing.assert_array_equal(degenerate_triangles(V, np.array([[0, 1, 2], [0, 1, 3]])), [True, False])
+
+
+def test_duplicates_are_numbered_among_their_likes():
+    V, F = meshes.grid(2, 2)
+    twice = np.concatenate([F, F[[3, 5, 3]][:, [1, 2, 0]]])
+    rows = duplicate_faces(triangle_surface(V, twice), np.ones(len(twice), bool))
+    assert rows.tolist() == [[3, 0], [5, 0], [8, 1], [9, 1], [10, 2]]
+
+
+def test_seams_know_no_direction():
+    surface = triangle_surface(*meshes.grid(), seams=[(1, 0), (5, 6)])
+    keys = pair_keys(np.array([0, 6, 0]), np.array([1, 5, 2]))
+    assert is_seam(surface, keys).tolist() == [True, True, False]
+
+
+def test_only_chosen_faces_are_judged():
+    V, F = meshes.grid(4, 4)
+    V[0] = np.nan
+    F = np.concatenate([F, F[[-1]], [[7, 7, 8]]])
+    surface = triangle_surface(V, F)
+    with pytest.raises(NonFiniteError) as caught:
+        chosen_triangles(surface, None)
+    assert caught.value.elements.tolist() == [0]
+    good = ~(F == 0).any(axis=1)
+    with pytest.raises(ZeroAreaFaceError) as caught:
+        strict_gluing(surface, good)
+    assert caught.value.elements.tolist() == [len(F) - 1]
+    good[-1] = False
+    with pytest.raises(DuplicateFaceError):
+        strict_gluing(surface, good)
+    good[-2] = False
+    assert len(strict_gluing(surface, good).triangles) == good.sum()
+    with pytest.raises(EmptyMeshError):
+        strict_gluing(surface, np.zeros(len(F), bool))
