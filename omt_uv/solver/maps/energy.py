@@ -107,10 +107,10 @@ def _energies(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float 
 
 def gradient(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
     """Gradient (n,) complex: real part by u, imaginary part by v."""
-    return scatter(faces, face_derivatives(faces, w, area_weight).gradient, len(w))
+    return sum_at_vertices(faces, face_derivatives(faces, w, area_weight).gradient, len(w))
 
 
-def scatter(faces: Elements, corner: np.ndarray, n: int) -> np.ndarray:
+def sum_at_vertices(faces: Elements, corner: np.ndarray, n: int) -> np.ndarray:
     """Sum of corner values (m,3) complex at each of n vertices, (n,)."""
     flat = faces.triangles.ravel()
     return np.bincount(flat, corner.real.ravel(), n) + 1j * np.bincount(flat, corner.imag.ravel(), n)

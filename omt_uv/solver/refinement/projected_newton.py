@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ..errors import PrecisionError
 from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.sparse import Factor
-from ..maps.energy import Elements, energies, face_derivatives, scatter, squared, target_error
+from ..maps.energy import Elements, energies, face_derivatives, squared, sum_at_vertices, target_error
 from .vertex_sweeps import Smoother
 
 ARMIJO = 1e-4  # least share of the promised decrease that a step must gain
@@ -228,7 +228,7 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
     """Hessian (2n,2n) and slopes (2n,) along the axes of the frame, and the mean of the Hessian's diagonal."""
     n, faces = len(w), problem.faces
     local = face_derivatives(faces, w, problem.area_weight, pressure)
-    gradient = scatter(faces, local.gradient, n)
+    gradient = sum_at_vertices(faces, local.gradient, n)
     rows = np.ascontiguousarray((local.rows * frame[faces.triangles][:, None, :]).conj()).view(float)
     rows *= free[faces.triangles].reshape(-1, 1, 6)
     blocks = np.matmul(rows.transpose(0, 2, 1), rows)

@@ -1,0 +1,47 @@
+"""Gaussian means by heat: they keep amounts and constants, and are those of a matrix exponential."""
+
+import meshes
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from omt_uv.solver.analysis.heat_means import HeatMeans
+from omt_uv.solver.mesh.geometry import cotangent_laplacian, vertex_areas
+
+SIGMAS = np.array([0.1, 0.2, 0.4])
+
+
+@pytest.mark.parametrize("mesh", [meshes.icosphere(2), meshes.bumpy(), meshes.torus(24, 12)])
+def test_amounts_and_constants_are_kept(mesh):
+    V, F = mesh
+    heat, area = HeatMeans(V, F, 0.2), vertex_areas(V, F)
+    amount = np.random.default_rng(0).random(len(V)) * area
+    np.testing.assert_allclose(heat.means(amount, SIGMAS) @ area, amount.sum(), rtol=1e-9)
+    np.testing.assert_allclose(heat.means(3 * area, SIGMAS), 3, rtol=1e-9)
+    assert not heat.means(0 * area, SIGMAS).any()
+
+
+def test_means_are_those_of_the_matrix_exponential():
+    """On a sphere without obtuse angles the stiffness is that of the cotangent Laplacian."""
+    V, F = meshes.icosphere(2)
+    area = vertex_areas(V, F)
+    amount = np.random.default_rng(0).random(len(V)) * area
+    found = HeatMeans(V, F, 0.2).means(amount, SIGMAS)
+    generator = cotangent_laplacian(V, F).toarray() / area[:, None]
+    for mean, sigma in zip(found, SIGMAS, strict=True):
+        expected = expm(-(sigma**2) / 2 * generator) @ (amount / area)
+        np.testing.assert_allclose(mean, expected, atol=1e-4 * np.ptp(amount / area))
+
+
+def test_means_grow_flatter_with_sigma():
+    V, F = meshes.bumpy()
+    found = HeatMeans(V, F, 0.2).means(np.where(np.arange(len(V)) == 150, 1.0, 0.0), SIGMAS)
+    assert (np.diff(found.max(axis=1)) < 0).all()
+
+
+def test_means_do_not_depend_on_scale():
+    V, F = meshes.bumpy()
+    values = np.random.default_rng(0).random(len(V))
+    small = HeatMeans(V, F, 0.2).means(values * vertex_areas(V, F), SIGMAS)
+    large = HeatMeans(1e4 * V, F, 2e3).means(values * vertex_areas(1e4 * V, F), 1e4 * SIGMAS)
+    np.testing.assert_allclose(large, small, rtol=1e-8)

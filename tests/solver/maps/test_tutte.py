@@ -1,0 +1,56 @@
+"""Mean value embeddings: no folds, whatever is convex around them, and what is flat comes back."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.maps import tutte as module
+from omt_uv.solver.maps.tutte import arc_length_parameters, mean_value_weights, tutte
+from omt_uv.solver.mesh.geometry import halfedge_lengths, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+
+
+def circle(V, loop):
+    angle = 2 * np.pi * arc_length_parameters(V, loop)
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+@pytest.mark.parametrize("mesh", [meshes.bumpy(), meshes.cone(), meshes.head(24), meshes.spiral_strip()])
+def test_embeddings_have_no_folds(mesh):
+    V, F = mesh
+    loop = boundary_loops(F)[0]
+    uv = tutte(V, F, loop, circle(V, loop))
+    assert (signed_areas(uv, F) > 0).all()
+    np.testing.assert_array_equal(uv[loop], circle(V, loop))
+
+
+def test_what_is_flat_comes_back():
+    """Mean value coordinates are exact on linear functions."""
+    V, F = meshes.random_disk(height=0.0)
+    loop = boundary_loops(F)[0]
+    turn = np.array([[2.0, 1.0], [-0.5, 1.5]])
+    np.testing.assert_allclose(tutte(V, F, loop, V[loop, :2] @ turn), V[:, :2] @ turn, atol=1e-9)
+
+
+def test_the_order_of_large_meshes_gives_the_same_map(monkeypatch):
+    V, F = meshes.head(24)
+    loop = boundary_loops(F)[0]
+    expected = tutte(V, F, loop, circle(V, loop))
+    monkeypatch.setattr(module, "LARGE", 10)
+    np.testing.assert_allclose(tutte(V, F, loop, circle(V, loop)), expected, atol=1e-9)
+
+
+def test_weights_are_positive_and_fall_with_scale():
+    length = halfedge_lengths(*meshes.spiral_strip()).reshape(-1, 3)
+    for near, far in zip(mean_value_weights(length), mean_value_weights(10 * length), strict=True):
+        assert (near > 0).all() and np.isfinite(near).all()
+        np.testing.assert_allclose(far, near / 10, rtol=1e-9)
+    degenerate = mean_value_weights(np.array([[1.0, 1.0, 2.0], [0.0, 1.0, 1.0]]))
+    assert all((w > 0).all() and np.isfinite(w).all() for w in degenerate)
+
+
+def test_parameters_are_shares_of_the_length():
+    V, F = meshes.grid(4, 4)
+    loop = boundary_loops(F)[0]
+    np.testing.assert_allclose(arc_length_parameters(V, loop), np.arange(16) / 16)
+    np.testing.assert_allclose(arc_length_parameters(7 * V + 3, loop), np.arange(16) / 16)
