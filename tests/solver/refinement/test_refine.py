@@ -12,17 +12,7 @@ from omt_uv.solver.maps.untangle import arc_length_boundary, count_folds, untang
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import Progress, drain
-from omt_uv.solver.refinement.boundary_barrier import box_pairs, crossings, make_barrier
 from omt_uv.solver.refinement.continuation_rules import QUALITIES
-from omt_uv.solver.refinement.projected_newton import (
-    Assembly,
-    CircleMotion,
-    FreeMotion,
-    NewtonProblem,
-    first_fold,
-    newton_direction,
-    newton_step,
-)
 from omt_uv.solver.refinement.refine import BOUNDARIES, RefinementOptions, refine
 
 STANDARD = QUALITIES["standard"].area_error
@@ -149,59 +139,6 @@ def test_pressure_only_softens_the_hessian():
     w = w / np.sqrt(faces.areas(w).sum())
     sizes = [np.square(np.abs(E.face_derivatives(faces, w, 50.0, p).rows)).sum() for p in (0.0, 0.3, 1.0)]
     assert sizes[0] < sizes[1] < sizes[2]
-
-
-# ---- steps --------------------------------------------------------------------------------------------------
-
-
-def test_assembly_sums_what_a_dense_sum_does():
-    V, F = meshes.grid(3, 2)
-    n = len(V)
-    blocks = np.random.default_rng(0).normal(size=(len(F), 6, 6))
-    blocks = blocks + np.swapaxes(blocks, 1, 2)
-    dense = np.zeros((2 * n, 2 * n))
-    for face, block in zip(F, blocks, strict=True):
-        unknowns = (2 * face[:, None] + [0, 1]).ravel()
-        dense[np.ix_(unknowns, unknowns)] += block
-    matrix = Assembly(F, n).matrix(blocks, np.arange(2 * n))
-    assert np.allclose(matrix.toarray(), dense + np.diag(np.arange(2 * n)))
-
-
-def test_first_fold_is_where_the_first_face_has_no_area():
-    V, F = meshes.random_disk()
-    w = complex_map(V, F)
-    rng = np.random.default_rng(1)
-    step = rng.normal(size=len(w)) + 1j * rng.normal(size=len(w))
-    faces = elements_of(V, F)
-    t = first_fold(faces, w, step)
-    smallest = [faces.areas(w + s * step).min() for s in (0.0, 0.5 * t, 0.999 * t, 1.001 * t)]
-    assert min(smallest[:3]) > 0 > smallest[3]
-
-
-@pytest.mark.parametrize("kind", ["free", "circle"])
-def test_newton_direction_descends_along_the_motion(kind):
-    V, F = meshes.bumpy()
-    faces, w, loop = elements_of(V, F), complex_map(V, F), boundary_loops(F)[0]
-    motion = CircleMotion(loop, 1.0, len(w)) if kind == "circle" else FreeMotion(np.zeros(len(w), bool))
-    problem = NewtonProblem(faces, Assembly(F, len(w)), motion, 5.0)
-    step, slope = newton_direction(problem, w)
-    h = 1e-6
-    difference = (problem.energy(motion.move(w, h * step)) - problem.energy(motion.move(w, -h * step))) / (2 * h)
-    assert slope < 0
-    assert difference == pytest.approx(slope, rel=1e-4)
-
-
-def test_newton_converges_fast_near_its_minimum():
-    V, F = meshes.bumpy()
-    w = complex_map(V, F)
-    problem = NewtonProblem(elements_of(V, F), Assembly(F, len(w)), FreeMotion(np.zeros(len(w), bool)), 5.0)
-    value, decrements = problem.energy(w), []
-    while not decrements or decrements[-1] > 1e-13:
-        step = newton_step(problem, w, value)
-        w, value = step.w, step.energy
-        decrements.append(step.decrement)
-        assert len(decrements) < 60
-    assert (np.divide(decrements[-3:], decrements[-4:-1]) < 0.1).all()
 
 
 # ---- the result ---------------------------------------------------------------------------------------------
@@ -368,63 +305,6 @@ def test_a_boundary_out_of_order_is_replaced_and_said():
 
 
 # ---- a boundary that may not cross itself -------------------------------------------------------------------
-
-
-def test_crossings_of_a_bow_tie_and_of_a_polygon():
-    assert crossings(np.array([0, 1 + 1j, 1, 1j]), np.arange(4)).tolist() == [[0, 2]]
-    circle = np.exp(2j * np.pi * np.arange(50) / 50)
-    assert len(crossings(circle, np.arange(50))) == 0
-
-
-def test_box_pairs_are_those_of_brute_force():
-    rng = np.random.default_rng(0)
-    low1, low2 = rng.random((60, 2)), rng.random((80, 2))
-    high1, high2 = low1 + 0.1 * rng.random((60, 2)), low2 + 0.2 * rng.random((80, 2))
-    i, j = box_pairs(low1, high1, low2, high2)
-    meet = (low1[:, None] <= high2).all(2) & (low2 <= high1[:, None]).all(2)
-    assert np.array_equal(np.column_stack([i, j]), np.argwhere(meet))
-
-
-def slot():
-    """A nearly closed ring: its ends face each other across a narrow gap."""
-    angle = np.linspace(0.005, 2 * np.pi - 0.005, 40)
-    ring = np.concatenate([np.exp(1j * angle), 0.6 * np.exp(1j * angle[::-1])])
-    return ring, np.arange(len(ring))
-
-
-def test_contact_gradient_is_the_derivative_of_its_energy():
-    ring, loop = slot()
-    barrier = make_barrier(ring, loop, 1.0)
-    assert barrier.energy(ring) > 0
-    rng = np.random.default_rng(0)
-    direction = rng.normal(size=len(ring)) + 1j * rng.normal(size=len(ring))
-    h = 1e-8
-    numeric = (barrier.energy(ring + h * direction) - barrier.energy(ring - h * direction)) / (2 * h)
-    gradient, _, _ = barrier.derivatives(ring)
-    assert numeric == pytest.approx((gradient.conj() * direction).real.sum(), rel=1e-4)
-
-
-def test_contact_hessian_bounds_how_the_energy_bends():
-    # A spike that nearly touches an edge; the second derivative counts sliding along an edge that turns.
-    spike = np.array([0, 1, 1 + 0.5j, 0.4 + 0.01j, 0.5j])
-    barrier = make_barrier(spike, np.arange(5), 1.0)
-    _, vertices, rows = barrier.derivatives(spike)
-    h = 1e-6
-    for direction in np.random.default_rng(0).normal(size=(200, 5, 2)) @ [1, 1j]:
-        before, here, after = (barrier.energy(spike + k * h * direction) for k in (-1, 0, 1))
-        bound = ((rows * direction[vertices]).sum(1).real ** 2).sum()
-        assert (before - 2 * here + after) / h**2 <= 1.001 * bound
-
-
-def test_no_step_goes_through_an_edge():
-    ring, loop = slot()
-    barrier = make_barrier(ring, loop, 1.0)
-    # Both ends move towards each other by more than the gap.
-    step = np.where(ring.imag > 0, -1j, 1j) * (ring.real > 0) * (np.abs(ring.imag) < 0.5) * 0.2
-    assert len(crossings(ring + step, loop)) > 0
-    share = barrier.limit(ring, step)
-    assert 0 < share < 1
-    assert len(crossings(ring + share * step, loop)) == 0
 
 
 def overlapping_helix():

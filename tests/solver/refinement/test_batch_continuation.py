@@ -1,0 +1,75 @@
+"""Many charts take their steps together, and each its own decisions."""
+
+import numpy as np
+
+from omt_uv.solver.refinement.batch_continuation import AreaErrors, BatchContinuation
+from omt_uv.solver.refinement.continuation_rules import FIRST_PRESSURE, QUALITIES, SQUEEZED
+
+ENERGIES = np.array([1.0, 2 * SQUEEZED, np.inf, 3.0])
+
+
+def batch(energies=ENERGIES, quality="standard", balance=0.0):
+    return BatchContinuation(len(energies), quality, balance, lambda weight: energies)
+
+
+def errors(error, count=4):
+    error = np.broadcast_to(error, count).astype(float)
+    return AreaErrors(error, error, np.full(count, 0.5))
+
+
+def promise(continuation, share, error, shares=None):
+    """A full step that leaves the energies and promises this share of them."""
+    value = np.where(np.isfinite(continuation.value), continuation.value, 1.0)
+    taken = np.ones(len(value)) if shares is None else shares
+    continuation.update(value, share * value, taken, errors(error, len(value)), lambda weight: value)
+
+
+def test_the_squeezed_begin_with_shear_and_the_folded_not_at_all():
+    continuation = batch()
+    np.testing.assert_array_equal(continuation.live, [True, True, False, True])
+    first = QUALITIES["standard"].area_weights[0]
+    np.testing.assert_array_equal(continuation.area_weight, [first, 1.0, 1.0, first])
+
+
+def test_charts_go_on_one_by_one():
+    continuation = batch(np.array([1.0, 1.0]))
+    value, weights = np.ones(2), QUALITIES["standard"].area_weights
+    continuation.update(value, np.array([1e-9, 0.5]), np.ones(2), errors(0.5, 2), lambda weight: value)
+    np.testing.assert_array_equal(continuation.area_weight, [weights[1], weights[0]])
+    np.testing.assert_array_equal(continuation.steps, [1, 1])
+    assert continuation.pressure[0] == FIRST_PRESSURE
+    assert continuation.multiplier[0] == weights[0] * 0.5 and continuation.multiplier[1] == 0
+
+
+def test_a_chart_that_has_its_areas_is_solved_and_stays():
+    continuation = batch(np.ones(3))
+    while continuation.live.any():
+        promise(continuation, 1e-9, 0.001)
+    assert continuation.solved.all()
+    np.testing.assert_array_equal(continuation.steps, len(QUALITIES["standard"].area_weights))
+    before = continuation.area_weight.copy()
+    promise(continuation, 0.5, 0.5)
+    np.testing.assert_array_equal(continuation.area_weight, before)
+
+
+def test_a_chart_that_no_step_helps_is_given_back():
+    continuation = batch(np.ones(2))
+    for _ in range(2):  # the first failure makes the Hessian definite
+        promise(continuation, 0.5, 0.5, shares=np.array([0.0, 1.0]))
+    np.testing.assert_array_equal(continuation.live, [False, True])
+    assert not continuation.solved.any()
+
+
+def test_steps_are_allowed_only_so_many():
+    continuation = batch(np.ones(1), "draft")
+    count = 0
+    while continuation.live.any():
+        promise(continuation, 0.5, 0.9 ** (count := count + 1))
+    assert count == QUALITIES["draft"].max_steps and not continuation.solved.any()
+
+
+def test_a_balance_needs_no_areas():
+    continuation = batch(np.ones(2), balance=1.0)
+    while continuation.live.any():
+        promise(continuation, 1e-9, 0.7)
+    assert continuation.solved.all() and not continuation.multiplier.any()

@@ -1,0 +1,73 @@
+"""Charts refined side by side: each as if it were alone."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.maps.untangle import count_folds
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.batch_refine import refine_batch
+from omt_uv.solver.refinement.continuation_rules import QUALITIES
+
+
+def in_unit_box(charts):
+    return [((V - V.mean(axis=0)) / np.ptp(V, axis=0).max(), F) for V, F in charts]
+
+
+def disks():
+    rough = [meshes.random_disk(40 + 20 * k, k, 0.2 + 0.2 * k) for k in range(4)]
+    return in_unit_box([*rough, meshes.cap(5, 12), meshes.grid(4, 3)])
+
+
+def maps_of(found, charts):
+    return np.split(found.uv, np.cumsum([len(V) for V, _ in charts])[:-1])
+
+
+def test_every_face_has_its_area_and_none_folds():
+    charts = in_unit_box([meshes.bumpy(8, 6), meshes.hemisphere(6, 14), meshes.cone(4, 12)])
+    found = drain(refine_batch(charts, "standard", 0.0))
+    assert found.solved.all()
+    for k, ((V, F), uv) in enumerate(zip(charts, maps_of(found, charts), strict=True)):
+        assert count_folds(uv, F) == 0
+        has, target = signed_areas(uv, F), face_areas(V, F)
+        error = np.abs(has / has.sum() - target / target.sum()).sum()
+        assert error == pytest.approx(found.area_l1[k]) and error <= QUALITIES["standard"].area_error
+
+
+@pytest.mark.parametrize("balance", [0.0, 0.5])
+def test_a_chart_does_not_depend_on_its_company(balance):
+    charts = disks()
+    together = drain(refine_batch(charts, "standard", balance))
+    for k, uv in enumerate(maps_of(together, charts)):
+        alone = drain(refine_batch(charts[k : k + 1], "standard", balance))
+        np.testing.assert_allclose(alone.uv, uv, atol=1e-6)
+        assert alone.steps[0] == together.steps[k] and alone.area_weight[0] == together.area_weight[k]
+
+
+def test_the_order_of_charts_is_kept():
+    charts = disks()
+    forth, back = (drain(refine_batch(c, "draft", 0.0)) for c in (charts, charts[::-1]))
+    for a, b in zip(maps_of(forth, charts), maps_of(back, charts[::-1])[::-1], strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-6)
+    np.testing.assert_array_equal(forth.steps, back.steps[::-1])
+
+
+def test_a_flat_chart_is_unrolled_and_stays():
+    V, F = disks()[-1]
+    found = drain(refine_batch([(V, F)], "exact", 0.0))
+    np.testing.assert_allclose(np.linalg.norm(found.uv[F[:, 0]] - found.uv[F[:, 1]], axis=1),
+                               np.linalg.norm(V[F[:, 0]] - V[F[:, 1]], axis=1), atol=1e-9)  # fmt: skip
+    assert found.angle_mean[0] == pytest.approx(1)
+
+
+def test_a_region_gets_its_share():
+    charts = disks()[:4]
+    middle = np.concatenate([np.linalg.norm(V[F].mean(axis=1), axis=1) < 0.25 for V, F in charts]).astype(float)
+    density = 1 + 2 * middle
+    found = drain(refine_batch(charts, "standard", 0.0, density, middle))
+    begin = 0
+    for (V, F), uv in zip(charts, maps_of(found, charts), strict=True):
+        here = slice(begin, begin := begin + len(F))
+        has, target = signed_areas(uv, F), face_areas(V, F) * density[here]
+        assert middle[here] @ has / has.sum() == pytest.approx(middle[here] @ target / target.sum(), rel=0.004)

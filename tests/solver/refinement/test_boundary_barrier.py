@@ -1,0 +1,90 @@
+"""A boundary that may not cross itself: crossings, and the barrier before them."""
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.refinement.boundary_barrier import box_pairs, crossings, loop_edges, make_barrier
+
+
+def test_crossings_of_a_bow_tie_and_of_a_polygon():
+    assert crossings(np.array([0, 1 + 1j, 1, 1j]), np.arange(4)).tolist() == [[0, 2]]
+    circle = np.exp(2j * np.pi * np.arange(50) / 50)
+    assert len(crossings(circle, np.arange(50))) == 0
+
+
+def test_box_pairs_are_those_of_brute_force():
+    rng = np.random.default_rng(0)
+    low1, low2 = rng.random((60, 2)), rng.random((80, 2))
+    high1, high2 = low1 + 0.1 * rng.random((60, 2)), low2 + 0.2 * rng.random((80, 2))
+    i, j = box_pairs(low1, high1, low2, high2)
+    meet = (low1[:, None] <= high2).all(2) & (low2 <= high1[:, None]).all(2)
+    assert np.array_equal(np.column_stack([i, j]), np.argwhere(meet))
+
+
+def slot():
+    """A nearly closed ring: its ends face each other across a narrow gap."""
+    angle = np.linspace(0.005, 2 * np.pi - 0.005, 40)
+    ring = np.concatenate([np.exp(1j * angle), 0.6 * np.exp(1j * angle[::-1])])
+    return ring, np.arange(len(ring))
+
+
+def test_contact_gradient_is_the_derivative_of_its_energy():
+    ring, loop = slot()
+    barrier = make_barrier(ring, loop, 1.0)
+    assert barrier.energy(ring) > 0
+    rng = np.random.default_rng(0)
+    direction = rng.normal(size=len(ring)) + 1j * rng.normal(size=len(ring))
+    h = 1e-8
+    numeric = (barrier.energy(ring + h * direction) - barrier.energy(ring - h * direction)) / (2 * h)
+    gradient, _, _ = barrier.derivatives(ring)
+    assert numeric == pytest.approx((gradient.conj() * direction).real.sum(), rel=1e-4)
+
+
+def test_contact_hessian_bounds_how_the_energy_bends():
+    # A spike that nearly touches an edge; the second derivative counts sliding along an edge that turns.
+    spike = np.array([0, 1, 1 + 0.5j, 0.4 + 0.01j, 0.5j])
+    barrier = make_barrier(spike, np.arange(5), 1.0)
+    _, vertices, rows = barrier.derivatives(spike)
+    h = 1e-6
+    for direction in np.random.default_rng(0).normal(size=(200, 5, 2)) @ [1, 1j]:
+        before, here, after = (barrier.energy(spike + k * h * direction) for k in (-1, 0, 1))
+        bound = ((rows * direction[vertices]).sum(1).real ** 2).sum()
+        assert (before - 2 * here + after) / h**2 <= 1.001 * bound
+
+
+def test_no_step_goes_through_an_edge():
+    ring, loop = slot()
+    barrier = make_barrier(ring, loop, 1.0)
+    # Both ends move towards each other by more than the gap.
+    step = np.where(ring.imag > 0, -1j, 1j) * (ring.real > 0) * (np.abs(ring.imag) < 0.5) * 0.2
+    assert len(crossings(ring + step, loop)) > 0
+    share = barrier.limit(ring, step)
+    assert 0 < share < 1
+    assert len(crossings(ring + share * step, loop)) == 0
+
+
+def test_crossings_do_not_depend_on_scale_turn_and_names():
+    random = np.random.default_rng(3)
+    w, loop = random.normal(size=(30, 2)) @ [1, 1j], np.arange(30)
+    found = crossings(w, loop)
+    assert len(found)
+    np.testing.assert_array_equal(crossings(1e-6 * (0.6 + 0.8j) * w + 5e-6, loop), found)
+    name = random.permutation(30)
+    np.testing.assert_array_equal(crossings(w[np.argsort(name)], name), found)
+
+
+def test_a_loop_and_its_edges_are_the_same_boundary():
+    ring, loop = slot()
+    edges = np.column_stack(loop_edges(loop))
+    a, b = make_barrier(ring, loop, 1.0), make_barrier(ring, edges, 1.0)
+    assert a.energy(ring) == b.energy(ring)
+    np.testing.assert_array_equal(a.derivatives(ring)[0], b.derivatives(ring)[0])
+
+
+def test_the_barrier_does_not_feel_where_the_map_lies():
+    ring, loop = slot()
+    barrier = make_barrier(ring, loop, 1.0)
+    gradient = barrier.derivatives(ring)[0]
+    assert barrier.energy(ring * (0.6 + 0.8j) + 3) == pytest.approx(barrier.energy(ring))
+    assert abs(gradient.sum()) < 1e-9 * np.abs(gradient).sum()
+    assert abs((gradient.conj() * 1j * ring).real.sum()) < 1e-9 * np.abs(gradient).sum()

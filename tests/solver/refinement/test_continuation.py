@@ -1,0 +1,113 @@
+"""Stages of growing area weight: how they end, and what does not change the way."""
+
+from dataclasses import dataclass, replace
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.maps.energy import area_error, elements
+from omt_uv.solver.maps.tutte import tutte
+from omt_uv.solver.maps.untangle import arc_length_boundary
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.continuation import MapProblem, StageLimits, minimise, minimise_in_stages, rescaled
+from omt_uv.solver.refinement.continuation_rules import QUALITIES
+from omt_uv.solver.refinement.projected_newton import Assembly, FreeMotion, NewtonStep
+
+
+@dataclass(frozen=True)
+class Parabola:
+    """Energy 1 + x^2, whose Newton steps are exact; areas are right at x = 0 alone."""
+
+    shares: tuple[float, ...] = (1.0,)
+
+    def energy(self, w):
+        return 1 + float(w @ w)
+
+    def area_error(self, w):
+        return float(np.abs(w).max())
+
+    def step(self, w, value, pressure):
+        share = self.shares[0]
+        after = w * (1 - share)
+        return NewtonStep(after, self.energy(after), float(w @ w), share)
+
+
+def test_an_exact_step_is_the_only_one_but_for_the_proof():
+    stage = drain(minimise(Parabola(), np.ones(3), StageLimits(0.1, 50)))
+    assert stage.status == "converged" and stage.steps == 2 and not stage.w.any()
+
+
+def test_a_stage_ends_when_its_steps_are_used_up_or_help_no_more():
+    assert drain(minimise(Parabola((0.01,)), np.ones(3), StageLimits(0.1, 5))).status == "steps"
+    stalled = drain(minimise(Parabola((0.0,)), np.ones(3), StageLimits(0.1, 50)))
+    assert stalled.status == "stalled" and stalled.w.all()
+
+
+def test_a_step_to_where_it_is_forbidden_is_not_taken():
+    stage = drain(minimise(Parabola(), np.ones(3), StageLimits(0.1, 50), 0, lambda w: not w.any()))
+    assert stage.status == "crossed" and stage.w.all()
+
+
+def problem_of(V, F, target=None, region=None):
+    loop = boundary_loops(F)[0]
+    area = face_areas(V, F)
+    target = area if target is None else target * (area.sum() / target.sum())
+    problem = MapProblem(
+        elements(V, F, target, region), Assembly(F, len(V)), FreeMotion(np.zeros(len(V), bool)), loop, False
+    )
+    w = tutte(V, F, loop, arc_length_boundary(V, loop, np.sqrt(area.sum() / np.pi))) @ [1, 1j]
+    return problem, w
+
+
+@pytest.fixture(scope="module")
+def bumpy():
+    return problem_of(*meshes.bumpy(10, 10))
+
+
+def test_targets_follow_the_area_of_the_map(bumpy):
+    problem, w = bumpy
+    faces = rescaled(problem, 3 * w).faces
+    assert faces.area @ faces.ratio == pytest.approx(faces.areas(3 * w).sum())
+    np.testing.assert_allclose(faces.ratio / problem.faces.ratio, faces.ratio[0] / problem.faces.ratio[0])
+
+
+@pytest.mark.parametrize("name", ["draft", "standard", "exact"])
+def test_the_areas_of_every_quality_are_reached(bumpy, name):
+    problem, w = bumpy
+    found = drain(minimise_in_stages(problem, w, 0.0, QUALITIES[name]))
+    assert found.status == "converged" and area_error(problem.faces, found.w) <= QUALITIES[name].area_error
+    assert found.area_weight in QUALITIES[name].area_weights and not found.warnings and not found.overlap
+
+
+def test_a_turn_of_the_start_turns_the_result(bumpy):
+    problem, w = bumpy
+    plain, turned = (drain(minimise_in_stages(problem, c * w, 0.0, QUALITIES["standard"])) for c in (1, 0.6 + 0.8j))
+    np.testing.assert_allclose(turned.w, (0.6 + 0.8j) * plain.w, atol=1e-6)
+    assert turned.steps == plain.steps
+
+
+def test_a_warm_start_begins_with_the_second_weight(bumpy):
+    problem, w = bumpy
+    near = drain(minimise_in_stages(problem, w, 0.0, QUALITIES["standard"])).w
+    again = drain(minimise_in_stages(problem, near, 0.0, QUALITIES["standard"], warm_start=True))
+    assert again.area_weight == 2 * QUALITIES["standard"].area_weights[1] and again.steps < 10
+
+
+def test_a_multiplier_gives_a_region_its_share():
+    V, F = meshes.bumpy(10, 10)
+    region = (np.linalg.norm(V[F].mean(axis=1)[:, :2] - 0.5, axis=1) < 0.2).astype(float)
+    problem, w = problem_of(V, F, face_areas(V, F) * (1 + 4 * region), region)
+    found = drain(minimise_in_stages(problem, w, 0.0, QUALITIES["standard"]))
+    has, target = problem.faces.areas(found.w), problem.faces.area * problem.faces.ratio
+    assert found.multiplier > 0
+    assert region @ has / has.sum() == pytest.approx(region @ target / target.sum(), rel=0.003)
+
+
+def test_a_boundary_that_may_not_move_has_no_barrier(bumpy):
+    problem, w = bumpy
+    with pytest.raises(ValueError, match="may not move"):
+        replace(problem, loop=None).barrier(w)
+    assert not replace(problem, loop=None).boundary_crosses(w)

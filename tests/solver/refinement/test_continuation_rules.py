@@ -1,0 +1,86 @@
+"""The table of rules: the same for one chart as for many, and monotone where that is the point."""
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.refinement import continuation_rules as rules
+from omt_uv.solver.refinement.continuation_rules import QUALITIES
+
+RANDOM = np.random.default_rng(0)
+PRESSURE = RANDOM.choice([0, 0.005, 0.01, 0.03, 0.3, 1.0], 300)
+SHARE = RANDOM.choice([0, 0.1, 0.5, 0.9, 1.0], 300)
+GAIN, DECREMENT = RANDOM.random((2, 300))
+GAIN[SHARE == 0] = 0
+
+
+def each(rule, *columns):
+    return np.array([rule(*(x.item() for x in row)) for row in zip(*columns, strict=True)])
+
+
+def test_one_chart_is_a_batch_of_one():
+    pressure = rules.next_pressure(PRESSURE, SHARE, GAIN, DECREMENT)
+    np.testing.assert_array_equal(pressure, each(rules.next_pressure, PRESSURE, SHARE, GAIN, DECREMENT))
+    met = GAIN < 0.2
+    verdict = rules.judge_step(SHARE, PRESSURE, DECREMENT, met, 0.3)
+    single = each(lambda *x: rules.judge_step(*x, 0.3), SHARE, PRESSURE, DECREMENT, met)
+    np.testing.assert_array_equal(np.column_stack(verdict), single)
+    np.testing.assert_array_equal(rules.promised(GAIN, DECREMENT), each(rules.promised, GAIN, DECREMENT))
+    quality = QUALITIES["standard"]
+    enough = rules.is_enough(quality, 0.0, 0.02 * GAIN, 1e7 * DECREMENT)
+    np.testing.assert_array_equal(
+        enough, each(lambda e, w: rules.is_enough(quality, 0.0, e, w), 0.02 * GAIN, 1e7 * DECREMENT)
+    )
+
+
+def test_pressure_stays_a_share_and_follows_the_promise():
+    after = rules.next_pressure(PRESSURE, SHARE, GAIN, DECREMENT)
+    assert ((after >= 0) & (after <= 1)).all()
+    kept = (SHARE == 1) & (GAIN > 0.7 * DECREMENT)
+    assert (after[kept] <= PRESSURE[kept]).all() and (after[~kept] >= PRESSURE[~kept]).all()
+    assert (after[SHARE == 0] == 1).all()
+
+
+def test_a_stage_ends_by_the_true_hessian_or_at_its_goal():
+    verdict = rules.judge_step(SHARE, PRESSURE, DECREMENT, np.zeros(300, bool), 0.3)
+    assert not (verdict.converged & verdict.sharpen).any()
+    np.testing.assert_array_equal(verdict.converged | verdict.sharpen, DECREMENT < 0.3)
+    assert rules.judge_step(1.0, 0.3, 0.9, True, 0.3).converged
+
+
+@pytest.mark.parametrize("name", QUALITIES)
+def test_weights_fall_with_the_balance(name):
+    quality = QUALITIES[name]
+    assert rules.planned_weights(0.0, quality) == list(quality.area_weights)
+    last = [rules.planned_weights(t, quality)[-1] for t in np.linspace(0, 1, 11)]
+    assert (np.diff(last) < 0).all() and last[-1] == pytest.approx(rules.LEAST_WEIGHT)
+    for t in (0.0, 0.3, 1.0):
+        assert (np.diff(rules.planned_weights(t, quality)) > 0).all()
+
+
+def test_weights_grow_within_bounds_and_with_the_error():
+    quality = QUALITIES["standard"]
+    error = quality.area_error * np.array([0.5, 1, 1.5, 2, 3, 100])
+    grown = rules.next_weight(30.0, error, quality) / 30
+    assert (np.diff(grown) >= 0).all()
+    np.testing.assert_allclose(grown, [1.3, 1.3, 2.25, 4, 9, 10])
+
+
+def test_more_area_error_is_futile_only_where_it_hardly_falls():
+    quality = QUALITIES["standard"]
+    assert not rules.is_futile(quality, 0.5, np.inf)
+    assert rules.is_futile(quality, 0.99, 1.0) and not rules.is_futile(quality, 0.97, 1.0)
+    assert rules.is_futile(quality, 0.97, 1.0, 10.0, with_region=True)
+    assert not rules.is_futile(quality, 0.5, 1.0, 10.0, with_region=True)
+    near = 0.97 * quality.area_error
+    assert not rules.is_futile(quality, near, quality.area_error, 10.0, with_region=True)
+
+
+def test_stages_on_the_way_end_sooner():
+    quality = QUALITIES["standard"]
+    for swept in (False, True):
+        there = rules.stage_tolerances(quality, 0.0, False, early=True, swept=swept)
+        under_way = rules.stage_tolerances(quality, 0.0, True, early=True, swept=swept)
+        assert there[0] == under_way[0]
+    assert rules.stage_tolerances(quality, 0.0, True, early=True)[1] > quality.loose_tolerance
+    assert rules.stage_tolerances(quality, 0.0, True, early=False)[1] == quality.loose_tolerance
+    assert rules.stage_tolerances(quality, 0.5, True, early=True) == (rules.STRICT, rules.LOOSE)

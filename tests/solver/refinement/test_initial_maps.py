@@ -1,0 +1,106 @@
+"""Initial maps: no folds, the boundary where it shall be, and nothing replaced without a warning."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.errors import FoldedUVError
+from omt_uv.solver.maps.untangle import count_folds
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.refinement.initial_maps import (
+    check_initial_map,
+    disk_initial_map,
+    free_initial_map,
+    is_far,
+    notched_disk,
+    square_initial_map,
+    unroll,
+)
+
+MESHES = {"bumpy": meshes.bumpy(8, 8), "cap": meshes.cap(6, 16), "random": meshes.random_disk(150)}
+DOMAINS = {"free": free_initial_map, "disk": disk_initial_map, "square": square_initial_map}
+
+
+def arch():
+    """A grid bent around a cylinder: its rows of quads are flat."""
+    V, F = meshes.grid(6, 6)
+    return np.column_stack([np.sin(2 * V[:, 0]), V[:, 1], np.cos(2 * V[:, 0])]), F, boundary_loops(F)[0]
+
+
+@pytest.mark.parametrize("domain", DOMAINS)
+@pytest.mark.parametrize("name", MESHES)
+def test_no_face_folds(name, domain):
+    V, F = MESHES[name]
+    initial = DOMAINS[domain](V, F, V[:, :2], boundary_loops(F)[0])
+    assert count_folds(initial.uv, F) == 0
+
+
+def test_a_disk_has_its_boundary_on_the_circle_of_the_surfaces_area():
+    V, F = MESHES["bumpy"]
+    loop = boundary_loops(F)[0]
+    radius = np.linalg.norm(disk_initial_map(V, F, V[:, :2] - 0.5, loop).uv[loop], axis=1)
+    np.testing.assert_allclose(np.pi * radius**2, face_areas(V, F).sum(), rtol=1e-12)
+
+
+def test_a_square_has_its_boundary_on_the_square_of_the_surfaces_area():
+    V, F = MESHES["bumpy"]
+    loop = boundary_loops(F)[0]
+    initial = square_initial_map(V, F, V[:, :2], loop)
+    half = np.sqrt(face_areas(V, F).sum()) / 2
+    np.testing.assert_allclose(np.abs(initial.uv[loop]).max(axis=1), half, rtol=1e-12)
+    assert (np.abs(initial.uv[loop]) > half * (1 - 1e-12)).all(axis=1).sum() == 4
+    assert not initial.motion.free[loop].all() and initial.motion.free[loop].any(axis=1).sum() == len(loop) - 4
+
+
+def test_a_map_that_will_do_is_kept():
+    V, F = MESHES["random"]
+    initial = free_initial_map(V, F, V[:, :2], boundary_loops(F)[0])
+    scale = np.sqrt(face_areas(V, F).sum() / signed_areas(V[:, :2], F).sum())
+    np.testing.assert_array_equal(initial.uv, V[:, :2] * scale)
+    assert not initial.warnings and initial.may_cross
+
+
+def test_developable_charts_are_unrolled_without_any_change_of_length():
+    V, F, loop = arch()
+    uv = unroll(V, F, loop)
+    a, b = F[:, [0, 1, 2]].ravel(), F[:, [1, 2, 0]].ravel()
+    np.testing.assert_allclose(np.linalg.norm(uv[a] - uv[b], axis=1), np.linalg.norm(V[a] - V[b], axis=1), rtol=1e-9)
+    V, F = MESHES["cap"]
+    assert unroll(V, F, boundary_loops(F)[0]) is None
+
+
+def test_unrolling_follows_the_scale_of_the_surface():
+    V, F, loop = arch()
+    np.testing.assert_allclose(unroll(1024 * V, F, loop), 1024 * unroll(V, F, loop), rtol=1e-9, atol=1e-9)
+
+
+def test_a_part_behind_one_edge_leaves_the_circle():
+    """Of a square of two triangles none has room; of a finer mesh none needs it."""
+    V, F = meshes.quad_patch()
+    loop = boundary_loops(F)[0]
+    initial = disk_initial_map(V, F, V[:, :2] - 0.5, loop)
+    notched = notched_disk(initial, F, loop)
+    assert notched.with_barrier and notched.warnings
+    assert notched.motion.free[loop].all(axis=1).sum() == 1
+    V, F = MESHES["cap"]
+    loop = boundary_loops(F)[0]
+    assert notched_disk(disk_initial_map(V, F, V[:, :2], loop), F, loop) is None
+
+
+def test_areas_are_far_by_their_shares_alone():
+    area = np.random.default_rng(0).random(100) + 0.1
+    assert not is_far(area, area) and not is_far(7 * area, area)
+    far = np.where(np.arange(100) < 5, 80.0, 1) * area
+    assert is_far(far, area) and is_far(9 * far, 0.1 * area)
+
+
+def test_maps_that_no_refinement_can_start_from_are_refused():
+    V, F = meshes.grid(4, 4)
+    check_initial_map(V[:, :2], F)
+    check_initial_map(V[:, :2] * [-1, 1], F)
+    for wrong in (0 * V[:, :2], V[:, [0, 0]], np.where(np.arange(len(V))[:, None] == 7, np.nan, V[:, :2])):
+        with pytest.raises(FoldedUVError):
+            check_initial_map(wrong, F)
+    with pytest.raises(FoldedUVError, match="repair"):
+        check_initial_map(np.abs(V[:, :2] - 0.5), F)
