@@ -62,7 +62,7 @@ class InitialMap:
 
 
 def is_far(target: np.ndarray, area: np.ndarray) -> bool:
-    """Whether areas (m,) asked for are far from those that there are, so that any map to them is sheared."""
+    """Whether target areas (m,) are far from those of the surface, so that any map to them is sheared."""
     return relative_entropy(target, area) > FAR
 
 

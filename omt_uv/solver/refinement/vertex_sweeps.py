@@ -137,17 +137,17 @@ def take_faces(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Element
 
 
 def relax(
-    vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, area_weight: float, steps: int, held=False
+    vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, area_weight: float, steps: int, fixed=False
 ) -> None:
     """Newton steps of every vertex (k,) within its star, in place, each only as far as its own energy falls.
 
-    row (s,): which of the vertices is the first corner of a face of the stars; held: vertices (k,) bool that stay.
+    row (s,): which of the vertices is the first corner of a face of the stars; fixed: vertices (k,) bool that stay.
     """
     k = len(vertex)
     value = np.bincount(row, energies(faces, w, area_weight), k)
     for _ in range(steps):
         step = _directions(row, faces, w, area_weight, k)
-        moving = np.ones(k, bool) & ~np.asarray(held)
+        moving = np.ones(k, bool) & ~np.asarray(fixed)
         for _ in range(HALVINGS):
             trial = w.copy()
             trial[vertex[moving]] += step[moving]

@@ -95,7 +95,7 @@ def by_flips(
         flip_in_place(triangles, twin, edges)
 
     flips, settled = flip_until_none(twin, violation, flip, MAX_ROUNDS, _backward(z, site_weights, start))
-    # Edges that wanted to flip and could not; a flip next to them may have helped since.
+    # Edges that are not regular and could not flip; a flip next to them may have helped since.
     edges = np.unique(np.concatenate(waiting))
     edges = edges[twin[edges] >= 0]
     below, _ = _below(z, site_weights, flat, edges, twin[edges])

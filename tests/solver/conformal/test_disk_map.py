@@ -77,8 +77,8 @@ def test_rectangle(name):
     result = drain(conformal_rectangle(V, F))
     (loop,) = boundary_loops(F)
     assert result.residual <= 1e-8
-    rim = result.uv[loop]
-    to_side = np.abs(np.column_stack([rim, rim - [1, result.aspect]])).min(axis=1)
+    outline = result.uv[loop]
+    to_side = np.abs(np.column_stack([outline, outline - [1, result.aspect]])).min(axis=1)
     np.testing.assert_allclose(to_side, 0, atol=1e-12)
     if len(loop) > 3:
         expected = np.array([[0, 0], [1, 0], [1, result.aspect], [0, result.aspect]])
@@ -182,7 +182,7 @@ def test_double_is_closed_and_mirrored():
 @pytest.mark.parametrize("height", [0.2, 0.7, 1.0, 1.6, 4.0])
 def test_rectangle_to_disk_is_conformal_and_keeps_the_boundary_in_order(height):
     t = np.linspace(0, 1, 30)[:-1]
-    rim = np.concatenate(
+    outline = np.concatenate(
         [
             np.column_stack([t, 0 * t]),
             np.column_stack([1 + 0 * t, t * height]),
@@ -190,7 +190,7 @@ def test_rectangle_to_disk_is_conformal_and_keeps_the_boundary_in_order(height):
             np.column_stack([0 * t, (1 - t) * height]),
         ]
     )
-    image = rectangle_to_disk(rim, height)
+    image = rectangle_to_disk(outline, height)
     np.testing.assert_allclose(np.linalg.norm(image, axis=1), 1, atol=1e-12)
     turn = np.diff(np.unwrap(np.arctan2(image[:, 1], image[:, 0])))
     assert (turn > 0).all() and turn.sum() < 2 * np.pi

@@ -1,4 +1,4 @@
-"""Yamabe flow: the cone angles that were asked for, and nothing where they are there already."""
+"""Yamabe flow: the cone angles that were prescribed, and nothing where they are there already."""
 
 import meshes
 import numpy as np

@@ -111,11 +111,11 @@ def test_a_region_of_most_of_the_texture_gets_it_by_way_of_coarser_charts():
 def test_smoothing_lowers_the_energy_and_folds_nothing():
     V, F, flat, mass, coarse = coarse_of("head")
     uv = drain(coarse.prolonged(flat[coarse.kept], len(V)))
-    faces, rim = elements(V, F, mass), boundary_loops(F)[0]
+    faces, outline = elements(V, F, mass), boundary_loops(F)[0]
     w = uv @ [1, 1j] * np.sqrt(mass.sum() / signed_areas(uv, F).sum())
     smooth = drain(smoothed(faces, w, 100.0, 2))
     assert (faces.areas(smooth) > 0).all() and energy(faces, smooth, 100.0) < energy(faces, w, 100.0)
-    np.testing.assert_array_equal(smooth[rim], w[rim])
+    np.testing.assert_array_equal(smooth[outline], w[outline])
 
 
 def test_what_returns_to_the_boundary_crosses_nothing():

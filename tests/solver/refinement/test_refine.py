@@ -21,10 +21,10 @@ STANDARD = QUALITIES["standard"].area_error
 def start(V, F, domain="disk"):
     """Tutte's map, boundary spread by length."""
     loop = boundary_loops(F)[0]
-    rim = arc_length_boundary(V, loop, 1.0)
+    outline = arc_length_boundary(V, loop, 1.0)
     if domain == "square":
-        rim = rim / np.abs(rim).max(1)[:, None]
-    return tutte(V, F, loop, rim)
+        outline = outline / np.abs(outline).max(1)[:, None]
+    return tutte(V, F, loop, outline)
 
 
 def run(V, F, uv=None, target=None, pins=None, **options):
@@ -194,9 +194,9 @@ def test_square_lies_on_the_square_exactly():
     V, F = meshes.bumpy()
     uv = run(V, F, boundary="square").uv
     half = np.sqrt(face_areas(V, F).sum()) / 2
-    rim = np.abs(uv[boundary_loops(F)[0]]) / half
-    assert np.allclose(rim.max(1), 1, atol=1e-14)
-    corners = (np.abs(rim - 1) < 1e-14).all(1)
+    outline = np.abs(uv[boundary_loops(F)[0]]) / half
+    assert np.allclose(outline.max(1), 1, atol=1e-14)
+    corners = (np.abs(outline - 1) < 1e-14).all(1)
     assert corners.sum() == 4
     assert signed_areas(uv, F).sum() == pytest.approx((2 * half) ** 2)
 
@@ -278,8 +278,8 @@ def test_refine_reports_progress_that_grows():
 def test_folded_starts_are_untangled(boundary):
     V, F = meshes.bumpy()
     uv = start(V, F, "square" if boundary == "square" else "disk")
-    rim = boundary_loops(F)[0]
-    inner = np.setdiff1d(np.arange(len(V)), rim)
+    outline = boundary_loops(F)[0]
+    inner = np.setdiff1d(np.arange(len(V)), outline)
     uv[inner] += 0.1 * np.random.default_rng(0).normal(size=(len(inner), 2))
     assert count_folds(uv, F) > 20
     result = run(V, F, uv, boundary=boundary)
