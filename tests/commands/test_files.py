@@ -166,33 +166,6 @@ def test_blend_with_several_objects_shares_one_density(package, run, tmp_path):
     assert densities[0] == pytest.approx(densities[1], rel=1e-4)
 
 
-def test_report(run, tmp_path):
-    write(tmp_path / "in.obj", *shuffled_patch())
-    report = tmp_path / "r.json"
-    assert run("unwrap", tmp_path / "in.obj", "-o", tmp_path / "out.blend", "--report", report)[0] == 0
-    charts = json.loads(report.read_text())["charts"]
-    assert len(charts) == 1
-    assert charts[0]["vertices"] == 42
-    expected = {"newton_conformal", "newton_transport", "residual_conformal", "residual_transport", "seconds"}
-    assert expected | {"area_l1", "area_sd", "angle_mean", "folds", "faces", "warnings"} <= set(charts[0])
-    assert all(seconds >= 0 for seconds in charts[0]["seconds"].values())
-
-
-def test_measure_prints_what_the_unwrap_reports(run, tmp_path):
-    write(tmp_path / "in.obj", *shuffled_patch())
-    report = tmp_path / "r.json"
-    assert run("unwrap", tmp_path / "in.obj", "-o", tmp_path / "out.blend", "--report", report)[0] == 0
-    status, out, _ = run("measure", tmp_path / "out.blend", "--json")
-    assert status == 0
-    figures, chart = json.loads(out), json.loads(report.read_text())["charts"][0]
-    assert figures["area_l1"] == pytest.approx(chart["area_l1"], abs=1e-4)
-    assert figures["angle_mean"] == pytest.approx(chart["angle_mean"], abs=1e-4)
-    assert figures["folds"] == 0
-    status, out, _ = run("measure", tmp_path / "out.blend")
-    assert status == 0
-    assert len(out.splitlines()) == 1
-
-
 def closed(path):
     path.write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n")
 

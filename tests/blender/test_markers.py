@@ -1,0 +1,45 @@
+"""Markers of a globe: vertex groups by name, or vertices in the order in which they were picked."""
+
+from __future__ import annotations
+
+import bpy
+
+import bmesh
+import numpy as np
+import pytest
+import scenes
+from globe_scenes import ball
+
+
+def test_groups_become_markers_of_the_objects_that_have_them(package):
+    markers = package("blender.markers")
+    first, second = ball("A"), ball("B")
+    first.vertex_groups.new(name="north").add([5], 0.5, "REPLACE")
+    found, none = markers.group_markers([first, second], "north")
+    assert none is None and np.flatnonzero(found.pole).tolist() == [5] and found.pole[5] == 0.5
+    assert found.meridian is None and markers.group_markers([first], "") == [None]
+    with pytest.raises(package("blender.vertex_groups").GroupError, match="south"):
+        markers.group_markers([first, second], "north", "south")
+
+
+def test_picked_vertices_keep_their_order(package):
+    markers, obj = package("blender.markers"), ball()
+    scenes.edit(obj, faces=[])
+    bpy.context.tool_settings.mesh_select_mode = (True, False, False)
+    mesh = bmesh.from_edit_mesh(obj.data)
+    mesh.verts.ensure_lookup_table()
+    for index in (7, 2, 30):
+        mesh.verts[index].select = True
+        mesh.select_history.add(mesh.verts[index])
+    found = markers.picked_markers(obj)
+    assert [int(np.argmax(x)) for x in (found.pole, found.meridian, found.side)] == [7, 2, 30]
+    scenes.leave_edit()
+
+
+def test_densities_go_from_one_to_the_factor(package):
+    obj = ball()
+    obj.vertex_groups.new(name="face").add([v.index for v in obj.data.vertices if v.co.z > 0], 1.0, "REPLACE")
+    pairs = [(obj, package("blender.mesh").read(obj))]
+    (density,) = package("blender.markers").globe_densities(pairs, "face", 4.0)
+    assert density.min() == 1 and density.max() == pytest.approx(4)
+    assert package("blender.markers").globe_densities(pairs, "", 4.0) == [None]

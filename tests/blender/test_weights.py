@@ -1,0 +1,52 @@
+"""The region: a group before an attribute, a score where neither is, and every size as the mesh has it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scenes
+from region_scenes import painted, weights_of, with_attribute
+
+
+def pairs_of(package, *objects):
+    return [(obj, package("blender.mesh").read(obj)) for obj in objects]
+
+
+def test_objects_without_the_group_have_no_part_in_the_region(package):
+    first, second = painted("A"), scenes.bump(name="B")
+    one, none = package("blender.weights").region_weights(pairs_of(package, first, second), "region")
+    assert (one == weights_of(first)).all()
+    assert none.shape == (len(second.data.vertices),) and not none.any()
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_attributes_above_one_are_divided_by_the_largest(package, mode):
+    obj = with_attribute(lambda obj: 5.0 * weights_of(obj))
+    if mode == "EDIT":
+        scenes.edit(obj)
+    (found,), warnings = package("blender.weights").attribute_weights(pairs_of(package, obj), "heat")
+    assert found.values.max() == pytest.approx(1) and found.kind == "vertex"
+    assert len(warnings) == 1 and "divided" in warnings[0][1]
+
+
+def test_computed_weights_are_those_of_the_name_unless_a_group_has_it(package):
+    weights, obj = package("blender.weights"), painted()
+    pairs = pairs_of(package, obj)
+    (computed,) = weights.region_weights(pairs, "curvature")
+    assert (computed == weights.computed_weights(pairs[0][1], "gaussian")).all()
+    assert 0 == computed.min() < computed.max() == 1
+    obj.vertex_groups["region"].name = "curvature"
+    assert (weights.region_weights(pairs, "curvature")[0] == weights_of(obj, "curvature")).all()
+
+
+def test_the_object_without_a_score_is_named_by_its_index(package):
+    flat = scenes.bump(height=0.0, name="Flat")
+    with pytest.raises(package("pipelines.layout").Refusal) as caught:
+        package("blender.weights").region_weights(pairs_of(package, scenes.bump(), flat), "curvature")
+    assert caught.value.index == 1
+
+
+def test_inverted_weights_add_up_to_one(package):
+    reading = pairs_of(package, scenes.bump())[0][1]
+    weigh = package("blender.weights").computed_weights
+    assert np.allclose(weigh(reading, "mean") + weigh(reading, "mean", invert=True), 1)

@@ -1,0 +1,52 @@
+"""A live session: it follows, comes to rest, gives back what was there, and notices when the mesh is another."""
+
+from __future__ import annotations
+
+import bpy
+
+import numpy as np
+import pytest
+import scenes
+from uv_scenes import plain
+
+
+@pytest.fixture
+def session(package):
+    made = []
+
+    def start(*objects):
+        pairs = [(obj, package("blender.mesh").read(obj)) for obj in objects]
+        made.append(package("session.live").Session(bpy.context, pairs))
+        return made[-1]
+
+    yield start
+    for each in made:
+        each.close()
+
+
+def test_it_comes_to_rest_and_gives_back_every_bit(session):
+    obj = plain()
+    before = scenes.uv_of(obj)
+    live = session(obj)
+    rounds = 0
+    while live.follow(0.3):
+        rounds += 1
+        assert rounds < 200
+    assert rounds > 0 and not np.array_equal(scenes.uv_of(obj), before)
+    live.restore()
+    assert (scenes.uv_of(obj) == before).all()
+
+
+def test_a_mesh_that_changed_is_left_alone(package, session):
+    obj = plain()
+    live = session(obj)
+    obj.data.uv_layers.remove(obj.data.uv_layers[0])
+    with pytest.raises(package("session.run").Disturbed, match="mesh was changed"):
+        live.follow(0.5)
+    live.restore()
+
+
+def test_objects_without_uvs_are_refused_by_their_index(package, session):
+    with pytest.raises(package("pipelines.layout").Refusal) as caught:
+        session(plain("A"), scenes.bump(name="B"))
+    assert caught.value.index == 1

@@ -1,0 +1,33 @@
+"""Presets: values and nothing else, and only those that the operator has."""
+
+from __future__ import annotations
+
+import bpy
+
+import pytest
+
+
+def test_ours_are_found_and_apply(package):
+    presets = package("session.presets")
+    found = presets.files("uv.omt_unwrap")
+    assert {"Character", "Lightmap", "Scan"} <= {path.stem for path in found}
+    properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    for path in found:
+        presets.choose(path, properties)
+        for name, value in presets.values(path).items():
+            if name in properties.bl_rna.properties:
+                got = getattr(properties, name)
+                assert got == (pytest.approx(value) if isinstance(value, float) else value), name
+
+
+def test_nothing_in_a_preset_is_run(package, tmp_path):
+    path = tmp_path / "bad.py"
+    path.write_text("import bpy\nop = bpy.context.active_operator\nop.margin = 8\nop.unknown = 1\n")
+    assert package("session.presets").values(path) == {"margin": 8, "unknown": 1}
+    properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
+    package("session.presets").choose(path, properties)
+    assert properties.margin == 8
+    path.write_text(f"op.margin = open({str(tmp_path / 'made')!r}, 'w')\n")
+    with pytest.raises(ValueError, match="malformed"):
+        package("session.presets").values(path)
+    assert not (tmp_path / "made").exists()
