@@ -1,0 +1,77 @@
+"""Arcs partition the boundaries of charts; samples on them are shared, and a whole number of equal edges apart."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.mesh.topology import pair_keys
+from omt_uv.solver.remeshing.initial.arc_network import chart_boundary, find_arcs, sample_arcs
+from omt_uv.solver.remeshing.initial.component_maps import RemeshSource
+
+NONE = np.zeros(0, np.int64)
+
+
+def networks():
+    for name in ("torus", "annulus", "grid"):
+        maps = RemeshSource(*getattr(meshes, name)()).maps[0]
+        component = maps.component
+        size = np.full(len(component.vertices), 0.1)
+        yield maps, find_arcs(component.vertices, maps.charts, component.boundary_edges, NONE, size)
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_every_arc_is_a_side_once_forwards_and_once_backwards_unless_on_the_boundary(case):
+    maps, network = list(networks())[case]
+    sides = [side for of_chart in network.sides for side in of_chart]
+    on_boundary = set(network.along(maps.component.boundary_edges))
+    for k, arc in enumerate(network.arcs):
+        ways = sorted(side.backwards for side in sides if side.arc == k)
+        assert ways == ([False] if k in on_boundary else [False, True])
+        assert arc.kept == (k in on_boundary)
+    edges = np.concatenate([pair_keys(a.vertices[:-1], a.vertices[1:]) for a in network.arcs])
+    assert len(np.unique(edges)) == len(edges)
+    assert sum(len(loop) for loop in network.loops) == sum(len(network.arcs[s.arc].vertices) - 1 for s in sides)
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_samples_lie_on_their_arcs_at_equal_distances(case):
+    maps, network = list(networks())[case]
+    V = maps.component.vertices
+    samples = sample_arcs(V, network.arcs, np.full(len(V), 0.1))
+    for k, arc in enumerate(network.arcs):
+        p = V[arc.vertices]
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
+        edge, share = samples.edge[k], samples.share[k]
+        at = s[edge] + share * (s[edge + 1] - s[edge])
+        np.testing.assert_allclose(np.diff(at), s[-1] / (len(at) - 1), rtol=1e-9)
+        places = p[edge] + share[:, None] * (p[edge + 1] - p[edge])
+        np.testing.assert_allclose(samples.points[samples.along[k]], places, atol=1e-12)
+    used = np.unique(np.concatenate(samples.along))
+    np.testing.assert_array_equal(used, np.arange(len(samples.points)))
+
+
+def test_a_square_has_its_corners():
+    maps, network = list(networks())[2]
+    V = maps.component.vertices
+    ends = np.unique([a.vertices[[0, -1]] for a in network.arcs])
+    assert len(network.arcs) == len(ends) == 4
+    assert (np.abs(V[ends][:, :2]).max(axis=1) == np.abs(V[:, :2]).max()).all()
+    samples = sample_arcs(V, network.arcs, np.full(len(V), 0.26))
+    assert samples.fixed.all() and len(samples.points) == 16
+    assert len(sample_arcs(V, network.arcs, np.full(len(V), 0.26), longer=2).points) == 17
+    assert len(sample_arcs(V, network.arcs, np.full(len(V), 0.26), line_spacing=2.0).points) == 8
+
+
+def test_samples_around_a_chart_come_in_order_of_its_loop():
+    for maps, network in networks():
+        V = maps.component.vertices
+        samples = sample_arcs(V, network.arcs, np.full(len(V), 0.1))
+        for sides, loop, chart in zip(network.sides, network.loops, maps.charts, strict=True):
+            found = chart_boundary(sides, samples, network.arcs)
+            assert (np.diff(found.place) > 0).all() and found.place[0] == 0 and found.place[-1] < len(loop)
+            k = found.place.astype(int)
+            a, b = (V[chart.vertex_ids[loop[i % len(loop)]]] for i in (k, k + 1))
+            on = a + (found.place - k)[:, None] * (b - a)
+            np.testing.assert_allclose(samples.points[found.samples], on, atol=1e-9)

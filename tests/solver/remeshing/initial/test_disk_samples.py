@@ -1,0 +1,62 @@
+"""Samples of a disk stay inside, lie evenly, and their triangles fill the polygon of the boundary's."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+from mesh_checks import topology
+
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.remeshing.initial.arc_network import ChartBoundary
+from omt_uv.solver.remeshing.initial.disk_samples import (
+    even_image,
+    spread_samples,
+    triangulate_chart,
+    triangulate_disk,
+)
+
+
+def circle(count):
+    turn = 2 * np.pi * np.arange(count) / count
+    return np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+@pytest.mark.parametrize("boundary, inner", [(6, 1), (12, 20), (40, 150)])
+def test_triangles_fill_the_polygon(boundary, inner):
+    rim = circle(boundary)
+    points = spread_samples(rim, inner)
+    assert points.shape == (inner, 2) and np.linalg.norm(points, axis=1).max() < 1
+    triangles = triangulate_disk(rim, points)
+    assert topology(triangles) == (1, 1) and len(triangles) == boundary + 2 * inner - 2
+    area = signed_areas(np.concatenate([rim, points]), triangles)
+    assert area.min() > 0 and area.sum() == pytest.approx(boundary / 2 * np.sin(2 * np.pi / boundary))
+
+
+def test_samples_are_even():
+    points = spread_samples(circle(60), 300)
+    gap = np.linalg.norm(points[:, None] - points, axis=2) + 9 * np.eye(300)
+    assert gap.min(axis=1).std() < 0.1 * gap.min(axis=1).mean()
+
+
+def test_samples_beyond_a_chord_come_inside():
+    rim = circle(4)
+    triangles = triangulate_disk(rim, np.array([[0.69, 0.69], [0.1, 0.0]]))
+    assert topology(triangles) == (1, 1) and len(np.unique(triangles)) == 6
+
+
+def test_three_samples_are_a_triangle_and_two_none():
+    np.testing.assert_array_equal(triangulate_disk(circle(3), np.zeros((0, 2))), [[0, 1, 2]])
+    assert triangulate_disk(circle(2), np.zeros((0, 2))) is None
+
+
+def test_a_chart_gets_the_samples_that_it_is_given():
+    V, F = meshes.bumpy(10, 10)
+    loop = boundary_loops(F)[0]
+    boundary = ChartBoundary(np.arange(20), np.arange(20) * len(loop) / 20)
+    image = even_image(V, F, loop, boundary)
+    assert signed_areas(image, F).min() > 0
+    np.testing.assert_allclose(np.linalg.norm(image[loop], axis=1), 1)
+    mesh = triangulate_chart(V, F, loop, (image, image), boundary, 70)
+    assert len(mesh.points) == 70 and topology(mesh.triangles) == (1, 1) and mesh.triangles.max() == 89
