@@ -45,7 +45,7 @@ def test_a_seam_across_makes_two_charts_and_one_that_ends_inside_none():
     assert len(charts) == 2 and sum(len(c.triangles) for c in charts) == len(F)
     assert sum(len(c.vertices) for c in charts) == len(V) + len(middle)
     (slit,) = strict_charts(surface(V, F, seams[:3]))
-    # Of a slit of three edges that starts on the rim, three vertices are cut in two and its inner end is not.
+    # Of a slit of three edges that starts on the boundary, three vertices are cut in two and its inner end is not.
     assert len(slit.vertices) == len(V) + 3
     assert len(boundary_loops(slit.triangles)[0]) == 24 + 6
 
