@@ -20,11 +20,13 @@ ENTRIES = (
 
 
 def exists(operator: str) -> bool:
+    """Whether there is an operator of this name."""
     group, verb = operator.split(".")
     return hasattr(bpy.types, f"{group.upper()}_OT_{verb}")
 
 
 def draw_unwrap(self, _context: bpy.types.Context) -> None:
+    """Append the entries to a menu; the others of these functions do so with one."""
     self.layout.separator()
     for name in filter(exists, ENTRIES):
         self.layout.operator(name)

@@ -23,9 +23,11 @@ def test_the_command_writes_what_the_operator_writes(run, tmp_path, kind):
 def test_what_cannot_be_is_refused_on_one_line(run, tmp_path):
     scenes.bump(height=0.0, name="Flat")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
-    for arguments, words in ((("-o", tmp_path / "w.ply"), "only .blend files keep vertex groups"),
-                             (("-o", tmp_path / "w.blend", "--group", ""), "has no name"),
-                             (("-o", tmp_path / "w.blend", "--kind", "mean"), "Flat: The score is the same"),
-                             (("-o", tmp_path / "w.blend", "--kind", "distance"), "Edit Mode")):  # fmt: skip
+    cases = (
+        (("-o", tmp_path / "w.ply"), "only .blend files keep vertex groups"),
+        (("-o", tmp_path / "w.blend", "--group", ""), "has no name"),
+        (("-o", tmp_path / "w.blend", "--kind", "mean"), "Flat: The score is the same"),
+    )
+    for arguments, words in cases:
         status, out, err = run("weights", tmp_path / "in.blend", *arguments)
         assert status == 1 and out == "" and words in err and len(err.splitlines()) == 1, err
