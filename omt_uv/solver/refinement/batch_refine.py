@@ -152,7 +152,13 @@ def _union(meshes) -> MeshUnion:
     boundary = np.concatenate([np.column_stack([loop, np.roll(loop, -1)]) for loop in loops])
     positions = np.concatenate([v for v, _ in meshes])
     return MeshUnion(
-        positions, triangles, boundary, of_vertex, of_vertex[triangles[:, 0]], of_vertex[boundary[:, 0]], len(meshes)
+        positions=positions,
+        triangles=triangles,
+        boundary=boundary,
+        of_vertex=of_vertex,
+        of_face=of_vertex[triangles[:, 0]],
+        of_boundary=of_vertex[boundary[:, 0]],
+        count=len(meshes),
     )
 
 
@@ -188,7 +194,12 @@ class _ActiveCharts:
         triangles = place[faces.triangles[kept]]
         region = None if faces.region is None else faces.region[kept]
         self.faces = Elements(
-            triangles, faces.area[kept], faces.gradient[kept], faces.ratio[kept], faces.weight[kept], region
+            triangles=triangles,
+            area=faces.area[kept],
+            gradient=faces.gradient[kept],
+            ratio=faces.ratio[kept],
+            weight=faces.weight[kept],
+            region=region,
         )
         self.of_face, self.of_vertex = union.of_face[kept], union.of_vertex[self.vertices]
         self.count = union.count
@@ -200,7 +211,7 @@ class _ActiveCharts:
         """A Newton step of all charts of the group, every one as far as it may go, in place."""
         w, area_weight = whole[self.vertices], continuation.area_weight[self.of_face]
         faces = self._tilted(continuation, continuation.area_weight)
-        problem = NewtonProblem(faces, self.assembly, self.motion, area_weight)
+        problem = NewtonProblem(faces=faces, assembly=self.assembly, motion=self.motion, area_weight=area_weight)
         step, _ = newton_direction(problem, w, continuation.pressure[self.of_face])
         down = (step.conj() * gradient(faces, w, area_weight)).real
         slope = np.bincount(self.of_vertex, down, self.count) / self.share

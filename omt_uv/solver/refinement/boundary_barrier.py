@@ -114,7 +114,15 @@ class BoundaryBarrier:
         reach = np.minimum(self.vertex_reach[i], self.edge_reach[j])
         on = distance < reach
         i, j = i[on], j[on]
-        return _Near(tail[i], tail[j], head[j], share[on], distance[on], reach[on], gap[on] / distance[on])
+        return _Near(
+            point=tail[i],
+            tail=tail[j],
+            head=head[j],
+            share=share[on],
+            distance=distance[on],
+            reach=reach[on],
+            normal=gap[on] / distance[on],
+        )
 
 
 @dataclass(frozen=True)
@@ -150,7 +158,9 @@ def make_barrier(w: np.ndarray, loop: np.ndarray, strength: float) -> BoundaryBa
     edge = np.minimum(edge, edge.mean())
     before = np.empty_like(edge)
     before[np.argsort(tail)] = edge[np.argsort(head)]
-    return BoundaryBarrier(tail, head, REACH * np.minimum(edge, before), REACH * edge, strength)
+    return BoundaryBarrier(
+        tail=tail, head=head, vertex_reach=REACH * np.minimum(edge, before), edge_reach=REACH * edge, strength=strength
+    )
 
 
 def _contact_times(p, dp, e, de):

@@ -256,7 +256,7 @@ def minimise(
     while steps < max(limits.max_steps, 1):
         step, used = problem.step(w, value, pressure), pressure
         if forbidden is not None and forbidden(step.w):
-            return StageResult(w, steps + 1, residual, value, "crossed")
+            return StageResult(w=w, steps=steps + 1, residual=residual, energy=value, status="crossed")
         pressure = float(next_pressure(used, step.share, value - step.energy, step.decrement))
         w, value, steps = step.w, step.energy, steps + 1
         residual = float(promised(step.decrement, value))
@@ -269,4 +269,4 @@ def minimise(
             break
         if verdict.sharpen:
             pressure = 0.0
-    return StageResult(w, steps, residual, value, status)
+    return StageResult(w=w, steps=steps, residual=residual, energy=value, status=status)

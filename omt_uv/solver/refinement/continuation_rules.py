@@ -98,11 +98,17 @@ class Quality:
 
 QUALITIES = {
     # For the start of a finer mesh: little shear alone, or areas about right, too.
-    "relaxed": Quality(0.1, (30.0,), 1e4, 80, 3e-2, 1e-2),
-    "rough": Quality(0.03, (30.0, 500.0), 1e4, 80, 1e-2),
-    "draft": Quality(0.05, (10.0, 100.0), 1e3, 40, 1e-2),
-    "standard": Quality(0.008, (30.0, 500.0), 1e6, 150, 3e-2),
-    "exact": Quality(0.0003, (30.0, 1000.0, 3e4), 1e8, 300, 1e-2),
+    "relaxed": Quality(
+        area_error=0.1, area_weights=(30.0,), greatest_weight=1e4, max_steps=80, tolerance=3e-2, loose_tolerance=1e-2
+    ),
+    "rough": Quality(area_error=0.03, area_weights=(30.0, 500.0), greatest_weight=1e4, max_steps=80, tolerance=1e-2),
+    "draft": Quality(area_error=0.05, area_weights=(10.0, 100.0), greatest_weight=1e3, max_steps=40, tolerance=1e-2),
+    "standard": Quality(
+        area_error=0.008, area_weights=(30.0, 500.0), greatest_weight=1e6, max_steps=150, tolerance=3e-2
+    ),
+    "exact": Quality(
+        area_error=0.0003, area_weights=(30.0, 1000.0, 3e4), greatest_weight=1e8, max_steps=300, tolerance=1e-2
+    ),
 }
 
 

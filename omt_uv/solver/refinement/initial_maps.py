@@ -91,7 +91,9 @@ def notched_disk(start: InitialMap, triangles, loop) -> InitialMap | None:
     radius = float(np.linalg.norm(start.uv[loop], axis=1).mean())
     motion = CircleMotion(loop[~released], radius, len(start.uv))
     warning = f"{released.sum()} boundary vertices leave the circle, where it has no room for their faces"
-    return InitialMap(start.uv, motion, (*start.warnings, warning), True, True)
+    return InitialMap(
+        uv=start.uv, motion=motion, warnings=(*start.warnings, warning), may_cross=True, with_barrier=True
+    )
 
 
 def free_initial_map(vertices, triangles, uv, loop, relaxed: float = RELAXED) -> InitialMap:
@@ -104,17 +106,17 @@ def free_initial_map(vertices, triangles, uv, loop, relaxed: float = RELAXED) ->
     motion = FreeMotion(np.zeros(len(vertices), bool))
     flat = unroll(vertices, triangles, loop)
     if flat is not None:
-        return InitialMap(flat, motion, (), True)
+        return InitialMap(uv=flat, motion=motion, warnings=(), may_cross=True)
     uv = uv * np.sqrt(area / np.abs(signed_areas(uv, triangles)).sum())
     if count_folds(uv, triangles) == 0 and not len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
-        return InitialMap(uv, motion, (), True)
+        return InitialMap(uv=uv, motion=motion, warnings=(), may_cross=True)
     start = disk_initial_map(vertices, triangles, uv - _middle(uv[loop]), loop)
     least = map_energy(start.uv, vertices, triangles)
     if least > relaxed:
         fresh = tutte(vertices, triangles, loop, arc_length_boundary(vertices, loop, np.sqrt(area / np.pi)))
         if map_energy(fresh, vertices, triangles) < least:
-            return InitialMap(fresh, motion, (), True)
-    return InitialMap(start.uv, motion, start.warnings, True)
+            return InitialMap(uv=fresh, motion=motion, warnings=(), may_cross=True)
+    return InitialMap(uv=start.uv, motion=motion, warnings=start.warnings, may_cross=True)
 
 
 def _middle(outline: np.ndarray) -> np.ndarray:
@@ -176,7 +178,7 @@ def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> InitialMap:
     motion = LineMotion(loop[slide], np.where(side[slide] % 2 == 0, 1.0, 1j), loop[corner], len(vertices))
     # Vertices of a side could pass each other where a released one between them leaves the side.
     notched = bool(released.any())
-    return InitialMap(straight, motion, tuple(warnings), notched, notched)
+    return InitialMap(uv=straight, motion=motion, warnings=tuple(warnings), may_cross=notched, with_barrier=notched)
 
 
 def unroll(vertices, triangles, loop) -> np.ndarray | None:

@@ -120,7 +120,9 @@ def move_pins(problem: MapProblem, w: np.ndarray, pins: Pins) -> Steps[tuple[Map
             return fixed, snapped
         problem = rescaled(problem, w)
         terms = (PinEnergy(pins, stiffness, extent), problem.barrier(w))
-        newton = NewtonProblem(problem.faces, problem.assembly, problem.motion, AREA_WEIGHT, terms)
+        newton = NewtonProblem(
+            faces=problem.faces, assembly=problem.assembly, motion=problem.motion, area_weight=AREA_WEIGHT, terms=terms
+        )
         yield Progress("Pins", k / len(STIFFNESS))
         w = (yield from minimise(newton, w, StageLimits(np.inf, MAX_STEPS), k)).w
     far = pins.vertices[np.abs(w[pins.vertices] - pins.places) > NEAR * extent]

@@ -200,7 +200,7 @@ class NewtonProblem:
         if self.smoother is None:
             return step
         smooth = self.smoother.smoothed(self.faces, step.w, float(self.area_weight))
-        return NewtonStep(smooth, self.energy(smooth), step.decrement, step.share)
+        return NewtonStep(w=smooth, energy=self.energy(smooth), decrement=step.decrement, share=step.share)
 
 
 @dataclass(frozen=True)
@@ -271,9 +271,9 @@ def newton_step(problem: NewtonProblem, w: np.ndarray, value: float, pressure: f
         trial = problem.motion.move(w, share * step)
         trial_value = problem.energy(trial)
         if trial_value <= value + ARMIJO * share * slope:
-            return NewtonStep(trial, trial_value, -slope / 2, share)
+            return NewtonStep(w=trial, energy=trial_value, decrement=-slope / 2, share=share)
         share *= 0.5
-    return NewtonStep(w, value, -slope / 2, 0.0)
+    return NewtonStep(w=w, energy=value, decrement=-slope / 2, share=0.0)
 
 
 def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:

@@ -133,7 +133,13 @@ def stars(F: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def take_faces(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Elements:
     """Some faces (s,), with their corners in the order (s,3)."""
     triangles, gradient = (np.take_along_axis(x[star], corner, 1) for x in (faces.triangles, faces.gradient))
-    return Elements(triangles, faces.area[star], gradient, faces.ratio[star], faces.weight[star])
+    return Elements(
+        triangles=triangles,
+        area=faces.area[star],
+        gradient=gradient,
+        ratio=faces.ratio[star],
+        weight=faces.weight[star],
+    )
 
 
 def relax(

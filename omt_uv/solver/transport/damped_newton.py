@@ -99,7 +99,7 @@ def solve_dual(
             cells = dual.confirmed(site_weights, cells)
             residual = largest_error(cells, mass)
             if residual <= tolerance:
-                return DualSolution(site_weights, cells, residual, iteration)
+                return DualSolution(site_weights=site_weights, cells=cells, residual=residual, iterations=iteration)
         direction = dual.direction(cells, mass)
         error = float(np.linalg.norm(cells.area - mass))
         step = min(1.0, dual.growth * step) if iteration else dual.first_step(cells, direction)
@@ -110,7 +110,7 @@ def solve_dual(
                 break
             step /= 2 if step > dual.small_step else 4
             if residual <= dual.good_residual and step <= dual.small_step:
-                return DualSolution(site_weights, cells, residual, iteration)
+                return DualSolution(site_weights=site_weights, cells=cells, residual=residual, iterations=iteration)
         else:
             raise TransportError(f"The transport is stuck at a residual of {residual:.1e}")
         site_weights, cells = trial_weights, trial

@@ -50,7 +50,14 @@ class PowerDiagram:
         """The same cells with site k called order[k], (n,)."""
         place = np.argsort(order)
         area, moment, second = (values[place] for values in (self.area, self.moment, self.second))
-        return PowerDiagram(area, moment, second, order[self.edges], self.length, self.dual.renumbered(order))
+        return PowerDiagram(
+            area=area,
+            moment=moment,
+            second=second,
+            edges=order[self.edges],
+            length=self.length,
+            dual=self.dual.renumbered(order),
+        )
 
 
 def power_diagram(
@@ -82,7 +89,14 @@ def power_diagram(
     ends, begins = np.concatenate([a[entering], b[leaving]]), np.concatenate([b[entering], a[leaving]])
     integrals = _arcs(z, site_weights, domain, np.concatenate([p[entering], q[leaving]]), ends, begins)
     _scatter(integrals, i, j, along)
-    return PowerDiagram(integrals[0] / 2, integrals[1:3].T, integrals[3], np.stack([i, j], axis=1), length, dual)
+    return PowerDiagram(
+        area=integrals[0] / 2,
+        moment=integrals[1:3].T,
+        second=integrals[3],
+        edges=np.stack([i, j], axis=1),
+        length=length,
+        dual=dual,
+    )
 
 
 def _arcs(z, site_weights, domain: Domain, crossing, ends, begins) -> np.ndarray:

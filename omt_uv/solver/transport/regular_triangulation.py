@@ -101,7 +101,7 @@ def by_flips(
     below, _ = _below(z, site_weights, flat, edges, twin[edges])
     stuck = edges[below < 0]
     if settled and len(stuck) == 0:
-        return RegularTriangulation(triangles, twin, start.whole, flips), False
+        return RegularTriangulation(triangles=triangles, twin=twin, whole=start.whole, flips=flips), False
     degree = np.bincount(flat, minlength=len(sites))
     on_hull = np.zeros(len(sites), dtype=bool)
     on_hull[flat[twin < 0]] = True

@@ -77,7 +77,7 @@ def spherical_cells(sites: np.ndarray, site_weights: np.ndarray, hull: Hull) -> 
     # The integral of x along an arc is tan(arc / 2) times the sum of its ends; lengths are in units of exp(h_i).
     integral = np.einsum("md,md->m", (before + after)[once], sites[i]) * apart[once] / along[once]
     conductance = np.maximum(integral, 0) / np.hypot(radial, np.linalg.norm(across, axis=1))
-    return SphericalCells(area, moment, np.stack([i, j], axis=1), conductance, hull)
+    return SphericalCells(area=area, moment=moment, edges=np.stack([i, j], axis=1), conductance=conductance, hull=hull)
 
 
 def by_hull(sites: np.ndarray, site_weights: np.ndarray) -> Hull:
