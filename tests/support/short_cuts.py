@@ -65,14 +65,24 @@ def _dreyfus_wagner(graph, ends):
     return float(best[(1 << k) - 1][ends[k]])
 
 
-def cotree_length(V, F):
-    """Length of the tree-cotree cut with geodesic lengths from vertex 0, or from the boundaries."""
+def gluing_of(V, F):
+    """How the triangles are glued."""
     surface = triangle_surface(V, F)
-    faces, triangles, owner = chosen_triangles(surface, None)
-    gluing = repaired_gluing(surface, faces, triangles, owner).gluing
+    return repaired_gluing(surface, *chosen_triangles(surface, None)).gluing
+
+
+def component_of(V, F):
+    """The whole mesh, which is connected, as a component to be cut; edges cost their lengths."""
+    gluing = gluing_of(V, F)
     factor = np.ones(len(gluing.first))
     everything = np.arange(len(F)), np.arange(len(factor))
     component = make_component(gluing, V, corner_classes(gluing), *everything, np.zeros(len(V)), factor)
     component.cost[:] = component.length
+    return component
+
+
+def cotree_length(V, F):
+    """Length of the tree-cotree cut with geodesic lengths from vertex 0, or from the boundaries."""
+    component = component_of(V, F)
     root = np.array([0] if len(component.boundary) == 0 else [], np.int64)
     return float(component.length[greedy_arcs(component, root)].sum())

@@ -1,0 +1,59 @@
+"""Components that are to be cut: what they are, and what their edges cost."""
+
+import meshes
+import numpy as np
+import pytest
+from short_cuts import component_of, gluing_of
+
+from omt_uv.solver.cutting.component import boundary_vertices, classify, fingerprint, fold_angles
+from omt_uv.solver.mesh.gluing import components, corner_classes
+
+
+def union(*shapes):
+    first = np.cumsum([0, *(len(V) for V, _ in shapes)])
+    return np.concatenate([V for V, _ in shapes]), np.concatenate(
+        [F + k for (_, F), k in zip(shapes, first, strict=False)]
+    )
+
+
+def test_topology_of_a_union_is_that_of_its_members():
+    gluing = gluing_of(*union(meshes.grid(4, 3), meshes.annulus(12, 2), meshes.icosphere(1), meshes.torus(8, 6)))
+    found = classify(gluing, corner_classes(gluing), components(gluing), np.zeros(len(gluing.triangles), bool))
+    assert found.boundaries.tolist() == [1, 2, 0, 0] and found.handles.tolist() == [0, 0, 0, 1]
+    assert found.is_disk.tolist() == [True, False, False, False]
+
+
+@pytest.mark.parametrize("mesh", [meshes.grid, meshes.annulus, meshes.torus, meshes.cube])
+def test_every_edge_is_an_inner_pair_or_a_boundary_halfedge(mesh):
+    V, F = mesh()
+    component = component_of(V, F)
+    assert 2 * len(component.pair) + len(component.boundary) == 3 * len(F)
+    assert len(np.unique(np.concatenate([component.pair.ravel(), component.boundary]))) == 3 * len(F)
+    p = component.positions[component.ends]
+    np.testing.assert_array_equal(component.length, np.linalg.norm(p[:, 0] - p[:, 1], axis=1))
+    np.testing.assert_array_equal(component.positions, V[component.vertex_ids])
+
+
+def test_boundaries_are_told_apart():
+    V, F = meshes.annulus(12, 2)
+    component = component_of(V, F)
+    radii = [np.linalg.norm(component.positions[loop], axis=1) for loop in boundary_vertices(component)]
+    assert sorted(map(len, radii)) == [12, 12] and all(np.ptp(r) < 1e-12 for r in radii)
+    assert component.on_boundary().sum() == 24
+    assert boundary_vertices(component_of(*meshes.torus(8, 6))) == []
+
+
+def test_folds_have_the_angle_between_the_faces_and_the_sign_of_the_side():
+    V, F = meshes.cube()
+    component = component_of(V, F)
+    for triangles, sign in ((component.triangles, 1), (component.triangles[:, ::-1], -1)):
+        pair = component.pair if sign > 0 else 3 * (component.pair // 3) + (1 - component.pair % 3) % 3
+        angle = np.sort(sign * fold_angles(component.positions, triangles, pair))
+        np.testing.assert_allclose(angle, np.repeat([0, np.pi / 2], [6, 12]), atol=1e-12)
+
+
+def test_fingerprints_are_equal_for_moved_copies_alone():
+    V, F = meshes.bumpy(5, 4)
+    own = fingerprint(component_of(V, F))
+    assert own == fingerprint(component_of(V + [0.25, 0.5, -1], F))
+    assert own != fingerprint(component_of(V * [1, 1, 1.1], F)) and own != fingerprint(component_of(V, F[::-1]))

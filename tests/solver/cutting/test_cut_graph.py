@@ -1,0 +1,72 @@
+"""Cuts along edges: what they leave, and that none can be shortened."""
+
+import meshes
+import numpy as np
+import pytest
+from short_cuts import component_of
+
+from omt_uv.solver.cutting.cut_graph import cut_boundary, cut_classes, greedy_arcs, path_to, shorten, stretches
+from omt_uv.solver.mesh.topology import boundary_loops
+
+
+def euler(triangles):
+    """Euler characteristic and number of boundary loops."""
+    edges = np.unique(
+        np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1), axis=0
+    )
+    return len(np.unique(triangles)) - len(edges) + len(triangles), len(boundary_loops(triangles))
+
+
+@pytest.mark.parametrize("mesh", [meshes.torus, meshes.annulus])
+def test_greedy_arcs_leave_a_disk(mesh):
+    component = component_of(*mesh())
+    roots = np.array([] if len(component.boundary) else [0], int)
+    cut = greedy_arcs(component, roots)
+    assert euler(cut_classes(component, cut)) == (1, 1)
+    shorter = shorten(component, cut.copy(), roots)
+    assert euler(cut_classes(component, shorter)) == (1, 1)
+    assert component.cost[shorter].sum() <= component.cost[cut].sum()
+
+
+def test_greedy_arcs_join_the_roots_of_a_sphere():
+    component = component_of(*meshes.icosphere(2))
+    roots = np.array([0, 40, 100])
+    cut = greedy_arcs(component, roots)
+    assert euler(cut_classes(component, cut)) == (1, 1) and np.isin(roots, component.ends[cut]).all()
+
+
+def test_a_cut_opens_two_halfedges_for_every_edge():
+    component = component_of(*meshes.annulus())
+    cut = greedy_arcs(component, np.array([], int))
+    assert len(cut_boundary(component, cut)) == len(component.boundary) + 2 * cut.sum()
+    np.testing.assert_array_equal(np.sort(cut_boundary(component, np.zeros_like(cut))), np.sort(component.boundary))
+
+
+def test_nothing_cut_leaves_the_vertices_as_they_are():
+    component = component_of(*meshes.torus())
+    classes = cut_classes(component, np.zeros(len(component.pair), bool))
+    assert classes.max() + 1 == component.vertex_count
+    assert (
+        len(np.unique(np.column_stack([classes.ravel(), component.triangles.ravel()]), axis=0))
+        == component.vertex_count
+    )
+
+
+def test_stretches_part_a_cut():
+    component = component_of(*meshes.torus())
+    cut = greedy_arcs(component, np.array([0]))
+    parts = stretches(component, cut, np.array([0]))
+    np.testing.assert_array_equal(np.sort(np.concatenate(parts)), np.flatnonzero(cut))
+    costs = [component.cost[p].sum() for p in parts]
+    assert costs == sorted(costs, reverse=True)
+
+
+def test_a_path_in_a_grid_is_as_long_as_its_steps():
+    component = component_of(*meshes.grid(6, 6, 6.0, 6.0))
+    corner, far = (int(np.argmin(np.abs(component.positions - p).sum(1))) for p in ([0, 0, 0], [6, 0, 0]))
+    path = path_to(component, np.array([corner]), far)
+    # The outline is no inner edge: one row inside it there are 4 sides, and a diagonal to it at each end, or a side.
+    assert np.isin([corner, far], component.ends[path]).all()
+    degree = np.bincount(component.ends[path].ravel())
+    assert (degree == 1).sum() == 2 and degree.max() == 2
+    assert 6 <= component.length[path].sum() <= 4 + 2 * np.sqrt(2) + 1e-12

@@ -1,0 +1,34 @@
+"""Nets of bodies with flat sides."""
+
+import meshes
+import numpy as np
+import pytest
+from short_cuts import component_of
+
+from omt_uv.solver.cutting.cut_graph import cut_classes
+from omt_uv.solver.cutting.developable_nets import is_long, net
+from omt_uv.solver.mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
+
+
+def test_a_cube_has_a_net_of_seven_edges():
+    component = component_of(*meshes.cube())
+    cut, tips = net(component)
+    assert cut.sum() == 7 and component.length[cut].sum() == pytest.approx(7) and len(tips) == 8
+    assert not is_long(component, cut) and is_long(component, np.ones(len(component.pair), bool))
+
+
+def test_a_net_leaves_no_curvature_inside():
+    V, F = meshes.cube()
+    component = component_of(*meshes.subdivide(V * [1, 2, 3], F))
+    cut, _ = net(component)
+    classes = cut_classes(component, cut)
+    inner = np.isin(np.arange(component.vertex_count), component.ends[cut], invert=True)
+    lengths = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
+    defects = angle_defects(component.triangles, angles_from_lengths(lengths), np.zeros(0, int), component.vertex_count)
+    np.testing.assert_allclose(defects[inner], 0, atol=1e-12)
+    assert classes.max() + 1 == component.vertex_count + cut.sum() - 1
+
+
+@pytest.mark.parametrize("mesh", [meshes.icosphere, meshes.torus, meshes.head])
+def test_smooth_bodies_have_none(mesh):
+    assert net(component_of(*mesh())) is None

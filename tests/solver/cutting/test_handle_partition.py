@@ -1,0 +1,70 @@
+"""Bodies of many handles taken apart."""
+
+import meshes
+import numpy as np
+from short_cuts import gluing_of
+
+from omt_uv.solver.cutting.component import classify
+from omt_uv.solver.cutting.geodesic_clusters import FEW, cluster_borders
+from omt_uv.solver.cutting.handle_partition import MANY_HANDLES, partition_pairs
+from omt_uv.solver.mesh.gluing import components, corner_classes
+
+
+def voxel_surface(solid):
+    """The boundary of voxels (a,b,c) bool: no two of them meet at an edge or a corner alone."""
+    V, F = meshes.cube()
+    side = {(-1, 0, 0): 0, (1, 0, 0): 1, (0, -1, 0): 2, (0, 1, 0): 3, (0, 0, -1): 4, (0, 0, 1): 5}
+    padded = np.pad(solid, 1)
+    corners, faces = [], []
+    for direction, k in side.items():
+        open_ = solid & ~np.roll(padded, [-x for x in direction], (0, 1, 2))[1:-1, 1:-1, 1:-1]
+        for cell in np.argwhere(open_):
+            for row in (k, k + 6):
+                faces.append(len(corners) + np.arange(3))
+                corners.extend(np.round(V[F[row]] + cell))
+    points, index = np.unique(np.array(corners), axis=0, return_inverse=True)
+    return points, index.ravel()[np.array(faces)]
+
+
+def frame(n):
+    """A flat frame of n by n square holes: n^2 handles."""
+    solid = np.ones((2 * n + 1, 2 * n + 1, 1), bool)
+    solid[1::2, 1::2] = False
+    return voxel_surface(solid)
+
+
+def handles(gluing):
+    one_sided = np.zeros(len(gluing.triangles), bool)
+    return classify(gluing, corner_classes(gluing), components(gluing), one_sided).handles
+
+
+def test_few_handles_are_left_alone():
+    V, F = frame(3)
+    gluing = gluing_of(V, F)
+    assert handles(gluing).tolist() == [9] and MANY_HANDLES > 9
+    assert not partition_pairs(gluing, V, np.zeros(len(F), bool)).any()
+
+
+def test_a_plate_of_many_holes_comes_apart_into_few_handles():
+    V, F = frame(4)
+    gluing = gluing_of(V, F)
+    assert handles(gluing).tolist() == [16]
+    gone = partition_pairs(gluing, V, np.zeros(len(F), bool))
+    # Both sides of the plate, its outer wall with one of them, and the walls of the holes.
+    assert gone.any() and handles(gluing.without(gone)).max() <= MANY_HANDLES
+
+
+def test_clusters_have_few_handles_and_nothing_else_is_touched():
+    V, F = frame(4)
+    W, G = meshes.torus(12, 8)
+    both, faces = np.concatenate([V, W + [50, 0, 0]]), np.concatenate([F, G + len(V)])
+    gluing = gluing_of(both, faces)
+    crowded = np.arange(len(faces)) < len(F)
+    gone = cluster_borders(gluing, both, np.zeros(len(faces), bool), crowded)
+    assert gone.any() and crowded[gluing.first[gone] // 3].all()
+    left = gluing.without(gone)
+    inside = np.unique(components(left)[crowded])
+    assert len(inside) > 1 and handles(left)[inside].max() <= FEW
+    # Where borders are cut they part clusters: each pair has two different ones beside it.
+    component = components(left)
+    assert (component[gluing.first[gone] // 3] != component[gluing.second[gone] // 3]).all()

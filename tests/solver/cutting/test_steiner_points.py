@@ -1,0 +1,33 @@
+"""Points at which the branches of a tree meet."""
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.cutting.steiner_points import meeting_points
+
+
+def distances(points, ends):
+    return np.linalg.norm(points[ends][:, None] - points, axis=2)
+
+
+def test_three_ends_meet_in_the_middle():
+    angle = 2 * np.pi * np.arange(3) / 3
+    points = np.concatenate([np.column_stack([np.cos(angle), np.sin(angle)]), [[0, 0], [0.2, 0.1], [3, 3]]])
+    distance = distances(points, [0, 1, 2])
+    assert meeting_points(distance, distance[:, :3]).tolist() == [3]
+
+
+def test_ends_on_a_line_need_no_point():
+    points = np.column_stack([np.arange(5.0), np.zeros(5)])
+    distance = distances(points, [0, 2, 4])
+    assert len(meeting_points(distance, distance[:, [0, 2, 4]])) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_tree_through_the_point_is_shorter_in_any_order_of_the_ends(seed):
+    points = np.random.default_rng(seed).random((500, 2))
+    distance = distances(points, [0, 1, 2])
+    found = [meeting_points(distance[order], distance[order][:, order]) for order in ([0, 1, 2], [2, 0, 1])]
+    np.testing.assert_array_equal(*found)
+    direct = distance[:, :3].sum() / 2 - distance[:, :3].max()
+    assert all(distance[:, point].sum() < direct for point in found[0])

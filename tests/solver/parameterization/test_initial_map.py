@@ -1,0 +1,76 @@
+"""The map from which the refinement of a chart starts."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.conformal.disk_map import sharpest_corners
+from omt_uv.solver.maps.untangle import count_folds
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.initial_map import (
+    DiskMesh,
+    centroid_map,
+    coarse_initial_map,
+    initial_map,
+    mean_value_sites,
+)
+from omt_uv.solver.progress import RunLog, drain
+from omt_uv.solver.transport.convex_domain import Disk, Rectangle
+from omt_uv.solver.transport.semidiscrete import transport
+
+
+def disk_of(V, F, boundary="free"):
+    loop = boundary_loops(F)[0]
+    corners = sharpest_corners(V, F, loop) if boundary == "square" else None
+    return DiskMesh(V, F, face_areas(V, F), loop, boundary, corners)
+
+
+@pytest.mark.parametrize("domain", [Disk(), Rectangle()])
+def test_mean_value_sites_are_an_embedding_with_its_boundary_on_the_domain(domain):
+    V, F = meshes.head(14)
+    loop = boundary_loops(F)[0]
+    corners = None if isinstance(domain, Disk) else sharpest_corners(V, F, loop)
+    sites = mean_value_sites(V, F, loop, corners, domain)
+    assert (signed_areas(sites, F) > 0).all()
+    on = sites[loop]
+    far = np.linalg.norm(on, axis=1) if corners is None else 2 * np.abs(on).max(axis=1)
+    np.testing.assert_allclose(far, 1, atol=1e-12)
+    if corners is not None:
+        np.testing.assert_allclose(np.abs(sites[corners]), 0.5, atol=1e-12)
+
+
+@pytest.mark.parametrize("boundary", ["free", "disk", "square"])
+def test_an_initial_map_keeps_the_boundary_in_order(boundary):
+    disk = disk_of(*meshes.bumpy(10, 10), boundary)
+    log = RunLog()
+    found = drain(initial_map(disk, log))
+    assert found.conformal is not None and found.cells is not None and not found.warm
+    assert {"conformal", "transport"} <= log.seconds.keys()
+    s = disk.domain.boundary_parameter(found.uv[disk.loop])
+    step = np.mod(np.roll(s, -1) - s, disk.domain.period)
+    assert (step > 0).all() and step.sum() == pytest.approx(disk.domain.period)
+
+
+def test_centroids_of_the_cells_have_the_mass_of_the_disk():
+    V, F = meshes.bumpy(8, 8)
+    disk = disk_of(V, F)
+    sites = mean_value_sites(V, F, disk.loop, None, Disk())
+    mass = np.bincount(F.ravel(), np.repeat(disk.target / 3, 3))
+    cells = drain(transport(sites, mass, Disk()))
+    uv = centroid_map(cells, Disk(), disk.loop, None, [])
+    inner = np.setdiff1d(np.arange(len(V)), disk.loop)
+    np.testing.assert_array_equal(uv[inner], cells.cells.centroid[inner])
+    np.testing.assert_allclose(np.linalg.norm(uv[disk.loop], axis=1), 1, atol=1e-12)
+
+
+def test_a_coarse_mesh_leads_to_a_map_without_folds():
+    disk = disk_of(*meshes.bumpy(24, 24))
+    found = drain(coarse_initial_map(disk, 0.0, log := RunLog()))
+    assert found.uv.shape == (len(disk.vertices), 2) and count_folds(found.uv, disk.triangles) == 0
+    assert signed_areas(found.uv, disk.triangles).sum() == pytest.approx(disk.target.sum(), rel=0.02)
+    assert {"coarsening", "coarse refinement"} <= log.seconds.keys()
+
+
+def test_a_mesh_of_boundary_vertices_is_not_coarsened():
+    assert drain(coarse_initial_map(disk_of(*meshes.spiral_strip(1.0, 20), "disk"), 0.0, RunLog())) is None
