@@ -121,7 +121,7 @@ def test_an_annulus_is_cut_along_a_shortest_path():
 
 
 def test_cuts_follow_edges_that_are_marked_sharp():
-    """A line of sharp edges from rim to rim of a flat ring, at any place, takes the cut; but not at any price."""
+    """A line of sharp edges from one boundary of a flat ring to the other, at any place, takes the cut; but not at any price."""
     V, F = meshes.annulus(sectors=24, rings=3)
     for sector in (3, 10, 20):
         line = sector + 24 * np.arange(4)
@@ -249,8 +249,8 @@ def test_holes_are_filled_and_the_longest_boundary_stays():
     (chart,) = cut_to_disks(triangle_surface(V, F), fill_holes=True).charts
     assert len(chart.patches) == 24 and len(chart.triangles) == len(F)
     assert (chart.vertex_ids == -1).sum() == 1 and np.allclose(chart.vertices[chart.vertex_ids == -1], 0)
-    rim = np.linalg.norm(chart.vertices[_loop(chart.disk)], axis=1)
-    assert np.allclose(rim, rim.max())
+    radius = np.linalg.norm(chart.vertices[_loop(chart.disk)], axis=1)
+    assert np.allclose(radius, radius.max())
     (strict,) = cut_to_disks(triangle_surface(V, F), seams="existing", fill_holes=True).charts
     np.testing.assert_array_equal(strict.disk, chart.disk)
 

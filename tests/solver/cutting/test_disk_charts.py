@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
-from omt_uv.solver.cutting.shear_slit import slit
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -36,13 +35,3 @@ def test_a_filled_hole_leaves_the_faces_and_adds_a_fan():
     np.testing.assert_allclose(
         chart.vertices[chart.vertex_ids == -1], [V[np.linalg.norm(V, axis=1) < 1.4].mean(0)], atol=1e-12
     )
-
-
-def test_a_slit_runs_from_the_boundary_inwards():
-    surface = triangle_surface(*meshes.hemisphere())
-    (chart,) = cut_to_disks(surface).charts
-    top = chart.vertices[chart.triangles].mean(1)[:, 2]
-    path = slit(surface, chart, 1 + top)
-    vertices, degree = np.unique(path, return_counts=True)
-    loop = chart.vertex_ids[boundary_loops(chart.triangles)[0]]
-    assert (degree == 1).sum() == 2 and np.isin(vertices, loop).sum() == 1

@@ -1,13 +1,15 @@
-"""Bodies full of holes: sheets, tubes and boxes that are sieves, frames, plates with holes right through them."""
+"""Bodies full of holes: surfaces, tubes and boxes that are sieves, frames, plates with holes right through them."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from short_cuts import gluing_of
 
 from omt_uv.pipelines.unwrap import _connected_triangles
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.cutting.hole_filling import NO_POLYGON, fill_holes, hole_boundaries
 from omt_uv.solver.errors import NotADiskError
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -69,8 +71,8 @@ def plate(n, thick=0.3):
     p, F = punched(n, n, lattice(3, 1))
     k = len(p)
     V = np.concatenate([np.column_stack([10 * p, np.full(k, thick)]), np.column_stack([10 * p, np.zeros(k)])])
-    rim = np.concatenate([np.column_stack([loop, np.roll(loop, -1)]) for loop in boundary_loops(F)])
-    a, b = rim.T
+    boundary = np.concatenate([np.column_stack([loop, np.roll(loop, -1)]) for loop in boundary_loops(F)])
+    a, b = boundary.T
     walls = np.concatenate([np.stack([b, a, a + k], 1), np.stack([b, a + k, b + k], 1)])
     return V, np.concatenate([F, F[:, ::-1] + k, walls])
 
@@ -118,7 +120,7 @@ def test_a_sheet_full_of_holes_is_mapped_whole():
     assert cut(triangle_surface(V, F)).length == 0
 
 
-def test_the_rims_of_a_tube_full_of_holes_stay_open():
+def test_the_outer_boundaries_of_a_tube_full_of_holes_stay_open():
     V, F = tube(32, 24, lattice(4, 2))
     result = check(V, F, 1.02)
     cuts = cut(triangle_surface(V, F))
@@ -155,7 +157,7 @@ def test_a_plate_with_many_holes_through_it_comes_apart_along_its_edges():
     assert len(np.unique(np.sort(result.seams, axis=1), axis=0)) == len(result.seams)
 
 
-def test_a_lattice_without_sides_falls_into_fragments():
+def test_a_lattice_without_sides_falls_into_clusters():
     """28 handles: cut open into one chart, it is sheared twice as much."""
     V, F = lattice_body(3)
     assert len(V) - len(F) // 2 == 2 - 2 * 28
@@ -215,3 +217,41 @@ def test_sieves_are_the_same_in_every_unit_and_place(change):
     result, other = (drain(unwrap(triangle_surface(x, F))) for x in (V, change(V)))
     np.testing.assert_array_equal(result.seams, other.seams)
     np.testing.assert_array_equal(result.charts[0].disk, other.charts[0].disk)
+
+
+# ---- the fans -----------------------------------------------------------------------------------------------
+
+
+def test_all_but_the_longest_boundary_are_filled_with_a_fan_each():
+    V, F = wavy_sheet(9, lattice(4, 2))
+    surface, gluing = triangle_surface(V, F), gluing_of(V, F)
+    one_sided = np.zeros(len(F), bool)
+    around, hole = hole_boundaries(V, gluing, one_sided)
+    found = fill_holes(surface, gluing, one_sided)
+    assert found.holes == hole.max() + 1 == len(boundary_loops(F)) - 1
+    fans = found.gluing.owner == NO_POLYGON
+    assert fans.sum() == len(around) and len(found.surface.positions) == len(V) + found.holes
+    # What was there stays, and one boundary is left.
+    np.testing.assert_array_equal(found.gluing.triangles[~fans], gluing.triangles)
+    np.testing.assert_array_equal(found.surface.positions[: len(V)], V)
+    filled = found.gluing.vertex[found.gluing.triangles]
+    assert sorted(map(len, boundary_loops(filled))) == [max(map(len, boundary_loops(F)))]
+
+
+def test_a_hole_is_filled_around_its_middle():
+    V, F = wavy_sheet(6, lattice(5, 3))
+    V[:, 2] = 0
+    found = fill_holes(triangle_surface(V, F), gluing_of(V, F), np.zeros(len(F), bool))
+    for k in range(found.holes):
+        loop = boundary_loops(F)
+        middles = [V[x].mean(0) for x in loop]
+        assert min(np.abs(m - found.surface.positions[len(V) + k]).max() for m in middles) < 1e-12
+    total = face_areas(found.surface.positions, found.gluing.vertex[found.gluing.triangles]).sum()
+    assert total == pytest.approx(np.prod(np.ptp(V[:, :2], axis=0)))
+
+
+def test_one_sided_surfaces_and_few_holes_are_left_alone():
+    V, F = wavy_sheet(9, lattice(4, 2))
+    surface, gluing = triangle_surface(V, F), gluing_of(V, F)
+    assert fill_holes(surface, gluing, np.ones(len(F), bool)).holes == 0
+    assert fill_holes(surface, gluing, np.zeros(len(F), bool), sieve=32).gluing is gluing

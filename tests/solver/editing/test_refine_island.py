@@ -9,7 +9,7 @@ from omt_uv.pipelines.refine import refine_islands
 from omt_uv.settings import RefineSettings
 from omt_uv.solver.editing.refine_island import STRAIGHTENED, refine_island
 from omt_uv.solver.editing.uv_islands import uv_islands
-from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, PinError
+from omt_uv.solver.errors import FoldedUVError, PinError
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary
@@ -111,14 +111,14 @@ def test_folds_are_undone_and_said(make, noise):
 def test_a_hole_is_kept_apart_from_the_outline():
     """A ring with a thin wall: pulled into a crossing, the barrier of one loop alone would let it through."""
     V, F, uv = ring(24, 3)
-    rim = boundary_edges(F)
-    assert len(rim) == 48
+    boundary = boundary_edges(F)
+    assert len(boundary) == 48
     w = uv @ [1, 1j]
-    assert not len(crossings(w, rim))
+    assert not len(crossings(w, boundary))
     inner = np.abs(w) < 1.3
     step = np.where(inner, 1.5, 0) + 0j
-    assert len(crossings(w + step, rim)) > 0
-    assert make_barrier(w, rim, 1.0).limit(w, step) < 1
+    assert len(crossings(w + step, boundary)) > 0
+    assert make_barrier(w, boundary, 1.0).limit(w, step) < 1
 
 
 def test_contact_of_edges_equals_contact_of_a_loop():
@@ -169,9 +169,9 @@ def test_pins_stay_to_the_bit():
 @pytest.mark.parametrize("make", [head, ring])
 def test_the_outline_can_be_kept(make):
     V, F, uv = make()
-    rim = np.unique(boundary_edges(F))
-    result = run(V, F, uv, pins=(rim, uv[rim]))
-    assert (result.uv[rim] == uv[rim]).all()
+    boundary = np.unique(boundary_edges(F))
+    result = run(V, F, uv, pins=(boundary, uv[boundary]))
+    assert (result.uv[boundary] == uv[boundary]).all()
     assert figures(V, F, result.uv).area_l1 < 0.3 * figures(V, F, uv).area_l1
     assert figures(V, F, result.uv).folds == 0
 
@@ -230,36 +230,6 @@ def torn():
     right = V[F].mean(1)[:, 0] > 0.5
     corners[np.repeat(right, 3)] += [2, 0]
     return triangle_surface(V, F), corners, right
-
-
-def test_islands_follow_the_uvs_and_not_the_seams():
-    surface, uv, right = torn()
-    islands = uv_islands(surface, uv).islands
-    assert sorted(len(i.chart.faces) for i in islands) == [right.sum(), right.sum()]
-    for island in islands:
-        assert (surface.corner_vertex[island.chart.corners] == island.chart.vertex_ids[island.chart.triangles]).all()
-        assert (island.uv[island.chart.triangles] == uv[island.chart.corners]).all()
-    seamed = triangle_surface(surface.positions, surface.corner_vertex.reshape(-1, 3), [[0, 13], [13, 14], [14, 1]])
-    assert (
-        len(uv_islands(seamed, corner_uv(surface.corner_vertex.reshape(-1, 3), surface.positions[:, :2])).islands) == 1
-    )
-
-
-def test_one_face_selects_its_whole_island():
-    surface, uv, right = torn()
-    faces = np.zeros(len(right), bool)
-    faces[np.flatnonzero(right)[5]] = True
-    (island,) = uv_islands(surface, uv, faces).islands
-    assert (np.sort(island.chart.faces) == np.flatnonzero(right)).all()
-
-
-def test_three_faces_of_an_island_at_an_edge_are_named():
-    V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 0.5, 1]])
-    F = np.array([[0, 1, 2], [2, 1, 3], [2, 1, 4]])
-    uv = corner_uv(F, np.array([[0, 0], [1, 0], [0, 1], [1, 1], [0.9, 0.9]]))
-    with pytest.raises(NonManifoldEdgeError) as info:
-        uv_islands(triangle_surface(V, F), uv)
-    assert sorted(info.value.elements.ravel()) == [1, 2]
 
 
 def refined(surface, uv, faces=None, pinned=None, **options):

@@ -54,7 +54,10 @@ def test_flat_charts_are_unrolled_exactly():
     chart = chart_of(turned, F)
     found = drain(map_chart(chart))
     assert found.newton_conformal is None and found.newton_transport is None
-    sides = [np.linalg.norm(p[chart.triangles] - p[np.roll(chart.triangles, 1, 1)], axis=2) for p in (chart.vertices, found.uv)]
+    sides = [
+        np.linalg.norm(p[chart.triangles] - p[np.roll(chart.triangles, 1, 1)], axis=2)
+        for p in (chart.vertices, found.uv)
+    ]
     np.testing.assert_allclose(*sides, rtol=1e-6)
 
 

@@ -10,8 +10,7 @@ import pytest
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.convexity import keep_convex
-from omt_uv.solver.parameterization.corner_solver import affordable
-from omt_uv.solver.parameterization.polygon_corners import CornerBarrier, PolygonCorners, convex_corners
+from omt_uv.solver.parameterization.polygon_corners import convex_corners
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
@@ -32,28 +31,6 @@ def corner_areas(surface, result, straight=False):
     everywhere = np.full((len(surface.corner_vertex), 2), np.nan)
     everywhere[corners] = uv
     return signed_areas(everywhere, corner) / (1 if straight else share)
-
-
-def test_only_corners_of_convex_polygons_count_and_no_straight_ones():
-    V = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 2, 0], [0.5, 0.5, 0], [3, 0, 0], [3, 2, 0]], float)
-    polygons = [[0, 1, 2, 4, 3], [0, 1, 5, 3], [1, 6, 7], [1, 6, 7, 2]]
-    surface = meshes.polygon_surface(1e5 + 1e-3 * V, polygons)
-    corner, polygon, share = convex_corners(surface)
-    assert sorted(surface.corner_vertex[corner[polygon == 0, 0]]) == [0, 1, 2, 3]
-    assert set(polygon) == {0, 3}
-    np.testing.assert_allclose(share[polygon == 3], 0.5, rtol=1e-6)
-
-
-def test_the_barrier_is_the_integral_of_its_gradient():
-    rng = np.random.default_rng(0)
-    w = rng.normal(size=6) + 1j * rng.normal(size=6)
-    corners = PolygonCorners(np.array([[0, 1, 2], [2, 3, 4], [5, 1, 0]]), np.ones(3), np.ones(3), np.zeros(3))
-    barrier = CornerBarrier(corners, np.full(3, 9.0), np.array([1.0, 2, 3]))
-    direction = rng.normal(size=6) + 1j * rng.normal(size=6)
-    difference = (barrier.energy(w + 1e-6 * direction) - barrier.energy(w - 1e-6 * direction)) / 2e-6
-    slope, vertices, rows = barrier.derivatives(w)
-    assert difference == pytest.approx((slope.conj() @ direction).real, rel=1e-6)
-    assert vertices.shape == rows.shape == (3, 3)
 
 
 def darts():
@@ -77,19 +54,6 @@ def test_darts_open_and_what_is_fixed_stays():
         area = signed_areas(found, chart.triangles)
         assert (signed_areas(found, vertex[corner]) > 0).all() and (area > 0).all()
         np.testing.assert_array_equal(found[fixed], uv[fixed])
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_cheapest_patches_that_a_chart_can_spare(seed):
-    rng = np.random.default_rng(seed)
-    gain, cost, chart = rng.integers(-2, 5, 40), rng.normal(size=40), rng.integers(0, 3, 40)
-    spare = np.array([0.0, 1.5, np.inf])
-    good = affordable(gain, cost, chart, spare)
-    paid = np.maximum(cost, 0)
-    assert (np.bincount(chart[good], paid[good], 3) <= spare).all()
-    assert not good[gain <= 0].any() and good[(gain > 0) & (cost <= 0)].all() and good[(gain > 0) & (chart == 2)].all()
-    mine, left = (good & (chart == 1) & (cost > 0)), (~good & (chart == 1) & (gain > 0))
-    assert (paid / np.maximum(gain, 1))[mine].max() <= (paid / np.maximum(gain, 1))[left].min()
 
 
 def test_maps_without_darts_are_left_alone():

@@ -1,0 +1,68 @@
+"""Maps whose polygons become convex keep their place, their size and what is pinned."""
+
+from dataclasses import replace
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.chart_pins import ChartPins
+from omt_uv.solver.parameterization.convex_maps import with_convex_polygons
+from omt_uv.solver.parameterization.options import MapOptions
+from omt_uv.solver.parameterization.polygon_corners import convex_corners
+from omt_uv.solver.progress import drain
+
+
+def darts():
+    """A flat square of quads, and a map of it with darts that says its areas are good enough to lose some."""
+    V, _ = meshes.grid(6, 6)
+    a = (7 * np.arange(6)[:, None] + np.arange(6)).ravel()
+    surface = meshes.polygon_surface(V, np.column_stack([a, a + 1, a + 8, a + 7]).tolist())
+    (chart,) = strict_charts(surface)
+    uv = chart.vertices[:, :2].copy()
+    uv[np.isin(chart.vertex_ids, [24])] += 0.1
+    found = drain(map_chart(chart))
+    return surface, chart, replace(found, uv=uv, area_l1=0.1, area_weight=500.0)
+
+
+def reflex(surface, chart, uv):
+    corner, _, _ = convex_corners(surface)
+    vertex = np.empty(len(surface.corner_vertex), int)
+    vertex[chart.corners] = chart.triangles
+    return (signed_areas(uv, vertex[corner]) <= 0).sum()
+
+
+@pytest.mark.parametrize("turn", [1.0, 1j, -1.0])
+def test_place_direction_and_area_stay(turn):
+    surface, chart, chart_map = darts()
+    w = 3 * turn * (chart_map.uv @ [1, 1j]) + (5 - 2j)
+    chart_map = replace(chart_map, uv=np.column_stack([w.real, w.imag]))
+    (found,) = with_convex_polygons(surface, [chart], [chart_map], [None], MapOptions())
+    assert reflex(surface, chart, chart_map.uv) and not reflex(surface, chart, found.uv)
+    np.testing.assert_allclose(found.uv.mean(0), chart_map.uv.mean(0))
+    area, before = signed_areas(found.uv, chart.triangles), signed_areas(chart_map.uv, chart.triangles)
+    assert area.sum() == pytest.approx(before.sum(), rel=1e-9) and (area > 0).all()
+    centred = (x @ [1, 1j] - (x @ [1, 1j]).mean() for x in (found.uv, chart_map.uv))
+    assert np.angle(np.vdot(*centred)) == pytest.approx(0, abs=1e-12)
+
+
+def test_pins_and_the_boundary_of_a_disk_stay_to_the_bit():
+    surface, chart, chart_map = darts()
+    at = np.flatnonzero(np.isin(chart.vertex_ids, [0, 6, 48]))
+    pins = ChartPins(at, chart_map.uv[at], chart_map.uv[chart.triangles])
+    (found,) = with_convex_polygons(surface, [chart], [chart_map], [pins], MapOptions())
+    assert not np.array_equal(found.uv, chart_map.uv)
+    np.testing.assert_array_equal(found.uv[at], chart_map.uv[at])
+    (found,) = with_convex_polygons(surface, [chart], [chart_map], [None], MapOptions("disk"))
+    edge = np.flatnonzero(np.isin(chart.vertices[:, :2], [0, 1]).any(1))
+    np.testing.assert_array_equal(found.uv[edge], chart_map.uv[edge])
+
+
+def test_triangles_are_left_alone():
+    surface = meshes.polygon_surface(*meshes.grid(3, 3))
+    (chart,) = strict_charts(surface)
+    maps = [drain(map_chart(chart))]
+    assert with_convex_polygons(surface, [chart], maps, [None], MapOptions()) is maps

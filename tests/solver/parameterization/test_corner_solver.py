@@ -1,0 +1,55 @@
+"""Patches whose corners become convex, each for itself."""
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.parameterization.corner_solver import CornerMesh, CornerPatches, affordable
+from omt_uv.solver.parameterization.polygon_corners import PolygonCorners
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_cheapest_patches_that_a_chart_can_spare(seed):
+    rng = np.random.default_rng(seed)
+    gain, cost, chart = rng.integers(-2, 5, 40), rng.normal(size=40), rng.integers(0, 3, 40)
+    spare = np.array([0.0, 1.5, np.inf])
+    good = affordable(gain, cost, chart, spare)
+    paid = np.maximum(cost, 0)
+    assert (np.bincount(chart[good], paid[good], 3) <= spare).all()
+    assert not good[gain <= 0].any() and good[(gain > 0) & (cost <= 0)].all() and good[(gain > 0) & (chart == 2)].all()
+    mine, left = (good & (chart == 1) & (cost > 0)), (~good & (chart == 1) & (gain > 0))
+    assert (paid / np.maximum(gain, 1))[mine].max() <= (paid / np.maximum(gain, 1))[left].min()
+
+
+def two_darts(spare):
+    """Two quads, each of which is a dart in the map, in charts of their own: the patches, and the map."""
+    quad = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    dart = np.array([0, 1, 0.3 + 0.3j, 1j])
+    triangles, ears = np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 1, 3], [1, 2, 0], [2, 3, 1], [3, 0, 2]])
+    both = np.concatenate([quad, quad + [3, 0]])
+    mesh = CornerMesh(
+        positions=np.column_stack([both, np.zeros(8)]),
+        triangles=np.concatenate([triangles, triangles + 4]),
+        target=np.full(4, 0.5),
+        area_weight=np.full(4, 10.0),
+        chart=np.repeat([0, 1], 2),
+        spare=np.asarray(spare, float),
+    )
+    corners = PolygonCorners(
+        triangles=np.concatenate([ears, ears + 4]), target=np.full(8, 0.5), whole=np.ones(8), least=np.full(8, 0.01)
+    )
+    return CornerPatches(mesh, corners, np.ones(8, bool)), corners, np.concatenate([dart, dart + 3])
+
+
+def test_darts_become_convex_each_as_if_it_were_alone():
+    patches, corners, w = two_darts([np.inf, np.inf])
+    assert patches.count == 2 and corners.reflex(w).sum() == 2
+    found = patches.convexified(w)
+    assert not corners.reflex(found).any()
+    np.testing.assert_allclose(found[4:] - found[4], found[:4] - found[0], atol=1e-9)
+
+
+def test_charts_that_can_spare_no_area_stay_to_the_bit():
+    patches, corners, w = two_darts([-np.inf, np.inf])
+    found = patches.convexified(w)
+    np.testing.assert_array_equal(found[:4], w[:4])
+    assert not corners.reflex(found)[4:].any()
