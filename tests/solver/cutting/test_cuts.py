@@ -121,7 +121,7 @@ def test_an_annulus_is_cut_along_a_shortest_path():
 
 
 def test_cuts_follow_edges_that_are_marked_sharp():
-    """A line of sharp edges from one boundary of a flat ring to the other, at any place, takes the cut; but not at any price."""
+    """A line of sharp edges across a flat ring, at any place, takes the cut; but not at any price."""
     V, F = meshes.annulus(sectors=24, rings=3)
     for sector in (3, 10, 20):
         line = sector + 24 * np.arange(4)
