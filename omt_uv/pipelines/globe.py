@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..settings import GlobeSettings
 from ..solver.errors import MeshError
@@ -19,6 +17,7 @@ from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.gluing import groups
 from ..solver.mesh.spherical_geometry import spherical_areas
 from ..solver.mesh.surface import Surface, chosen_triangles
+from ..solver.mesh.topology import graph_components
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.sphere.sphere_map import SphereMap, sphere_map
 from .layout import Refusal
@@ -157,7 +156,7 @@ def closed_components(surface: Surface, faces: np.ndarray | None = None) -> list
     vertex = surface.corner_vertex[triangles]
     n = len(surface.positions)
     rows, columns = vertex[:, [0, 1]].ravel(), vertex[:, [1, 2]].ravel()
-    label = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False)[1]
+    label = graph_components(rows, columns, n)[1]
     components = []
     for mine in groups(label[vertex[:, 0]]):
         ids, local = np.unique(vertex[mine], return_inverse=True)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import UserError
 from ..solver.mesh.surface import Surface, chosen_triangles
-from ..solver.mesh.topology import halfedges, pair_keys, pair_up
+from ..solver.mesh.topology import graph_components, halfedges, pair_keys, pair_up
 
 # Extent of the mesh for xatlas, which drops faces of meshes with small units.
 EXTENT = 100.0
@@ -65,5 +63,5 @@ def _chart_of_triangle(surface: Surface, triangles: np.ndarray) -> np.ndarray:
     flat = np.asarray(indices, dtype=np.int64)
     n = int(flat.max()) + 1
     rows, columns = np.repeat(flat[:, 0], 2), flat[:, 1:].ravel()
-    label = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False)[1]
+    label = graph_components(rows, columns, n)[1]
     return label[flat[:, 0]]

@@ -8,10 +8,8 @@ Panozzo, Zorin 2021).
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-from ..mesh.topology import halfedges
+from ..mesh.topology import graph_components, halfedges
 from .intrinsic_triangulation import IntrinsicTriangulation
 
 # The mirrored triangle (b, a, c) of (a, b, c) runs through its halfedges in this order.
@@ -60,7 +58,7 @@ def crossed_segment(tri: IntrinsicTriangulation, loop: np.ndarray, n: int) -> np
     if len(h) == 0:
         return segment
     m = len(tri.triangles)
-    strip = connected_components(coo_matrix((np.ones(len(h)), (h // 3, tri.twin[h] // 3)), shape=(m, m)), False)[1]
+    strip = graph_components(h // 3, tri.twin[h] // 3, m)[1]
     place = np.full(count, -1, dtype=np.int64)
     place[loop] = np.arange(len(loop))
     corner = place[tri.triangles[h // 3]]

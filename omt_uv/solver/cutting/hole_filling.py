@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..mesh.gluing import Gluing, components, corner_classes
 from ..mesh.surface import Surface
-from ..mesh.topology import halfedges
+from ..mesh.topology import graph_components, halfedges
 from .component import NOISE
 
 NO_POLYGON = -1
@@ -58,9 +56,7 @@ def hole_boundaries(
     if len(boundary) == 0:
         return boundary, boundary
     size = int(max(tail.max(), head.max())) + 1
-    loop = connected_components(
-        coo_matrix((np.ones(len(boundary)), (tail[boundary], head[boundary])), shape=(size, size)), False
-    )[1]
+    loop = graph_components(tail[boundary], head[boundary], size)[1]
     loop = np.unique(loop[tail[boundary]], return_inverse=True)[1].ravel()
     hole = _holes(positions, gluing, boundary, loop, sieve)
     return boundary[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()

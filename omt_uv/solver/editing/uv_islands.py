@@ -8,8 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import FoldedUVError, NonManifoldEdgeError, OrientationError
 from ..maps.distortion import WELD
@@ -18,7 +16,7 @@ from ..mesh.geometry import face_areas
 from ..mesh.gluing import orientations, turn_over
 from ..mesh.repair import repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles
-from ..mesh.topology import pair_keys
+from ..mesh.topology import graph_components, pair_keys
 
 
 @dataclass(frozen=True)
@@ -114,4 +112,4 @@ def _labels(surface: Surface) -> np.ndarray:
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order][1:] == key[order][:-1])
     a, b = polygon[order][same], polygon[order][same + 1]
-    return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(f, f)), directed=False)[1]
+    return graph_components(a, b, f)[1]

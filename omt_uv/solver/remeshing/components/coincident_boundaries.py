@@ -8,11 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...mesh.cut_mesh import cut_open
-from ...mesh.topology import halfedges, pair_keys, pair_up
+from ...mesh.topology import graph_components, halfedges, pair_keys, pair_up
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ def join_coincident(positions: np.ndarray, triangles: np.ndarray) -> JoinedBound
     if len(first) == 0:
         return none
     rows, columns = np.concatenate([a[first], b[first]]), np.concatenate([b[second], a[second]])
-    label = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n)), directed=False)[1]
+    label = graph_components(rows, columns, n)[1]
     same = np.unique(label, return_index=True)[1][label]
     result = same[triangles]
     tail, head = halfedges(result)
