@@ -202,7 +202,7 @@ def _hiding(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> n
 def edge_graph(component: CutComponent, edges: np.ndarray, ends: np.ndarray, n: int) -> csr_matrix:
     """Symmetric graph (n,n) of the cost of edges (k,) between the vertices `ends` (k,2); diagonals are no edges.
 
-    No two edges have the same ends (`repair.join` sees to it): a sparse matrix would add them up.
+    No two edges have the same ends (`repair.repaired_gluing` sees to it): a sparse matrix would add them up.
     """
     keep = np.isfinite(component.cost[edges])
     (a, b), cost = ends[keep].T, component.cost[edges[keep]]

@@ -42,7 +42,7 @@ class ChartMap:
     newton_conformal, newton_transport : Newton steps; None where a stage was replaced
     residual_conformal : largest error of an angle sum, radians; residual_transport : |cell area - mass| / mass
     newton_refinement, residual_refinement, status, area_weight : see `refine.Refinement`
-    area_l1, area_sd, angle_mean, folds : see `maps.distortion`
+    area_l1, area_sd, angle_mean, folds : see `distortion.Distortion`
     warnings : what was replaced and why; seconds : wall-clock time per stage
     """
 

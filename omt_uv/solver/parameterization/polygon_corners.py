@@ -60,7 +60,7 @@ class PolygonCorners:
 
 @dataclass(frozen=True)
 class CornerBarrier:
-    """The energy of corners with slack (k,) and strength (k,); one of the extras of `newton.NewtonProblem`."""
+    """The energy of corners with slack (k,) and strength (k,); one of the extras of `projected_newton.NewtonProblem`."""
 
     corners: PolygonCorners
     slack: np.ndarray
