@@ -60,7 +60,7 @@ class PolygonCorners:
 
 @dataclass(frozen=True)
 class CornerBarrier:
-    """The energy of corners with slack (k,) and strength (k,); one of the extras of `projected_newton.NewtonProblem`."""
+    """The energy of corners with slack (k,) and strength (k,); an extra of `projected_newton.NewtonProblem`."""
 
     corners: PolygonCorners
     slack: np.ndarray
