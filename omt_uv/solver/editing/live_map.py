@@ -13,8 +13,9 @@ from ..mesh.topology import boundary_edges
 from ..refinement.continuation import MapProblem, rescaled
 from ..refinement.continuation_rules import FIRST_PRESSURE, NO_ENERGY, QUALITIES, final_weight
 from ..refinement.elimination_order import renumbered
+from ..refinement.hessian_blocks import Assembly
 from ..refinement.pins import PinEnergy, Pins, placed_like
-from ..refinement.projected_newton import Assembly, FreeMotion, NewtonProblem, newton_step
+from ..refinement.projected_newton import FreeMotion, NewtonProblem, newton_step
 from .refine_island import island_start, meets_itself
 
 # Of the springs between pins and where they are dragged to, energy per squared length in units of the map: stiff, as

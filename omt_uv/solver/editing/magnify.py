@@ -23,7 +23,7 @@ from ..progress import Progress, Steps, part_of
 from ..refinement.continuation import ContinuationResult, MapProblem, minimise_in_stages
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.elimination_order import Renumbered, renumbered
-from ..refinement.projected_newton import Assembly
+from ..refinement.hessian_blocks import Assembly
 from .outline import Outline, centroid, free_motion, recognise_outline
 from .refine_island import meets_itself
 

@@ -21,9 +21,10 @@ from ..refinement.boundary_barrier import crossings, make_barrier
 from ..refinement.continuation import MapProblem, minimise_in_stages
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.elimination_order import renumbered
+from ..refinement.hessian_blocks import Assembly
 from ..refinement.initial_maps import disk_initial_map
 from ..refinement.pins import aligned_to_pins, move_pins, placed_like
-from ..refinement.projected_newton import Assembly, FreeMotion
+from ..refinement.projected_newton import FreeMotion
 from ..refinement.refine import Refinement
 
 STRAIGHTENED = "The UVs were folded, or met themselves; the refinement started from a straightened map"

@@ -1,13 +1,17 @@
 """Evaluate the energy of a piecewise linear map to the plane: shear plus weighted area error, infinite at a fold.
 
-    E = sum_f M_f [ (s1/s2 + s2/s1)/2 - 1 ] + area_weight sum_f M_f [ (r + 1/r)/2 - 1 ],   r = s1 s2 / target ratio
+    E = sum_p M_p [ sum_f part_f ((s1/s2 + s2/s1)/2 - 1) ] + area_weight * sum_p M_p [ (r + 1/r)/2 - 1 ],
+    r = UV area of the polygon / target
 
-with M_f the greater of a face's shares of the surface and of the target area, so that neither a magnified region nor
-the rest is neglected, and s1 >= s2 the singular values of a face's Jacobian: MIPS (Hormann, Greiner 2000) plus its
-area counterpart (Degener, Meseth, Klein 2003). In complex notation the map is w and its derivatives
-a = dw/dz, b = dw/dconj(z); det J = |a|^2 - |b|^2 and the shear term is 2 |b|^2 / det J. The energy depends on
-|a| and |b| alone, so the Hessian's eigensystem is explicit (Smith, de Goes, Kim 2019): the two tangential
-directions i a, i b are eigenvectors and the radial ones form a 2x2 block. No singular value decomposition is needed.
+with M_p the greater of a polygon's shares of the surface and of the target area, so that neither a magnified part nor
+the rest is neglected, and s1 >= s2 the singular values of the Jacobian of a triangle f of the polygon: MIPS (Hormann,
+Greiner 2000) plus its area counterpart (Degener, Meseth, Klein 2003). The area is that of the whole polygon, which does
+not depend on how it is cut, and the shear of a quad is the mean of both its triangulations (`polygon_elements`), so
+that no diagonal prefers a direction. In complex notation the map is w and its derivatives a = dw/dz, b = dw/dconj(z);
+det J = |a|^2 - |b|^2 and the shear term is 2 |b|^2 / det J. The energy of a triangle depends on |a| and |b| alone, so
+the Hessian's eigensystem is explicit (Smith, de Goes, Kim 2019): the two tangential directions i a, i b are
+eigenvectors and the radial ones form a 2x2 block. No singular value decomposition is needed. The area term of a polygon
+of several triangles adds the square of its area's slope (Gauss-Newton), one row a polygon.
 """
 
 from __future__ import annotations
@@ -23,12 +27,23 @@ FACE_ERROR = 0.45
 
 
 @dataclass(frozen=True)
-class Elements:
-    """Faces of a surface, ready for the energy.
+class Quads:
+    """Quads of a surface: size (q,4), the areas of their four triangles over that of the quad, those of the given
+    diagonal first; convex (q,) bool, whether all four are on the quad's own side."""
 
-    triangles (m,3); area (m,) of the surface, summing to 1; gradient (m,3) complex, the gradients of the hat functions
-    in each face's own plane; ratio (m,) target UV area over surface area; weight (m,) in the energy,
-    summing to 1; region (m,) in [0, 1], weights of a region whose share shall be exact, if there is one.
+    size: np.ndarray
+    convex: np.ndarray
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Polygons of a surface, and the triangles on which their shear is measured, ready for the energy.
+
+    triangles (m,3); gradient (m,3) complex, the gradients of the hat functions in each triangle's own plane. Of every
+    polygon: area (p,) of the surface, summing to 1; ratio (p,) target UV area over surface area; weight (p,) in the
+    energy, summing to 1; region (p,) in [0, 1], weights of a region whose share shall be exact, if there is one.
+    polygon (m,): whose triangle each is, None where each is a polygon of its own; part (m,): how much of its polygon's
+    area it stands for, 0 for one that does not count; quads: those of the last triangles, four each.
     """
 
     triangles: np.ndarray
@@ -37,9 +52,12 @@ class Elements:
     ratio: np.ndarray
     weight: np.ndarray
     region: np.ndarray | None = None
+    polygon: np.ndarray | None = None
+    part: np.ndarray | None = None
+    quads: Quads | None = None
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dw/dz and dw/dconj(z) per face, (m,) complex each, of a map w (n,) complex."""
+        """dw/dz and dw/dconj(z) per triangle, (m,) complex each, of a map w (n,) complex."""
         corner = 0.5 * w[self.triangles]
         g = self.gradient
         a = np.einsum("mi,mi->m", corner, g.conj())
@@ -47,18 +65,50 @@ class Elements:
         return a, b
 
     def areas(self, w: np.ndarray) -> np.ndarray:
-        """Signed UV area of every face, (m,), over the area of the surface."""
+        """Signed UV area of every polygon, (p,), over the area of the surface."""
         a, b = self.derivatives(w)
-        return self.area * (squared(a) - squared(b))
+        return self.area * self.sums(squared(a) - squared(b))
+
+    def sums(self, values: np.ndarray) -> np.ndarray:
+        """Values of triangles (m,) summed by their parts of the polygons, (p,)."""
+        if self.polygon is None or self.part is None:
+            return values
+        return np.bincount(self.polygon, self.part * values, len(self.area))
+
+    def of_triangles(self, values):
+        """Values of polygons (p,), or one for all, as those of the triangles, (m,)."""
+        return values if self.polygon is None or np.ndim(values) == 0 else values[self.polygon]
+
+    def folded(self, det: np.ndarray) -> np.ndarray:
+        """Triangles (m,) bool that count and whose determinant (m,) is not positive."""
+        folded = ~(det > 0)
+        return folded if self.part is None else folded & (self.part > 0)
+
+    @property
+    def triangle_areas(self) -> np.ndarray:
+        """Area (m,) of the surface that every triangle stands for."""
+        return self.area if self.polygon is None or self.part is None else self.area[self.polygon] * self.part
+
+    @property
+    def alone(self) -> np.ndarray | None:
+        """Triangles (m,) bool that are polygons of their own, None where all are."""
+        return None if self.polygon is None else np.bincount(self.polygon)[self.polygon] == 1
 
 
 def elements(
     positions: np.ndarray, triangles: np.ndarray, target: np.ndarray, region: np.ndarray | None = None
 ) -> Elements:
-    """Elements of a surface (n,3), (m,3) whose faces shall have the UV areas target (m,).
+    """Elements of a surface (n,3), (m,3) whose triangles shall have the UV areas target (m,), each a polygon.
 
     Slivers too thin for double precision keep a finite gradient: their height is at least 1e-9 of their length.
     """
+    area, gradient = hat_gradients(positions, triangles)
+    weight = np.maximum(area / area.sum(), target / target.sum())
+    return Elements(triangles, area / area.sum(), gradient, target / area, weight / weight.sum(), region)
+
+
+def hat_gradients(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Areas (m,) of triangles (m,3) and the gradients (m,3) complex of their hat functions, in their own planes."""
     p = positions[triangles]
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     side = np.linalg.norm(e1, axis=1)
@@ -68,16 +118,7 @@ def elements(
     local = np.stack([np.zeros(len(x)), side, x + 1j * y], axis=1)
     area = 0.5 * side * y
     # The gradient of a hat function is the opposite side, turned by a quarter, over twice the area.
-    gradient = 1j * (local[:, [2, 0, 1]] - local[:, [1, 2, 0]]) / (2 * area)[:, None]
-    weight = np.maximum(area / area.sum(), target / target.sum())
-    return Elements(
-        triangles=triangles,
-        area=area / area.sum(),
-        gradient=gradient,
-        ratio=target / area,
-        weight=weight / weight.sum(),
-        region=region,
-    )
+    return area, 1j * (local[:, [2, 0, 1]] - local[:, [1, 2, 0]]) / (2 * area)[:, None]
 
 
 def energy(faces: Elements, w: np.ndarray, area_weight: float) -> float:
@@ -91,7 +132,7 @@ def energy_of(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float)
 
 
 def energies(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
-    """The energy of every face (m,) of a map w (n,) complex, infinite at a fold; area_weight: one, or (m,)."""
+    """The energy of every polygon (p,) of a map w (n,) complex, infinite at a fold; area_weight: one, or (p,)."""
     return _energies(faces, *faces.derivatives(w), area_weight)
 
 
@@ -99,10 +140,13 @@ def _energies(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float 
     """The energy of every face (m,) from the derivatives a, b (m,) complex."""
     outer, inner = squared(a), squared(b)
     det = outer - inner
-    good = det > 0
-    safe = np.where(good, det, 1)
-    r = safe / faces.ratio
-    return np.where(good, faces.weight * (2 * inner / safe + area_weight * ((r + 1 / r) / 2 - 1)), np.inf)
+    safe = np.where(det > 0, det, 1)
+    r = faces.sums(safe) / faces.ratio
+    value = faces.weight * (faces.sums(2 * inner / safe) + area_weight * ((r + 1 / r) / 2 - 1))
+    folded = faces.folded(det)
+    if faces.polygon is None:
+        return np.where(folded, np.inf, value)
+    return np.where(np.bincount(faces.polygon, folded, len(value)) > 0, np.inf, value) if folded.any() else value
 
 
 def gradient(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
@@ -171,15 +215,39 @@ def _by_squares(faces, a, b, area_weight, pressure):
     """Derivatives by |a|^2 and |b|^2, the same for the Hessian, and the Hessian's entries by |a| and |b|."""
     outer, inner = squared(a), squared(b)
     det = outer - inner
-    slope = area_weight / 2 * (1 / faces.ratio - faces.ratio / det**2)
-    bend = area_weight * faces.ratio / det**3 + 4 * inner / det**3
-    weight, shear_outer, shear_inner = faces.weight, -2 * inner / det**2, 2 / det + 2 * inner / det**2
+    weight, ratio, whole = faces.weight, faces.ratio, det
+    if faces.polygon is not None:
+        det = np.where(faces.part > 0, det, 1)
+        weight, ratio = faces.weight[faces.polygon] * faces.part, faces.ratio[faces.polygon]
+        whole = faces.sums(det)[faces.polygon]
+        area_weight, pressure = faces.of_triangles(area_weight), faces.of_triangles(pressure)
+    slope = area_weight / 2 * (1 / ratio - ratio / whole**2)
+    bend = area_weight * ratio / whole**3
+    if faces.polygon is not None:
+        # That of a polygon of several triangles is a row of its own, see `area_forms`.
+        bend = np.where(faces.alone, bend, 0)
+    bend = bend + 4 * inner / det**3
+    shear_outer, shear_inner = -2 * inner / det**2, 2 / det + 2 * inner / det**2
     first = weight * (shear_outer + slope), weight * (shear_inner - slope)
     kept = weight * (shear_outer + pressure * slope), weight * (shear_inner - pressure * slope)
     aa = 2 * kept[0] + weight * 4 * outer * bend
     ab = -4 * weight * np.sqrt(outer * inner) * (bend + 2 / det**2)
     bb = 2 * kept[1] + weight * 4 * inner * (bend + 4 / det**2)
     return first, kept, (aa, ab, bb)
+
+
+def area_forms(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
+    """Rows of the area term's Hessian, corner by corner (m,3) complex: a polygon's row is the sum over its triangles.
+
+    The row is the slope of the polygon's area times the root of the area term's second derivative by it. 0 for polygons
+    of one triangle, whose term is among the rows of `face_derivatives`.
+    """
+    a, b = faces.derivatives(w)
+    whole = faces.sums(squared(a) - squared(b))
+    size = np.sqrt(faces.weight * area_weight * faces.ratio / whole**3)
+    g = faces.gradient
+    scale = np.where(faces.alone, 0, faces.part * size[faces.polygon])
+    return scale[:, None] * (a.conj()[:, None] * g.conj() - b.conj()[:, None] * g)
 
 
 def _split(aa, ab, bb):
@@ -213,8 +281,8 @@ def _area_error(faces: Elements, area: np.ndarray) -> float:
 
 
 def _region_error(faces: Elements, area: np.ndarray) -> tuple[float, float]:
-    """Relative error of the share of the region with UV areas (m,), and of single faces, in the region or in the rest,
-    whichever is worse; 0 without a region."""
+    """Relative error of the share of the region with UV areas (p,), and of single polygons, in the region or in the
+    rest, whichever is worse; 0 without a region."""
     if faces.region is None:
         return 0.0, 0.0
     target = faces.area * faces.ratio
@@ -228,7 +296,7 @@ def _region_error(faces: Elements, area: np.ndarray) -> tuple[float, float]:
 
 
 def tilted(faces: Elements, tilt: float) -> Elements:
-    """The faces with exp(tilt * region) times their targets; the targets sum to what they did."""
+    """The polygons with exp(tilt * weight) times their targets in the region; the targets sum to what they did."""
     if tilt == 0 or faces.region is None:
         return faces
     ratio = faces.ratio * np.exp(tilt * faces.region)

@@ -109,6 +109,7 @@ def map_chart(
             multiplier=initial.multiplier,
         )
         given = {"target": None if target is None else disk.target, "region": disk.region, "pins": places}
+        given["polygons"] = _polygons(chart)
         refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
     with log.timed("measure"):
         figures = distortion(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=density)
@@ -150,6 +151,11 @@ def _chart_map(
         pinned=pinned,
         area_weight=refined.area_weight,
     )
+
+
+def _polygons(chart: Chart) -> np.ndarray:
+    """The polygon (m+k,) of every triangle of a chart's disk; patches over holes are none of the surface's."""
+    return np.concatenate([chart.faces, -1 - np.arange(len(chart.patches))])
 
 
 def _disk_mesh(vertices: np.ndarray, chart: Chart, boundary: str, target: Target | None, log: RunLog) -> DiskMesh:

@@ -11,10 +11,10 @@ from scipy.sparse.csgraph import connected_components
 from ..maps.energy import elements, energies, gradient
 from ..mesh.geometry import face_areas
 from ..mesh.topology import halfedges
+from ..refinement.hessian_blocks import Assembly
 from ..refinement.projected_newton import (
     ARMIJO,
     FOLD_SHARE,
-    Assembly,
     FreeMotion,
     NewtonProblem,
     fold_shares,

@@ -24,7 +24,7 @@ BATCH = 50_000
 
 def is_small(chart: Chart) -> bool:
     """Whether a chart is small enough to be solved together with others, and has no patches over holes."""
-    return len(chart.triangles) <= SMALL and not len(chart.patches)
+    return len(chart.triangles) <= SMALL and not len(chart.patches) and len(np.unique(chart.faces)) == len(chart.faces)
 
 
 def map_together(

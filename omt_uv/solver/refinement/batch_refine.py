@@ -21,8 +21,9 @@ from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps
 from .batch_continuation import AreaErrors, BatchContinuation
 from .boundary_barrier import crossings
+from .hessian_blocks import Assembly
 from .initial_maps import NEARLY_FLAT, unroll
-from .projected_newton import ARMIJO, FOLD_SHARE, Assembly, FreeMotion, NewtonProblem, fold_shares, newton_direction
+from .projected_newton import ARMIJO, FOLD_SHARE, FreeMotion, NewtonProblem, fold_shares, newton_direction
 
 # Halvings of a step before it counts as none.
 MAX_HALVINGS = 12

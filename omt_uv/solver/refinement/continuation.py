@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from ..maps.energy import Elements, missing_tilt, target_error, target_error_but_share, tilted
+from ..maps.polygon_elements import with_convex_quads
 from ..progress import Progress, Steps
 from .boundary_barrier import BoundaryBarrier, crossings, make_barrier
 from .continuation_rules import (
@@ -33,7 +34,8 @@ from .continuation_rules import (
     promised,
     stage_tolerances,
 )
-from .projected_newton import Assembly, Motion, NewtonProblem, NewtonStep
+from .hessian_blocks import Assembly, Symmetry
+from .projected_newton import Motion, NewtonProblem, NewtonStep
 from .vertex_sweeps import Smoother
 
 FIRST_SWEEPS = 8  # before the first step of a stage
@@ -60,6 +62,7 @@ class MapProblem:
     with_barrier: bool
     scale_free: bool = False
     smoother: Smoother | None = None
+    symmetry: Symmetry | None = None
 
     def newton_problem(self, w: np.ndarray, area_weight: float, with_barrier: bool, tilt: float = 0.0) -> NewtonProblem:
         """What Newton minimises at an area weight, starting from the map w (n,), with the `barrier` of that map or not.
@@ -76,6 +79,7 @@ class MapProblem:
             terms=(self.barrier(w),) if with_barrier else (),
             aim=self.faces,
             smoother=self.smoother,
+            symmetry=self.symmetry,
         )
 
     def barrier(self, w: np.ndarray) -> BoundaryBarrier:
@@ -147,6 +151,7 @@ def minimise_in_stages(
     while True:
         weight = weights[k]
         problem = rescaled(problem, w) if problem.scale_free else problem
+        problem = replace(problem, faces=with_convex_quads(problem.faces, w))
         newton = problem.newton_problem(w, weight, with_barrier, multiplier / weight)
         if problem.smoother is not None:
             w = problem.smoother.smoothed(newton.faces, w, weight, FIRST_SWEEPS)

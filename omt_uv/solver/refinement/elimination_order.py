@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..linalg.nested_dissection import mesh_order
+from ..maps.polygon_elements import polygon_mesh
 from ..mesh.geometry import signed_areas
 from .initial_maps import check_initial_map
 from .pins import Pins, check_pins
@@ -46,8 +47,12 @@ class Renumbered:
         return type(error)(error.cause, error.remedy, error.kind, elements)
 
 
-def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | None) -> Renumbered:
+def renumbered(
+    vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | None, polygons: np.ndarray | None = None
+) -> Renumbered:
     """Renumber a mesh (n,3), (m,3), its map (n,2), and pins: vertices (k,) and their places (k,2).
+
+    polygons (m,): of every triangle; all corners of a quad are neighbours.
 
     Raises
     ------
@@ -56,7 +61,8 @@ def renumbered(vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | No
     uv = np.asarray(uv, float)
     check_initial_map(uv, triangles)
     mirror = np.array([np.sign(signed_areas(uv, triangles).sum()), 1.0])
-    order = mesh_order(vertices, triangles)
+    joined = triangles if polygons is None else polygon_mesh(triangles, polygons).every_triangle()
+    order = mesh_order(vertices, joined)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     renumbered_pins = None

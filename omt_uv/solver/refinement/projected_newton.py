@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from ..errors import PrecisionError
 from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.sparse import Factor
-from ..maps.energy import Elements, energies, face_derivatives, squared, sum_at_vertices, target_error
+from ..maps.energy import Elements, energies, squared, target_error
+from .hessian_blocks import Assembly, Symmetry, hessian_blocks
 from .vertex_sweeps import Smoother
 
 ARMIJO = 1e-4  # least share of the promised decrease that a step must gain
@@ -115,41 +116,6 @@ class LineMotion:
         return w + self.axis * step
 
 
-class Assembly:
-    """Scatters 6x6 matrices of faces into one sparse matrix whose pattern never changes.
-
-    Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: of a mesh that is solved in parts, or None.
-    """
-
-    def __init__(self, triangles: np.ndarray, n: int, parts: AdditiveSchwarz | None = None):
-        self.parts = parts
-        rows = np.repeat(triangles, 3, axis=1)
-        columns = np.tile(triangles, (1, 3))
-        key, block = np.unique(columns.astype(np.int64) * n + rows, return_inverse=True)
-        column, row = key // n, key % n
-        degree = np.bincount(column, minlength=n)
-        start = np.cumsum(degree) - degree
-        place = np.arange(len(key)) - start[column]
-        # Within column 2 j + q the rows 2 i + p follow each other.
-        axis = np.arange(2)
-        slot = 4 * start[column][:, None, None] + 2 * place[:, None, None] + axis[:, None]
-        slot = slot + (2 * degree[column])[:, None, None] * axis
-        local = slot[block.reshape(-1, 3, 3)].transpose(0, 1, 3, 2, 4)
-        self._slot = np.ascontiguousarray(local.reshape(-1), dtype=np.int64)
-        self._indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))])
-        self._indices = np.empty(4 * len(key), np.int32)
-        self._indices[slot.ravel()] = np.broadcast_to(2 * row[:, None, None] + axis[:, None], slot.shape).ravel()
-        self._diagonal = np.empty(2 * n, np.int64)
-        self._diagonal[:] = slot[row == column][:, axis, axis].ravel()
-        self._size = 2 * n
-
-    def matrix(self, blocks: np.ndarray, diagonal: np.ndarray) -> sp.csc_matrix:
-        """Sum of the faces' blocks (m,6,6), plus a diagonal (2n,)."""
-        data = np.bincount(self._slot, blocks.ravel(), len(self._indices))
-        data[self._diagonal] += diagonal
-        return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
-
-
 class EnergyTerm(Protocol):
     """An energy beside that of the faces, for example a barrier."""
 
@@ -184,6 +150,7 @@ class NewtonProblem:
     terms: tuple[EnergyTerm, ...] = ()
     aim: Elements | None = None
     smoother: Smoother | None = None
+    symmetry: Symmetry | None = None
 
     def energy(self, w: np.ndarray) -> float:
         """Energy of the faces and of all extras at a map w (n,) complex; infinity where a face is folded."""
@@ -226,24 +193,24 @@ def newton_direction(
 
 def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> tuple[sp.spmatrix, np.ndarray, float]:
     """Hessian (2n,2n) and slopes (2n,) along the axes of the frame, and the mean of the Hessian's diagonal."""
-    n, faces = len(w), problem.faces
-    local = face_derivatives(faces, w, problem.area_weight, pressure)
-    gradient = sum_at_vertices(faces, local.gradient, n)
-    rows = np.ascontiguousarray((local.rows * frame[faces.triangles][:, None, :]).conj()).view(float)
-    rows *= free[faces.triangles].reshape(-1, 1, 6)
-    blocks = np.matmul(rows.transpose(0, 2, 1), rows)
-    scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
+    n = len(w)
+    found = hessian_blocks(problem.faces, w, problem.area_weight, pressure, (frame, free), problem.symmetry)
+    gradient = found.gradient
     extra = sp.csr_matrix((2 * n, 2 * n))
     for part in problem.terms:
         slope, vertices, forms = part.derivatives(w)
+        if problem.symmetry is not None:
+            slope = problem.symmetry.folded(slope)
+            vertices, forms = problem.symmetry.carried(vertices, forms)
         gradient = gradient + slope
         linear = linear_forms(vertices, forms * frame[vertices], n) @ sp.diags(free.ravel())
         extra = extra + linear.T @ linear
     axes = (gradient * frame.conj()).view(float).reshape(n, 2) * free
     diagonal = 1 - free
     diagonal[:, 0] += np.maximum(problem.motion.bend(w, gradient), 0) * free[:, 0]
-    matrix = problem.assembly.matrix(blocks, diagonal.ravel() + SHIFT * scale)
-    return matrix + extra if problem.terms else matrix, axes.ravel(), scale
+    matrix = problem.assembly.matrix(found.triangles, diagonal.ravel() + SHIFT * found.scale, found.quads)
+    matrix = matrix if found.rest is None else matrix + found.rest
+    return matrix + extra if problem.terms else matrix, axes.ravel(), found.scale
 
 
 def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | None, w, axes) -> np.ndarray:
@@ -262,7 +229,10 @@ def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | Non
 def newton_step(problem: NewtonProblem, w: np.ndarray, value: float, pressure: float = 1.0) -> NewtonStep:
     """One line-searched Newton step from a map w (n,) complex of energy `value`; pressure: see `face_derivatives`."""
     step, slope = newton_direction(problem, w, pressure)
+    # The whole change of the map: where some vertices follow others, these move, too.
     moved = problem.motion.frame(w) * step
+    if problem.symmetry is not None:
+        moved = problem.symmetry.spread(moved)
     share = min(1.0, FOLD_SHARE * first_fold(problem.faces, w, moved))
     for extra in problem.terms:
         # Of what is left of the step: how far a whole one would reach is a large search, and of no use.
@@ -278,7 +248,8 @@ def newton_step(problem: NewtonProblem, w: np.ndarray, value: float, pressure: f
 
 def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:
     """The smallest t > 0 at which a face of w + t step has no area; infinity if there is none."""
-    return fold_share(*faces.derivatives(w), *faces.derivatives(step))
+    far = fold_shares(*faces.derivatives(w), *faces.derivatives(step))
+    return float((far if faces.part is None else far[faces.part > 0]).min(initial=np.inf))
 
 
 def fold_share(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> float:

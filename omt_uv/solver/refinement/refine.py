@@ -13,15 +13,17 @@ import numpy as np
 from ..errors import MeshError, positive_density
 from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import Elements, area_error, elements
+from ..maps.polygon_elements import polygon_elements
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps, part_of
 from .continuation import ContinuationResult, MapProblem, minimise_in_stages
 from .continuation_rules import QUALITIES, planned_weights
 from .elimination_order import Renumbered, renumbered
+from .hessian_blocks import Assembly, assembly_of
 from .initial_maps import InitialMap, disk_initial_map, free_initial_map, is_far, notched_disk, square_initial_map
+from .mirror_symmetry import MirroredMotion, MirrorSymmetry, find_symmetry, symmetric_start
 from .pins import move_pins, placed_like
-from .projected_newton import Assembly
 from .vertex_sweeps import Smoother, smoothed
 
 INITIAL_MAPS = {"free": free_initial_map, "disk": disk_initial_map, "square": square_initial_map}
@@ -110,8 +112,9 @@ def refine(
     target: np.ndarray | None = None,
     region: np.ndarray | None = None,
     pins: tuple[np.ndarray, np.ndarray] | None = None,
+    polygons: np.ndarray | None = None,
 ) -> Steps[Refinement]:
-    """Refine a map uv (n,2) of a disk (n,3), (m,3) until every face has its area.
+    """Refine a map uv (n,2) of a disk (n,3), (m,3) until every polygon has its area.
 
     Parameters
     ----------
@@ -121,6 +124,7 @@ def refine(
     pins : vertices (k,) and their places (k,2), in free mode. Two or more fix place, direction and scale, one fixes the
         place; with one, scale and direction are those of `uv`. Without pins the map has the area of the surface, and
         the place and the direction of `uv`.
+    polygons : (m,) polygon of every triangle; by default each is its own
 
     Raises
     ------
@@ -138,10 +142,12 @@ def refine(
         raise ValueError("pins need a free boundary")
     yield Progress("Refinement", 0.0)
     target = _targets(face_areas(vertices, triangles), target)
-    mesh = renumbered(vertices, triangles, uv, pins)
-    faces = elements(mesh.vertices, mesh.triangles, target, region)
+    mesh = renumbered(vertices, triangles, uv, pins, polygons)
+    faces = polygon_elements(mesh.vertices, mesh.triangles, target, polygons, region)
+    by_triangle = faces if faces.polygon is None else elements(mesh.vertices, mesh.triangles, target, region)
+    symmetry = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, polygons, faces)
     try:
-        found, warnings = yield from _refined(mesh, faces, options)
+        found, warnings = yield from _refined(mesh, faces, by_triangle, options, symmetry)
     except MeshError as error:
         raise mesh.original_error(error) from error
     yield Progress("Refinement", 1.0)
@@ -170,7 +176,11 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
 
 
 def _refined(
-    mesh: Renumbered, faces: Elements, options: RefinementOptions
+    mesh: Renumbered,
+    faces: Elements,
+    by_triangle: Elements,
+    options: RefinementOptions,
+    symmetry: MirrorSymmetry | None,
 ) -> Steps[tuple[ContinuationResult, tuple[str, ...]]]:
     """Stages on a renumbered chart: what was found, and the warnings of the initial map it was found from."""
     boundary, balance, quality = options.boundary, options.balance, QUALITIES[options.quality]
@@ -179,16 +189,24 @@ def _refined(
     far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
     given = (mesh.vertices, mesh.triangles, mesh.uv, loop)
     initial = INITIAL_MAPS[boundary](*given, **({"relaxed": np.inf} if far else {}))
-    assembly = Assembly(mesh.triangles, n, schwarz_solver(mesh.vertices, mesh.triangles))
-    # Sweeps know of no pins, and of no balance.
-    swept = faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
+    w = initial.uv @ [1, 1j]
+    symmetric = None if symmetry is None else symmetric_start(symmetry, w, by_triangle, boundary, loop)
+    symmetry, w = (None, w) if symmetric is None else symmetric
+    assembly = assembly_of(faces, n, schwarz_solver(mesh.vertices, mesh.triangles), symmetry)
+    # Sweeps know of triangles alone, of no pins, and of no balance.
+    swept = faces.polygon is None and faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
     smoother = Smoother(mesh.triangles, n) if swept else None
     problem = _map_problem(faces, assembly, initial, loop, boundary, smoother)
-    w, several_pins = initial.uv @ [1, 1j], pins is not None and len(pins.vertices) > 1
+    if symmetry is not None:
+        mirrored = MirroredMotion(problem.motion, symmetry, w)
+        problem = replace(problem, motion=mirrored, symmetry=symmetry, smoother=None)
+    several_pins = pins is not None and len(pins.vertices) > 1
     if pins is not None and several_pins:
         problem, w = yield from move_pins(problem, w, pins)
     elif boundary == "free":
-        w = yield from part_of(_smoothed_if_tense(problem, w, planned_weights(balance, quality)[0]), *SMOOTHING)
+        w = yield from part_of(
+            _smoothed_if_tense(problem, by_triangle, w, planned_weights(balance, quality)[0]), *SMOOTHING
+        )
     way = minimise_in_stages(problem, w, balance, quality, options.warm_start, options.multiplier)
     found = yield from part_of(way, *STAGES)
     error = area_error(faces, found.w)
@@ -205,7 +223,9 @@ def _refined(
     return found, initial.warnings
 
 
-def _smoothed_if_tense(problem: MapProblem, w: np.ndarray, area_weight: float) -> Steps[np.ndarray]:
+def _smoothed_if_tense(
+    problem: MapProblem, by_triangle: Elements, w: np.ndarray, area_weight: float
+) -> Steps[np.ndarray]:
     """An initial map w (n,) whose vertices, those of the boundary too, have moved within their stars, if it is tense.
 
     Triangles of three boundary vertices are slivers in a disk. They hold up Newton's first steps, and have lost the
@@ -214,7 +234,9 @@ def _smoothed_if_tense(problem: MapProblem, w: np.ndarray, area_weight: float) -
     faces = problem.faces
     tense = len(faces.triangles) > FEW and problem.newton_problem(w, area_weight, False).energy(w) > TENSE
     if tense and not problem.boundary_crosses(w):
-        w = yield from smoothed(faces, w, area_weight, SWEEPS, problem.loop)
+        w = yield from smoothed(by_triangle, w, area_weight, SWEEPS, problem.loop)
+        if problem.symmetry is not None:
+            w = problem.symmetry.averaged(w)
     return w
 
 

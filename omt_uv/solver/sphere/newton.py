@@ -16,7 +16,8 @@ import numpy as np
 from ..linalg.sparse import Factor
 from ..maps.energy import Elements, FaceDerivatives, derivatives_of, energy_of, squared
 from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
-from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, Assembly, NewtonStep, fold_share
+from ..refinement.hessian_blocks import Assembly
+from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, NewtonStep, fold_share
 
 
 @dataclass(frozen=True)

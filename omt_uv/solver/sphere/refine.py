@@ -27,7 +27,7 @@ from ..refinement.continuation_rules import (
     is_squeezed,
     planned_weights,
 )
-from ..refinement.projected_newton import Assembly
+from ..refinement.hessian_blocks import Assembly
 from .newton import SphereProblem, derivatives, project_faces
 from .untangle import untangle_on_sphere
 

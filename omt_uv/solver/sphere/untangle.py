@@ -14,7 +14,8 @@ from ..maps.energy import Elements, FaceDerivatives, elements, face_derivatives_
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..mesh.topology import vertices_around
 from ..progress import Progress, Steps
-from ..refinement.projected_newton import ARMIJO, Assembly
+from ..refinement.hessian_blocks import Assembly
+from ..refinement.projected_newton import ARMIJO
 from .newton import derivatives, newton_direction, project_faces, retract, tangents
 
 # Newton steps.

@@ -18,13 +18,8 @@ from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.projected_newton import (
-    Assembly,
-    CircleMotion,
-    FreeMotion,
-    NewtonProblem,
-    newton_direction,
-)
+from omt_uv.solver.refinement.hessian_blocks import Assembly
+from omt_uv.solver.refinement.projected_newton import CircleMotion, FreeMotion, NewtonProblem, newton_direction
 
 
 def flattened(kind, weight=500.0):

@@ -14,7 +14,8 @@ from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.continuation import MapProblem, StageLimits, minimise, minimise_in_stages, rescaled
 from omt_uv.solver.refinement.continuation_rules import QUALITIES
-from omt_uv.solver.refinement.projected_newton import Assembly, FreeMotion, NewtonStep
+from omt_uv.solver.refinement.hessian_blocks import Assembly
+from omt_uv.solver.refinement.projected_newton import FreeMotion, NewtonStep
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.continuation import MapProblem
+from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.refinement.pins import PinEnergy, Pins, aligned_to_pins, check_pins, move_pins
-from omt_uv.solver.refinement.projected_newton import Assembly, FreeMotion
+from omt_uv.solver.refinement.projected_newton import FreeMotion
 
 
 def test_pins_are_sorted_and_given_once():

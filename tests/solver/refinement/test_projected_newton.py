@@ -9,8 +9,8 @@ from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.refinement.projected_newton import (
-    Assembly,
     CircleMotion,
     FreeMotion,
     LineMotion,

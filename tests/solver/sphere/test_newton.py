@@ -8,7 +8,7 @@ from sphere_shapes import blob, lopsided, random_rotation, random_sphere
 from omt_uv.solver.maps.energy import derivatives_of, elements
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
-from omt_uv.solver.refinement.projected_newton import Assembly
+from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.sphere.newton import SphereProblem, derivatives, newton_direction, project_faces, retract, tangents
 
 

@@ -9,7 +9,7 @@ from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.mesh.topology import vertices_around
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.projected_newton import Assembly
+from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.sphere.untangle import RINGS, straighten_around, untangle_locally, untangle_on_sphere
 
 

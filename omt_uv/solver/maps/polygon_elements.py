@@ -1,0 +1,167 @@
+"""Make elements of polygons: one area each, whichever way it is cut, and shear without a diagonal.
+
+In space a quad has the mean area of both its triangulations, and its shear is the mean over both, each triangle by its
+area. That needs all four triangles positive in the map, so that only quads that are convex, on the surface and in the
+map, have it; others are measured on the triangulation given until they have become convex (`with_convex_quads`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .energy import Elements, Quads, elements, hat_gradients
+
+# Triangles of a polygon with one area, at most: a row of the Hessian joins all its corners, and long rows fill it.
+MOST_TRIANGLES = 8
+# Share of a quad's area that each of its four triangles needs, on the surface and in the map, for both triangulations.
+CONVEX = 0.03
+# Corners of a quad's four triangles: those of the diagonal given, then the others.
+BOTH = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
+
+
+@dataclass(frozen=True)
+class PolygonMesh:
+    """Triangles that are polygons of their own, or make one with others, and quads apart.
+
+    triangles (k,3) and polygon (k,) of each, from 0 on; quads (q,4), their given diagonal from the first to the third
+    corner; their polygons follow the others'. rows (m,): where triangles of the mesh are: those of `triangles`, then
+    two of each quad.
+    """
+
+    triangles: np.ndarray
+    polygon: np.ndarray
+    quads: np.ndarray
+    rows: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Polygons."""
+        return int(self.polygon.max(initial=-1)) + 1 + len(self.quads)
+
+    def every_triangle(self) -> np.ndarray:
+        """All triangles (m,3) whose shear may be measured: four of each quad come last."""
+        return np.concatenate([self.triangles, self.quads[:, BOTH].reshape(-1, 3)])
+
+    def of_polygons(self) -> np.ndarray:
+        """The polygon (m,) of each of `every_triangle`."""
+        first = self.count - len(self.quads)
+        return np.concatenate([self.polygon, np.repeat(first + np.arange(len(self.quads)), 4)])
+
+    def given(self, values: np.ndarray) -> np.ndarray:
+        """Values (m,) of the triangles of the mesh summed over the polygons, (p,)."""
+        first = self.count - len(self.quads)
+        owner = np.concatenate([self.polygon, np.repeat(first + np.arange(len(self.quads)), 2)])
+        return np.bincount(owner, values[self.rows], self.count)
+
+
+def polygon_mesh(triangles: np.ndarray, faces: np.ndarray) -> PolygonMesh:
+    """The polygons of triangles (m,3) that belong to the faces (m,), any numbers.
+
+    Two triangles of a face that share a side are a quad. A face of more than `MOST_TRIANGLES` counts triangle by
+    triangle.
+    """
+    owner = np.unique(faces, return_inverse=True)[1].ravel()
+    sides = np.bincount(owner)
+    order = np.argsort(owner, kind="stable")
+    start = np.cumsum(sides) - sides
+    pairs = np.flatnonzero(sides == 2)
+    first, second = order[start[pairs]], order[start[pairs] + 1]
+    quads, joined = _quads(triangles[first], triangles[second])
+    is_quad = np.zeros(len(sides), bool)
+    is_quad[pairs[joined]] = True
+    rest = order[~is_quad[owner[order]]]
+    # Long polygons and two triangles that share no side: each triangle for itself.
+    long = (sides > MOST_TRIANGLES) | ((sides == 2) & ~is_quad)
+    label = np.where(long[owner[rest]], len(sides) + rest, owner[rest])
+    polygon = np.unique(label, return_inverse=True)[1].ravel()
+    both = np.column_stack([first, second])[joined].ravel()
+    return PolygonMesh(triangles[rest], polygon, quads[joined], np.concatenate([rest, both]))
+
+
+def _quads(one: np.ndarray, two: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quads (k,4) of pairs of triangles (k,3), the common side from corner 0 to 2; which (k,) bool have one."""
+    shared = (one[:, :, None] == two[:, None, :]).any(axis=2)
+    # From the corner that the other triangle lacks.
+    turn = (~shared).argmax(axis=1)[:, None] + np.arange(3)
+    one = np.take_along_axis(one, turn % 3, axis=1)
+    apart = ~(one[:, :, None] == two[:, None, :]).any(axis=1)
+    turn = apart.argmax(axis=1)[:, None] + np.arange(3)
+    two = np.take_along_axis(two, turn % 3, axis=1)
+    joined = (shared.sum(axis=1) == 2) & (one[:, 1] == two[:, 2]) & (one[:, 2] == two[:, 1])
+    # one = (a, b, d) and two = (c, d, b): the quad b, c, d, a.
+    return np.column_stack([one[:, 1], two[:, 0], one[:, 2], one[:, 0]]), joined
+
+
+def polygon_elements(
+    positions: np.ndarray,
+    triangles: np.ndarray,
+    target: np.ndarray,
+    faces: np.ndarray | None = None,
+    region: np.ndarray | None = None,
+) -> Elements:
+    """Elements of a surface (n,3), (m,3) whose polygons, the faces (m,) of the triangles, shall have their targets.
+
+    Parameters
+    ----------
+    target : (m,) UV area asked for by each triangle; a polygon asks for their sum
+    faces : (m,) polygon of every triangle, None where each is its own
+    region : (m,) in [0, 1]
+    """
+    if faces is None or len(np.unique(faces)) == len(faces):
+        return elements(positions, triangles, target, region)
+    mesh = polygon_mesh(triangles, faces)
+    every, polygon = mesh.every_triangle(), mesh.of_polygons()
+    area, gradient = hat_gradients(positions, every)
+    q = len(mesh.quads)
+    share = np.ones(len(every))
+    share[len(every) - 4 * q :] = 0.5
+    whole = np.bincount(polygon, share * area, mesh.count)
+    given = mesh.given(_areas(positions, triangles))
+    # Per area of the triangulation given, so that a density of 1 asks for a polygon's own area.
+    asked = mesh.given(target) * whole / given
+    weight = np.maximum(whole / whole.sum(), asked / asked.sum())
+    inside = None if region is None else mesh.given(region * _areas(positions, triangles)) / given
+    part = area / whole[polygon]
+    size = part[len(every) - 4 * q :].reshape(q, 4).copy()
+    part[len(every) - 4 * q :].reshape(q, 4)[:, 2:] = 0
+    return Elements(
+        triangles=every,
+        area=whole / whole.sum(),
+        gradient=gradient,
+        ratio=asked / whole,
+        weight=weight / weight.sum(),
+        region=inside,
+        polygon=polygon,
+        part=part,
+        quads=Quads(size, _convex(positions, mesh.quads)),
+    )
+
+
+def with_convex_quads(faces: Elements, w: np.ndarray) -> Elements:
+    """The elements with both triangulations of the quads that are convex on the surface and in the map w (n,) complex.
+
+    The areas of polygons and their targets do not change by that.
+    """
+    if faces.quads is None or faces.part is None or not len(faces.quads.convex):
+        return faces
+    first = len(faces.triangles) - 4 * len(faces.quads.convex)
+    a, b, c = w[faces.triangles[first:]].T
+    area = ((b - a).conj() * (c - a)).imag.reshape(-1, 4)
+    both = faces.quads.convex & (area > CONVEX * area[:, :2].sum(axis=1)[:, None]).all(axis=1)
+    part = faces.part.copy()
+    part[first:] = (faces.quads.size * np.where(both[:, None], 0.5, [1, 1, 0, 0])).ravel()
+    return replace(faces, part=part)
+
+
+def _convex(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
+    """Quads (q,4) whose four triangles look to the quad's own side, and have an area, (q,) bool."""
+    p = positions[quads[:, BOTH]]
+    normal = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
+    own = normal[:, :2].sum(axis=1)
+    return (np.einsum("qtd,qd->qt", normal, own) > CONVEX * (own**2).sum(axis=1)[:, None]).all(axis=1)
+
+
+def _areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    return hat_gradients(positions, triangles)[0]

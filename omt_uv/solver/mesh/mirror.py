@@ -1,0 +1,127 @@
+"""Find the mirror image of a mesh in itself, by matching polygons across candidate planes.
+
+Vertices of a chart that was cut open lie on one another along its seams, so positions alone do not tell a vertex from
+its neighbour across the seam. Polygons do: the centre of each has one place. A plane is kept if it takes every polygon
+to a polygon and, corner by corner, every vertex to one vertex.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+# Distance between a vertex and the image of its partner, over the extent of the mesh, up to which they are a pair.
+MIRROR_TOLERANCE = 1e-4
+# Polygons whose images are looked up before those of all others.
+PROBES = 40
+# Planes that are tried of those between a vertex and the others that are as far from the centre.
+MOST_PLANES = 40
+# Vertices are as far from the centre if their distances differ by less than this share of the extent.
+SAME_DISTANCE = 1e-3
+# Distances from the centre, over the greatest, below which a vertex says nothing about a plane.
+NEAR_CENTRE = 0.1
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """A reflection that takes a mesh to itself: image (n,) of every vertex, the plane by its normal (3,) and offset."""
+
+    image: np.ndarray
+    normal: np.ndarray
+    offset: float
+
+
+def find_mirror(
+    positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray | None = None, across: Mirror | None = None
+) -> Mirror | None:
+    """The first mirror plane of a mesh (n,3), (m,3), those across x, y and z before others; None if it has none.
+
+    faces (m,): polygon of every triangle, by default each its own; a polygon may be cut into triangles either way.
+    across: a mirror that the plane is to be at right angles to. Every vertex belongs to a triangle. Mirror images agree
+    to `MIRROR_TOLERANCE` of the extent.
+    """
+    polygons = _Polygons(positions, triangles, faces)
+    for normal in _candidates(positions, triangles):
+        if across is not None and abs(normal @ across.normal) > MIRROR_TOLERANCE:
+            continue
+        image = polygons.image(normal)
+        if image is not None and (across is None or (image[across.image] == across.image[image]).all()):
+            return Mirror(image, normal, float(positions.mean(axis=0) @ normal))
+    return None
+
+
+class _Polygons:
+    """Corners (c,) of polygons, by polygon, and trees to find polygons and their corners by place."""
+
+    def __init__(self, positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray | None):
+        faces = np.arange(len(triangles)) if faces is None else np.unique(faces, return_inverse=True)[1]
+        pairs = np.unique(np.repeat(faces, 3).astype(np.int64) * len(positions) + triangles.ravel())
+        self.polygon, self.vertex = pairs // len(positions), pairs % len(positions)
+        self.sides = np.bincount(self.polygon)
+        self.points = positions - positions.mean(axis=0)
+        self.extent = float(np.ptp(positions, axis=0).max())
+        corner = self.points[self.vertex]
+        sums = [np.bincount(self.polygon, corner[:, k]) for k in range(3)]
+        self.centres = np.stack(sums, axis=1) / self.sides[:, None]
+        self.centre_tree = cKDTree(self.centres)
+        # A polygon's number, scaled beyond all distances, keeps its corners apart from those of others.
+        self.corner_tree = cKDTree(np.column_stack([corner, 2 * self.extent * self.polygon]))
+        self.probes = np.random.default_rng(0).permutation(len(self.sides))[:PROBES]
+
+    def image(self, normal: np.ndarray) -> np.ndarray | None:
+        """The image (n,) of every vertex in the plane through the mean with this normal (3,); None if there is none."""
+        if self._matched(self.probes, normal) is None:
+            return None
+        other = self._matched(np.arange(len(self.sides)), normal)
+        if other is None or (other[other] != np.arange(len(other))).any():
+            return None
+        corner = _reflected(self.points[self.vertex], normal)
+        far, found = self.corner_tree.query(np.column_stack([corner, 2 * self.extent * other[self.polygon]]))
+        if far.max() > MIRROR_TOLERANCE * self.extent:
+            return None
+        image = np.full(len(self.points), -1)
+        image[self.vertex] = self.vertex[found]
+        if (image[self.vertex] != self.vertex[found]).any() or (image[image] != np.arange(len(image))).any():
+            return None
+        return image
+
+    def _matched(self, polygons: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
+        """The polygons (p,) where the images of `polygons` (p,) lie, None unless each has one of as many sides."""
+        far, other = self.centre_tree.query(_reflected(self.centres[polygons], normal))
+        close = far.max() <= MIRROR_TOLERANCE * self.extent
+        return other if close and (self.sides[other] == self.sides[polygons]).all() else None
+
+
+def _reflected(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Points (k,3) reflected in the plane through 0 with a unit normal (3,)."""
+    return points - 2 * (points @ normal)[:, None] * normal
+
+
+def _candidates(positions: np.ndarray, triangles: np.ndarray) -> Iterator[np.ndarray]:
+    """Unit normals (3,) of planes through the mean: across the axes, the principal directions, and between vertices.
+
+    A plane that is none of the first ones belongs to a turning symmetry, and takes a vertex to another that is as far
+    from the mean. The vertex with fewest of these has the fewest planes to try.
+    """
+    yield from np.eye(3)
+    points = positions - positions.mean(axis=0)
+    principal = np.linalg.eigh(points.T @ points)[1].T
+    yield from principal
+    distance = np.linalg.norm(points, axis=1)
+    step = SAME_DISTANCE * max(float(np.ptp(positions, axis=0).max()), np.finfo(float).tiny)
+    ring = np.round(distance / step).astype(np.int64)
+    used = np.zeros(len(points), bool)
+    used[triangles] = True
+    telling = np.flatnonzero(used & (distance > NEAR_CENTRE * distance.max()))
+    rings, count = np.unique(ring[telling], return_counts=True)
+    if not (count > 1).any():
+        return
+    chosen = telling[np.abs(ring[telling] - rings[np.where(count > 1, count, len(points) + 1).argmin()]) <= 1]
+    for other in chosen[1 : MOST_PLANES + 1]:
+        between = points[other] - points[chosen[0]]
+        length = np.linalg.norm(between)
+        if length > step:
+            yield between / length

@@ -1,0 +1,176 @@
+"""Sum the rows of a Hessian into dense blocks of triangles and quads, and these into one sparse matrix.
+
+A row stands for the linear form dw -> Re(row . dw); the Hessian is the sum of the squares of all rows. Those of the
+four triangles of a quad and of its area share four vertices, and make one block of 8 x 8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..linalg.additive_schwarz import AdditiveSchwarz
+from ..maps.energy import Elements, area_forms, face_derivatives, sum_at_vertices
+from ..maps.polygon_elements import BOTH
+
+# Quads whose rows are dense at a time: 17 rows of 8 numbers each.
+CHUNK = 20_000
+
+
+class Assembly:
+    """Scatters dense blocks of triangles, and of quads, into one sparse matrix whose pattern never changes.
+
+    Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: of a mesh that is solved in parts, or None.
+    """
+
+    def __init__(
+        self, triangles: np.ndarray, n: int, parts: AdditiveSchwarz | None = None, quads: np.ndarray | None = None
+    ):
+        self.parts = parts
+        cells = [triangles] if quads is None or not len(quads) else [triangles, quads]
+        keys = [np.tile(c, (1, c.shape[1])).astype(np.int64) * n + np.repeat(c, c.shape[1], axis=1) for c in cells]
+        # The diagonal, too: a vertex may follow another, and be in no cell.
+        keys.append(np.arange(n, dtype=np.int64) * (n + 1))
+        key, block = np.unique(np.concatenate([k.ravel() for k in keys]), return_inverse=True)
+        column, row = key // n, key % n
+        degree = np.bincount(column, minlength=n)
+        start = np.cumsum(degree) - degree
+        place = np.arange(len(key)) - start[column]
+        # Within column 2 j + q the rows 2 i + p follow each other.
+        axis = np.arange(2)
+        slot = 4 * start[column][:, None, None] + 2 * place[:, None, None] + axis[:, None]
+        slot = slot + (2 * degree[column])[:, None, None] * axis
+        blocks = np.split(block, np.cumsum([k.size for k in keys])[:-1])
+        local = [
+            slot[b.reshape(-1, c.shape[1], c.shape[1])].transpose(0, 1, 3, 2, 4).reshape(-1)
+            for b, c in zip(blocks, cells, strict=False)
+        ]
+        self._slot = np.ascontiguousarray(np.concatenate(local), dtype=np.int64)
+        self._indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))])
+        self._indices = np.empty(4 * len(key), np.int32)
+        self._indices[slot.ravel()] = np.broadcast_to(2 * row[:, None, None] + axis[:, None], slot.shape).ravel()
+        self._diagonal = np.empty(2 * n, np.int64)
+        self._diagonal[:] = slot[row == column][:, axis, axis].ravel()
+        self._size = 2 * n
+
+    def matrix(self, blocks: np.ndarray, diagonal: np.ndarray, quads: np.ndarray | None = None) -> sp.csc_matrix:
+        """Sum of the blocks (t,6,6) of triangles and (q,8,8) of quads, plus a diagonal (2n,)."""
+        values = blocks.ravel() if quads is None else np.concatenate([blocks.ravel(), quads.ravel()])
+        data = np.bincount(self._slot, values, len(self._indices))
+        data[self._diagonal] += diagonal
+        return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
+
+
+class Symmetry(Protocol):
+    """Vertices that follow others, see `mirror_symmetry.MirrorSymmetry`."""
+
+    representative: np.ndarray
+
+    def spread(self, w: np.ndarray) -> np.ndarray:
+        """Values (n,) of the representatives as those of all vertices."""
+
+    def folded(self, slope: np.ndarray) -> np.ndarray:
+        """Slopes (n,) by all vertices as those by the representatives."""
+
+    def carried(self, vertices: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Linear forms by vertices as forms by representatives."""
+
+
+def assembly_of(
+    faces: Elements, n: int, parts: AdditiveSchwarz | None = None, symmetry: Symmetry | None = None
+) -> Assembly:
+    """The assembly of the elements of a mesh of n vertices, of which some may follow others."""
+    first = lone_triangles(faces)
+    place = np.arange(n) if symmetry is None else symmetry.representative
+    return Assembly(place[faces.triangles[:first]], n, parts, place[corners_of_quads(faces)])
+
+
+def lone_triangles(faces: Elements) -> int:
+    """How many triangles come before those of the quads."""
+    return len(faces.triangles) - (0 if faces.quads is None else 4 * len(faces.quads.convex))
+
+
+def corners_of_quads(faces: Elements) -> np.ndarray:
+    """Corners (q,4) of the quads."""
+    four = faces.triangles[lone_triangles(faces) :].reshape(-1, 4, 3)
+    return np.column_stack([four[:, 0], four[:, 1, 2]])
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Derivatives of the energy: gradient (n,) complex, blocks (t,6,6) of triangles and (q,8,8) of quads, a sparse
+    matrix for longer polygons or None, and the mean of the diagonal."""
+
+    gradient: np.ndarray
+    triangles: np.ndarray
+    quads: np.ndarray | None
+    rest: sp.spmatrix | None
+    scale: float
+
+
+def hessian_blocks(
+    faces: Elements,
+    w: np.ndarray,
+    weight,
+    pressure,
+    axes: tuple[np.ndarray, np.ndarray],
+    symmetry: Symmetry | None = None,
+) -> Blocks:
+    """Gradient and projected Hessian at a map w (n,) complex, in axes: a frame (n,), and which count, free (n,2).
+
+    weight : of the area term, one or (p,) of the polygons; pressure : see `energy.face_derivatives`
+    """
+    n, first, (frame, free) = len(w), lone_triangles(faces), axes
+    local = face_derivatives(faces, w, weight, pressure)
+    gradient, vertex, forms = sum_at_vertices(faces, local.gradient, n), faces.triangles, local.rows
+    if symmetry is not None:
+        gradient = symmetry.folded(gradient)
+        vertex, forms = symmetry.carried(vertex, forms)
+    rows = np.ascontiguousarray((forms * frame[vertex][:, None, :]).conj()).view(float)
+    rows *= free[vertex].reshape(-1, 1, 6)
+    blocks = np.matmul(rows[:first].transpose(0, 2, 1), rows[:first])
+    scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
+    if faces.polygon is None:
+        return Blocks(gradient, blocks, None, None, scale)
+    forms = area_forms(faces, w, weight)
+    if symmetry is not None:
+        _, forms = symmetry.carried(faces.triangles, forms)
+    area = np.ascontiguousarray((forms * frame[vertex]).conj()).view(float)
+    area *= free[vertex].reshape(-1, 6)
+    return Blocks(
+        gradient=gradient,
+        triangles=blocks,
+        quads=_quad_blocks(rows[first:].reshape(-1, 4, 4, 6), area[first:].reshape(-1, 4, 6)),
+        rest=_long_forms(faces, vertex, area[:first], n),
+        scale=scale,
+    )
+
+
+def _quad_blocks(rows: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Blocks (q,8,8) from the rows (q,4,4,6) of four triangles each, and their parts (q,4,6) of the area's row."""
+    columns = (2 * BOTH[:, :, None] + [0, 1]).reshape(4, 6)
+    blocks = np.empty((len(rows), 8, 8))
+    for begin in range(0, len(rows), CHUNK):
+        here = slice(begin, begin + CHUNK)
+        full = np.zeros((len(rows[here]), 17, 8))
+        for k in range(4):
+            full[:, 4 * k : 4 * k + 4, columns[k]] = rows[here, k]
+            full[:, 16, columns[k]] += area[here, k]
+        np.matmul(full.transpose(0, 2, 1), full, out=blocks[here])
+    return blocks
+
+
+def _long_forms(faces: Elements, vertex: np.ndarray, area: np.ndarray, n: int) -> sp.spmatrix | None:
+    """The squares of the rows of polygons of several triangles that are no quads, from their triangles' (t,6)."""
+    if faces.polygon is None or faces.alone is None:
+        return None
+    several = np.flatnonzero(~faces.alone[: len(area)])
+    if not len(several):
+        return None
+    columns = (2 * vertex[several][:, :, None] + [0, 1]).reshape(-1, 6)
+    owner = np.repeat(faces.polygon[several], 6)
+    forms = sp.csr_matrix((area[several].ravel(), (owner, columns.ravel())), shape=(len(faces.area), 2 * n))
+    return (forms.T @ forms).tocsc()
