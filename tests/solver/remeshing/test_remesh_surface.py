@@ -72,7 +72,7 @@ def test_cuts_between_boundaries_leave_no_trace():
 
 
 def open_pipe():
-    """A sheet rolled up until two sides of it touch, which stay apart."""
+    """A rectangle rolled up until two sides of it touch, which stay apart."""
     V, F = meshes.grid(24, 36)
     P = np.concatenate([np.cos(V[:, :1] * 2 * np.pi), 6 * V[:, 1:2], -np.sin(V[:, :1] * 2 * np.pi)], axis=1)
     number = np.arange(len(P)).reshape(37, 25)
@@ -87,26 +87,26 @@ def along_the_equator(half):
     above = V[F].mean(axis=1)[:, 2] > 0
     tail, head = halfedges(F)
     twin = twins(F)
-    chart_boundary = above[np.arange(len(tail)) // 3] & ~above[twin // 3]
+    across = above[np.arange(len(tail)) // 3] & ~above[twin // 3]
     if half:
-        chart_boundary &= (V[tail, 0] > 0) & (V[head, 0] > 0)
-    return reopened(V, F, np.sort(pair_keys(tail[chart_boundary], head[chart_boundary])))
+        across &= (V[tail, 0] > 0) & (V[head, 0] > 0)
+    return reopened(V, F, np.sort(pair_keys(tail[across], head[across])))
 
 
 @pytest.mark.parametrize(
     "make, alone", [(open_pipe, None), (lambda: along_the_equator(False), 0), (lambda: along_the_equator(True), 2)]
 )
-def test_both_sides_of_a_slit_stay_on_one_another(make, alone):
+def test_both_sides_of_a_cut_stay_on_one_another(make, alone):
     V, F = make()
     result = run(V, F, 500, rounds=10)
     assert len(result.vertices) == 500 and topology(result.triangles) == topology(F)
     assert any(MERGING in text for text in result.warnings)
-    rim = result.vertices[np.concatenate(boundary_loops(result.triangles))]
+    boundary = result.vertices[np.concatenate(boundary_loops(result.triangles))]
     if alone is None:
-        rim = rim[(rim[:, 1] > 1e-6) & (rim[:, 1] < 6 - 1e-6)]
+        boundary = boundary[(boundary[:, 1] > 1e-6) & (boundary[:, 1] < 6 - 1e-6)]
         alone = 0
-    count = np.unique(rim, axis=0, return_counts=True)[1]
-    assert len(rim) > 30 and count.max() == 2 and (count == 1).sum() == alone
+    count = np.unique(boundary, axis=0, return_counts=True)[1]
+    assert len(boundary) > 30 and count.max() == 2 and (count == 1).sum() == alone
 
 
 def test_points_of_the_input_under_the_new_vertices():
@@ -197,8 +197,8 @@ def test_boundary_corners_stay():
 def test_boundaries_that_need_not_be_kept_lose_their_frays():
     """A disk with a rough boundary, teeth smaller than the new edges."""
     V, F = meshes.polar(lambda r: r, lambda r: 0 * r, 4, 480)
-    rim = boundary_loops(F)[0]
-    V[rim] *= 1 + 0.04 * np.random.default_rng(0).uniform(-1, 1, (len(rim), 1))
+    boundary = boundary_loops(F)[0]
+    V[boundary] *= 1 + 0.04 * np.random.default_rng(0).uniform(-1, 1, (len(boundary), 1))
     radius = []
     for keep in (True, False):
         result = run(V, F, 150, preserve_boundary=keep, rounds=10)
@@ -309,8 +309,8 @@ def test_bad_input_is_named():
 def test_one_sided_surfaces_are_refused():
     k = np.arange(40)
     turn, half = 2 * np.pi * k / 40, np.pi * k / 40
-    rim = [(1 + s * np.cos(half)) * np.exp(1j * turn) for s in (-0.3, 0.3)]
-    sides = zip(rim, (-0.3, 0.3), strict=True)
+    boundary = [(1 + s * np.cos(half)) * np.exp(1j * turn) for s in (-0.3, 0.3)]
+    sides = zip(boundary, (-0.3, 0.3), strict=True)
     V = np.concatenate([np.column_stack([r.real, r.imag, s * np.sin(half)]) for r, s in sides])
     a, b = k, k + 40
     c, d = np.append(k[1:], 40), np.append(k[1:] + 40, 0)

@@ -35,7 +35,7 @@ class StuckError(Exception):
 # Target edge lengths (k,) at points (k,3).
 SizeFunction: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
-# Rounds of splits or collapses; each takes a good part of the difference.
+# Rounds of splits or collapses; each makes up for much of the difference.
 MAX_ROUNDS = 500
 # Share of the missing vertices that one round may split: only edges about as long as the longest go.
 ROUND_SHARE = 0.5

@@ -27,9 +27,9 @@ def farthest(V, F, result) -> float:
 
 def curvature_in(V, F, centres, radius):
     """Measure of the angle defects around every centre, (c,)."""
-    rim = np.concatenate([np.zeros(0, np.int64), *boundary_loops(F)])
-    defect = angle_defects(F, angles_from_lengths(halfedge_lengths(V, F).reshape(-1, 3)), rim, len(V))
-    defect[rim] = 0
+    boundary = np.concatenate([np.zeros(0, np.int64), *boundary_loops(F)])
+    defect = angle_defects(F, angles_from_lengths(halfedge_lengths(V, F).reshape(-1, 3)), boundary, len(V))
+    defect[boundary] = 0
     distance = np.linalg.norm(centres[:, None] - V, axis=2) / radius
     return np.maximum(1 - distance**2, 0) ** 2 @ defect
 
@@ -106,7 +106,7 @@ def test_patches_are_disjoint_and_know_their_ring(rings):
     patches = cut_patches(F, middle, n, rings)
     assert len(patches) > 3 and (patches.faces[patches.middle] == middle).all()
     assert (patches.vertices[patches.triangles] == F[patches.faces]).all()
-    # No vertex is of two pieces, and what is not on the outer ring has all its triangles in its own.
+    # No vertex is of two patches, and what is not on the outer ring has all its triangles in its own.
     assert len(np.unique(patches.vertices)) == len(patches.vertices)
     assert (patches.of_vertex[patches.triangles] == patches.of_face[:, None]).all()
     inside = np.bincount(patches.triangles.ravel(), minlength=len(patches.vertices))

@@ -57,10 +57,10 @@ def test_the_matrix_is_symmetric_where_the_surface_bends(monkeypatch):
     """Springs act along the surface, which is another plane at every vertex; conjugate gradients need symmetry."""
     V, F = meshes.bumpy(7, 6)
     n, rng = len(V), np.random.default_rng(1)
-    asked = []
-    monkeypatch.setattr(least_squares, "conjugate_gradients", lambda times, b, *_: asked.append(times) or b)
+    systems = []
+    monkeypatch.setattr(least_squares, "conjugate_gradients", lambda times, b, *_: systems.append(times) or b)
     monkeypatch.setattr(least_squares, "smallness", lambda points, triangles: rng.random(len(triangles)))
     displacements(V, F, twins(F), np.zeros(n, bool), some_pairs(V, F), np.zeros((n, 3)), DistanceWeighting(1e-3, 1.0))
-    matrix = np.stack([asked[0](e) for e in np.eye(3 * n)])
+    matrix = np.stack([systems[0](e) for e in np.eye(3 * n)])
     assert np.abs(matrix - matrix.T).max() < 1e-14 * np.abs(matrix).max()
     assert np.linalg.eigvalsh(matrix).min() > 0

@@ -25,12 +25,12 @@ def circle(count):
 
 @pytest.mark.parametrize("boundary, inner", [(6, 1), (12, 20), (40, 150)])
 def test_triangles_fill_the_polygon(boundary, inner):
-    rim = circle(boundary)
-    points = spread_samples(rim, inner)
+    ring = circle(boundary)
+    points = spread_samples(ring, inner)
     assert points.shape == (inner, 2) and np.linalg.norm(points, axis=1).max() < 1
-    triangles = triangulate_disk(rim, points)
+    triangles = triangulate_disk(ring, points)
     assert topology(triangles) == (1, 1) and len(triangles) == boundary + 2 * inner - 2
-    area = signed_areas(np.concatenate([rim, points]), triangles)
+    area = signed_areas(np.concatenate([ring, points]), triangles)
     assert area.min() > 0 and area.sum() == pytest.approx(boundary / 2 * np.sin(2 * np.pi / boundary))
 
 
@@ -41,8 +41,8 @@ def test_samples_are_even():
 
 
 def test_samples_beyond_a_chord_come_inside():
-    rim = circle(4)
-    triangles = triangulate_disk(rim, np.array([[0.69, 0.69], [0.1, 0.0]]))
+    ring = circle(4)
+    triangles = triangulate_disk(ring, np.array([[0.69, 0.69], [0.1, 0.0]]))
     assert topology(triangles) == (1, 1) and len(np.unique(triangles)) == 6
 
 
