@@ -9,7 +9,6 @@ from ..lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     convex_domain="ConvexPolygon Disk Domain Rectangle",
-    damped_newton="DualSolution solve_dual",
     polar_factorization="PolarFactorisation polar_factorisation",
     power_diagram="PowerDiagram",
     regular_triangulation="RegularTriangulation",
