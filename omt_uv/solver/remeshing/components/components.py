@@ -124,7 +124,7 @@ def split_components(vertices: np.ndarray, triangles: np.ndarray, features: np.n
     sound = [p for p in components if p.area.sum() > 1e-12 * area.sum()]
     if len(sound) < len(components):
         warnings.append(f"{len(components) - len(sound)} parts without area were left out")
-    return Components(sound, centre, size, tuple(warnings))
+    return Components(components=sound, centre=centre, size=size, warnings=tuple(warnings))
 
 
 def _component(chart: Chart, boxed: np.ndarray, features: np.ndarray, to_reopen: np.ndarray) -> Component:

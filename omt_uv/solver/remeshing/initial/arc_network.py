@@ -197,7 +197,7 @@ def sample_arcs(
         if arc.kept:
             fixed[0][[first, last]] = True
         total += p - 1
-    return ArcSamples(np.concatenate(points), np.concatenate(fixed), along, edges, shares)
+    return ArcSamples(points=np.concatenate(points), fixed=np.concatenate(fixed), along=along, edge=edges, share=shares)
 
 
 @dataclass(frozen=True)

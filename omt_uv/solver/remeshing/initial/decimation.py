@@ -33,7 +33,9 @@ def decimated(component: Component, count: int, density: np.ndarray, size: float
     density (m,) of the component's triangles, of mean 1; size: edge length at density 1
     """
     none = np.zeros((0, 2), np.int64)
-    mesh = LineMesh(component.vertices, component.triangles, none, none, none.ravel())
+    mesh = LineMesh(
+        points=component.vertices, triangles=component.triangles, lines=none, to_reopen=none, vertices=none.ravel()
+    )
     return _reached(component, mesh, count, _sizing(component, density, size))[0]
 
 

@@ -102,7 +102,13 @@ class LineMesh:
 def collapse_along_lines(component: Component, vertices: np.ndarray) -> LineMesh:
     """Collapse all vertices of a component's features but `vertices` (v,) along these, as far as that goes."""
     to_reopen = np.stack([component.to_reopen >> 32, component.to_reopen & 0xFFFFFFFF], axis=1)
-    mesh = LineMesh(component.vertices, component.triangles, component.features, to_reopen, vertices)
+    mesh = LineMesh(
+        points=component.vertices,
+        triangles=component.triangles,
+        lines=component.features,
+        to_reopen=to_reopen,
+        vertices=vertices,
+    )
     least = MIN_COSINE
     for _ in range(MAX_ROUNDS):
         kept = np.zeros(len(mesh.points), dtype=bool)
@@ -145,4 +151,10 @@ def _collapsed(mesh: LineMesh, h: np.ndarray, kept: np.ndarray, least: float, al
         np.unique(np.sort(edit.new_number[pairs], axis=1), axis=0) for pairs in (mesh.lines, mesh.to_reopen)
     )
     lines, to_reopen = (pairs[pairs[:, 0] < pairs[:, 1]] for pairs in (lines, to_reopen))
-    return LineMesh(edit.points, edit.triangles, lines, to_reopen, edit.new_number[mesh.vertices])
+    return LineMesh(
+        points=edit.points,
+        triangles=edit.triangles,
+        lines=lines,
+        to_reopen=to_reopen,
+        vertices=edit.new_number[mesh.vertices],
+    )
