@@ -36,14 +36,14 @@ def insert_samples(component: Component, arcs: list[Arc], samples: ArcSamples) -
 
     All kept arcs become features.
     """
-    kept_edges = [k for k, arc in enumerate(arcs) if arc.kept]
-    chains = [arcs[k].vertices for k in kept_edges]
+    kept_arcs = [k for k, arc in enumerate(arcs) if arc.kept]
+    chains = [arcs[k].vertices for k in kept_arcs]
     component = replace(component, features=np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in chains]))
     ends = np.concatenate(
-        [np.stack([arcs[k].vertices[samples.edge[k] + i] for i in (0, 1)], axis=1) for k in kept_edges]
+        [np.stack([arcs[k].vertices[samples.edge[k] + i] for i in (0, 1)], axis=1) for k in kept_arcs]
     )
-    sample = np.concatenate([samples.along[k] for k in kept_edges])
-    waiting = _Waiting(sample, ends, np.concatenate([samples.share[k] for k in kept_edges]))
+    sample = np.concatenate([samples.along[k] for k in kept_arcs])
+    waiting = _Waiting(sample, ends, np.concatenate([samples.share[k] for k in kept_arcs]))
     vertex = np.full(len(samples.points), -1)
     for _ in range(MAX_ROUNDS):
         for end, near in ((0, waiting.share <= AT_END), (1, waiting.share >= 1 - AT_END)):
