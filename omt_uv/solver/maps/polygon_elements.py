@@ -155,6 +155,27 @@ def with_convex_quads(faces: Elements, w: np.ndarray) -> Elements:
     return replace(faces, part=part)
 
 
+def restricted(faces: Elements, kept: np.ndarray, place: np.ndarray) -> Elements:
+    """The elements of the polygons `kept` (p,) bool alone, vertex k as vertex place[k]."""
+    region = None if faces.region is None else faces.region[kept]
+    here = faces.of_triangles(kept)
+    quads = faces.quads
+    if quads is not None:
+        four = kept[len(kept) - len(quads.convex) :]
+        quads = Quads(quads.size[four], quads.convex[four])
+    return Elements(
+        triangles=place[faces.triangles[here]],
+        area=faces.area[kept],
+        gradient=faces.gradient[here],
+        ratio=faces.ratio[kept],
+        weight=faces.weight[kept],
+        region=region,
+        polygon=None if faces.polygon is None else (np.cumsum(kept) - 1)[faces.polygon[here]],
+        part=None if faces.part is None else faces.part[here],
+        quads=quads,
+    )
+
+
 def _convex(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
     """Quads (q,4) whose four triangles look to the quad's own side, and have an area, (q,) bool."""
     p = positions[quads[:, BOTH]]

@@ -24,7 +24,7 @@ BATCH = 50_000
 
 def is_small(chart: Chart) -> bool:
     """Whether a chart is small enough to be solved together with others, and has no patches over holes."""
-    return len(chart.triangles) <= SMALL and not len(chart.patches) and len(np.unique(chart.faces)) == len(chart.faces)
+    return len(chart.triangles) <= SMALL and not len(chart.patches)
 
 
 def map_together(
@@ -53,7 +53,9 @@ def _map_batch(charts: list[Chart], targets: list[Target | None], options: MapOp
     try:
         boxes = [in_unit_box(c.vertices) for c in charts]
         meshes = [(v, c.triangles) for (v, _), c in zip(boxes, charts, strict=True)]
-        maps = yield from refine_batch(meshes, options.quality, options.balance, **_side_by_side(targets))
+        faces = [c.faces for c in charts]
+        given = _side_by_side(targets)
+        maps = yield from refine_batch(meshes, options.quality, options.balance, polygons=faces, **given)
     except MeshError:
         return [None] * len(charts)  # the one with the error has it alone, too, and says so
     seconds = (time.perf_counter() - begin) / len(charts)

@@ -14,16 +14,18 @@ import numpy as np
 
 from ..linalg.nested_dissection import vertex_graph
 from ..linalg.sparse import minimum_degree
-from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, elements, energies, gradient
+from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, energies, gradient
+from ..maps.polygon_elements import polygon_elements, restricted, with_convex_quads
 from ..maps.tutte import arc_length_parameters, tutte
 from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps
 from .batch_continuation import AreaErrors, BatchContinuation
 from .boundary_barrier import crossings
-from .hessian_blocks import Assembly
+from .hessian_blocks import assembly_of
 from .initial_maps import NEARLY_FLAT, unroll
-from .projected_newton import ARMIJO, FOLD_SHARE, FreeMotion, NewtonProblem, fold_shares, newton_direction
+from .mirror_symmetry import MirroredMotion, MirrorSymmetry, find_symmetry, symmetric_start, without_symmetry
+from .projected_newton import ARMIJO, FOLD_SHARE, FreeMotion, Motion, NewtonProblem, fold_shares, newton_direction
 
 # Halvings of a step before it counts as none.
 MAX_HALVINGS = 12
@@ -31,6 +33,8 @@ MAX_HALVINGS = 12
 # there are only a few of them.
 REBUILD = 0.6
 FEW = 8
+# Polygons below which a chart has no ties that its mirror image would have to break.
+LEAST_SYMMETRIC = 6
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class MeshUnion:
     ----------
     positions, triangles : (n,3), (m,3) of all charts, one after the other
     boundary : (b,2) edges
+    polygon : (m,) of every triangle, None where each is its own
     of_vertex, of_face, of_boundary : (n,), (m,), (b,) the chart of each of them
     count : of charts
     """
@@ -48,10 +53,18 @@ class MeshUnion:
     positions: np.ndarray
     triangles: np.ndarray
     boundary: np.ndarray
+    polygon: np.ndarray | None
     of_vertex: np.ndarray
     of_face: np.ndarray
     of_boundary: np.ndarray
     count: int
+
+    def of_polygons(self, faces: Elements) -> np.ndarray:
+        """The chart (p,) of every polygon of the elements of the union."""
+        owner = np.arange(len(faces.area)) if faces.polygon is None else faces.polygon
+        chart = np.zeros(len(faces.area), np.int64)
+        chart[owner] = self.of_vertex[faces.triangles[:, 0]]
+        return chart
 
     def sums(self, face_values: np.ndarray) -> np.ndarray:
         """Sum of face values (m,) over each chart, (c,)."""
@@ -86,6 +99,7 @@ def refine_batch(
     balance: float,
     density: np.ndarray | None = None,
     region: np.ndarray | None = None,
+    polygons: list[np.ndarray] | None = None,
 ) -> Steps[BatchMaps]:
     """Refine maps with free boundaries of disks, vertices (n,3) of unit extent and triangles (m,3) each.
 
@@ -96,28 +110,32 @@ def refine_batch(
     quality, balance : see `refine.RefinementOptions`
     density : (m,) target area over area of the triangles of all disks, one after the other; 1 by default
     region : (m,) in [0, 1], weights of a region whose share of every disk's target is to be exact
+    polygons : of the triangles (m,) of every disk; by default each triangle is its own
 
     Raises
     ------
     PrecisionError : a linear system is singular in double precision
     """
     yield Progress("Small charts", 0.0)
-    union = _union(meshes)
+    union = _union(meshes, polygons)
     area = 0.5 * np.linalg.norm(_normals(union), axis=1)
     target = area if density is None else area * density
     target = target * (union.sums(area) / union.sums(target))[union.of_face]
-    faces = elements(union.positions, union.triangles, target, region)
-    share = union.sums(faces.weight)
     w = _initial_maps(union, meshes, area)
-    order = minimum_degree(vertex_graph(union.triangles, len(w)))
+    faces = polygon_elements(union.positions, union.triangles, target, union.polygon, region)
+    faces = with_convex_quads(faces, w)
+    symmetry, w = _symmetric(union, faces, w)
+    of_polygon = union.of_polygons(faces)
+    share = np.bincount(of_polygon, faces.weight, union.count)
+    order = minimum_degree(vertex_graph(faces.triangles, len(w)))
     continuation = BatchContinuation(
         union.count,
         quality,
         balance,
-        lambda area_weight: union.sums(energies(faces, w, area_weight[union.of_face])) / share,
+        lambda area_weight: np.bincount(of_polygon, energies(faces, w, area_weight[of_polygon]), union.count) / share,
     )
     while continuation.live.any():
-        active = _ActiveCharts(union, faces, order, continuation.live)
+        active = _ActiveCharts(union, faces, order, continuation.live, symmetry)
         began = continuation.live.sum()
         while continuation.live.sum() > REBUILD * began or 0 < continuation.live.sum() < FEW:
             active.step(w, continuation)
@@ -128,23 +146,29 @@ def refine_batch(
 
 def _measured(union: MeshUnion, faces: Elements, w: np.ndarray, continuation: BatchContinuation) -> BatchMaps:
     """Maps w (n,) with their figures."""
+    faces, of_polygon = with_convex_quads(faces, w), union.of_polygons(faces)
     a, b = (np.abs(x) for x in faces.derivatives(w))
     has, target = faces.areas(w), faces.area * faces.ratio
-    share = target / union.sums(target)[union.of_face]
-    ratio = has / union.sums(has)[union.of_face] / share
+
+    def sums(values: np.ndarray) -> np.ndarray:
+        return np.bincount(of_polygon, values, union.count)
+
+    share = target / sums(target)[of_polygon]
+    ratio = has / sums(has)[of_polygon] / share
+    shear = faces.sums(np.where(a > b, (a + b) / np.maximum(a - b, 1e-300), 0)) / faces.sums(np.ones(len(a)))
     return BatchMaps(
         uv=np.column_stack([w.real, w.imag]),
         solved=continuation.solved,
         steps=continuation.steps,
         residual=continuation.residual,
-        area_l1=union.sums(share * np.abs(ratio - 1)),
-        area_sd=np.sqrt(union.sums(share * (ratio - 1) ** 2)),
-        angle_mean=union.sums(share * (a + b) / np.maximum(a - b, 1e-300)),
+        area_l1=sums(share * np.abs(ratio - 1)),
+        area_sd=np.sqrt(sums(share * (ratio - 1) ** 2)),
+        angle_mean=sums(share * shear),
         area_weight=continuation.area_weight,
     )
 
 
-def _union(meshes) -> MeshUnion:
+def _union(meshes, polygons) -> MeshUnion:
     sizes = np.array([len(v) for v, _ in meshes])
     first = np.cumsum(sizes) - sizes
     triangles = np.concatenate([t + k for (_, t), k in zip(meshes, first, strict=True)])
@@ -156,6 +180,7 @@ def _union(meshes) -> MeshUnion:
         positions=positions,
         triangles=triangles,
         boundary=boundary,
+        polygon=None if polygons is None else _numbered(polygons),
         of_vertex=of_vertex,
         of_face=of_vertex[triangles[:, 0]],
         of_boundary=of_vertex[boundary[:, 0]],
@@ -187,37 +212,52 @@ def _initial_maps(union: MeshUnion, meshes, area: np.ndarray) -> np.ndarray:
 class _ActiveCharts:
     """The charts of a union that are still on their way, renumbered."""
 
-    def __init__(self, union: MeshUnion, faces: Elements, order: np.ndarray, live: np.ndarray):
+    def __init__(
+        self,
+        union: MeshUnion,
+        faces: Elements,
+        order: np.ndarray,
+        live: np.ndarray,
+        symmetry: MirrorSymmetry | None,
+    ):
         self.vertices = order[live[union.of_vertex[order]]]
         place = np.empty(len(order), np.int64)
         place[self.vertices] = np.arange(len(self.vertices))
-        kept = live[union.of_face]
-        triangles = place[faces.triangles[kept]]
-        region = None if faces.region is None else faces.region[kept]
-        self.faces = Elements(
-            triangles=triangles,
-            area=faces.area[kept],
-            gradient=faces.gradient[kept],
-            ratio=faces.ratio[kept],
-            weight=faces.weight[kept],
-            region=region,
-        )
-        self.of_face, self.of_vertex = union.of_face[kept], union.of_vertex[self.vertices]
+        of_polygon = union.of_polygons(faces)
+        kept = live[of_polygon]
+        self.faces = restricted(faces, kept, place)
+        self.of_face, self.of_vertex = of_polygon[kept], union.of_vertex[self.vertices]
         self.count = union.count
         self.share = np.maximum(self._sums(self.faces.weight), 1e-300)
-        self.assembly = Assembly(triangles, len(self.vertices))
-        self.motion = FreeMotion(np.zeros(len(self.vertices), bool))
+        self.symmetry = None if symmetry is None else symmetry.restricted(self.vertices, place)
+        self.assembly = assembly_of(self.faces, len(self.vertices), None, self.symmetry)
+        self.motion: Motion = FreeMotion(np.zeros(len(self.vertices), bool))
+        if self.symmetry is not None:
+            self.motion = MirroredMotion(self.motion, self.symmetry, np.zeros(len(self.vertices), complex))
 
     def step(self, whole: np.ndarray, continuation: BatchContinuation) -> None:
         """A Newton step of all charts of the group, every one as far as it may go, in place."""
         w, area_weight = whole[self.vertices], continuation.area_weight[self.of_face]
+        self._select_quads(w, area_weight, continuation)
         faces = self._tilted(continuation, continuation.area_weight)
-        problem = NewtonProblem(faces=faces, assembly=self.assembly, motion=self.motion, area_weight=area_weight)
+        problem = NewtonProblem(
+            faces=faces,
+            assembly=self.assembly,
+            motion=self.motion,
+            area_weight=area_weight,
+            symmetry=self.symmetry,
+        )
         step, _ = newton_direction(problem, w, continuation.pressure[self.of_face])
+        step = self.motion.frame(w) * step
+        if self.symmetry is not None:
+            step = self.symmetry.spread(step)
         down = (step.conj() * gradient(faces, w, area_weight)).real
         slope = np.bincount(self.of_vertex, down, self.count) / self.share
         far = np.full(self.count, 1 / FOLD_SHARE)
-        np.minimum.at(far, self.of_face, fold_shares(*self.faces.derivatives(w), *self.faces.derivatives(step)))
+        folds = fold_shares(*faces.derivatives(w), *faces.derivatives(step))
+        if faces.part is not None:
+            folds = np.where(faces.part > 0, folds, np.inf)
+        np.minimum.at(far, faces.of_triangles(self.of_face), folds)
         share = np.where(continuation.live, FOLD_SHARE * far, 0)
         waiting = continuation.live.copy()
         for _ in range(MAX_HALVINGS):
@@ -238,6 +278,14 @@ class _ActiveCharts:
             self._area_errors(trial),
             lambda new: self._energies(self._tilted(continuation, new), trial, new[self.of_face]),
         )
+
+    def _select_quads(self, w: np.ndarray, area_weight: np.ndarray, continuation: BatchContinuation) -> None:
+        """Measure quads that have become convex on both triangulations, and the energies of their charts anew."""
+        before = self.faces.part
+        self.faces = with_convex_quads(self.faces, w)
+        if before is not None and (self.faces.part != before).any():
+            value = self._energies(self._tilted(continuation, continuation.area_weight), w, area_weight)
+            continuation.value = np.where(continuation.live, value, continuation.value)
 
     def _energies(self, faces, w, area_weight):
         return self._sums(energies(faces, w, area_weight)) / self.share
@@ -277,6 +325,34 @@ class _ActiveCharts:
 
     def _sums(self, face_values):
         return np.bincount(self.of_face, face_values, self.count)
+
+
+def _numbered(polygons: list[np.ndarray]) -> np.ndarray:
+    """Polygons of several disks, any numbers, as different numbers."""
+    own = [np.unique(p, return_inverse=True)[1].ravel() for p in polygons]
+    first = np.cumsum([0, *(p.max() + 1 for p in own[:-1])])
+    return np.concatenate([p + k for p, k in zip(own, first, strict=True)])
+
+
+def _symmetric(union: MeshUnion, faces: Elements, w: np.ndarray) -> tuple[MirrorSymmetry | None, np.ndarray]:
+    """The symmetry of all charts that are their own mirror images, and the maps w (n,) made symmetric."""
+    of_polygon, w = union.of_polygons(faces), w.copy()
+    sizes = np.bincount(of_polygon, minlength=union.count)
+    large = np.flatnonzero(sizes >= LEAST_SYMMETRIC)
+    found = without_symmetry(len(w))
+    for k in large:
+        vertices = np.flatnonzero(union.of_vertex == k)
+        rows = union.of_face == k
+        place = np.full(len(w), -1)
+        place[vertices] = np.arange(len(vertices))
+        chart = restricted(faces, of_polygon == k, place)
+        polygon = None if union.polygon is None else union.polygon[rows]
+        symmetry = find_symmetry(union.positions[vertices], place[union.triangles[rows]], polygon, chart)
+        start = None if symmetry is None else symmetric_start(symmetry, w[vertices], chart, "free", vertices[:0])
+        if start is not None:
+            found = found.with_part(start[0], vertices)
+            w[vertices] = start[1]
+    return (found if found.follows.any() else None), w
 
 
 def _side_by_side(union: MeshUnion, w: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ has the rows and slopes of all vertices, carried over by these moves, so that el
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,6 +67,27 @@ class MirrorSymmetry:
         rows = rows * self.factor[vertices].reshape(shape)
         return self.representative[vertices], np.where(self.flip[vertices].reshape(shape), rows.conj(), rows)
 
+    def restricted(self, vertices: np.ndarray, place: np.ndarray) -> MirrorSymmetry:
+        """That of some vertices (k,), whole images, of which vertex i is vertex place[i]."""
+        return replace(
+            self,
+            images=place[self.images[:, vertices]],
+            representative=place[self.representative[vertices]],
+            flip=self.flip[vertices],
+            factor=self.factor[vertices],
+            line=self.line[vertices],
+        )
+
+    def with_part(self, other: MirrorSymmetry, vertices: np.ndarray) -> MirrorSymmetry:
+        """This symmetry with another one of some vertices (k,), which had none so far."""
+        arrays = {}
+        for name in ("flip", "factor", "line"):
+            arrays[name] = getattr(self, name).copy()
+            arrays[name][vertices] = getattr(other, name)
+        representative = self.representative.copy()
+        representative[vertices] = vertices[other.representative]
+        return replace(self, representative=representative, **arrays)
+
     def averaged(self, w: np.ndarray) -> np.ndarray:
         """A map w (n,) complex averaged with its images."""
         found = w + self.phase * w[self.images[0]].conj()
@@ -94,6 +115,18 @@ def mirror_symmetry(images: np.ndarray, phase: complex = 1.0) -> MirrorSymmetry:
         flip=flips[lowest],
         factor=factors[lowest],
         line=line,
+    )
+
+
+def without_symmetry(n: int) -> MirrorSymmetry:
+    """n vertices of which none follows another."""
+    return MirrorSymmetry(
+        images=np.arange(n)[None],
+        phase=1.0,
+        representative=np.arange(n),
+        flip=np.zeros(n, bool),
+        factor=np.ones(n, complex),
+        line=np.full(n, np.nan, complex),
     )
 
 
