@@ -223,7 +223,7 @@ def _by_squares(faces, a, b, area_weight, pressure):
         area_weight, pressure = faces.of_triangles(area_weight), faces.of_triangles(pressure)
     slope = area_weight / 2 * (1 / ratio - ratio / whole**2)
     bend = area_weight * ratio / whole**3
-    if faces.polygon is not None:
+    if faces.alone is not None:
         # That of a polygon of several triangles is a row of its own, see `area_forms`.
         bend = np.where(faces.alone, bend, 0)
     bend = bend + 4 * inner / det**3
@@ -246,7 +246,10 @@ def area_forms(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) 
     whole = faces.sums(squared(a) - squared(b))
     size = np.sqrt(faces.weight * area_weight * faces.ratio / whole**3)
     g = faces.gradient
-    scale = np.where(faces.alone, 0, faces.part * size[faces.polygon])
+    alone = faces.alone
+    if alone is None or faces.part is None:
+        return np.zeros(faces.triangles.shape, complex)
+    scale = np.where(alone, 0, faces.part * size[faces.polygon])
     return scale[:, None] * (a.conj()[:, None] * g.conj() - b.conj()[:, None] * g)
 
 

@@ -152,7 +152,7 @@ def with_convex_quads(faces: Elements, w: np.ndarray) -> Elements:
     both = faces.quads.convex & (area > CONVEX * area[:, :2].sum(axis=1)[:, None]).all(axis=1)
     part = faces.part.copy()
     part[first:] = (faces.quads.size * np.where(both[:, None], 0.5, [1, 1, 0, 0])).ravel()
-    return replace(faces, part=part)
+    return faces if np.array_equal(part, faces.part) else replace(faces, part=part)
 
 
 def restricted(faces: Elements, kept: np.ndarray, place: np.ndarray) -> Elements:

@@ -111,7 +111,8 @@ def _candidates(positions: np.ndarray, triangles: np.ndarray) -> Iterator[np.nda
     principal = np.linalg.eigh(points.T @ points)[1].T
     yield from principal
     distance = np.linalg.norm(points, axis=1)
-    step = SAME_DISTANCE * max(float(np.ptp(positions, axis=0).max()), np.finfo(float).tiny)
+    extent = float(np.ptp(positions, axis=0).max())
+    step = SAME_DISTANCE * max(extent, float(np.finfo(float).tiny))
     ring = np.round(distance / step).astype(np.int64)
     used = np.zeros(len(points), bool)
     used[triangles] = True

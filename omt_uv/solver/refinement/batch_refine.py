@@ -15,6 +15,7 @@ import numpy as np
 from ..linalg.nested_dissection import vertex_graph
 from ..linalg.sparse import minimum_degree
 from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, energies, gradient
+from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
 from ..maps.polygon_elements import polygon_elements, restricted, with_convex_quads
 from ..maps.tutte import arc_length_parameters, tutte
 from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
@@ -24,7 +25,7 @@ from .batch_continuation import AreaErrors, BatchContinuation
 from .boundary_barrier import crossings
 from .hessian_blocks import assembly_of
 from .initial_maps import NEARLY_FLAT, unroll
-from .mirror_symmetry import MirroredMotion, MirrorSymmetry, find_symmetry, symmetric_start, without_symmetry
+from .mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from .projected_newton import ARMIJO, FOLD_SHARE, FreeMotion, Motion, NewtonProblem, fold_shares, newton_direction
 
 # Halvings of a step before it counts as none.
@@ -281,9 +282,8 @@ class _ActiveCharts:
 
     def _select_quads(self, w: np.ndarray, area_weight: np.ndarray, continuation: BatchContinuation) -> None:
         """Measure quads that have become convex on both triangulations, and the energies of their charts anew."""
-        before = self.faces.part
-        self.faces = with_convex_quads(self.faces, w)
-        if before is not None and (self.faces.part != before).any():
+        before, self.faces = self.faces, with_convex_quads(self.faces, w)
+        if before is not self.faces:
             value = self._energies(self._tilted(continuation, continuation.area_weight), w, area_weight)
             continuation.value = np.where(continuation.live, value, continuation.value)
 
@@ -327,9 +327,9 @@ class _ActiveCharts:
         return np.bincount(self.of_face, face_values, self.count)
 
 
-def _numbered(polygons: list[np.ndarray]) -> np.ndarray:
+def _numbered(of_disks: list[np.ndarray]) -> np.ndarray:
     """Polygons of several disks, any numbers, as different numbers."""
-    own = [np.unique(p, return_inverse=True)[1].ravel() for p in polygons]
+    own = [np.unique(p, return_inverse=True)[1].ravel() for p in of_disks]
     first = np.cumsum([0, *(p.max() + 1 for p in own[:-1])])
     return np.concatenate([p + k for p, k in zip(own, first, strict=True)])
 

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from ..maps.energy import Elements, missing_tilt, target_error, target_error_but_share, tilted
+from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import with_convex_quads
 from ..progress import Progress, Steps
 from .boundary_barrier import BoundaryBarrier, crossings, make_barrier
@@ -34,7 +35,7 @@ from .continuation_rules import (
     promised,
     stage_tolerances,
 )
-from .hessian_blocks import Assembly, Symmetry
+from .hessian_blocks import Assembly
 from .projected_newton import Motion, NewtonProblem, NewtonStep
 from .vertex_sweeps import Smoother
 
@@ -62,7 +63,7 @@ class MapProblem:
     with_barrier: bool
     scale_free: bool = False
     smoother: Smoother | None = None
-    symmetry: Symmetry | None = None
+    symmetry: MirrorSymmetry | None = None
 
     def newton_problem(self, w: np.ndarray, area_weight: float, with_barrier: bool, tilt: float = 0.0) -> NewtonProblem:
         """What Newton minimises at an area weight, starting from the map w (n,), with the `barrier` of that map or not.

@@ -7,13 +7,13 @@ four triangles of a quad and of its area share four vertices, and make one block
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..maps.energy import Elements, area_forms, face_derivatives, sum_at_vertices
+from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import BOTH
 
 # Quads whose rows are dense at a time: 17 rows of 8 numbers each.
@@ -64,23 +64,8 @@ class Assembly:
         return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
 
 
-class Symmetry(Protocol):
-    """Vertices that follow others, see `mirror_symmetry.MirrorSymmetry`."""
-
-    representative: np.ndarray
-
-    def spread(self, w: np.ndarray) -> np.ndarray:
-        """Values (n,) of the representatives as those of all vertices."""
-
-    def folded(self, slope: np.ndarray) -> np.ndarray:
-        """Slopes (n,) by all vertices as those by the representatives."""
-
-    def carried(self, vertices: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Linear forms by vertices as forms by representatives."""
-
-
 def assembly_of(
-    faces: Elements, n: int, parts: AdditiveSchwarz | None = None, symmetry: Symmetry | None = None
+    faces: Elements, n: int, parts: AdditiveSchwarz | None = None, symmetry: MirrorSymmetry | None = None
 ) -> Assembly:
     """The assembly of the elements of a mesh of n vertices, of which some may follow others."""
     first = lone_triangles(faces)
@@ -117,7 +102,7 @@ def hessian_blocks(
     weight,
     pressure,
     axes: tuple[np.ndarray, np.ndarray],
-    symmetry: Symmetry | None = None,
+    symmetry: MirrorSymmetry | None = None,
 ) -> Blocks:
     """Gradient and projected Hessian at a map w (n,) complex, in axes: a frame (n,), and which count, free (n,2).
 

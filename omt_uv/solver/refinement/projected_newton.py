@@ -15,7 +15,8 @@ from ..errors import PrecisionError
 from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.sparse import Factor
 from ..maps.energy import Elements, energies, squared, target_error
-from .hessian_blocks import Assembly, Symmetry, hessian_blocks
+from ..maps.mirror_symmetry import MirrorSymmetry
+from .hessian_blocks import Assembly, hessian_blocks
 from .vertex_sweeps import Smoother
 
 ARMIJO = 1e-4  # least share of the promised decrease that a step must gain
@@ -150,7 +151,7 @@ class NewtonProblem:
     terms: tuple[EnergyTerm, ...] = ()
     aim: Elements | None = None
     smoother: Smoother | None = None
-    symmetry: Symmetry | None = None
+    symmetry: MirrorSymmetry | None = None
 
     def energy(self, w: np.ndarray) -> float:
         """Energy of the faces and of all extras at a map w (n,) complex; infinity where a face is folded."""

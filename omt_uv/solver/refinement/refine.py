@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import MeshError, positive_density
 from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import Elements, area_error, elements
+from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import polygon_elements
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
@@ -22,7 +23,7 @@ from .continuation_rules import QUALITIES, planned_weights
 from .elimination_order import Renumbered, renumbered
 from .hessian_blocks import Assembly, assembly_of
 from .initial_maps import InitialMap, disk_initial_map, free_initial_map, is_far, notched_disk, square_initial_map
-from .mirror_symmetry import MirroredMotion, MirrorSymmetry, find_symmetry, symmetric_start
+from .mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from .pins import move_pins, placed_like
 from .vertex_sweeps import Smoother, smoothed
 
@@ -154,11 +155,16 @@ def refine(
     refined = mesh.original(found.w)
     if pins is not None and mesh.pins is not None:
         refined[pins[0]] = pins[1]
+    return _refinement(refined, found, area_error(faces, found.w), warnings)
+
+
+def _refinement(uv: np.ndarray, found: ContinuationResult, error: float, warnings: tuple[str, ...]) -> Refinement:
+    """The refined map uv (n,2), and how it came about."""
     return Refinement(
-        uv=refined,
+        uv=uv,
         iterations=found.steps,
         residual=found.residual,
-        area_error=area_error(faces, found.w),
+        area_error=error,
         area_weight=found.area_weight,
         energy=found.energy,
         status=found.status,

@@ -1,0 +1,94 @@
+"""Refine a map of a mirror-symmetric mesh as what it is, solving for one vertex of every pair, or of every four."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..maps.energy import Elements, squared
+from ..maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry
+from ..mesh.mirror import find_mirror
+from .projected_newton import Motion
+
+# How far, over its extent, an initial map may be from its mirror image: farther, it is no map of a symmetric chart.
+FAR = 0.3
+# Sine of the angle up to which a direction lies along the axis; and how far points may leave the square.
+ALONG = 1e-6
+# Relative difference of the targets of mirror images up to which they are symmetric.
+SAME_TARGET = 1e-4
+
+
+class MirroredMotion:
+    """A motion of the vertices that represent pairs; their images follow, and vertices on the axis stay on it."""
+
+    def __init__(self, motion: Motion, symmetry: MirrorSymmetry, w: np.ndarray):
+        self.motion, self.symmetry = motion, symmetry
+        self._inside = symmetry.on_axis & motion.free.all(axis=1) & (symmetry.line != 0)
+        line = np.where(symmetry.on_axis, symmetry.line, 1)[:, None]
+        along = (np.abs((self.frame(w)[:, None] * [1, 1j] * line.conj()).imag) < ALONG) & (line != 0)
+        self.free = motion.free & ~symmetry.follows[:, None] & (along | ~symmetry.on_axis[:, None])
+
+    def frame(self, w):
+        """First axis (n,) of every vertex: that of the motion, or that of the mirror for free vertices upon it."""
+        return np.where(self._inside, self.symmetry.line, self.motion.frame(w))
+
+    def bend(self, w, gradient):
+        """Second derivative (n,) of the energy from the bending of curves; `gradient` by the representatives."""
+        return self.motion.bend(w, gradient)
+
+    def move(self, w, step):
+        """The symmetric map (n,) complex after a step (n,) of the representatives."""
+        return self.symmetry.spread(self.motion.move(w, step * self.frame(w) / self.motion.frame(w)))
+
+
+def find_symmetry(
+    vertices: np.ndarray, triangles: np.ndarray, polygons: np.ndarray | None, faces: Elements
+) -> MirrorSymmetry | None:
+    """The mirror symmetry of a mesh (n,3), (m,3) whose polygons (m,) have symmetric targets, too; None without one."""
+    first = find_mirror(vertices, triangles, polygons)
+    if first is None:
+        return None
+    second = find_mirror(vertices, triangles, polygons, across=first)
+    n, asked = len(vertices), faces.area * faces.ratio
+    owner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
+    pairs = np.unique(np.repeat(owner, 3).astype(np.int64) * n + faces.triangles.ravel())
+    around = np.bincount(pairs % n, asked[pairs // n], n)
+    mirrors = [first] if second is None else [first, second]
+    images = [m.image for m in mirrors if (np.abs(around - around[m.image]) <= SAME_TARGET * around).all()]
+    return mirror_symmetry(np.array(images)) if images else None
+
+
+def symmetric_start(
+    symmetry: MirrorSymmetry, w: np.ndarray, faces: Elements, boundary: str, loop: np.ndarray
+) -> tuple[MirrorSymmetry, np.ndarray] | None:
+    """The symmetry with the axis of a map w (n,) complex, and the symmetric map next to it.
+
+    None where that is far, has folds, or leaves the square; `faces` say what a fold is. loop (b,): vertices of the
+    boundary, which stay on their circle or square.
+    """
+    centred = w - w.mean() if boundary == "free" else w
+    turn = (centred[symmetry.images[0]] * centred).sum()
+    if not abs(turn) > 0:
+        return None
+    phase = turn / abs(turn)
+    if boundary == "square":
+        # Across the middles of sides, or the corners: other axes are none of the square's.
+        phase = 1j ** round(2 * np.angle(turn) / np.pi)
+    found = mirror_symmetry(symmetry.images, phase)
+    start = found.averaged(centred)
+    if np.abs(start - centred).max() > FAR * np.abs(centred).max():
+        return None
+    if boundary == "disk":
+        start[loop] *= np.abs(w[loop]) / np.abs(start[loop])
+        start = found.spread(start)
+    if (
+        boundary == "square"
+        and np.abs(_from_square(start[loop]) - _from_square(w[loop])).max() > ALONG * np.abs(w).max()
+    ):
+        return None
+    a, b = faces.derivatives(start)
+    return None if faces.folded(squared(a) - squared(b)).any() else (found, start)
+
+
+def _from_square(w: np.ndarray) -> np.ndarray:
+    """Size (b,) of the square about 0 on which a point lies."""
+    return np.maximum(np.abs(w.real), np.abs(w.imag))
