@@ -12,7 +12,7 @@ def main() -> None:
     vertices, faces = hill()
     uv = omt.unwrap(vertices, faces, boundary="square").uv
 
-    # 1 on the top of the hill, 0 at its foot, and a soft rim between them.
+    # 1 on the top of the hill, 0 at its foot, and a smooth step between them.
     weights = np.clip(3 * vertices[:, 2] - 1, 0, 1)
     result = omt.magnify(vertices, faces, uv, weights, factor=4)
     print(

@@ -152,7 +152,11 @@ class RemeshSettings:
 
 SOURCES = (
     ("MESH", "Mesh", "Unwrap anew: every part of the surface gets its share, and the region what was asked"),
-    ("UV", "UVs", "Magnify inside the UV islands that are there, in their own outline, like a lens on a map"),
+    (
+        "UV",
+        "UVs",
+        "Magnify inside the UV islands that are there, in their own outline, as under a glass",
+    ),
 )
 REGIONS = (
     (

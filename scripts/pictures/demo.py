@@ -16,8 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import numpy as np
+from plates import area_colours
 from renders import VIEWS, View, checker_material, render_checker, render_colours
-from sheets import area_colours
 from textures import checker, equal_density
 
 from benchmarks.cases import load_case, meshes, our_uv

@@ -87,15 +87,15 @@ def make(path: Path, pixels=720):
     """Write the graph before and after, side by side."""
     old, new, before, after = magnified()
     picture = drawn()
-    sheet = Image.new("RGB", (2 * pixels + 30, pixels + 56), "white")
-    draw = ImageDraw.Draw(sheet)
+    plate = Image.new("RGB", (2 * pixels + 30, pixels + 56), "white")
+    draw = ImageDraw.Draw(plate)
     captions = (f"centre {100 * before:.1f} % of the picture", f"magnified {FACTOR:g} x: {100 * after:.1f} %")
     for k, (image, caption) in enumerate(zip((picture, warp_image(picture, old, new)), captions, strict=True)):
         small = Image.fromarray(image[::-1]).resize((pixels, pixels), Image.Resampling.LANCZOS)
-        sheet.paste(small, (k * (pixels + 30), 0))
+        plate.paste(small, (k * (pixels + 30), 0))
         middle = k * (pixels + 30) + pixels / 2, pixels + 28
         draw.text(middle, caption, "#333333", typeface(24, bold=False), anchor="mm")
-    sheet.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+    plate.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 if __name__ == "__main__":

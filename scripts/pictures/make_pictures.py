@@ -16,8 +16,8 @@ sys.path.insert(0, str(ROOT))
 
 import magnified_graph
 import numpy as np
+import plates
 import renders
-import sheets
 import textures
 import world_map
 
@@ -56,7 +56,7 @@ def maps(case):
 
 
 def gallery(name, out, scratch, pixels):
-    """Three sheets of one model: the checker, the distortions as colours, and the layouts."""
+    """Three plates of one model: the checker, the distortions as colours, and the layouts."""
     case = load_case(name)
     V, F = case.V, case.F
     view = view_of(name)
@@ -69,7 +69,7 @@ def gallery(name, out, scratch, pixels):
     uvs = maps(case)
     for k, uv in enumerate(uvs.values()):
         octaves, shear = face_distortion(V, F, uv)
-        area_rgb, shear_rgb = sheets.area_colours(octaves), sheets.shear_colours(shear)
+        area_rgb, shear_rgb = plates.area_colours(octaves), plates.shear_colours(shear)
         captions.append(caption(case, uv))
         for folder, suffix in ((checks, "checker"), (areas, "area"), (shears, "shear"), (layouts, "layout")):
             folder.append(scratch / f"{name}_{k}_{suffix}.png")
@@ -77,16 +77,16 @@ def gallery(name, out, scratch, pixels):
         renders.render_checker(V, F, scaled, view, checks[-1], texture, pixels)
         renders.render_colours(V, F, area_rgb, view, areas[-1], pixels)
         renders.render_colours(V, F, shear_rgb, view, shears[-1], pixels)
-        sheets.layout(uv, sheets.lit(V, F, area_rgb), layouts[-1], pixels)
+        plates.layout(uv, plates.lit(V, F, area_rgb), layouts[-1], pixels)
     titles, blank = list(uvs), [""] * len(uvs)
-    sheets.sheet(out / f"{name}_checker.png", titles, [("", checks, captions, None)])
-    rows = [("area", areas, blank, sheets.AREA_SCALE), ("shear", shears, captions, sheets.SHEAR_SCALE)]
-    sheets.sheet(out / f"{name}_distortion.png", titles, rows)
-    sheets.sheet(out / f"{name}_layout.png", titles, [("", layouts, captions, sheets.AREA_SCALE)])
+    plates.plate(out / f"{name}_checker.png", titles, [("", checks, captions, None)])
+    rows = [("area", areas, blank, plates.AREA_SCALE), ("shear", shears, captions, plates.SHEAR_SCALE)]
+    plates.plate(out / f"{name}_distortion.png", titles, rows)
+    plates.plate(out / f"{name}_layout.png", titles, [("", layouts, captions, plates.AREA_SCALE)])
 
 
-def balance_sheet(name, out, scratch, pixels):
-    """One sheet of the slider from exact area to conformal."""
+def balance_plate(name, out, scratch, pixels):
+    """One plate of the slider from exact area to conformal."""
     case = load_case(name)
     texture = textures.checker(scratch / "checker.png")
     drawn, layouts, captions = [], [], []
@@ -98,14 +98,14 @@ def balance_sheet(name, out, scratch, pixels):
         scaled = textures.equal_density(case.V, case.F, uv, CELLS.get(name, CHECKERS))
         renders.render_checker(case.V, case.F, scaled, view_of(name), drawn[-1], texture, pixels)
         octaves, _ = face_distortion(case.V, case.F, uv)
-        rgb = sheets.lit(case.V, case.F, sheets.area_colours(octaves))
-        sheets.layout(uv, rgb, layouts[-1], pixels)
+        rgb = plates.lit(case.V, case.F, plates.area_colours(octaves))
+        plates.layout(uv, rgb, layouts[-1], pixels)
     titles = [f"balance {b:g}" for b in BALANCES]
-    rows = [("", drawn, captions, None), ("", layouts, [""] * len(BALANCES), sheets.AREA_SCALE)]
-    sheets.sheet(out / f"{name}_balance.png", titles, rows)
+    rows = [("", drawn, captions, None), ("", layouts, [""] * len(BALANCES), plates.AREA_SCALE)]
+    plates.plate(out / f"{name}_balance.png", titles, rows)
 
 
-def globe_sheet(names, out, scratch, pixels):
+def globe_plate(names, out, scratch, pixels):
     """A map of the world on closed models, from conformal to area preserving, by their equirectangular layouts."""
     world = world_map.draw(scratch / "world.png")
     rows = []
@@ -119,7 +119,7 @@ def globe_sheet(names, out, scratch, pixels):
             renders.render_checker(V, F, uv, view, drawn[-1], world, pixels)
             captions.append(sphere_caption(V, F, points))
         rows.append((name.replace("_", " "), drawn, captions, None))
-    sheets.sheet(out / "globes.png", ["Conformal", "Balance 0.5", "Area preserving"], rows)
+    plates.plate(out / "globes.png", ["Conformal", "Balance 0.5", "Area preserving"], rows)
 
 
 def globe_maps(V, F):
@@ -141,7 +141,7 @@ def sphere_caption(V, F, points):
     return f"area error {figures['area_l1']:.3f}   shear {figures['angle_mean']:.2f}"
 
 
-def circle_sheet(name, out, scratch, pixels):
+def circle_plate(name, out, scratch, pixels):
     """A packing of equal circles on the surface: a conformal map keeps them round, ours keeps their areas.
 
     As Su 2015, figure 14.
@@ -159,12 +159,12 @@ def circle_sheet(name, out, scratch, pixels):
         scaled = textures.equal_density(case.V, case.F, uv, CIRCLES.get(name, PACKED))
         renders.render_checker(case.V, case.F, scaled, view_of(name), drawn[-1], texture, pixels)
         octaves, _ = face_distortion(case.V, case.F, uv)
-        sheets.layout(uv, sheets.lit(case.V, case.F, sheets.area_colours(octaves)), layouts[-1], pixels)
-    rows = [("", drawn, captions, None), ("", layouts, [""] * len(uvs), sheets.AREA_SCALE)]
-    sheets.sheet(out / f"{name}_circles.png", list(uvs), rows)
+        plates.layout(uv, plates.lit(case.V, case.F, plates.area_colours(octaves)), layouts[-1], pixels)
+    rows = [("", drawn, captions, None), ("", layouts, [""] * len(uvs), plates.AREA_SCALE)]
+    plates.plate(out / f"{name}_circles.png", list(uvs), rows)
 
 
-def remesh_sheet(names, out, scratch, pixels):
+def remesh_plate(names, out, scratch, pixels):
     """Wireframes of about as many vertices: QuadriFlow's, and ours, uniform and by curvature."""
     rows = []
     for name in names:
@@ -182,7 +182,7 @@ def remesh_sheet(names, out, scratch, pixels):
             captions.append(f"{len(np.unique(G)):,} vertices, {figures['below 30 %']:.1f} % below 30 degrees")
         rows.append((name.replace("_", " "), drawn, captions, None))
     titles = ["Input", "Blender QuadriFlow", f"{OURS}, uniform", f"{OURS}, by curvature"]
-    sheets.sheet(out / "remesh.png", titles, rows)
+    plates.plate(out / "remesh.png", titles, rows)
 
 
 def _remeshed(V, F, density):
@@ -190,7 +190,7 @@ def _remeshed(V, F, density):
     return found.vertices, found.triangles
 
 
-def strategies_sheet(name, out, scratch, pixels):
+def strategies_plate(name, out, scratch, pixels):
     """Wireframes of the four pairs of maps to sample and to triangulate on (B. Gu 2018, figure 5)."""
     V, F = meshes.load_model(name)
     source, drawn, captions = RemeshSource(V, F), [], []
@@ -201,7 +201,7 @@ def strategies_sheet(name, out, scratch, pixels):
         figures = shape(found.vertices, found.triangles)
         captions.append(f"angle_p1 {figures['angle_p1']:.1f}, edges vary by {figures['edge_cv']:.2f}")
     titles = [strategy.upper() for strategy in STRATEGIES]
-    sheets.sheet(out / "strategies.png", titles, [("", drawn, captions, None)])
+    plates.plate(out / "strategies.png", titles, [("", drawn, captions, None)])
 
 
 def caption(case, uv):
@@ -216,7 +216,7 @@ def view_of(name):
 
 
 def main():
-    """Make the sheets whose models are at hand."""
+    """Make the plates whose models are at hand."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     present = [n for n in GALLERY if meshes.model_path(n)]
     parser.add_argument("--models", nargs="*", default=present or ["head"])
@@ -230,19 +230,19 @@ def main():
     args.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
         for name in args.circles:
-            circle_sheet(name, args.out, Path(scratch), args.pixels)
+            circle_plate(name, args.out, Path(scratch), args.pixels)
         for name in args.models:
             gallery(name, args.out, Path(scratch), args.pixels)
         globes = [n for n in args.globes if meshes.model_path(n)]
         if globes:
-            globe_sheet(globes, args.out, Path(scratch), 5 * args.pixels // 4)
+            globe_plate(globes, args.out, Path(scratch), 5 * args.pixels // 4)
         remeshed = [n for n in args.remeshed if meshes.model_path(n)]
         if remeshed:
-            remesh_sheet(remeshed, args.out, Path(scratch), 5 * args.pixels // 4)
-            strategies_sheet(remeshed[0], args.out, Path(scratch), 5 * args.pixels // 4)
+            remesh_plate(remeshed, args.out, Path(scratch), 5 * args.pixels // 4)
+            strategies_plate(remeshed[0], args.out, Path(scratch), 5 * args.pixels // 4)
         favourite = "lion" if "lion" in args.models else next(iter(args.models), "")
         if favourite:
-            balance_sheet(favourite, args.out, Path(scratch), 3 * args.pixels // 4)
+            balance_plate(favourite, args.out, Path(scratch), 3 * args.pixels // 4)
     magnified_graph.make(args.out / "graph_magnified.png")
     for path in sorted(args.out.glob("*.png")):
         print(f"{path} {path.stat().st_size // 1000} kB")

@@ -11,14 +11,14 @@ from remesh_scenes import arrays, ball, dressed, fill, made, remesh, values
 
 
 def cube_with_marks():
-    """A cube whose top rim is sharp, creased, to be bevelled, and marked with an attribute."""
+    """A cube whose top edges are sharp, creased, to be bevelled, and marked with an attribute."""
     obj = scenes.cube()
     mesh = obj.data
     top = np.array([all(mesh.vertices[v].co.z > 0 for v in edge.vertices) for edge in mesh.edges])
     mesh.edges.foreach_set("use_edge_sharp", top)
     fill(mesh, "crease_edge", "FLOAT", "EDGE", np.where(top, 0.5, 0).astype(np.float32))
     fill(mesh, "bevel_weight_edge", "FLOAT", "EDGE", np.where(top, 0.25, 0).astype(np.float32))
-    fill(mesh, "rim", "INT", "EDGE", np.where(top, 7, 0).astype(np.int32))
+    fill(mesh, "top", "INT", "EDGE", np.where(top, 7, 0).astype(np.int32))
     fill(mesh, "way", "FLOAT_VECTOR", "EDGE", np.outer(top, [1, 2, 3]).astype(np.float32), "vector")
     fill(mesh, "everywhere", "FLOAT", "EDGE", np.ones(len(top), np.float32))
     return obj
@@ -33,7 +33,7 @@ def test_marks_and_attributes_of_edges_are_carried_along_lines_that_are_kept(cap
     co, _ = arrays(new)
     z = co[np.array([edge.vertices[:] for edge in mesh.edges])][:, :, 2]
     ends = np.array([edge.vertices[:] for edge in mesh.edges])
-    # The cube is that from 0 to 1; the rim's edges lie in one of its four sides.
+    # The cube is that from 0 to 1; those of the top lie in one of its four sides.
     on_side = np.abs(np.concatenate([co[:, :2], 1 - co[:, :2]], axis=1)) < 1e-5
     top = (np.abs(z - 1) < 1e-5).all(axis=1) & on_side[ends].all(axis=1).any(axis=1)
     assert top.sum() > 12
@@ -41,7 +41,7 @@ def test_marks_and_attributes_of_edges_are_carried_along_lines_that_are_kept(cap
     assert (sharp == top).all()
     assert (values(mesh, "crease_edge") == np.where(top, 0.5, 0)).all()
     assert (values(mesh, "bevel_weight_edge") == np.where(top, 0.25, 0)).all()
-    assert (values(mesh, "rim") == np.where(top, 7, 0)).all()
+    assert (values(mesh, "top") == np.where(top, 7, 0)).all()
     assert (values(mesh, "way", "vector", 3) == np.outer(top, [1, 2, 3])).all()
     # A mark that is everywhere cannot be followed.
     assert "everywhere" not in mesh.attributes

@@ -28,10 +28,10 @@ def test_commands(run, tmp_path):
     again = (tmp_path / "m.blend", "-o", tmp_path / "n.blend", "--weights", "w", "--report", report)
     status, out, err = run("magnify", *again, "--factor", 0.7, "--source", "uv", "--cascade", 2)
     assert status == 0, err
-    lens = json.loads(report.read_text())
-    assert lens["share"]["before"] == pytest.approx(told["after"], rel=1e-3)
-    assert lens["share"]["after"] == pytest.approx(0.49 * told["after"], rel=5e-3)
-    assert lens["charts"][0]["folds"] == 0
+    inside = json.loads(report.read_text())
+    assert inside["share"]["before"] == pytest.approx(told["after"], rel=1e-3)
+    assert inside["share"]["after"] == pytest.approx(0.49 * told["after"], rel=5e-3)
+    assert inside["charts"][0]["folds"] == 0
 
 
 def test_command_warps_a_picture(run, tmp_path):

@@ -159,8 +159,8 @@ def test_all_together_keeps_the_differences():
     assert bpy.ops.uv.omt_density_set(density=200.0, texture_size=1024, scope="ALL") == {"FINISHED"}
     np.testing.assert_allclose(densities(obj) / ratio, (densities(obj) / ratio)[0], rtol=1e-5)
     assert bpy.ops.uv.omt_density_get(texture_size=1024) == {"FINISHED"}
-    wanted = bpy.context.window_manager.operator_properties_last("uv.omt_density_set")
-    assert wanted.density == pytest.approx(200.0, rel=1e-5)
+    target = bpy.context.window_manager.operator_properties_last("uv.omt_density_set")
+    assert target.density == pytest.approx(200.0, rel=1e-5)
 
 
 def test_density_is_per_metre_whatever_the_units():

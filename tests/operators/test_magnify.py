@@ -291,10 +291,10 @@ def test_linked_meshes_are_refused(tmp_path):
     painted()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
-        wanted.objects = ["Bump"]
-    bpy.context.collection.objects.link(wanted.objects[0])
-    scenes.select([wanted.objects[0]])
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, linked):
+        linked.objects = ["Bump"]
+    bpy.context.collection.objects.link(linked.objects[0])
+    scenes.select([linked.objects[0]])
     for operator in (bpy.ops.uv.omt_magnify, bpy.ops.object.omt_weights):
         assert "linked from a library" in scenes.error_of(operator)
 

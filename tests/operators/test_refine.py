@@ -141,13 +141,13 @@ def test_pins_stay_to_the_bit(mode):
 
 def test_outlines_stay_on_request():
     obj = ring()
-    rim = {
+    outline = {
         v
         for e in obj.data.edges
         for v in e.vertices
         if sum(set(e.vertices) <= set(p.vertices) for p in obj.data.polygons) == 1
     }
-    corners = np.array([loop.vertex_index in rim for loop in obj.data.loops])
+    corners = np.array([loop.vertex_index in outline for loop in obj.data.loops])
     before, worse = scenes.uv_of(obj), error(obj)
     refine(keep_boundary=True)
     after = scenes.uv_of(obj)

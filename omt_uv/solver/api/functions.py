@@ -127,7 +127,7 @@ def magnify(
     Parameters
     ----------
     vertices, faces, uv : as for `refine`
-    weights : (n,) in [0, 1], the region: 1 inside, 0 outside, between them a soft rim
+    weights : (n,) in [0, 1], the region: 1 inside, 0 outside, between them a smooth step
     factor : how many times its share the region gets
     progress : called with every `Progress`
     **options : exact (True; False for the factor between weight 1 and 0), boundary "own" (circles and straight sides

@@ -39,7 +39,7 @@ def lattice(period, size):
     return lambda i, j: (i % period >= 1) & (i % period <= size) & (j % period >= 1) & (j % period <= size)
 
 
-def wavy_sheet(n, hole):
+def wavy_plate(n, hole):
     p, F = punched(n, n, hole)
     p = 10 * p
     return np.column_stack([p, 0.5 * np.sin(p[:, 0]) * np.cos(1.3 * p[:, 1])]), F
@@ -112,8 +112,8 @@ def check(V, F, shear, parts=1):
     return result
 
 
-def test_a_sheet_full_of_holes_is_mapped_whole():
-    V, F = wavy_sheet(25, lattice(3, 1))
+def test_a_plate_full_of_holes_is_mapped_whole():
+    V, F = wavy_plate(25, lattice(3, 1))
     assert len(boundary_loops(F)) > 33
     result = check(V, F, 1.2)
     assert len(result.seams) == 0 and "holes" in result.warnings[0]
@@ -140,13 +140,13 @@ def test_a_box_full_of_holes_has_its_net():
 
 
 def test_few_holes_are_cut_to():
-    V, F = wavy_sheet(12, lattice(3, 1))
+    V, F = wavy_plate(12, lattice(3, 1))
     (chart,) = cut_to_disks(triangle_surface(V, F), sieve=32).charts
     assert len(chart.patches) == 0
 
 
 def test_a_frame_of_few_holes_is_cut():
-    result = check(*wavy_sheet(44, lattice(11, 9)), 1.3)
+    result = check(*wavy_plate(44, lattice(11, 9)), 1.3)
     assert len(result.seams) and not len(result.charts[0].patches)
 
 
@@ -188,12 +188,12 @@ def test_seams_of_a_sieve_that_leave_a_tube_are_refused():
 
 
 def test_who_prepares_without_asking_for_it_gets_no_patches():
-    charts = cut_to_disks(triangle_surface(*wavy_sheet(25, lattice(3, 1)))).charts
+    charts = cut_to_disks(triangle_surface(*wavy_plate(25, lattice(3, 1)))).charts
     assert not any(len(c.patches) for c in charts)
 
 
 def test_marked_seams_are_kept_in_sieves():
-    V, F = wavy_sheet(25, lattice(3, 1))
+    V, F = wavy_plate(25, lattice(3, 1))
     line = np.flatnonzero(np.abs(V[:, 0] - 4.8) < 1e-9)
     line = line[np.argsort(V[line, 1])]
     seams = np.column_stack([line[:-1], line[1:]])
@@ -203,7 +203,7 @@ def test_marked_seams_are_kept_in_sieves():
 
 
 def test_what_hangs_by_a_vertex_is_packed_with_what_fills_its_holes():
-    chart = cut_to_disks(triangle_surface(*wavy_sheet(25, lattice(3, 1))), sieve=32).charts[0]
+    chart = cut_to_disks(triangle_surface(*wavy_plate(25, lattice(3, 1))), sieve=32).charts[0]
     assert _connected_triangles(chart) is chart.triangles
     half = len(chart.triangles) // 2
     quad, two = (replace(chart, triangles=chart.triangles[[0, k]]) for k in (half, half - 1))
@@ -223,7 +223,7 @@ def test_sieves_are_the_same_in_every_unit_and_place(change):
 
 
 def test_all_but_the_longest_boundary_are_filled_with_a_fan_each():
-    V, F = wavy_sheet(9, lattice(4, 2))
+    V, F = wavy_plate(9, lattice(4, 2))
     surface, gluing = triangle_surface(V, F), gluing_of(V, F)
     one_sided = np.zeros(len(F), bool)
     around, hole = hole_boundaries(V, gluing, one_sided)
@@ -239,7 +239,7 @@ def test_all_but_the_longest_boundary_are_filled_with_a_fan_each():
 
 
 def test_a_hole_is_filled_around_its_middle():
-    V, F = wavy_sheet(6, lattice(5, 3))
+    V, F = wavy_plate(6, lattice(5, 3))
     V[:, 2] = 0
     found = fill_holes(triangle_surface(V, F), gluing_of(V, F), np.zeros(len(F), bool))
     for k in range(found.holes):
@@ -251,7 +251,7 @@ def test_a_hole_is_filled_around_its_middle():
 
 
 def test_one_sided_surfaces_and_few_holes_are_left_alone():
-    V, F = wavy_sheet(9, lattice(4, 2))
+    V, F = wavy_plate(9, lattice(4, 2))
     surface, gluing = triangle_surface(V, F), gluing_of(V, F)
     assert fill_holes(surface, gluing, np.ones(len(F), bool)).holes == 0
     assert fill_holes(surface, gluing, np.zeros(len(F), bool), sieve=32).gluing is gluing

@@ -129,7 +129,7 @@ def test_what_is_no_disk(shape, kind, words):
     assert words in error.cause and len(error.elements)
 
 
-def test_a_handle_with_a_rim():
+def test_a_handle_with_a_boundary():
     V, F = meshes.torus()
     assert "handle" in rejected(errors.NotADiskError, V, F[1:]).cause
 

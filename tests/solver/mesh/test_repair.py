@@ -44,7 +44,7 @@ def fin():
     return np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -1, 0], [0.5, 0, 1.0]]), [[0, 1, 2], [1, 0, 3], [0, 1, 4]]
 
 
-def test_three_sheets_become_three_charts():
+def test_three_fins_become_three_charts():
     result = prepared(*fin())
     assert [len(c.triangles) for c in result.charts] == [1, 1, 1]
     assert result.cuts.edges.tolist() == [[0, 1]] and result.cuts.torn.tolist() == [[0, 1]]

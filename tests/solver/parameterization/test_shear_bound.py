@@ -1,4 +1,4 @@
-"""The cut budget: more seam, less shear, and charts that stay disks."""
+"""The shear bound: more seam, less shear, and charts that stay disks."""
 
 import meshes
 import numpy as np

@@ -49,7 +49,7 @@ def test_no_face_folds_on_the_way_back(name):
 
 
 @pytest.mark.parametrize("name", ["head", "random_disk", "grid"])
-def test_vertices_are_left_where_they_are_wanted(name):
+def test_vertices_are_left_where_the_density_asks_for_them(name):
     """Of a part that is to have eight times as many vertices for its area a greater share stays than of the rest."""
     V, F, flat, mass, _ = coarse_of(name)
     inside = np.linalg.norm(V - V[np.argmax(V @ [1.0, 0.6, 0.3])], axis=1) < 0.35 * np.ptp(V, axis=0).max()

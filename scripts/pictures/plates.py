@@ -1,4 +1,4 @@
-"""Draw UV layouts in the colours of their distortion, and compose pictures into labelled sheets."""
+"""Draw UV layouts in the colours of their distortion, and compose pictures into labelled plates."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def layout(uv, rgb, path, pixels=480):
     image.resize((pixels, pixels), Image.Resampling.LANCZOS).save(path)
 
 
-def sheet(path, columns, rows):
-    """Compose pictures into a labelled sheet.
+def plate(path, columns, rows):
+    """Compose pictures into a labelled plate.
 
     columns : titles
     rows : (title, pictures, captions, scale), one picture path and one caption per column; scale is None or
