@@ -2,6 +2,10 @@
 
 All area figures compare *shares*: a face's share of the UV area with its share of the surface, so that one scale for
 the whole mesh does not count. All angle figures come from the singular values s1 >= s2 of the face's Jacobian.
+
+A face is a polygon where it is said which polygon every triangle belongs to, a triangle otherwise. Then its area on the
+surface is that of `mesh.polygon_areas`, in the map the sum over its triangles, and the shear of a quad is the mean over
+both its triangulations, by area: no figure of a quad that is convex in the map knows which diagonal cuts it.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ import numpy as np
 
 from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
 from ..mesh.geometry import cross2, face_areas
+from ..mesh.polygon_areas import BOTH, polygon_areas, quads
 from ..mesh.topology import graph_components
 from .overlap import overlap_share
 
@@ -26,12 +31,13 @@ class Distortion:
     """Figures of one UV map; every figure but the counts is independent of its scale, rotation and mirror image.
 
     faces, charts : how many were measured; a chart is connected by edges with equal UVs at both ends
-    folds : faces whose orientation differs from most of their chart's area, or without UV area
+    folds : faces with a triangle whose orientation differs from most of their chart's area, or without UV area
     area_l1 : share of the UV area that is in the wrong place times two, sum |UV share - surface share|; 0 is exact
     area_sd : area-weighted standard deviation of the ratio of the shares; 0 is exact
     area_p99, area_max : |log2 ratio| in octaves that 99 % of the surface stays under; the largest without folds
-    angle_mean, angle_p99 : area-weighted mean and 99th percentile of s1/s2 over faces without folds; 1 is conformal
-    seed_area, seed_angle : mean of r + 1/r, and of s1/s2 + s2/s1, over faces without folds; 2 is exact
+    angle_mean, angle_p99 : area-weighted mean and 99th percentile of s1/s2 over triangles that are not turned; 1 is
+        conformal
+    seed_area, seed_angle : mean of r + 1/r over faces without folds, and of s1/s2 + s2/s1; 2 is exact
         (Dominitz & Tannenbaum 2010, Tables 2 and 1); None where every face is folded
     overlap : share of the UV area that is covered more than once; None where it was not asked for
     uv_min, uv_max : corners of the bounding box
@@ -59,20 +65,28 @@ class Distortion:
 
 @dataclass(frozen=True)
 class _FaceFigures:
-    """Per measured face: share of the surface, UV share / surface share (negative where folded), s1/s2, chart."""
+    """Per measured face: share of the surface, UV share / surface share (negative where folded), s1/s2 of what is not
+    turned, whether all, and whether nothing of it is; the number of charts."""
 
     weight: np.ndarray
     ratio: np.ndarray
     shear: np.ndarray
+    folded: np.ndarray
+    turned: np.ndarray
     charts: int
 
-    @property
-    def folded(self) -> np.ndarray:
-        """Faces (m,) bool that are folded, or without UV area."""
-        return self.ratio <= 0
+
+@dataclass(frozen=True)
+class _Triangles:
+    """Triangles of the surface and the map: V (n,3), F (m,3), uv (m,3,2), and the areas (m,) that they are to have."""
+
+    V: np.ndarray
+    F: np.ndarray
+    uv: np.ndarray
+    target: np.ndarray
 
 
-def distortion(V, F, uv, *, overlap: bool = True, density=None) -> Distortion:
+def distortion(V, F, uv, *, overlap: bool = True, density=None, polygons=None) -> Distortion:
     """Area error, shear, folds and overlap of a UV map.
 
     Parameters
@@ -83,6 +97,7 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None) -> Distortion:
     overlap : also sample the overlap, which is most of the cost (100,000 faces: 0.2 of 0.3 seconds)
     density : (m,) > 0, how many times its area every face is meant to have; then "share of the surface" above is its
         share of area times density
+    polygons : (m,) the polygon of every triangle, any numbers; None where each is its own. Figures are of polygons
 
     Raises
     ------
@@ -91,13 +106,15 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None) -> Distortion:
     ZeroAreaFaceError : no face has an area in 3D
     """
     V, F, uv = _checked(V, F, uv)
-    area, real = _surface_area(V, F)
+    polygons = _counted(polygons, len(F))
+    area, real = _surface_area(V, F, polygons)
     target = area if density is None else area * np.asarray(density, float)
-    faces = _measure_faces(V, F[real], uv[real], target[real])
+    faces = _measure_faces(_Triangles(V, F[real], uv[real], target[real]), None if polygons is None else polygons[real])
     w, ratio, good = faces.weight, faces.ratio, ~faces.folded
     octaves = np.abs(np.log2(np.maximum(ratio, RATIO_FLOOR)))
-    w_good, r_good, s_good = w[good], ratio[good], faces.shear[good]
-    any_good = bool(good.any())
+    r_good, sheared = ratio[good], ~faces.turned
+    w_sheared, s_sheared = w[sheared], faces.shear[sheared]
+    any_sheared = bool(sheared.any())
     corners = uv[real].reshape(-1, 2)
     return Distortion(
         faces=len(w),
@@ -107,30 +124,33 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None) -> Distortion:
         area_sd=float(np.sqrt(w @ (ratio - 1) ** 2)),
         area_p99=_weighted_quantile(octaves, w, 0.99),
         area_max=float(octaves[good].max(initial=0.0)),
-        angle_mean=float(w_good @ s_good / w_good.sum()) if any_good else 0.0,
-        angle_p99=_weighted_quantile(s_good, w_good, 0.99) if any_good else 0.0,
-        seed_area=float((r_good + 1 / r_good).mean()) if any_good else None,
-        seed_angle=float((s_good + 1 / s_good).mean()) if any_good else None,
+        angle_mean=float(w_sheared @ s_sheared / w_sheared.sum()) if any_sheared else 0.0,
+        angle_p99=_weighted_quantile(s_sheared, w_sheared, 0.99) if any_sheared else 0.0,
+        seed_area=float((r_good + 1 / r_good).mean()) if len(r_good) else None,
+        seed_angle=float((s_sheared + 1 / s_sheared).mean()) if any_sheared else None,
         overlap=overlap_share(uv[real]) if overlap else None,
         uv_min=tuple(corners.min(0).tolist()),
         uv_max=tuple(corners.max(0).tolist()),
         finite=True,
-        skipped_zero_area_faces=int((~real).sum()),
+        skipped_zero_area_faces=int((~real).sum()) if polygons is None else len(np.unique(polygons[~real])),
     )
 
 
-def face_distortion(V, F, uv) -> tuple[np.ndarray, np.ndarray]:
+def face_distortion(V, F, uv, polygons=None) -> tuple[np.ndarray, np.ndarray]:
     """Signed octaves (m,) and shear s1/s2 (m,) of every face, for colours; arguments and errors as for `distortion`.
 
     Octaves are log2 of UV share over surface share: positive where the face has too much texture. A folded face has
-    log2 of RATIO_FLOOR (about -40), a face without area in 3D has 0 and shear 1.
+    log2 of RATIO_FLOOR (about -40), a face without area in 3D has 0 and shear 1. With polygons (m,), every triangle has
+    the values of its polygon.
     """
     V, F, uv = _checked(V, F, uv)
-    area, real = _surface_area(V, F)
-    faces = _measure_faces(V, F[real], uv[real], area[real])
+    polygons = _counted(polygons, len(F))
+    area, real = _surface_area(V, F, polygons)
+    of = np.arange(real.sum()) if polygons is None else np.unique(polygons[real], return_inverse=True)[1].ravel()
+    faces = _measure_faces(_Triangles(V, F[real], uv[real], area[real]), None if polygons is None else of)
     octaves, shear = np.zeros(len(F)), np.ones(len(F))
-    octaves[real] = np.log2(np.maximum(faces.ratio, RATIO_FLOOR))
-    shear[real] = faces.shear
+    octaves[real] = np.log2(np.where(faces.folded, RATIO_FLOOR, np.maximum(faces.ratio, RATIO_FLOOR)))[of]
+    shear[real] = faces.shear[of]
     return octaves, shear
 
 
@@ -151,24 +171,93 @@ def _checked(V, F, uv):
     return V, F, uv
 
 
-def _surface_area(V, F):
-    """3D areas (m,) and which faces have one (m,)."""
-    area = face_areas(V, F)
-    real = area > NEGLIGIBLE_AREA * area.sum()
+def _counted(polygons, m: int) -> np.ndarray | None:
+    """Polygons (m,) counted from 0; None where each triangle is a polygon of its own."""
+    if polygons is None:
+        return None
+    if np.shape(polygons) != (m,):
+        raise ValueError(f"expected polygons ({m},), got {np.shape(polygons)}")
+    found, counted = np.unique(polygons, return_inverse=True)
+    return None if len(found) == m else counted.ravel()
+
+
+def _surface_area(V, F, polygons):
+    """3D areas (m,), summing to those of the polygons (m,), and which triangles belong to faces with an area (m,)."""
+    area = polygon_areas(V, F, polygons)
+    whole = area if polygons is None else np.bincount(polygons, area)
+    real = whole > NEGLIGIBLE_AREA * whole.sum()
     if not real.any():
         raise ZeroAreaFaceError("No face has an area", "", "face", np.arange(len(F)))
-    return area, real
+    return area, real if polygons is None else real[polygons]
 
 
-def _measure_faces(V, F, uv, area) -> _FaceFigures:
-    """Figures of the faces of a map (m,3,2) with the areas (m,) that they are to have."""
-    charts, chart = uv_charts(F, uv)
+def _measure_faces(mesh: _Triangles, polygons) -> _FaceFigures:
+    """Figures of the faces of a map: of its triangles, or of polygons (m,)."""
+    uv = mesh.uv
+    charts, chart = uv_charts(mesh.F, uv)
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     uv_area = 0.5 * cross2(a, b)
     mirrored = np.bincount(chart, uv_area, charts) < 0
-    weight = area / area.sum()
-    share = np.where(mirrored[chart], -uv_area, uv_area) / max(np.abs(uv_area).sum(), np.finfo(float).tiny)
-    return _FaceFigures(weight=weight, ratio=share / weight, shear=shear_of(V, F, a, b), charts=charts)
+    signed = np.where(mirrored[chart], -uv_area, uv_area)
+    if polygons is not None:
+        return _measure_polygons(
+            mesh, signed, mirrored[chart], np.unique(polygons, return_inverse=True)[1].ravel(), charts
+        )
+    weight = mesh.target / mesh.target.sum()
+    ratio = signed / max(np.abs(uv_area).sum(), np.finfo(float).tiny) / weight
+    return _FaceFigures(
+        weight=weight,
+        ratio=ratio,
+        shear=shear_of(mesh.V, mesh.F, a, b),
+        folded=ratio <= 0,
+        turned=ratio <= 0,
+        charts=charts,
+    )
+
+
+def _measure_polygons(mesh: _Triangles, signed, mirrored, polygons, charts: int) -> _FaceFigures:
+    """Figures of polygons (m,), counted from 0, from the UV areas (m,) of the triangles, and those mirrored (m,)."""
+    target = np.bincount(polygons, mesh.target)
+    has = np.bincount(polygons, signed)
+    weight = target / target.sum()
+    ratio = has / max(np.abs(has).sum(), np.finfo(float).tiny) / weight
+    area = face_areas(mesh.V, mesh.F)
+    back = (signed <= 0) & (area > NEGLIGIBLE_AREA * area.sum())
+    shear, turned = _shear_of_polygons(mesh, polygons, mirrored)
+    return _FaceFigures(
+        weight=weight,
+        ratio=ratio,
+        shear=shear,
+        folded=(np.bincount(polygons, back) > 0) | (ratio <= 0),
+        turned=turned,
+        charts=charts,
+    )
+
+
+def _shear_of_polygons(mesh: _Triangles, polygons, mirrored) -> tuple[np.ndarray, np.ndarray]:
+    """s1/s2 (p,) of polygons (m,), the mean by area over triangles that are not turned, and whether all are (p,) bool.
+
+    Of a quad the four triangles of both diagonals count, of other polygons those given. Where all are turned, the mean
+    is over all of them.
+    """
+    square = quads(mesh.F, polygons)
+    alone = np.ones(len(mesh.F), bool)
+    rows = square // 3
+    alone[rows[:, :2]] = False
+    corner = np.concatenate([np.arange(mesh.F.size).reshape(-1, 3)[alone], square[:, BOTH].reshape(-1, 3)])
+    F, uv = mesh.F.ravel()[corner], mesh.uv.reshape(-1, 2)[corner]
+    of, flip = polygons[corner[:, 0] // 3], mirrored[corner[:, 0] // 3]
+    area = face_areas(mesh.V, F)
+    real = area > NEGLIGIBLE_AREA * area.sum()
+    F, uv, of, flip, area = F[real], uv[real], of[real], flip[real], area[real]
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    forward = cross2(a, b) * np.where(flip, -1, 1) > 0
+    count = int(polygons.max()) + 1
+    turned = np.bincount(of, forward, count) == 0
+    weight = np.where(forward | turned[of], area, 0)
+    total = np.bincount(of, weight, count)
+    mean = np.bincount(of, weight * shear_of(mesh.V, F, a, b), count)
+    return np.divide(mean, total, out=np.ones(count), where=total > 0), turned
 
 
 def shear_of(V, F, a, b):

@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..mesh.polygon_areas import BOTH, quad_corners, triangle_pairs
 from .energy import Elements, Quads, elements, hat_gradients
 
 # Triangles of a polygon with one area, at most: a row of the Hessian joins all its corners, and long rows fill it.
 MOST_TRIANGLES = 8
 # Share of a quad's area that each of its four triangles needs, on the surface and in the map, for both triangulations.
 CONVEX = 0.03
-# Corners of a quad's four triangles: those of the diagonal given, then the others.
-BOTH = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
 
 
 @dataclass(frozen=True)
@@ -65,33 +64,17 @@ def polygon_mesh(triangles: np.ndarray, faces: np.ndarray) -> PolygonMesh:
     owner = np.unique(faces, return_inverse=True)[1].ravel()
     sides = np.bincount(owner)
     order = np.argsort(owner, kind="stable")
-    start = np.cumsum(sides) - sides
-    pairs = np.flatnonzero(sides == 2)
-    first, second = order[start[pairs]], order[start[pairs] + 1]
-    quads, joined = _quads(triangles[first], triangles[second])
+    first, second = triangle_pairs(owner)
+    corners, joined = quad_corners(triangles, first, second)
     is_quad = np.zeros(len(sides), bool)
-    is_quad[pairs[joined]] = True
+    is_quad[owner[first[joined]]] = True
     rest = order[~is_quad[owner[order]]]
     # Long polygons and two triangles that share no side: each triangle for itself.
     long = (sides > MOST_TRIANGLES) | ((sides == 2) & ~is_quad)
     label = np.where(long[owner[rest]], len(sides) + rest, owner[rest])
     polygon = np.unique(label, return_inverse=True)[1].ravel()
     both = np.column_stack([first, second])[joined].ravel()
-    return PolygonMesh(triangles[rest], polygon, quads[joined], np.concatenate([rest, both]))
-
-
-def _quads(one: np.ndarray, two: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Quads (k,4) of pairs of triangles (k,3), the common side from corner 0 to 2; which (k,) bool have one."""
-    shared = (one[:, :, None] == two[:, None, :]).any(axis=2)
-    # From the corner that the other triangle lacks.
-    turn = (~shared).argmax(axis=1)[:, None] + np.arange(3)
-    one = np.take_along_axis(one, turn % 3, axis=1)
-    apart = ~(one[:, :, None] == two[:, None, :]).any(axis=1)
-    turn = apart.argmax(axis=1)[:, None] + np.arange(3)
-    two = np.take_along_axis(two, turn % 3, axis=1)
-    joined = (shared.sum(axis=1) == 2) & (one[:, 1] == two[:, 2]) & (one[:, 2] == two[:, 1])
-    # one = (a, b, d) and two = (c, d, b): the quad b, c, d, a.
-    return np.column_stack([one[:, 1], two[:, 0], one[:, 2], one[:, 0]]), joined
+    return PolygonMesh(triangles[rest], polygon, triangles.ravel()[corners[joined]], np.concatenate([rest, both]))
 
 
 def polygon_elements(

@@ -16,6 +16,7 @@ __getattr__, __all__ = lazy(
     geometry="angle_defects cotangent_laplacian face_areas face_normals signed_areas vertex_areas vertex_normals",
     gluing="Gluing components corner_classes orientations turn_over",
     point_location="locate",
+    polygon_areas="quad_corners quads triangle_pairs",
     repair="Repaired perturbed repaired_gluing with_area",
     spherical_geometry="signed_volumes spherical_areas",
     surface="Surface chosen_triangles strict_gluing triangle_surface",

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..maps.energy import Elements, area_forms, face_derivatives, sum_at_vertices
 from ..maps.mirror_symmetry import MirrorSymmetry
-from ..maps.polygon_elements import BOTH
+from ..mesh.polygon_areas import BOTH
 
 # Quads whose rows are dense at a time: 17 rows of 8 numbers each.
 CHUNK = 20_000

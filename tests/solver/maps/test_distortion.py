@@ -9,11 +9,14 @@ from pathlib import Path
 
 import meshes
 import numpy as np
+import polygons
 import pytest
 
 from omt_uv.solver.errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
 from omt_uv.solver.maps.distortion import RATIO_FLOOR, distortion, face_distortion
 from omt_uv.solver.maps.overlap import overlap_share
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.mesh.polygon_areas import polygon_areas
 
 JUDGE = Path(os.environ.get("OMT_UV_JUDGE") or meshes.ROOT.parent / "shared" / "tools" / "judge_uv.py")
 needs_judge = pytest.mark.skipif(not JUDGE.is_file(), reason=f"no judge at {JUDGE}: set OMT_UV_JUDGE to judge_uv.py")
@@ -181,15 +184,15 @@ def test_faces_without_area_are_skipped_and_vanished_maps_are_all_folds():
     assert vanished.folds == 18 and vanished.seed_area is None and vanished.overlap == 0
 
 
-def judge(V, F, uv):
+def judge_module():
     spec = importlib.util.spec_from_file_location("judge_uv", JUDGE)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.judge(V, F, uv)
+    return module
 
 
 def assert_agrees(V, F, uv):
-    ours, theirs = asdict(distortion(V, F, uv)), judge(V, F, uv)
+    ours, theirs = asdict(distortion(V, F, uv)), judge_module().judge(V, F, uv)
     assert set(theirs) <= set(ours)
     for name, value in theirs.items():
         assert ours[name] == pytest.approx(value, rel=1e-4, abs=1e-4), name
@@ -221,3 +224,96 @@ def test_agrees_with_the_judge_on_models(name):
     axes = np.linalg.svd(spread.T @ spread)[0][:, :2]
     X = spread @ axes
     assert_agrees(V, F, np.float32(X / np.ptp(X))[F].astype(float))
+
+
+def measured(V, faces, uv, turn=0, order=None):
+    """Figures of a map (n,2) of polygons cut from one of their corners, in some order of the polygons."""
+    F, owner = polygons.cut(faces if order is None else [faces[k] for k in order], turn)
+    return {**asdict(distortion(V, F, uv[F], polygons=owner, overlap=False)), "overlap": 0.0}
+
+
+@pytest.mark.parametrize("turn", [1, 2, 3])
+def test_figures_of_quads_do_not_depend_on_the_diagonals(turn):
+    V, faces, uv = polygons.wavy_quads()
+    expected, found = measured(V, faces, uv), measured(V, faces, uv, turn)
+    assert expected["faces"] == len(faces) and expected["folds"] == 0 and expected["area_l1"] > 0.01
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=1e-12), name
+
+
+@pytest.mark.parametrize("turn", [1, 4])
+def test_areas_of_polygons_depend_neither_on_diagonals_nor_on_the_order_of_faces(turn):
+    V, faces, uv = polygons.wavy_mixed()
+    order = np.random.default_rng(turn).permutation(len(faces))
+    expected, found = measured(V, faces, uv), measured(V, faces, uv, turn, order)
+    for name in ("faces", "charts", "folds", "area_l1", "area_sd", "area_p99", "area_max", "seed_area"):
+        assert found[name] == pytest.approx(expected[name], rel=1e-12), name
+    same = measured(V, faces, uv, 0, order)
+    for name, value in expected.items():
+        assert same[name] == pytest.approx(value, rel=1e-12), name
+
+
+@needs_judge
+@pytest.mark.parametrize("scene", [polygons.wavy_quads, polygons.wavy_mixed])
+def test_area_error_of_polygons_agrees_with_the_judge(scene):
+    V, faces, uv = scene()
+    vertex = np.concatenate(faces)
+    start = np.concatenate([[0], np.cumsum([len(p) for p in faces])[:-1]])
+    theirs = judge_module().polygon_error(V, start, vertex, uv[vertex])
+    assert measured(V, faces, uv)["area_l1"] == pytest.approx(theirs, rel=1e-12) and theirs > 0.01
+
+
+def test_polygons_that_are_triangles_change_no_bit():
+    V, F, uv = rough_map()
+    for polygons_of in (np.arange(len(F)), np.arange(len(F))[::-1] * 3 - 5):
+        assert distortion(V, F, uv, polygons=polygons_of) == distortion(V, F, uv)
+        assert np.array_equal(face_distortion(V, F, uv, polygons_of), face_distortion(V, F, uv))
+
+
+def test_triangles_among_polygons_measure_as_without():
+    """One quad far away makes polygons of all, and no difference to the triangles beyond rounding."""
+    V, F, uv = rough_map()
+    W, G = meshes.quad_patch()
+    V, F = np.concatenate([V, W + [5, 0, 0]]), np.concatenate([F, G + len(V)])
+    uv = np.concatenate([uv, W[G][..., :2] + [5, 0]])
+    owner = np.minimum(np.arange(len(F)), len(F) - 2)
+    alone, found = distortion(V, F, uv, overlap=False), distortion(V, F, uv, overlap=False, polygons=owner)
+    assert found.faces == alone.faces - 1 and found.folds == alone.folds > 0
+    for name in ("area_l1", "area_sd", "angle_mean", "angle_p99", "area_max"):
+        assert getattr(found, name) == pytest.approx(getattr(alone, name), rel=1e-10), name
+
+
+def test_shear_of_a_quad_is_that_of_both_its_triangulations():
+    V, faces, uv = polygons.wavy_quads(1, 1)
+    both = [polygons.cut(faces, turn)[0] for turn in (0, 1)]
+    F = np.concatenate(both)
+    a, b = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
+    area = np.linalg.norm(np.cross(a, b), axis=1)
+    shear = np.concatenate([face_distortion(V, f, uv[f])[1] for f in both])
+    assert measured(V, faces, uv)["angle_mean"] == pytest.approx(area @ shear / area.sum(), rel=1e-12)
+
+
+def test_a_polygon_with_a_turned_triangle_is_one_fold():
+    V, Q = meshes.quad_grid(3, 3)
+    uv = V[:, :2].copy()
+    F, owner = polygons.cut(Q)
+    inner = np.flatnonzero((np.abs(uv - uv.mean(0)) < 0.4 * np.ptp(uv, axis=0)).all(1))[0]
+    uv[inner] += 4 * (uv.mean(0) - uv[inner])
+    signed = signed_areas(uv, F)
+    found = distortion(V, F, uv[F], polygons=owner, overlap=False)
+    assert found.folds == len(np.unique(owner[signed <= 0])) > 0
+    octaves, shear = face_distortion(V, F, uv[F], owner)
+    assert np.array_equal(np.unique(owner[octaves == np.log2(RATIO_FLOOR)]), np.unique(owner[signed <= 0]))
+    pairs = owner[:, None] == owner
+    assert all((values[:, None] == values)[pairs].all() for values in (octaves, shear))
+
+
+def test_a_density_of_polygons_changes_what_is_due():
+    V, faces, uv = polygons.wavy_quads()
+    F, owner = polygons.cut(faces)
+    area = np.bincount(owner, polygon_areas(V, F, owner))
+    plane = np.bincount(owner, signed_areas(uv, F))
+    found = distortion(V, F, uv[F], density=(plane / area)[owner], polygons=owner)
+    assert found.area_l1 == pytest.approx(0, abs=1e-12) and found.area_max == pytest.approx(0, abs=1e-12)
+    with pytest.raises(ValueError, match="polygons"):
+        distortion(V, F, uv[F], polygons=owner[1:])

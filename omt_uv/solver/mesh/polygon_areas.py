@@ -1,0 +1,99 @@
+"""Measure the areas of polygons that come as triangles, whichever way they are cut.
+
+In space the corners of a polygon need not lie in a plane, so that its area depends on the triangles. A quad has the
+mean area of both its triangulations, any other polygon that of a fan around the mean of its corners, which knows no
+diagonal either. Where the fan turns back on itself, as in deep concave polygons, its triangles count.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .geometry import face_areas
+
+# Corners of a quad's four triangles: those of the diagonal given, then the others.
+BOTH = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
+
+
+def polygon_areas(positions: np.ndarray, triangles: np.ndarray, polygons: np.ndarray | None = None) -> np.ndarray:
+    """Areas (m,) of triangles (m,3) of a surface (n,3), scaled so that those of every polygon sum to its area.
+
+    polygons : (m,) the polygon of every triangle, any numbers; None where each is its own
+    """
+    area = face_areas(positions, triangles)
+    if polygons is None:
+        return area
+    owner = np.unique(polygons, return_inverse=True)[1].ravel()
+    given = np.bincount(owner, area)
+    if len(given) == len(owner):
+        return area
+    whole = given.copy()
+    corners = quads(triangles, owner)
+    both = face_areas(positions, triangles.ravel()[corners][:, BOTH].reshape(-1, 3))
+    whole[owner[corners[:, 0] // 3]] = both.reshape(-1, 4).sum(axis=1) / 2
+    several = np.flatnonzero(np.bincount(owner)[owner] > 2)
+    if len(several):
+        fan, looks_out = _fans(positions, triangles[several], owner[several], len(whole))
+        whole[looks_out] = fan[looks_out]
+    return area * np.divide(whole, given, out=np.ones(len(whole)), where=given > 0)[owner]
+
+
+def quads(triangles: np.ndarray, polygons: np.ndarray) -> np.ndarray:
+    """Quads among the polygons (m,), counted from 0, of triangles (m,3): their corners (q,4), places in the m x 3 ones.
+
+    The given diagonal goes from the first corner to the third. Quads come in the order of the polygons.
+    """
+    first, second = triangle_pairs(polygons)
+    corners, joined = quad_corners(triangles, first, second)
+    return corners[joined]
+
+
+def triangle_pairs(polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (k,), (k,) of the triangles of polygons (m,), counted from 0, that have two."""
+    size = np.bincount(polygons)
+    order = np.argsort(polygons, kind="stable")
+    start = (np.cumsum(size) - size)[size == 2]
+    return order[start], order[start + 1]
+
+
+def quad_corners(triangles: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (k,4) of what pairs of triangles, rows (k,) and (k,), make; which (k,) bool have a side in common.
+
+    Corners are places in the m x 3 of `triangles` (m,3); the common side goes from the first to the third.
+    """
+    one, two = triangles[first], triangles[second]
+    shared = (one[:, :, None] == two[:, None, :]).any(axis=2)
+    # From the corner that the other triangle lacks.
+    turn = ((~shared).argmax(axis=1)[:, None] + np.arange(3)) % 3
+    one = np.take_along_axis(one, turn, axis=1)
+    apart = ~(one[:, :, None] == two[:, None, :]).any(axis=1)
+    other = apart.argmax(axis=1)
+    two = np.take_along_axis(two, (other[:, None] + np.arange(3)) % 3, axis=1)
+    joined = (shared.sum(axis=1) == 2) & (one[:, 1] == two[:, 2]) & (one[:, 2] == two[:, 1])
+    # one = (a, b, d) and two = (c, d, b): the quad b, c, d, a.
+    place = 3 * first[:, None] + turn
+    return np.column_stack([place[:, 1], 3 * second + other, place[:, 2], place[:, 0]]), joined
+
+
+def _fans(positions, triangles, polygons, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Areas (p,) of fans around the centres of `count` polygons (m,); where (p,) bool all of a fan looks to one side.
+
+    The fan goes along the sides that only one triangle of the polygon has.
+    """
+    of, tail, head = np.repeat(polygons, 3), triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    place = np.unique(of * np.int64(len(positions)) + tail, return_inverse=True)[1].reshape(-1, 3)
+    ends = np.sort([place.ravel(), place[:, [1, 2, 0]].ravel()], axis=0)
+    _, first, uses = np.unique(ends[0] * place.size + ends[1], return_index=True, return_counts=True)
+    outline = first[uses == 1]
+    of, tail, head = of[outline], tail[outline], head[outline]
+    sides = np.bincount(of, minlength=count)
+    centre = _sums(of, positions[tail], count) / np.maximum(sides, 1)[:, None]
+    double = np.cross(positions[tail] - centre[of], positions[head] - centre[of])
+    normal = _sums(of, double, count)
+    backward = np.bincount(of, np.einsum("ij,ij->i", double, normal[of]) < 0, count)
+    return np.bincount(of, np.linalg.norm(double, axis=1) / 2, count), (sides > 2) & (backward == 0)
+
+
+def _sums(rows: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """Sums (count,3) of values (k,3) by their rows (k,)."""
+    return np.column_stack([np.bincount(rows, column, count) for column in values.T])

@@ -1,0 +1,70 @@
+"""Areas of polygons: exact where plane, the same however they are cut, sums of triangles where they must be."""
+
+import numpy as np
+import polygons
+import pytest
+
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.polygon_areas import polygon_areas, quad_corners, quads, triangle_pairs
+
+
+def of_each(V, faces, turn=0):
+    """Areas (f,) of polygons that are cut from a corner."""
+    F, owner = polygons.cut(faces, turn)
+    return np.bincount(owner, polygon_areas(V, F, owner))
+
+
+@pytest.mark.parametrize("scene", [polygons.wavy_quads, polygons.wavy_mixed])
+def test_areas_do_not_depend_on_the_diagonals(scene):
+    V, faces, _ = scene()
+    for turn in range(1, 8):
+        assert of_each(V, faces, turn) == pytest.approx(of_each(V, faces), rel=1e-13)
+
+
+def test_plane_polygons_have_their_area():
+    corners = np.exp(2j * np.pi * np.arange(7) / 7)
+    V = np.column_stack([corners.real, corners.imag, corners.real + 2])
+    assert of_each(V, [np.arange(7)]) == pytest.approx([3.5 * np.sin(2 * np.pi / 7) * np.sqrt(2)])
+
+
+def test_a_quad_has_the_mean_of_both_triangulations():
+    V = np.array([[0, 0, 0], [1, 0, 0.5], [1, 1, 0], [0, 1, 0.3]])
+    both = [face_areas(V, np.array(t)).sum() for t in ([[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]])]
+    assert both[0] != pytest.approx(both[1])
+    assert of_each(V, [np.arange(4)]) == pytest.approx([np.mean(both)])
+
+
+def test_a_deep_concave_polygon_is_the_sum_of_its_triangles():
+    """A U: its centre is outside, and a fan around it would count twice."""
+    V = np.array([[0, 0, 0], [3, 0, 0], [3, 3, 0], [2, 3, 0], [2, 1, 0], [1, 1, 0], [1, 3, 0], [0, 3, 0]], float)
+    F = np.array([[0, 1, 4], [0, 4, 5], [1, 2, 3], [1, 3, 4], [0, 5, 6], [0, 6, 7]])
+    assert polygon_areas(V, F, np.zeros(6, int)).sum() == pytest.approx(7)
+
+
+def test_triangles_of_their_own_keep_their_bits():
+    V, faces, _ = polygons.wavy_mixed()
+    F, owner = polygons.cut(faces)
+    area = face_areas(V, F)
+    assert np.array_equal(polygon_areas(V, F), area)
+    assert np.array_equal(polygon_areas(V, F, np.arange(len(F))[::-1]), area)
+    single = np.bincount(owner)[owner] == 1
+    assert single.any() and np.array_equal(polygon_areas(V, F, owner)[single], area[single])
+
+
+def test_quads_go_around_their_corners():
+    _, faces, _ = polygons.wavy_mixed()
+    for turn in range(4):
+        F, owner = polygons.cut(faces, turn)
+        found = F.ravel()[quads(F, owner)]
+        expected = [p for p in faces if len(p) == 4]
+        assert len(found) == len(expected)
+        for mine, given in zip(found, expected, strict=True):
+            start = int(np.flatnonzero(mine == given[0])[0])
+            assert np.array_equal(np.roll(mine, -start), given)
+
+
+def test_two_triangles_that_only_touch_are_no_quad():
+    F = np.array([[0, 1, 2], [2, 3, 4], [0, 1, 2], [2, 1, 3]])
+    first, second = triangle_pairs(np.array([0, 0, 1, 1]))
+    assert (first.tolist(), second.tolist()) == ([0, 2], [1, 3])
+    assert quad_corners(F, first, second)[1].tolist() == [False, True]

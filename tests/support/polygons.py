@@ -1,0 +1,40 @@
+"""Meshes of polygons, each cut into triangles from any of its corners."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+
+
+def cut(polygons, turn=0):
+    """Triangles (m,3), and the polygon (m,) of each: fans from corner `turn` of every polygon."""
+    triangles, owner = [], []
+    for k, polygon in enumerate(polygons):
+        p = np.roll(polygon, -(turn % len(polygon)))
+        triangles += [(p[0], p[i], p[i + 1]) for i in range(1, len(p) - 1)]
+        owner += [k] * (len(p) - 2)
+    return np.array(triangles), np.array(owner)
+
+
+def wavy(V):
+    """The plane (n,2) or (n,3) as a surface without a plane polygon, and a smooth map (n,2) of it without folds."""
+    x, y = V[:, 0], V[:, 1]
+    surface = np.column_stack([x, y, 0.3 * np.sin(5 * x + 1) * np.cos(4 * y) + 0.1 * x * y])
+    return surface, np.column_stack([x + 0.08 * np.sin(3 * y + x), y + 0.06 * np.cos(4 * x - y)])
+
+
+def wavy_quads(columns=9, rows=7):
+    """Positions (n,3), quads (f,4) and a map (n,2)."""
+    V, Q = meshes.quad_grid(columns, rows)
+    return (*wavy(V)[:1], Q, wavy(V)[1])
+
+
+def wavy_mixed(columns=6, rows=5):
+    """Positions (n,3), polygons of three to eight corners, and a map (n,2): all are convex in it."""
+    points, polygons = [], []
+    for k, (i, j) in enumerate(np.ndindex(columns, rows)):
+        angle = 2 * np.pi * np.arange(3 + k % 6) / (3 + k % 6) + k
+        polygons.append(len(points) + np.arange(len(angle)))
+        points += list(np.column_stack([i + 0.45 * np.cos(angle), j + 0.45 * np.sin(angle)]) / columns)
+    surface, uv = wavy(np.array(points))
+    return surface, polygons, uv
