@@ -55,11 +55,11 @@ class PolygonMesh:
         return np.bincount(owner, values[self.rows], self.count)
 
 
-def polygon_mesh(triangles: np.ndarray, faces: np.ndarray) -> PolygonMesh:
+def polygon_mesh(triangles: np.ndarray, faces: np.ndarray, most: int = MOST_TRIANGLES) -> PolygonMesh:
     """The polygons of triangles (m,3) that belong to the faces (m,), any numbers.
 
-    Two triangles of a face that share a side are a quad. A face of more than `MOST_TRIANGLES` counts triangle by
-    triangle.
+    Two triangles of a face that share a side are a quad. A face of more than `most` triangles counts triangle
+    by triangle.
     """
     owner = np.unique(faces, return_inverse=True)[1].ravel()
     sides = np.bincount(owner)
@@ -70,7 +70,7 @@ def polygon_mesh(triangles: np.ndarray, faces: np.ndarray) -> PolygonMesh:
     is_quad[owner[first[joined]]] = True
     rest = order[~is_quad[owner[order]]]
     # Long polygons and two triangles that share no side: each triangle for itself.
-    long = (sides > MOST_TRIANGLES) | ((sides == 2) & ~is_quad)
+    long = (sides > most) | ((sides == 2) & ~is_quad)
     label = np.where(long[owner[rest]], len(sides) + rest, owner[rest])
     polygon = np.unique(label, return_inverse=True)[1].ravel()
     both = np.column_stack([first, second])[joined].ravel()

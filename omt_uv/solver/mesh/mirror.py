@@ -86,6 +86,8 @@ class _Polygons:
         image[self.vertex] = self.vertex[found]
         if (image[self.vertex] != self.vertex[found]).any() or (image[image] != np.arange(len(image))).any():
             return None
+        if (image == np.arange(len(image))).all():
+            return None  # the plane of a flat mesh: it moves nothing
         return image
 
     def _matched(self, polygons: np.ndarray, normal: np.ndarray) -> np.ndarray | None:

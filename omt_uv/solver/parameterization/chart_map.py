@@ -5,7 +5,7 @@ Each stage may be replaced by a milder one where its mathematics leaves double p
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from ..transport.convex_domain import Disk
 from .chart_pins import ChartPins, mirrored_to_pins, moved_to_pins, refuse_pins_on_outline
 from .initial_map import COARSE_ABOVE, DiskMesh, InitialChartMap, coarse_initial_map, initial_map, mean_value_sites
 from .options import MapOptions
+from .polygon_disk import of_polygon_disk, polygon_disk
 
 # Where the time of a chart goes, roughly, as start and width in [0, 1]: a bar that moves evenly needs no more.
 INITIAL = (0.0, 0.4)
@@ -109,8 +110,10 @@ def map_chart(
             multiplier=initial.multiplier,
         )
         given = {"target": None if target is None else disk.target, "region": disk.region, "pins": places}
-        given["polygons"] = _polygons(chart)
+        given["polygons"] = disk.polygons
         refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
+        # Centres of polygons were there for the map alone.
+        refined = replace(refined, uv=refined.uv[: len(vertices)])
     with log.timed("measure"):
         figures = distortion(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=density)
     if target is not None and options.balance == 0:
@@ -153,27 +156,31 @@ def _chart_map(
     )
 
 
-def _polygons(chart: Chart) -> np.ndarray:
-    """The polygon (m+k,) of every triangle of a chart's disk; patches over holes are none of the surface's."""
-    return np.concatenate([chart.faces, -1 - np.arange(len(chart.patches))])
-
-
 def _disk_mesh(vertices: np.ndarray, chart: Chart, boundary: str, target: Target | None, log: RunLog) -> DiskMesh:
-    """The chart, vertices (n,3) in a unit box, as a disk to be mapped.
+    """The chart, vertices (n,3) in a unit box, as a disk to be mapped, its polygons cut for that.
 
     Patches over holes are mapped with the rest, and forgotten afterwards.
     """
-    area, region, loop = face_areas(vertices, chart.disk), None, boundary_loops(chart.disk)[0]
+    disk = polygon_disk(vertices, chart)
+    area, region, loop = face_areas(disk.vertices, disk.triangles), None, boundary_loops(disk.triangles)[0]
     if target is not None:
-        patches = len(chart.patches)
-        area = area * np.concatenate([positive_density(target.density), np.ones(patches)])
+        area = area * of_polygon_disk(positive_density(target.density), vertices, chart, disk, 1.0)
         if target.region is not None:
-            region = np.concatenate([target.region, np.zeros(patches)])
+            region = of_polygon_disk(target.region, vertices, chart, disk, 0.0)
     if boundary == "square" and len(loop) < 4:
         log.warnings.append("A chart with only three boundary vertices does not fill a square; its boundary is free")
         boundary = "free"
-    corners = sharpest_corners(vertices, chart.disk, loop) if boundary == "square" else None
-    return DiskMesh(vertices, chart.disk, area, loop, boundary, corners, region)
+    corners = sharpest_corners(disk.vertices, disk.triangles, loop) if boundary == "square" else None
+    return DiskMesh(
+        vertices=disk.vertices,
+        triangles=disk.triangles,
+        target=area,
+        loop=loop,
+        boundary=boundary,
+        corners=corners,
+        region=region,
+        polygons=disk.polygons,
+    )
 
 
 def _initial_map(disk: DiskMesh, balance: float, log: RunLog) -> Steps[InitialChartMap]:

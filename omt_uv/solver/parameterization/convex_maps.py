@@ -20,6 +20,7 @@ from .chart_map import ChartMap, in_unit_box
 from .chart_pins import ChartPins
 from .convexity import keep_convex
 from .options import MapOptions
+from .polygon_disk import cut_as_mapped
 
 # The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
 AREA_KEPT = 1.1
@@ -39,6 +40,7 @@ def with_convex_polygons(
     """
     if not (np.diff(surface.face_start) > 3).any():
         return maps
+    given, charts = charts, [cut_as_mapped(c, m.uv) for c, m in zip(charts, maps, strict=True)]
     fixed = [_fixed(c, p, options.boundary) for c, p in zip(charts, pins, strict=True)]
     targets = [chart_target(target, surface, c) for c in charts]
     density = [None if t is None else t.density for t in targets]
@@ -47,7 +49,7 @@ def with_convex_polygons(
     new = list(maps)
     found = keep_convex(surface, charts, [m.uv for m in maps], fixed, density, [m.area_weight for m in maps], spare)
     for k, uv in found.items():
-        chart, old = charts[k], maps[k]
+        chart, old = given[k], maps[k]
         (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
         figures = distortion(vertices, chart.triangles, flat[chart.triangles], overlap=False, density=density[k])
         if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and not figures.folds:

@@ -72,6 +72,7 @@ class DiskMesh:
     boundary : "free", "disk" or "square"
     corners (4,) : boundary vertices that go into the corners of a square; None in another boundary
     region (m,) : weights in [0, 1] of a region whose share is to be exact, or None
+    polygons (m,) : of every triangle, or None where each is its own
     """
 
     vertices: np.ndarray
@@ -81,6 +82,7 @@ class DiskMesh:
     boundary: str = "free"
     corners: np.ndarray | None = None
     region: np.ndarray | None = None
+    polygons: np.ndarray | None = None
 
     @property
     def domain(self) -> Domain:

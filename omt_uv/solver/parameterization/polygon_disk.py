@@ -1,0 +1,126 @@
+"""Cut the polygons of a chart for its map: quads along their shorter diagonal, others into fans about their centres.
+
+Which way an importer, or a modeller, has cut them then plays no part, and a cap of thousands of sides is a fan of good
+triangles instead of slivers. Polygons that are not convex stay as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..maps.polygon_elements import polygon_mesh
+from ..mesh.charts import Chart
+from ..mesh.geometry import face_areas, signed_areas
+
+# Sine, squared, of the angle by which a corner may turn inwards and count as straight.
+STRAIGHT = -1e-9
+
+
+@dataclass(frozen=True)
+class PolygonDisk:
+    """A chart as it is mapped.
+
+    vertices (n+k,3): those of the chart, then the centres of fans; triangles (t,3), those of patches over holes last;
+    polygons (t,): whose triangle each is, negative for patches.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    polygons: np.ndarray
+
+
+def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
+    """The chart, with its vertices at (n,3), cut for its map."""
+    faces = np.unique(chart.faces, return_inverse=True)[1].ravel()
+    cut = polygon_mesh(chart.triangles, faces, most=len(faces))
+    quads = _shorter(vertices, cut.quads)
+    own = faces[cut.rows[: len(cut.triangles)]]
+    of_quads = faces[cut.rows[len(cut.triangles) :]].reshape(-1, 2)[:, 0]
+    centres, fans, of_fans = _fans(vertices, cut.triangles, own)
+    kept = ~np.isin(own, of_fans)
+    halves = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    return PolygonDisk(
+        vertices=np.concatenate([vertices, centres]),
+        triangles=np.concatenate([cut.triangles[kept], halves, fans, chart.patches]),
+        polygons=np.concatenate([own[kept], np.repeat(of_quads, 2), of_fans, -1 - np.arange(len(chart.patches))]),
+    )
+
+
+def of_polygon_disk(values: np.ndarray, vertices: np.ndarray, chart: Chart, disk: PolygonDisk, patch: float):
+    """Values (m,) per area of a chart's triangles as those (t,) of the disk: one a polygon, `patch` over holes."""
+    faces = np.unique(chart.faces, return_inverse=True)[1].ravel()
+    area = face_areas(vertices, chart.triangles)
+    mean = np.bincount(faces, area * values) / np.bincount(faces, area)
+    return np.where(disk.polygons >= 0, mean[disk.polygons], patch)
+
+
+def cut_as_mapped(chart: Chart, uv: np.ndarray) -> Chart:
+    """The chart with quads that are folded in the map uv (n,2) cut along the other diagonal, where that is not."""
+    folded = signed_areas(uv, chart.triangles) <= 0
+    if not folded.any():
+        return chart
+    rows = np.flatnonzero(np.isin(chart.faces, chart.faces[folded]))
+    cut = polygon_mesh(chart.triangles[rows], chart.faces[rows])
+    pairs = rows[cut.rows[len(cut.triangles) :]].reshape(-1, 2)
+    other = cut.quads[:, [[0, 1, 3], [1, 2, 3]]]
+    better = (signed_areas(uv, other.reshape(-1, 3)).reshape(-1, 2) > 0).all(axis=1)
+    triangles, corners = chart.triangles.copy(), chart.corners.copy()
+    pairs, other = pairs[better], other[better]
+    # Each vertex of a quad, and its corner, from the two triangles that it had.
+    vertex, corner = (x[pairs].reshape(-1, 1, 6) for x in (chart.triangles, chart.corners))
+    place = (vertex[:, :, None, :] == other[:, :, :, None]).argmax(axis=3)
+    triangles[pairs] = other
+    corners[pairs] = np.take_along_axis(corner, place.reshape(-1, 1, 6), axis=2).reshape(-1, 2, 3)
+    return replace(chart, triangles=triangles, corners=corners)
+
+
+def _shorter(vertices: np.ndarray, quads: np.ndarray) -> np.ndarray:
+    """Quads (q,4) turned so that the diagonal from the first to the third corner is the shorter one that may be cut."""
+    p = vertices[quads]
+    length = np.linalg.norm(p[:, [0, 1]] - p[:, [2, 3]], axis=2)
+    normal = np.cross(p[:, [1, 2, 3, 0]] - p, p[:, [3, 0, 1, 2]] - p)
+    own = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    convex = (np.einsum("qkd,qd->qk", normal, own) > 0).all(axis=1)
+    # Between equal ones the first corner in space decides.
+    first = np.lexsort(vertices.T[::-1])
+    rank = np.empty(len(vertices), np.int64)
+    rank[first] = np.arange(len(vertices))
+    equal = np.abs(length[:, 1] - length[:, 0]) <= 1e-9 * length.max(axis=1)
+    turned = np.where(equal, rank[quads].argmin(axis=1) % 2 == 1, length[:, 1] < length[:, 0])
+    return np.where((convex & turned)[:, None], np.roll(quads, -1, axis=1), quads)
+
+
+def _fans(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray):
+    """Centres (k,3), triangles (t,3) and polygons (t,) of fans of the convex polygons of at least three triangles."""
+    several = np.bincount(owner, minlength=1)[owner] > 2
+    triangles, owner, n = triangles[several], owner[several], len(vertices)
+    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    of_edge = np.repeat(owner, 3)
+    key = (of_edge * n + np.minimum(tail, head)) * n + np.maximum(tail, head)
+    _, where, count = np.unique(key, return_index=True, return_counts=True)
+    sides = where[count == 1]
+    # By polygon and tail: the side after the one that ends there.
+    sides = sides[np.lexsort((tail[sides], of_edge[sides]))]
+    tail, head, of_side = tail[sides], head[sides], of_edge[sides]
+    start = of_side * n + tail
+    after = np.searchsorted(start, of_side * n + head)
+    sound = np.bincount(of_side, minlength=1) == np.bincount(owner, minlength=1) + 2
+    after = np.minimum(after, len(start) - 1)
+    broken = (start[after] != of_side * n + head) | (np.diff(start, prepend=-1) == 0)
+    sound[of_side[broken]] = False
+    label, index = np.unique(of_side, return_inverse=True)
+    centre = np.stack([np.bincount(index, vertices[tail, k]) for k in range(3)], axis=1) / np.bincount(index)[:, None]
+    p, q, r, c = vertices[tail], vertices[head], vertices[head[after]], centre[index]
+    fan = np.cross(q - c, p - c) * -1
+    normal = np.stack([np.bincount(index, fan[:, k]) for k in range(3)], axis=1)[index]
+    size = np.linalg.norm(normal, axis=1)
+    ear = np.einsum("sd,sd->s", np.cross(q - p, r - q), normal)
+    flat = ear < STRAIGHT * size * np.linalg.norm(q - p, axis=1) * np.linalg.norm(r - q, axis=1)
+    sound[of_side[flat | (np.einsum("sd,sd->s", fan, normal) <= 0)]] = False
+    kept = sound[of_side]
+    chosen = np.unique(index[kept])
+    place = np.full(len(label), -1)
+    place[chosen] = n + np.arange(len(chosen))
+    return centre[chosen], np.column_stack([tail, head, place[index]])[kept], of_side[kept]
