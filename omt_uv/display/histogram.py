@@ -10,7 +10,7 @@ import numpy as np
 from ..pipelines.distortion import triangles_of
 from ..pipelines.reading import Reading
 from ..solver.maps.distortion import distortion, face_distortion
-from ..solver.mesh.geometry import face_areas
+from ..solver.mesh.polygon_areas import polygon_areas
 from .canvas import write
 from .colormaps import AREA_OCTAVES, SHEAR_TOP, area_colours, shear_colours
 
@@ -86,11 +86,13 @@ def thumbnail(readings: Sequence[Reading], size: int = 256) -> np.ndarray:
 
 
 def _values(readings: Sequence[Reading]):
-    """Octaves (m,), shear (m,) and share of the surface in percent (m,) of every face, and the figures of all."""
-    V, F, uv = triangles_of(readings)
-    octaves, shear = face_distortion(V, F, uv)
-    weight = face_areas(V, F)
-    return octaves, shear, 100 * weight / weight.sum(), distortion(V, F, uv, overlap=False)
+    """Octaves (m,), shear (m,) and share of the surface in percent (m,) of every triangle, the first two
+    those of its polygon, and the figures of all."""
+    found = triangles_of(readings)
+    V, F, uv, polygons = found.positions, found.triangles, found.uv, found.polygons
+    octaves, shear = face_distortion(V, F, uv, polygons)
+    weight = polygon_areas(V, F, polygons)
+    return octaves, shear, 100 * weight / weight.sum(), distortion(V, F, uv, overlap=False, polygons=polygons)
 
 
 def _area_place(octaves):

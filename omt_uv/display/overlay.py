@@ -44,8 +44,8 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
     from ..solver.maps.distortion import face_distortion
     from .colormaps import area_colours, shear_colours
 
-    V, F, uv = triangles_of([reading for _, reading in pairs])
-    octaves, shear = face_distortion(V, F, uv)
+    found = triangles_of([reading for _, reading in pairs])
+    octaves, shear = face_distortion(found.positions, found.triangles, found.uv, found.polygons)
     rgb = area_colours(octaves) if figure == "AREA" else shear_colours(shear)
     _paint_views(context)
     start = 0
@@ -55,7 +55,7 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
         colour_attributes.write_colours(obj, corners.ravel(), mine)
         start += len(corners)
     rgba = np.concatenate([np.repeat(rgb, 3, axis=0), np.full((3 * len(rgb), 1), OPACITY)], axis=1)
-    _shown.kind, _shown.places, _shown.colours = figure, uv.reshape(-1, 2).tolist(), rgba.tolist()
+    _shown.kind, _shown.places, _shown.colours = figure, found.uv.reshape(-1, 2).tolist(), rgba.tolist()
     _shown.batch = None
     if _shown.handle is None and not bpy.app.background:
         _shown.handle = bpy.types.SpaceImageEditor.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")

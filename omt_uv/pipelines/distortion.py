@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,28 +12,47 @@ from ..solver.maps.distortion import Distortion, distortion
 from .reading import Reading
 
 
-def triangles_of(readings: Sequence[Reading]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions (n,3), triangles (m,3) and their UVs (m,3,2) of the chosen polygons of all readings in turn.
+@dataclass(frozen=True)
+class ChosenTriangles:
+    """Positions (n,3), triangles (m,3), their UVs (m,3,2), and the polygon (m,) of each, counted over all readings."""
+
+    positions: np.ndarray
+    triangles: np.ndarray
+    uv: np.ndarray
+    polygons: np.ndarray
+
+
+def triangles_of(readings: Sequence[Reading]) -> ChosenTriangles:
+    """Triangles of the chosen polygons of all readings in turn.
 
     Raises
     ------
     EmptyMeshError : no polygon is chosen, or a mesh with chosen polygons has no UVs
     """
-    positions, triangles, uv, offset = [], [], [], 0
+    positions, triangles, uv, polygons = [], [], [], []
+    vertices = faces = 0
     for reading in readings:
         surface = reading.surface
-        corners = surface.triangles[reading.faces[surface.triangle_face]]
+        chosen = reading.faces[surface.triangle_face]
+        corners = surface.triangles[chosen]
         if not len(corners):
             continue
         if reading.uv is None:
             raise EmptyMeshError("There are no UVs to measure", remedy="Unwrap the mesh first")
         positions.append(surface.positions)
-        triangles.append(surface.corner_vertex[corners] + offset)
+        triangles.append(surface.corner_vertex[corners] + vertices)
+        polygons.append(surface.triangle_face[chosen] + faces)
         uv.append(reading.uv[corners].astype(float))
-        offset += len(surface.positions)
+        vertices += len(surface.positions)
+        faces += len(reading.faces)
     if not triangles:
         raise EmptyMeshError("There are no faces to measure")
-    return np.concatenate(positions), np.concatenate(triangles), np.concatenate(uv)
+    return ChosenTriangles(
+        positions=np.concatenate(positions),
+        triangles=np.concatenate(triangles),
+        uv=np.concatenate(uv),
+        polygons=np.concatenate(polygons),
+    )
 
 
 def measure_readings(readings: Sequence[Reading], overlap: bool = True) -> Distortion:
@@ -43,7 +63,8 @@ def measure_readings(readings: Sequence[Reading], overlap: bool = True) -> Disto
     EmptyMeshError : no polygon is chosen, or a mesh with chosen polygons has no UVs
     NonFiniteError, ZeroAreaFaceError : see `solver.maps.distortion.distortion`
     """
-    return distortion(*triangles_of(readings), overlap=overlap)
+    found = triangles_of(readings)
+    return distortion(found.positions, found.triangles, found.uv, overlap=overlap, polygons=found.polygons)
 
 
 def summary(figures: Distortion) -> str:

@@ -13,8 +13,9 @@ from ..solver.globe.exact_areas import correct_areas, equirectangular_areas
 from ..solver.globe.projections import EQUIRECT
 from ..solver.globe.rotation import MarkerError, along_axes, by_markers
 from ..solver.globe.unfolding import Polygons, gather_polygons, unfold
-from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.gluing import groups
+from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.spherical_geometry import spherical_areas
 from ..solver.mesh.surface import Surface, chosen_triangles
 from ..solver.mesh.topology import graph_components
@@ -87,9 +88,14 @@ class Globe:
             "status": self.sphere.status,
             "iterations": self.sphere.iterations,
             "residual": self.sphere.residual,
-            "area_l1_sphere": float(np.abs(on_sphere / on_sphere.sum() - self.shares).sum()),
-            "area_l1": float(np.abs(self.areas / self.areas.sum() - self.shares).sum()),
+            "area_l1_sphere": self._area_error(on_sphere),
+            "area_l1": self._area_error(self.areas),
         }
+
+    def _area_error(self, areas: np.ndarray) -> float:
+        """Sum over the polygons of how far their shares of the areas (m,) are from what they shall have."""
+        of = np.unique(self.component.faces, return_inverse=True)[1].ravel()
+        return float(np.abs(np.bincount(of, areas / areas.sum() - self.shares)).sum())
 
 
 @dataclass(frozen=True)
@@ -223,7 +229,7 @@ def _laid_out(
 
 def _shares(component: ClosedComponent, density: np.ndarray | None) -> np.ndarray:
     """Shares (m,) of the texture that the triangles of a component shall have."""
-    area = face_areas(component.vertices, component.triangles)
+    area = polygon_areas(component.vertices, component.triangles, component.faces)
     mass = area if density is None else area * density
     return mass / mass.sum()
 

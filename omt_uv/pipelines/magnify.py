@@ -336,7 +336,9 @@ def _report(done: _MagnifiedIsland) -> dict:
     """Figures of an island for a report."""
     chart = done.island.chart
     flat = np.column_stack([done.island.uv, np.zeros(len(done.uv))])
-    figures = distortion(flat, chart.triangles, done.uv[chart.triangles], density=done.found.density)
+    figures = distortion(
+        flat, chart.triangles, done.uv[chart.triangles], density=done.found.density, polygons=chart.faces
+    )
     now = np.abs(signed_areas(done.uv, chart.triangles))
     return {
         "vertices": len(chart.vertices),

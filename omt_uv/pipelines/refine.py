@@ -14,6 +14,7 @@ from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
 from ..solver.maps.distortion import distortion
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_edges
 from ..solver.parameterization.chart_indices import located
@@ -57,7 +58,7 @@ class _RefinedIsland:
         """Area of the surface and of the UVs."""
         chart = self.island.chart
         covered = abs(float(signed_areas(self.refinement.uv, chart.triangles).sum()))
-        return float(face_areas(chart.vertices, chart.triangles).sum()), covered
+        return float(polygon_areas(chart.vertices, chart.triangles, chart.faces).sum()), covered
 
 
 def refine_islands(
@@ -209,7 +210,8 @@ def _report(refined: _RefinedIsland, uv: np.ndarray) -> dict:
     """Figures of an island for a report, before and after."""
     chart, done = refined.island.chart, refined.refinement
     before, after = (
-        distortion(chart.vertices, chart.triangles, x[chart.triangles], overlap=False) for x in (refined.island.uv, uv)
+        distortion(chart.vertices, chart.triangles, x[chart.triangles], overlap=False, polygons=chart.faces)
+        for x in (refined.island.uv, uv)
     )
     return {
         "vertices": len(chart.vertices),

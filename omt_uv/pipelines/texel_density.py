@@ -9,7 +9,8 @@ import numpy as np
 
 from ..solver.errors import EmptyMeshError, ZeroAreaFaceError
 from ..solver.maps.distortion import uv_charts
-from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.geometry import signed_areas
+from ..solver.mesh.polygon_areas import polygon_areas
 from .reading import Reading
 
 
@@ -23,7 +24,8 @@ class Texels:
 
 @dataclass(frozen=True)
 class _MeasuredFaces:
-    """UVs (c,2), triangles (m,3) of corners, of vertices, and their areas (m,) in space and in UV."""
+    """UVs (c,2), triangles (m,3) of corners, of vertices, and their areas (m,) in space,
+    those of a polygon summing to its own, and in UV."""
 
     uv: np.ndarray
     corners: np.ndarray
@@ -94,9 +96,9 @@ def _faces(reading: Reading) -> _MeasuredFaces:
     if not len(corners):
         raise EmptyMeshError("There are no faces to measure")
     uv, triangles = reading.uv.astype(float), surface.corner_vertex[corners]
-    return _MeasuredFaces(
-        uv, corners, triangles, face_areas(surface.positions, triangles), np.abs(signed_areas(uv, corners))
-    )
+    polygons = surface.triangle_face[reading.faces[surface.triangle_face]]
+    space = polygon_areas(surface.positions, triangles, polygons)
+    return _MeasuredFaces(uv, corners, triangles, space, np.abs(signed_areas(uv, corners)))
 
 
 def _texels_per_metre(space: float, covered: float, texels: Texels) -> float:

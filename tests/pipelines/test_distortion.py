@@ -35,9 +35,12 @@ def test_a_similarity_has_no_distortion():
 def test_only_chosen_polygons_count():
     V, F, uv = bumps()
     faces = np.arange(len(F)) % 3 == 0
-    positions, triangles, values = triangles_of([reading(V, F, uv, faces)])
-    assert np.array_equal(triangles, F[faces]) and np.array_equal(positions, V)
-    assert np.array_equal(values, uv[F[faces]])
+    found = triangles_of([reading(V, F, uv, faces), reading(V, F, uv, faces)])
+    n, m = len(V), faces.sum()
+    assert np.array_equal(found.triangles[:m], F[faces]) and np.array_equal(found.triangles[m:], F[faces] + n)
+    assert np.array_equal(found.positions, np.concatenate([V, V]))
+    assert np.array_equal(found.uv[:m], uv[F[faces]]) and np.array_equal(found.uv[m:], uv[F[faces]])
+    assert np.array_equal(found.polygons[:m], np.flatnonzero(faces)) and len(np.unique(found.polygons)) == 2 * m
     # A mesh of which nothing is chosen needs no UVs.
     alone = measure_readings([reading(V, F, uv)])
     assert measure_readings([reading(V, F, None, np.zeros(len(F), bool)), reading(V, F, uv)]) == alone

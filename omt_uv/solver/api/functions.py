@@ -230,7 +230,7 @@ def remesh(vertices: np.ndarray, faces: Faces, count: int, *, progress: Callback
 
 
 def distortion(vertices: np.ndarray, faces: Faces, uv: np.ndarray, *, overlap: bool = True) -> Distortion:
-    """Measure the area error, shear, folds and overlap of UVs.
+    """Measure the area error, shear, folds and overlap of UVs, face by face: polygons, however they are cut.
 
     Parameters
     ----------
@@ -254,4 +254,6 @@ def distortion(vertices: np.ndarray, faces: Faces, uv: np.ndarray, *, overlap: b
     surface = polygon_surface(vertices, faces)
     corner_uv = to_corners(uv, surface)
     triangles = surface.corner_vertex[surface.triangles]
-    return figures.distortion(surface.positions, triangles, corner_uv[surface.triangles], overlap=overlap)
+    return figures.distortion(
+        surface.positions, triangles, corner_uv[surface.triangles], overlap=overlap, polygons=surface.triangle_face
+    )

@@ -16,7 +16,8 @@ from ..editing.refine_island import refine_island
 from ..editing.uv_islands import uv_islands
 from ..maps.distortion import distortion
 from ..mesh.charts import triangle_rows
-from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.geometry import signed_areas
+from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface
 from ..parameterization import unwrap as unwrapping
 from ..parameterization.chart_pins import CornerPins
@@ -72,7 +73,8 @@ def refine(
         done = yield from part_of(steps, sum(sizes[:k]) / sum(sizes), sizes[k] / sum(sizes))
         refined.append(done.uv)
         covered.append(abs(signed_areas(done.uv, island.chart.triangles).sum()))
-        space.append(face_areas(island.chart.vertices, island.chart.triangles).sum())
+        chart = island.chart
+        space.append(polygon_areas(chart.vertices, chart.triangles, chart.faces).sum())
         texts += done.warnings
     density = sum(covered) / sum(space)
     for k, island in enumerate(found.islands):
@@ -140,7 +142,13 @@ def _figures(surface: Surface, corner_uv: np.ndarray, density=None):
     """Distortion of the UVs (c,2) of a surface, against a density (f,) of its polygons."""
     triangles = surface.corner_vertex[surface.triangles]
     asked = None if density is None else np.asarray(density, float)[surface.triangle_face]
-    return distortion(surface.positions, triangles, corner_uv[surface.triangles], density=asked)
+    return distortion(
+        surface.positions,
+        triangles,
+        corner_uv[surface.triangles],
+        density=asked,
+        polygons=surface.triangle_face,
+    )
 
 
 def _side_by_side(corner_uv: np.ndarray, islands: list[np.ndarray]) -> np.ndarray:

@@ -15,6 +15,7 @@ from ..errors import FoldedUVError, MeshError, positive_density
 from ..maps.distortion import Distortion, distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.polygon_areas import polygon_areas
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
@@ -115,14 +116,14 @@ def map_chart(
         # Centres of polygons were there for the map alone.
         refined = replace(refined, uv=refined.uv[: len(vertices)])
     with log.timed("measure"):
-        figures = distortion(vertices, chart.triangles, refined.uv[chart.triangles], overlap=False, density=density)
+        figures = measured_chart(vertices, chart, refined.uv, density)
     if target is not None and options.balance == 0:
         log.warnings += area_error_warnings(figures.area_l1, QUALITIES[options.quality].area_error)
     if figures.folds:
         log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
     uv = refined.uv
     if places is None:
-        uv = placed_chart(uv, vertices, chart.triangles, density, unit, pins, disk.boundary == "free")
+        uv = placed_chart(uv, vertices, chart, density, unit, pins, disk.boundary == "free")
     return _chart_map(uv, initial, refined, figures, log, pins is not None)
 
 
@@ -216,20 +217,26 @@ def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: 
     return (yield from refine(disk.vertices, disk.triangles, uv, free, **given))
 
 
+def measured_chart(vertices: np.ndarray, chart: Chart, uv: np.ndarray, density: np.ndarray | None) -> Distortion:
+    """Figures of a map (n,2) of the polygons of a chart, at the positions (n,3), against a density (m,)."""
+    mapped = uv[chart.triangles]
+    return distortion(vertices, chart.triangles, mapped, overlap=False, density=density, polygons=chart.faces)
+
+
 def placed_chart(
-    uv: np.ndarray, vertices, triangles, density, unit: float, pins: ChartPins | None, centred: bool = True
+    uv: np.ndarray, vertices, chart: Chart, density, unit: float, pins: ChartPins | None, centred: bool = True
 ) -> np.ndarray:
     """A map uv (n,2) of a chart in a unit box, as large as its target really is, or where its one or two pins are.
 
     centred : with its centroid at 0, if it has no pins
     """
     # A polygon inscribed in the disk is smaller than the disk: one texel density needs its own area.
-    covered = signed_areas(uv, triangles).sum()
-    area = face_areas(vertices, triangles)
+    covered = signed_areas(uv, chart.triangles).sum()
+    area = polygon_areas(vertices, chart.triangles, chart.faces)
     uv = uv * np.sqrt((area.sum() if density is None else area @ density) / covered)
     if pins is not None:
-        return moved_to_pins(uv, triangles, pins)
-    return (_about_zero(uv, triangles) if centred else uv) * unit
+        return moved_to_pins(uv, chart.triangles, pins)
+    return (_about_zero(uv, chart.triangles) if centred else uv) * unit
 
 
 def _about_zero(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..analysis.density import Target
-from ..maps.distortion import distortion
 from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart
 from ..mesh.geometry import signed_areas
@@ -16,7 +15,7 @@ from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops
 from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import chart_target
-from .chart_map import ChartMap, in_unit_box
+from .chart_map import ChartMap, in_unit_box, measured_chart
 from .chart_pins import ChartPins
 from .convexity import keep_convex
 from .options import MapOptions
@@ -51,7 +50,7 @@ def with_convex_polygons(
     for k, uv in found.items():
         chart, old = given[k], maps[k]
         (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
-        figures = distortion(vertices, chart.triangles, flat[chart.triangles], overlap=False, density=density[k])
+        figures = measured_chart(vertices, chart, flat, density[k])
         if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and not figures.folds:
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit

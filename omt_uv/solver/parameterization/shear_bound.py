@@ -12,7 +12,7 @@ from ..cutting.hole_filling import MANY
 from ..cutting.shear_slit import slit
 from ..maps.distortion import face_distortion
 from ..mesh.charts import Chart
-from ..mesh.geometry import face_areas
+from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface
 from ..progress import Steps
 from .chart_map import ChartMap
@@ -119,16 +119,16 @@ def _same(chart: Chart, other: Chart) -> bool:
 
 
 def _shear(chart: Chart, chart_map: ChartMap) -> np.ndarray:
-    return face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])[1]
+    return face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles], chart.faces)[1]
 
 
 def _mean(chart: Chart, shear: np.ndarray) -> float:
-    area = face_areas(chart.vertices, chart.triangles)
+    area = polygon_areas(chart.vertices, chart.triangles, chart.faces)
     return float(area @ shear / area.sum())
 
 
 def _overall(charts: list[Chart], mean: np.ndarray) -> float:
-    area = np.array([face_areas(c.vertices, c.triangles).sum() for c in charts])
+    area = np.array([polygon_areas(c.vertices, c.triangles, c.faces).sum() for c in charts])
     return float(area @ mean / area.sum())
 
 

@@ -63,7 +63,7 @@ def _map_batch(charts: list[Chart], targets: list[Target | None], options: MapOp
     found: list[ChartMap | None] = []
     for k, ((vertices, unit), chart, uv) in enumerate(zip(boxes, charts, coordinates, strict=True)):
         density = None if (target := targets[k]) is None else target.density
-        placed = placed_chart(uv, vertices, chart.triangles, density, unit, None) if maps.solved[k] else None
+        placed = placed_chart(uv, vertices, chart, density, unit, None) if maps.solved[k] else None
         found.append(None if placed is None else _of_many(maps, k, placed, seconds))
     return found
 
