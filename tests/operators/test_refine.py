@@ -22,7 +22,7 @@ def refine(**arguments):
 
 
 def error(obj):
-    space, uv = scenes.areas(obj)
+    space, uv = scenes.polygon_areas(obj)
     return np.abs(uv / uv.sum() - space / space.sum()).sum()
 
 

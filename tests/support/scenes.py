@@ -175,6 +175,20 @@ def areas(obj):
     return space, 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
+def polygon_areas(obj):
+    """Areas (f,) of the polygons in space, and in UV the sums (f,) over their triangles."""
+    from omt_uv.solver.mesh import polygon_areas as of_polygons
+
+    p, _ = triangles_of(obj)
+    owner, vertex = np.zeros(len(p), np.int32), np.zeros(3 * len(p), np.int32)
+    obj.data.loop_triangles.foreach_get("polygon_index", owner)
+    obj.data.loop_triangles.foreach_get("vertices", vertex)
+    place = np.zeros((len(obj.data.vertices), 3))
+    place[vertex] = p.reshape(-1, 3)
+    space = of_polygons.polygon_areas(place, vertex.reshape(-1, 3), owner)
+    return np.bincount(owner, space), np.bincount(owner, areas(obj)[1])
+
+
 def error_of(operator, **arguments):
     """Message of the error that an operator reports."""
     try:
