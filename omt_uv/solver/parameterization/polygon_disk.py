@@ -13,6 +13,7 @@ import numpy as np
 from ..maps.polygon_elements import polygon_mesh
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.topology import pair_keys
 
 # Sine, squared, of the angle by which a corner may turn inwards and count as straight.
 STRAIGHT = -1e-9
@@ -35,7 +36,7 @@ def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     """The chart, with its vertices at (n,3), cut for its map."""
     faces = np.unique(chart.faces, return_inverse=True)[1].ravel()
     cut = polygon_mesh(chart.triangles, faces, most=len(faces))
-    quads = _shorter(vertices, cut.quads)
+    quads = _shorter(vertices, cut.quads, chart.disk)
     own = faces[cut.rows[: len(cut.triangles)]]
     of_quads = faces[cut.rows[len(cut.triangles) :]].reshape(-1, 2)[:, 0]
     centres, fans, of_fans = _fans(vertices, cut.triangles, own)
@@ -76,8 +77,11 @@ def cut_as_mapped(chart: Chart, uv: np.ndarray) -> Chart:
     return replace(chart, triangles=triangles, corners=corners)
 
 
-def _shorter(vertices: np.ndarray, quads: np.ndarray) -> np.ndarray:
-    """Quads (q,4) turned so that the diagonal from the first to the third corner is the shorter one that may be cut."""
+def _shorter(vertices: np.ndarray, quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Quads (q,4) turned so that the diagonal from the first to the third corner is the shorter one that may be cut.
+
+    triangles (m,3): of the mesh; a diagonal between vertices that an edge joins would double that edge.
+    """
     p = vertices[quads]
     length = np.linalg.norm(p[:, [0, 1]] - p[:, [2, 3]], axis=2)
     normal = np.cross(p[:, [1, 2, 3, 0]] - p, p[:, [3, 0, 1, 2]] - p)
@@ -89,7 +93,11 @@ def _shorter(vertices: np.ndarray, quads: np.ndarray) -> np.ndarray:
     rank[first] = np.arange(len(vertices))
     equal = np.abs(length[:, 1] - length[:, 0]) <= 1e-9 * length.max(axis=1)
     turned = np.where(equal, rank[quads].argmin(axis=1) % 2 == 1, length[:, 1] < length[:, 0])
-    return np.where((convex & turned)[:, None], np.roll(quads, -1, axis=1), quads)
+    keys = pair_keys(quads[:, 1], quads[:, 3])
+    edges = pair_keys(triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
+    _, label, count = np.unique(keys, return_inverse=True, return_counts=True)
+    single = ~np.isin(keys, edges) & (count[label] == 1)
+    return np.where((convex & turned & single)[:, None], np.roll(quads, -1, axis=1), quads)
 
 
 def _fans(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray):
