@@ -65,7 +65,7 @@ def test_every_picture_is_shown():
 
 @pytest.mark.parametrize("page", METHOD, ids=lambda p: p.name)
 def test_method_names_what_there_is(page):
-    """A module without a folder before it is one of the page's own package."""
+    """A module without a folder before it stands in the page's own package."""
     lost = []
     for folder, module, name, member in CODE.findall(page.read_text()):
         if name == "py":
@@ -82,6 +82,7 @@ def test_method_names_what_there_is(page):
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_method_has_a_page_for_every_package_that_names_its_modules(package):
+    """A new module gets a sentence there: what it does, and by which method."""
     text = (ROOT / "docs" / "method" / f"{package}.md").read_text()
     modules = {p.stem for p in (SOLVER / package).glob("**/*.py")} - {"__init__", "options"}
     assert not {m for m in modules if not re.search(rf"`(\w+/)?{m}[.`]", text)}
