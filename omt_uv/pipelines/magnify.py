@@ -17,7 +17,7 @@ from ..solver.analysis.density import (
     check_factor,
     check_region,
     from_polygons,
-    from_vertices,
+    means_of_corners,
     normalised_density,
     region_share,
 )
@@ -28,7 +28,8 @@ from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, MeshError, WeightError
 from ..solver.maps.distortion import distortion
 from ..solver.mesh.charts import check_disk, triangle_rows
-from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.geometry import signed_areas
+from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.surface import Surface
 from ..solver.parameterization.chart_indices import located
 from ..solver.parameterization.chart_map import map_chart
@@ -54,10 +55,11 @@ class Region:
     kind: str = "vertex"
 
     def of_triangles(self, rows: np.ndarray) -> np.ndarray:
-        """Weights (k,) of some triangles (k,) of the surface."""
-        if self.kind == "face":
-            return from_polygons(self.weights, self.surface.triangle_face[rows])
-        return from_vertices(self.weights, self.surface.corner_vertex[self.surface.triangles[rows]])
+        """Weights (k,) of some triangles (k,) of the surface: those of their polygons."""
+        surface, weights = self.surface, self.weights
+        if self.kind != "face":
+            weights = means_of_corners(weights, surface.corner_vertex, surface.face_start)
+        return from_polygons(weights, surface.triangle_face[rows])
 
 
 @dataclass(frozen=True)
@@ -179,7 +181,7 @@ def _triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     surface = region.surface
     rows = np.flatnonzero(region.faces[surface.triangle_face])
     vertices = surface.corner_vertex[surface.triangles[rows]]
-    area = face_areas(surface.positions, vertices)
+    area = polygon_areas(surface.positions, vertices, surface.triangle_face[rows])
     return rows, np.where(np.isfinite(area), area, 0.0), region.of_triangles(rows)
 
 

@@ -13,9 +13,9 @@ from region_scenes import of_group, painted, picture_file, weights_of, with_attr
 
 
 def share(obj, areas, group="region"):
-    """Share of the region in areas (m,) of the loop triangles."""
-    corners = np.array([list(t.vertices) for t in obj.data.loop_triangles])
-    weight = weights_of(obj, group)[corners].mean(axis=1)
+    """Share of the region in areas (f,) of the polygons."""
+    weights = weights_of(obj, group)
+    weight = np.array([weights[list(p.vertices)].mean() for p in obj.data.polygons])
     return weight @ np.abs(areas) / np.abs(areas).sum()
 
 
@@ -27,7 +27,7 @@ def magnify(**arguments):
 @pytest.mark.parametrize("source", ["MESH", "UV"])
 def test_the_region_gets_its_share(source, mode):
     obj = painted()
-    space, before = scenes.areas(obj)
+    space, before = scenes.polygon_areas(obj)
     asked = 2.0 * share(obj, space if source == "MESH" else before)
     untouched = scenes.state(obj, leave_out={"UVMap"})
     if mode == "EDIT":
@@ -35,7 +35,7 @@ def test_the_region_gets_its_share(source, mode):
     magnify(factor=2.0, source=source)
     if mode == "EDIT":
         scenes.leave_edit()
-    after = scenes.areas(obj)[1]
+    after = scenes.polygon_areas(obj)[1]
     assert share(obj, after) == pytest.approx(asked, rel=5e-3)
     assert (after * np.sign(after.sum()) > 0).all()
     assert scenes.state(obj, leave_out={"UVMap"}) == untouched
@@ -45,10 +45,10 @@ def test_the_region_gets_its_share(source, mode):
 
 def test_cascades_from_uvs():
     obj = painted()
-    start, before = scenes.uv_of(obj), share(obj, scenes.areas(obj)[1])
+    start, before = scenes.uv_of(obj), share(obj, scenes.polygon_areas(obj)[1])
     magnify(factor=1.5, source="UV", cascade=2)
     both = scenes.uv_of(obj)
-    assert share(obj, scenes.areas(obj)[1]) == pytest.approx(1.5**2 * before, rel=5e-3)
+    assert share(obj, scenes.polygon_areas(obj)[1]) == pytest.approx(1.5**2 * before, rel=5e-3)
     scenes.set_uv(obj, start)
     magnify(factor=1.5, source="UV")
     magnify(factor=1.5, source="UV")
@@ -167,17 +167,16 @@ def test_attributes_of_faces_get_their_share(source, mode):
     values = np.array(of_faces(obj))
 
     def has(areas):
-        w = values[[t.polygon_index for t in obj.data.loop_triangles]]
-        return w @ np.abs(areas) / np.abs(areas).sum()
+        return values @ np.abs(areas) / np.abs(areas).sum()
 
-    asked = 2.0 * has(scenes.areas(obj)[0 if source == "MESH" else 1])
+    asked = 2.0 * has(scenes.polygon_areas(obj)[0 if source == "MESH" else 1])
     untouched = scenes.state(obj, leave_out={"UVMap"})
     if mode == "EDIT":
         scenes.edit(obj)
     magnify(factor=2.0, source=source, region="ATTRIBUTE", attribute="heat")
     if mode == "EDIT":
         scenes.leave_edit()
-    assert has(scenes.areas(obj)[1]) == pytest.approx(asked, rel=5e-3)
+    assert has(scenes.polygon_areas(obj)[1]) == pytest.approx(asked, rel=5e-3)
     assert scenes.state(obj, leave_out={"UVMap"}) == untouched
 
 

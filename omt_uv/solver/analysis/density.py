@@ -83,6 +83,13 @@ def mean_curvature_density(positions: np.ndarray, triangles: np.ndarray, c: floa
     return _curvature_density(area, triangles, curvature.mean_curvature(positions, triangles), c, whole)
 
 
+def means_of_corners(values: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray) -> np.ndarray:
+    """Means (f,) of values (n,) of vertices over the corners of polygons, which know no diagonal: see `Surface`."""
+    sides = np.diff(face_start)
+    total = np.bincount(np.repeat(np.arange(len(sides)), sides), values[corner_vertex], len(sides))
+    return total / np.maximum(sides, 1)
+
+
 def from_vertices(values: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Mean of the corners' values (n,) per triangle, (m,): weights of vertices as weights of faces."""
     return np.asarray(values, float)[triangles].mean(axis=1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .. import remeshing
-from ..analysis.density import Target, from_vertices, region_share
+from ..analysis.density import Target, means_of_corners, region_share
 from ..analysis.region_density import target_density
 from ..editing.magnify import magnify_region
 from ..editing.refine_island import refine_island
@@ -95,7 +95,8 @@ def magnify(
     """Magnify a painted region of existing UVs step by step, see `functions.magnify`."""
     surface = polygon_surface(vertices, faces)
     corner_uv = to_corners(uv, surface).copy()
-    painted = from_vertices(np.asarray(weights, float), surface.corner_vertex[surface.triangles])
+    painted = means_of_corners(np.asarray(weights, float), surface.corner_vertex, surface.face_start)
+    painted = painted[surface.triangle_face]
     before = np.abs(signed_areas(corner_uv, surface.triangles))
     asked = target_density(painted, before, factor, options.get("exact", True))
     found = uv_islands(surface, corner_uv)

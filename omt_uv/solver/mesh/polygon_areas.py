@@ -35,7 +35,7 @@ def polygon_areas(positions: np.ndarray, triangles: np.ndarray, polygons: np.nda
     if len(several):
         fan, looks_out = _fans(positions, triangles[several], owner[several], len(whole))
         whole[looks_out] = fan[looks_out]
-    return area * np.divide(whole, given, out=np.ones(len(whole)), where=given > 0)[owner]
+    return area * np.divide(whole, given, out=np.ones(len(whole)), where=(given > 0) & np.isfinite(given))[owner]
 
 
 def quads(triangles: np.ndarray, polygons: np.ndarray) -> np.ndarray:
