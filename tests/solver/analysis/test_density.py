@@ -10,6 +10,7 @@ from omt_uv.solver.analysis.density import (
     gaussian_curvature_density,
     graded_density,
     mean_curvature_density,
+    means_of_corners,
     normalised_density,
     painted_density,
     region_share,
@@ -17,6 +18,14 @@ from omt_uv.solver.analysis.density import (
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.errors import DensityError, ShareError, WeightError
 from omt_uv.solver.mesh.geometry import face_areas
+
+
+def test_means_of_corners_of_triangles_are_those_of_their_vertices():
+    V, F = meshes.bumpy(5, 4)
+    values = V[:, 0] ** 2
+    assert means_of_corners(values, F.ravel(), 3 * np.arange(len(F) + 1)) == pytest.approx(from_vertices(values, F))
+    found = means_of_corners(np.arange(6.0), np.array([0, 1, 2, 3, 5, 4, 3]), np.array([0, 4, 7]))
+    assert found.tolist() == [1.5, 4.0]
 
 
 def rotation(seed=0):
