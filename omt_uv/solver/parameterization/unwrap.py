@@ -17,6 +17,7 @@ from .chart_indices import chart_target, located
 from .chart_map import ChartMap, map_chart
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons
+from .mirrored_charts import mirror_partners, mirrored_map
 from .options import UnwrapOptions
 from .shear_bound import bound_shear
 from .small_charts import is_small, map_together
@@ -106,16 +107,21 @@ class _Task:
             raise located(error, chart) from error
 
     def map_all(self, charts: list[Chart], pins: list[ChartPins | None]) -> Steps[list[ChartMap]]:
-        """Maps of all charts, small ones without pins together."""
+        """Maps of all charts, small ones without pins together, one for two that are each other's mirror image."""
         total = sum(len(c.triangles) for c in charts)
         free = self.options.boundary == "free"
-        alike = [k for k, c in enumerate(charts) if free and pins[k] is None and is_small(c)]
+        every = [chart_target(self.target, self.surface, chart) for chart in charts]
+        pairs = {} if any(p is not None for p in pins) else mirror_partners(charts, every)
+        alike = [k for k, c in enumerate(charts) if free and pins[k] is None and is_small(c) and k not in pairs]
         done = sum(len(charts[k].triangles) for k in alike) / total
-        targets = [chart_target(self.target, self.surface, charts[k]) for k in alike]
+        targets = [every[k] for k in alike]
         found = yield from part_of(map_together([charts[k] for k in alike], targets, self.options), 0.0, done)
         ready = dict(zip(alike, found, strict=True))
-        maps = []
+        maps: list[ChartMap] = []
         for k, chart in enumerate(charts):
+            if k in pairs:
+                maps.append(mirrored_map(maps[pairs[k][0]], pairs[k][1]))
+                continue
             chart_map = ready.get(k)
             if chart_map is None:
                 share = 0.0 if k in ready else len(chart.triangles) / total
