@@ -27,11 +27,10 @@ NEAR_CENTRE = 0.1
 
 @dataclass(frozen=True)
 class Mirror:
-    """A reflection that takes a mesh to itself: image (n,) of every vertex, the plane by its normal (3,) and offset."""
+    """A reflection that takes a mesh to itself: image (n,) of every vertex, and the normal (3,) of the plane."""
 
     image: np.ndarray
     normal: np.ndarray
-    offset: float
 
 
 def find_mirror(
@@ -43,13 +42,19 @@ def find_mirror(
     across: a mirror that the plane is to be at right angles to. Every vertex belongs to a triangle. Mirror images agree
     to `MIRROR_TOLERANCE` of the extent.
     """
+    # Halves first: the difference of two huge numbers may be infinite.
+    low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
+    extent = float((high - low).max())
+    if not (0 < extent and np.isfinite(extent)):
+        return None
+    positions = (positions / 2 - low) / extent
     polygons = _Polygons(positions, triangles, faces)
     for normal in _candidates(positions, triangles):
         if across is not None and abs(normal @ across.normal) > MIRROR_TOLERANCE:
             continue
         image = polygons.image(normal)
         if image is not None and (across is None or (image[across.image] == across.image[image]).all()):
-            return Mirror(image, normal, float(positions.mean(axis=0) @ normal))
+            return Mirror(image, normal)
     return None
 
 
