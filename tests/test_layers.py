@@ -27,6 +27,7 @@ ARROWS: dict[str, str] = {
     "solver.transfer": "solver solver.mesh",
     "solver.analysis": "solver solver.mesh solver.linalg",
     "solver.maps": "solver solver.mesh solver.linalg",
+    "solver.subdivision": "solver solver.maps",
     "solver.transport": "solver solver.mesh solver.linalg",
     "solver.cutting": "solver solver.mesh solver.linalg solver.analysis",
     "solver.conformal": "solver solver.mesh solver.linalg solver.maps",
@@ -48,7 +49,8 @@ ARROWS: dict[str, str] = {
     "solver.remeshing",
     "remedies": "solver",
     "xatlas": "errors solver solver.mesh",
-    "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.transfer solver.refinement "
+    "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.subdivision solver.transfer "
+    "solver.refinement "
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization xatlas "

@@ -12,6 +12,7 @@ __getattr__, __all__ = lazy(
     mesh="TargetError check_target read read_mesh target_layer write_uv",
     remesh_objects="Request SourceError new_objects read_request",
     seams="mark_seams",
+    subdivision="modifier_of subdivision_warnings",
     uv_packer="pack",
     vertex_groups="GroupError group_weights write_group",
     weights="Weights region_weights",

@@ -17,6 +17,7 @@ from ..errors import UserError
 from ..pipelines.reading import Reading
 from ..solver.errors import MeshError, NonFiniteError
 from ..solver.mesh.surface import Surface
+from .subdivision import modifier_of
 from .versions import uv_values
 
 UV_LAYER_NAME = "UVMap"
@@ -67,10 +68,10 @@ def read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, layer: str = "", edit
     faces = np.ones(f, dtype=bool)
     if edit_mode:
         faces = _get(mesh.polygons, "select", f, bool) & ~_get(mesh.polygons, "hide", f, bool)
-    source = mesh.uv_layers.get(layer) or mesh.uv_layers.active
+    source, modifier = mesh.uv_layers.get(layer) or mesh.uv_layers.active, modifier_of(obj, mesh)
     if source is None:
-        return Reading(surface, faces, None, None)
-    return Reading(surface, faces, read_uv(mesh, source.name), read_pinned(mesh, source.name))
+        return Reading(surface, faces, None, None, modifier)
+    return Reading(surface, faces, read_uv(mesh, source.name), read_pinned(mesh, source.name), modifier)
 
 
 def _get(collection, name: str, count: int, dtype=np.int32) -> np.ndarray:

@@ -23,14 +23,17 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ..pipelines.distortion import measure_readings, summary
+    from ..pipelines.distortion import measure_readings, on_subdivision, summary
+    from ..pipelines.subdivision import evaluated
 
     with refusals(name=str(options.input)):
         readings = [reading for _, reading in read_file(options.input)]
         figures = measure_readings(readings)
         if options.histogram:
-            _draw(options.histogram, readings)
-    print(json.dumps(asdict(figures), indent=1) if options.json else summary(figures))
+            _draw(options.histogram, [evaluated(reading) for reading in readings])
+    subdivided = on_subdivision(readings)
+    more = {"on_subdivided_surface": True} if subdivided else {}
+    print(json.dumps(asdict(figures) | more, indent=1) if options.json else summary(figures, subdivided))
 
 
 def _draw(path: Path, readings: list) -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from ..settings import DEFAULT_BALANCE, DEFAULT_QUALITY, FIRST_TILE, QUALITIES
 
+# Levels of subdivision, as many as Blender's slider has.
+MOST_LEVELS = 6
 FORMATS = ".blend .obj .ply .stl .glb .fbx"
 
 
@@ -48,6 +50,16 @@ def shear(text: str) -> float:
     value = float(text)
     if not 1 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not greater than 1, which is no shear")
+    return value
+
+
+def subdivision(text: str) -> str | int:
+    """ "auto", or levels; "off" is 0."""
+    if text in ("auto", "off"):
+        return "auto" if text == "auto" else 0
+    value = int(text)
+    if not 0 <= value <= MOST_LEVELS:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of levels from 0 to {MOST_LEVELS}")
     return value
 
 

@@ -16,7 +16,18 @@ from ..settings import (
 )
 from .common import drain_shown, refusals, write_report
 from .layers import read_layers, write_layers
-from .options import add_area_options, add_cut_options, add_files, add_report, margin, names, shear, texture_size, tile
+from .options import (
+    add_area_options,
+    add_cut_options,
+    add_files,
+    add_report,
+    margin,
+    names,
+    shear,
+    subdivision,
+    texture_size,
+    tile,
+)
 
 
 def add(commands) -> None:
@@ -41,6 +52,13 @@ def add(commands) -> None:
     command.add_argument(
         "--texture-size", type=texture_size, default=DEFAULT_TEXTURE_SIZE, metavar="PX", help="width of the texture"
     )
+    command.add_argument(
+        "--subdivision",
+        type=subdivision,
+        default="auto",
+        metavar="auto|off|N",
+        help="keep the areas of the subdivided surface: of the modifier's, of the mesh alone, or of N levels",
+    )
     command.add_argument("--no-pack", action="store_true", help="centre the islands one upon the other")
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
     add_report(command, "chart")
@@ -48,6 +66,7 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     objects, readings = read_layers(options)
+    from ..blender.subdivision import subdivision_warnings, with_levels
     from ..blender.uv_packer import pack
     from ..blender.vertex_groups import avoided
     from ..pipelines.layout import UnwrapJob
@@ -67,8 +86,15 @@ def run(options: argparse.Namespace) -> None:
     )
     with refusals(objects):
         free = avoided(objects, options.keep_free)
-        jobs = [UnwrapJob(r.surface, r.faces, r.pins, avoid) for r, avoid in zip(readings, free, strict=True)]
+        if options.subdivision != "auto":
+            readings = [with_levels(r, options.subdivision) for r in readings]
+        jobs = [
+            UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision)
+            for r, avoid in zip(readings, free, strict=True)
+        ]
         layout = drain_shown(lay_out(jobs, settings, pack))
+        if options.subdivision != 0:
+            layout.warnings.extend(subdivision_warnings(objects))
         warnings = write_layers(options, objects, layout)
     if options.report:
         charts = [surface_map.report() for surface_map in layout.maps]

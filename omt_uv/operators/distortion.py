@@ -26,10 +26,10 @@ class UV_OT_omt_measure(QuickOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def act(self, context: bpy.types.Context) -> None:
-        from ..pipelines.distortion import measure_readings, summary
+        from ..pipelines.distortion import measure_readings, on_subdivision, summary
 
         readings = [reading for _, reading in read_objects(context)]
-        self.report({"INFO"}, summary(measure_readings(readings)))
+        self.report({"INFO"}, summary(measure_readings(readings), on_subdivision(readings)))
         rows = last_run.figures(readings, DEFAULT_TEXTURE_SIZE, context.scene.unit_settings.scale_length)
         last_run.state.summary = last_run.Summary(self.bl_label, rows)
 
@@ -64,8 +64,9 @@ class UV_OT_omt_histogram(QuickOperator, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         from ..display.canvas import set_preview, show
         from ..display.histogram import histogram, thumbnail
+        from ..pipelines.subdivision import evaluated
 
-        readings = [reading for _, reading in read_objects(context)]
+        readings = [evaluated(reading) for _, reading in read_objects(context)]
         image = show(HISTOGRAM, histogram(readings))
         set_preview(image, thumbnail(readings))
         if context.space_data is not None and context.space_data.type == "IMAGE_EDITOR":

@@ -46,6 +46,12 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         "the largest as wide as the square",
         default=True,
     )
+    use_subdivision: BoolProperty(
+        name="Use Subdivision Surface",
+        description="Where an object has a Subdivision Surface modifier, keep the areas of the subdivided surface, "
+        "as it is rendered, instead of those of the mesh",
+        default=True,
+    )
     uv_layer: StringProperty(
         name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
     )
@@ -76,14 +82,20 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         objects, readings = read_writable(context, self.uv_layer)
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
-            jobs = [UnwrapJob(r.surface, r.faces, r.pins, avoid) for r, avoid in zip(readings, free, strict=True)]
+            used = self.use_subdivision
+            jobs = [
+                UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision if used else None)
+                for r, avoid in zip(readings, free, strict=True)
+            ]
             layout = yield from run.aside(lay_out(jobs, self.settings(), run.in_front(pack)))
         return objects, layout
 
     def finish(self, context: bpy.types.Context, result) -> None:
+        from ..blender.subdivision import subdivision_warnings
+
         objects, layout = result
         write_layers(objects, self.uv_layer, layout)
-        warn(self, objects, layout.warnings)
+        warn(self, objects, layout.warnings + (subdivision_warnings(objects) if self.use_subdivision else []))
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
@@ -112,6 +124,7 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     choose_group(column, properties, "keep_free")
     layout.prop(properties, "fill_holes")
     layout.prop(properties, "max_shear")
+    layout.prop(properties, "use_subdivision")
     layout.separator()
     layout.prop(properties, "pack")
     column = layout.column()

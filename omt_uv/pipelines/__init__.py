@@ -15,9 +15,10 @@ __getattr__, __all__ = lazy(
     layout="Layout PlacedIsland Refusal UnwrapJob pack_islands",
     magnify="Magnified Region Shares warped_picture",
     panorama_redraw="redraw",
-    reading="Reading",
+    reading="Reading SubdivisionModifier",
     refine="RefinedLayout refine_islands",
     remesh="LevelOfDetail RemeshJob Series remesh_series",
     texel_density="Texels with_texel_density",
+    subdivision="evaluated subdivided_target",
     unwrap="lay_out",
 )

@@ -10,6 +10,9 @@ import numpy as np
 from ..solver.errors import EmptyMeshError
 from ..solver.maps.distortion import Distortion, distortion
 from .reading import Reading
+from .subdivision import evaluated
+
+ON_SUBDIVISION = "on the subdivided surface"
 
 
 @dataclass(frozen=True)
@@ -58,18 +61,26 @@ def triangles_of(readings: Sequence[Reading]) -> ChosenTriangles:
 def measure_readings(readings: Sequence[Reading], overlap: bool = True) -> Distortion:
     """Distortion of the active UVs over the chosen polygons of all readings; `overlap` costs most of the time.
 
+    Of objects with a Subdivision Surface modifier, the subdivided surface and its UVs are measured.
+
     Raises
     ------
     EmptyMeshError : no polygon is chosen, or a mesh with chosen polygons has no UVs
     NonFiniteError, ZeroAreaFaceError : see `solver.maps.distortion.distortion`
     """
-    found = triangles_of(readings)
+    found = triangles_of([evaluated(reading) for reading in readings])
     return distortion(found.positions, found.triangles, found.uv, overlap=overlap, polygons=found.polygons)
 
 
-def summary(figures: Distortion) -> str:
-    """One line for a status bar."""
-    return (
+def on_subdivision(readings: Sequence[Reading]) -> bool:
+    """Whether figures of the readings are those of a subdivided surface."""
+    return any(reading.subdivision is not None for reading in readings)
+
+
+def summary(figures: Distortion, subdivided: bool = False) -> str:
+    """One line for a status bar; `subdivided` is said."""
+    place = ON_SUBDIVISION[0].upper() + ON_SUBDIVISION[1:] + ": " if subdivided else ""
+    return place + (
         f"Area error {100 * figures.area_l1:.2f} % "
         f"(SD {figures.area_sd:.4f}, 99 % within {figures.area_p99:.3f} octaves), "
         f"shear {figures.angle_mean:.3f} (99 % within {figures.angle_p99:.2f}), "

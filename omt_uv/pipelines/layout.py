@@ -21,6 +21,7 @@ from ..solver.mesh.surface import Surface
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..xatlas import packing
+from .reading import SubdivisionModifier
 
 Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
 
@@ -42,7 +43,7 @@ class UnwrapJob:
 
     faces : its polygons (f,) bool to unwrap, all by default; pins : corners that stay; avoid : vertices (n,) in [0,1]
         to keep free of cuts; target : density and region of its triangles, their own areas by default. Targets of
-        several surfaces are relative to each other
+        several surfaces are relative to each other; subdivision : the modifier on whose surface areas shall be right
     """
 
     surface: Surface
@@ -50,6 +51,7 @@ class UnwrapJob:
     pins: CornerPins | None = None
     avoid: np.ndarray | None = None
     target: Target | None = None
+    subdivision: SubdivisionModifier | None = None
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,14 +11,34 @@ from ..solver.parameterization.chart_pins import CornerPins
 
 
 @dataclass(frozen=True)
+class SubdivisionModifier:
+    """What a Subdivision Surface modifier does to a mesh.
+
+    levels : how often; uv_smooth : an identifier of Blender's; keep_corners : corners of an open boundary stay;
+    simple : no smoothing; limit : vertices lie on the limit surface; ends (k,2), sharpness (k,) and corner_sharpness
+    (n,): creased edges and vertices
+    """
+
+    levels: int
+    uv_smooth: str = "PRESERVE_BOUNDARIES"
+    keep_corners: bool = False
+    simple: bool = False
+    limit: bool = True
+    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    sharpness: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    corner_sharpness: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
 class Reading:
     """A surface, the polygons to work on (f,) bool, and of a UV layer, if there is one, the UVs (c,2) float32 and
-    which of them are pinned (c,) bool."""
+    which of them are pinned (c,) bool; the Subdivision Surface modifier of the object, if it has one."""
 
     surface: Surface
     faces: np.ndarray
     uv: np.ndarray | None
     pinned: np.ndarray | None
+    subdivision: SubdivisionModifier | None = None
 
     @property
     def all_pins(self) -> CornerPins | None:

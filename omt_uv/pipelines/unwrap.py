@@ -18,6 +18,10 @@ from ..solver.parameterization.unwrap import SurfaceMap, unwrap
 from ..solver.progress import Progress, Steps, part_of
 from ..xatlas.segmentation import SegmentationError, chart_seams
 from .layout import Layout, Packer, PlacedIsland, Refusal, UnwrapJob, corner_uvs, pack_islands
+from .subdivision import refinable, refined_on_subdivision, subdivided_target
+
+# Share of the time that the cage's own maps take where those of its subdivided surface follow.
+CAGE_SHARE = 0.5
 
 
 def lay_out(
@@ -42,8 +46,7 @@ def lay_out(
     for index, job in enumerate(jobs):
         try:
             job, warning = _with_charts(job) if settings.seams == "charts" else (job, "")
-            steps = unwrap(job.surface, job.faces, options=options, pins=job.pins, target=job.target, avoid=job.avoid)
-            maps.append((yield from part_of(steps, index / len(jobs), 1 / len(jobs))))
+            maps.append((yield from part_of(_unwrapped(job, options), index / len(jobs), 1 / len(jobs))))
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for text in (warning, *maps[-1].warnings) if text]
@@ -66,6 +69,22 @@ def lay_out(
     placed = [i if stays else replace(i, uv=next(packed_uv)) for i, stays in zip(mapped, pinned, strict=True)]
     corners, uv = corner_uvs(len(maps), placed)
     return Layout(corners=corners, uv=uv, maps=maps, packing=packed, warnings=warnings)
+
+
+def _unwrapped(job: UnwrapJob, options: UnwrapOptions) -> Steps[SurfaceMap]:
+    """The maps of the charts of a surface, for the areas of its subdivided surface where it has a modifier for that."""
+    target, modifier = job.target, job.subdivision
+    share = 1.0
+    if modifier is not None:
+        share = CAGE_SHARE
+        if options.boundary != "free" or not refinable(job.surface):
+            target = subdivided_target(job.surface, modifier)
+    steps = unwrap(job.surface, job.faces, options=options, pins=job.pins, target=target, avoid=job.avoid)
+    found = yield from part_of(steps, 0.0, share)
+    if modifier is None:
+        return found
+    rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary)
+    return (yield from part_of(rest, share, 1 - share))
 
 
 def _with_charts(job: UnwrapJob) -> tuple[UnwrapJob, str]:

@@ -26,16 +26,20 @@ state = State()
 
 def figures(readings, texture_size: float, metres: float) -> tuple[tuple[str, str], ...]:
     """Rows about the active UVs of readings; none where there is nothing to measure."""
-    from ..pipelines.distortion import measure_readings
+    from ..pipelines.distortion import ON_SUBDIVISION, measure_readings, on_subdivision
+    from ..pipelines.subdivision import evaluated
     from ..pipelines.texel_density import Texels, texel_density
     from ..solver.errors import MeshError
 
     try:
+        place = (("Measured", ON_SUBDIVISION),) if on_subdivision(readings) else ()
+        readings = [evaluated(reading) for reading in readings]
         found = measure_readings(readings, overlap=False)
         pixels = texel_density(readings, Texels(texture_size, metres))
     except MeshError:
         return ()
     return (
+        *place,
         ("Area error", f"{100 * found.area_l1:.2f} %"),
         ("Shear", f"{found.angle_mean:.3f}"),
         ("Folded faces", f"{found.folds}"),

@@ -20,3 +20,20 @@ def test_report(run, tmp_path):
     expected = {"newton_conformal", "newton_transport", "residual_conformal", "residual_transport", "seconds"}
     assert expected | {"area_l1", "area_sd", "angle_mean", "folds", "faces", "warnings"} <= set(charts[0])
     assert all(seconds >= 0 for seconds in charts[0]["seconds"].values())
+
+
+def test_subdivision(run, tmp_path):
+    modifier = scenes.bump(5, 6).modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    errors = {}
+    for choice in ("auto", "off", "1", "2"):
+        out = tmp_path / f"{choice}.blend"
+        assert run("unwrap", tmp_path / "in.blend", "-o", out, "--subdivision", choice)[0] == 0
+        status, text, _ = run("measure", out, "--json")
+        figures = json.loads(text)
+        assert status == 0 and figures["on_subdivided_surface"]
+        errors[choice] = figures["area_l1"]
+    assert errors["auto"] == errors["1"] < errors["off"] and errors["2"] < errors["off"]
+    assert "on the subdivided surface" in run("measure", tmp_path / "auto.blend")[1].lower()
+    assert run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "o.blend", "--subdivision", "-1")[0] != 0

@@ -45,7 +45,7 @@ def find_mirror(
     # Halves first: the difference of two huge numbers may be infinite.
     low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
     extent = float((high - low).max())
-    if not (0 < extent and np.isfinite(extent)):
+    if not (extent > 0 and np.isfinite(extent)):
         return None
     positions = (positions / 2 - low) / extent
     polygons = _Polygons(positions, triangles, faces)

@@ -1,0 +1,315 @@
+"""Judge UVs, and make them, on the subdivided surface that a Subdivision Surface modifier shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..solver.analysis.density import Target
+from ..solver.maps.distortion import distortion
+from ..solver.maps.energy import Elements
+from ..solver.mesh.charts import Chart
+from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.surface import Surface
+from ..solver.mesh.topology import boundary_loops
+from ..solver.parameterization.chart_map import ChartMap
+from ..solver.parameterization.chart_pins import CornerPins, pins_of_chart
+from ..solver.parameterization.unwrap import SurfaceMap
+from ..solver.progress import Steps
+from ..solver.refinement.boundary_barrier import crossings
+from ..solver.subdivision.cage_refinement import refine_cage, subdivided_elements
+from ..solver.subdivision.catmull_clark import (
+    SHARP,
+    Cage,
+    Subdivision,
+    bilinear,
+    straight_boundary,
+    straight_corners,
+    subdivide,
+)
+from .reading import Reading, SubdivisionModifier
+
+# Quads of the subdivided surface at most: fewer levels stand for all where there are more.
+MOST_QUADS = 250_000
+# And where the UVs of the cage are refined for them; denser cages get the areas of their subdivided polygons alone,
+# whose UVs are smoothed by little.
+REFINED_QUADS = 40_000
+# The area's weight is no larger: what the cage cannot express would be bought by shear alone.
+AREA_WEIGHT = 100.0
+# Area error on the subdivided surface that is worth a warning.
+INEXACT = 0.05
+COARSE = "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface"
+# How warnings about the areas of a cage begin.
+AREA_WARNING = "Areas are"
+# Corners of one vertex closer than this have one UV, as for Blender.
+SAME_UV = 1e-4
+# Triangles of a quad.
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
+SMOOTH_UV = "SMOOTH_ALL"
+LINEAR_UV = "NONE"
+STRAIGHT_UV = "PRESERVE_BOUNDARIES"
+
+
+@dataclass(frozen=True)
+class SubdividedSurface:
+    """Corners (q,4,3) in space of the quads of a subdivided surface, its vertices' matrix, and the level it is of."""
+
+    corners: np.ndarray
+    subdivision: Subdivision
+    levels: int
+
+    def polygon_areas(self, count: int) -> np.ndarray:
+        """Areas (f,) of the polygons of the cage on the subdivided surface."""
+        return np.bincount(self.subdivision.polygon, _quad_areas(self.corners), count)
+
+
+def evaluated(reading: Reading) -> Reading:
+    """The reading of the subdivided mesh with its smoothed UVs, as the renderer has it; itself without a modifier."""
+    modifier, surface = reading.subdivision, reading.surface
+    if modifier is None or not len(surface.corner_vertex):
+        return reading
+    fine = subdivided_surface(surface, modifier, MOST_QUADS)
+    quads, polygon = fine.subdivision.quads, fine.subdivision.polygon
+    corner = 4 * np.arange(len(quads))[:, None, None] + HALVES
+    subdivided = Surface(
+        positions=fine.subdivision.matrix @ surface.positions,
+        corner_vertex=quads.ravel(),
+        face_start=np.arange(0, 4 * len(quads) + 1, 4),
+        triangles=corner.reshape(-1, 3),
+        triangle_face=np.repeat(np.arange(len(quads)), 2),
+        seams=np.zeros((0, 2), np.int64),
+        sharp=np.zeros((0, 2), np.int64),
+    )
+    uv = None
+    if reading.uv is not None:
+        vertex, first = _uv_vertices(surface.corner_vertex, np.asarray(reading.uv, float))
+        mapped = subdivided_uv(vertex, surface.face_start, surface.corner_vertex[first], modifier, fine.levels)
+        uv = (mapped.matrix @ np.asarray(reading.uv, float)[first])[mapped.quads].reshape(-1, 2)
+    return Reading(subdivided, reading.faces[polygon], uv, None)
+
+
+def subdivided_surface(surface: Surface, modifier: SubdivisionModifier, most: int) -> SubdividedSurface:
+    """The subdivided surface at the level of the modifier, or at a lower one with at most so many quads."""
+    quads = 4.0 ** np.arange(modifier.levels) * len(surface.corner_vertex)
+    levels = max(1, int((quads <= most).sum()))
+    sharpness = modifier.corner_sharpness
+    cage = Cage(
+        corner_vertex=surface.corner_vertex,
+        face_start=surface.face_start,
+        count=len(surface.positions),
+        ends=modifier.ends,
+        sharpness=modifier.sharpness,
+        corner_sharpness=np.zeros(len(surface.positions)) if sharpness is None else sharpness,
+    )
+    if modifier.simple:
+        found = bilinear(cage, levels)
+    else:
+        found = subdivide(straight_corners(cage) if modifier.keep_corners else cage, levels, modifier.limit)
+    return SubdividedSurface((found.matrix @ surface.positions)[found.quads], found, levels)
+
+
+def subdivided_uv(
+    vertex: np.ndarray, face_start: np.ndarray, ids: np.ndarray, modifier: SubdivisionModifier, levels: int
+) -> Subdivision:
+    """How the modifier subdivides UVs whose vertex at each corner (c,) of polygons (f+1,) is given.
+
+    ids (n,): vertices of the surface that the UVs' are at. Creases count as they do for the surface.
+    """
+    ends, sharpness = _creases(vertex, face_start, ids, modifier)
+    cage = Cage(vertex, face_start, len(ids), ends, sharpness, _corner_sharpness(ids, modifier))
+    smooth = modifier.uv_smooth
+    if modifier.simple or smooth == LINEAR_UV:
+        return bilinear(cage, levels)
+    if smooth == STRAIGHT_UV:
+        cage = straight_boundary(cage)
+    elif smooth != SMOOTH_UV:
+        cage = straight_corners(cage)
+        if smooth != "PRESERVE_CORNERS":
+            # Where three and more islands meet.
+            several = np.bincount(ids + 1)[ids + 1] > 2
+            cage = replace(cage, corner_sharpness=np.where(several, SHARP, cage.corner_sharpness))
+    return subdivide(cage, levels, modifier.limit)
+
+
+def subdivided_target(surface: Surface, modifier: SubdivisionModifier) -> Target:
+    """What every polygon of a cage shall get: its area on the subdivided surface."""
+    count = len(surface.face_start) - 1
+    fine = subdivided_surface(surface, modifier, MOST_QUADS).polygon_areas(count)
+    area = face_areas(surface.positions, surface.corner_vertex[surface.triangles])
+    own = np.bincount(surface.triangle_face, area, count)
+    usable = (own > 0) & (fine > 0)
+    density = np.where(usable, fine / np.where(usable, own, 1), 1.0)
+    middle = np.median(density[usable]) if usable.any() else 1.0
+    # A polygon that vanishes on either side still needs a place.
+    return Target(np.clip(density, 1e-2 * middle, 1e2 * middle)[surface.triangle_face])
+
+
+def refinable(surface: Surface) -> bool:
+    """Whether the subdivided surface is small enough to refine the UVs of the cage for it."""
+    return 0 < len(surface.corner_vertex) <= REFINED_QUADS
+
+
+def refined_on_subdivision(
+    surface: Surface,
+    found: SurfaceMap,
+    modifier: SubdivisionModifier,
+    pins: CornerPins | None,
+    boundary: str,
+) -> Steps[SurfaceMap]:
+    """The maps of the charts of a cage refined for the areas of the subdivided surface, with its figures.
+
+    Pinned vertices stay, and so do the outlines of disks and squares.
+    """
+    if not refinable(surface):
+        return found
+    fine = subdivided_surface(surface, modifier, REFINED_QUADS)
+    part = _mapped_part(surface, found, fine, modifier)
+    if not len(part.corners):
+        return found
+    fixed = _fixed(found, pins, boundary)
+    found = part.resized(found, fixed)
+    uv = np.concatenate([m.uv for m in found.maps])
+    weight = min(AREA_WEIGHT, max(m.area_weight for m in found.maps))
+    elements = part.elements(found, uv, fixed)
+    refined = (yield from refine_cage(elements, part.mapping.matrix, uv, fixed, weight)).uv
+    maps, area = [], np.zeros(len(part.chart))
+    for k, (chart, old) in enumerate(zip(found.charts, found.maps, strict=True)):
+        mine = part.chart == k
+        new = refined[part.first[k] : part.first[k + 1]]
+        spoilt = _crosses(new, chart) and not _crosses(old.uv, chart)
+        corners = (part.mapping.matrix @ (uv if spoilt else refined))[part.mapping.quads[mine]]
+        area[mine] = _quad_areas(np.pad(corners, ((0, 0), (0, 0), (0, 1))))
+        maps.append(_with_figures(old, old.uv if spoilt else new, part.corners[mine], corners))
+    space = _quad_areas(part.corners)
+    error = float(np.abs(area / area.sum() - space / space.sum()).sum())
+    more = (COARSE.format(100 * error),) if weight == AREA_WEIGHT and error > INEXACT else ()
+    return replace(found, maps=maps, warnings=(*found.warnings, *more))
+
+
+@dataclass(frozen=True)
+class _MappedQuads:
+    """The quads of a subdivided surface that charts map: corners (q,4,3) in space, the chart (q,) of each, the UVs'
+    subdivision, and the first (k+1,) of each chart's vertices among all."""
+
+    corners: np.ndarray
+    chart: np.ndarray
+    mapping: Subdivision
+    first: np.ndarray
+
+    def resized(self, found: SurfaceMap, fixed: np.ndarray) -> SurfaceMap:
+        """The maps with the area of the subdivided surface, where no vertex (n,) bool is fixed."""
+        space = np.bincount(self.chart, _quad_areas(self.corners), len(found.charts))
+        maps = []
+        for k, (chart, old) in enumerate(zip(found.charts, found.maps, strict=True)):
+            covered = signed_areas(old.uv, chart.triangles).sum()
+            free = not fixed[self.first[k] : self.first[k + 1]].any() and covered > 0 and space[k] > 0
+            maps.append(replace(old, uv=old.uv * np.sqrt(space[k] / covered)) if free else old)
+        return replace(found, maps=maps)
+
+    def elements(self, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray) -> Elements:
+        """Those of the quads and of the triangles of the charts; a chart with fixed vertices keeps its area."""
+        count = len(found.charts)
+        owner = np.repeat(np.arange(count), np.diff(self.first))
+        triangles = np.concatenate([c.triangles + k for c, k in zip(found.charts, self.first, strict=False)])
+        covered = np.bincount(owner[triangles[:, 0]], signed_areas(uv, triangles), count)
+        triangles = triangles[signed_areas(uv, triangles) > 0]
+        space = np.bincount(self.chart, _quad_areas(self.corners), count)
+        bound = np.bincount(owner, fixed, count) > 0
+        scale = np.where(bound & (space > 0), covered / np.where(space > 0, space, 1), 1.0)
+        positions = np.concatenate([c.vertices for c in found.charts])
+        scales = np.concatenate([scale[self.chart], scale[owner[triangles[:, 0]]]])
+        return subdivided_elements(self.corners, self.mapping.quads, positions[triangles], triangles, scales)
+
+
+def _mapped_part(
+    surface: Surface, found: SurfaceMap, fine: SubdividedSurface, modifier: SubdivisionModifier
+) -> _MappedQuads:
+    """The quads of the polygons whose corners all have a vertex of a chart."""
+    first = np.cumsum([0, *(len(c.vertices) for c in found.charts)])
+    vertex = np.full(len(surface.corner_vertex), -1)
+    for chart, offset in zip(found.charts, first, strict=False):
+        vertex[chart.corners.ravel()] = chart.triangles.ravel() + offset
+    whole = np.logical_and.reduceat(vertex >= 0, surface.face_start[:-1])
+    sides = np.diff(surface.face_start)
+    start = np.concatenate([[0], np.cumsum(sides[whole])])
+    vertex = vertex[np.repeat(whole, sides)]
+    ids = np.concatenate([c.vertex_ids for c in found.charts])
+    mapping = subdivided_uv(vertex, start, ids, modifier, fine.levels)
+    owner = np.repeat(np.arange(len(found.charts)), np.diff(first))
+    chart = owner[vertex[start[:-1]]][mapping.polygon]
+    return _MappedQuads(fine.corners[whole[fine.subdivision.polygon]], chart, mapping, first)
+
+
+def _with_figures(old: ChartMap, uv: np.ndarray, corners: np.ndarray, mapped: np.ndarray) -> ChartMap:
+    """The map of a chart with its UVs and the figures of its quads (q,4,3) with UVs (q,4,2)."""
+    if not len(corners):
+        return old
+    triangles = np.arange(6 * len(corners)).reshape(-1, 3)
+    points, coordinates = corners[:, HALVES].reshape(-1, 3), mapped[:, HALVES].reshape(-1, 3, 2)
+    polygons = np.repeat(np.arange(len(corners)), 2)
+    found = distortion(points, triangles, coordinates, overlap=False, polygons=polygons)
+    # What was said about the target of the cage is said about the subdivided surface instead.
+    warnings = tuple(text for text in old.warnings if not text.startswith(AREA_WARNING))
+    if found.folds:
+        warnings += (f"{found.folds} faces of the subdivided surface are folded",)
+    figures = {name: getattr(found, name) for name in ("area_l1", "area_sd", "angle_mean", "folds")}
+    return replace(old, uv=uv, warnings=warnings, **figures)
+
+
+def _fixed(found: SurfaceMap, pins: CornerPins | None, boundary: str) -> np.ndarray:
+    """Vertices (n,) bool of all charts in turn that stay."""
+    every = []
+    for chart in found.charts:
+        fixed = np.zeros(len(chart.vertices), bool)
+        mine = pins_of_chart(pins, chart)
+        if mine is not None:
+            fixed[mine.vertices] = True
+        if boundary != "free":
+            fixed[boundary_loops(chart.disk)[0]] = True
+        every.append(fixed)
+    return np.concatenate(every)
+
+
+def _crosses(uv: np.ndarray, chart: Chart) -> bool:
+    """Whether the outline of a map (n,2) of a chart crosses itself."""
+    loops = boundary_loops(chart.disk)
+    return len(loops) > 0 and len(crossings(uv @ [1, 1j], loops[0])) > 0
+
+
+def _creases(
+    vertex: np.ndarray, face_start: np.ndarray, ids: np.ndarray, modifier: SubdivisionModifier
+) -> tuple[np.ndarray, np.ndarray]:
+    """Creased edges (k,2) between the vertices of UVs, and their sharpness (k,), as between the surface's vertices."""
+    if not len(modifier.ends):
+        return modifier.ends, modifier.sharpness
+    following = np.arange(len(vertex)) + 1
+    following[face_start[1:] - 1] = face_start[:-1]
+    n = int(max(ids.max(initial=0), modifier.ends.max())) + 1
+    ends = np.column_stack([vertex, vertex[following]])
+    low, high = np.sort(ids[ends], axis=1).T
+    creased = modifier.ends.min(axis=1) * n + modifier.ends.max(axis=1)
+    order = np.argsort(creased)
+    at = np.minimum(np.searchsorted(creased[order], low * n + high), len(order) - 1)
+    known = creased[order][at] == low * n + high
+    return ends[known], modifier.sharpness[order][at][known]
+
+
+def _corner_sharpness(ids: np.ndarray, modifier: SubdivisionModifier) -> np.ndarray:
+    """Sharpness (n,) of the vertices of UVs, that of the surface's vertices they are at."""
+    if modifier.corner_sharpness is None:
+        return np.zeros(len(ids))
+    return np.where(ids >= 0, modifier.corner_sharpness[ids], 0.0)
+
+
+def _uv_vertices(corner_vertex: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The UV vertex (c,) of every corner, and the first corner (n,) of each: equal vertex, and UVs that agree."""
+    key = np.column_stack([corner_vertex, np.round(uv / SAME_UV)]).astype(np.int64)
+    _, first, vertex = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return vertex.ravel(), first
+
+
+def _quad_areas(corners: np.ndarray) -> np.ndarray:
+    """Areas (q,) of quads (q,4,3)."""
+    points = corners[:, HALVES].reshape(-1, 3)
+    return face_areas(points, np.arange(len(points)).reshape(-1, 3)).reshape(-1, 2).sum(axis=1)

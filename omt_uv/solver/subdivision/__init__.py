@@ -1,0 +1,13 @@
+"""Subdivision surfaces of polygon meshes, and UVs of the cage that are right on the subdivided surface.
+
+Imports solver.maps and solver.progress.
+Main names: Cage, Subdivision, cage_of, subdivide, bilinear, subdivided_elements, refine_cage.
+"""
+
+from ..lazy import lazy
+
+__getattr__, __all__ = lazy(
+    __name__,
+    cage_refinement="CageMap refine_cage subdivided_elements",
+    catmull_clark="Cage Subdivision bilinear cage_of straight_boundary straight_corners subdivide",
+)

@@ -1,0 +1,193 @@
+"""Refine the UVs of a cage so that its subdivided surface has its areas, by projected Newton on the cage's vertices.
+
+The UVs of the subdivided mesh are a sparse matrix S times those of the cage (`catmull_clark`), so that the gradient
+of an energy of the fine triangles by the cage is S^T g, and its Hessian S^T H S. While fine triangles are folded, the
+determinant in the denominators is replaced by chi(det) = (det + sqrt(det^2 + eps^2)) / 2 > 0, with an eps that goes
+to 0 with the folds (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov 2021).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import block_diag, csr_matrix, identity, vstack
+from scipy.sparse.linalg import splu
+
+from ..maps.energy import Elements, face_derivatives_of, hat_gradients, squared, sum_at_vertices
+from ..progress import Progress, Steps
+
+# Corners of the four triangles of a quad, of both its diagonals, so that none prefers a direction.
+BOTH_DIAGONALS = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
+# Weight of the cage's own triangles beside those of the subdivided surface: they shall not fold.
+CAGE_WEIGHT = 1e-3
+STEPS = 60  # of Newton at most
+HALVINGS = 30  # of one step at most
+ARMIJO = 1e-4  # least share of the promised decrease that a step must gain
+# Predicted decrease over energy below which it is done.
+DONE = 1e-4
+# And the share of the energy that so many last steps have to gain, together.
+SLOW = 0.02
+LAST = 4
+# Added to the Hessian's diagonal, relative to its mean: charts have no place and no direction of their own.
+SHIFT = 1e-9
+# eps over the most negative determinant, and its least value, where a face has 1.
+REGULAR = 0.2
+LEAST = 1e-3
+# After so many steps, triangles of the other diagonals and of the cage that are still folded are left out: a quad with
+# three corners on a straight boundary cannot be convex.
+PATIENCE = 12
+
+
+@dataclass(frozen=True)
+class CageMap:
+    """UVs (n,2) of the cage, Newton steps, and the triangles of the subdivided surface that are still folded."""
+
+    uv: np.ndarray
+    iterations: int
+    folds: int
+
+
+@dataclass(frozen=True)
+class _CageProblem:
+    """Elements of the fine and the cage's triangles, the matrix to their vertices, and what is fixed (n,) bool."""
+
+    faces: Elements
+    matrix: csr_matrix
+    free: np.ndarray
+    area_weight: float
+
+    def without(self, out: np.ndarray) -> _CageProblem:
+        """The problem without some triangles (m,) bool."""
+        f = self.faces
+        faces = Elements(f.triangles[~out], f.area[~out], f.gradient[~out], f.ratio[~out], f.weight[~out])
+        return replace(self, faces=faces)
+
+    def dets(self, w: np.ndarray) -> np.ndarray:
+        """Determinants (m,) over those that are asked for, of a map w (n,) complex of the cage."""
+        a, b = self.faces.derivatives(self.matrix @ w)
+        return (squared(a) - squared(b)) / self.faces.ratio
+
+    def energy(self, w: np.ndarray, eps: float) -> float:
+        """The energy of a map w (n,) complex of the cage; with eps 0 infinite at a fold."""
+        a, b = self.faces.derivatives(self.matrix @ w)
+        outer, inner = squared(a) / self.faces.ratio, squared(b) / self.faces.ratio
+        det = outer - inner
+        if eps == 0 and not (det > 0).all():
+            return np.inf
+        chi = _chi(det, eps)[0]
+        value = (outer + inner) / chi - 1 + self.area_weight * ((det**2 + 1) / (2 * chi) - 1)
+        return float(self.faces.weight @ value)
+
+    def newton(self, w: np.ndarray, eps: float) -> tuple[np.ndarray, float]:
+        """The step (n,) complex of a map w (n,) of the cage and the decrease that it promises."""
+        n = len(w)
+        d = face_derivatives_of(self.faces, *self.faces.derivatives(self.matrix @ w), *self._by_squares(w, eps))
+        gradient = self.matrix.T @ sum_at_vertices(self.faces, d.gradient, self.matrix.shape[0])
+        rows = _real_rows(d.rows, self.faces.triangles, self.matrix.shape[0])
+        both = block_diag([self.matrix, self.matrix], format="csr")
+        hessian = (both.T @ ((rows.T @ rows) @ both)).tocsc()
+        free = np.flatnonzero(np.tile(self.free, 2))
+        right = np.concatenate([gradient.real, gradient.imag])[free]
+        hessian = hessian[free][:, free]
+        shift = SHIFT * hessian.diagonal().mean()
+        step = np.zeros(2 * n)
+        system = (hessian + shift * identity(len(free))).tocsc()
+        factor = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        step[free] = factor.solve(-right)
+        return step[:n] + 1j * step[n:], float(-right @ step[free])
+
+    def _by_squares(self, w: np.ndarray, eps: float):
+        """Derivatives of the energy by |a|^2 and |b|^2, those that the Hessian keeps, and its entries."""
+        ratio, weight = self.faces.ratio, self.faces.weight
+        a, b = self.faces.derivatives(self.matrix @ w)
+        p, q = squared(a) / ratio, squared(b) / ratio
+        d = p - q
+        chi, slope, bend = _chi(d, eps)
+        h, h1, h2 = 1 / chi, -slope / chi**2, 2 * slope**2 / chi**3 - bend / chi**2
+        # (d^2 + 1) h / 2, whose second derivative is kept where it is positive.
+        g1 = self.area_weight * (d * h + (d**2 + 1) / 2 * h1)
+        g2 = self.area_weight * np.maximum(h + 2 * d * h1 + (d**2 + 1) / 2 * h2, 0)
+        shear = h + (p + q) * h1, h - (p + q) * h1
+        scale = weight / ratio
+        first = scale * (shear[0] + g1), scale * (shear[1] - g1)
+        kept = scale * shear[0], scale * shear[1]
+        pp, pq, qq = 2 * h1 + (p + q) * h2 + g2, -(p + q) * h2 - g2, -2 * h1 + (p + q) * h2 + g2
+        aa = 2 * kept[0] + scale * 4 * p * pp
+        ab = scale * 4 * np.sqrt(p * q) * pq
+        bb = 2 * kept[1] + scale * 4 * q * qq
+        return first, kept, (aa, ab, bb)
+
+
+def _chi(det: np.ndarray, eps: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """chi(det), and its first and second derivative."""
+    if eps == 0:
+        return det, np.ones(len(det)), np.zeros(len(det))
+    root = np.sqrt(det**2 + eps**2)
+    return (det + root) / 2, (1 + det / root) / 2, eps**2 / (2 * root**3)
+
+
+def _real_rows(rows: np.ndarray, triangles: np.ndarray, n: int) -> csr_matrix:
+    """Linear forms (m,4,3) complex of n fine vertices as real rows (4m,2n) by u and v."""
+    m = len(triangles)
+    column = np.broadcast_to(triangles[:, None, :], (m, 4, 3)).reshape(-1, 3)
+    column = np.concatenate([column, column + n], axis=1)
+    value = np.concatenate([rows.real, -rows.imag], axis=2)
+    return csr_matrix((value.ravel(), column.ravel(), np.arange(0, 24 * m + 1, 6)), shape=(4 * m, 2 * n))
+
+
+def subdivided_elements(
+    corners: np.ndarray, quads: np.ndarray, cage_corners: np.ndarray, cage_triangles: np.ndarray, scale: np.ndarray
+) -> Elements:
+    """Elements of fine quads (q,4) with corners (q,4,3) in space, and of the cage's triangles (m,3) with corners
+    (m,3,3), whose vertices come after those of the quads. Each shall have scale (q+m,) times its area in the plane.
+
+    Triangles of the cage have next to no weight: they only shall not fold.
+    """
+    space = np.concatenate([corners[:, BOTH_DIAGONALS].reshape(-1, 3), cage_corners.reshape(-1, 3)])
+    area, gradient = hat_gradients(space, np.arange(len(space)).reshape(-1, 3))
+    offset = int(quads.max(initial=-1)) + 1
+    triangles = np.concatenate([quads[:, BOTH_DIAGONALS].reshape(-1, 3), cage_triangles + offset])
+    fine = 4 * len(quads)
+    # A face without area has nothing to ask for.
+    area = np.maximum(area, 1e-12 * area.sum() / len(area))
+    share = area / area[:fine].sum()
+    share[fine:] *= CAGE_WEIGHT
+    ratio = np.concatenate([np.repeat(scale[: len(quads)], 4), scale[len(quads) :]])
+    return Elements(triangles, share, gradient, ratio, share)
+
+
+def refine_cage(
+    faces: Elements, matrix: csr_matrix, uv: np.ndarray, fixed: np.ndarray, area_weight: float
+) -> Steps[CageMap]:
+    """Refine the UVs (n,2) of a cage for the elements of its subdivided surface (`subdivided_elements`).
+
+    matrix (n',n): from the cage to the fine vertices; fixed (n,) bool: vertices of the cage that stay
+    """
+    problem = _CageProblem(faces, vstack([matrix, identity(len(uv))]).tocsr(), ~fixed, area_weight)
+    w, iterations, history = uv @ [1, 1j], 0, list[float]()
+    # The second of a quad's triangulations, and the cage.
+    spare = np.arange(len(faces.triangles)) % 4 > 1
+    spare |= faces.triangles.min(axis=1) >= matrix.shape[0]
+    for k in range(STEPS if not fixed.all() else 0):
+        yield Progress("Subdivision", k / STEPS)
+        if k == PATIENCE:
+            problem = problem.without(spare & (problem.dets(w) <= 0))
+        least = float(problem.dets(w).min())
+        eps = 0.0 if least > 0 else float(np.hypot(LEAST, REGULAR * least))
+        before = problem.energy(w, eps)
+        step, decrease = problem.newton(w, eps)
+        size = 1.0
+        for _ in range(HALVINGS):
+            if problem.energy(w + size * step, eps) <= before - ARMIJO * size * decrease:
+                break
+            size /= 2
+        else:
+            break
+        w, iterations = w + size * step, k + 1
+        history = [*history, before] if eps == 0 else []
+        slow = len(history) > LAST and history[-LAST - 1] - before < SLOW * before
+        if slow or (eps == 0 and decrease < DONE * max(before, 1e-9)):
+            break
+    folds = int((problem.dets(w) <= 0).sum())
+    return CageMap(np.column_stack([w.real, w.imag]), iterations, folds)

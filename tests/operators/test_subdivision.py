@@ -1,0 +1,139 @@
+"""Use Subdivision Surface: areas and folds are those of the mesh with its modifier applied."""
+
+from __future__ import annotations
+
+import bpy
+
+import numpy as np
+import pytest
+import scenes
+
+
+def unwrap(**arguments):
+    assert bpy.ops.uv.omt_unwrap(**arguments) == {"FINISHED"}
+
+
+def bump(levels: int = 2, **settings):
+    obj = scenes.bump(columns=8, rows=8)
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = levels
+    for name, value in settings.items():
+        setattr(modifier, name, value)
+    return obj
+
+
+def applied(obj):
+    """Areas of the triangles of the evaluated mesh in space and in its UVs."""
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    mesh.calc_loop_triangles()
+    points = np.array([[mesh.vertices[v].co[:] for v in t.vertices] for t in mesh.loop_triangles])
+    layer = mesh.uv_layers.active.data
+    uv = np.array([[layer[k].uv[:] for k in t.loops] for t in mesh.loop_triangles])
+    space = 0.5 * np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=1)
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return space, 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def error(obj):
+    space, uv = applied(obj)
+    return np.abs(uv / uv.sum() - space / space.sum()).sum()
+
+
+SMOOTHING = ("NONE", "PRESERVE_CORNERS", "PRESERVE_BOUNDARIES", "SMOOTH_ALL")
+
+
+@pytest.mark.parametrize("uv_smooth", SMOOTHING)
+@pytest.mark.parametrize("make", [scenes.cube, lambda: scenes.bump(columns=5, rows=6)])
+def test_the_subdivided_mesh_is_that_of_blender(package, make, uv_smooth):
+    obj = make()
+    unwrap()
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.render_levels = modifier.levels = 2
+    modifier.uv_smooth = uv_smooth
+    modifier.use_creases = True
+    values = package("blender.mesh").read(obj)
+    found = package("pipelines.distortion").measure_readings([values], overlap=False)
+    space, uv = applied(obj)
+    assert found.faces == len(space) // 2
+    whole = [x.reshape(-1, 2).sum(axis=1) for x in (space, uv)]
+    assert found.area_l1 == pytest.approx(np.abs(whole[1] / whole[1].sum() - whole[0] / whole[0].sum()).sum(), abs=2e-3)
+
+
+def test_creases_count_as_they_do_for_blender(package):
+    obj = scenes.cube()
+    unwrap()
+    attribute = obj.data.attributes.new("crease_edge", "FLOAT", "EDGE")
+    attribute.data.foreach_set("value", [1.0, 0.3, 0.5] * 4)
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.render_levels = modifier.levels = 3
+    fine = package("pipelines.subdivision").evaluated(package("blender.mesh").read(obj))
+    space, uv = applied(obj)
+    area = fine.surface.positions[fine.surface.corner_vertex[fine.surface.triangles]]
+    mine = 0.5 * np.linalg.norm(np.cross(area[:, 1] - area[:, 0], area[:, 2] - area[:, 0]), axis=1)
+    assert mine.sum() == pytest.approx(space.sum(), rel=5e-3)
+
+
+def test_areas_of_the_applied_mesh_are_kept_and_nothing_folds():
+    obj = bump()
+    unwrap(use_subdivision=False)
+    without = error(obj)
+    unwrap()
+    assert (applied(obj)[1] > 0).all()
+    assert error(obj) < min(0.02, 0.7 * without)
+
+
+def test_without_the_modifier_the_box_does_nothing():
+    obj = scenes.bump(columns=8, rows=8)
+    unwrap()
+    expected = scenes.uv_of(obj)
+    unwrap(use_subdivision=False)
+    assert (scenes.uv_of(obj) == expected).all()
+
+
+def test_a_modifier_that_is_off_does_nothing():
+    obj = bump(show_render=False, show_viewport=False)
+    unwrap()
+    expected = scenes.uv_of(obj)
+    unwrap(use_subdivision=False)
+    assert (scenes.uv_of(obj) == expected).all()
+
+
+def test_edit_mode_equals_object_mode_and_nothing_is_left_behind():
+    obj = bump()
+    unwrap()
+    expected = scenes.uv_of(obj)
+    kept = {name: len(getattr(bpy.data, name)) for name in ("meshes", "objects", "scenes", "collections")}
+    scenes.edit(obj)
+    unwrap()
+    scenes.leave_edit()
+    assert np.allclose(scenes.uv_of(obj), expected, atol=1e-6)
+    assert kept == {name: len(getattr(bpy.data, name)) for name in kept}
+
+
+@pytest.mark.parametrize("boundary", ["DISK", "SQUARE"])
+def test_outlines_stay(boundary):
+    obj = bump()
+    unwrap(boundary=boundary, margin=0)
+    uv = scenes.uv_of(obj)
+    assert (applied(obj)[1] > 0).all()
+    if boundary == "SQUARE":
+        assert np.abs(scenes.areas(obj)[1]).sum() == pytest.approx(1, abs=1e-3)
+    else:
+        assert np.hypot(*(uv - 0.5).T).max() == pytest.approx(0.5, abs=1e-2)
+
+
+def test_figures_are_of_the_subdivided_surface_and_say_so(package):
+    obj = bump()
+    unwrap()
+    rows = dict(package("session.last_run").state.summary.rows)
+    assert rows["Measured"] == "on the subdivided surface"
+    assert float(rows["Area error"].split()[0]) == pytest.approx(100 * error(obj), abs=0.5)
+
+
+def test_other_modifiers_that_change_areas_are_said(package):
+    obj = bump()
+    obj.modifiers.new("Thick", "SOLIDIFY")
+    obj.modifiers.new("Copies", "ARRAY")
+    unwrap()
+    warnings = package("session.last_run").state.summary.warnings
+    assert any("Thick" in text and "Copies" not in text for text in warnings)
