@@ -173,14 +173,18 @@ def refined_on_subdivision(
     weight = min(AREA_WEIGHT, max(m.area_weight for m in found.maps))
     elements = part.elements(found, uv, fixed)
     refined = (yield from refine_cage(elements, part.mapping.matrix, uv, fixed, weight)).uv
-    maps, area = [], np.zeros(len(part.chart))
-    for k, (chart, old) in enumerate(zip(found.charts, found.maps, strict=True)):
+    again, stays = part.crossing(found, refined)
+    if again.any():
+        # With their outlines as they were.
+        start = np.where(again[:, None], uv, refined)
+        refined = (yield from refine_cage(elements, part.mapping.matrix, start, stays | fixed, weight)).uv
+    maps, area, fine_uv = [], np.zeros(len(part.chart)), part.mapping.matrix @ refined
+    for k, old in enumerate(found.maps):
         mine = part.chart == k
         new = refined[part.first[k] : part.first[k + 1]]
-        spoilt = _crosses(new, chart) and not _crosses(old.uv, chart)
-        corners = (part.mapping.matrix @ (uv if spoilt else refined))[part.mapping.quads[mine]]
+        corners = fine_uv[part.mapping.quads[mine]]
         area[mine] = _quad_areas(np.pad(corners, ((0, 0), (0, 0), (0, 1))))
-        maps.append(_with_figures(old, old.uv if spoilt else new, part.corners[mine], corners))
+        maps.append(_with_figures(old, new, part.corners[mine], corners))
     space = _quad_areas(part.corners)
     error = float(np.abs(area / area.sum() - space / space.sum()).sum())
     more = (COARSE.format(100 * error),) if weight == AREA_WEIGHT and error > INEXACT else ()
@@ -206,6 +210,16 @@ class _MappedQuads:
             free = not fixed[self.first[k] : self.first[k + 1]].any() and covered > 0 and space[k] > 0
             maps.append(replace(old, uv=old.uv * np.sqrt(space[k] / covered)) if free else old)
         return replace(found, maps=maps)
+
+    def crossing(self, found: SurfaceMap, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (n,) bool of the charts whose outlines cross themselves in the UVs (n,2) but not in their maps, and
+        all others with those on such an outline."""
+        again, stays = np.zeros(len(uv), bool), np.ones(len(uv), bool)
+        for chart, old, start, end in zip(found.charts, found.maps, self.first, self.first[1:], strict=False):
+            if _crosses(uv[start:end], chart) and not _crosses(old.uv, chart):
+                again[start:end], stays[start:end] = True, False
+                stays[start + np.concatenate(boundary_loops(chart.disk))] = True
+        return again, stays
 
     def elements(self, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray) -> Elements:
         """Those of the quads and of the triangles of the charts; a chart with fixed vertices keeps its area."""

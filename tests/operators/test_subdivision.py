@@ -137,3 +137,35 @@ def test_other_modifiers_that_change_areas_are_said(package):
     unwrap()
     warnings = package("session.last_run").state.summary.warnings
     assert any("Thick" in text and "Copies" not in text for text in warnings)
+
+
+def test_many_charts_of_a_coarse_mesh_do_not_fold():
+    bpy.ops.mesh.primitive_monkey_add()
+    obj = bpy.context.object
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 2
+    unwrap(seams="CHARTS")
+    assert (applied(obj)[1] > 0).all()
+
+
+def test_some_faces_alone():
+    obj = bump()
+    unwrap()
+    before = scenes.uv_of(obj)
+    chosen = np.arange(len(obj.data.polygons)) % 8 < 4
+    scenes.edit(obj, faces=np.flatnonzero(chosen))
+    unwrap()
+    scenes.leave_edit()
+    rest = np.repeat(~chosen, 4)
+    assert (scenes.uv_of(obj)[rest] == before[rest]).all()
+    assert (applied(obj)[1] > 0).all()
+
+
+def test_pins_stay():
+    obj = bump()
+    unwrap()
+    pinned = scenes.pin(obj, [0, 40, 80])
+    before = scenes.uv_of(obj)
+    unwrap()
+    assert np.allclose(scenes.uv_of(obj)[pinned], before[pinned], atol=1e-6)
+    assert (applied(obj)[1] > 0).all() and error(obj) < 0.05
