@@ -1,0 +1,78 @@
+"""Mirror planes of meshes: found wherever the mesh lies, however polygons are cut, and never where there is none."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.mesh.mirror import find_mirror
+
+
+def bump(count=8):
+    x, y = np.meshgrid(np.linspace(-1, 1, count + 1), np.linspace(-1, 1, count + 1), indexing="ij")
+    V = np.stack([x, y, np.exp(-2 * (x**2 + 2 * y**2))], axis=-1).reshape(-1, 3)
+    corner = ((count + 1) * np.arange(count)[:, None] + np.arange(count)).ravel()
+    Q = np.column_stack([corner, corner + count + 1, corner + count + 2, corner + 1])
+    return V, Q
+
+
+def cut(Q, other):
+    """Quads as triangles, those of `other` (q,) bool along the second diagonal, and the quad of each."""
+    one, two = Q[:, [[0, 1, 2], [0, 2, 3]]], Q[:, [[0, 1, 3], [1, 2, 3]]]
+    return np.where(other[:, None, None], two, one).reshape(-1, 3), np.repeat(np.arange(len(Q)), 2)
+
+
+def turned(V, seed):
+    Q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return V @ Q.T + 7
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("scale", [1e-200, 1.0, 1e200])
+def test_found_in_any_direction_unit_and_cut(seed, scale):
+    V, Q = bump()
+    T, faces = cut(Q, np.random.default_rng(seed).random(len(Q)) < 0.5)
+    mirror = find_mirror(scale * turned(V, seed), T, faces)
+    assert mirror is not None
+    np.testing.assert_array_equal(mirror.image[mirror.image], np.arange(len(V)))
+    W = turned(V, seed) - turned(V, seed).mean(axis=0)
+    reflected = W - 2 * (W @ mirror.normal)[:, None] * mirror.normal
+    np.testing.assert_allclose(W[mirror.image], reflected, atol=1e-9)
+
+
+def test_the_second_is_at_right_angles_to_the_first():
+    V, Q = bump()
+    T, faces = cut(Q, np.zeros(len(Q), bool))
+    first = find_mirror(V, T, faces)
+    second = find_mirror(V, T, faces, across=first)
+    assert abs(first.normal @ second.normal) < 1e-12
+    np.testing.assert_array_equal(first.image[second.image], second.image[first.image])
+    assert (first.image != second.image).any()
+
+
+def test_a_scar_leaves_none():
+    V, Q = bump()
+    V[10, 2] += 0.01
+    assert find_mirror(V, *cut(Q, np.zeros(len(Q), bool))) is None
+
+
+def test_vertices_that_lie_on_one_another_are_told_apart_by_their_polygons():
+    """As along a seam: both halves of a tube that was cut open."""
+    angle = np.linspace(0, 2 * np.pi, 13)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    V = np.concatenate([ring, ring + [0, 0, 1]])
+    k = np.arange(12)
+    Q = np.column_stack([k, k + 1, k + 14, k + 13])
+    mirror = find_mirror(V, *cut(Q, np.zeros(12, bool)))
+    assert mirror is not None and len(np.unique(mirror.image)) == len(V)
+
+
+def test_the_plane_of_a_flat_mesh_moves_nothing_and_is_none():
+    V = np.array([[0, 0, 0], [3, 0, 0], [1, 1, 0.0]])
+    assert find_mirror(V, np.array([[0, 1, 2]])) is None
+
+
+def test_no_symmetry_of_a_random_disk():
+    V, F = meshes.random_disk(60)
+    assert find_mirror(V, F) is None

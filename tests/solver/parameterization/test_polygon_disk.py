@@ -1,0 +1,77 @@
+"""Charts cut for their map: whichever way polygons came, the disk is the same, and long polygons are fans."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.parameterization.mirrored_charts import mirror_partners, mirrored_map
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped, of_polygon_disk, polygon_disk
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
+
+
+def disk_of(V, P):
+    (chart,) = strict_charts(meshes.polygon_surface(V, P))
+    return chart, polygon_disk(chart.vertices, chart)
+
+
+def test_which_corner_a_quad_begins_with_does_not_matter():
+    V, P = meshes.quad_grid()
+    V = V + 0.1 * np.random.default_rng(0).random(V.shape)
+    found = []
+    for k in range(4):
+        chart, disk = disk_of(V, [np.roll(p, k).tolist() for p in P])
+        place = chart.vertex_ids[disk.triangles]
+        found.append({tuple(sorted(t)) for t in place.tolist()})
+    assert found[0] == found[1] == found[2] == found[3]
+
+
+def test_a_long_convex_polygon_is_a_fan_about_its_centre():
+    angle = 2 * np.pi * np.arange(50) / 50
+    V = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    chart, disk = disk_of(V, [list(range(50))])
+    assert len(disk.triangles) == 50 and len(disk.vertices) == 51
+    np.testing.assert_allclose(disk.vertices[-1], 0, atol=1e-12)
+    np.testing.assert_allclose(face_areas(disk.vertices, disk.triangles).sum(), face_areas(V, chart.triangles).sum())
+
+
+def test_a_polygon_that_is_not_convex_stays_as_it_is():
+    V = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0.0]])
+    chart, disk = disk_of(V, [[3, 4, 0, 1, 2]])
+    assert len(disk.vertices) == 5 and len(disk.triangles) == len(chart.triangles)
+
+
+def test_densities_are_one_a_polygon():
+    V, P = meshes.quad_grid()
+    chart, disk = disk_of(V, P)
+    values = np.arange(len(chart.triangles), dtype=float)
+    given = of_polygon_disk(values, chart.vertices, chart, disk, 1.0)
+    for polygon in np.unique(disk.polygons):
+        assert np.ptp(given[disk.polygons == polygon]) == 0
+
+
+def test_a_dart_is_cut_so_that_no_triangle_folds():
+    V = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    (chart,) = strict_charts(meshes.polygon_surface(V, [[0, 1, 2, 3]]))
+    places = np.array([[0, 0], [2, 0], [2, 2], [1.5, 0.4]])
+    for k in range(4):
+        uv = np.roll(places, k, axis=0)[chart.vertex_ids]
+        new = cut_as_mapped(chart, uv)
+        assert (signed_areas(uv, new.triangles) > 0).all()
+        np.testing.assert_array_equal(new.vertex_ids[new.triangles], new.corners % 4)
+
+
+def test_charts_that_are_mirror_images_have_mirrored_maps():
+    V, F = meshes.bumpy(6, 6)
+    W = V * [-1, 1, 1] - [3, 0, 0]
+    surface = meshes.polygon_surface(np.concatenate([V, W]), np.concatenate([F, F[:, ::-1] + len(V)]).tolist())
+    found = drain(unwrap(surface, options=UnwrapOptions(quality="draft")))
+    pairs = mirror_partners(found.charts, [None, None])
+    (second,) = pairs
+    first, image = pairs[second]
+    np.testing.assert_array_equal(mirrored_map(found.maps[first], image).uv, found.maps[second].uv)
+    assert (signed_areas(found.maps[second].uv, found.charts[second].triangles) > 0).all()

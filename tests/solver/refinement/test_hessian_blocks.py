@@ -1,0 +1,54 @@
+"""Blocks of triangles and quads: the matrix is that of the rows, whichever way it is put together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from omt_uv.solver.maps.energy import area_forms, face_derivatives
+from omt_uv.solver.maps.polygon_elements import polygon_elements, with_convex_quads
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.refinement.hessian_blocks import assembly_of, corners_of_quads, hessian_blocks
+
+
+def patch(count=4):
+    """Quads, and a pentagon at the end: vertices, triangles, the polygon of each."""
+    x, y = np.meshgrid(np.arange(count + 1.0), np.arange(count + 1.0), indexing="ij")
+    V = np.stack([x, y, 0.3 * np.sin(x + 2 * y)], axis=-1).reshape(-1, 3)
+    corner = ((count + 1) * np.arange(count)[:, None] + np.arange(count)).ravel()
+    Q = np.column_stack([corner, corner + count + 1, corner + count + 2, corner + 1])
+    faces = np.repeat(np.arange(len(Q)), 2)
+    faces[-4:] = faces[-1]  # two quads make a hexagon
+    return V, Q[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), faces
+
+
+@pytest.mark.parametrize("convex", [False, True])
+def test_the_matrix_is_the_sum_of_the_squares_of_all_rows(convex):
+    V, T, polygons = patch()
+    w, n = V[:, :2] @ [1, 1j] * (1 + 0.05 * V[:, 0]), len(V)
+    faces = polygon_elements(V, T, face_areas(V, T), polygons)
+    faces = with_convex_quads(faces, w) if convex else faces
+    frame, free = np.exp(1j * np.arange(n)), np.ones((n, 2))
+    free[3] = [1, 0]
+    found = hessian_blocks(faces, w, 20.0, 0.5, (frame, free))
+    matrix = assembly_of(faces, n).matrix(found.triangles, np.zeros(2 * n), found.quads) + found.rest
+    local = face_derivatives(faces, w, 20.0, 0.5)
+    rows = [(faces.triangles[i], r) for i in range(len(faces.triangles)) for r in local.rows[i]]
+    forms = area_forms(faces, w, 20.0)
+    dense = np.zeros((len(rows) + len(faces.area), 2 * n))
+    for k, (vertices, row) in enumerate(rows):
+        for v, value in zip(vertices, row * frame[vertices], strict=True):
+            dense[k, 2 * v : 2 * v + 2] += [value.real, -value.imag]
+    for i, vertices in enumerate(faces.triangles):
+        for v, value in zip(vertices, forms[i] * frame[vertices], strict=True):
+            dense[len(rows) + faces.polygon[i], 2 * v : 2 * v + 2] += [value.real, -value.imag]
+    dense *= free.ravel()
+    np.testing.assert_allclose(sp.csr_matrix(matrix).toarray(), dense.T @ dense, atol=1e-12 * found.scale)
+
+
+def test_corners_of_quads_go_around():
+    V, T, polygons = patch()
+    faces = polygon_elements(V, T, face_areas(V, T), polygons)
+    a, b, c, d = V[corners_of_quads(faces)][:, :, :2].transpose(1, 0, 2) @ np.array([1, 1j])
+    assert (((c - a).conj() * (d - b)).imag > 0).all()

@@ -1,0 +1,79 @@
+"""Maps of symmetric meshes are symmetric, in every outline; small defects and other targets leave them free."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.mesh.mirror import find_mirror
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
+
+
+def hill(count=14, height=1.0):
+    """A patch of quads with a hill: its own image across x and y."""
+    x, y = np.meshgrid(np.linspace(-1, 1, count + 1), np.linspace(-1, 1, count + 1), indexing="ij")
+    V = np.stack([x, y, height * np.exp(-6 * (x**2 + 1.5 * y**2))], axis=-1).reshape(-1, 3)
+    corner = ((count + 1) * np.arange(count)[:, None] + np.arange(count)).ravel()
+    return V, np.column_stack([corner, corner + count + 1, corner + count + 2, corner + 1])
+
+
+def mapped(V, Q, target=None, **options):
+    """The chart and its map (n,) complex about the centre of its outline."""
+    result = drain(unwrap(meshes.polygon_surface(V, Q.tolist()), options=UnwrapOptions(**options), target=target))
+    (chart,), (found,) = result.charts, result.maps
+    return chart, found.uv @ [1, 1j]
+
+
+def deviation(chart, w, mirror):
+    """How far a map is from its mirror image in the best axis, over its extent."""
+    centred = w - w.mean()
+    turn = (centred[mirror.image] * centred).sum()
+    return np.abs(centred[mirror.image] - turn / abs(turn) * centred.conj()).max() / np.abs(centred).max()
+
+
+@pytest.mark.parametrize("balance", [0.0, 0.2])
+@pytest.mark.parametrize("boundary", ["free", "disk", "square"])
+def test_maps_are_symmetric_in_both_mirrors(boundary, balance):
+    V, Q = hill()
+    chart, w = mapped(V, Q, boundary=boundary, balance=balance)
+    first = find_mirror(chart.vertices, chart.triangles, chart.faces)
+    second = find_mirror(chart.vertices, chart.triangles, chart.faces, across=first)
+    assert max(deviation(chart, w, first), deviation(chart, w, second)) < 1e-9
+
+
+def test_a_target_that_is_not_symmetric_is_met():
+    V, Q = hill()
+    density = np.repeat(np.where(V[Q].mean(axis=1)[:, 0] > 0, 2.0, 1.0), 2)
+    chart, w = mapped(V, Q, Target(density, None))
+    mirror = find_mirror(chart.vertices, chart.triangles, chart.faces)
+    x = chart.vertices[:, 0]
+    across = mirror.image if np.abs(x[mirror.image] + x).max() < 1e-9 else None
+    if across is None:
+        mirror = find_mirror(chart.vertices, chart.triangles, chart.faces, across=mirror)
+    assert deviation(chart, w, mirror) > 0.05
+
+
+def test_a_scar_changes_little():
+    """Without the symmetry's help: the free solve next to it."""
+    V, Q = hill()
+    _, w = mapped(V, Q)
+    W = V.copy()
+    W[20, 2] += 0.002
+    _, scarred = mapped(W, Q)
+    a, b = (z - z.mean() for z in (w, scarred))
+    turn = np.vdot(b, a)
+    assert np.abs(a - b * turn / abs(turn)).max() < 0.05 * np.abs(a).max()
+
+
+def test_which_diagonals_were_given_does_not_matter():
+    V, Q = hill()
+    maps = []
+    for k in range(2):
+        chart, w = mapped(V, np.roll(Q, k, axis=1))
+        maps.append((w - w.mean())[np.argsort(chart.vertex_ids)])
+    turn = np.vdot(maps[1], maps[0])
+    assert np.abs(maps[0] - maps[1] * turn / abs(turn)).max() < 1e-6 * np.abs(maps[0]).max()
