@@ -10,7 +10,7 @@ import bmesh
 import numpy as np
 
 from ..pipelines.globe import Markers
-from ..solver.analysis.density import from_vertices, painted_density
+from ..solver.analysis.density import from_polygons, means_of_corners, painted_density
 from ..solver.globe.rotation import MarkerError
 from .vertex_groups import GroupError, group_weights
 from .weights import region_weights
@@ -72,8 +72,9 @@ def globe_densities(pairs: Sequence, name: str, factor: float) -> list[np.ndarra
     if not name:
         return [None] * len(pairs)
     weights = region_weights(pairs, name)
-    surfaces = [reading.surface for _, reading in pairs]
-    return [
-        painted_density(from_vertices(w, s.corner_vertex[s.triangles]), factor)
-        for w, s in zip(weights, surfaces, strict=True)
-    ]
+    densities = []
+    for w, (_, reading) in zip(weights, pairs, strict=True):
+        surface = reading.surface
+        mean = means_of_corners(w, surface.corner_vertex, surface.face_start)
+        densities.append(painted_density(from_polygons(mean, surface.triangle_face), factor))
+    return densities

@@ -282,6 +282,7 @@ def _magnified(
             exact=settings.exact,
             boundary=settings.boundary,
             quality=settings.quality,
+            polygons=island.chart.faces,
         )
     else:
         done = yield from _into_shape(island, weights, settings)

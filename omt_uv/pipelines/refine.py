@@ -153,7 +153,8 @@ def _improve(island: Island, pins: ChartPins | None, settings: RefineSettings) -
             island.uv,
             balance=settings.balance,
             quality=settings.quality,
-            pins=(vertices, places),
+            pins=(vertices, places) if len(vertices) else None,
+            polygons=chart.faces,
         )
     except PinError as error:
         if not settings.keep_boundary:

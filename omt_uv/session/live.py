@@ -68,7 +68,7 @@ class Session:
             at = (at[0][order], at[1][order])
         free = ~np.isin(vertices, pinned)
         try:
-            live_map = LiveMap(chart.vertices, chart.triangles, island.uv, at)
+            live_map = LiveMap(chart.vertices, chart.triangles, island.uv, at, chart.faces)
         except MeshError as error:
             raise Refusal(owner, located(error, chart)) from error
         return _LiveIsland(owner, corners[free], vertices[free], pin_corners, live_map)

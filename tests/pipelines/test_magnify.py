@@ -3,6 +3,7 @@
 import meshes
 import numpy as np
 import pytest
+from polygons import cut
 from readings import reading
 
 from omt_uv.pipelines.layout import Refusal
@@ -10,6 +11,7 @@ from omt_uv.pipelines.magnify import Magnified, Region, Shares, magnify, warped_
 from omt_uv.settings import MagnifySettings
 from omt_uv.solver.errors import ShareError, WeightError
 from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.mesh.surface import Surface
 from omt_uv.solver.parameterization.chart_pins import CornerPins
 from omt_uv.solver.progress import drain
 
@@ -137,3 +139,26 @@ def test_a_picture_follows_its_uvs():
     picture[..., 0] = (np.arange(16) + 0.5) / 16
     result = warped_picture(picture, [mine], moved, 0)
     assert np.allclose(result[:, 8:], picture[:, :8])
+
+
+@pytest.mark.parametrize(
+    ("source", "boundary"), [("mesh", "free"), ("uv", "own"), ("uv", "free"), ("uv", "disk"), ("uv", "square")]
+)
+def test_a_symmetric_region_of_a_grid_of_quads_keeps_its_centre_lines_straight(source, boundary):
+    n = 30
+    _, Q = meshes.quad_grid(n, n)
+    x, y = np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0))
+    V, corner = np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()]), np.ravel(Q)
+    triangles, faces = cut(np.arange(4 * n * n).reshape(-1, 4))
+    surface = Surface(V, corner, 4 * np.arange(n * n + 1), triangles, faces, np.zeros((0, 2), np.int64))
+    pins = CornerPins(np.zeros(len(corner), bool), V[corner, :2] / n)
+    chosen = Region(surface, np.ones(n * n, bool), spot(V, 0.2 * n), pins)
+    result = drain(magnify([chosen], MagnifySettings(source=source, boundary=boundary, factor=4.0)))
+    assert result.shares.after == pytest.approx(result.shares.target, rel=5e-3)
+    uv = np.zeros((len(V), 2))
+    uv[corner[result.corners[0]]] = result.uv[0]
+    assert (np.sign(signed_areas(uv, corner[triangles])) == 1).all()
+    grid = (uv @ [1, 1j]).reshape(n + 1, n + 1)
+    for line in (grid[n // 2], grid[:, n // 2]):
+        along = (line[-1] - line[0]) / abs(line[-1] - line[0])
+        assert np.abs(((line - line[0]) / along).imag).max() < 1e-6 * np.ptp(uv)

@@ -67,8 +67,9 @@ def refine(
     texts, sizes = list(found.warnings), [len(island.chart.triangles) for island in found.islands]
     refined, covered, space = [], [], []
     for k, island in enumerate(found.islands):
+        chart = island.chart
         steps = refine_island(
-            island.chart.vertices, island.chart.triangles, island.uv, balance=balance, quality=quality
+            chart.vertices, chart.triangles, island.uv, balance=balance, quality=quality, polygons=chart.faces
         )
         done = yield from part_of(steps, sum(sizes[:k]) / sum(sizes), sizes[k] / sum(sizes))
         refined.append(done.uv)
@@ -104,9 +105,10 @@ def magnify(
     for k, island in enumerate(found.islands):
         region = painted[triangle_rows(surface, island.chart)]
         if np.ptp(region) > 0:
-            steps = magnify_region(island.uv, island.chart.triangles, region, factor, **options)
+            chart = island.chart
+            steps = magnify_region(island.uv, chart.triangles, region, factor, polygons=chart.faces, **options)
             done = yield from part_of(steps, sum(sizes[:k]) / sum(sizes), sizes[k] / sum(sizes))
-            corner_uv[island.chart.corners] = done.uv[island.chart.triangles]
+            corner_uv[chart.corners] = done.uv[chart.triangles]
             texts += done.warnings
     after = np.abs(signed_areas(corner_uv, surface.triangles))
     return MagnifiedUVs(

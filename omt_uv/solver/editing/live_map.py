@@ -7,16 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..maps.energy import elements
-from ..mesh.geometry import face_areas
+from ..maps.polygon_elements import with_convex_quads
 from ..mesh.topology import boundary_edges
 from ..refinement.continuation import MapProblem, rescaled
 from ..refinement.continuation_rules import FIRST_PRESSURE, NO_ENERGY, QUALITIES, final_weight
 from ..refinement.elimination_order import renumbered
-from ..refinement.hessian_blocks import Assembly
+from ..refinement.hessian_blocks import assembly_of
 from ..refinement.pins import PinEnergy, Pins, placed_like
 from ..refinement.projected_newton import FreeMotion, NewtonProblem, newton_step
-from .refine_island import island_start, meets_itself
+from .refine_island import island_elements, island_start, meets_itself
 
 # Of the springs between pins and where they are dragged to, energy per squared length in units of the map: stiff, as
 # the barrier against folds must only just win.
@@ -32,6 +31,7 @@ class LiveMap:
     ----------
     vertices, triangles, uv : (n,3), (m,3), (n,2) a connected surface and its map
     pins : vertices (k,) and their places (k,2)
+    polygons : (m,) polygon of every triangle; by default each is its own
 
     Attributes
     ----------
@@ -42,16 +42,22 @@ class LiveMap:
     FoldedUVError, PinError : see `refine_island.refine_island`
     """
 
-    def __init__(self, vertices, triangles, uv, pins: tuple[np.ndarray, np.ndarray] | None = None):
-        self._mesh = mesh = renumbered(vertices, triangles, uv, pins)
+    def __init__(
+        self,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        uv: np.ndarray,
+        pins: tuple[np.ndarray, np.ndarray] | None = None,
+        polygons: np.ndarray | None = None,
+    ):
+        self._mesh = mesh = renumbered(vertices, triangles, uv, pins, polygons)
         self._given = given = mesh.uv @ [1, 1j]
-        vertices = mesh.vertices / np.sqrt(face_areas(mesh.vertices, mesh.triangles).sum())
-        self._faces = elements(vertices, mesh.triangles, face_areas(vertices, mesh.triangles))
+        self._faces = faces = island_elements(mesh, polygons)
         boundary = boundary_edges(mesh.triangles)
-        start, self.warnings = island_start(vertices, mesh.triangles, given, boundary, mesh.pins is not None)
+        start, self.warnings = island_start(mesh.vertices, mesh.triangles, given, boundary, mesh.pins is not None)
         guard = None if meets_itself(start, boundary) else boundary
         motion = FreeMotion(np.zeros(len(given), bool))
-        self._task = MapProblem(self._faces, Assembly(mesh.triangles, len(given)), motion, guard, False)
+        self._task = MapProblem(faces, assembly_of(faces, len(given)), motion, guard, False)
         self._w, self._pins, self._guarded = start, mesh.pins, False
         self._balance = -1.0
         self.at_rest = False
@@ -86,7 +92,7 @@ class LiveMap:
 
     def _step(self) -> None:
         """One Newton step; where the boundary would cross itself, the next goes on with a barrier."""
-        task = self._task
+        task = replace(self._task, faces=with_convex_quads(self._faces, self._w))
         extras: tuple = ()
         if self._pins is not None:
             task = rescaled(task, self._w)

@@ -15,21 +15,26 @@ from ..analysis.density import area_error_warnings, normalised_density, region_s
 from ..analysis.region_density import RegionDensity, exact_density, target_density
 from ..errors import FoldedUVError, MeshError
 from ..linalg.additive_schwarz import schwarz_solver
-from ..maps.energy import Elements, area_error, elements
+from ..maps.energy import Elements, area_error
+from ..maps.mirror_symmetry import MirrorSymmetry
+from ..maps.polygon_elements import BOTH, polygon_elements, polygon_mesh
 from ..maps.similarity import fit_similarity
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_edges, boundary_loops
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation import ContinuationResult, MapProblem, minimise_in_stages
-from ..refinement.continuation_rules import QUALITIES
+from ..refinement.continuation_rules import QUALITIES, Quality
 from ..refinement.elimination_order import Renumbered, renumbered
-from ..refinement.hessian_blocks import Assembly
+from ..refinement.hessian_blocks import assembly_of
+from ..refinement.mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from .outline import Outline, centroid, free_motion, recognise_outline
 from .refine_island import meets_itself
 
 OUTLINES = ("own", "free")
 # Greatest step of a magnification, in the logarithm of the share.
 LARGEST_STEP = np.log(2)
+# How far, over the extent, sides may move to become mirror images of each other: less than anyone sees.
+KEPT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,7 @@ def magnify_map(
     boundary: str = "own",
     quality: str = "standard",
     stricter: float = 1.0,
+    polygons: np.ndarray | None = None,
 ) -> Steps[Magnification]:
     """Change the areas of a map uv (n,2), triangles (m,3), by a density (m,), without folds.
 
@@ -76,6 +82,9 @@ def magnify_map(
     ----------
     region : (m,) in [0, 1], weights of a region whose share is to be exact. What lies outside of it keeps its place,
         as well as it can, where the outline is free
+    polygons : (m,) polygon of every triangle, whose area counts as a whole; by default each is its own. Triangles of
+        one polygon have one density and one weight. Where polygons and densities are their own mirror image the
+        result is, too
     boundary : "own" keeps a circle and straight sides; "free"
     quality : "draft", "standard" or "exact"; stricter: the area error is to be so many times smaller
 
@@ -91,11 +100,14 @@ def magnify_map(
     size = np.sqrt(area.sum())
     middle = (area @ uv[triangles].mean(axis=1)) / area.sum()
     flat = (uv - middle) / size
-    mesh = renumbered(np.column_stack([flat, np.zeros(len(flat))]), triangles, flat, None)
+    if polygons is not None:
+        polygons = with_concave_quads_apart(uv, triangles, polygons)
+    mesh = renumbered(np.column_stack([flat, np.zeros(len(flat))]), triangles, flat, None, polygons)
     settings = QUALITIES[quality]
     settings = replace(settings, area_error=settings.area_error / stricter)
     try:
-        found, outline, error = yield from _magnified(mesh, density, region, boundary, settings)
+        goal = _Goal(density, region, polygons)
+        found, outline, error = yield from _magnified(mesh, goal, boundary, settings)
     except MeshError as problem:
         raise mesh.original_error(problem) from problem
     return Magnification(
@@ -118,6 +130,7 @@ def magnify_region(
     exact: bool = True,
     boundary: str = "own",
     quality: str = "standard",
+    polygons: np.ndarray | None = None,
 ) -> Steps[RegionMagnification]:
     """Give a region of weights (m,) in [0, 1] `factor` times its share of a map uv (n,2), in steps of at most 2.
 
@@ -125,6 +138,7 @@ def magnify_region(
     does once by 4.
 
     exact : False for the factor between weight 1 and weight 0, see `region_density.target_density`
+    polygons : see `magnify_map`
 
     Raises
     ------
@@ -136,19 +150,20 @@ def magnify_region(
     whole = target_density(weights, before, factor, exact)
     count = max(1, int(np.ceil(abs(np.log(factor)) / LARGEST_STEP - 1e-9)))
     # The areas of a step follow from those before it, so that their errors add up.
-    options = {"region": weights, "boundary": boundary, "quality": quality, "stricter": max(1.0, np.sqrt(count / 2))}
+    stricter = max(1.0, np.sqrt(count / 2))
+    options = {"boundary": boundary, "quality": quality, "stricter": stricter, "polygons": polygons}
     done, texts = 0, list(whole.warnings)
     for k in range(count):
         area = np.abs(signed_areas(uv, triangles))
         # From what the region has to what it is to have: errors of the share do not add up.
         rest = whole.share_before * factor ** ((k + 1) / count) / region_share(weights, area)
         density = exact_density(weights, area, rest).density if exact else whole.density ** (1 / count)
-        job = magnify_map(uv, triangles, normalised_density(density, area), **options)
+        job = magnify_map(uv, triangles, normalised_density(density, area), region=weights, **options)
         step = yield from part_of(job, k / count, 1 / count)
         uv, done = step.uv, done + step.iterations
         texts += [text for text in step.warnings if text not in texts]
     has, target = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
-    error = float(np.abs(has - target).sum())
+    error = float(np.abs(_by_polygon(has - target, polygons)).sum())
     texts += area_error_warnings(error, count * QUALITIES[quality].area_error)
     return RegionMagnification(
         uv=uv,
@@ -160,6 +175,25 @@ def magnify_region(
         warnings=tuple(texts),
         target=whole,
     )
+
+
+def _by_polygon(values: np.ndarray, polygons: np.ndarray | None) -> np.ndarray:
+    """Values of triangles (m,) summed over their polygons, (p,)."""
+    return values if polygons is None else np.bincount(np.unique(polygons, return_inverse=True)[1].ravel(), values)
+
+
+def with_concave_quads_apart(uv: np.ndarray, triangles: np.ndarray, polygons: np.ndarray) -> np.ndarray:
+    """Polygons (m,) of triangles; those of quads that are concave in a map uv (n,2) without folds become their own.
+
+    Such a quad has one triangulation only, and its area would not be the mean of two.
+    """
+    mesh = polygon_mesh(triangles, polygons)
+    four = signed_areas(uv, mesh.quads[:, BOTH].reshape(-1, 3)).reshape(-1, 4)
+    concave = (np.sign(four) != np.sign(four[:, :1])).any(axis=1)
+    rows = mesh.rows[len(mesh.triangles) :].reshape(-1, 2)[concave].ravel()
+    apart = np.unique(polygons, return_inverse=True)[1].ravel()
+    apart[rows] = len(triangles) + rows
+    return apart
 
 
 def refuse_folds(uv: np.ndarray, triangles: np.ndarray) -> None:
@@ -175,26 +209,66 @@ def refuse_folds(uv: np.ndarray, triangles: np.ndarray) -> None:
         )
 
 
+@dataclass(frozen=True)
+class _Goal:
+    """Density (m,), weights of a region (m,) and polygons (m,) of the triangles of a map."""
+
+    density: np.ndarray
+    region: np.ndarray | None
+    polygons: np.ndarray | None
+
+
 def _magnified(
-    mesh: Renumbered, density, region, boundary: str, settings
+    mesh: Renumbered, goal: _Goal, boundary: str, settings: Quality
 ) -> Steps[tuple[ContinuationResult, Outline, float]]:
+    """What was found, the outline it has, and its area error."""
     given = mesh.uv @ [1, 1j]
-    outline = recognise_outline(given, _outer(given, mesh.triangles))
+    loop = _outer(given, mesh.triangles)
+    outline = recognise_outline(given, loop)
     if boundary == "free":
         outline = Outline(kind="free", motion=free_motion(len(given)), w=given, centre=0j)
     # The surface is the map as it is on its exact outline: nothing is sheared there.
     flat = np.column_stack([outline.w.real, outline.w.imag, np.zeros(len(given))])
-    faces = elements(flat, mesh.triangles, face_areas(flat, mesh.triangles) * density, region)
+    target = face_areas(flat, mesh.triangles) * goal.density
+    faces = polygon_elements(flat, mesh.triangles, target, goal.polygons, goal.region)
+    symmetric = _symmetric(flat, mesh.triangles, goal, faces, outline, loop)
+    symmetry, start, shift = (None, outline.w, 0j) if symmetric is None else symmetric
     edges = boundary_edges(mesh.triangles)
     if outline.kind != "free":
         # Holes are free all the same.
-        edges = edges[~np.isin(edges[:, 0], _outer(given, mesh.triangles))]
-    guard = edges if len(edges) and not meets_itself(outline.w, edges) else None
-    assembly = Assembly(mesh.triangles, len(given), schwarz_solver(mesh.vertices, mesh.triangles))
-    task = MapProblem(faces, assembly, outline.motion, guard, False, outline.kind != "free")
-    found = yield from minimise_in_stages(task, outline.w, 0.0, settings)
+        edges = edges[~np.isin(edges[:, 0], loop)]
+    task = MapProblem(
+        faces=faces,
+        assembly=assembly_of(faces, len(given), schwarz_solver(mesh.vertices, mesh.triangles), symmetry),
+        motion=outline.motion if symmetry is None else MirroredMotion(outline.motion, symmetry, start),
+        loop=edges if len(edges) and not meets_itself(start, edges) else None,
+        with_barrier=False,
+        scale_free=outline.kind != "free",
+        symmetry=symmetry,
+    )
+    found = yield from minimise_in_stages(task, start, 0.0, settings)
     error = area_error(faces, found.w)
-    return replace(found, w=_placed_like_outside(found.w, given, outline, faces, region)), outline, error
+    placed = _placed_like_outside(found.w + shift, given, outline, faces)
+    return replace(found, w=placed), outline, error
+
+
+def _symmetric(
+    flat: np.ndarray, triangles: np.ndarray, goal: _Goal, faces: Elements, outline: Outline, loop: np.ndarray
+) -> tuple[MirrorSymmetry, np.ndarray, complex] | None:
+    """The symmetry of a plane (n,3), the symmetric map next to it, about the axis, and what has to be added to it.
+
+    None where there is none, or where it would move the outline, with the vertices loop (b,), that is to be kept.
+    """
+    symmetry = find_symmetry(flat, triangles, goal.polygons, faces)
+    boundary = "disk" if outline.kind == "circle" else "free"
+    found = None if symmetry is None else symmetric_start(symmetry, outline.w, faces, boundary, loop)
+    if found is None:
+        return None
+    shift = 0j if boundary == "disk" else complex(outline.w.mean())
+    moved = np.abs(found[1] + shift - outline.w)[loop].max()
+    if outline.kind == "sides" and moved > KEPT * np.ptp(flat, axis=0).max():
+        return None
+    return (*found, shift)
 
 
 def _outer(w: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -222,11 +296,11 @@ def placed_like_outside(
     return np.column_stack([placed.real, placed.imag])
 
 
-def _placed_like_outside(w: np.ndarray, given: np.ndarray, outline: Outline, faces: Elements, region) -> np.ndarray:
+def _placed_like_outside(w: np.ndarray, given: np.ndarray, outline: Outline, faces: Elements) -> np.ndarray:
     """The map turned, and with a free outline moved and scaled, so that what is not magnified lies as it did."""
     if outline.kind == "sides":
         return w
-    calm = faces.area if region is None else faces.area * (1 - region)
+    calm = faces.triangle_areas if faces.region is None else faces.triangle_areas * faces.of_triangles(1 - faces.region)
     mass = np.bincount(faces.triangles.ravel(), np.repeat(calm / calm.sum(), 3) / 3, len(w))
     if outline.kind == "free":
         w = w * np.sqrt(abs(faces.areas(given).sum()) / faces.areas(w).sum())

@@ -10,8 +10,9 @@ from ..refinement.projected_newton import CircleMotion, FreeMotion, LineMotion, 
 
 # Greatest difference between distances from the middle of a circle, relative to its radius.
 ROUND = 2e-3
-# Fewest vertices that make a circle.
+# Fewest vertices that make a circle, and the greatest angle, in radians, between two that follow each other on it.
 FEWEST = 12
+WIDEST = 2 * np.pi / 3
 # A vertex where the outline turns by less than this, in radians, lies on a side.
 STRAIGHT = 0.02
 # Of the outline's vertices at least this share has to lie on sides, where it has more than four corners.
@@ -39,9 +40,8 @@ class Outline:
 def recognise_outline(w: np.ndarray, loop: np.ndarray) -> Outline:
     """Recognise the outline of a map w (n,) complex with the boundary loop (b,), counter-clockwise."""
     polygon = w[loop]
-    centre, area = centroid(polygon)
-    radius = np.abs(polygon - centre).mean()
-    if len(loop) >= FEWEST and np.ptp(np.abs(polygon - centre)) < ROUND * radius:
+    centre, radius = fitted_circle(polygon)
+    if len(loop) >= FEWEST and _goes_round(polygon - centre, radius):
         moved = w - centre
         moved[loop] *= radius / np.abs(moved[loop])
         return Outline(kind="circle", motion=CircleMotion(loop, radius, len(w)), w=moved, centre=centre)
@@ -49,6 +49,28 @@ def recognise_outline(w: np.ndarray, loop: np.ndarray) -> Outline:
     if corner.sum() >= 3 and (corner.sum() <= 4 or corner.mean() <= 1 - MOSTLY):
         return _on_sides(w, loop, corner)
     return Outline(kind="free", motion=free_motion(len(w)), w=w, centre=0j)
+
+
+def fitted_circle(points: np.ndarray) -> tuple[complex, float]:
+    """Centre and radius of the circle next to points (k,) complex, however unevenly they lie on it (Kasa 1976).
+
+    The centroid of the polygon is another point as soon as its vertices have slid along the circle.
+    """
+    middle = points.mean()
+    z = points - middle
+    size = max(float(np.abs(z).max(initial=0.0)), float(np.finfo(float).tiny))
+    z = z / size
+    rows = np.column_stack([2 * z.real, 2 * z.imag, np.ones(len(z))])
+    x, y, rest = np.linalg.lstsq(rows, np.abs(z) ** 2, rcond=None)[0]
+    return complex(middle + size * (x + 1j * y)), float(size * np.sqrt(max(rest + x**2 + y**2, 0.0)))
+
+
+def _goes_round(spokes: np.ndarray, radius: float) -> bool:
+    """Whether points (b,) about the middle of a circle lie on it and follow each other around it, in small steps."""
+    if not np.ptp(np.abs(spokes)) < ROUND * radius:
+        return False
+    ahead = np.angle(np.roll(spokes, -1) * spokes.conj())
+    return bool((ahead > 0).all() and ahead.max() < WIDEST and abs(ahead.sum() - 2 * np.pi) < 1)
 
 
 def free_motion(n: int) -> FreeMotion:

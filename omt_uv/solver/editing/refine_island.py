@@ -12,17 +12,20 @@ import numpy as np
 
 from ..errors import FoldedUVError, MeshError
 from ..linalg.additive_schwarz import schwarz_solver
-from ..maps.energy import area_error, elements
+from ..maps.energy import Elements, area_error
+from ..maps.mirror_symmetry import MirrorSymmetry
+from ..maps.polygon_elements import polygon_elements
 from ..maps.untangle import count_folds
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_edges, boundary_loops, halfedges
 from ..progress import Progress, Steps
 from ..refinement.boundary_barrier import crossings, make_barrier
-from ..refinement.continuation import MapProblem, minimise_in_stages
-from ..refinement.continuation_rules import QUALITIES
-from ..refinement.elimination_order import renumbered
-from ..refinement.hessian_blocks import Assembly
+from ..refinement.continuation import ContinuationResult, MapProblem, minimise_in_stages
+from ..refinement.continuation_rules import QUALITIES, Quality
+from ..refinement.elimination_order import Renumbered, renumbered
+from ..refinement.hessian_blocks import assembly_of
 from ..refinement.initial_maps import disk_initial_map
+from ..refinement.mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from ..refinement.pins import aligned_to_pins, move_pins, placed_like
 from ..refinement.projected_newton import FreeMotion
 from ..refinement.refine import Refinement
@@ -43,15 +46,18 @@ def refine_island(
     balance: float = 0.0,
     quality: str = "standard",
     pins: tuple[np.ndarray, np.ndarray] | None = None,
+    polygons: np.ndarray | None = None,
 ) -> Steps[Refinement]:
     """Refine a map uv (n,2) of a connected surface (n,3), (m,3) with one or more boundaries.
 
-    The result keeps the centroid, the direction, the mirroring and the UV area of the given map.
+    The result keeps the centroid, the direction, the mirroring and the UV area of the given map. An island that is its
+    own mirror image gets a map that is, too, unless it is pinned.
 
     Parameters
     ----------
     balance, quality : see `refine.refine`
     pins : vertices (k,) and their places (k,2); two or more fix place, direction and scale
+    polygons : (m,) polygon of every triangle, whose area counts as a whole; by default each is its own
 
     Raises
     ------
@@ -65,12 +71,9 @@ def refine_island(
     if not 0 <= balance <= 1:
         raise ValueError(f"balance must lie in [0, 1], not {balance}")
     yield Progress("Refinement", 0.0)
-    mesh = renumbered(vertices, triangles, uv, pins)
-    given = mesh.uv @ [1, 1j]
+    mesh = renumbered(vertices, triangles, uv, pins, polygons)
     try:
-        found, error, warnings = yield from _refined(
-            mesh.vertices, mesh.triangles, given, balance, QUALITIES[quality], mesh.pins
-        )
+        found, error, warnings = yield from _refined(mesh, polygons, balance, QUALITIES[quality])
     except MeshError as problem:
         raise mesh.original_error(problem) from problem
     refined = mesh.original(found.w)
@@ -89,35 +92,60 @@ def refine_island(
     )
 
 
-def _refined(vertices, triangles, given, balance, settings, pins):
-    """What was found from the map given (n,) complex, in its place; its area error; warnings."""
-    # The energy weighs lengths: surface and map are measured in the same unit, in which both have the area 1.
-    vertices = vertices / np.sqrt(face_areas(vertices, triangles).sum())
-    faces = elements(vertices, triangles, face_areas(vertices, triangles))
+def _refined(
+    mesh: Renumbered, polygons: np.ndarray | None, balance: float, settings: Quality
+) -> Steps[tuple[ContinuationResult, float, tuple[str, ...]]]:
+    """What was found from the map given, in its place; its area error; warnings."""
+    given, pins, n = mesh.uv @ [1, 1j], mesh.pins, len(mesh.uv)
+    faces = island_elements(mesh, polygons)
+    boundary = boundary_edges(mesh.triangles)
     several = pins if pins is not None and len(pins.vertices) > 2 else None
     fixed = several is not None
-    boundary = boundary_edges(triangles)
-    start, warnings = island_start(vertices, triangles, given, boundary, fixed)
+    start, warnings = island_start(mesh.vertices, mesh.triangles, given, boundary, fixed)
     # Pins may ask for a map that meets itself, as the given one does, and so may handles.
     guard = None if meets_itself(start, boundary) else boundary
     if guard is None and not (pins is not None and np.isin(boundary, pins.vertices).all()):
         warnings = (*warnings, UNGUARDED)
+    symmetric = None if pins is not None else _symmetric(mesh, polygons, faces, start, guard)
+    symmetry, w = (None, start) if symmetric is None else symmetric
+    free = FreeMotion(np.zeros(n, bool))
     task = MapProblem(
-        faces,
-        Assembly(triangles, len(given), schwarz_solver(vertices, triangles)),
-        FreeMotion(np.zeros(len(given), bool)),
-        guard,
-        False,
+        faces=faces,
+        assembly=assembly_of(faces, n, schwarz_solver(mesh.vertices, mesh.triangles), symmetry),
+        motion=free if symmetry is None else MirroredMotion(free, symmetry, w),
+        loop=guard,
+        with_barrier=False,
+        symmetry=symmetry,
     )
-    w = start
     if several is not None:
         task, w = yield from move_pins(task, w, several)
     found = yield from minimise_in_stages(task, w, balance, settings)
     error = area_error(faces, found.w)
     if several is None:
-        two = pins is not None and len(pins.vertices) == 2
-        found = replace(found, w=aligned_to_pins(found.w, pins) if two else placed_like(found.w, given, faces, pins))
+        if pins is not None and len(pins.vertices) == 2:
+            found = replace(found, w=aligned_to_pins(found.w, pins))
+        else:
+            found = replace(found, w=placed_like(found.w, given, faces, pins))
     return found, error, (*warnings, *found.warnings)
+
+
+def island_elements(mesh: Renumbered, polygons: np.ndarray | None) -> Elements:
+    """Elements of a surface whose polygons (m,) shall have their own areas.
+
+    The energy weighs lengths: surface and map are measured in the same unit, in which both have the area 1.
+    """
+    vertices = mesh.vertices / np.sqrt(face_areas(mesh.vertices, mesh.triangles).sum())
+    return polygon_elements(vertices, mesh.triangles, face_areas(vertices, mesh.triangles), polygons)
+
+
+def _symmetric(
+    mesh: Renumbered, polygons: np.ndarray | None, faces: Elements, w: np.ndarray, guard: np.ndarray | None
+) -> tuple[MirrorSymmetry, np.ndarray] | None:
+    """The symmetry of an island and the symmetric map next to w (n,), None where there is none; guard (b,2): edges of
+    the boundary that may not meet."""
+    symmetry = find_symmetry(mesh.vertices, mesh.triangles, polygons, faces)
+    found = None if symmetry is None else symmetric_start(symmetry, w, faces, "free", np.zeros(0, np.int64))
+    return None if found is None or (guard is not None and meets_itself(found[1], guard)) else found
 
 
 def meets_itself(w: np.ndarray, boundary: np.ndarray) -> bool:

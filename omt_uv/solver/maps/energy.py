@@ -149,6 +149,12 @@ def _energies(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float 
     return np.where(np.bincount(faces.polygon, folded, len(value)) > 0, np.inf, value) if folded.any() else value
 
 
+def has_folds(faces: Elements, w: np.ndarray) -> bool:
+    """Whether a triangle that counts is folded in a map w (n,) complex, or has no area."""
+    a, b = faces.derivatives(w)
+    return bool(faces.folded(squared(a) - squared(b)).any())
+
+
 def gradient(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
     """Gradient (n,) complex: real part by u, imaginary part by v."""
     return sum_at_vertices(faces, face_derivatives(faces, w, area_weight).gradient, len(w))

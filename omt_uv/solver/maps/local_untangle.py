@@ -44,6 +44,11 @@ def straighten_folds(triangles: np.ndarray, uv: np.ndarray, side: np.ndarray) ->
     return np.where((moved != points).any(axis=1)[faces.ravel(), None], moved[faces.ravel()], uv), left
 
 
+def inner_folds_straightened(uv: np.ndarray, triangles: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """A map (n,2) whose vertices around folds are averages of their neighbours, but for those `fixed` (n,) bool."""
+    return _averaged(uv, triangles, np.ones(len(triangles), np.int64), fixed)
+
+
 def uv_vertices(triangles: np.ndarray, uv: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners (3t,2) of a mesh (t,3) joined where they are one vertex and about `tolerance` apart at most.
 

@@ -7,7 +7,7 @@ to a polygon and, corner by corner, every vertex to one vertex.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,13 +34,18 @@ class Mirror:
 
 
 def find_mirror(
-    positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray | None = None, across: Mirror | None = None
+    positions: np.ndarray,
+    triangles: np.ndarray,
+    faces: np.ndarray | None = None,
+    across: Mirror | None = None,
+    accepted: Callable[[np.ndarray], bool] | None = None,
 ) -> Mirror | None:
     """The first mirror plane of a mesh (n,3), (m,3), those across x, y and z before others; None if it has none.
 
     faces (m,): polygon of every triangle, by default each its own; a polygon may be cut into triangles either way.
-    across: a mirror that the plane is to be at right angles to. Every vertex belongs to a triangle. Mirror images agree
-    to `MIRROR_TOLERANCE` of the extent.
+    across: a mirror that the plane is to be at right angles to; accepted: of the images (n,), for what else has to be
+    symmetric. Every vertex belongs to a triangle. Mirror images agree to `MIRROR_TOLERANCE` of the extent. The plane in
+    which a flat mesh lies is none.
     """
     # Halves first: the difference of two huge numbers may be infinite.
     low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
@@ -53,7 +58,9 @@ def find_mirror(
         if across is not None and abs(normal @ across.normal) > MIRROR_TOLERANCE:
             continue
         image = polygons.image(normal)
-        if image is not None and (across is None or (image[across.image] == across.image[image]).all()):
+        if image is None or not (accepted is None or accepted(image)):
+            continue
+        if across is None or (image[across.image] == across.image[image]).all():
             return Mirror(image, normal)
     return None
 

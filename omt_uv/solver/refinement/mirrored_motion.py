@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..maps.energy import Elements, squared
+from ..maps.energy import Elements, has_folds, squared
+from ..maps.local_untangle import inner_folds_straightened
 from ..maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry
 from ..mesh.mirror import find_mirror
+from ..mesh.topology import boundary_edges
 from .projected_newton import Motion
 
 # How far, over its extent, an initial map may be from its mirror image: farther, it is no map of a symmetric chart.
 FAR = 0.3
 # Sine of the angle up to which a direction lies along the axis; and how far points may leave the square.
 ALONG = 1e-6
+# Share of the triangles that may be folded in the mean of an initial map and its image, to be straightened, in so many
+# rounds.
+FEW = 0.01
+ROUNDS = 5
 # Relative difference of the targets of mirror images up to which they are symmetric.
 SAME_TARGET = 1e-4
 
@@ -44,17 +50,20 @@ def find_symmetry(
     vertices: np.ndarray, triangles: np.ndarray, polygons: np.ndarray | None, faces: Elements
 ) -> MirrorSymmetry | None:
     """The mirror symmetry of a mesh (n,3), (m,3) whose polygons (m,) have symmetric targets, too; None without one."""
-    first = find_mirror(vertices, triangles, polygons)
-    if first is None:
-        return None
-    second = find_mirror(vertices, triangles, polygons, across=first)
-    n, asked = len(vertices), faces.area * faces.ratio
+    n, target = len(vertices), faces.area * faces.ratio
     owner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
     pairs = np.unique(np.repeat(owner, 3).astype(np.int64) * n + faces.triangles.ravel())
-    around = np.bincount(pairs % n, asked[pairs // n], n)
-    mirrors = [first] if second is None else [first, second]
-    images = [m.image for m in mirrors if (np.abs(around - around[m.image]) <= SAME_TARGET * around).all()]
-    return mirror_symmetry(np.array(images)) if images else None
+    asked = [target] if faces.region is None else [target, target * faces.region]
+    around = [np.bincount(pairs % n, values[pairs // n], n) for values in asked]
+
+    def accepted(image: np.ndarray) -> bool:
+        return all((np.abs(x - x[image]) <= SAME_TARGET * around[0]).all() for x in around)
+
+    first = find_mirror(vertices, triangles, polygons, accepted=accepted)
+    if first is None:
+        return None
+    second = find_mirror(vertices, triangles, polygons, across=first, accepted=accepted)
+    return mirror_symmetry(np.array([m.image for m in (first, second) if m is not None]))
 
 
 def symmetric_start(
@@ -85,8 +94,24 @@ def symmetric_start(
         and np.abs(_from_square(start[loop]) - _from_square(w[loop])).max() > ALONG * np.abs(w).max()
     ):
         return None
-    a, b = faces.derivatives(start)
-    return None if faces.folded(squared(a) - squared(b)).any() else (found, start)
+    start = _straightened(found, start, faces)
+    return None if has_folds(faces, start) else (found, start)
+
+
+def _straightened(symmetry: MirrorSymmetry, w: np.ndarray, faces: Elements) -> np.ndarray:
+    """A symmetric map w (n,) complex whose folds, if they are few, are straightened where they are; averaging makes
+    some where a map varies fast."""
+    triangles = faces.triangles if faces.part is None else faces.triangles[faces.part > 0]
+    outline = np.zeros(len(w), bool)
+    outline[boundary_edges(triangles)] = True
+    for _ in range(ROUNDS):
+        a, b = faces.derivatives(w)
+        folds = faces.folded(squared(a) - squared(b)).sum()
+        if not 0 < folds <= FEW * len(triangles):
+            break
+        straight = inner_folds_straightened(np.column_stack([w.real, w.imag]), triangles, outline)
+        w = symmetry.averaged(straight @ [1, 1j])
+    return w
 
 
 def _from_square(w: np.ndarray) -> np.ndarray:

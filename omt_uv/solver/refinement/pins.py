@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import PinError
-from ..maps.energy import Elements, squared
+from ..maps.energy import Elements, has_folds, squared
 from ..maps.similarity import fit_similarity
 from ..progress import Progress, Steps
 from .continuation import MapProblem, StageLimits, minimise, rescaled
@@ -115,7 +115,7 @@ def move_pins(problem: MapProblem, w: np.ndarray, pins: Pins) -> Steps[tuple[Map
         snapped = w.copy()
         snapped[pins.vertices] = pins.places
         near = np.abs(snapped - w).max() <= NEAR * extent or k == 0
-        if near and (problem.faces.areas(snapped) > 0).all() and not problem.boundary_crosses(snapped):
+        if near and not has_folds(problem.faces, snapped) and not problem.boundary_crosses(snapped):
             fixed = replace(rescaled(problem, snapped), motion=_fixed(len(w), pins), scale_free=True)
             return fixed, snapped
         problem = rescaled(problem, w)

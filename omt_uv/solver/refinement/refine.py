@@ -202,10 +202,7 @@ def _refined(
     # Sweeps know of triangles alone, of no pins, and of no balance.
     swept = faces.polygon is None and faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
     smoother = Smoother(mesh.triangles, n) if swept else None
-    problem = _map_problem(faces, assembly, initial, loop, boundary, smoother)
-    if symmetry is not None:
-        mirrored = MirroredMotion(problem.motion, symmetry, w)
-        problem = replace(problem, motion=mirrored, symmetry=symmetry, smoother=None)
+    problem = _mirrored(_map_problem(faces, assembly, initial, loop, boundary, smoother), symmetry, w)
     several_pins = pins is not None and len(pins.vertices) > 1
     if pins is not None and several_pins:
         problem, w = yield from move_pins(problem, w, pins)
@@ -219,7 +216,7 @@ def _refined(
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):
         notched = notched_disk(initial, mesh.triangles, loop)
         if notched is not None:
-            problem = _map_problem(faces, assembly, notched, loop, boundary, smoother)
+            problem = _mirrored(_map_problem(faces, assembly, notched, loop, boundary, smoother), symmetry, w)
             with_notches = yield from minimise_in_stages(problem, w, balance, quality)
             if area_error(faces, with_notches.w) < error:
                 found, initial = with_notches, notched
@@ -244,6 +241,14 @@ def _smoothed_if_tense(
         if problem.symmetry is not None:
             w = problem.symmetry.averaged(w)
     return w
+
+
+def _mirrored(problem: MapProblem, symmetry: MirrorSymmetry | None, w: np.ndarray) -> MapProblem:
+    """The problem for maps that keep the symmetry of the map w (n,) complex, if there is one."""
+    if symmetry is None:
+        return problem
+    motion = MirroredMotion(problem.motion, symmetry, w)
+    return replace(problem, motion=motion, symmetry=symmetry, smoother=None)
 
 
 def _map_problem(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import meshes
 import numpy as np
 import pytest
+from polygons import cut, wavy_quads
 
 from omt_uv.solver.editing.live_map import LiveMap
 from omt_uv.solver.editing.refine_island import refine_island
@@ -74,3 +75,11 @@ def test_a_start_with_folds_is_straightened_and_said():
     live = LiveMap(V, F, uv)
     assert live.warnings
     assert (signed_areas(live.uv, F) > 0).all()
+
+
+def test_quads_go_where_the_refinement_takes_them():
+    V, Q, uv = wavy_quads()
+    F, faces = cut(Q)
+    mine = at_rest(LiveMap(V, F, uv, polygons=faces), 0.4)
+    theirs = drain(refine_island(V, F, uv, balance=0.4, polygons=faces)).uv
+    assert np.abs(mine - theirs).max() < 5e-3 * np.ptp(theirs)

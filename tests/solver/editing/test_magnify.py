@@ -3,16 +3,18 @@
 import meshes
 import numpy as np
 import pytest
+from polygons import cut
 
 from omt_uv.solver.analysis.density import Target, from_vertices, normalised_density, region_share
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.editing.image_warp import warp_image
-from omt_uv.solver.editing.magnify import magnify_map, magnify_region
+from omt_uv.solver.editing.magnify import magnify_map, magnify_region, with_concave_quads_apart
 from omt_uv.solver.errors import FoldedUVError
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.options import MapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -171,3 +173,70 @@ def test_areas_that_cannot_be_are_said():
         options = {"density": normalised_density(found.density, area), "region": weights}
         result = drain(map_chart(chart, target=Target(**options)))
         assert any("Areas are" in text for text in result.warnings) == said == (result.area_l1 > 0.016)
+
+
+def flat_quads(columns=16, rows=16, turn=0):
+    """A square of quads: its map (n,2) from -1 to 1, triangles and polygons, cut from their corner `turn`."""
+    V, Q = meshes.quad_grid(columns, rows)
+    x, y = np.meshgrid(np.linspace(-1, 1, columns + 1), np.linspace(-1, 1, rows + 1))
+    assert len(V) == x.size
+    return np.column_stack([x.ravel(), y.ravel()]), *cut(Q, turn)
+
+
+def radial(uv, triangles, faces, radius=0.7):
+    """Weights of triangles, the same for all of a polygon, that fall off from 0."""
+    t = np.clip(2 * (1 - np.linalg.norm(uv, axis=1) / radius), 0, 1)
+    return means_of_polygons(t * t * (3 - 2 * t), triangles, faces)
+
+
+def means_of_polygons(values, triangles, faces):
+    corners = [np.unique(triangles[faces == f]) for f in range(faces.max() + 1)]
+    return np.array([values[c].mean() for c in corners])[faces]
+
+
+@pytest.mark.parametrize("boundary", ["own", "free"])
+@pytest.mark.parametrize("factor", [3.0, 0.3])
+def test_a_symmetric_region_of_quads_keeps_its_symmetry(factor, boundary):
+    uv, F, faces = flat_quads()
+    w = radial(uv, F, faces)
+    result = drain(magnify_region(uv, F, w, factor, boundary=boundary, polygons=faces))
+    area = np.abs(signed_areas(result.uv, F))
+    assert region_share(w, area) == pytest.approx(factor * region_share(w, np.abs(signed_areas(uv, F))), rel=5e-3)
+    assert (signed_areas(result.uv, F) > 0).all() and result.area_error < 0.02
+    grid = result.uv.reshape(17, 17, 2)
+    assert np.abs(grid[:, ::-1] * [-1, 1] - grid).max() < 1e-9 and np.abs(grid[::-1] * [1, -1] - grid).max() < 1e-9
+    if boundary == "own":
+        assert np.abs(np.abs(grid[[0, -1], :, 1]) - 1).max() < 1e-9
+
+
+def test_the_diagonals_of_quads_do_not_matter():
+    found = []
+    for turn in (0, 1):
+        uv, F, faces = flat_quads(10, 8, turn)
+        w = radial(uv + 0.1, F, faces)
+        found.append(drain(magnify_region(uv, F, w, 2.0, quality="exact", polygons=faces)).uv)
+    assert np.abs(found[0] - found[1]).max() < 1e-6
+
+
+def test_a_concave_quad_stays_where_its_density_is_one():
+    uv = np.array([[0, 0], [4, 0], [4, 4], [0, 4], [1.5, 0.3], [3.0, 1]])
+    F, faces = cut([[0, 1, 5, 4], [1, 2, 5], [2, 3, 4], [5, 2, 4], [3, 0, 4]], 1)
+    apart = with_concave_quads_apart(uv, F, faces)
+    quad = faces == 0
+    assert (signed_areas(uv, F) > 0).all() and len(set(apart[quad])) == 2
+    assert len(set(apart)) == len(set(faces)) + 1
+    result = drain(magnify_map(uv, F, np.ones(len(F)), polygons=faces))
+    np.testing.assert_allclose(result.uv, uv, atol=1e-6)
+
+
+@pytest.mark.parametrize(("factor", "radius"), [(4.0, 0.25), (8.0, 0.3)])
+def test_a_circle_stays_the_circle_it_is(factor, radius):
+    angle = 2 * np.pi * np.arange(64) / 64
+    V, F = meshes.polar(lambda t: t, lambda t: 0 * t, 10, 64)
+    uv = V[:, :2].copy()
+    assert np.abs(uv).max() == pytest.approx(np.abs(np.exp(1j * angle)).max())
+    w = from_vertices(blob(uv, np.array([0.5, 0.2]), radius), F)
+    result = drain(magnify_region(uv, F, w, factor))
+    loop = boundary_loops(F)[0]
+    assert result.outline == "circle"
+    np.testing.assert_allclose(np.linalg.norm(result.uv[loop], axis=1), 1, atol=1e-6)

@@ -4,7 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.editing.outline import centroid, recognise_outline
+from omt_uv.solver.editing.outline import centroid, fitted_circle, recognise_outline
 from omt_uv.solver.mesh.topology import boundary_loops
 
 
@@ -54,3 +54,18 @@ def test_the_centroid_is_that_of_the_area():
     more = np.insert(corner, 1, [101 - 7j, 101.1 - 7j])
     assert centroid(more)[0] == pytest.approx(middle) and centroid(corner[::-1])[1] == pytest.approx(-6)
     assert centroid(np.array([0, 1, 2.0])) == (1, 0)
+
+
+def test_a_circle_is_found_from_points_that_lie_on_it_unevenly():
+    angle = 2 * np.pi * np.linspace(0, 1, 40, endpoint=False) ** 2
+    points = 3 - 2j + 0.25 * np.exp(1j * angle)
+    centre, radius = fitted_circle(points)
+    assert abs(centre - (3 - 2j)) < 1e-12 and radius == pytest.approx(0.25, rel=1e-12)
+    assert abs(centroid(points)[0] - centre) > 1e-4
+    found = recognise_outline(points, np.arange(40))
+    assert found.kind == "circle" and abs(found.centre - centre) < 1e-12
+
+
+def test_half_a_disk_is_no_circle():
+    half = np.exp(1j * np.linspace(0, np.pi, 30))
+    assert recognise_outline(half, np.arange(30)).kind != "circle"

@@ -3,6 +3,7 @@
 import meshes
 import numpy as np
 import pytest
+from polygons import cut
 
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.refine import refine_islands
@@ -342,3 +343,22 @@ def test_unwrapping_names_pins_that_contradict():
     with pytest.raises(PinError, match="square") as info:
         drain(unwrap(surface, options=UnwrapOptions("square"), pins=CornerPins(F.ravel() == 7, uv)))
     assert info.value.elements.tolist() == [7]
+
+
+@pytest.mark.parametrize("balance", [0.0, 0.5])
+def test_a_symmetric_island_of_quads_gets_a_symmetric_map(balance):
+    _, Q = meshes.quad_grid(12, 10)
+    x, y = np.meshgrid(np.linspace(-1, 1, 13), np.linspace(-1, 1, 11))
+    V = np.column_stack([x.ravel(), y.ravel(), np.exp(-3 * (x**2 + (y - 0.2) ** 2)).ravel()])
+    F, faces = cut(Q)
+    lopsided = V[:, :2] + 0.02 * np.sin(5 * V[:, [1, 0]] + 1)
+    result = run(V, F, lopsided, balance=balance, polygons=faces)
+    grid = result.uv @ [1, 1j]
+    grid = (grid - grid.mean()).reshape(11, 13)
+    # The mirror image, about its own axis.
+    phase = (grid * grid[:, ::-1]).sum()
+    image = phase / abs(phase) * grid[:, ::-1].conj()
+    assert np.abs(image - grid).max() < 1e-9 and (signed_areas(result.uv, F) > 0).all()
+    if balance == 0:
+        figures = distortion(V, F, result.uv[F], polygons=faces)
+        assert figures.area_l1 < 0.01 < distortion(V, F, lopsided[F], polygons=faces).area_l1
