@@ -72,7 +72,7 @@ def globe_densities(pairs: Sequence, name: str, factor: float) -> list[np.ndarra
     if not name:
         return [None] * len(pairs)
     weights = region_weights(pairs, name)
-    densities = []
+    densities: list[np.ndarray | None] = []
     for w, (_, reading) in zip(weights, pairs, strict=True):
         surface = reading.surface
         mean = means_of_corners(w, surface.corner_vertex, surface.face_start)
