@@ -201,3 +201,15 @@ def test_tests_assert_nothing_about_time():
     found = [place(p, n) for p, n in nodes(TESTS, ast.Import) if {a.name for a in n.names} & clocks]
     found += [place(p, n) for p, n in nodes(TESTS, ast.ImportFrom) if n.module in clocks]
     assert not found
+
+
+def test_every_module_of_the_solver_is_imported_by_a_test():
+    imported = set()
+    for path in TESTS:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                imported |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    every = {
+        ".".join(p.relative_to(ROOT).with_suffix("").parts) for p in SOLVER.glob("**/*.py") if p.stem != "__init__"
+    }
+    assert not every - imported

@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.maps.polygon_elements import polygon_elements
+from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.mirror import find_mirror
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
+from omt_uv.solver.refinement.projected_newton import FreeMotion
 
 
 def hill(count=14, height=1.0):
@@ -78,3 +82,19 @@ def test_which_corner_quads_begin_with_matters_little():
         maps.append((w - w.mean())[np.argsort(chart.vertex_ids)])
     turn = np.vdot(maps[1], maps[0])
     assert np.abs(maps[0] - maps[1] * turn / abs(turn)).max() < 1e-3 * np.abs(maps[0]).max()
+
+
+def test_moves_of_representatives_keep_a_map_symmetric():
+    V, Q = hill(6)
+    T, faces = Q[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), np.repeat(np.arange(len(Q)), 2)
+    elements = polygon_elements(V, T, face_areas(V, T), faces)
+    found = find_symmetry(V, T, faces, elements)
+    symmetry, w = symmetric_start(found, V[:, :2] @ [1, 1j] + 0.3, elements, "free", np.arange(0))
+    motion = MirroredMotion(FreeMotion(np.zeros(len(V), bool)), symmetry, w)
+    rng = np.random.default_rng(0)
+    step = 0.01 * (rng.normal(size=len(V)) * motion.free[:, 0] + 1j * rng.normal(size=len(V)) * motion.free[:, 1])
+    moved = motion.move(w, step)
+    assert np.abs(moved - w).max() > 0
+    np.testing.assert_allclose(symmetry.spread(moved), moved, atol=1e-12)
+    # Both mirrors: a quarter of the vertices and their axes are all that is free.
+    assert motion.free.sum() == 2 * 9 + 2 * 3
