@@ -17,6 +17,8 @@ from ..mesh.topology import pair_keys
 
 # Sine, squared, of the angle by which a corner may turn inwards and count as straight.
 STRAIGHT = -1e-9
+# Share of a quad's area that the triangle at each of its corners needs for the quad to be cut anew.
+LEAST_CORNER = 1e-3
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,8 @@ def _shorter(vertices: np.ndarray, quads: np.ndarray, triangles: np.ndarray) -> 
     length = np.linalg.norm(p[:, [0, 1]] - p[:, [2, 3]], axis=2)
     normal = np.cross(p[:, [1, 2, 3, 0]] - p, p[:, [3, 0, 1, 2]] - p)
     own = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    convex = (np.einsum("qkd,qd->qk", normal, own) > 0).all(axis=1)
+    # A triangle next to a corner that is nearly straight is a sliver: if it was given, the map has to keep it open.
+    convex = (np.einsum("qkd,qd->qk", normal, own) > LEAST_CORNER * (own**2).sum(axis=1)[:, None]).all(axis=1)
     # Between equal ones the first corner in space decides.
     first = np.lexsort(vertices.T[::-1])
     rank = np.empty(len(vertices), np.int64)
