@@ -28,7 +28,7 @@ from ..refinement.initial_maps import disk_initial_map
 from ..refinement.mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from ..refinement.pins import aligned_to_pins, move_pins, placed_like
 from ..refinement.projected_newton import FreeMotion
-from ..refinement.refine import Refinement
+from ..refinement.refine import Refinement, refinement_of
 
 STRAIGHTENED = "The UVs were folded, or met themselves; the refinement started from a straightened map"
 UNGUARDED = "The outline of an island meets itself; it is not kept apart"
@@ -79,17 +79,7 @@ def refine_island(
     refined = mesh.original(found.w)
     if pins is not None:
         refined[pins[0]] = pins[1]
-    return Refinement(
-        uv=refined,
-        iterations=found.steps,
-        residual=found.residual,
-        area_error=error,
-        area_weight=found.area_weight,
-        energy=found.energy,
-        status=found.status,
-        overlap=found.overlap,
-        warnings=warnings,
-    )
+    return refinement_of(refined, found, error, warnings)
 
 
 def _refined(

@@ -155,11 +155,11 @@ def refine(
     refined = mesh.original(found.w)
     if pins is not None and mesh.pins is not None:
         refined[pins[0]] = pins[1]
-    return _refinement(refined, found, area_error(faces, found.w), warnings)
+    return refinement_of(refined, found, area_error(faces, found.w), (*warnings, *found.warnings))
 
 
-def _refinement(uv: np.ndarray, found: ContinuationResult, error: float, warnings: tuple[str, ...]) -> Refinement:
-    """The refined map uv (n,2), and how it came about."""
+def refinement_of(uv: np.ndarray, found: ContinuationResult, error: float, warnings: tuple[str, ...]) -> Refinement:
+    """The refined map uv (n,2) with its area error and all warnings, and how it came about."""
     return Refinement(
         uv=uv,
         iterations=found.steps,
@@ -169,7 +169,7 @@ def _refinement(uv: np.ndarray, found: ContinuationResult, error: float, warning
         energy=found.energy,
         status=found.status,
         overlap=found.overlap,
-        warnings=(*warnings, *found.warnings),
+        warnings=warnings,
         multiplier=found.multiplier,
     )
 
