@@ -129,8 +129,7 @@ def cut_gluing(
     vertex_count = len(surface.positions)
     positions, unit = _in_unit_box(surface, repaired.gluing)
     gluing, one_sided = _oriented(repaired.gluing, positions)
-    # What has one side only is not told to look to the other.
-    turned = gluing.triangles[:, 1] != repaired.gluing.triangles[:, 1]
+    twisted = one_sided
     gone = np.zeros(len(gluing.first), dtype=bool)
     if sieve is not None:
         gone = partition_pairs(gluing, positions, one_sided)
@@ -155,8 +154,9 @@ def cut_gluing(
     gluing, _ = _oriented(gluing.without(gone), positions)
     length = sum(p.length for p in report) + unit * float(np.linalg.norm(apart, axis=1).sum())
     edges = np.concatenate([edges, parting, repaired.torn]).astype(np.int64)
-    backwards = len(np.unique(repaired.gluing.owner[turned]))
-    warnings = (*repaired.warnings, *_warnings(len(parting), backwards, holes * sieves, touching))
+    turned = gluing.triangles[: len(twisted), 1] != repaired.gluing.triangles[:, 1]
+    backwards, mirrored = (len(np.unique(repaired.gluing.owner[turned & k])) for k in (~twisted, twisted))
+    warnings = (*repaired.warnings, *_warnings(len(parting), backwards, mirrored, holes * sieves, touching))
     cuts = Cuts(edges=edges, length=length, components=tuple(report), torn=repaired.torn, warnings=warnings)
     return CutSurface(surface=surface, gluing=gluing, cuts=cuts, extent=unit)
 
@@ -166,12 +166,16 @@ def sieved(holes: int) -> str:
     return f"{holes} holes are filled for the map: cuts to them would leave it no shape"
 
 
-def _warnings(parting: int, backwards: int, holes: int, touching: int) -> Iterator[str]:
-    """Warnings, from the numbers of partition edges, faces turned over, holes of sieves, and coincident vertices."""
+def _warnings(parting: int, backwards: int, mirrored: int, holes: int, touching: int) -> Iterator[str]:
+    """Warnings, from the numbers of partition edges, of faces turned over on surfaces of two sides and of one, of holes
+    of sieves, and of coincident vertices."""
     if parting:
         yield "A part with many handles was taken apart, along the hard edges of its holes or into clusters"
     if backwards:
         yield _turned_warning(backwards)
+    if mirrored:
+        who = "a face looks" if mirrored == 1 else f"{mirrored} faces look"
+        yield f"Where a surface has one side only, {who} to the other side of the map; the texture is mirrored there"
     if holes:
         yield sieved(holes)
     if touching:
@@ -186,36 +190,57 @@ def _cut_components(
 
     sieves : what has been filled are sieves, which are cut to extremities as closed components are, disks too
     """
-    component_of, corner_class = components(gluing), corner_classes(gluing)
-    topology = classify(gluing, corner_class, component_of, one_sided)
-    factor = cost_factors(surface, gluing)
-    gone = np.zeros(len(gluing.first), dtype=bool)
+    component_of = components(gluing)
+    whole = classify(gluing, corner_classes(gluing), component_of, one_sided)
+    gone = turning_lines(gluing, component_of, one_sided)
+    opened = np.bincount(component_of[gluing.first[gone] // 3], minlength=int(component_of.max()) + 1) > 0
+    left = gluing.without(gone)
+    number, line = np.flatnonzero(~gone), np.flatnonzero(gone)
+    a, b = gluing.ends(gluing.first[line])
+    line_length = np.linalg.norm(positions[a] - positions[b], axis=1)
+    line_of = component_of[gluing.first[line] // 3]
+    corner_class = corner_classes(left)
+    topology = classify(left, corner_class, component_of, one_sided & ~opened[component_of])
+    factor = cost_factors(surface, left)
     members = groups(component_of)
-    order, start = _by_component(component_of[gluing.first // 3], len(members))
+    order, start = _by_component(component_of[left.first // 3], len(members))
     report = []
     # A mesh may hold the same component many times: rivets, teeth, leaves.
     known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
     patched = np.zeros(len(members), dtype=bool)
     patched[component_of[gluing.owner < 0]] = True
-    for k in np.flatnonzero(~topology.is_disk | (patched & sieves)):
+    for k in np.flatnonzero(~whole.is_disk | (patched & sieves)):
         pairs = order[start[k] : start[k + 1]]
-        component = make_component(gluing, positions, corner_class, members[k], pairs, avoid, factor)
+        component = make_component(left, positions, corner_class, members[k], pairs, avoid, factor)
         name = fingerprint(component)
         if name not in known:
             known[name] = _best_cut(component, topology, k, extremities, bool(patched[k]) and not sieves)
         chosen, tips = known[name]
-        gone[component.gluing_pair[chosen]] = True
+        gone[number[component.gluing_pair[chosen]]] = True
         report.append(
             ComponentCut(
                 triangles=len(component.triangles),
-                boundaries=int(topology.boundaries[k]),
-                handles=int(topology.handles[k]),
-                one_sided=bool(topology.one_sided[k]),
-                length=float(component.length[chosen].sum()) * unit,
+                boundaries=int(whole.boundaries[k]),
+                handles=int(whole.handles[k]),
+                one_sided=bool(whole.one_sided[k]),
+                length=float(component.length[chosen].sum() + line_length[line_of == k].sum()) * unit,
                 extremities=component.vertex_ids[tips],
             )
         )
-    return gone, report, coincident_boundary_vertices(surface, gluing, component_of, topology.is_disk)
+    return gone, report, coincident_boundary_vertices(surface, gluing, component_of, whole.is_disk)
+
+
+def turning_lines(gluing: Gluing, component_of: np.ndarray, one_sided: np.ndarray) -> np.ndarray:
+    """Pairs (p,) bool at which faces look to opposite sides, of components (m,) with one side that stay in one without.
+
+    Cut there first, such a component has two sides, and no face has to be turned over.
+    """
+    pair_component = component_of[gluing.first // 3]
+    lines = gluing.parallel() & one_sided[gluing.first // 3]
+    apart = components(gluing.without(lines))
+    _, first = np.unique(apart, return_index=True)
+    parts = np.bincount(component_of[first], minlength=int(component_of.max()) + 1)
+    return lines & (parts == 1)[pair_component]
 
 
 def _best_cut(

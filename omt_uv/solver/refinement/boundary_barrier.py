@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..maps.contacts import covering_contacts, turns
 from ..mesh.topology import expand
 
 # Reach of the barrier, relative to the shorter of the boundary edges involved.
@@ -31,17 +32,24 @@ def loop_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
     """Pairs (k,2) of edges of a boundary that cross: edge i goes from loop[i] to the next; see `loop_edges`.
 
-    Touching at a common vertex is no crossing, and neither are edges that only touch.
+    Touching at a common vertex is no crossing, and neither are edges that only touch, unless the map covers itself
+    there: see `contacts.covering_contacts`.
     """
     tail, head = loop_edges(loop)
     a, b = w[tail], w[head]
     low, high = _box(np.stack([a, b]))
-    i, j = box_pairs(low, high, low, high)
+    depth = TOUCH * float((high.max(0) - low.min(0)).max())
+    i, j = box_pairs(low - depth, high + depth, low, high)
     apart = (j > i) & (tail[i] != head[j]) & (head[i] != tail[j])
     i, j = i[apart], j[apart]
-    depth = TOUCH * float((high.max(0) - low.min(0)).max())
     hit = _passes(a[i], b[i], a[j], b[j], depth) & _passes(a[j], b[j], a[i], b[i], depth)
+    hit |= covering_contacts(w, tail, head, i, j, depth) | covering_contacts(w, tail, head, j, i, depth)
     return np.column_stack([i[hit], j[hit]])
+
+
+def covers_itself(w: np.ndarray, loop: np.ndarray) -> bool:
+    """Whether a map w (n,) without folds of a disk with the boundary loop (b,) covers any place twice."""
+    return turns(w, loop) > 1 or len(crossings(w, loop)) > 0
 
 
 def _passes(a, b, p, q, depth: float) -> np.ndarray:

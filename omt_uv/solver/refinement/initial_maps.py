@@ -18,7 +18,7 @@ from ..maps.tutte import arc_length_parameters, tutte
 from ..maps.untangle import USABLE, arc_length_boundary, circle_boundary, count_folds, map_energy, untangle
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import expand, halfedges, twins
-from .boundary_barrier import crossings
+from .boundary_barrier import covers_itself
 from .projected_newton import CircleMotion, FreeMotion, LineMotion, Motion, linear_forms
 
 SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"
@@ -108,7 +108,7 @@ def free_initial_map(vertices, triangles, uv, loop, relaxed: float = RELAXED) ->
     if flat is not None:
         return InitialMap(uv=flat, motion=motion, warnings=(), may_cross=True)
     uv = uv * np.sqrt(area / np.abs(signed_areas(uv, triangles)).sum())
-    if count_folds(uv, triangles) == 0 and not len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
+    if count_folds(uv, triangles) == 0 and not covers_itself(uv @ [1, 1j], loop):
         return InitialMap(uv=uv, motion=motion, warnings=(), may_cross=True)
     start = disk_initial_map(vertices, triangles, uv - _middle(uv[loop]), loop)
     least = map_energy(start.uv, vertices, triangles)
@@ -207,7 +207,7 @@ def unroll(vertices, triangles, loop) -> np.ndarray | None:
         x[others] -= factor.solve(free.T @ (linear @ x))
     uv = x.reshape(n, 2)
     signed = signed_areas(uv, triangles)
-    if not (signed > 0).all() or len(crossings(uv[:, 0] + 1j * uv[:, 1], loop)):
+    if not (signed > 0).all() or covers_itself(uv @ [1, 1j], loop):
         return None
     return uv * np.sqrt(area.sum() / signed.sum())
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import hard_meshes
 import meshes
 import numpy as np
 import pytest
@@ -81,7 +82,10 @@ def test_every_surface_becomes_one_disk(name):
     before = V.copy(), F.copy()
     prepared = cut_to_disks(triangle_surface(V, F))  # refuses anything that is no disk
     (chart,) = prepared.charts
-    assert len(chart.triangles) == len(F) and not prepared.warnings
+    assert len(chart.triangles) == len(F)
+    # However it is opened, faces of this one look to both sides of the map.
+    (warning,) = prepared.warnings if name == "projective plane" else [""]
+    assert ("one side only, 3 faces look to the other side" in warning) == (name == "projective plane")
     np.testing.assert_array_equal(V, before[0])
     np.testing.assert_array_equal(F, before[1])
 
@@ -96,6 +100,21 @@ def test_cuts_are_seams_that_split_accepts(name):
     assert np.isclose(cuts.length, length, rtol=1e-12)
     # Cut again, there is nothing left to do.
     assert len(cut(triangle_surface(V, F, cuts.edges)).edges) == 0
+
+
+def test_a_klein_bottle_is_opened_where_its_winding_turns():
+    V, quads = hard_meshes.klein_bottle(24, 16)
+    surface = meshes.polygon_surface(V, quads.tolist())
+    prepared = cut_to_disks(surface)
+    (chart,) = prepared.charts
+    (component,) = prepared.cuts.components
+    assert component.one_sided and component.boundaries == 0 and component.handles == 2
+    ends = V[prepared.cuts.edges]
+    assert component.length == pytest.approx(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum(), rel=1e-9)
+    # Each triangle as it was wound: its corners in their order.
+    order = np.argsort(chart.corners, axis=1)
+    assert ((order - order[:, :1]) % 3 == [0, 1, 2]).all()
+    assert not prepared.warnings
 
 
 def test_topology_is_told():

@@ -1,0 +1,69 @@
+"""Outlines that touch themselves: neighbours, or a map that covers itself."""
+
+import hard_meshes
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.maps.contacts import turns
+from omt_uv.solver.maps.overlap import overlap_share
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.boundary_barrier import covers_itself, crossings
+
+STEPS = [1, 1j, -1, -1j]
+
+
+def path_of_squares(directions):
+    """Unit squares (k,) complex along a path, each joined to the one before alone: a map (n,) and triangles (m,3)."""
+    cells = np.concatenate([[0], np.cumsum(np.array(STEPS)[directions])])
+    corner = np.array([0, 1, 1 + 1j, 1j])
+    vertex = np.arange(4 * len(cells)).reshape(-1, 4)
+    w = (cells[:, None] + corner).ravel()
+    for k, d in enumerate(directions):  # the side that two squares share, of the square before and of the next
+        one, other = [(1, 2), (2, 3), (3, 0), (0, 1)][d], [(0, 3), (1, 0), (2, 1), (3, 2)][d]
+        vertex[k + 1, other] = vertex[k, one]
+    used, vertex = np.unique(vertex, return_inverse=True)
+    vertex = vertex.reshape(-1, 4)
+    return cells, w[used], np.concatenate([vertex[:, [0, 1, 2]], vertex[:, [0, 2, 3]]])
+
+
+@pytest.mark.parametrize("turn", [1, np.exp(0.3j)], ids=["straight", "turned"])
+def test_a_path_of_squares_covers_itself_where_it_comes_by_twice(turn):
+    rng = np.random.default_rng(0)
+    seen = []
+    for _ in range(300):
+        directions = [0]
+        while len(directions) < 12:
+            directions.append(int(rng.choice([d for d in range(4) if (d + 2) % 4 != directions[-1]])))
+        cells, w, F = path_of_squares(directions[: rng.integers(3, 12)])
+        (loop,) = boundary_loops(F)
+        twice = len(np.unique(np.round(cells, 6))) < len(cells)
+        assert covers_itself(turn * w, loop) == twice
+        seen.append(twice)
+    assert 50 < sum(seen) < 250
+
+
+def test_more_than_a_full_turn_around_a_vertex_is_two_turns_of_the_outline():
+    _, w, F = path_of_squares([0, 1, 2, 3])
+    assert turns(w, boundary_loops(F)[0]) == 2
+    _, w, F = path_of_squares([0, 1, 2])
+    assert turns(w, boundary_loops(F)[0]) == 1
+
+
+@pytest.mark.parametrize("turn", [1, np.exp(0.7j)])
+def test_the_two_sides_of_a_slit_are_neighbours(turn):
+    V, F = meshes.hinge(height=0)
+    w, (loop,) = V[:, :2] @ [turn, 1j * turn], boundary_loops(F)
+    assert not len(crossings(w, loop)) and not covers_itself(w, loop)
+
+
+@pytest.mark.parametrize("make", [hard_meshes.sponge, lambda: hard_meshes.voxel_blob(6)], ids=["sponge", "voxels"])
+def test_maps_of_bodies_of_cubes_cover_nothing_twice(make):
+    V, quads = make()
+    result = drain(unwrap(meshes.polygon_surface(V, quads.tolist()), options=UnwrapOptions(quality="draft")))
+    for chart, chart_map in zip(result.charts, result.maps, strict=True):
+        assert overlap_share(chart_map.uv[chart.triangles], samples=20_000) == 0
+        assert chart_map.folds == 0
