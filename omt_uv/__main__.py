@@ -1,7 +1,7 @@
 """`python -m omt_uv`."""
 
+import contextlib
 import os
-import shutil
 import sys
 
 from .cli import main
@@ -15,7 +15,9 @@ def leave(status: int) -> None:
     """
     bpy = sys.modules.get("bpy")
     if bpy is not None and bpy.app.version < (4, 5, 0):
-        shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
+        # Only ever an empty folder: where Blender made none for this session, this is the folder of everybody's files.
+        with contextlib.suppress(OSError):
+            os.rmdir(bpy.app.tempdir)
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)
