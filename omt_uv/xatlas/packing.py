@@ -174,16 +174,27 @@ def turn_upright(points: np.ndarray) -> np.ndarray:
     edge = np.roll(hull, -1, axis=0) - hull
     # One side of the smallest enclosing rectangle lies on an edge of the convex hull (Freeman & Shapira 1975).
     direction = edge / np.linalg.norm(edge, axis=1)[:, None]
-    along = hull @ direction.T
-    across = hull @ np.stack([-direction[:, 1], direction[:, 0]])
-    sides = np.ptp(along, axis=0), np.ptp(across, axis=0)
+    normal = np.column_stack([-direction[:, 1], direction[:, 0]])
+    sides = _widths(hull, direction), _widths(hull, normal)
     # All three rectangles of a triangle have the same area: rounding shall not choose, and the shortest fits best.
     equal = sides[0] * sides[1] <= (1 + EQUAL) * (sides[0] * sides[1]).min()
     best = np.argmin(np.where(equal, np.maximum(*sides), np.inf))
     c, s = direction[best]
-    if np.ptp(along[:, best]) > np.ptp(across[:, best]):
+    if sides[0][best] > sides[1][best]:
         c, s = -s, c
     return points @ np.array([[c, -s], [s, c]])
+
+
+def _widths(hull: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Widths (k,) of a convex polygon (h,2), counterclockwise, along unit vectors (k,2), in h + k steps or so."""
+    edge = np.roll(hull, -1, axis=0) - hull
+    angle = np.unwrap(np.arctan2(edge[:, 1], edge[:, 0]))
+    # A vertex is the farthest between the edges before and after it; rounding may mean its neighbours.
+    ahead = np.arctan2(direction[:, 1], direction[:, 0])[:, None] + np.array([0.5, -0.5]) * np.pi
+    found = np.searchsorted(angle, angle[0] + (ahead - angle[0]) % (2 * np.pi))
+    near = (found[:, :, None] + [-1, 0, 1]) % len(hull)
+    reach = np.einsum("ksnd,kd->ksn", hull[near], direction)
+    return reach[:, 0].max(axis=1) - reach[:, 1].min(axis=1)
 
 
 def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) -> tuple[list[np.ndarray], float]:
@@ -201,8 +212,7 @@ def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) 
     own = np.array([np.ptp(p, axis=0) for p in islands])
     own *= np.maximum(1, SPECK * extent / own.max(axis=1))[:, None]
     meshes = [
-        (_enlarged(p, float(size.max()) * EXTENT / extent), np.ascontiguousarray(t, np.uint32))
-        for p, size, t in zip(islands, own, triangles, strict=True)
+        _for_xatlas(p, t, float(size.max()) * EXTENT / extent) for p, size, t in zip(islands, own, triangles, strict=True)
     ]
     atlas = xatlas.Atlas()
     # xatlas keeps pointers to these arrays until generate(); `meshes` keeps them alive.
@@ -221,7 +231,7 @@ def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) 
 
     low, size = np.empty((len(islands), 2)), np.empty((len(islands), 2))
     for k in range(len(islands)):
-        texel = atlas.get_mesh(k)[2] * [atlas.width, atlas.height]
+        texel = atlas.get_mesh(k)[2][np.unique(meshes[k][1])] * [atlas.width, atlas.height]
         low[k], size[k] = texel.min(axis=0), np.ptp(texel, axis=0)
     if not (np.isfinite(low).all() and (size > 0).all()):
         raise PackingError("xatlas left an island unplaced")
@@ -232,10 +242,18 @@ def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) 
     ], scale
 
 
-def _enlarged(points: np.ndarray, extent: float) -> np.ndarray:
-    """Points (n,2) from 0 to the extent, for xatlas."""
+def _for_xatlas(points: np.ndarray, triangles: np.ndarray, extent: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n,2) from 0 to the extent, and the triangles (m,3) that single precision does not turn over.
+
+    xatlas takes what is turned over for an island of its own, and places it elsewhere: slivers of a cap of thousands of
+    sides, of no width in a texture.
+    """
     points = points - points.min(axis=0)
-    return np.ascontiguousarray(points * (extent / points.max()), np.float32)
+    points = np.ascontiguousarray(points * (extent / points.max()), np.float32)
+    a, b, c = (points[triangles[:, k]].astype(float) for k in range(3))
+    double_area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    kept = double_area * np.sign(double_area.sum()) > 0
+    return points, np.ascontiguousarray(triangles[kept] if kept.any() else triangles, np.uint32)
 
 
 def covered_area(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> float:

@@ -16,8 +16,10 @@ from .cut_graph import greedy_arcs
 
 # An edge at which the normal turns by more is hard. Prisms with 4, 5, 6 and 8 sides are clear of it.
 HARD = np.radians(52)
-# A vertex with less curvature, in radians, is flat.
+# A vertex with less curvature, in radians, is flat. Those of hard edges that are many, and only together have much of it,
+# as around a cap of thousands of sides, are flat if they have less than this share of their mean.
 FLAT = 1e-3
+FLATTER = 0.1
 # Vertices off the hard edges may count as corners if they have so much curvature, in radians, as the tip of a cone has,
 # and are so many at most.
 SPIKE = 0.75
@@ -47,7 +49,7 @@ def net(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     hard = np.zeros(component.vertex_count, dtype=bool)
     hard[component.ends[folded]] = True
     spike = ~hard & (curvature > SPIKE)
-    corner = (hard & (curvature > FLAT)) | spike
+    corner = (hard & (curvature > _flat(curvature[hard]))) | spike
     tips = np.flatnonzero(corner)
     curved = spike.sum() > MOST_SPIKES or curvature[~corner].sum() > MOST_LEFT
     # A closed surface needs a cut of two edges at least.
@@ -55,6 +57,12 @@ def net(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     chosen = greedy_arcs(replace(component, cost=np.where(folded, component.cost, ACROSS * component.cost)), tips)
     return chosen, tips
+
+
+def _flat(curvature: np.ndarray) -> float:
+    """The curvature below which a vertex of hard edges is flat, of all of theirs (k,)."""
+    little = curvature[curvature <= FLAT]
+    return FLATTER * little.mean() if little.sum() > MOST_LEFT else FLAT
 
 
 def is_long(component: CutComponent, cut: np.ndarray) -> bool:

@@ -22,6 +22,8 @@ CONTACT_SHARE = 0.8
 # Edges that reach past each other by less than this share of the map only touch: the two sides of a cut through a flat
 # surface lie on one another, and rounding shall not decide whether they cross.
 TOUCH = 1e-9
+# Cells along a side of the grid in which boxes that meet are looked for.
+MOST_CELLS = 1 << 16
 
 
 def loop_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -188,9 +190,11 @@ def _contact_times(p, dp, e, de):
 def box_pairs(low1, high1, low2, high2) -> tuple[np.ndarray, np.ndarray]:
     """Pairs i, j (p,) of boxes that meet, by a uniform grid: their corners are (k,2) each, and (l,2) each."""
     low = np.minimum(low1.min(0), low2.min(0))
-    extent = np.maximum(high1.max(0), high2.max(0)) - low
-    cells = int(np.clip(np.sqrt(len(low1) + len(low2)), 1, 512))
-    size = max(extent.max(), 1e-300) / cells * (1 + 1e-9)
+    extent = float((np.maximum(high1.max(0), high2.max(0)) - low).max())
+    # A box lies in a few cells, in the mean: a boundary is a curve, and with fewer cells all of it would lie in few.
+    sides = np.concatenate([high1 - low1, high2 - low2])
+    size = max(np.sqrt(sides.prod(1).mean()), sides.mean(), extent / MOST_CELLS, 1e-300) * (1 + 1e-9)
+    cells = int(extent / size) + 1
     box1, cell1 = _rasterise(low1 - low, high1 - low, size, cells)
     box2, cell2 = _rasterise(low2 - low, high2 - low, size, cells)
     order = np.argsort(cell2, kind="stable")
