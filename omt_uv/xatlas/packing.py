@@ -16,6 +16,8 @@ from ..errors import UserError
 
 # Extent that the largest island has for xatlas, which drops faces of meshes with small units.
 EXTENT = 100.0
+# xatlas ignores triangles of less than half of this area, at that extent, and leaves their vertices where they may.
+LEAST_AREA = 4e-7
 # Islands below this share of the largest are shown to xatlas in this size: it drops smaller ones.
 SPECK = 1e-4
 # Texels along a side; rasterising finer costs more than the space it saves.
@@ -212,7 +214,8 @@ def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) 
     own = np.array([np.ptp(p, axis=0) for p in islands])
     own *= np.maximum(1, SPECK * extent / own.max(axis=1))[:, None]
     meshes = [
-        _for_xatlas(p, t, float(size.max()) * EXTENT / extent) for p, size, t in zip(islands, own, triangles, strict=True)
+        _for_xatlas(p, t, float(size.max()) * EXTENT / extent)
+        for p, size, t in zip(islands, own, triangles, strict=True)
     ]
     atlas = xatlas.Atlas()
     # xatlas keeps pointers to these arrays until generate(); `meshes` keeps them alive.
@@ -243,16 +246,15 @@ def _place(islands, triangles, raster: int, padding: int, density: float = 0.0) 
 
 
 def _for_xatlas(points: np.ndarray, triangles: np.ndarray, extent: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n,2) from 0 to the extent, and the triangles (m,3) that single precision does not turn over.
+    """Points (n,2) from 0 to the extent, and the triangles (m,3) that still have an area in single precision.
 
-    xatlas takes what is turned over for an island of its own, and places it elsewhere: slivers of a cap of thousands of
-    sides, of no width in a texture.
+    Vertices of others, slivers of a cap of thousands of sides and of no width in a texture, xatlas places elsewhere.
     """
     points = points - points.min(axis=0)
     points = np.ascontiguousarray(points * (extent / points.max()), np.float32)
     a, b, c = (points[triangles[:, k]].astype(float) for k in range(3))
     double_area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    kept = double_area * np.sign(double_area.sum()) > 0
+    kept = double_area * np.sign(double_area.sum()) > LEAST_AREA
     return points, np.ascontiguousarray(triangles[kept] if kept.any() else triangles, np.uint32)
 
 

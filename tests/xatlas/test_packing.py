@@ -152,3 +152,21 @@ def test_without_xatlas(monkeypatch):
     monkeypatch.setitem(sys.modules, "xatlas", None)
     with pytest.raises(packing.PackingError, match="xatlas"):
         pack(corners(2), [FAN] * 2)
+
+
+def test_slivers_that_single_precision_turns_over_tear_no_island():
+    n = 8192
+    turn = 2 * np.pi * np.arange(n) / n
+    cap = np.column_stack([np.cos(turn), np.sin(turn)]).astype(np.float32).astype(float)
+    ears = [np.arange(0, n, 2 * s)[:, None] + [0, s, 2 * s] for s in 2 ** np.arange(12)]
+    islands = pack([cap, cap, 0.5 * cap], [np.concatenate(ears) % n] * 3, 4, 1024).islands
+    radius = [np.ptp(p, axis=0).max() / 2 for p in islands]
+    centre = [(p.min(axis=0) + p.max(axis=0)) / 2 for p in islands]
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        assert np.linalg.norm(centre[i] - centre[j]) > radius[i] + radius[j] + 3.9 / 1024
+
+
+def test_smallest_rectangle_of_a_round_outline():
+    turn = 2 * np.pi * np.arange(8192) / 8192
+    points = np.column_stack([np.cos(turn), 2 * np.sin(turn)]) @ rotation(0.3).T
+    np.testing.assert_allclose(np.ptp(turn_upright(points), axis=0), [2, 4], rtol=1e-5)

@@ -32,3 +32,14 @@ def test_a_net_leaves_no_curvature_inside():
 @pytest.mark.parametrize("mesh", [meshes.icosphere, meshes.torus, meshes.head])
 def test_smooth_bodies_have_none(mesh):
     assert net(component_of(*mesh())) is None
+
+
+def test_the_net_of_a_cylinder_of_many_sides_opens_both_caps():
+    n = 10_000
+    turn = 2 * np.pi * np.arange(n) / n
+    around = np.column_stack([np.cos(turn), np.sin(turn)])
+    V = np.concatenate([np.column_stack([around, 0 * turn + z]) for z in (-1, 1)] + [[[0, 0, -1], [0, 0, 1]]])
+    i, j = np.arange(n), (np.arange(n) + 1) % n
+    sides = [(i, j, n + j), (i, n + j, n + i), (j, i, 2 * n + 0 * i), (n + i, n + j, 2 * n + 1 + 0 * i)]
+    cut, tips = net(component_of(V, np.concatenate([np.column_stack(side) for side in sides])))
+    assert len(tips) == 2 * n and cut.sum() == 2 * n - 1
