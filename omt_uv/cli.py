@@ -4,29 +4,79 @@ from __future__ import annotations
 
 import argparse
 import sys
+import traceback
 from collections.abc import Sequence
+from pathlib import Path
 
-from . import __version__
+from . import __version__, supervision
 from .commands import magnify, measure, refine, remesh, seams, sphere, unwrap, weights
-from .commands.common import PROGRAM
 from .errors import UserError
+from .supervision import PROGRAM, tell
 
 COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, remesh)
-FAILURE = 1
+
+
+def script() -> None:
+    """Run the command that the arguments of this process ask for, and end it; what an installed `omt-uv` calls."""
+    supervision.leave(program(sys.argv[1:], [sys.executable, *sys.orig_argv[1:]]))
+
+
+def program(arguments: Sequence[str], words: Sequence[str]) -> int:
+    """Run a command in a child process, which `words` start; returns the exit status."""
+    try:
+        options = parser().parse_args(arguments)
+    except SystemExit as stop:
+        return _status(stop)
+    if supervision.is_child():
+        supervision.begin_child(options.memory)
+        return carry_out(options)
+    paths = [value for value in vars(options).values() if isinstance(value, Path)]
+    return supervision.supervise(
+        supervision.Errand(
+            words=words,
+            about=str(options.input),
+            folders=tuple({path.absolute().parent for path in paths}),
+            timeout=options.timeout,
+            memory=options.memory > 0,
+        )
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit status."""
+    """Run a command in this process, without its limits; returns the exit status."""
     try:
-        options = parser().parse_args(arguments)
-    except SystemExit as stop:  # argparse has printed help or the error
-        return stop.code if isinstance(stop.code, int) else FAILURE
+        return carry_out(parser().parse_args(arguments))
+    except SystemExit as stop:
+        return _status(stop)
+
+
+def carry_out(options: argparse.Namespace) -> int:
+    """Run a parsed command; what goes wrong is one line and a status."""
     try:
         options.run(options)
     except UserError as error:
-        print(f"{PROGRAM}: error: {' '.join(str(error).split())}", file=sys.stderr)
-        return FAILURE
+        return _told(str(error), supervision.FAILURE)
+    except MemoryError as error:
+        return _told(f"{options.input}: not enough memory. {error}", supervision.MEMORY)
+    except KeyboardInterrupt:
+        return _told(f"{options.input}: stopped by SIGINT", supervision.INTERRUPTED)
+    except Exception as error:
+        if sys.flags.dev_mode:
+            raise
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}: {error}"
+        return _told(f"{options.input}: a defect of this program, please report it: {text}", supervision.DEFECT)
     return 0
+
+
+def _told(text: str, status: int) -> int:
+    tell(text)
+    return status
+
+
+def _status(stop: SystemExit) -> int:
+    """The status with which argparse ends, which has printed help or the error."""
+    return stop.code if isinstance(stop.code, int) else supervision.FAILURE
 
 
 def parser() -> argparse.ArgumentParser:

@@ -80,6 +80,11 @@ def _clear(_) -> None:
 
 
 def _command(arguments: list[str]) -> int:
-    from .cli import main
+    """`blender --command omt_uv`: in a second Blender, with the words that started this one."""
+    import sys
 
-    return main(arguments)
+    from .cli import main, program
+
+    if "--command" not in sys.argv:
+        return main(arguments)
+    return program(arguments, [bpy.app.binary_path, *sys.argv[1:]])

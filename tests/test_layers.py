@@ -20,6 +20,7 @@ MOST_MODULES, MOST_LINES, MOST_FUNCTION_LINES, MOST_PARAMETERS = 14, 450, 60, 8
 ARROWS: dict[str, str] = {
     "settings": "",
     "errors": "",
+    "supervision": "",
     # The names of the front door are looked up in solver.api when they are used.
     "solver": "",
     "solver.mesh": "solver",
@@ -58,8 +59,8 @@ ARROWS: dict[str, str] = {
     "files": "errors solver blender",
     "display": "solver solver.mesh solver.maps pipelines blender",
     "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
-    "commands": "errors remedies settings solver solver.cutting solver.globe solver.parameterization xatlas pipelines "
-    "blender files display",
+    "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization xatlas "
+    "pipelines blender files display",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "xatlas pipelines blender files display session",
     "panels": "settings solver blender display session operators",

@@ -11,8 +11,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import UserError
-
-PROGRAM = "omt_uv"
+from ..supervision import PROGRAM
 
 
 class CommandError(UserError):

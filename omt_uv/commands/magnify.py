@@ -20,7 +20,7 @@ from ..settings import (
 )
 from .common import CommandError, drain_shown, refusals, require_blender, write_report
 from .layers import read_layers, write_layers
-from .options import FORMATS, add_files, add_report, margin, names, texture_size
+from .options import FORMATS, add_files, add_report, margin, names, positive, texture_size
 
 
 def add(commands) -> None:
@@ -34,7 +34,7 @@ def add(commands) -> None:
         help="vertex group of the region, or an attribute of floats on vertices or faces; or saliency, or curvature",
     )
     command.add_argument(
-        "--factor", type=float, default=DEFAULT_FACTOR, metavar="M", help="times its share (default %(default)s)"
+        "--factor", type=positive, default=DEFAULT_FACTOR, metavar="M", help="times its share (default %(default)s)"
     )
     command.add_argument(
         "--exact",

@@ -8,13 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 from .common import CommandError, read_file, refusals, require_blender
-from .options import FORMATS
+from .options import add_input
 
 
 def add(commands) -> None:
     command = commands.add_parser("measure", help="area error, shear, folds and overlap of the active UV maps")
     command.set_defaults(run=run)
-    command.add_argument("input", type=Path, metavar="IN", help=f"{FORMATS} .off")
+    add_input(command)
     command.add_argument(
         "--histogram", type=Path, metavar="H.png", help="draw how area error and shear are spread over the surface"
     )

@@ -3,18 +3,43 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from ..settings import DEFAULT_BALANCE, DEFAULT_QUALITY, FIRST_TILE, QUALITIES
+from ..supervision import MEMORY_IS_LIMITED
 
 # Levels of subdivision, as many as Blender's slider has.
 MOST_LEVELS = 6
 FORMATS = ".blend .obj .ply .stl .glb .fbx"
+# Gigabytes; with 0.35 Blender hangs while it starts.
+LEAST_MEMORY = 0.5
+# Corners of faces that Blender can count; a closed mesh of triangles has six for every vertex.
+MOST_CORNERS = 2**31 - 1
+MOST_FACES = MOST_CORNERS // 3
+MOST_VERTICES = MOST_CORNERS // 6
 
 
 def add_files(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off", writes: str = FORMATS) -> None:
-    command.add_argument("input", type=Path, metavar="IN", help=accepts)
+    add_input(command, accepts)
     command.add_argument("-o", "--output", type=Path, metavar="OUT", required=True, help=writes)
+
+
+def add_input(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off") -> None:
+    """What is read, how strictly, and how much time and memory that may take."""
+    command.add_argument("input", type=Path, metavar="IN", help=accepts)
+    command.add_argument(
+        "--object", action="append", default=[], metavar="NAME", help="take this object of IN alone; may be repeated"
+    )
+    command.add_argument("--scene", default="", metavar="NAME", help="take the objects of this scene of a .blend alone")
+    command.add_argument(
+        "--skip-linked", action="store_true", help="leave out linked objects and library overrides instead of refusing"
+    )
+    command.add_argument(
+        "--strict", action="store_true", help="refuse what is read incompletely, and UVs with folds or overlap"
+    )
+    command.add_argument("--timeout", type=positive, default=0.0, metavar="S", help="give up after so many seconds")
+    command.add_argument("--memory", type=gigabytes, default=0.0, metavar="GB", help="take no more memory than this")
 
 
 def add_area_options(command: argparse.ArgumentParser) -> None:
@@ -39,16 +64,62 @@ def names(items) -> list[str]:
     return [identifier.lower() for identifier, *_ in items]
 
 
-def share(text: str) -> float:
+def number(text: str) -> float:
+    """A float that is one: every option of floats is of this type or made of it."""
     value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+    return value
+
+
+def positive(text: str) -> float:
+    value = number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{text} is not greater than 0")
+    return value
+
+
+def angle(text: str) -> float:
+    value = number(text)
+    if not 0 <= value <= 180:
+        raise argparse.ArgumentTypeError(f"{text} is not an angle from 0 to 180 degrees")
+    return value
+
+
+def gigabytes(text: str) -> float:
+    value = number(text)
+    if value < LEAST_MEMORY:
+        raise argparse.ArgumentTypeError(f"{text} is less than {LEAST_MEMORY}, which Blender needs to start")
+    if not MEMORY_IS_LIMITED:
+        raise argparse.ArgumentTypeError("this system does not hold a program to a limit of memory; Linux does")
+    return value
+
+
+def vertices(text: str) -> int:
+    return _count(text, MOST_VERTICES)
+
+
+def faces(text: str) -> int:
+    return _count(text, MOST_FACES)
+
+
+def _count(text: str, most: int) -> int:
+    value = int(text)
+    if not 1 <= value <= most:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to {most}, the most that a mesh can hold")
+    return value
+
+
+def share(text: str) -> float:
+    value = number(text)
     if not 0 <= value <= 1:
         raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
     return value
 
 
 def shear(text: str) -> float:
-    value = float(text)
-    if not 1 < value < float("inf"):
+    value = number(text)
+    if value <= 1:
         raise argparse.ArgumentTypeError(f"{text} is not greater than 1, which is no shear")
     return value
 
@@ -64,8 +135,8 @@ def subdivision(text: str) -> str | int:
 
 
 def margin(text: str) -> float:
-    value = float(text)
-    if not 0 <= value < float("inf"):
+    value = number(text)
+    if value < 0:
         raise argparse.ArgumentTypeError(f"{text} is not a number of pixels")
     return value
 

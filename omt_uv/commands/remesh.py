@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
 from .common import CommandError, check_output, drain_shown, read_file, refusals, require_blender, warn
-from .options import add_files, names
+from .options import add_files, angle, faces, names, number, positive, vertices
 
 KINDS = ("uniform", "curvature", "gaussian", "saliency")
 
@@ -19,9 +19,9 @@ def add(commands) -> None:
     command.set_defaults(run=run)
     add_files(command)
     count = command.add_mutually_exclusive_group(required=True)
-    count.add_argument("--vertices", type=int, metavar="N", help="vertices of each new mesh")
-    count.add_argument("--faces", type=int, metavar="N", help="triangles of each new mesh")
-    count.add_argument("--edge", type=float, metavar="L", help="mean length of the edges")
+    count.add_argument("--vertices", type=vertices, metavar="N", help="vertices of each new mesh")
+    count.add_argument("--faces", type=faces, metavar="N", help="triangles of each new mesh")
+    count.add_argument("--edge", type=positive, metavar="L", help="mean length of the edges")
     command.add_argument(
         "--density",
         default="uniform",
@@ -30,7 +30,7 @@ def add(commands) -> None:
     )
     command.add_argument(
         "--factor",
-        type=float,
+        type=number,
         metavar="M",
         help="density where the weight is 1 next to where it is 0, default 4; amount of curvature, default 1",
     )
@@ -46,7 +46,7 @@ def add(commands) -> None:
 
 def _add_features(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        "--sharp", type=float, nargs="?", const=40.0, metavar="DEGREES", help="keep sharp edges, by default above 40"
+        "--sharp", type=angle, nargs="?", const=40.0, metavar="DEGREES", help="keep sharp edges, by default above 40"
     )
     command.add_argument("--no-boundary", action="store_true", help="smooth the boundary, and do not keep its corners")
     command.add_argument("--no-seams", action="store_true", help="do not keep seams and outlines of UV islands")
@@ -61,14 +61,14 @@ def _positive(text: str) -> int:
 
 
 def _growth(text: str) -> float:
-    value = float(text)
-    if not 0 <= value < float("inf"):
+    value = number(text)
+    if value < 0:
         raise argparse.ArgumentTypeError(f"{text} is no growth per length")
     return value
 
 
 def _ratio(text: str) -> float:
-    value = float(text)
+    value = number(text)
     if not 0 < value < 1:
         raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
     return value

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
 from .common import CommandError, drain_shown, refusals, require_blender, write_report
 from .layers import read_layers, write_layers
-from .options import add_area_options, add_files, add_report, names
+from .options import add_area_options, add_files, add_report, names, positive
 
 
 def add(commands) -> None:
@@ -26,7 +26,11 @@ def add(commands) -> None:
         "--weights", default="", metavar="GROUP", help="vertex group that gets more texture, or saliency, curvature"
     )
     command.add_argument(
-        "--weight-factor", type=float, default=2.0, metavar="F", help="how many times that of vertices without weight"
+        "--weight-factor",
+        type=positive,
+        default=2.0,
+        metavar="F",
+        help="how many times that of vertices without weight",
     )
     command.add_argument("--pole", default="", metavar="GROUP", help="vertex group of the north pole; default: Z is up")
     command.add_argument("--meridian", default="", metavar="GROUP", help="vertex group of the middle of the map")

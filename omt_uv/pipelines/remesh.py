@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -28,6 +29,8 @@ from ..solver.progress import Progress, Steps, part_of
 from ..solver.remeshing import Remesh, RemeshOptions, RemeshSource, remesh
 from ..solver.transfer.correspondence import Correspondence, correspond
 
+# What a vertex of a new mesh takes at least while it is made: 13 kB between 10,000 and 40,000 vertices.
+BYTES_PER_VERTEX = 10_000
 # Share of the work on one level that its mesh takes; the rest is where it lies on the surface.
 REMESHING = 0.95
 
@@ -113,11 +116,28 @@ def _counts(surface: Surface, triangles: np.ndarray, settings: RemeshSettings) -
     if count_of == "edge":
         # A triangle with three edges of length L has the area sqrt(3) L^2 / 4; faces are even in number where closed.
         area = face_areas(surface.positions, triangles).sum()
-        first, count_of = 2 * max(round(area / (np.sqrt(3) / 2 * first**2)), 1), "faces"
+        # Floats of Python overflow to infinity without a word, which is too many as well.
+        faces = float(area) / (3**0.5 / 4) / first / first
+        _check_memory(faces / 2)
+        first, count_of = 2 * max(round(faces / 2), 1), "faces"
+    _check_memory(first if count_of == "vertices" else first / 2)
     counts = [round(first * settings.ratio**k) for k in range(max(settings.levels, 1))]
     if count_of == "faces":
         counts = [counts[0], *(c + c % 2 for c in counts[1:])]
     return count_of, counts
+
+
+def _check_memory(vertex_count: float) -> None:
+    """Raise CountError for so many vertices that this machine cannot hold them."""
+    if not hasattr(os, "sysconf"):
+        return
+    there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if not vertex_count * BYTES_PER_VERTEX <= there:
+        raise CountError(
+            f"A mesh of about {vertex_count:.3g} vertices takes more memory to make than the {there / 1e9:.3g} GB "
+            "of this machine",
+            "Ask for fewer, or for longer edges",
+        )
 
 
 def _features(

@@ -51,7 +51,6 @@ def test_command_warps_a_picture(run, tmp_path):
     "options",
     [
         ("--weights", "none", "--factor", 2),
-        ("--weights", "region", "--factor", -1),
         ("--weights", "saliency", "--factor", 99),
     ],
 )

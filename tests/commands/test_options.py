@@ -7,9 +7,12 @@ import argparse
 import pytest
 
 GOOD = [("share", "0", 0.0), ("share", "1", 1.0), ("shear", "1.01", 1.01), ("margin", "0", 0.0), ("tile", "1999", 1999),
-        ("tile", "1001", 1001), ("texture_size", "1", 1)]  # fmt: skip
+        ("tile", "1001", 1001), ("texture_size", "1", 1), ("positive", "1e-9", 1e-9), ("angle", "180", 180.0),
+        ("vertices", "357913941", 357913941), ("faces", "1", 1)]  # fmt: skip
 BAD = [("share", "-0.1"), ("share", "nan"), ("shear", "1"), ("shear", "inf"), ("margin", "-1"), ("margin", "nan"),
-       ("tile", "1000"), ("tile", "2000"), ("texture_size", "0")]  # fmt: skip
+       ("tile", "1000"), ("tile", "2000"), ("texture_size", "0"), ("positive", "0"), ("positive", "-inf"),
+       ("angle", "181"), ("angle", "nan"), ("vertices", "0"), ("vertices", "357913942"), ("faces", "-1"),
+       ("gigabytes", "0.4")]  # fmt: skip
 
 
 @pytest.mark.parametrize("name, text, value", GOOD)
@@ -25,3 +28,39 @@ def test_values_beyond_are_refused_by_what_they_are(package, name, text):
 
 def test_choices_are_those_of_the_settings_in_lower_case(package):
     assert package("commands.options").names(package("settings").QUALITIES) == ["draft", "standard", "exact"]
+
+
+def commands(package):
+    """Pairs of the name and the parser of every command."""
+    (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
+    return every.choices.items()
+
+
+def complete(command, beside):
+    """Arguments that make a command complete beside an action."""
+    exclusive = [group._group_actions for group in command._mutually_exclusive_groups]
+    needed = [a for a in command._actions if a.required and a.option_strings and a is not beside]
+    words = ["in.obj", *(word for a in needed for word in (a.option_strings[-1], "x"))]
+    free = [actions[0].option_strings[0] for actions in exclusive if beside not in actions]
+    return [*words, *(word for name in free for word in (name, "9"))]
+
+
+def test_every_option_of_numbers_refuses_what_is_no_finite_number(package, run):
+    """By reflection: no option can be added that takes one."""
+    tried = 0
+    for name, command in commands(package):
+        for action in command._actions:
+            if action.type is not None and getattr(action.type, "__name__", "") != "Path":
+                for value in ("nan", "inf", "-inf", "1e999"):
+                    words = [*complete(command, action), f"{action.option_strings[0]}={value}"]
+                    status, out, err = run(name, *words)
+                    assert (status, out) == (2, ""), (name, action.option_strings, value)
+                    assert action.option_strings[0] in err.splitlines()[-1] and "Traceback" not in err
+                    tried += 1
+    assert tried > 100
+
+
+def test_every_command_has_the_options_of_input_and_budgets(package):
+    for name, command in commands(package):
+        have = {text for action in command._actions for text in action.option_strings}
+        assert have >= {"--object", "--scene", "--skip-linked", "--strict", "--timeout", "--memory"}, name

@@ -53,7 +53,7 @@ def test_an_attribute_gives_the_density_where_no_group_has_its_name(run, tmp_pat
     (["--vertices", 100, "--levels", 0], 2),
     (["--vertices", 100, "--grading", -1], 2),
     (["--vertices", "many"], 2),
-    (["--edge", "inf"], 1),
+    (["--edge", "inf"], 2),
     (["--vertices", 100, "--density", "curvature", "--factor", -1], 1),
 ])  # fmt: skip
 def test_statuses_tell_options_from_meshes(run, tmp_path, arguments, status):
@@ -118,9 +118,9 @@ def test_command_writes_both_objects_to_a_blend_file(run, tmp_path):
 @pytest.mark.parametrize("arguments, words", [
     ([], "--vertices --faces --edge"),
     (["--vertices", 100, "--faces", 200], "not allowed with"),
-    (["--vertices", 0], "a number above 0"),
+    (["--vertices", 0], "not a number from 1"),
     (["--vertices", 3], "at least"),
-    (["--edge", "nan"], "a number above 0"),
+    (["--edge", "nan"], "not a finite number"),
     (["--vertices", 100, "--density", "nowhere"], "no vertex group 'nowhere'"),
     (["--vertices", 100, "--levels", 2, "--ratio", 1.5], "between 0 and 1"),
 ])  # fmt: skip

@@ -89,9 +89,9 @@ def test_a_painted_part_gets_more_of_the_texture(run, tmp_path):
     arguments = ("-o", tmp_path / "out.blend", "--projection", "lambert", "--weights", "face", "--weight-factor", "4")
     assert run("sphere", tmp_path / "in.blend", *arguments)[0] == 0
     assert (scenes.uv_of(bpy.data.objects["Ball"]) == expected).all()
-    for bad, message in (
-        (("--weights", "none"), "no vertex group"),
-        (("--weights", "face", "--weight-factor", "-1"), ""),
+    for bad, expected, message in (
+        (("--weights", "none"), 1, "no vertex group"),
+        (("--weights", "face", "--weight-factor", "-1"), 2, "not greater than 0"),
     ):
         status, _, err = run("sphere", tmp_path / "in.blend", "-o", tmp_path / "x.blend", *bad)
-        assert status == 1 and message in err
+        assert status == expected and message in err

@@ -1,0 +1,164 @@
+"""Run a command in a child process, so that a crash, a hang or too little memory ends as one line and a status.
+
+The parent imports no Blender. It hands signals on as an end of the child, keeps to a limit of time, and removes what a
+child that was ended left behind. The child has a folder of its own for temporary files, a limit of memory, and ends
+when its parent is gone.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+PROGRAM = "omt_uv"
+
+# Exit statuses; 0 is success, and 128 + n the end by signal n.
+FAILURE = 1
+USAGE = 2
+CRASH = 3
+TIMEOUT = 4
+MEMORY = 5
+DEFECT = 6
+INTERRUPTED = 128 + signal.SIGINT
+OWN = {0, FAILURE, USAGE, MEMORY, DEFECT, INTERRUPTED}
+
+GIGABYTE = 10**9
+# Says to a process that it is the child.
+MARK = "OMT_UV_CHILD"
+MEMORY_IS_LIMITED = sys.platform.startswith("linux")
+# What a user or a system ends a program with; Windows knows the first two alone.
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+@dataclass(frozen=True)
+class Errand:
+    """What a child does: the words that start it, and what is said about it.
+
+    about : the file it works on; folders : where it may leave temporary files; timeout : seconds, 0 for no end;
+    memory : whether it has a limit, see `begin_child`
+    """
+
+    words: Sequence[str]
+    about: str
+    folders: Sequence[Path] = ()
+    timeout: float = 0.0
+    memory: bool = False
+
+
+def temporary_prefix() -> str:
+    """How the names of temporary files of this process begin, wherever they lie."""
+    return f".omt_uv_{os.getpid()}_"
+
+
+def is_child() -> bool:
+    return MARK in os.environ
+
+
+def begin_child(gigabytes: float) -> None:
+    """Take up the life of a child: no more than so much memory, 0 for all there is, and an end with the parent."""
+    os.environ.pop(MARK, None)
+    if gigabytes and MEMORY_IS_LIMITED:
+        import resource
+
+        # What is written to: the address space counts libraries and reserves of threads as well.
+        resource.setrlimit(resource.RLIMIT_DATA, (int(gigabytes * GIGABYTE),) * 2)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Wait for the end of the standard input, which the parent holds open and never writes to."""
+    # Not sys.stdin, whose lock would be held while the interpreter shuts down.
+    while os.read(0, 1):
+        pass
+    os._exit(CRASH)
+
+
+def leave(status: int) -> None:
+    """End this process with a status.
+
+    As a Python module, Blender may crash while the interpreter shuts down (4.2 does after a glTF export), and the
+    status would be that of the crash. Its temporary files lie in a folder that the parent removes.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if "bpy" in sys.modules:
+        os._exit(status)
+    sys.exit(status)
+
+
+def supervise(errand: Errand) -> int:
+    """Run the child to its end and say what ended it unless it did so itself; returns the exit status."""
+    with tempfile.TemporaryDirectory(prefix="omt_uv_", ignore_cleanup_errors=True) as folder:
+        places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
+        child = subprocess.Popen(
+            errand.words,
+            env={**os.environ, **places, MARK: "1"},
+            stdin=subprocess.PIPE,
+            # Ctrl-C in a terminal is for the parent alone, which ends the child at once.
+            start_new_session=True,
+        )
+        with _stopped_by_signals(child) as received:
+            try:
+                child.wait(errand.timeout or None)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.wait()
+                return _told(errand, child, TIMEOUT, f"not done within {errand.timeout:g} s")
+        if received:
+            return _told(errand, child, 128 + received[0], f"stopped by {signal.Signals(received[0]).name}")
+        if child.returncode in OWN:
+            return child.returncode
+        return _told(errand, child, *_crash(child.returncode, errand.memory))
+
+
+@contextmanager
+def _stopped_by_signals(child: subprocess.Popen) -> Iterator[list[int]]:
+    """Signals that are received end the child; the value lists them."""
+    received: list[int] = []
+
+    def stop(number: int, _frame) -> None:
+        received.append(number)
+        child.kill()
+
+    before = {number: signal.signal(number, stop) for number in SIGNALS}
+    try:
+        yield received
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _crash(returned: int, memory: bool) -> tuple[int, str]:
+    """Exit status and words for a child that ended itself neither by a status of ours nor by us."""
+    if os.name == "posix" and returned == -signal.SIGKILL:
+        return MEMORY, "killed from outside, as a rule because the system is out of memory"
+    what = f"status {returned}" if returned > 0 else signal.Signals(-returned).name
+    more = ", or lacked the memory that it may have" if memory else ""
+    return CRASH, f"Blender crashed on it ({what}); the file may be damaged{more}"
+
+
+def _told(errand: Errand, child: subprocess.Popen, status: int, text: str) -> int:
+    """The status, said on one line and tidied up after."""
+    for folder in errand.folders:
+        # By the number of the child: other runs may be writing to the same folder.
+        for rest in folder.glob(f".omt_uv_{child.pid}_*"):
+            if rest.is_dir() and not rest.is_symlink():
+                shutil.rmtree(rest, ignore_errors=True)
+            else:
+                rest.unlink(missing_ok=True)
+    tell(f"{errand.about}: {text}")
+    return status
+
+
+def tell(text: str) -> None:
+    """Say an error on one line."""
+    print(f"{PROGRAM}: error: {' '.join(text.split())}", file=sys.stderr, flush=True)

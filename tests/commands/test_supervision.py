@@ -1,0 +1,144 @@
+"""A command in a child process: crashes, signals, limits of time and memory end as one line and a status."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+posix = pytest.mark.skipif(os.name != "posix", reason="signals")
+# A child that leaves a temporary folder, says what its process is and where its temporary files go, and sleeps.
+SLEEPER = """
+import os, pathlib, time
+folder = pathlib.Path(FOLDER)
+(folder / f".omt_uv_{os.getpid()}_rest").mkdir()
+print(os.getpid(), os.environ["TMPDIR"], flush=True)
+time.sleep(60)
+"""
+PARENT = """
+import sys
+from pathlib import Path
+from omt_uv.supervision import Errand, supervise
+sys.exit(supervise(Errand([sys.executable, "-c", sys.argv[1]], "in.obj", (Path(sys.argv[2]),), timeout=50.0)))
+"""
+
+
+def supervise(package, code, **more):
+    supervision = package("supervision")
+    return supervision.supervise(supervision.Errand([sys.executable, "-c", code], "in.obj", **more))
+
+
+def sleeper(folder):
+    return SLEEPER.replace("FOLDER", repr(str(folder)))
+
+
+@pytest.mark.parametrize("status", [0, 1, 2, 5, 6])
+def test_a_status_of_the_child_is_that_of_the_parent_without_a_word(package, capfd, status):
+    assert supervise(package, f"import sys; sys.exit({status})") == status
+    assert capfd.readouterr() == ("", "")
+
+
+@posix
+@pytest.mark.parametrize(
+    "number, status, word", [(11, 3, "SIGSEGV"), (6, 3, "SIGABRT"), (8, 3, "SIGFPE"), (9, 5, "memory")]
+)
+def test_a_crash_is_one_line_and_a_status(package, capfd, number, status, word):
+    assert supervise(package, f"import os; os.kill(os.getpid(), {number})") == status
+    out, err = capfd.readouterr()
+    assert out == "" and len(err.splitlines()) == 1
+    assert err.startswith("omt_uv: error: in.obj: ") and word in err
+
+
+def test_what_takes_too_long_is_ended(package, capfd, tmp_path):
+    assert supervise(package, sleeper(tmp_path), timeout=2.0, folders=(tmp_path,)) == 4
+    assert "not done within 2 s" in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@posix
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_signal_ends_the_child_leaves_nothing_and_is_one_line(tmp_path, number):
+    """What lies beside the temporary files of the child, also those of another run, stays."""
+    (tmp_path / ".omt_uv_1_other").mkdir()
+    words = [sys.executable, "-c", PARENT, sleeper(tmp_path), str(tmp_path)]
+    parent = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT, text=True)
+    child, folder = parent.stdout.readline().split()
+    assert Path(folder).is_dir()
+    parent.send_signal(number)
+    assert parent.wait(20) == 128 + number
+    err = parent.stderr.read()
+    assert len(err.splitlines()) == 1 and signal.Signals(number).name in err
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(child), 0)
+    assert sorted(p.name for p in tmp_path.iterdir()) == [".omt_uv_1_other"]
+    assert not Path(folder).exists()
+
+
+@posix
+def test_a_child_ends_with_its_parent_and_removes_nothing(tmp_path):
+    (tmp_path / "somebody.txt").write_text("work")
+    code = "from omt_uv import supervision; import time; supervision.begin_child(0); time.sleep(50)"
+    more = {"OMT_UV_CHILD": "1", "TMPDIR": str(tmp_path)}
+    child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, cwd=ROOT, env={**os.environ, **more})
+    child.stdin.close()
+    assert child.wait(20) == 3
+    assert (tmp_path / "somebody.txt").read_text() == "work"
+
+
+def test_leaving_removes_nothing_and_runs_no_end_of_blender(package, tmp_path, monkeypatch):
+    """Where Blender made no folder of its own for temporary files, its name for it is that of everybody's."""
+    (tmp_path / "somebody.txt").write_text("work")
+    (tmp_path / "empty").mkdir()
+    left = []
+    monkeypatch.setitem(sys.modules, "bpy", SimpleNamespace(app=SimpleNamespace(tempdir=f"{tmp_path}/")))
+    monkeypatch.setattr(os, "_exit", left.append)
+    with pytest.raises(SystemExit):
+        package("supervision").leave(3)
+    assert left == [3]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["empty", "somebody.txt"]
+
+
+@pytest.mark.parametrize(
+    "error, status, word",
+    [
+        (MemoryError("Unable to allocate 60 GiB"), 5, "60 GiB"),
+        (KeyboardInterrupt(), 130, "SIGINT"),
+        (KeyError("x"), 6, "KeyError"),
+        (ValueError("min() arg is an empty\nsequence"), 6, "test_supervision.py"),
+    ],
+)
+def test_whatever_is_raised_is_one_line(package, run, monkeypatch, error, status, word):
+    def fail(options):
+        raise error
+
+    monkeypatch.setattr(package("commands.measure"), "run", fail)
+    found, out, err = run("measure", "in.obj")
+    assert (found, out) == (status, "")
+    assert len(err.splitlines()) == 1 and err.startswith("omt_uv: error: ") and word in err
+
+
+@posix
+def test_as_a_program_a_crash_while_reading_is_one_line(tmp_path):
+    """The whole way, with a Blender that ends itself while it reads."""
+    code = (
+        "import os, sys; import omt_uv.commands.measure as m, omt_uv.cli as c\n"
+        "m.run = lambda options: os.abort()\n"
+        "sys.argv[1:] = ['measure', 'in.obj']; c.script()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True,
+                          env={**os.environ, "PYTHONPATH": str(ROOT)})  # fmt: skip
+    assert done.returncode == 3 and len(done.stderr.splitlines()) == 1, done.stderr
+
+
+@pytest.mark.parametrize("words", [["--edge", "1e-6"], ["--edge", "1e-300"], ["--vertices", "300000000"]])
+def test_impossible_counts_are_refused_before_memory_is_asked_for(run, tmp_path, words):
+    (tmp_path / "in.off").write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n")
+    status, _, err = run("remesh", tmp_path / "in.off", "-o", tmp_path / "out.obj", *words)
+    assert status == 1 and len(err.splitlines()) == 1 and "memory" in err
+    assert not (tmp_path / "out.obj").exists()
