@@ -59,8 +59,8 @@ ARROWS: dict[str, str] = {
     "files": "errors solver blender",
     "display": "solver solver.mesh solver.maps pipelines blender",
     "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
-    "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization xatlas "
-    "pipelines blender files display",
+    "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
+    "xatlas pipelines blender files display",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "xatlas pipelines blender files display session",
     "panels": "settings solver blender display session operators",

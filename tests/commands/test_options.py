@@ -60,7 +60,7 @@ def test_every_option_of_numbers_refuses_what_is_no_finite_number(package, run):
     assert tried > 100
 
 
-def test_every_command_has_the_options_of_input_and_budgets(package):
+def test_every_command_has_the_options_of_input_and_limits(package):
     for name, command in commands(package):
         have = {text for action in command._actions for text in action.option_strings}
         assert have >= {"--object", "--scene", "--skip-linked", "--strict", "--timeout", "--memory"}, name
