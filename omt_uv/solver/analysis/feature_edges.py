@@ -23,6 +23,24 @@ def sharp_edges(positions: np.ndarray, triangles: np.ndarray, angle: float) -> n
     return edges[turn > angle]
 
 
+def fold_angles(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> np.ndarray:
+    """Angle (e,) between the normals of the two faces (m,3) at pairs of halfedges (e,2), radians.
+
+    Negative where the surface is hollow, 0 beside faces without area.
+    """
+    p = positions[triangles]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    size = np.linalg.norm(normal, axis=1)
+    normal /= np.where(size > 0, size, 1)[:, None]
+    t, s = pair.T // 3
+    cosine = np.clip((normal[t] * normal[s]).sum(axis=1), -1, 1)
+    # The far corner of the one face lies above the other where the surface is hollow.
+    far = positions[triangles[s, (pair[:, 1] + 2) % 3]] - positions[triangles[t, pair[:, 0] % 3]]
+    rise = (normal[t] * far).sum(axis=1)
+    depth = np.where((size[t] > 0) & (size[s] > 0), np.arccos(cosine), 0.0)
+    return np.where(rise > 0, -depth, depth)
+
+
 def region_borders(triangles: np.ndarray, region: np.ndarray) -> np.ndarray:
     """Edges (k,2) of triangles (m,3) between faces of different `region` (m,)."""
     first, second, edges = _pairs(triangles)

@@ -32,14 +32,21 @@ def saliency(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
     with G the Gaussian mean and H the mean curvature. Zero on planes and round spheres.
     """
-    positions = unit_size(positions, triangles)
+    return saliency_of(curvature_means(unit_size(positions, triangles), triangles), triangles)
+
+
+def curvature_means(positions: np.ndarray, triangles: np.ndarray) -> dict[float, np.ndarray]:
+    """Gaussian means (n,) of the mean curvature of a surface of unit size (n,3), (m,3), by their scale in EPSILON."""
     heat = HeatMeans(positions, triangles, 6 * EPSILON)
     sigmas = np.unique(np.concatenate([SCALES, 2 * SCALES]))
-    means = heat.means(mean_curvature(positions, triangles), EPSILON * sigmas)
-    at = {s: means[k] for k, s in enumerate(sigmas.tolist())}
-    total = np.zeros(len(positions))
+    return dict(zip(sigmas.tolist(), heat.means(mean_curvature(positions, triangles), EPSILON * sigmas), strict=True))
+
+
+def saliency_of(means: dict[float, np.ndarray], triangles: np.ndarray) -> np.ndarray:
+    """Saliency (n,) of a surface with triangles (m,3) from its `curvature_means`."""
+    total = np.zeros(len(means[SCALES[0]]))
     for scale in SCALES.tolist():
-        total += _suppressed(np.abs(at[scale] - at[2 * scale]), triangles)
+        total += _suppressed(np.abs(means[scale] - means[2 * scale]), triangles)
     return total
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..analysis.feature_edges import fold_angles
 from ..mesh.gluing import Gluing, groups
 from ..mesh.topology import halfedges
 
@@ -172,24 +173,6 @@ def make_component(
         vertex_ids=vertex_ids,
         avoid=avoid[vertex_ids],
     )
-
-
-def fold_angles(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> np.ndarray:
-    """Angle (e,) between the normals of the two faces (m,3) at pairs of halfedges (e,2), radians.
-
-    Negative where the surface is hollow, 0 beside faces without area.
-    """
-    p = positions[triangles]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    size = np.linalg.norm(normal, axis=1)
-    normal /= np.where(size > 0, size, 1)[:, None]
-    t, s = pair.T // 3
-    cosine = np.clip((normal[t] * normal[s]).sum(axis=1), -1, 1)
-    # The far corner of the one face lies above the other where the surface is hollow.
-    far = positions[triangles[s, (pair[:, 1] + 2) % 3]] - positions[triangles[t, pair[:, 0] % 3]]
-    rise = (normal[t] * far).sum(axis=1)
-    depth = np.where((size[t] > 0) & (size[s] > 0), np.arccos(cosine), 0.0)
-    return np.where(rise > 0, -depth, depth)
 
 
 def _hiding(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) -> np.ndarray:

@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..analysis.feature_edges import fold_angles
 from ..mesh.geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
-from .component import CutComponent, fold_angles
+from .component import CutComponent
 from .cut_graph import greedy_arcs
 
 # An edge at which the normal turns by more is hard. Prisms with 4, 5, 6 and 8 sides are clear of it.

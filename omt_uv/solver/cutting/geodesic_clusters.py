@@ -10,8 +10,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from ..analysis.feature_edges import fold_angles
 from ..mesh.gluing import Gluing, components, corner_classes
-from .component import SMOOTH, classify, fold_angles
+from .component import SMOOTH, classify
 
 # A component falls into so many clusters.
 CLUSTERS = 4

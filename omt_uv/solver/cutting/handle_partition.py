@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..analysis.feature_edges import fold_angles
 from ..mesh.gluing import Gluing, components, corner_classes
-from .component import Topology, classify, fold_angles
+from .component import Topology, classify
 from .developable_nets import HARD
 from .geodesic_clusters import cluster_borders
 from .hole_filling import hole_boundaries

@@ -1,0 +1,107 @@
+"""Measure how hidden the faces of a surface are from all around, by depth buffers of samples.
+
+Seen from a direction, a sample is hidden if another one in the same pixel is nearer by more than the slope of its own
+face explains. Each buffer is looked through from both of its ends, so that half as many serve for all directions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..mesh.closest_point import spread_points
+from ..mesh.geometry import face_areas, face_normals
+from ..mesh.topology import graph_components, halfedges
+from .saliency import unit_size
+
+# Buffers; each one is two directions.
+VIEWS = 32
+# Pixels across the sphere about the surface.
+PIXELS = 192
+# Samples are no farther apart than so many pixels.
+SPACING = 1.5
+# A plane that fills a pixel is no nearer than so many pixels times its slope; the rest is for rounding.
+SLOPE = 1.5
+LEVEL = 0.25
+# Slopes of faces seen from their edges, as cosines, end here.
+LEAST_COSINE = 1e-3
+
+
+def face_occlusion(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Share (m,) in [0, 1] of the directions, each as a face would be lit from it, in which something hides a triangle.
+
+    positions (n,3), triangles (m,3): 0 on convex bodies, near 1 deep within a cave. The outside of a part that is open
+    or turned inside out is the side from which more of it is seen. Independent of place, direction and size but for
+    about 0.02 of noise.
+    """
+    points = unit_size(positions, triangles)
+    used = points[triangles]
+    centre = (used.min(axis=(0, 1)) + used.max(axis=(0, 1))) / 2
+    radius = float(np.linalg.norm(used - centre, axis=2).max())
+    # Pixels of the buffers are units, whose middle is their centre.
+    points = (points - centre) * ((PIXELS / 2 - 1) / radius)
+    owner, samples = spread_points(points, triangles, SPACING)
+    normal = face_normals(points, triangles).astype(np.float32)
+    samples = samples.T.astype(np.float32)
+    weight = np.zeros(len(triangles))
+    # Of the front of every face, and of its back.
+    seen = np.zeros((2, len(triangles)))
+    count = np.maximum(np.bincount(owner, minlength=len(triangles)), 1)
+    for frame in _frames(VIEWS):
+        slant = normal @ frame[2]
+        near, far = _visible(frame @ samples, slant, owner)
+        lit = np.abs(slant)
+        weight += lit
+        shares = [np.bincount(owner, v, len(triangles)) / count for v in (near, far)]
+        towards = slant < 0
+        seen[0] += lit * np.where(towards, *shares)
+        seen[1] += lit * np.where(towards, *shares[::-1])
+    hidden = np.where(weight > 0, 1 - seen / np.maximum(weight, np.finfo(float).tiny), 0)
+    return np.clip(_outer(hidden, face_areas(points, triangles), triangles, len(points)), 0, 1)
+
+
+def vertex_occlusion(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Mean (n,) of `face_occlusion` over the triangles (m,3) around every vertex (n,3), 0 for those of none."""
+    hidden = face_occlusion(positions, triangles)
+    area = np.maximum(face_areas(unit_size(positions, triangles), triangles), np.finfo(float).tiny)
+    around = np.bincount(triangles.ravel(), np.repeat(area, 3), len(positions))
+    total = np.bincount(triangles.ravel(), np.repeat(area * hidden, 3), len(positions))
+    return total / np.where(around > 0, around, 1)
+
+
+def half_sphere(count: int) -> np.ndarray:
+    """Directions (count,3) spread over half of the sphere (Fibonacci)."""
+    k = np.arange(count) + 0.5
+    z = 1 - k / count
+    turn = np.pi * (1 + np.sqrt(5)) * k
+    return np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+
+
+def _frames(count: int) -> np.ndarray:
+    """Orthonormal frames (count,3,3) whose third rows are spread over half of the sphere."""
+    axis = half_sphere(count)
+    across = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    return np.stack([across, np.cross(axis, across), axis], axis=1).astype(np.float32)
+
+
+def _visible(seen: np.ndarray, slant: np.ndarray, owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which samples (3,s), of triangles `owner` (s,) with a cosine (m,) to the line of sight, are seen from below, and
+    which from above, (s,) bool each."""
+    half = PIXELS // 2
+    pixel = (seen[1] + half).astype(np.int32) * PIXELS + (seen[0] + half).astype(np.int32)
+    nearest = np.full(PIXELS**2, np.inf, np.float32)
+    farthest = np.full(PIXELS**2, -np.inf, np.float32)
+    np.minimum.at(nearest, pixel, seen[2])
+    np.maximum.at(farthest, pixel, seen[2])
+    cosine = np.clip(np.abs(slant), LEAST_COSINE, 1)
+    room = (LEVEL + SLOPE * np.sqrt(1 - cosine**2) / cosine)[owner]
+    return seen[2] - room <= nearest[pixel], seen[2] + room >= farthest[pixel]
+
+
+def _outer(hidden: np.ndarray, area: np.ndarray, triangles: np.ndarray, n: int) -> np.ndarray:
+    """Of (2,m) the row, by component, that is less hidden in the mean over the areas (m,)."""
+    tail, head = halfedges(triangles)
+    count, label = graph_components(tail, head, n)
+    label = label[triangles[:, 0]]
+    mean = np.stack([np.bincount(label, area * h, count) for h in hidden])
+    return hidden[(mean[1] < mean[0]).astype(int)[label], np.arange(len(area))]

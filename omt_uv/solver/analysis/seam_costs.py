@@ -1,0 +1,194 @@
+"""Say where an artist would cut: a cost per length for every edge, low where a seam is hidden, high where it is seen.
+
+What speaks for an edge or against it is a reason in [0, 1], and each has a factor: that of an edge of which it holds
+fully. The factors of an edge multiply, within bounds, so that no seam becomes much longer than it has to be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mesh.geometry import halfedge_lengths, vertex_areas
+from ..mesh.gluing import polygon_sides
+from ..mesh.surface import Surface, chosen_triangles
+from ..mesh.topology import halfedges, pair_keys, pair_up
+from .facing import Facing, facing, salient_weights, towards
+from .feature_edges import fold_angles
+from .occlusion import vertex_occlusion
+from .saliency import curvature_means, saliency_of, unit_size
+from .symmetry_plane import NEAR, SymmetryPlane, symmetry_plane
+
+# Bounds of the product of all factors.
+LEAST = 0.2
+MOST = 5.0
+# Occlusion where an edge begins to be hidden, and where it is.
+HIDDEN = (0.05, 0.5)
+# Angles between faces that are smooth, and sharp, in radians.
+SHARP = (np.pi / 6, np.pi / 2)
+# Curvature of a valley, negative and over the size, where it begins and where it is a crease; a sphere has 3.5.
+CREASE = (4.0, 20.0)
+# The scale at which valleys are looked for, in the units of saliency.
+CREASE_SCALE = 4.0
+# How far a vertex looks and lies to a side, where the side begins, and where it is nothing else.
+SIDE = (0.1, 0.6)
+# Shares of the area with less saliency than what stands out, and than what counts fully.
+SALIENT = (0.5, 0.95)
+# Distance from the mirror plane, over the size, at which a seam no longer lies on it.
+ON_PLANE = 0.02
+# Triangles that pair up to quads across their longest sides, of all: so many come from quads and not by chance.
+PAIRED = 0.9
+
+
+@dataclass(frozen=True)
+class SeamPreferences:
+    """Cost of a cut along an edge of which something holds fully, over that of any edge; 1 does not care.
+
+    Attributes
+    ----------
+    hidden : other parts of the surface hide it
+    crease : it lies in a valley; sharp : its faces meet at a right angle or sharper
+    underside, back : it looks down, or away from where the body looks to
+    front, salient : it looks to where the body does; it stands out, and is not hidden
+    mirror : it lies in the mirror plane
+    loops : it is a side of quads on both sides
+    up (3,) : what is up in the scene; None where nothing is
+    """
+
+    hidden: float = 0.5
+    crease: float = 0.7
+    sharp: float = 0.6
+    underside: float = 0.75
+    back: float = 0.75
+    front: float = 4.0
+    salient: float = 2.0
+    mirror: float = 0.7
+    loops: float = 0.85
+    up: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class SeamCosts:
+    """What cutting the edges of a surface costs, and why.
+
+    Attributes
+    ----------
+    edges (e,2) : of polygons, the smaller vertex first, in ascending order
+    cost (e,) : per length, between LEAST and MOST; 1 is neutral
+    reasons : (e,) in [0, 1] for everything that has a factor, by its name in `SeamPreferences`
+    vertex_cost (n,) : mean over the edges at a vertex, 1 where there is none
+    plane : in which the surface is its own mirror image; facing : where it looks to
+    """
+
+    edges: np.ndarray
+    cost: np.ndarray
+    reasons: dict[str, np.ndarray]
+    vertex_cost: np.ndarray
+    plane: SymmetryPlane | None
+    facing: Facing
+
+    def of(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Costs (k,) of the edges between vertices a (k,) and b (k,); the mean of its ends where there is no edge."""
+        keys = pair_keys(*self.edges.T)
+        asked = pair_keys(a, b)
+        at = np.minimum(np.searchsorted(keys, asked), len(keys) - 1)
+        return np.where(keys[at] == asked, self.cost[at], (self.vertex_cost[a] + self.vertex_cost[b]) / 2)
+
+
+def seam_costs(
+    surface: Surface, preferences: SeamPreferences | None = None, faces: np.ndarray | None = None
+) -> SeamCosts:
+    """Costs of the edges of the polygons `faces` (f,) bool of a surface, by default all.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError : nothing to cut, or not anywhere
+    """
+    preferences = preferences or SeamPreferences()
+    _, corners, owner = chosen_triangles(surface, faces)
+    triangles = surface.corner_vertex[corners]
+    positions = unit_size(surface.positions, triangles)
+    side = polygon_sides(len(surface.corner_vertex), surface.face_start, corners)
+    tail, head = (ends[side] for ends in halfedges(triangles))
+    keys = np.unique(pair_keys(tail, head))
+    edges = np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
+    plane = symmetry_plane(surface.positions, triangles, owner)
+    seen, at_vertices = _vertex_reasons(positions, triangles, plane, preferences.up)
+    if plane is not None:
+        _symmetrise(surface.positions, triangles, plane, at_vertices)
+    reasons = {name: reason[edges].mean(axis=1) for name, reason in at_vertices.items()}
+    reasons["sharp"] = _sharp(positions, triangles, keys)
+    reasons["loops"] = _sides_of_quads(positions, triangles, owner, keys)
+    cost = np.ones(len(edges))
+    for name, reason in reasons.items():
+        cost *= getattr(preferences, name) ** reason
+    cost = np.clip(cost, LEAST, MOST)
+    count = np.bincount(edges.ravel(), minlength=len(positions))
+    total = np.bincount(edges.ravel(), np.repeat(cost, 2), len(positions))
+    vertex_cost = np.where(count > 0, total / np.maximum(count, 1), 1.0)
+    return SeamCosts(edges, cost, reasons, vertex_cost, plane, seen)
+
+
+def _vertex_reasons(
+    positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane | None, up: tuple[float, float, float] | None
+) -> tuple[Facing, dict[str, np.ndarray]]:
+    """Where a surface of unit size looks to, and what speaks for and against its vertices, (n,) each in [0, 1]."""
+    n, area = len(positions), vertex_areas(positions, triangles)
+    means = curvature_means(positions, triangles)
+    saliency = saliency_of(means, triangles)
+    seen = facing(positions, triangles, saliency, plane, None if up is None else np.array(up))
+    hidden = _step(vertex_occlusion(positions, triangles), HIDDEN)
+    ahead = seen.certainty * towards(positions, triangles, seen.front)
+    below = towards(positions, triangles, -seen.up)
+    reasons = {
+        "hidden": hidden,
+        "crease": _step(-means[CREASE_SCALE], CREASE),
+        "underside": _step(below, SIDE),
+        "back": _step(-ahead, SIDE),
+        "front": _step(ahead, SIDE),
+        "salient": salient_weights(saliency, area, SALIENT) * (1 - hidden),
+        "mirror": np.zeros(n),
+    }
+    return seen, reasons
+
+
+def _symmetrise(space: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, reasons: dict[str, np.ndarray]) -> None:
+    """Give vertices (n,3) and the ones nearest to their images the same reasons, and tell those on the plane."""
+    used = np.unique(triangles)
+    size = float(np.linalg.norm(np.ptp(space[used], axis=0)))
+    image, far = plane.nearest_images(space, triangles)
+    image = np.where(far <= NEAR * size, image, np.arange(len(image)))
+    for name, reason in reasons.items():
+        reasons[name] = (reason + reason[image]) / 2
+    reasons["mirror"] = np.exp(-0.5 * (plane.distance(space) / (ON_PLANE * size)) ** 2)
+
+
+def _step(value: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """0 below the one end, 1 above the other, and smooth between."""
+    t = np.clip((value - ends[0]) / (ends[1] - ends[0]), 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def _sharp(positions: np.ndarray, triangles: np.ndarray, keys: np.ndarray) -> np.ndarray:
+    """How sharp the edges with these keys (e,) are, (e,) in [0, 1]; 0 where there are not two faces."""
+    every = pair_keys(*halfedges(triangles))
+    first, second = pair_up(every)
+    sharp = _step(np.abs(fold_angles(positions, triangles, np.stack([first, second], axis=1))), SHARP)
+    result = np.zeros(len(keys))
+    side = np.isin(every[first], keys)
+    result[np.searchsorted(keys, every[first][side])] = sharp[side]
+    return result
+
+
+def _sides_of_quads(positions: np.ndarray, triangles: np.ndarray, owner: np.ndarray, keys: np.ndarray) -> np.ndarray:
+    """Edges (e,) with quads on all sides, 1 or 0; quads that were cut into triangles are recognised."""
+    every = pair_keys(*halfedges(triangles))
+    sizes = np.bincount(owner)[owner]
+    if (sizes == 1).all():
+        first, second = pair_up(every)
+        longest = halfedge_lengths(positions, triangles).reshape(-1, 3).argmax(axis=1)
+        pairs = (longest[first // 3] == first % 3) & (longest[second // 3] == second % 3)
+        from_quads = 2 * pairs.sum() >= PAIRED * len(triangles)
+        return (~np.isin(keys, every[first[pairs]])).astype(float) if from_quads else np.zeros(len(keys))
+    return (~np.isin(keys, every[np.repeat(sizes != 2, 3)])).astype(float)

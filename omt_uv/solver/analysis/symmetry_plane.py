@@ -1,0 +1,238 @@
+"""Find the plane in which a surface is its own mirror image, exactly or nearly, as scans and sculpted bodies are.
+
+Exact mirrors are those of `mesh/mirror.py`. Near ones: planes in all directions through the middle are compared by how
+far the images of a few points lie from the surface, and the best are refined by pairing every image with its nearest
+point again and again (iterated closest points; trimmed, so that an arm that is raised does not turn the plane).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..mesh.geometry import face_areas, face_normals
+from ..mesh.mirror import find_mirror
+from .occlusion import half_sphere
+from .saliency import unit_size
+
+# Surfaces whose images lie this far from them, over the size, are still their own mirror images.
+NEAR = 0.01
+# Directions that are tried, spread over half of the sphere, beside the axes of space and of inertia.
+DIRECTIONS = 200
+# Candidates that are refined; they differ by more than a tenth of a right angle.
+REFINED = 4
+APART = np.cos(np.pi / 20)
+# Points of the surface that nearest ones are looked up among, and those that are looked up: to compare, and at last.
+SAMPLES = 12_000
+COMPARED = 250
+PAIRED = 2000
+# Distance to the nearest of samples drawn at random, 95 of 100 times, where there is one for every unit of area.
+RANDOM = 1.0
+# Share of the pairs that count.
+KEPT = 0.85
+# Rounds of pairing at most, for each candidate and for the best one, and the turn and shift that end them.
+ROUNDS = 6
+LAST_ROUNDS = 12
+CONVERGED = 1e-7
+# Against planes of bodies of revolution, of which any will do.
+DAMPING = 1e-6
+# Vertices this close to images of others, over the size, are pairs, and so many of all make a mirror of vertices.
+PAIR = 1e-3
+MOST_PAIRS = 0.9
+# What is flat is nearly its own image in the plane in which it lies: residuals are to be less than this share of the
+# distances of the surface from the plane.
+FLAT = 0.1
+
+
+@dataclass(frozen=True)
+class SymmetryPlane:
+    """A plane `normal @ x == offset` in which a surface is its own mirror image, exactly or nearly.
+
+    Attributes
+    ----------
+    normal (3,), offset : of the plane, in the units of the surface
+    residual : root mean square of the distances of the images from the surface, over its size (the diagonal of the box
+        about a round body of the same spread); the farthest 15 % of the images do not count
+    image (n,) : the vertex where the mirror image of a vertex lies, polygon by polygon; None where the mirror is not
+        exact
+    """
+
+    normal: np.ndarray
+    offset: float
+    residual: float
+    image: np.ndarray | None
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether every polygon is the image of one."""
+        return self.image is not None
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Signed distance (k,) of points (k,3) from the plane."""
+        return points @ self.normal - self.offset
+
+    def reflected(self, points: np.ndarray) -> np.ndarray:
+        """Mirror images (k,3) of points (k,3)."""
+        return points - 2 * self.distance(points)[:, None] * self.normal
+
+    def nearest_images(self, positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """For every vertex of a surface (n,3), (m,3) the one (n,) nearest to its image, and how far (n,) it lies.
+
+        Vertices of no triangle are their own images, infinitely far.
+        """
+        image, far = np.arange(len(positions)), np.full(len(positions), np.inf)
+        used = np.unique(triangles)
+        if self.image is not None:
+            image[used] = self.image[used]
+            far[used] = np.linalg.norm(self.reflected(positions[used]) - positions[image[used]], axis=1)
+        else:
+            far[used], found = cKDTree(positions[used]).query(self.reflected(positions[used]))
+            image[used] = used[found]
+        return image, far
+
+
+def symmetry_plane(
+    positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray | None = None, near: float = NEAR
+) -> SymmetryPlane | None:
+    """The mirror plane of a surface (n,3), (m,3), an exact one before near ones; None if there is none.
+
+    faces (m,): polygon of every triangle. near: greatest residual of the images over the size of the surface.
+    """
+    used, compact = np.unique(triangles, return_inverse=True)
+    compact = compact.reshape(-1, 3)
+    corners = positions[used]
+    mirror = find_mirror(corners, compact, faces)
+    if mirror is not None:
+        image = np.arange(len(positions))
+        image[used] = used[mirror.image]
+        return SymmetryPlane(mirror.normal, float(mirror.normal @ corners.mean(axis=0)), 0.0, image)
+    return _near_plane(corners, compact, near)
+
+
+class _Samples:
+    """Points (s,3) spread evenly over a surface, with the normals (s,3) of their faces."""
+
+    def __init__(self, positions: np.ndarray, triangles: np.ndarray):
+        draw = np.random.default_rng(0)
+        # Stratified along the areas, so that no face has more than its share.
+        along = (np.arange(SAMPLES) + draw.random(SAMPLES)) / SAMPLES
+        below = np.cumsum(face_areas(positions, triangles))
+        self.spacing = RANDOM * float(np.sqrt(below[-1] / SAMPLES))
+        face = np.minimum(np.searchsorted(below / below[-1], along), len(triangles) - 1)[draw.permutation(SAMPLES)]
+        u, v = draw.random((2, SAMPLES, 1))
+        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+        a, b, c = (positions[triangles[face, k]] for k in range(3))
+        self.points = a + u * (b - a) + v * (c - a)
+        self.normals = face_normals(positions, triangles)[face]
+        self.tree = cKDTree(self.points)
+
+    def distances(self, normal: np.ndarray, offset: float, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the images of the first `count` points: distances (count,) from the surface, signed distances (count,)
+        from the planes of the nearest samples, and the normals (count,3) of these planes.
+
+        Samples lie apart, the surface does not: beside its plane an image may be as far from a sample as these are.
+        """
+        p = self.points[:count]
+        image = p - 2 * (p @ normal - offset)[:, None] * normal
+        far, found = self.tree.query(image)
+        facing = self.normals[found]
+        off = ((image - self.points[found]) * facing).sum(axis=1)
+        beside = np.sqrt(np.maximum(far**2 - off**2, 0))
+        return np.hypot(off, np.maximum(beside - self.spacing, 0)), off, facing
+
+    def compared(self, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+        """Trimmed root mean square (k,) of the distances of a few images in planes (k,3), (k,)."""
+        p = self.points[:COMPARED]
+        image = p - 2 * (p @ normals.T - offsets).T[:, :, None] * normals[:, None]
+        return _trimmed(self.tree.query(image.reshape(-1, 3))[0].reshape(len(normals), -1))
+
+
+def _trimmed(distance: np.ndarray) -> np.ndarray:
+    """Root mean square (k,) of the least of the distances (k,c)."""
+    kept = np.sort(distance, axis=1)[:, : int(KEPT * distance.shape[1])]
+    return np.sqrt((kept**2).mean(axis=1))
+
+
+def _near_plane(positions: np.ndarray, triangles: np.ndarray, near: float) -> SymmetryPlane | None:
+    """The best plane of a surface without an exact one; None if it is not good enough."""
+    scaled = unit_size(positions, triangles)
+    samples = _Samples(scaled, triangles)
+    normals = np.concatenate([np.eye(3), _principal(samples.points), half_sphere(DIRECTIONS)])
+    offsets = normals @ samples.points.mean(axis=0)
+    worth = samples.compared(normals, offsets)
+    found = [_refined(samples, normals[k], offsets[k], COMPARED, ROUNDS) for k in _chosen(normals, worth)]
+    best = min(found, key=lambda plane: plane[2])
+    normal, offset, residual = _refined(samples, *best[:2], PAIRED, LAST_ROUNDS)
+    depth = float(np.sqrt(((samples.points @ normal - offset) ** 2).mean()))
+    if residual > near or residual >= FLAT * depth:
+        return None
+    sign = np.sign(normal[np.abs(normal).argmax()])
+    normal, offset = sign * normal, sign * offset
+    # Back from unit size: the same vertices tell scale and shift.
+    scale = float(np.linalg.norm(np.ptp(positions, axis=0)) / np.linalg.norm(np.ptp(scaled, axis=0)))
+    shift = positions.mean(axis=0) - scale * scaled.mean(axis=0)
+    return _between_pairs(
+        positions, scale, SymmetryPlane(normal, float(scale * offset + normal @ shift), residual, None)
+    )
+
+
+def _between_pairs(positions: np.ndarray, size: float, plane: SymmetryPlane) -> SymmetryPlane:
+    """The plane, to the last digit if most vertices (n,3) have others as images: polygons may be cut one-sidedly."""
+    image, far = plane.nearest_images(positions, np.arange(len(positions))[:, None])
+    pairs = (far <= PAIR * size) & (image[image] == np.arange(len(image)))
+    if pairs.mean() < MOST_PAIRS:
+        return plane
+    a, b = positions[pairs], positions[image[pairs]]
+    middle = (a + b).mean(axis=0) / 2
+    # Of all planes through the middle, the one that takes a nearest to b.
+    both = (a - middle).T @ (b - middle)
+    normal = np.linalg.eigh(both + both.T)[1][:, 0]
+    normal *= np.sign(normal @ plane.normal)
+    return replace(plane, normal=normal, offset=float(normal @ middle))
+
+
+def _principal(points: np.ndarray) -> np.ndarray:
+    """Principal axes (3,3) of points (s,3), as rows."""
+    moved = points - points.mean(axis=0)
+    return np.linalg.eigh(moved.T @ moved)[1].T
+
+
+def _chosen(normals: np.ndarray, worth: np.ndarray) -> Iterator[int]:
+    """The best candidates that are not close to a better one."""
+    left = np.argsort(worth, kind="stable")
+    for _ in range(REFINED):
+        if not len(left):
+            return
+        yield int(left[0])
+        left = left[np.abs(normals[left] @ normals[left[0]]) < APART]
+
+
+def _refined(
+    samples: _Samples, normal: np.ndarray, offset: float, count: int, rounds: int
+) -> tuple[np.ndarray, float, float]:
+    """A plane after `rounds` of pairing the images of `count` samples with the surface, and its residual.
+
+    Gauss and Newton's steps on the distances of the images from the planes of their nearest points.
+    """
+    p = samples.points[:count]
+    for _ in range(rounds):
+        far, off, facing = samples.distances(normal, offset, count)
+        kept = far <= np.quantile(far, KEPT)
+        depth = p @ normal - offset
+        # An image moves by -2 (t @ p) n - 2 depth t when the normal turns by t, by 2 n per offset.
+        tilt = np.linalg.svd(normal[None])[2][1:]
+        across = (facing @ normal)[:, None]
+        turning = -2 * across * (p @ tilt.T) - 2 * depth[:, None] * (facing @ tilt.T)
+        slopes = np.column_stack([turning, 2 * across])[kept]
+        squares = slopes.T @ slopes
+        squares += (DAMPING * np.trace(squares) + np.finfo(float).tiny) * np.eye(3)
+        step = -np.linalg.solve(squares, slopes.T @ off[kept])
+        turned = normal + step[:2] @ tilt
+        length = np.linalg.norm(turned)
+        normal, offset = turned / length, float((offset + step[2]) / length)
+        if np.abs(step).max() < CONVERGED:
+            break
+    return normal, offset, float(_trimmed(samples.distances(normal, offset, count)[0][None])[0])

@@ -1,0 +1,57 @@
+"""Occlusion by what it means: nothing hides a convex body, a bowl hides its inside, and place and size do not count."""
+
+import meshes
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from omt_uv.solver.analysis.occlusion import face_occlusion, vertex_occlusion
+
+
+def bowl():
+    """A hemisphere with an inner wall, closed along its edge, and the outer faces, (m,) bool."""
+    V, F = meshes.hemisphere()
+    n = len(V)
+    return np.concatenate([V, 0.9 * V]), np.concatenate([F, F[:, ::-1] + n]), np.arange(2 * len(F)) < len(F)
+
+
+@pytest.mark.parametrize("inwards", [False, True])
+def test_nothing_hides_a_convex_body(inwards):
+    """Of large faces, of small ones, and of slivers; when the faces look inwards, too."""
+    ball, faces = meshes.icosphere(3)
+    for V, F in (meshes.cube(), (ball, faces), (ball * [1, 1e-3, 1e-2], faces)):
+        assert face_occlusion(V, F[:, ::-1] if inwards else F).max() < 0.01
+
+
+def test_the_inside_of_a_bowl_is_hidden_and_its_bottom_most():
+    V, F, outer = bowl()
+    hidden = face_occlusion(V, F)
+    assert hidden[outer].max() < 0.05
+    assert hidden[~outer].min() > 0.1
+    # Light that comes in at the opening of half a sphere: half of it reaches every place.
+    assert hidden[~outer].mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_occlusion_does_not_depend_on_place_direction_and_size():
+    V, F, _ = bowl()
+    hidden = face_occlusion(V, F)
+    np.testing.assert_allclose(face_occlusion(1e6 * V + 1e7, F), hidden, atol=0.02)
+    turned = face_occlusion(V @ Rotation.random(random_state=0).as_matrix(), F)
+    assert np.abs(turned - hidden).mean() < 0.02
+    assert np.abs(turned - hidden).max() < 0.15
+
+
+def test_tiny_faces_beside_huge_ones_are_hidden_as_these_are():
+    """A ball of tiny faces in a closed box of huge ones is not seen from anywhere, and hides nothing outside."""
+    V, F = meshes.icosphere(3)
+    box, sides = meshes.cube()
+    hidden = face_occlusion(np.concatenate([box, 0.5 + 1e-2 * V]), np.concatenate([sides, F + len(box)]))
+    assert hidden[: len(sides)].max() < 0.01
+    assert hidden[len(sides) :].min() > 0.9
+
+
+def test_vertices_have_the_mean_of_their_faces_and_loose_ones_nothing():
+    V, F, outer = bowl()
+    hidden = vertex_occlusion(np.concatenate([V, [[9.0, 9.0, 9.0]]]), F)
+    assert hidden[-1] == 0
+    assert hidden[: len(V) // 2].max() < 0.05 < hidden[len(V) // 2 : -1].min()

@@ -1,0 +1,87 @@
+"""Costs of seams: low where an artist would cut, high on a face, the same on both sides, and neutral where told."""
+
+from dataclasses import replace
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.analysis.seam_costs import LEAST, MOST, SeamPreferences, seam_costs
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import pair_keys
+
+NEUTRAL = SeamPreferences(hidden=1, crease=1, sharp=1, underside=1, back=1, front=1, salient=1, mirror=1, loops=1)
+
+
+def head_costs(preferences=None):
+    V, F = meshes.head(40)
+    return V, seam_costs(triangle_surface(V, F), preferences)
+
+
+def test_neutral_preferences_cost_one_everywhere():
+    V, costs = head_costs(NEUTRAL)
+    assert (costs.cost == 1).all() and (costs.vertex_cost == 1).all()
+
+
+def test_the_face_is_dear_and_the_back_of_the_head_cheap():
+    V, costs = head_costs()
+    along = V[:, 0] / V[:, 0].max()
+    assert costs.vertex_cost[along > 1 / 3].min() > 1
+    middle = np.abs(V[:, 1]) < 0.05
+    assert costs.vertex_cost[(along < -0.4) & middle].max() < 0.7
+    assert costs.cost.min() >= LEAST and costs.cost.max() <= MOST
+
+
+def test_both_sides_cost_the_same():
+    """Which triangles pair up to quads aside: they are cut one-sidedly."""
+    V, F = meshes.head(40)
+    costs = seam_costs(triangle_surface(V, F), SeamPreferences(loops=1))
+    image, _ = costs.plane.nearest_images(V, F)
+    other = image[costs.edges]
+    there = np.isin(pair_keys(*other.T), pair_keys(*costs.edges.T))
+    assert there.mean() > 0.5
+    for reason in costs.reasons.values():
+        assert ((reason >= 0) & (reason <= 1)).all()
+    np.testing.assert_allclose(costs.of(*other.T)[there], costs.cost[there], rtol=1e-2)
+
+
+@pytest.mark.parametrize("name", ["hidden", "crease", "back", "front", "salient", "mirror"])
+def test_a_factor_of_its_own_is_the_cost_where_its_reason_is_one(name):
+    V, costs = head_costs(replace(NEUTRAL, **{name: 0.5}))
+    np.testing.assert_allclose(costs.cost, 0.5 ** costs.reasons[name])
+
+
+def test_what_looks_down_is_cheap_only_if_down_is_known():
+    V, F = meshes.icosphere(3)
+    surface = triangle_surface(V, F)
+    assert not seam_costs(surface).reasons["underside"].any()
+    costs = seam_costs(surface, SeamPreferences(up=(0.0, 0.0, 2.0)))
+    height = V[costs.edges].mean(axis=1)[:, 2]
+    assert (costs.reasons["underside"][height < -0.7] > 0.9).all()
+    assert not costs.reasons["underside"][height > 0].any()
+
+
+def test_edges_are_those_of_polygons_and_only_edges_of_cubes_are_sharp():
+    V, _ = meshes.cube()
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    costs = seam_costs(meshes.polygon_surface(V, quads))
+    assert len(costs.edges) == 12 and (costs.reasons["sharp"] > 0.99).all() and (costs.reasons["loops"] == 1).all()
+    triangles = seam_costs(triangle_surface(*meshes.cube()))
+    assert len(triangles.edges) == 18
+    # Six diagonals, which are no sides of the quads that the cube was cut from.
+    assert (triangles.reasons["loops"] == 0).sum() == 6 == (triangles.reasons["sharp"] == 0).sum()
+
+
+def test_costs_of_pairs_of_vertices():
+    V, costs = head_costs()
+    a, b = costs.edges.T
+    np.testing.assert_array_equal(costs.of(b, a), costs.cost)
+    far = np.array([0]), np.array([len(V) - 1])
+    assert costs.of(*far) == (costs.vertex_cost[0] + costs.vertex_cost[-1]) / 2
+
+
+def test_only_chosen_faces_count():
+    V, F = meshes.head(20)
+    chosen = V[F].mean(axis=1)[:, 2] > 0
+    costs = seam_costs(triangle_surface(V, F), faces=chosen)
+    assert set(np.unique(costs.edges)) == set(np.unique(F[chosen]))

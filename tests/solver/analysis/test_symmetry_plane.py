@@ -1,0 +1,88 @@
+"""Mirror planes: found wherever the body lies and however it is turned, exact or nearly; none where there is none."""
+
+import meshes
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from omt_uv.solver.analysis.symmetry_plane import NEAR, symmetry_plane
+
+TURNS = [np.eye(3), *Rotation.random(2, random_state=1).as_matrix()]
+
+
+def rough_head(noise=0.0):
+    """A head whose mirror plane is that of y, its vertices moved at random."""
+    V, F = meshes.head(30)
+    return V + noise * np.random.default_rng(3).standard_normal(V.shape), F
+
+
+def degrees_between(a, b):
+    return np.degrees(np.arccos(min(1.0, abs(a @ b))))
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_the_plane_turns_and_moves_with_the_body(turn, noise):
+    V, F = rough_head(noise)
+    shift = np.array([5.0, -6.0, 7.0])
+    plane = symmetry_plane(3 * V @ turn.T + shift, F)
+    assert degrees_between(plane.normal, turn[:, 1]) < 0.5
+    assert abs(plane.distance(shift)) < 0.03
+    assert plane.residual <= NEAR
+
+
+def test_vertices_that_are_pairs_tell_the_plane_to_the_last_digit():
+    """Triangles of the head run one way, so that it is no exact mirror image of itself."""
+    V, F = rough_head()
+    plane = symmetry_plane(V @ TURNS[1].T, F)
+    assert not plane.is_exact
+    np.testing.assert_allclose(np.abs(plane.normal @ TURNS[1]), [0, 1, 0], atol=1e-9)
+    assert plane.nearest_images(V @ TURNS[1].T, F)[1].max() < 1e-9
+
+
+def test_an_exact_mirror_pairs_vertices():
+    V, F = meshes.cube()
+    V = V * [1, 2, 3] + 5
+    plane = symmetry_plane(V, F, np.tile(np.arange(6), 2))
+    assert plane.is_exact and plane.residual == 0
+    np.testing.assert_allclose(plane.reflected(V), V[plane.image], atol=1e-12)
+    image, far = plane.nearest_images(V, F)
+    assert (image == plane.image).all() and far.max() < 1e-12
+
+
+def test_images_of_a_near_mirror_lie_near():
+    V, F = rough_head(0.005)
+    loose = np.array([[50.0, 50.0, 50.0]])
+    V = np.concatenate([V, loose])
+    plane = symmetry_plane(V, F)
+    image, far = plane.nearest_images(V, F)
+    assert not plane.is_exact
+    assert np.median(far[:-1]) < 0.05 and image[-1] == len(V) - 1 and far[-1] == np.inf
+
+
+def test_what_has_no_mirror_gets_none():
+    """A ball with bumps anywhere."""
+    V, F = meshes.icosphere(3)
+    bumps = np.random.default_rng(1).standard_normal((6, 3))
+    far = np.linalg.norm(V[:, None] - bumps / np.linalg.norm(bumps, axis=1)[:, None], axis=2)
+    assert symmetry_plane(V * (1 + (np.exp(-4 * far**2)).sum(axis=1))[:, None], F) is None
+
+
+def test_a_flat_disk_is_mirrored_across_and_not_in_the_plane_it_lies_in():
+    plane = symmetry_plane(*meshes.random_disk(300, height=1e-3))
+    assert abs(plane.normal[2]) < 0.01
+
+
+@pytest.mark.parametrize("name", ["lion", "max_planck", "spot", "bunny_small"])
+def test_published_bodies(name):
+    """Bodies with two like sides have a plane, wherever they look; the bunny that turns has none."""
+    if meshes.model_path(name) is None:
+        pytest.skip("no models")
+    V, F = meshes.load_model(name)
+    turn = TURNS[1]
+    found = symmetry_plane(V, F), symmetry_plane(V @ turn.T, F)
+    if name == "bunny_small":
+        assert found == (None, None)
+    else:
+        assert degrees_between(turn @ found[0].normal, found[1].normal) < 0.2
+        assert max(p.residual for p in found) <= NEAR
