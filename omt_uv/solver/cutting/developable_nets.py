@@ -17,8 +17,8 @@ from .cut_graph import greedy_arcs
 
 # An edge at which the normal turns by more is hard. Prisms with 4, 5, 6 and 8 sides are clear of it.
 HARD = np.radians(52)
-# A vertex with less curvature, in radians, is flat. Those of hard edges that are many, and only together have much of it,
-# as around a cap of thousands of sides, are flat if they have less than this share of their mean.
+# A vertex with less curvature, in radians, is flat. Those of hard edges that are many, and have much of it together
+# alone, as around a cap of thousands of sides, are flat if they have less than this share of their mean.
 FLAT = 1e-3
 FLATTER = 0.1
 # Vertices off the hard edges may count as corners if they have so much curvature, in radians, as the tip of a cone has,

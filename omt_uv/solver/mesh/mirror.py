@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .topology import halfedges, pair_keys, pair_up
+
 # Distance between a vertex and the image of its partner, over the extent of the mesh, up to which they are a pair.
 MIRROR_TOLERANCE = 1e-4
 # Polygons whose images are looked up before those of all others.
@@ -23,6 +25,8 @@ MOST_PLANES = 40
 SAME_DISTANCE = 1e-3
 # Distances from the centre, over the greatest, below which a vertex says nothing about a plane.
 NEAR_CENTRE = 0.1
+# Share of the triangles whose images may be cut along the other diagonal.
+FEW = 0.2
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,56 @@ class _Polygons:
         far, other = self.centre_tree.query(_reflected(self.centres[polygons], normal))
         close = far.max() <= MIRROR_TOLERANCE * self.extent
         return other if close and (self.sides[other] == self.sides[polygons]).all() else None
+
+
+def mirrored_quads(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Pairs (k,2) of triangles that are a quad whose mirror image is cut along the other diagonal.
+
+    positions (n,3), triangles (m,3): a mesh all of whose vertices have an image. Quads that a program has cut into
+    triangles are symmetric, their diagonals are not. Where many triangles have no image there are no such pairs.
+    """
+    none = np.zeros((0, 2), np.int64)
+    used, compact = np.unique(triangles, return_inverse=True)
+    if not len(used):
+        return none
+    triangles, points = compact.reshape(-1, 3), positions[used] / 2
+    extent = float(np.ptp(points, axis=0).max())
+    if not (extent > 0 and np.isfinite(extent)):
+        return none
+    points = (points - points.min(axis=0)) / extent
+    centred = points - points.mean(axis=0)
+    tree, probes = cKDTree(centred), np.random.default_rng(0).permutation(len(points))[:PROBES]
+    for normal in _candidates(points, triangles):
+        if tree.query(_reflected(centred[probes], normal))[0].max() > MIRROR_TOLERANCE:
+            continue
+        far, image = tree.query(_reflected(centred, normal))
+        if far.max() <= MIRROR_TOLERANCE and (image[image] == np.arange(len(image))).all():
+            pairs = _recut(triangles, image)
+            if len(pairs):
+                return pairs
+    return none
+
+
+def _recut(triangles: np.ndarray, image: np.ndarray) -> np.ndarray:
+    """Pairs (k,2) of triangles (m,3) without an image whose quads have one, for the image (n,) of every vertex."""
+    rest = np.flatnonzero(~_among(image[triangles], triangles))
+    if not 0 < len(rest) <= FEW * len(triangles):
+        return np.zeros((0, 2), np.int64)
+    tail, head = halfedges(triangles[rest])
+    first, second = pair_up(pair_keys(tail, head))
+    opposite = triangles[rest][second // 3, (second + 2) % 3]
+    quads = np.column_stack([triangles[rest][first // 3], opposite])
+    kept = _among(image[quads], quads)
+    pairs = np.column_stack([first // 3, second // 3])[kept]
+    single = np.bincount(pairs.ravel(), minlength=len(rest)) == 1
+    return rest[pairs[single[pairs].all(axis=1)]]
+
+
+def _among(rows: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Which rows (k,q) of vertices are some other's (l,q), in any order, (k,) bool."""
+    both = np.sort(np.concatenate([others, rows]), axis=1)
+    label = np.unique(both, axis=0, return_inverse=True)[1].ravel()
+    return np.isin(label[len(others) :], label[: len(others)])
 
 
 def _reflected(points: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -13,11 +13,12 @@ from ..errors import MeshError
 from ..mesh.charts import Chart
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
+from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import chart_target, located
 from .chart_map import ChartMap, map_chart
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons
-from .mirrored_charts import mirror_partners, mirrored_map
+from .mirrored_charts import as_given, mirror_partners, mirrored_map, with_mirrored_quads
 from .options import UnwrapOptions
 from .shear_bound import bound_shear
 from .small_charts import is_small, map_together
@@ -82,7 +83,7 @@ def unwrap(
         prepared = cut_to_disks(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
         charts, warnings = prepared.charts, prepared.warnings
         chart_pins = [pins_of_chart(pins, chart) for chart in charts]
-        maps = yield from task.map_all(charts, chart_pins)
+        maps = yield from task.map_symmetric(charts, chart_pins)
         cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     maps = with_convex_polygons(surface, charts, maps, chart_pins, task.options, target)
     return SurfaceMap(charts, maps, cuts, warnings)
@@ -105,6 +106,20 @@ class _Task:
             return (yield from map_chart(chart, options=self.options, target=target, pins=pins))
         except MeshError as error:
             raise located(error, chart) from error
+
+    def map_symmetric(self, charts: list[Chart], pins: list[ChartPins | None]) -> Steps[list[ChartMap]]:
+        """Maps of all charts, symmetric ones also where their mirror images are cut along other diagonals."""
+        joined = charts if any(p is not None for p in pins) else with_mirrored_quads(self.surface, charts)
+        maps = yield from self.map_all(joined, pins)
+        changed = [k for k, (a, b) in enumerate(zip(charts, joined, strict=True)) if (a.faces != b.faces).any()]
+        goal = QUALITIES[self.options.quality].area_error if self.options.balance == 0 else np.inf
+        for k in changed:
+            target = chart_target(self.target, self.surface, charts[k])
+            found = as_given(charts[k], maps[k], None if target is None else target.density, goal)
+            if found is None:
+                return (yield from self.map_all(charts, pins))
+            maps[k] = found
+        return maps
 
     def map_all(self, charts: list[Chart], pins: list[ChartPins | None]) -> Steps[list[ChartMap]]:
         """Maps of all charts, small ones without pins together, one for two that are each other's mirror image."""

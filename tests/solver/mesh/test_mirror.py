@@ -6,7 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.mesh.mirror import find_mirror
+from omt_uv.solver.mesh.mirror import find_mirror, mirrored_quads
 
 
 def bump(count=8):
@@ -76,3 +76,16 @@ def test_the_plane_of_a_flat_mesh_moves_nothing_and_is_none():
 def test_no_symmetry_of_a_random_disk():
     V, F = meshes.random_disk(60)
     assert find_mirror(V, F) is None
+
+
+def test_triangles_cut_along_other_diagonals_than_their_images_are_found():
+    V, Q = bump()
+    V = V + 0.2 * V[:, [1]] ** [9, 2, 3] * [0, 1, 1]
+    x = V[Q].mean(axis=1)[:, 0]
+    other = x > 0
+    other[np.flatnonzero(other)[[3, 8, 20]]] = False
+    T, faces = cut(Q, other)
+    pairs = mirrored_quads(turned(V, 1), T)
+    assert len(pairs) == 6 and (faces[pairs[:, 0]] == faces[pairs[:, 1]]).all()
+    assert not len(mirrored_quads(turned(V, 1), cut(Q, x > 0)[0]))
+    assert not len(mirrored_quads(turned(V, 1) + 0.01 * np.sin(V), T))

@@ -7,7 +7,8 @@ import numpy as np
 
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
-from omt_uv.solver.parameterization.mirrored_charts import mirror_partners, mirrored_map
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization.mirrored_charts import mirror_partners, mirrored_map, with_mirrored_quads
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped, of_polygon_disk, polygon_disk
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -75,3 +76,24 @@ def test_charts_that_are_mirror_images_have_mirrored_maps():
     first, image = pairs[second]
     np.testing.assert_array_equal(mirrored_map(found.maps[first], image).uv, found.maps[second].uv)
     assert (signed_areas(found.maps[second].uv, found.charts[second].triangles) > 0).all()
+
+
+def test_diagonals_alone_do_not_break_a_symmetry():
+    x, y = np.meshgrid(np.linspace(-1, 1, 13), np.linspace(-1, 1, 13), indexing="ij")
+    V = np.stack([x, y, 0.6 * np.exp(-3 * (x**2 + 2 * (y - 0.2) ** 2))], axis=-1).reshape(-1, 3)
+    corner = (13 * np.arange(12)[:, None] + np.arange(12)).ravel()
+    Q = np.column_stack([corner, corner + 13, corner + 14, corner + 1])
+    other = x[:-1, :-1].ravel() > -0.01
+    other[[30, 100, 110]] ^= True
+    cuts = np.where(other[:, None, None], Q[:, [[0, 1, 3], [1, 2, 3]]], Q[:, [[0, 1, 2], [0, 2, 3]]])
+    surface = triangle_surface(V, cuts.reshape(-1, 3))
+    (chart,) = strict_charts(surface)
+    joined = with_mirrored_quads(surface, [chart])[0]
+    assert len(np.unique(joined.faces)) == 288 - 6
+    found = drain(unwrap(surface, options=UnwrapOptions(seams="existing")))
+    w = np.empty(len(V), complex)
+    w[found.charts[0].vertex_ids] = found.maps[0].uv @ [1, 1j]
+    image = w.reshape(13, 13)[::-1].ravel()
+    turn = (image * w).sum()
+    np.testing.assert_allclose(image.conj() * turn / abs(turn), w, atol=1e-9)
+    assert found.maps[0].folds == 0 and found.maps[0].area_l1 < 0.012
