@@ -60,3 +60,74 @@ def klein_bottle(around: int = 48, across: int = 30) -> tuple[np.ndarray, np.nda
         return i % around * across + np.where(i == around, -j, j) % across
 
     return V, np.column_stack([vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)])
+
+
+def strip(count: int = 50_000) -> tuple[np.ndarray, np.ndarray]:
+    """A flat strip of quads, one beside the other."""
+    x = np.arange(count + 1.0)
+    V = np.concatenate([np.column_stack([x, 0 * x, 0 * x]), np.column_stack([x, 0 * x + 1, 0 * x])])
+    k = np.arange(count)
+    return V, np.column_stack([k, k + 1, k + count + 2, k + count + 1])
+
+
+def fan(count: int = 20_000, height: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles around one vertex, a cone."""
+    angle = 2 * np.pi * np.arange(count) / count
+    rim = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    k = np.arange(count)
+    return np.concatenate([rim, [[0, 0, height]]]), np.column_stack([k, (k + 1) % count, np.full(count, count)])
+
+
+def pieces(count: int = 20_000, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that have nothing in common."""
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(count, 3, 3)) + 5 * rng.normal(size=(count, 1, 3))
+    return corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)
+
+
+def percolation(side: int = 128, density: float = 0.22, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """The largest part of a square grid whose quads are there by chance: a disk with hundreds of holes."""
+    from scipy.ndimage import label
+
+    there = np.random.default_rng(seed).random((side, side)) > density
+    parts, _ = label(there)
+    cells = np.argwhere(parts == np.bincount(parts[there]).argmax())
+    corners = cells[:, None] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    points, index = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
+    V = np.column_stack([points, 0.1 * side * np.sin(points / side * 7).prod(1)])
+    return V.astype(float), index.reshape(-1, 4)
+
+
+def sliver_sphere(count: int = 100_000) -> tuple[np.ndarray, np.ndarray]:
+    """A sphere of triangles from pole to pole: rings of few, meridians of many vertices."""
+    rings = 10
+    sectors = count // (2 * rings - 2)
+    polar = np.pi * np.arange(1, rings) / rings
+    angle = 2 * np.pi * np.arange(sectors) / sectors
+    ring = np.stack(
+        np.broadcast_arrays(np.sin(polar)[:, None] * np.cos(angle), np.sin(polar)[:, None] * np.sin(angle),
+                            np.cos(polar)[:, None]), axis=2)  # fmt: skip
+    V = np.concatenate([ring.reshape(-1, 3), [[0, 0, 1.0], [0, 0, -1]]])
+    s, n = np.arange(sectors), (np.arange(sectors) + 1) % sectors
+    top, bottom = np.full(sectors, len(V) - 2), np.full(sectors, len(V) - 1)
+    last = (rings - 2) * sectors
+    faces = [np.column_stack([top, s, n]), np.column_stack([bottom, last + n, last + s])]
+    for k in range(rings - 2):
+        a, b = k * sectors, (k + 1) * sectors
+        faces += [np.column_stack([a + s, b + s, b + n]), np.column_stack([a + s, b + n, a + n])]
+    return V, np.concatenate(faces)
+
+
+def terrain(side: int = 1000, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A height field of side * side quads, hills over hills."""
+    rng = np.random.default_rng(seed)
+    x = np.arange(side + 1) / side
+    height = np.zeros((side + 1, side + 1))
+    for octave in range(6):
+        (p, q), (a, b) = rng.random((2, 2)) * 2 * np.pi
+        waves = 2.0**octave * 3
+        height += 0.1 / 2**octave * np.sin(waves * x[:, None] + p + a) * np.sin(waves * x[None] + q + b)
+    u, v = np.meshgrid(x, x, indexing="ij")
+    V = np.column_stack([u.ravel(), v.ravel(), height.ravel()])
+    i = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    return V, np.column_stack([i, i + side + 1, i + side + 2, i + 1])
