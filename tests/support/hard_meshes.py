@@ -73,9 +73,9 @@ def strip(count: int = 50_000) -> tuple[np.ndarray, np.ndarray]:
 def fan(count: int = 20_000, height: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
     """Triangles around one vertex, a cone."""
     angle = 2 * np.pi * np.arange(count) / count
-    rim = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    around = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     k = np.arange(count)
-    return np.concatenate([rim, [[0, 0, height]]]), np.column_stack([k, (k + 1) % count, np.full(count, count)])
+    return np.concatenate([around, [[0, 0, height]]]), np.column_stack([k, (k + 1) % count, np.full(count, count)])
 
 
 def pieces(count: int = 20_000, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -20,8 +20,6 @@ def covering_contacts(
     tail, head : (b,) of the edges of an outline, with the map to their left; each vertex is the tail of one
     """
     along = w[head] - w[tail]
-    before = np.empty(len(tail), np.int64)
-    before[np.argsort(tail)] = np.argsort(head)
     length = np.abs(along[j])
     near = length > depth
     i, j, length = i[near], j[near], length[near]
@@ -30,6 +28,7 @@ def covering_contacts(
     at_tail = np.abs(to) <= depth
     on = at_tail | ((np.abs(across.imag) <= depth) & (across.real > depth) & (across.real < length - depth))
     i, j, at_tail = i[on], j[on], at_tail[on]
+    before = _before(tail, head)
     begin, other = np.angle(along[i]), np.angle(along[j])
     angle = _turn(-along[before[i]], along[i])
     opposite = np.where(at_tail, _turn(-along[before[j]], along[j]), np.pi)
@@ -48,10 +47,20 @@ def _turn(to: np.ndarray, along: np.ndarray) -> np.ndarray:
     return np.where(angle < OVERLAPPING, 2 * np.pi, angle)
 
 
-def turns(w: np.ndarray, loop: np.ndarray) -> int:
-    """How often the direction of an outline, a loop (b,) of a map w (n,) complex, turns around; once if it is simple.
+def turns(w: np.ndarray, tail: np.ndarray, head: np.ndarray, owner: np.ndarray | None = None) -> np.ndarray:
+    """How often the direction of outlines turns around, once if they are simple, of a map w (n,) complex: (c,).
 
     Every vertex around which the map goes more than once adds a turn, though its edges cross no others.
+    tail, head : (b,) of the edges; owner (b,) : the outline from 0 to c - 1 that each belongs to, one by default
     """
-    along = np.roll(w[loop], -1) - w[loop]
-    return round(float((np.pi - _turn(-np.roll(along, 1), along)).sum()) / (2 * np.pi))
+    along = w[head] - w[tail]
+    before = along[_before(tail, head)]
+    owner = np.zeros(len(tail), np.int64) if owner is None else owner
+    return np.rint(np.bincount(owner, np.pi - _turn(-before, along)) / (2 * np.pi)).astype(np.int64)
+
+
+def _before(tail: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """The edge (b,) that ends where each begins."""
+    before = np.empty(len(tail), np.int64)
+    before[np.argsort(tail)] = np.argsort(head)
+    return before

@@ -14,6 +14,8 @@ import numpy as np
 
 from ..linalg.nested_dissection import vertex_graph
 from ..linalg.sparse import minimum_degree
+from ..maps.contacts import turns
+from ..maps.development import developed
 from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, energies, gradient
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
 from ..maps.polygon_elements import polygon_elements, restricted, with_convex_quads
@@ -24,7 +26,7 @@ from ..progress import Progress, Steps
 from .batch_continuation import AreaErrors, BatchContinuation
 from .boundary_barrier import crossings
 from .hessian_blocks import assembly_of
-from .initial_maps import NEARLY_FLAT, unroll
+from .initial_maps import EXACT, NEARLY_FLAT, farthest_from_first, unroll
 from .mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from .projected_newton import ARMIJO, FOLD_SHARE, FreeMotion, Motion, NewtonProblem, fold_shares, newton_direction
 
@@ -200,14 +202,35 @@ def _initial_maps(union: MeshUnion, meshes, area: np.ndarray) -> np.ndarray:
     defect = np.abs(angle_defects(union.triangles, angle, loop, len(uv)))
     defect[loop] = 0
     flat = np.bincount(union.of_vertex, defect, union.count) <= NEARLY_FLAT
-    for k in np.flatnonzero(flat):
+    w = uv @ [1, 1j]
+    exact, places = _developed(union, flat)
+    w[exact[union.of_vertex]] = places[exact[union.of_vertex]]
+    for k in np.flatnonzero(flat & ~exact):
         vertices, triangles = meshes[k]
         begin = int(np.searchsorted(union.of_vertex, k))
         unrolled = unroll(vertices, triangles, loops[k] - begin)
         if unrolled is not None:
-            uv[begin : begin + len(vertices)] = unrolled
-    scale = np.sqrt(union.sums(area) / np.abs(union.sums(signed_areas(uv, union.triangles))))
-    return scale[union.of_vertex] * (uv[:, 0] + 1j * uv[:, 1])
+            w[begin : begin + len(vertices)] = unrolled @ [1, 1j]
+    signed = signed_areas(np.column_stack([w.real, w.imag]), union.triangles)
+    return np.sqrt(union.sums(area) / np.abs(union.sums(signed)))[union.of_vertex] * w
+
+
+def _developed(union: MeshUnion, flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of the flat charts (c,) bool are developable and do not cover themselves, and their places (n,) complex.
+
+    What `unroll` does with one of them.
+    """
+    w, gap = developed(union.positions, union.triangles)
+    first = np.searchsorted(union.of_vertex, np.arange(union.count))
+    exact = flat & (np.maximum.reduceat(gap, first) <= EXACT * np.maximum.reduceat(np.abs(w), first))
+    start, end = farthest_from_first(union.positions, union.boundary, union.of_boundary)
+    along = w[end] - w[start]
+    w = (w - w[start][union.of_vertex]) * (along.conj() / np.maximum(np.abs(along), 1e-300))[union.of_vertex]
+    exact &= turns(w, union.boundary[:, 0], union.boundary[:, 1], union.of_boundary) <= 1
+    mine = exact[union.of_boundary]
+    if mine.any():
+        exact[union.of_boundary[mine][crossings(_side_by_side(union, w), union.boundary[mine])]] = False
+    return exact, w
 
 
 class _ActiveCharts:

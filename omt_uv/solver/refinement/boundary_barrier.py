@@ -53,7 +53,7 @@ def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
 
 def covers_itself(w: np.ndarray, loop: np.ndarray) -> bool:
     """Whether a map w (n,) without folds of a disk with the boundary loop (b,) covers any place twice."""
-    return turns(w, loop) > 1 or len(crossings(w, loop)) > 0
+    return int(turns(w, *loop_edges(loop))[0]) > 1 or len(crossings(w, loop)) > 0
 
 
 def _passes(a, b, p, q, depth: float) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 from ..analysis.density import relative_entropy
 from ..errors import FoldedUVError
 from ..linalg.sparse import Factor
+from ..maps.development import developed
 from ..maps.energy import elements
 from ..maps.tutte import arc_length_parameters, tutte
 from ..maps.untangle import USABLE, arc_length_boundary, circle_boundary, count_folds, map_energy, untangle
@@ -25,6 +26,8 @@ SPREAD = "The boundary of the start is not in order; it was spread over the doma
 SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by the length of the boundary"
 # Curvature, summed without sign over the inner vertices, below which a chart may be unrolled at once, in radians.
 NEARLY_FLAT = 0.5
+# Triangles of a chart that is developed may disagree about a vertex by this share of its size; by more, it is curved.
+EXACT = 1e-10
 # Solutions of normal equations have half of the digits, and each further one of what is left has as many more: on a
 # plane with hundreds of slits rounding would let the two sides of some cross.
 POLISH = 3
@@ -182,21 +185,46 @@ def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> InitialMap:
 
 
 def unroll(vertices, triangles, loop) -> np.ndarray | None:
-    """The least squares conformal map (n,2) of a nearly flat surface, where it neither folds nor crosses itself.
+    """The map (n,2) of a nearly flat surface that changes hardly any length, where it neither folds nor covers itself.
 
-    Exact for developable charts (Levy et al. 2002). None for any other chart.
+    Developable charts are developed, others mapped by least squares conformal (Levy et al. 2002). None for any other.
     """
     if _curvature(vertices, triangles, loop) > NEARLY_FLAT:
         return None
+    w, gap = developed(vertices, triangles)
+    first, second = farthest_from_first(vertices, loop[:, None], np.zeros(len(loop), np.int64))
+    if gap.max() <= EXACT * np.abs(w).max():
+        w = (w - w[first]) * np.abs(w[second] - w[first]) / (w[second] - w[first])
+    else:
+        w = _least_squares_conformal(vertices, triangles, int(first[0]), int(second[0]))
+    uv = np.column_stack([w.real, w.imag])
+    signed = signed_areas(uv, triangles)
+    if not (signed > 0).all() or covers_itself(w, loop):
+        return None
+    return uv * np.sqrt(face_areas(vertices, triangles).sum() / signed.sum())
+
+
+def farthest_from_first(vertices: np.ndarray, boundary: np.ndarray, owner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The first tail of the boundary edges (b,2) of every chart, and the one farthest in space from it, (c,) each.
+
+    owner (b,) : ascending; which chart an edge belongs to
+    """
+    begin = np.searchsorted(owner, np.unique(owner))
+    chart = np.repeat(np.arange(len(begin)), np.diff(np.append(begin, len(owner))))
+    tail = boundary[:, 0]
+    far = np.linalg.norm(vertices[tail] - vertices[tail[begin]][chart], axis=1)
+    # On a symmetric boundary rounding shall not decide between two.
+    good = np.flatnonzero(far >= FARTHEST * np.maximum.reduceat(far, begin)[chart])
+    return tail[begin], tail[good[np.unique(chart[good], return_index=True)[1]]]
+
+
+def _least_squares_conformal(vertices, triangles, first: int, second: int) -> np.ndarray:
+    """The least squares conformal map (n,) complex that keeps the distance of two vertices, the first one at 0."""
     n = len(vertices)
     area = face_areas(vertices, triangles)
     faces = elements(vertices, triangles, area)
     rows = np.sqrt(area)[:, None] * faces.gradient
     linear = linear_forms(np.vstack([triangles, triangles]), np.vstack([rows, -1j * rows]), n).tocsc()
-    first = loop[0]
-    far = np.linalg.norm(vertices[loop] - vertices[first], axis=1)
-    # On a symmetric boundary rounding shall not decide between two.
-    second = loop[np.argmax(far >= FARTHEST * far.max())]
     fixed = np.array([2 * first, 2 * first + 1, 2 * second, 2 * second + 1])
     x = np.zeros(2 * n)
     x[fixed[2]] = np.linalg.norm(vertices[second] - vertices[first])
@@ -205,11 +233,7 @@ def unroll(vertices, triangles, loop) -> np.ndarray | None:
     factor = Factor(free.T @ free)
     for _ in range(POLISH):
         x[others] -= factor.solve(free.T @ (linear @ x))
-    uv = x.reshape(n, 2)
-    signed = signed_areas(uv, triangles)
-    if not (signed > 0).all() or covers_itself(uv @ [1, 1j], loop):
-        return None
-    return uv * np.sqrt(area.sum() / signed.sum())
+    return x.reshape(n, 2) @ [1, 1j]
 
 
 def check_initial_map(uv: np.ndarray, triangles: np.ndarray) -> None:

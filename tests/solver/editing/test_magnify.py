@@ -229,7 +229,7 @@ def test_a_concave_quad_stays_where_its_density_is_one():
     np.testing.assert_allclose(result.uv, uv, atol=1e-6)
 
 
-@pytest.mark.parametrize(("factor", "radius"), [(4.0, 0.25), (8.0, 0.3)])
+@pytest.mark.parametrize(("factor", "radius"), [(2.0, 0.25), (4.0, 0.25), (8.0, 0.3), (16.0, 0.2)])
 def test_a_circle_stays_the_circle_it_is(factor, radius):
     angle = 2 * np.pi * np.arange(64) / 64
     V, F = meshes.polar(lambda t: t, lambda t: 0 * t, 10, 64)

@@ -11,7 +11,7 @@ from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.boundary_barrier import covers_itself, crossings
+from omt_uv.solver.refinement.boundary_barrier import covers_itself, crossings, loop_edges
 
 STEPS = [1, 1j, -1, -1j]
 
@@ -48,9 +48,9 @@ def test_a_path_of_squares_covers_itself_where_it_comes_by_twice(turn):
 
 def test_more_than_a_full_turn_around_a_vertex_is_two_turns_of_the_outline():
     _, w, F = path_of_squares([0, 1, 2, 3])
-    assert turns(w, boundary_loops(F)[0]) == 2
+    assert turns(w, *loop_edges(boundary_loops(F)[0])) == 2
     _, w, F = path_of_squares([0, 1, 2])
-    assert turns(w, boundary_loops(F)[0]) == 1
+    assert turns(w, *loop_edges(boundary_loops(F)[0])) == 1
 
 
 @pytest.mark.parametrize("turn", [1, np.exp(0.7j)])

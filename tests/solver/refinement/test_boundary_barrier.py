@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from omt_uv.solver.refinement import boundary_barrier
 from omt_uv.solver.refinement.boundary_barrier import box_pairs, crossings, loop_edges, make_barrier
 
 
@@ -19,6 +20,17 @@ def test_box_pairs_are_those_of_brute_force():
     i, j = box_pairs(low1, high1, low2, high2)
     meet = (low1[:, None] <= high2).all(2) & (low2 <= high1[:, None]).all(2)
     assert np.array_equal(np.column_stack([i, j]), np.argwhere(meet))
+
+
+@pytest.mark.parametrize("turn", [1, np.exp(0.5j)], ids=["along", "askew"])
+def test_boxes_of_a_long_strip_are_compared_with_their_neighbours_alone(turn, monkeypatch):
+    rows = []
+    expand = boundary_barrier.expand
+    monkeypatch.setattr(boundary_barrier, "expand", lambda counts: rows.append(int(counts.sum())) or expand(counts))
+    x = np.arange(20_000)
+    w = np.concatenate([x, x[::-1] + 1j]) * turn
+    assert not len(crossings(w, np.arange(len(w))))
+    assert max(rows) < 100 * len(w)
 
 
 def slot():

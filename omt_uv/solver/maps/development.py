@@ -1,0 +1,78 @@
+"""Develop flat surfaces into the plane, triangle by triangle, however many and however long they are.
+
+Every triangle is placed beside its parent in a tree of neighbours; the motions along the tree are composed by pointer
+doubling. Where a surface has no curvature that is exact to rounding, while the condition of a system of equations
+grows with the fourth power of the length of a strip.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order
+
+from ..mesh.geometry import halfedge_lengths
+from ..mesh.topology import graph_components, twins
+
+
+def developed(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n,) complex of the vertices of flat components (n,3), (m,3), and how far their triangles disagree, (n,).
+
+    Edges keep their lengths where triangles agree. Each component has a place of its own.
+    """
+    local = _local_frames(positions, triangles)
+    turn, shift = _composed(*_motions(local, triangles))
+    corners = (turn[:, None] * local + shift[:, None]).ravel()
+    flat, n = triangles.ravel(), len(positions)
+    count = np.maximum(np.bincount(flat, minlength=n), 1)
+    w = (np.bincount(flat, corners.real, n) + 1j * np.bincount(flat, corners.imag, n)) / count
+    gap = np.zeros(n)
+    np.maximum.at(gap, flat, np.abs(corners - w[flat]))
+    return w, gap
+
+
+def _local_frames(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Corners (m,3) complex of every triangle in a plane of its own, the first edge along the real axis."""
+    length = halfedge_lengths(positions, triangles).reshape(-1, 3)
+    base, right, left = length.T
+    p = positions[triangles]
+    height = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / np.maximum(base, 1e-300)
+    along = ((p[:, 1] - p[:, 0]) * (p[:, 2] - p[:, 0])).sum(axis=1) / np.maximum(base, 1e-300)
+    return np.stack([np.zeros(len(base), complex), base.astype(complex), along + 1j * height], axis=1)
+
+
+def _motions(local: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Parents (m,) in a forest of neighbours, a root its own, and the turn and shift (m,) complex into their frames."""
+    m = len(triangles)
+    twin = twins(triangles)
+    inner = np.flatnonzero(twin >= 0)
+    _, component = graph_components(inner // 3, twin[inner] // 3, m)
+    roots = np.unique(component, return_index=True)[1]
+    # One more node, beside all roots, makes the forest a tree.
+    rows = np.concatenate([inner // 3, np.full(len(roots), m), roots])
+    columns = np.concatenate([twin[inner] // 3, roots, np.full(len(roots), m)])
+    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(m + 1, m + 1)).tocsr()
+    parent = breadth_first_order(graph, m, directed=False)[1][:m].astype(np.int64)
+    parent[roots] = roots
+    child = inner[twin[inner] // 3 == parent[inner // 3]]
+    edge = np.full(m, -1)
+    edge[child // 3] = child
+    turn, shift = np.ones(m, complex), np.zeros(m, complex)
+    t = np.flatnonzero(edge >= 0)
+    h, g = edge[t], twin[edge[t]]
+    tail, head = local.ravel()[h], local.ravel()[h + 1 - 3 * (h % 3 == 2)]
+    far, near = local.ravel()[g], local.ravel()[g + 1 - 3 * (g % 3 == 2)]
+    turn[t] = (far - near) * (head - tail).conj()
+    turn[t] /= np.maximum(np.abs(turn[t]), 1e-300)
+    shift[t] = (far + near) / 2 - turn[t] * (head + tail) / 2
+    return parent, turn, shift
+
+
+def _composed(parent: np.ndarray, turn: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Turn and shift (m,) into the frames of the roots, by pointer doubling."""
+    while (parent[parent] != parent).any():
+        shift = shift[parent] + turn[parent] * shift
+        turn = turn[parent] * turn
+        turn /= np.maximum(np.abs(turn), 1e-300)
+        parent = parent[parent]
+    return turn, shift

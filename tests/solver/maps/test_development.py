@@ -1,0 +1,45 @@
+"""Flat surfaces developed triangle by triangle."""
+
+import hard_meshes
+import meshes
+import numpy as np
+
+from omt_uv.solver.maps.development import developed
+from omt_uv.solver.mesh.geometry import halfedge_lengths
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.refinement.initial_maps import unroll
+
+
+def test_edges_of_a_developable_surface_keep_their_lengths():
+    V, F = meshes.bumpy(20, 6)
+    V[:, 2] = 0.3 * np.sin(7 * V[:, 0])
+    both = np.concatenate([V, V[:, [1, 2, 0]] + 5]), np.concatenate([F, F + len(V)])
+    w, gap = developed(*both)
+    assert gap.max() < 1e-13
+    flat = np.column_stack([w.real, w.imag, 0 * w.real])
+    np.testing.assert_allclose(halfedge_lengths(flat, both[1]), halfedge_lengths(*both), rtol=1e-12)
+
+
+def test_triangles_of_a_curved_surface_disagree():
+    V, F = meshes.bumpy(12, 12)
+    assert developed(V, F)[1].max() > 1e-3
+
+
+def test_a_strip_is_developed_exactly_however_long():
+    V, quads = hard_meshes.strip(50_000)
+    # Wound into a helix, whose ends no system of equations would bring together.
+    angle = V[:, 0] / 40
+    helix = np.column_stack([40 * np.cos(angle), 40 * np.sin(angle), V[:, 1] + 0 * angle])
+    F = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    w, gap = developed(helix, F)
+    chord = np.linalg.norm(helix[1] - helix[0])
+    assert gap.max() < 1e-12 * 50_000
+    np.testing.assert_allclose(np.abs(w[50_000] - w[0]), 50_000 * chord, rtol=1e-12)
+
+
+def test_a_long_strip_is_unrolled():
+    V, quads = hard_meshes.strip(4000)
+    F = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    uv = unroll(V / 4000, F, boundary_loops(F)[0])
+    length = halfedge_lengths(V, F) / 4000
+    np.testing.assert_allclose(halfedge_lengths(np.column_stack([uv, 0 * uv[:, 0]]), F), length, rtol=1e-8)
