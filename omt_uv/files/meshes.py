@@ -151,7 +151,10 @@ _READERS: dict[str, Callable[[str], None]] = {
     ),
     ".ply": _reader(lambda path: bpy.ops.wm.ply_import(filepath=path, merge_verts=False, **AXES)),
     ".stl": _reader(lambda path: bpy.ops.wm.stl_import(filepath=path, use_mesh_validate=False, **AXES)),
-    ".glb": _reader(lambda path: bpy.ops.import_scene.gltf(filepath=path, merge_vertices=False)),
+    # Shapes of bones would be meshes that the file does not have.
+    ".glb": _reader(
+        lambda path: bpy.ops.import_scene.gltf(filepath=path, merge_vertices=False, disable_bone_shape=True)
+    ),
     ".fbx": _reader(_read_fbx),
     ".off": _reader(_read_off),
 }

@@ -1,0 +1,140 @@
+"""Read the lines of an OBJ file that hold positions, UVs and faces; all bytes are kept."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .imported import InPlaceError
+
+WORD = re.compile(rb"[^\s\\]+")
+CONTINUED = re.compile(rb"\\\r?\n")
+
+
+@dataclass(frozen=True)
+class ObjText:
+    """The lines of an OBJ file, with continuation lines joined by what joined them, and what they say.
+
+    positions (n,3); uv (m,2) and uv_line (m,); of faces their line (f,), face_start (f+1,), and of their corners the
+    vertex and UV (c,), -1 where there is none. Polylines and points stand among the faces, is_face (f,) tells them apart;
+    last_vertex (f,): the line of positions, normals or parameters before; has_surfaces : free-form ones, which use UVs
+    """
+
+    lines: list[bytes]
+    positions: np.ndarray
+    uv: np.ndarray
+    uv_line: np.ndarray
+    face_line: np.ndarray
+    face_start: np.ndarray
+    corner_vertex: np.ndarray
+    corner_uv: np.ndarray
+    is_face: np.ndarray
+    last_vertex: np.ndarray
+    has_surfaces: bool
+
+
+def read(data: bytes) -> ObjText:
+    """Read an OBJ file.
+
+    Raises
+    ------
+    InPlaceError : a line of positions or UVs has no numbers
+    """
+    lines = _logical_lines(data)
+    vertices: list[bytes] = []
+    uv_line: list[int] = []
+    faces: list[tuple[int, int, int, int, bool]] = []
+    before, has_surfaces = -1, False
+    for i, line in enumerate(lines):
+        kind = line[:2] if line[:1] not in b" \t" else line.lstrip()[:2]
+        if kind in (b"v ", b"v\t"):
+            vertices.append(line)
+            before = i
+        elif kind in (b"vt", b"vn", b"vp"):
+            if kind == b"vt":
+                uv_line.append(i)
+            before = i
+        elif kind in (b"f ", b"f\t", b"l ", b"p ", b"l\t", b"p\t"):
+            faces.append((i, len(vertices), len(uv_line), before, kind[:1] == b"f"))
+        elif kind in (b"su", b"cu") and line.split()[:1] in ([b"surf"], [b"curv"], [b"curv2"]):
+            has_surfaces = True
+    where = np.array(faces, np.int64).reshape(-1, 5)
+    start, corner_vertex, corner_uv = _corners(lines, faces)
+    return ObjText(
+        lines=lines,
+        positions=_numbers(vertices, 3),
+        uv=_numbers([lines[i] for i in uv_line], 2),
+        uv_line=np.array(uv_line, np.int64),
+        face_line=where[:, 0],
+        face_start=start,
+        corner_vertex=corner_vertex,
+        corner_uv=corner_uv,
+        is_face=where[:, 4] > 0,
+        last_vertex=where[:, 3],
+        has_surfaces=has_surfaces,
+    )
+
+
+def words(line: bytes) -> list[bytes]:
+    """What a line says, without its comment."""
+    found = WORD.findall(line)
+    for k, word in enumerate(found):
+        if word.startswith(b"#"):
+            return found[:k]
+    return found
+
+
+def _logical_lines(data: bytes) -> list[bytes]:
+    """Lines with their ends, those that a backslash continues as one."""
+    pieces = data.split(b"\n")
+    lines = [piece + b"\n" for piece in pieces[:-1]] + ([pieces[-1]] if pieces[-1] else [])
+    if not CONTINUED.search(data):
+        return lines
+    joined: list[bytes] = []
+    open_line = False
+    for line in lines:
+        if open_line:
+            joined[-1] += line
+        else:
+            joined.append(line)
+        open_line = line.endswith((b"\\\n", b"\\\r\n"))
+    return joined
+
+
+def _numbers(lines: Sequence[bytes], columns: int) -> np.ndarray:
+    """The first numbers (k, columns) of lines; a UV may lack the second."""
+    try:
+        rows = [[float(word) for word in words(line)[1 : 1 + columns]] for line in lines]
+        if columns == 2:
+            rows = [[*row, 0.0] if len(row) == 1 else row for row in rows]
+        return np.array(rows, float).reshape(len(lines), columns)
+    except ValueError as error:
+        raise InPlaceError("a line of positions or UVs lacks a number") from error
+
+
+def _corners(lines: list[bytes], faces: list) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """face_start (f+1,), vertices (c,) and UVs (c,) of face lines; -1 for what is not there."""
+    start = [0]
+    vertices: list[int] = []
+    uvs: list[int] = []
+    for i, n, m, *_ in faces:
+        for word in words(lines[i])[1:]:
+            parts = word.split(b"/", 2)
+            vertices.append(_index(parts[0], n))
+            uvs.append(_index(parts[1], m) if len(parts) > 1 else -1)
+        start.append(len(vertices))
+    return np.array(start), np.array(vertices, np.int64), np.array(uvs, np.int64)
+
+
+def _index(word: bytes, count: int) -> int:
+    """The index from 0 that a word stands for, where `count` elements have come; -1 for none of these."""
+    try:
+        value = int(word)
+    except ValueError:
+        return -1
+    value = value - 1 if value > 0 else value + count if value < 0 else -1
+    return value if 0 <= value < count else -1
+
