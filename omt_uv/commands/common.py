@@ -75,12 +75,9 @@ def read_file(path: Path, layer: str = "") -> list:
 
 def check_output(path: Path) -> None:
     """Raise CommandError unless meshes can be written to a file of this name."""
-    from ..files.meshes import WRITABLE
+    from ..files.saving import check_target
 
-    if path.suffix.lower() not in WRITABLE:
-        raise CommandError(f"{path}: unknown format. Use one of {' '.join(WRITABLE)}.")
-    if not path.resolve().parent.is_dir():
-        raise CommandError(f"{path}: there is no such folder")
+    check_target(path)
 
 
 def drain_shown(steps):

@@ -22,8 +22,8 @@ def read_layers(options: argparse.Namespace) -> tuple[list, list]:
 def write_layers(options: argparse.Namespace, objects: list, result) -> list[str]:
     """Write `result.uv` to `result.corners` of the layer of every object, and the file; print and return warnings."""
     from ..blender.mesh import target_layer, write_uv
-    from ..files.meshes import save
+    from ..files.saving import save_uvs
 
     for obj, corners, uv in zip(objects, result.corners, result.uv, strict=True):
         write_uv(obj, target_layer(obj.data, options.uv_layer), corners, uv)
-    return warn(objects, result.warnings, save(options.output, objects))
+    return warn(objects, result.warnings, save_uvs(options.output, objects, options.input))

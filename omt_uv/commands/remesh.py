@@ -133,7 +133,7 @@ def _save(path: Path, made: list[list[str]]) -> list[str]:
     """A .blend with everything in it; other files hold the new objects alone, every level a file of its own."""
     import bpy
 
-    from ..files.meshes import save
+    from ..files.saving import save
 
     if path.suffix.lower() == ".blend":
         return save(path, [])

@@ -19,7 +19,7 @@ def run(options: argparse.Namespace) -> None:
     require_blender()
     from ..blender.seams import mark_seams
     from ..blender.vertex_groups import avoided
-    from ..files.meshes import save
+    from ..files.saving import save
     from ..solver.cutting.cuts import cut
     from ..solver.parameterization.chart_pins import clear_of_pins
 
@@ -36,4 +36,4 @@ def run(options: argparse.Namespace) -> None:
         told += [(k, text) for text in cuts.warnings]
         mark_seams(obj, cuts.edges)
         print(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")
-    warn(objects, told, save(options.output, objects))
+    warn(objects, told, save(options.output, objects, options.input))

@@ -24,7 +24,7 @@ def run(options: argparse.Namespace) -> None:
     require_blender()
     from ..blender.vertex_groups import check_group_target, selected_vertices, write_group
     from ..blender.weights import computed_weights
-    from ..files.meshes import save
+    from ..files.saving import save
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep vertex groups. Write one of these.")
@@ -37,4 +37,4 @@ def run(options: argparse.Namespace) -> None:
             found.append(computed_weights(reading, options.kind, options.low, options.high, options.invert, selected))
     for obj, weights in zip(objects, found, strict=True):
         write_group(obj, options.group, weights)
-    warn(objects, [], save(options.output, objects))
+    warn(objects, [], save(options.output, objects, options.input))

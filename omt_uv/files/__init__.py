@@ -9,6 +9,6 @@ from ..solver.lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     images="ImageError has_straight_alpha packed_image pixels_of",
-    meshes="FileError",
+    verified="FileError",
     obj_precision="restore_precision",
 )

@@ -23,10 +23,10 @@ except ModuleNotFoundError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 PREFIX = ".omt_uv_"
-LOCK = "lock"
+LOCK = ".lock"
 # Blender cuts paths at 1024 bytes without a word, and those of its own temporary files are longer than ours.
 MOST_PATH_BYTES = 960
-# Seconds after which a folder that nothing locks is left over: one whose lock is not made yet is younger.
+# Seconds after which a file that nothing locks is left over: one whose lock is not made yet is younger.
 ABANDONED = 60.0
 # Where locks of files cannot be asked for, no run is thought to write for longer than a day.
 ABANDONED_WITHOUT_LOCKS = 86400.0
@@ -47,7 +47,7 @@ def check_writable(path: Path) -> None:
     if path.exists() and not os.access(path, os.W_OK):
         raise FileError(f"{path}: is write-protected. Allow writing, or name another file.")
     try:
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=PREFIX):
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=PREFIX):
             pass
     except OSError as error:
         raise FileError(f"{path}: nothing can be written into this folder ({error.strerror})") from error
@@ -66,10 +66,10 @@ def check_length(path: Path) -> None:
 
 
 @contextmanager
-def staged(target: Path) -> Iterator[Path]:
+def staged(target: Path, companions: dict[Path, Path] | None = None) -> Iterator[Path]:
     """The path at which to write a file, and to check it, that takes the place of `target` at the end of the block.
 
-    Whatever else the block leaves in the folder of that path is put beside the target, before it.
+    companions : what the block writes besides, with names that begin like its own, and where that goes
 
     Raises
     ------
@@ -79,17 +79,18 @@ def staged(target: Path) -> Iterator[Path]:
     check_writable(target)
     sweep(target.parent)
     try:
-        with _own_folder(target.parent) as folder:
-            made = folder / target.name
+        with _own_name(target.parent) as name:
+            made = target.with_name(name + target.suffix)
             yield made
             if not made.is_file():
                 raise FileError(f"{target}: nothing was written. Look for space and rights in its folder.")
-            _keep_rights(target, made)
-            others = [path for path in sorted(folder.iterdir()) if path.name not in (LOCK, made.name)]
-            for path in (*others, made):
+            # The target comes last: it names its companions.
+            places = {**(companions or {}), made: target}
+            for path, place in places.items():
+                _keep_rights(place, path)
                 _flush(path)
-            for path in (*others, made):
-                os.replace(path, target.parent / path.name)
+            for path, place in places.items():
+                os.replace(path, place)
             _flush(target.parent)
     except OSError as error:
         raise FileError(f"{target}: cannot be written ({error.strerror or error})") from error
@@ -125,9 +126,14 @@ def check_bytes(path: Path, data: bytes) -> None:
 
 def sweep(folder: Path) -> None:
     """Remove from a folder what processes left behind that were ended while they wrote into it."""
-    for path in folder.glob(f"{PREFIX}*"):
-        if path.is_dir() and not path.is_symlink() and _is_abandoned(path):
-            shutil.rmtree(path, ignore_errors=True)
+    # Locks come last: they tell whose the others are.
+    for path in sorted(folder.glob(f"{PREFIX}*"), key=lambda path: path.suffix == LOCK):
+        if not path.exists():
+            continue
+        # .omt_uv_abcdefgh.obj belongs to .omt_uv_abcdefgh.lock.
+        name = path.name.split(".")[1]
+        if _is_abandoned(path, path.with_name(f".{name}{LOCK}")):
+            _remove(path)
 
 
 def same_file(a: Path, b: Path) -> bool:
@@ -147,31 +153,43 @@ def clash(paths: Sequence[tuple[str, Path]]) -> tuple[str, str] | None:
 
 
 @contextmanager
-def _own_folder(parent: Path) -> Iterator[Path]:
-    """A folder of this process alone, locked as long as it lives, and removed at the end."""
-    folder = Path(tempfile.mkdtemp(dir=parent, prefix=PREFIX))
+def _own_name(folder: Path) -> Iterator[str]:
+    """A name of this process alone, with a locked file as long as it lives; files whose names begin so go at the end."""
+    handle, made = tempfile.mkstemp(dir=folder, prefix=PREFIX, suffix=f"{LOCK}.new")
+    new = Path(made)
+    name = new.name.removesuffix(f"{LOCK}.new")
     try:
-        with open(folder / f"{LOCK}.new", "wb") as lock:
+        with open(handle, "wb") as lock:
             if fcntl is not None:
                 with suppress(OSError):  # a file system without locks: age decides
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # A file of this name is locked from the first moment on, or nobody is there any more.
-            os.replace(folder / f"{LOCK}.new", folder / LOCK)
-            yield folder
+                # A file of this name is locked from the first moment on, or nobody is there any more.
+                os.replace(new, folder / f"{name}{LOCK}")
+            yield name
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        for path in folder.glob(f"{name}.*"):
+            _remove(path)
 
 
-def _is_abandoned(folder: Path) -> bool:
-    """Whether the process that made a temporary folder is gone."""
+def _remove(path: Path) -> None:
+    """Remove a temporary file; a folder is one of earlier versions."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()
+
+
+def _is_abandoned(path: Path, lock: Path) -> bool:
+    """Whether the process that made a temporary file is gone."""
     try:
-        age = time.time() - folder.stat().st_mtime
-        if fcntl is None:
+        age = time.time() - path.stat().st_mtime
+        if fcntl is None or path.is_dir():
             return age > ABANDONED_WITHOUT_LOCKS
-        if not (folder / LOCK).exists():
+        if not lock.exists():
             return age > ABANDONED
-        with open(folder / LOCK, "rb") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with open(lock, "rb") as held:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
         return True
     except OSError:
         # Locked, of another user, or removed meanwhile.
