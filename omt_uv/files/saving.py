@@ -121,8 +121,12 @@ def _save_blend(path: Path, objects: Objects, source: Path | None) -> list[str]:
         try:
             with silence():
                 bpy.context.preferences.filepaths.save_version = 0
+                # A copy: what is read again must not be the file of this session.
                 bpy.ops.wm.save_as_mainfile(
-                    filepath=str(made), check_existing=False, compress=source is not None and _is_compressed(source)
+                    filepath=str(made),
+                    check_existing=False,
+                    copy=True,
+                    compress=source is not None and _is_compressed(source),
                 )
         except RuntimeError as error:
             raise FileError(f"{path}: {last_line(str(error)) or 'cannot be written'}") from error
