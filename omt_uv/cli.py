@@ -55,7 +55,7 @@ def carry_out(options: argparse.Namespace) -> int:
     try:
         options.run(options)
     except UserError as error:
-        return _told(str(error), supervision.FAILURE)
+        return _told(str(error), getattr(error, "status", supervision.FAILURE))
     except MemoryError as error:
         return _told(f"{options.input}: not enough memory. {error}", supervision.MEMORY)
     except KeyboardInterrupt:

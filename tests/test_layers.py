@@ -56,7 +56,8 @@ ARROWS: dict[str, str] = {
     "xatlas",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization xatlas "
     "pipelines",
-    "files": "errors solver blender",
+    "files.in_place": "errors solver",
+    "files": "errors solver blender files.in_place",
     "display": "solver solver.mesh solver.maps pipelines blender",
     "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
     "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "

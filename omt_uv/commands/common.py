@@ -17,6 +17,14 @@ from ..supervision import PROGRAM
 class CommandError(UserError):
     """Told on one line, with a status that is not zero."""
 
+    status = 1
+
+
+class UsageError(CommandError):
+    """Options that make no sense together, before anything was read."""
+
+    status = 2
+
 
 def require_blender() -> None:
     """Import what needs Blender, which the help and a misspelt option do not; CommandError says what is missing."""
@@ -73,11 +81,32 @@ def read_file(path: Path, layer: str = "") -> list:
     return pairs
 
 
-def check_output(path: Path) -> None:
-    """Raise CommandError unless meshes can be written to a file of this name."""
-    from ..files.saving import check_target
+def check_paths(options: argparse.Namespace, outputs: Sequence[Path] | None = None) -> None:
+    """Refuse what cannot be written before the long work: all files of the options, and whatever names one twice.
 
-    check_target(path)
+    outputs : mesh files that are written, if other than OUT. OUT may be IN, which is replaced; a picture may be, too
+
+    Raises
+    ------
+    UsageError : two options lead to one file
+    FileError : a file cannot be written
+    """
+    from ..files.saving import check_target
+    from ..files.verified import check_writable, clash
+
+    meshes = [options.output] if outputs is None and "output" in options else list(outputs or ())
+    more = [(name, getattr(options, name, None)) for name in ("report", "histogram", "image_out", "image_output")]
+    written = [(f"--{name.replace('_', '-')}", path) for name, path in more if path is not None]
+    read = [("IN", options.input), ("--image", getattr(options, "image", None))]
+    mesh_names = [("OUT", path) for path in meshes]
+    found = clash([*mesh_names, *written]) or clash([("IN", options.input), *written])
+    found = found or next(filter(None, (clash([pair, *mesh_names]) for pair in read[1:] if pair[1] is not None)), None)
+    if found:
+        raise UsageError(f"{found[0]} and {found[1]} are one file. Give each a name of its own.")
+    for path in meshes:
+        check_target(path)
+    for _, path in written:
+        check_writable(path)
 
 
 def drain_shown(steps):
@@ -110,6 +139,8 @@ def warn(objects: list, solver_warnings: list[tuple[int, str]], warnings: list[s
 
 def write_report(options: argparse.Namespace, more: dict, objects: list, charts: list, warnings: list[str]) -> None:
     """Settings, `more`, the figures of the charts of every object, and warnings as JSON."""
+    from ..files.verified import write_text
+
     report = {
         "version": __version__,
         "input": str(options.input),
@@ -124,7 +155,4 @@ def write_report(options: argparse.Namespace, more: dict, objects: list, charts:
         ],
         "warnings": warnings,
     }
-    try:
-        options.report.write_text(json.dumps(report, indent=1) + "\n")
-    except OSError as error:
-        raise CommandError(f"{options.report}: {error.strerror}") from error
+    write_text(options.report, json.dumps(report, indent=1) + "\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from .common import check_output, read_file, require_blender, warn
+from .common import check_paths, read_file, require_blender, warn
 
 
 def read_layers(options: argparse.Namespace) -> tuple[list, list]:
@@ -12,7 +12,7 @@ def read_layers(options: argparse.Namespace) -> tuple[list, list]:
     require_blender()
     from ..blender.mesh import check_target
 
-    check_output(options.output)
+    check_paths(options)
     pairs = read_file(options.input, options.uv_layer)
     for obj, _ in pairs:
         check_target(obj.data, options.uv_layer)

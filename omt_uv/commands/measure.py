@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from .common import CommandError, read_file, refusals, require_blender
+from .common import CommandError, check_paths, read_file, refusals, require_blender
 from .options import add_input
 
 
@@ -26,6 +26,9 @@ def run(options: argparse.Namespace) -> None:
     from ..pipelines.distortion import measure_readings, on_subdivision, summary
     from ..pipelines.subdivision import evaluated
 
+    if options.histogram and options.histogram.suffix.lower() != ".png":
+        raise CommandError(f"{options.histogram}: a histogram is a picture. Name a .png file.")
+    check_paths(options)
     with refusals(name=str(options.input)):
         readings = [reading for _, reading in read_file(options.input)]
         figures = measure_readings(readings)
@@ -40,11 +43,10 @@ def _draw(path: Path, readings: list) -> None:
     from ..display.canvas import save
     from ..display.histogram import histogram
     from ..files.silence import silence
+    from ..files.verified import staged
 
-    if path.suffix.lower() != ".png":
-        raise CommandError(f"{path}: a histogram is a picture. Name a .png file.")
     try:
-        with silence():
-            save(path, histogram(readings))
+        with staged(path) as made, silence():
+            save(made, histogram(readings))
     except (OSError, RuntimeError) as error:
         raise CommandError(f"{path}: {error}") from error

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
-from .common import CommandError, check_output, drain_shown, read_file, refusals, require_blender, warn
+from .common import UsageError, check_paths, drain_shown, read_file, refusals, require_blender, warn
 from .options import add_files, angle, faces, names, number, positive, vertices
 
 KINDS = ("uniform", "curvature", "gaussian", "saliency")
@@ -77,11 +77,13 @@ def _ratio(text: str) -> float:
 def run(options: argparse.Namespace) -> None:
     require_blender()
     from ..blender.remesh_objects import carried_attributes, lost, new_objects, read_request, source_of
+    from ..files.verified import same_file
     from ..pipelines.remesh import remesh_series
 
-    check_output(options.output)
-    if options.input.resolve() in [path.resolve() for path in _targets(options.output, options.levels)]:
-        raise CommandError(f"{options.input}: the new mesh would replace the input. Give another name.")
+    targets = _targets(options.output, options.levels)
+    check_paths(options, targets or [options.output])
+    if any(same_file(options.input, path) for path in targets):
+        raise UsageError(f"{options.input}: the new mesh would replace the input. Give another name.")
     common = _settings(options)
     objects = [obj for obj, _ in read_file(options.input)]
     results = []
@@ -96,7 +98,7 @@ def run(options: argparse.Namespace) -> None:
     for k, (obj, request, series, carried) in enumerate(results):
         told += [(k, text) for text in (*lost(obj, request, carried, by_hand), *series.warnings)]
         made.append(new_objects([obj], request, series, carried))
-    warn(objects, told, _save(options.output, made))
+    warn(objects, told, _save(options.output, made, options.input))
 
 
 def _is_split(path: Path, obj) -> bool:
@@ -129,14 +131,14 @@ def _settings(options: argparse.Namespace) -> RemeshSettings:
     )
 
 
-def _save(path: Path, made: list[list[str]]) -> list[str]:
+def _save(path: Path, made: list[list[str]], source: Path) -> list[str]:
     """A .blend with everything in it; other files hold the new objects alone, every level a file of its own."""
     import bpy
 
     from ..files.saving import save
 
     if path.suffix.lower() == ".blend":
-        return save(path, [])
+        return save(path, [], source)
     warnings: list[str] = []
     for k, target in enumerate(_targets(path, len(made[0]))):
         warnings += save(target, [bpy.data.objects[names[k]] for names in made])

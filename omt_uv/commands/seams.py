@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from .common import CommandError, read_file, refusals, require_blender, warn
+from .common import CommandError, check_paths, read_file, refusals, require_blender, warn
 from .options import add_cut_options, add_files
 
 
@@ -25,6 +25,7 @@ def run(options: argparse.Namespace) -> None:
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")
+    check_paths(options)
     pairs = read_file(options.input)
     objects = [obj for obj, _ in pairs]
     told = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
-from .common import CommandError, read_file, refusals, require_blender, warn
+from .common import CommandError, check_paths, read_file, refusals, require_blender, warn
 from .options import add_files, names, share
 
 
@@ -28,6 +28,7 @@ def run(options: argparse.Namespace) -> None:
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep vertex groups. Write one of these.")
+    check_paths(options)
     pairs = read_file(options.input)
     objects, found = [obj for obj, _ in pairs], []
     for obj, reading in pairs:

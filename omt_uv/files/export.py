@@ -175,7 +175,7 @@ def _is_smooth(mesh: bpy.types.Mesh) -> bool:
 
 def _write_fbx(path: Path, objects: Objects, everything: bool) -> list[str]:
     """Write an FBX file; returns warnings."""
-    options = {}
+    options: dict[str, object] = {}
     if everything:
         options |= {"use_custom_props": True, "add_leaf_bones": False, "bake_anim_simplify_factor": 0.0}
     else:

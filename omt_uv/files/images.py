@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import UserError
 from .silence import silence
+from .verified import check_writable, staged
 
 # What can be written: Blender's name of the format by the suffix of the file.
 FORMATS = {
@@ -100,8 +101,7 @@ def check_target(path: Path) -> None:
     """Raise ImageError unless an image can be written to the path."""
     if path.suffix.lower() not in FORMATS:
         raise ImageError(f"{path}: unknown image format. Use one of {' '.join(FORMATS)}.")
-    if not path.resolve().parent.is_dir():
-        raise ImageError(f"{path}: there is no such folder")
+    check_writable(path)
 
 
 def save(path: Path, pixels: np.ndarray, like: bpy.types.Image) -> None:
@@ -115,16 +115,31 @@ def save(path: Path, pixels: np.ndarray, like: bpy.types.Image) -> None:
     image = _new_image(path.stem, pixels, like)
     file_format = FORMATS[path.suffix.lower()]
     try:
-        with silence():
+        with staged(path) as made, silence():
             if image.is_float:
-                _render(image, path, file_format)
+                _render(image, made, file_format)
             else:
-                image.filepath_raw, image.file_format = str(path.resolve()), file_format
+                image.filepath_raw, image.file_format = str(made), file_format
                 image.save()
+            _check_size(made, image)
     except RuntimeError as error:
         raise ImageError(f"{path}: {str(error).strip() or 'cannot be written'}") from error
     finally:
         bpy.data.images.remove(image)
+
+
+def _check_size(path: Path, image: bpy.types.Image) -> None:
+    """Raise RuntimeError unless a file has the pixels of an image, as far as its size tells."""
+    if not path.is_file():
+        raise RuntimeError("nothing was written. Is the disk full?")
+    there = bpy.data.images.load(str(path), check_existing=False)
+    try:
+        # Reading a pixel reads the file.
+        whole = tuple(there.size) == tuple(image.size) and len(there.pixels) > 0 and there.has_data
+    finally:
+        bpy.data.images.remove(there)
+    if not whole:
+        raise RuntimeError("what was written cannot be read again. Is the disk full?")
 
 
 def _render(image: bpy.types.Image, path: Path, file_format: str) -> None:

@@ -96,9 +96,9 @@ def _read_fbx(path: str) -> None:
     """Read an FBX file by the reader that this Blender has."""
     # Blender 4.5 and later have a reader of their own; the one in Python came before.
     if "fbx_import" in dir(bpy.ops.wm):
-        bpy.ops.wm.fbx_import(filepath=path, validate_meshes=False, use_anim=False)
+        bpy.ops.wm.fbx_import(filepath=path, validate_meshes=False)
     else:
-        bpy.ops.import_scene.fbx(filepath=path, use_anim=False)
+        bpy.ops.import_scene.fbx(filepath=path)
     for obj in bpy.context.scene.objects:
         # Turned to other axes and back, with a rest of 4e-8.
         matrix = np.array(obj.matrix_basis)

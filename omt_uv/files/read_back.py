@@ -13,7 +13,8 @@ import numpy as np
 
 from ..blender.mesh import read_uv
 from . import fbx_nodes
-from .in_place import InPlaceError, glb_data, obj_text, ply
+from .in_place import glb_data, obj_text, ply
+from .in_place.imported import InPlaceError
 from .verified import FileError
 
 

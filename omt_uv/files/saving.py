@@ -16,7 +16,9 @@ import numpy as np
 from ..blender.mesh import read_uv
 from .export import export, exported_meshes
 from .fbx_nodes import count
-from .in_place import Imported, InPlaceError, glb, obj, ply
+from .in_place import glb, ply
+from .in_place import obj as obj_file
+from .in_place.imported import Imported, InPlaceError
 from .losses import losses
 from .meshes import check_suffix, last_line
 from .obj_materials import place_materials
@@ -27,7 +29,7 @@ from .verified import FileError, check_bytes, check_writable, staged
 WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx")
 # What can be changed in place.
 IN_PLACE: dict[str, Callable[[bytes, Sequence[Imported]], tuple[bytes, list[str]]]] = {
-    ".obj": obj.put,
+    ".obj": obj_file.put,
     ".ply": ply.put,
     ".glb": glb.put,
 }

@@ -154,7 +154,7 @@ def clash(paths: Sequence[tuple[str, Path]]) -> tuple[str, str] | None:
 
 @contextmanager
 def _own_name(folder: Path) -> Iterator[str]:
-    """A name of this process alone, with a locked file as long as it lives; files whose names begin so go at the end."""
+    """A name of this process alone, locked as long as it lives; files whose names begin so go at the end."""
     handle, made = tempfile.mkstemp(dir=folder, prefix=PREFIX, suffix=f"{LOCK}.new")
     new = Path(made)
     name = new.name.removesuffix(f"{LOCK}.new")

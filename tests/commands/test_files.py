@@ -139,7 +139,8 @@ def test_obj_keeps_the_order_of_faces_over_materials(package, run, tmp_path):
     lines = (tmp_path / "in.obj").read_text().splitlines()
     lines = [f"usemtl m{i % 3}\n{line}" if line.startswith("f") else line for i, line in enumerate(lines)]
     (tmp_path / "in.obj").write_text("\n".join(lines) + "\n")
-    status, _, err = run("unwrap", tmp_path / "in.obj", "-o", tmp_path / "out.obj", "--quality", "draft")
+    assert run("unwrap", tmp_path / "in.obj", "-o", tmp_path / "in.blend", "--quality", "draft")[0] == 0
+    status, _, err = run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "out.obj", "--quality", "draft")
     assert status == 0
     assert "Materials" in err
     assert read(package, tmp_path / "out.obj")[1] == faces.tolist()

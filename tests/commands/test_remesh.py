@@ -69,7 +69,7 @@ def test_the_input_is_never_replaced(run, tmp_path, name, more):
     write_ball(tmp_path / name)
     before = (tmp_path / name).read_bytes()
     status, _, err = run("remesh", tmp_path / name, "-o", tmp_path / "in.obj", "--vertices", 100, *more)
-    assert status == 1
+    assert status == 2
     assert "replace the input" in err
     assert (tmp_path / name).read_bytes() == before
 

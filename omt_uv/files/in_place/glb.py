@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .glb_data import COMPRESSIONS, DRACO, Glb, accessor, normalized, read, triangles, write
-from .glb_layout import ATTRIBUTES, ELEMENTS, Layout, rows_of
+from .glb_layout import ATTRIBUTES, ELEMENTS, GlbChange, rows_of
 from .imported import Imported, InPlaceError, check_found, dropped_warning, find_corners
 
-# What Blender appends to a name that is taken, and as much of a name as it keeps.
-NUMBERED, NAME_BYTES = re.compile(r"\.\d{3,}$"), 63
+# What Blender appends to a name that is taken.
+NUMBERED = re.compile(r"\.\d{3,}$")
+# As much of a name as it keeps.
+NAME_BYTES = 63
 # v is turned around with single precision.
 TURNED = 1.2e-7
 MALFORMED = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError)
@@ -49,19 +51,19 @@ def put(data: bytes, meshes: Sequence[Imported]) -> tuple[bytes, list[str]]:
 
 
 def _put(data: bytes, meshes: Sequence[Imported]) -> tuple[bytes, list[str]]:
-    layout = Layout(read(data))
-    for name in layout.doc.get("extensionsUsed", []):
+    change = GlbChange(read(data))
+    for name in change.doc.get("extensionsUsed", []):
         if name in COMPRESSIONS:
             raise InPlaceError(f"its buffers are compressed ({name})")
-    parts, dropped = _parts(layout.glb, meshes)
+    parts, dropped = _parts(change.glb, meshes)
     groups: dict[str, list[Part]] = {}
     for part in parts:
         of = part.primitive
         groups.setdefault(repr((sorted(of["attributes"].items()), of.get("targets"))), []).append(part)
-    changed = [part for group in groups.values() for part in _write_group(layout, group)]
+    changed = [part for group in groups.values() for part in _write_group(change, group)]
     if not changed:
         return data, dropped_warning(dropped)
-    new = write(layout.result())
+    new = write(change.result())
     _check(read(data), read(new), meshes)
     told = dropped_warning(dropped)
     if any("TANGENT" in part.primitive["attributes"] for part in changed):
@@ -135,15 +137,16 @@ class _Meshes:
                 raise InPlaceError(f"its meshes are compressed ({DRACO})")
             if "POSITION" not in primitive["attributes"]:
                 continue
-            corners = triangles(self.glb, primitive).ravel()
-            if primitive.get("mode", 4) < 4:
-                # Blender adds their vertices between those of the faces.
-                corners = accessor(self.glb, primitive["indices"])[:, 0].astype(np.int64) if "indices" in primitive else None
             place = accessor(self.glb, primitive["attributes"]["POSITION"])
-            used, inverse = np.unique(np.arange(len(place)) if corners is None else corners, return_inverse=True)
-            if len(used) and (used[-1] >= len(place) or used[0] < 0):
+            # Blender has the vertices that a primitive uses, in their order; those of lines and points, too.
+            mode, corners = primitive.get("mode", 4), triangles(self.glb, primitive).ravel()
+            if mode < 4:
+                given = primitive.get("indices")
+                corners = np.arange(len(place)) if given is None else accessor(self.glb, given)[:, 0].astype(np.int64)
+            used, inverse = np.unique(corners, return_inverse=True)
+            if len(used) and not 0 <= used[0] <= used[-1] < len(place):
                 raise InPlaceError(f"a primitive of mesh {index} has vertices that do not exist")
-            if primitive.get("mode", 4) >= 4:
+            if mode >= 4:
                 vertices.append(count + inverse.ravel())
             positions.append(place[used])
             count += len(used)
@@ -165,31 +168,31 @@ def _is_called(name: str, here: str) -> bool:
     return name in (here, bare) or (len(here.encode()) > NAME_BYTES - 8 and name.startswith(bare))
 
 
-def _write_group(layout: Layout, parts: list[Part]) -> list[Part]:
+def _write_group(change: GlbChange, parts: list[Part]) -> list[Part]:
     """Write the UVs of primitives that have their vertices in common; returns them if anything changes."""
     attributes = parts[0].primitive["attributes"]
     layer = parts[0].mesh.layer
     if any(part.mesh.layer != layer for part in parts):
         raise InPlaceError("meshes that share their vertices have UV maps of different names")
-    wanted = [k for k in range(layer + 1) if k == layer or f"TEXCOORD_{k}" not in attributes]
-    n = layout.doc["accessors"][attributes["POSITION"]]["count"]
-    old = [_old_uv(layout.glb, attributes, k, n) for k in wanted]
+    layers = [k for k in range(layer + 1) if k == layer or f"TEXCOORD_{k}" not in attributes]
+    n = change.doc["accessors"][attributes["POSITION"]]["count"]
+    old = [_old_uv(change.glb, attributes, k, n) for k in layers]
     corners = np.concatenate([part.corners for part in parts])
-    uv = np.concatenate([_wished(part, old, wanted) for part in parts])
+    uv = np.concatenate([_wished(part, old, layers) for part in parts])
     present = [values is not None for values in old]
     before = np.concatenate([np.zeros((n, 2), np.float32) if v is None else v for v in old], axis=1)
     if all(present) and (before[corners] == uv).all():
         return []
     corner_vertex, copies, values = _split(before, corners, uv)
-    users = layout.users()
+    users = change.users()
     own = _all(parts[0].primitive)
     owned = {k for k in own if users[k] == own.count(k) * len(parts)}
     fresh: dict[str, np.ndarray] = {}
-    for k, name in enumerate(f"TEXCOORD_{j}" for j in wanted):
+    for k, name in enumerate(f"TEXCOORD_{j}" for j in layers):
         fresh[name] = np.ascontiguousarray(values[:, 2 * k : 2 * k + 2])
-    _write_attributes(layout, parts, fresh, copies, owned)
+    _write_attributes(change, parts, fresh, copies, owned)
     if len(copies):
-        _write_indices(layout, parts, corner_vertex, users)
+        _write_indices(change, parts, corner_vertex, users)
     return parts
 
 
@@ -214,11 +217,11 @@ def _old_uv(glb: Glb, attributes: dict, layer: int, n: int) -> np.ndarray | None
     return values
 
 
-def _wished(part: Part, old: list[np.ndarray | None], wanted: list[int]) -> np.ndarray:
+def _wished(part: Part, old: list[np.ndarray | None], layers: list[int]) -> np.ndarray:
     """UVs (c, 2 layers) of the corners of a primitive, in glTF's direction; those that stay keep their bits."""
     here = part.found >= 0
     columns = []
-    for values, layer in zip(old, wanted, strict=True):
+    for values, layer in zip(old, layers, strict=True):
         uv = np.zeros((len(part.corners), 2), np.float32)
         new = part.mesh.layers[layer][part.found[here]].astype(np.float32)
         uv[here] = np.stack([new[:, 0], np.float32(1) - new[:, 1]], axis=1)
@@ -251,9 +254,9 @@ def _split(before: np.ndarray, corners: np.ndarray, uv: np.ndarray) -> tuple[np.
     return new[pair.ravel()], vertex[more], values
 
 
-def _write_attributes(layout: Layout, parts: list[Part], fresh: dict, copies: np.ndarray, owned: set[int]) -> None:
+def _write_attributes(change: GlbChange, parts: list[Part], fresh: dict, copies: np.ndarray, owned: set[int]) -> None:
     """Write the UVs `fresh`, and copy the vertices `copies` (k,) in everything else; `owned` nobody else names."""
-    doc, done, own = layout.doc, dict[tuple, int](), _all(parts[0].primitive)
+    doc, done, own = change.doc, dict[tuple, int](), _all(parts[0].primitive)
     for which, targets in enumerate(zip(*(_tables(part.primitive) for part in parts), strict=True)):
         table = dict(targets[0])
         for name in {**table, **(fresh if which == 0 else {})}:
@@ -263,21 +266,23 @@ def _write_attributes(layout: Layout, parts: list[Part], fresh: dict, copies: np
                 values = fresh[name]
                 # Where two attributes are one accessor, the other one keeps it.
                 mine = index in owned and own.count(index) == 1
-                if mine and layout.overwrite(index, values):
+                if mine and index is not None and change.overwrite(index, values):
                     continue
                 like = doc["accessors"][index] if index is not None else {"type": "VEC2"}
-                done[key] = layout.replace(index, values, mine, like, ATTRIBUTES)
-            elif not len(copies):
+                done[key] = change.replace(index, values, mine, like, ATTRIBUTES)
+            elif index is None or not len(copies):
                 continue
             elif key not in done:
-                rows = rows_of(layout.glb, index)
+                rows = rows_of(change.glb, index)
                 like = doc["accessors"][index]
-                done[key] = layout.replace(index, np.concatenate([rows, rows[copies]]), index in owned, like, ATTRIBUTES)
+                done[key] = change.replace(
+                    index, np.concatenate([rows, rows[copies]]), index in owned, like, ATTRIBUTES
+                )
             for target in targets:
                 target[name] = done[key]
 
 
-def _write_indices(layout: Layout, parts: list[Part], corner_vertex: np.ndarray, users: dict[int, int]) -> None:
+def _write_indices(change: GlbChange, parts: list[Part], corner_vertex: np.ndarray, users: dict[int, int]) -> None:
     """Write the vertices (c,) of the corners of all primitives."""
     count, at = int(corner_vertex.max(initial=0)) + 1, 0
     for part in parts:
@@ -286,11 +291,11 @@ def _write_indices(layout: Layout, parts: list[Part], corner_vertex: np.ndarray,
         if (new == part.corners).all() and part.primitive.get("mode", 4) == 4:
             continue
         index = part.primitive.get("indices")
-        like = {"type": "SCALAR"} if index is None else layout.doc["accessors"][index]
+        like = {"type": "SCALAR"} if index is None else change.doc["accessors"][index]
         wide = count > 65535 or like.get("componentType") == 5125
         values = new.astype("<u4" if wide else "<u2")[:, None]
         owned = index is not None and users.get(index) == 1
-        part.primitive["indices"] = layout.replace(index, values, owned, like, ELEMENTS)
+        part.primitive["indices"] = change.replace(index, values, owned, like, ELEMENTS)
         if part.primitive.get("mode", 4) != 4:
             part.primitive["mode"] = 4
 

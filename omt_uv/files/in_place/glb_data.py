@@ -10,7 +10,9 @@ import numpy as np
 
 from .imported import InPlaceError
 
-MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+MAGIC = 0x46546C67
+JSON_CHUNK = 0x4E4F534A
+BINARY_CHUNK = 0x004E4942
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 # No format of a value needs more; attributes of vertices need 4.

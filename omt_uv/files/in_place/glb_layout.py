@@ -10,10 +10,12 @@ import numpy as np
 from .glb_data import ALIGNMENT, COMPONENTS, WIDTHS, Glb, accessor
 
 CODES = {np.dtype(kind).str: code for code, kind in COMPONENTS.items()}
-ATTRIBUTES, ELEMENTS = 34962, 34963
+# What buffer views say that they hold: attributes of vertices, or indices of these.
+ATTRIBUTES = 34962
+ELEMENTS = 34963
 
 
-class Layout:
+class GlbChange:
     """The accessors of a file as they change: its JSON is changed in place, its bytes at the end, by `result`."""
 
     def __init__(self, glb: Glb):
@@ -122,7 +124,7 @@ class Layout:
         """The file with everything that was overwritten and replaced."""
         binary = bytearray(self.glb.binary)
         for at, stride, values in self._patches:
-            rows = np.ndarray(values.shape, values.dtype, binary, at, (stride, values.dtype.itemsize))
+            rows: np.ndarray = np.ndarray(values.shape, values.dtype, binary, at, (stride, values.dtype.itemsize))
             rows[:] = values
         views = self.doc["bufferViews"]
         gone = [views[k].pop("_old", None) for k in self._written]

@@ -199,7 +199,7 @@ def _replaced(line: bytes, fresh: dict[int, bytes]) -> bytes:
 
 
 def _check(old: ObjText, new: ObjText, here: np.ndarray, wished: np.ndarray) -> None:
-    """Raise InPlaceError unless the new text is the old mesh with the UVs wished (k,2) at the corners that are mapped."""
+    """Raise InPlaceError unless the new text is the old mesh with the UVs wished (k,2) at the corners mapped."""
     same = np.array_equal(old.positions, new.positions, equal_nan=True) and np.array_equal(
         old.corner_vertex, new.corner_vertex
     )

@@ -19,8 +19,8 @@ class ObjText:
     """The lines of an OBJ file, with continuation lines joined by what joined them, and what they say.
 
     positions (n,3); uv (m,2) and uv_line (m,); of faces their line (f,), face_start (f+1,), and of their corners the
-    vertex and UV (c,), -1 where there is none. Polylines and points stand among the faces, is_face (f,) tells them apart;
-    last_vertex (f,): the line of positions, normals or parameters before; has_surfaces : free-form ones, which use UVs
+    vertex and UV (c,), -1 where there is none. Polylines and points stand among the faces; is_face (f,) tells them
+    apart; last_vertex (f,): the line of positions, normals or parameters before; has_surfaces : of free form, with UVs
     """
 
     lines: list[bytes]
@@ -137,4 +137,3 @@ def _index(word: bytes, count: int) -> int:
         return -1
     value = value - 1 if value > 0 else value + count if value < 0 else -1
     return value if 0 <= value < count else -1
-

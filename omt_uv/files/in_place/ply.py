@@ -207,7 +207,9 @@ def _with_vertices(ply: PlyMesh, here: np.ndarray, wished: np.ndarray) -> bytes:
     p = next(p for p in face.properties if p.name == ply.indices)
     if len(split.touched) - 1 > np.iinfo(p.type).max:
         raise InPlaceError(f"the file counts vertices as {p.type}, and has no numbers left for those that are split")
-    write_vertices, write_faces = (_binary_vertices, _binary_faces) if ply.header.order else (_text_vertices, _text_faces)
+    write_vertices, write_faces = (
+        (_binary_vertices, _binary_faces) if ply.header.order else (_text_vertices, _text_faces)
+    )
     sections = sorted(
         [
             (int(rows.start[0]), int(rows.start[-1]), write_vertices(ply, split, old)),

@@ -99,7 +99,9 @@ def read_header(data: bytes) -> Header:
     ------
     InPlaceError : it is none
     """
-    lines, at, order, elements = [], 0, None, []
+    lines: list[bytes] = []
+    elements: list[Element] = []
+    at, order = 0, None
     while True:
         end = data.find(b"\n", at)
         if end < 0 or len(lines) > 10000:
@@ -153,7 +155,9 @@ def _binary_rows(data: bytes, at: int, element: Element, order: str) -> Rows:
     if layout is not None:
         return layout
     rows = Rows.empty(element, at)
-    parts = [(p.name, int(p.type[1]), np.dtype(order + p.count_type) if p.count_type else None) for p in element.properties]
+    parts = [
+        (p.name, int(p.type[1]), np.dtype(order + p.count_type) if p.count_type else None) for p in element.properties
+    ]
     for k in range(element.count):
         for name, size, counter in parts:
             length = 1
