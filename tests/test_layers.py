@@ -57,7 +57,7 @@ ARROWS: dict[str, str] = {
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization xatlas "
     "pipelines",
     "files.in_place": "errors solver",
-    "files": "errors solver blender files.in_place",
+    "files": "errors supervision solver blender files.in_place",
     "display": "solver solver.mesh solver.maps pipelines blender",
     "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
     "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "

@@ -16,12 +16,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import UserError
+from ..supervision import temporary_prefix
 
 try:
     import fcntl
 except ModuleNotFoundError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
+# How the names of temporary files begin, of all processes.
 PREFIX = ".omt_uv_"
 LOCK = ".lock"
 # Blender cuts paths at 1024 bytes without a word, and those of its own temporary files are longer than ours.
@@ -47,7 +49,7 @@ def check_writable(path: Path) -> None:
     if path.exists() and not os.access(path, os.W_OK):
         raise FileError(f"{path}: is write-protected. Allow writing, or name another file.")
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=PREFIX):
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=temporary_prefix()):
             pass
     except OSError as error:
         raise FileError(f"{path}: nothing can be written into this folder ({error.strerror})") from error
@@ -155,7 +157,7 @@ def clash(paths: Sequence[tuple[str, Path]]) -> tuple[str, str] | None:
 @contextmanager
 def _own_name(folder: Path) -> Iterator[str]:
     """A name of this process alone, locked as long as it lives; files whose names begin so go at the end."""
-    handle, made = tempfile.mkstemp(dir=folder, prefix=PREFIX, suffix=f"{LOCK}.new")
+    handle, made = tempfile.mkstemp(dir=folder, prefix=temporary_prefix(), suffix=f"{LOCK}.new")
     new = Path(made)
     name = new.name.removesuffix(f"{LOCK}.new")
     try:
