@@ -41,7 +41,7 @@ def count(data: bytes) -> FbxCounts:
     try:
         for path, length, kind in _records(data, 27, len(data), long, ()):
             ended |= path == ("",)
-            if path[:1] == ("Objects",) and len(path) == 2:
+            if path[:1] == ("Objects",) and len(path) == 2 and kind:
                 kinds[kind] += 1
             elif path[:2] == ("Objects", "Geometry"):
                 totals["/".join(path[2:])] += length
