@@ -9,6 +9,7 @@ from textures import typeface
 
 AREA_OCTAVES = 2.0  # ends of the colour scale for area
 SHEAR_TOP = 4.0  # end of the colour scale for s1/s2
+OUTLINE = (60, 66, 78, 255)
 AREA_COLOURS = matplotlib.colormaps["RdBu_r"]
 SHEAR_COLOURS = matplotlib.colormaps["magma_r"]
 
@@ -38,16 +39,21 @@ AREA_SCALE = (
 SHEAR_SCALE = (lambda t: shear_colours(SHEAR_TOP**t), ["conformal", "s1/s2 = 2", "4"])
 
 
-def layout(uv, rgb, path, pixels=480):
-    """Draw the UV layout (m,3,2), one colour (m,3) per face, to `path`."""
+def layout(uv, rgb, path, pixels=480, outline=()):
+    """Draw the UV layout (m,3,2), one colour (m,3) per face, to `path`; lines (k,2,2) of the map are drawn dark."""
     low, high = uv.reshape(-1, 2).min(0), uv.reshape(-1, 2).max(0)
     scale = 3 * pixels / (1.06 * (high - low).max())  # drawn three times too large: Pillow has no antialiasing
-    points = (uv - (low + high) / 2) * scale * [1, -1] + 1.5 * pixels
+
+    def placed(points):
+        return (points - (low + high) / 2) * scale * [1, -1] + 1.5 * pixels
+
     image = Image.new("RGBA", (3 * pixels, 3 * pixels))
     draw = ImageDraw.Draw(image)
     colours = np.round(255 * rgb).astype(int).tolist()
-    for triangle, colour in zip(points.reshape(-1, 6).tolist(), colours, strict=True):
+    for triangle, colour in zip(placed(uv).reshape(-1, 6).tolist(), colours, strict=True):
         draw.polygon(triangle, fill=tuple(colour))
+    for line in placed(np.reshape(outline, (-1, 2, 2))).reshape(-1, 4).tolist():
+        draw.line(line, OUTLINE, width=pixels // 120)
     image.resize((pixels, pixels), Image.Resampling.LANCZOS).save(path)
 
 

@@ -14,6 +14,9 @@ from benchmarks.rivals import make_object, remove_object, write_uv
 CLAY = (0.75, 0.8, 0.86, 1)
 INK = (0.03, 0.05, 0.09, 1)
 WIRE = 0.0022  # thickness over the diagonal of the box
+SEAM = (0.85, 0.02, 0.06, 1)
+SEAM_RADIUS = 0.0028  # over the diagonal of the box
+SHARP = np.radians(50)  # between faces: shaded as an edge
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,18 @@ VIEWS = {
     "max_planck": View("Y", 100, 5),
     "bunny": View("Y", -10, 12),
     "spot": View("Y", 155, 15),
+    "homer": View("Y", 330, 5),
+    "armadillo": View("Y", 330, 8),
+    "suzanne": View("Y", 335, 8),
+    "ogre": View("Y", 335, 5),
+    "stanford_bunny": View("Y", -20, 12),
+    "cow": View("Y", 20, 12),
+    "david": View("Z", 75, 5),
+    "optcuts_max_planck_i": View("Y", 70, 5),
+    "optcuts_bunny_i": View("Y", -20, 12),
+    "optcuts_lion_o": View("Y", 10, 12),
+    "optcuts_bimba_i": View("Y", -10, 8),
+    "optcuts_face": View("Y", 345, 5),
     "head": View("Z", 30, 5),
 }
 
@@ -66,6 +81,41 @@ def render_checker(V, F, uv, view, path, texture, pixels=480):
     bpy.data.materials.remove(material)
 
 
+def render_cut(found, view, path, texture, pixels=480):
+    """Render a `DrawnMap` as a checker, and the edges that it cuts as red lines, to `path`."""
+    V, F = found.V, found.F
+    obj = make_object(V, F)
+    write_uv(obj, found.uv)
+    material = checker_material(texture)
+    obj.data.materials.append(material)
+    obj.data.set_sharp_from_angle(angle=SHARP)
+    points = V[np.unique(F)]
+    lines = _tubes(V[found.cut], SEAM_RADIUS * float(np.linalg.norm(np.ptp(points, axis=0))))
+    _render(obj, points, view, path, "TEXTURE", pixels, also=(lines,))
+    curve, paint = lines.data, lines.data.materials[0]
+    bpy.data.objects.remove(lines)
+    bpy.data.curves.remove(curve)
+    bpy.data.materials.remove(paint)
+    remove_object(obj)
+    bpy.data.materials.remove(material)
+
+
+def _tubes(ends, radius):
+    """An object of one tube for every pair of ends (k,2,3)."""
+    curve = bpy.data.curves.new("seams", "CURVE")
+    curve.dimensions, curve.bevel_depth, curve.bevel_resolution = "3D", radius, 1
+    for pair in ends.tolist():
+        spline = curve.splines.new("POLY")
+        spline.points.add(1)
+        spline.points.foreach_set("co", [*pair[0], 1.0, *pair[1], 1.0])
+    paint = bpy.data.materials.new("seams")
+    paint.diffuse_color = SEAM
+    curve.materials.append(paint)
+    obj = bpy.data.objects.new("seams", curve)
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
 def render_colours(V, F, rgb, view, path, pixels=480):
     """Render the mesh with one colour (m,3) per face to `path`."""
     obj = make_object(V, F)
@@ -92,7 +142,8 @@ def render_wires(V, F, view, path, pixels=480):
 
 
 def _render(obj, points, view, path, color_type, pixels, also=()):
-    obj.data.shade_smooth()
+    if color_type != "TEXTURE" or not obj.data.attributes.get("sharp_edge"):
+        obj.data.shade_smooth()
     scene = bpy.context.scene
     scene.render.engine = "BLENDER_WORKBENCH"
     scene.render.resolution_x = scene.render.resolution_y = pixels
