@@ -4,7 +4,7 @@
 
 A row (or three) for every model, a column for every method, figures below. `given` takes FOLDER/MODEL.obj with UVs of
 another program; `stretch` and `angle` are Blender's Minimum Stretch and Angle Based on the cuts of ours, or of the
-given maps where those shear less there.
+given maps where their symmetric Dirichlet energy is less there. A method that some model has no map of is left out.
 """
 
 from __future__ import annotations
@@ -90,13 +90,14 @@ def main():
     args.out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         rows = []
-        for name in args.models:
-            maps = maps_of(name, args.methods, args.given)
+        every = {name: maps_of(name, args.methods, args.given) for name in args.models}
+        methods = [m for m in args.methods if all(m in maps for maps in every.values())]
+        for name, maps in every.items():
             for method, found in maps.items():
                 figures = rival_maps.figures_of(found)
                 print(f"{name:22} {method:8} {figures.caption()}   {figures.islands} islands, {found.seconds:.1f} s")
-            rows += draw(name, maps, args.rows, Path(folder), args.pixels)
-        plates.plate(args.out, [TITLES[method] for method in args.methods], rows)
+            rows += draw(name, {method: maps[method] for method in methods}, args.rows, Path(folder), args.pixels)
+        plates.plate(args.out, [TITLES[method] for method in methods], rows)
     print(f"{args.out} {args.out.stat().st_size // 1000} kB")
 
 
