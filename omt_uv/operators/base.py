@@ -18,6 +18,10 @@ from ..session import last_run, run
 from ..settings import DEFAULT_TEXTURE_SIZE
 
 
+# What Blender makes of infinity is above, and nothing that is meant.
+LARGEST = 3e38
+
+
 class Complaint(UserError):
     """What the user is told instead of a result, and the object and MeshError it is about, if any."""
 
@@ -142,6 +146,18 @@ def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, 
         operator.report({"WARNING"}, f"{name}{text}{several}")
 
 
+def _is_finite(value) -> bool:
+    """Whether a property, a number or several, is finite; Blender makes the largest float of infinity."""
+    return all(abs(x) < LARGEST for x in (value if hasattr(value, "__iter__") else (value,)))
+
+
+def check_numbers(operator: bpy.types.Operator) -> None:
+    """Raise Complaint where a property is no finite number: Blender's own limits let NaN pass."""
+    for prop in operator.rna_type.properties:
+        if prop.type == "FLOAT" and not _is_finite(getattr(operator, prop.identifier)):
+            raise Complaint(f"{prop.name} is not a finite number. Give another value.")
+
+
 # Events that move the view, which goes on while a solver runs.
 NAVIGATION = {
     *(
@@ -176,6 +192,8 @@ class SolverOperator:
     bl_label: str
     # Whether it changes the active UVs, so that their figures are worth a look.
     makes_uvs = False
+    # Whether its islands may lie on one another, so that only overlap inside of them is told.
+    stacks = False
     # Rows of a name and a value on the result that `finish` wants to be shown first, instead of others of that name.
     said: tuple[tuple[str, str], ...] = ()
     _timer: bpy.types.Timer | None = None
@@ -197,6 +215,7 @@ class SolverOperator:
         manager, begin = context.window_manager, time.monotonic()
         manager.progress_begin(0, 100)
         try:
+            check_numbers(self)
             result = drain(self.steps(context), lambda p: manager.progress_update(int(100 * p.fraction)))
             self._finish(context, result, time.monotonic() - begin)
         except Complaint as complaint:
@@ -215,6 +234,7 @@ class SolverOperator:
         if run.current is not None:
             return tell(self, context, Complaint(f"{run.current.label} is still running. Wait, or cancel it by Esc."))
         try:
+            check_numbers(self)
             objects = mesh_objects(context)
         except Complaint as complaint:
             return tell(self, context, complaint)
@@ -256,11 +276,20 @@ class SolverOperator:
             pairs = read_objects(context)
             scale = context.scene.unit_settings.scale_length
             rows = last_run.figures([r for _, r in pairs], getattr(self, "texture_size", DEFAULT_TEXTURE_SIZE), scale)
+            rows += self._gate([r for _, r in pairs])
             overlay.refresh(context, pairs)
         told = {name for name, _ in self.said}
         rows = (*self.said, *(row for row in rows if row[0] not in told), ("Time", last_run.seconds(seconds)))
         last_run.state.summary = last_run.Summary(self.bl_label, rows, tuple(last_run.state.warnings))
         last_run.state.error = ""
+
+    def _gate(self, readings: list) -> tuple[tuple[str, str], ...]:
+        """Tell of folds and overlap in the UVs that were written; a row for the panel."""
+        from ..pipelines.gate import gate
+
+        found = gate(readings, apart=self.stacks)
+        warn(self, [], [(-1, text) for text in found.warnings()])
+        return (("Overlap", f"{100 * found.overlap:.2g} %"),)
 
     def _advance(self, context: bpy.types.Context) -> set[str]:
         current, ended = run.current, True
@@ -300,6 +329,7 @@ class QuickOperator:
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
+            check_numbers(self)
             with complaints():
                 self.act(context)
         except Complaint as complaint:

@@ -24,6 +24,7 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
     bl_label = "OMT Sphere Projection"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
     makes_uvs = True
+    stacks = True
 
     projection: EnumProperty(
         name="Projection", description="Layout of the globe", items=PROJECTIONS, default=DEFAULT_PROJECTION

@@ -56,6 +56,10 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
     )
 
+    @property
+    def stacks(self) -> bool:
+        return not self.pack
+
     def draw(self, _context: bpy.types.Context) -> None:
         draw_settings(self.layout, self)
 

@@ -1,0 +1,105 @@
+"""Whether a layout is one to one: exactly, and as the samples say where it is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.maps.embedding import check_layout
+from omt_uv.solver.maps.overlap import overlap_share
+
+
+def grid(n):
+    """Positions ((n+1)^2,2) of a square of n x n quads, and its triangles."""
+    y, x = np.mgrid[0 : n + 1, 0 : n + 1]
+    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    quads = np.stack([corner, corner + 1, corner + n + 2, corner + n + 1], 1)
+    F = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return np.stack([x, y], -1).reshape(-1, 2) / n, F
+
+
+def never(*_, **__):
+    raise AssertionError("samples were drawn although the map is one to one")
+
+
+def turned(uv, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return uv @ np.array([[c, s], [-s, c]])
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 2.0])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_maps_that_are_one_to_one_need_no_samples(monkeypatch, angle, mirrored):
+    P, F = grid(12)
+    monkeypatch.setattr("omt_uv.solver.maps.embedding.overlap_share", never)
+    P = turned(P * [-1 if mirrored else 1, 1], angle)
+    annulus = np.exp((0.1 + P[:, :1]) * [[1]]) * np.column_stack([np.cos(5 * P[:, 1]), np.sin(5 * P[:, 1])])
+    for uv in (P, annulus):
+        found = check_layout(F, uv.astype(np.float32)[F])
+        assert found.overlap == 0 and not found.folded.any()
+
+
+def test_a_hole_with_an_island_in_it_is_one_to_one(monkeypatch):
+    P, F = grid(9)
+    middle = np.abs(P[F].mean(1) - 0.5).max(1)
+    ring, inner = F[middle > 1 / 6], F[middle < 1 / 6]
+    monkeypatch.setattr("omt_uv.solver.maps.embedding.overlap_share", never)
+    uv = np.concatenate([P[ring], 0.5 + 0.8 * (P[inner] - 0.5)])
+    assert check_layout(np.concatenate([ring, inner + len(P)]), uv).overlap == 0
+
+
+@pytest.mark.parametrize("shift, share", [((0.0, 0.0), 1.0), ((0.2, 0.3), 0.56), ((0.5, 0.0), 0.5), ((1.0, 0.0), 0.0)])
+def test_islands_over_one_another_by_their_share(shift, share):
+    """Also where outlines lie on one another, so that no edges cross; islands side by side touch and do not overlap."""
+    P, F = grid(4)
+    F, uv = np.concatenate([F, F + len(P)]), np.concatenate([P[F], P[F] + shift])
+    found = check_layout(F, uv)
+    assert found.overlap == pytest.approx(share, abs=0.01) and not found.folded.any()
+    assert check_layout(F, uv, apart=True).overlap == 0
+
+
+def test_an_island_inside_another_is_found():
+    P, F = grid(6)
+    uv = np.concatenate([P[F], 0.45 + 0.1 * P[F]])
+    assert check_layout(np.concatenate([F, F + len(P)]), uv).overlap == pytest.approx(0.02 / 1.01, rel=0.1)
+
+
+def test_a_strip_that_goes_around_twice_and_a_vertex_with_two_turns_are_found():
+    P, F = grid(40)
+    angle = 4 * np.pi * P[:, 0]
+    spiral = (1 + 0.2 * P[:, 1:]) * np.column_stack([np.cos(angle), np.sin(angle)])
+    assert check_layout(F, spiral[F]).overlap > 0.9
+    wheel = np.array([[0, k, k % 8 + 1] for k in range(1, 9)])
+    angle = np.pi / 2 * np.arange(8)
+    twice = np.concatenate(
+        [[[0, 0]], np.column_stack([np.cos(angle), np.sin(angle)]) * (1 + np.arange(8)[:, None] / 20)]
+    )
+    assert check_layout(wheel, twice[wheel]).overlap > 0.5
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_random_maps_agree_with_samples(seed):
+    """A smooth random warp, from gentle to wild: exactly 0 where samples say so, and never where they do not."""
+    rng = np.random.default_rng(seed)
+    P, F = grid(25)
+    for strength in (0.1, 0.4, 1.0):
+        uv = P + strength * sum(
+            np.outer(np.sin(P @ rng.normal(size=2) * 4 + rng.random()), rng.normal(size=2)) / 3 for _ in range(3)
+        )
+        uv = uv.astype(np.float32)[F]
+        e, f = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+        area = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
+        found, sampled = check_layout(F, uv), overlap_share(uv)
+        assert found.overlap == sampled or (found.overlap == 0 and sampled < 1e-4)
+        assert found.folded.sum() == min((area <= 0).sum(), (area >= 0).sum()) or abs(area.sum()) < 1e-3
+
+
+def test_folds_are_counted_chart_by_chart():
+    """A mirrored chart has none; a triangle over its neighbour and one without area are folded."""
+    P, F = grid(5)
+    uv = np.concatenate([P[F], P[F] * [-1, 1] - [0.5, 0]])
+    assert not check_layout(np.concatenate([F, F + len(P)]), uv).folded.any()
+    P[7] = P[13]
+    found = check_layout(F, P[F])
+    e, f = P[F][:, 1] - P[F][:, 0], P[F][:, 2] - P[F][:, 0]
+    assert (found.folded == (e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0] <= 0)).all() and found.folded.any()
