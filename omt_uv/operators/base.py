@@ -17,7 +17,6 @@ from ..errors import UserError
 from ..session import last_run, run
 from ..settings import DEFAULT_TEXTURE_SIZE
 
-
 # What Blender makes of infinity is above, and nothing that is meant.
 LARGEST = 3e38
 
@@ -192,8 +191,6 @@ class SolverOperator:
     bl_label: str
     # Whether it changes the active UVs, so that their figures are worth a look.
     makes_uvs = False
-    # Whether its islands may lie on one another, so that only overlap inside of them is told.
-    stacks = False
     # Rows of a name and a value on the result that `finish` wants to be shown first, instead of others of that name.
     said: tuple[tuple[str, str], ...] = ()
     _timer: bpy.types.Timer | None = None
@@ -283,11 +280,15 @@ class SolverOperator:
         last_run.state.summary = last_run.Summary(self.bl_label, rows, tuple(last_run.state.warnings))
         last_run.state.error = ""
 
+    def stacks(self) -> bool:
+        """Whether islands may lie on one another, so that only overlap inside of them is told."""
+        return False
+
     def _gate(self, readings: list) -> tuple[tuple[str, str], ...]:
         """Tell of folds and overlap in the UVs that were written; a row for the panel."""
         from ..pipelines.gate import gate
 
-        found = gate(readings, apart=self.stacks)
+        found = gate(readings, apart=self.stacks())
         warn(self, [], [(-1, text) for text in found.warnings()])
         return (("Overlap", f"{100 * found.overlap:.2g} %"),)
 

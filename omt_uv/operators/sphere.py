@@ -24,7 +24,6 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
     bl_label = "OMT Sphere Projection"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
     makes_uvs = True
-    stacks = True
 
     projection: EnumProperty(
         name="Projection", description="Layout of the globe", items=PROJECTIONS, default=DEFAULT_PROJECTION
@@ -58,6 +57,9 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
     uv_layer: StringProperty(
         name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
     )
+
+    def stacks(self) -> bool:
+        return True
 
     def draw(self, _context: bpy.types.Context) -> None:
         draw_settings(self.layout, self)

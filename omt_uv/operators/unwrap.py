@@ -56,7 +56,6 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
     )
 
-    @property
     def stacks(self) -> bool:
         return not self.pack
 

@@ -1,4 +1,4 @@
-"""Look at the UVs of a run once more, as they are stored: folds and overlap, the last gate before anything is written."""
+"""Look at the UVs of a run once more, as they are stored: a last gate that folds and overlap do not pass unsaid."""
 
 from __future__ import annotations
 

@@ -13,7 +13,8 @@ from omt_uv.pipelines.gate import Gate, gate
 from omt_uv.pipelines.reading import Reading
 from omt_uv.solver.mesh.surface import Surface
 
-JUDGE = os.environ.get("OMT_UV_JUDGE")
+SHARED = Path(__file__).resolve().parents[3] / "shared"
+JUDGE = Path(os.environ.get("OMT_UV_JUDGE", SHARED / "tools" / "judge_uv.py"))
 
 
 def reading(n=14, uv=None, scale=1.0):
@@ -44,8 +45,8 @@ def warped(strength, seed):
 
 @pytest.mark.parametrize("strength, seed", [(0.0, 0), (0.05, 1), (0.2, 2), (0.6, 3), (1.5, 4)])
 def test_figures_are_those_of_the_judge(strength, seed):
-    if not JUDGE or not Path(JUDGE).exists():
-        pytest.skip("OMT_UV_JUDGE names no judge")
+    if not JUDGE.exists():
+        pytest.skip(f"no judge at {JUDGE}: set OMT_UV_JUDGE to judge_uv.py")
     spec = importlib.util.spec_from_file_location("judge_uv", JUDGE)
     judge = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(judge)

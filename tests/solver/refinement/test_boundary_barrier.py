@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from omt_uv.solver.refinement import boundary_barrier
-from omt_uv.solver.refinement.boundary_barrier import box_pairs, crossings, loop_edges, make_barrier
+from omt_uv.solver.maps import boxes
+from omt_uv.solver.maps.boxes import box_pairs
+from omt_uv.solver.refinement.boundary_barrier import crossings, loop_edges, make_barrier
 
 
 def test_crossings_of_a_bow_tie_and_of_a_polygon():
@@ -25,8 +26,8 @@ def test_box_pairs_are_those_of_brute_force():
 @pytest.mark.parametrize("turn", [1, np.exp(0.5j)], ids=["along", "askew"])
 def test_boxes_of_a_long_strip_are_compared_with_their_neighbours_alone(turn, monkeypatch):
     rows = []
-    expand = boundary_barrier.expand
-    monkeypatch.setattr(boundary_barrier, "expand", lambda counts: rows.append(int(counts.sum())) or expand(counts))
+    expand = boxes.expand
+    monkeypatch.setattr(boxes, "expand", lambda counts: rows.append(int(counts.sum())) or expand(counts))
     x = np.arange(20_000)
     w = np.concatenate([x, x[::-1] + 1j]) * turn
     assert not len(crossings(w, np.arange(len(w))))
