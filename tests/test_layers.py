@@ -29,6 +29,7 @@ ARROWS: dict[str, str] = {
     "solver.analysis": "solver solver.mesh solver.linalg",
     "solver.maps": "solver solver.mesh solver.linalg",
     "solver.subdivision": "solver solver.maps",
+    "solver.packing": "solver solver.mesh",
     "solver.transport": "solver solver.mesh solver.linalg",
     "solver.cutting": "solver solver.mesh solver.linalg solver.analysis",
     "solver.conformal": "solver solver.mesh solver.linalg solver.maps",
@@ -49,21 +50,19 @@ ARROWS: dict[str, str] = {
     "solver.api": "solver solver.mesh solver.analysis solver.maps solver.parameterization solver.editing solver.sphere "
     "solver.remeshing",
     "remedies": "solver",
-    "xatlas": "errors solver solver.mesh",
-    "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.subdivision solver.transfer "
+    "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.packing solver.subdivision "
+    "solver.transfer "
     "solver.refinement "
-    "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
-    "xatlas",
-    "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization xatlas "
-    "pipelines",
+    "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing",
+    "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
     "files.in_place": "errors solver",
     "files": "errors supervision solver blender files.in_place",
     "display": "solver solver.mesh solver.maps pipelines blender",
     "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
     "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
-    "xatlas pipelines blender files display",
+    "pipelines blender files display",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
-    "xatlas pipelines blender files display session",
+    "pipelines blender files display session",
     "panels": "settings solver blender display session operators",
 }
 SOLVER_LIBRARIES = {"numpy", "scipy"}
@@ -225,7 +224,7 @@ def test_entry_of_the_extension_imports_nothing_at_the_top():
     assert not [n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)]
 
 
-FACES = ["solver", "pipelines", "blender", "files", "display", "session", "commands", "operators", "panels", "xatlas"]
+FACES = ["solver", "pipelines", "blender", "files", "display", "session", "commands", "operators", "panels"]
 
 
 @pytest.mark.parametrize("name", [*FACES, "registration", "cli"])

@@ -1,6 +1,6 @@
 """Meshes, vertex groups and attributes in and out of Blender: the only place that reads or writes them.
 
-Imports pipelines, whose inputs it makes and whose results it writes, xatlas and the solver.
+Imports pipelines, whose inputs it makes and whose results it writes, and the solver.
 Main names: read, write_uv, target_layer, mark_seams, group_weights, read_request, new_objects.
 """
 
@@ -13,7 +13,6 @@ __getattr__, __all__ = lazy(
     remesh_objects="Request SourceError new_objects read_request",
     seams="mark_seams",
     subdivision="modifier_of subdivision_warnings",
-    uv_packer="pack",
     vertex_groups="GroupError group_weights write_group",
     weights="Weights region_weights",
 )

@@ -70,8 +70,8 @@ def read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, layer: str = "", edit
         faces = _get(mesh.polygons, "select", f, bool) & ~_get(mesh.polygons, "hide", f, bool)
     source, modifier = mesh.uv_layers.get(layer) or mesh.uv_layers.active, modifier_of(obj, mesh)
     if source is None:
-        return Reading(surface, faces, None, None, modifier)
-    return Reading(surface, faces, read_uv(mesh, source.name), read_pinned(mesh, source.name), modifier)
+        return Reading(surface, faces, None, None, modifier, up_of(obj))
+    return Reading(surface, faces, read_uv(mesh, source.name), read_pinned(mesh, source.name), modifier, up_of(obj))
 
 
 def _get(collection, name: str, count: int, dtype=np.int32) -> np.ndarray:
@@ -103,6 +103,13 @@ def stretch(obj: bpy.types.Object) -> np.ndarray:
         factor = stretch.mean()
         return np.eye(3) * (1.0 if abs(factor - 1) < 1e-6 else factor)
     return (axes.T * stretch) @ axes
+
+
+def up_of(obj: bpy.types.Object) -> tuple[float, float, float]:
+    """The direction (3,) of positions that are stretched, and not rotated, which is up in the world."""
+    left, _, axes = np.linalg.svd(np.array(obj.matrix_world, dtype=float)[:3, :3])
+    x, y, z = (left @ axes)[2].tolist()
+    return x, y, z
 
 
 def weld_split_vertices(reading: Reading) -> Reading:

@@ -32,7 +32,7 @@ def require_blender() -> None:
 
     try:
         with silence():
-            from ..blender import mesh, uv_packer  # noqa: F401
+            from ..blender import mesh  # noqa: F401
             from ..files import meshes  # noqa: F401
     except ModuleNotFoundError as error:
         raise CommandError(f"{error}. Install bpy, numpy, scipy and xatlas, or run inside Blender.") from error

@@ -77,7 +77,6 @@ def times(text: str) -> int:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ..blender.uv_packer import pack
     from ..blender.weights import named_weights
     from ..pipelines.magnify import Region, magnify, warped_picture
 
@@ -96,9 +95,10 @@ def run(options: argparse.Namespace) -> None:
     with refusals(objects):
         weights, told = named_weights(list(zip(objects, readings, strict=True)), options.weights)
         regions = [
-            Region(r.surface, r.faces, w.values, r.all_pins, w.kind) for r, w in zip(readings, weights, strict=True)
+            Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up)
+            for r, w in zip(readings, weights, strict=True)
         ]
-        result = drain_shown(magnify(regions, settings, pack))
+        result = drain_shown(magnify(regions, settings))
         result = replace(result, warnings=[*told, *result.warnings])
         warnings = write_layers(options, objects, result)
     if picture is not None:

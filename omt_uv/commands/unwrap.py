@@ -59,6 +59,7 @@ def add(commands) -> None:
         metavar="auto|off|N",
         help="keep the areas of the subdivided surface: of the modifier's, of the mesh alone, or of N levels",
     )
+    command.add_argument("--pack-around", action="store_true", help="leave room for islands with pins, which stay")
     command.add_argument("--no-pack", action="store_true", help="centre the islands one upon the other")
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
     add_report(command, "chart")
@@ -67,7 +68,6 @@ def add(commands) -> None:
 def run(options: argparse.Namespace) -> None:
     objects, readings = read_layers(options)
     from ..blender.subdivision import subdivision_warnings, with_levels
-    from ..blender.uv_packer import pack
     from ..blender.vertex_groups import avoided
     from ..pipelines.layout import UnwrapJob
     from ..pipelines.unwrap import lay_out
@@ -80,6 +80,7 @@ def run(options: argparse.Namespace) -> None:
         texture_size=options.texture_size,
         tile=options.udim,
         pack=not options.no_pack,
+        pack_around=options.pack_around,
         seams=options.seams,
         fill_holes=options.fill_holes,
         max_shear=options.max_shear,
@@ -89,10 +90,10 @@ def run(options: argparse.Namespace) -> None:
         if options.subdivision != "auto":
             readings = [with_levels(r, options.subdivision) for r in readings]
         jobs = [
-            UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision)
+            UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision, up=r.up, uv=r.uv)
             for r, avoid in zip(readings, free, strict=True)
         ]
-        layout = drain_shown(lay_out(jobs, settings, pack))
+        layout = drain_shown(lay_out(jobs, settings))
         if options.subdivision != 0:
             layout.warnings.extend(subdivision_warnings(objects))
         warnings = write_layers(options, objects, layout)

@@ -258,7 +258,6 @@ class SolverOperator:
         if run.current is not None:
             run.current.close()
             run.current = None
-            run.serve()
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None

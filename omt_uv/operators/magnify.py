@@ -98,7 +98,6 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.uv_packer import pack
         from ..files import images
         from ..pipelines.magnify import Region, magnify, warped_picture
 
@@ -107,9 +106,10 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             picture = images.pixels_of(images.named(self.image)) if self.image and self.source == "UV" else None
             weights, warnings = self._weights(context, list(zip(objects, readings, strict=True)))
             regions = [
-                Region(r.surface, r.faces, w.values, r.all_pins, w.kind) for r, w in zip(readings, weights, strict=True)
+                Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up)
+                for r, w in zip(readings, weights, strict=True)
             ]
-            result = yield from run.aside(magnify(regions, self.settings(), run.in_front(pack)))
+            result = yield from run.aside(magnify(regions, self.settings()))
         if picture is not None:
             straight = images.has_straight_alpha(images.named(self.image))
             picture = warped_picture(picture, regions, result, self.margin, straight)

@@ -43,13 +43,12 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.uv_packer import pack
         from ..pipelines.refine import refine_islands
 
         objects, readings = read_writable(context)
         surfaces = [(reading.surface, reading.faces, reading.all_pins) for reading in readings]
         with complaints(objects=objects):
-            refined = yield from run.aside(refine_islands(surfaces, self.settings(), run.in_front(pack)))
+            refined = yield from run.aside(refine_islands(surfaces, self.settings()))
         return objects, refined
 
     def finish(self, context: bpy.types.Context, result) -> None:

@@ -46,6 +46,12 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         "the largest as wide as the square",
         default=True,
     )
+    pack_around: BoolProperty(
+        name="Pack Around",
+        description="Leave room for islands that stay where they are: those with pins, and in Edit Mode those of faces "
+        "that are not selected. Otherwise they are packed as if there were none",
+        default=False,
+    )
     use_subdivision: BoolProperty(
         name="Use Subdivision Surface",
         description="Where an object has a Subdivision Surface modifier, keep the areas of the subdivided surface, "
@@ -70,6 +76,7 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             margin=self.margin,
             texture_size=self.texture_size,
             pack=self.pack,
+            pack_around=self.pack_around,
             tile=self.tile,
             seams=self.seams.lower(),
             fill_holes=self.fill_holes,
@@ -77,7 +84,6 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.uv_packer import pack
         from ..blender.vertex_groups import avoided
         from ..pipelines.layout import UnwrapJob
         from ..pipelines.unwrap import lay_out
@@ -87,10 +93,12 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             free = avoided(objects, self.keep_free)
             used = self.use_subdivision
             jobs = [
-                UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision if used else None)
+                UnwrapJob(
+                    r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision if used else None, up=r.up, uv=r.uv
+                )
                 for r, avoid in zip(readings, free, strict=True)
             ]
-            layout = yield from run.aside(lay_out(jobs, self.settings(), run.in_front(pack)))
+            layout = yield from run.aside(lay_out(jobs, self.settings()))
         return objects, layout
 
     def finish(self, context: bpy.types.Context, result) -> None:
@@ -132,5 +140,6 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "pack")
     column = layout.column()
     column.active = properties.pack
+    column.prop(properties, "pack_around")
     draw_margin(column, properties)
     choose_layer(layout, properties, "uv_layer")

@@ -6,7 +6,7 @@ index and text; index -1 stands for the layout as a whole.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,15 +18,18 @@ from ..solver.errors import MeshError
 from ..solver.maps.overlap import overlap_share
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.surface import Surface
+from ..solver.packing.pack_square import Packing, pack, stack
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.unwrap import SurfaceMap
-from ..xatlas import packing
+from ..solver.progress import Steps
 from .reading import SubdivisionModifier
-
-Packer = Callable[[Sequence[np.ndarray], Sequence[np.ndarray], float, int], packing.Packing]
 
 # More new overlap than this, as a share of the UV area, is said: less is rounding.
 OVERLAP = 1e-4
+# Share of the time of a run after which its islands are packed.
+PACKING_FROM = 0.8
+# Where up is, unless a surface says otherwise.
+UP = (0.0, 0.0, 1.0)
 
 
 class Refusal(UserError):
@@ -44,6 +47,7 @@ class UnwrapJob:
     faces : its polygons (f,) bool to unwrap, all by default; pins : corners that stay; avoid : vertices (n,) in [0,1]
         to keep free of cuts; target : density and region of its triangles, their own areas by default. Targets of
         several surfaces are relative to each other; subdivision : the modifier on whose surface areas shall be right
+    up : the direction (3,) of the surface that is up in the world; uv : UVs (c,2) that its corners have, if any
     """
 
     surface: Surface
@@ -52,6 +56,8 @@ class UnwrapJob:
     avoid: np.ndarray | None = None
     target: Target | None = None
     subdivision: SubdivisionModifier | None = None
+    up: tuple[float, float, float] = UP
+    uv: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,7 @@ class Layout:
     corners: list[np.ndarray]
     uv: list[np.ndarray]
     maps: list[SurfaceMap]
-    packing: packing.Packing
+    packing: Packing
     warnings: list[tuple[int, str]]
 
 
@@ -76,35 +82,28 @@ class PlacedIsland:
 
 
 def pack_islands(
-    islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray], settings: Settings, spare_packer: Packer | None
-) -> tuple[packing.Packing, str]:
+    islands: Sequence[np.ndarray],
+    triangles: Sequence[np.ndarray],
+    settings: Settings,
+    around: Sequence[tuple[np.ndarray, np.ndarray]] = (),
+) -> Steps[Packing]:
     """Pack islands (n_i,2) with triangles (m_i,3) into the UDIM tile of the settings, all by one scale.
 
-    `spare_packer` takes over where xatlas cannot, and then the text is a warning; otherwise it is empty.
+    around : points and triangles of islands that stay where they are, in UV space
 
     Raises
     ------
-    PackingError : neither packer can place the islands; MarginError : the margins leave no room
+    MarginError : the margins leave no room
     """
     if not islands:
-        return packing.Packing([], 0.0, "none", 0.0), ""
-    packed, warning = _in_unit_square(islands, triangles, settings, spare_packer)
-    return replace(packed, islands=[uv + settings.tile_origin for uv in packed.islands]), warning
-
-
-def _in_unit_square(islands, triangles, settings: Settings, spare_packer: Packer | None) -> tuple[packing.Packing, str]:
-    """Pack islands into the unit square; with a warning or an empty text."""
-    if not settings.pack:
-        return packing.stack(islands), ""
-    try:
-        return packing.pack(islands, triangles, settings.margin, settings.texture_size), ""
-    except packing.MarginError:
-        raise
-    except packing.PackingError as error:
-        if spare_packer is None:
-            raise
-        result = spare_packer(islands, triangles, settings.margin, settings.texture_size)
-        return result, f"{error}; packed with {result.packer} instead"
+        return Packing([], 0.0, "none", 0.0)
+    origin = np.array(settings.tile_origin, dtype=float)
+    if settings.pack:
+        staying = [(points - origin, index) for points, index in around]
+        packed = yield from pack(islands, triangles, settings.margin, settings.texture_size, staying)
+    else:
+        packed = stack(islands)
+    return replace(packed, islands=[uv + origin for uv in packed.islands])
 
 
 def corner_uvs(surface_count: int, islands: Sequence[PlacedIsland]) -> tuple[list[np.ndarray], list[np.ndarray]]:

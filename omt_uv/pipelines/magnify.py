@@ -36,7 +36,7 @@ from ..solver.parameterization.chart_map import map_chart
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.options import MapOptions
 from ..solver.progress import Steps, part_of
-from .layout import Packer, PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
+from .layout import UP, PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
 from .unwrap import lay_out
 
 # Shares that miss their target by more than this, relative to it, are said.
@@ -46,13 +46,14 @@ MISSED = 5e-3
 @dataclass(frozen=True)
 class Region:
     """A surface, the polygons (f,) bool to work on, weights of its vertices (n,), or of its polygons (f,) where
-    `kind` is "face", UVs and pins if it has any."""
+    `kind` is "face", UVs and pins if it has any, and what is up."""
 
     surface: Surface
     faces: np.ndarray
     weights: np.ndarray
     pins: CornerPins | None = None
     kind: str = "vertex"
+    up: tuple[float, float, float] = UP
 
     def of_triangles(self, rows: np.ndarray) -> np.ndarray:
         """Weights (k,) of some triangles (k,) of the surface: those of their polygons."""
@@ -104,15 +105,13 @@ class Magnified:
     warnings: list[tuple[int, str]]
 
 
-def magnify(
-    regions: Sequence[Region], settings: MagnifySettings, spare_packer: Packer | None = None
-) -> Steps[Magnified]:
+def magnify(regions: Sequence[Region], settings: MagnifySettings) -> Steps[Magnified]:
     """Magnify painted regions of surfaces as the settings say.
 
     Raises
     ------
     Refusal : with the index of the surface and the MeshError that says why
-    PackingError : see `unwrap.lay_out`
+    MarginError : the margins leave no room
     """
     for index, region in enumerate(regions):
         try:
@@ -121,7 +120,7 @@ def magnify(
             raise Refusal(index, error) from error
     if settings.source == "uv":
         return (yield from _from_uv(regions, settings))
-    return (yield from _from_mesh(regions, settings, spare_packer))
+    return (yield from _from_mesh(regions, settings))
 
 
 def _check(region: Region) -> None:
@@ -137,7 +136,7 @@ def _check(region: Region) -> None:
 # ---- from the mesh ------------------------------------------------------------------------------------------
 
 
-def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnified]:
+def _from_mesh(regions, settings: MagnifySettings) -> Steps[Magnified]:
     """Unwrap with the density as target; the share is that of all surfaces together."""
     parts = [_triangles(region) for region in regions]
     area = np.concatenate([a for _, a, _ in parts])
@@ -153,10 +152,10 @@ def _from_mesh(regions, settings: MagnifySettings, spare_packer) -> Steps[Magnif
         full[rows], inside[rows] = density[start : start + len(a)], w
         start += len(a)
         pins = region.pins if region.pins is not None and region.pins.pinned.any() else None
-        jobs.append(UnwrapJob(region.surface, region.faces, pins, target=Target(full, inside)))
+        jobs.append(UnwrapJob(region.surface, region.faces, pins, target=Target(full, inside), up=region.up))
     if settings.boundary == "own":
         settings = replace(settings, boundary="free")
-    layout = yield from lay_out(jobs, settings, spare_packer)
+    layout = yield from lay_out(jobs, settings)
     after = [_uv_areas(*x) for x in zip(regions, parts, layout.corners, layout.uv, strict=True)]
     shares = Shares(
         before=found.share_before,

@@ -32,13 +32,15 @@ class SubdivisionModifier:
 @dataclass(frozen=True)
 class Reading:
     """A surface, the polygons to work on (f,) bool, and of a UV layer, if there is one, the UVs (c,2) float32 and
-    which of them are pinned (c,) bool; the Subdivision Surface modifier of the object, if it has one."""
+    which of them are pinned (c,) bool; the Subdivision Surface modifier of the object, if it has one; and the direction
+    (3,) of its positions that is up in the world."""
 
     surface: Surface
     faces: np.ndarray
     uv: np.ndarray | None
     pinned: np.ndarray | None
     subdivision: SubdivisionModifier | None = None
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     @property
     def all_pins(self) -> CornerPins | None:

@@ -19,9 +19,9 @@ from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_edges
 from ..solver.parameterization.chart_indices import located
 from ..solver.parameterization.chart_pins import ChartPins, CornerPins, pins_of_chart
-from ..solver.progress import Progress, Steps, part_of
+from ..solver.progress import Steps, part_of
 from ..solver.refinement.refine import Refinement
-from .layout import Packer, PlacedIsland, Refusal, corner_uvs, grown_together, pack_islands
+from .layout import PACKING_FROM, PlacedIsland, Refusal, corner_uvs, grown_together, pack_islands
 
 # Of `Distortion`, what a report says of an island before and after.
 FIGURES = ("area_l1", "area_sd", "angle_mean", "folds")
@@ -64,7 +64,6 @@ class _RefinedIsland:
 def refine_islands(
     surfaces: Sequence[tuple[Surface, np.ndarray | None, CornerPins | None]],
     settings: RefineSettings,
-    spare_packer: Packer | None = None,
 ) -> Steps[RefinedLayout]:
     """Improve the UV islands that contain the given polygons (f,) bool of surfaces with UVs and pins.
 
@@ -75,16 +74,17 @@ def refine_islands(
     Raises
     ------
     Refusal : with the index of the surface and the MeshError that says why
-    PackingError : neither packer can place the islands
+    MarginError : the margins leave no room for the islands
     """
     found, warnings = found_islands(surfaces)
     total = sum(len(island.chart.triangles) for _, island, _ in found)
     refined, done = [], 0
+    working = PACKING_FROM if settings.pack else 1.0
     for owner, island, pins in found:
         share = len(island.chart.triangles)
         steps = _improve(island, pins, settings)
         try:
-            fixed_scale, refinement = yield from part_of(steps, done / total, share / total)
+            fixed_scale, refinement = yield from part_of(steps, working * done / total, working * share / total)
         except MeshError as error:
             raise Refusal(owner, located(_shown(error, island.chart), island.chart)) from error
         refined.append(
@@ -94,9 +94,7 @@ def refine_islands(
         done += share
     uvs = _at_one_density(refined)
     if settings.pack:
-        yield Progress("Packing", 1.0)
-        uvs, texts = _packed(refined, uvs, settings, spare_packer)
-        warnings += [(-1, text) for text in texts]
+        uvs = yield from part_of(_packed(refined, uvs, settings), PACKING_FROM, 1 - PACKING_FROM)
     placed = [
         PlacedIsland(owner=r.owner, chart=r.island.chart, uv=uv, before=r.island.uv)
         for r, uv in zip(refined, uvs, strict=True)
@@ -196,15 +194,17 @@ def _centroid(chart: Chart, uv: np.ndarray) -> np.ndarray:
     return (area[:, None] * uv[chart.triangles].mean(axis=1)).sum(axis=0) / area.sum()
 
 
-def _packed(refined: Sequence[_RefinedIsland], uvs, settings, spare_packer) -> tuple[list[np.ndarray], list[str]]:
-    """The islands without pins packed into the unit square, the others where they are, and warnings."""
+def _packed(
+    refined: Sequence[_RefinedIsland], uvs: list[np.ndarray], settings: RefineSettings
+) -> Steps[list[np.ndarray]]:
+    """The islands without pins packed into the unit square, the others where they are."""
     loose = [k for k, r in enumerate(refined) if r.pins is None and not r.fixed_scale]
     triangles = [refined[k].island.chart.triangles for k in loose]
-    packed, warning = pack_islands([uvs[k] for k in loose], triangles, settings, spare_packer)
+    packed = yield from pack_islands([uvs[k] for k in loose], triangles, settings)
     result = list(uvs)
     for k, uv in zip(loose, packed.islands, strict=True):
         result[k] = uv
-    return result, [warning] if warning else []
+    return result
 
 
 def _report(refined: _RefinedIsland, uv: np.ndarray) -> dict:

@@ -11,14 +11,16 @@ from scipy.sparse.csgraph import connected_components
 
 from ..settings import Settings
 from ..solver.errors import MeshError
+from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
+from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.topology import twins
 from ..solver.parameterization.options import UnwrapOptions
 from ..solver.parameterization.unwrap import SurfaceMap, unwrap
-from ..solver.progress import Progress, Steps, part_of
-from ..xatlas.segmentation import SegmentationError, chart_seams
-from .layout import Layout, Packer, PlacedIsland, Refusal, UnwrapJob, corner_uvs, pack_islands
+from ..solver.progress import Steps, part_of
+from .layout import PACKING_FROM, Layout, PlacedIsland, Refusal, UnwrapJob, corner_uvs, pack_islands
 from .subdivision import refinable, refined_on_subdivision, subdivided_target
+from .xatlas_charts import SegmentationError, chart_seams
 
 # Share of the time that the cage's own maps take where those of its subdivided surface follow.
 CAGE_SHARE = 0.5
@@ -27,31 +29,31 @@ CAGE_SHARE = 0.5
 def lay_out(
     jobs: Sequence[UnwrapJob],
     settings: Settings,
-    spare_packer: Packer | None = None,
 ) -> Steps[Layout]:
     """Unwrap surfaces at one texel density into one unit square.
 
     Solver results have the area of the surface, or of the target, so packing with a single scale gives every island
-    of every surface the same texels per area. `spare_packer` takes over, with a warning, where xatlas cannot. Islands
-    with pins are neither scaled nor packed, as in Blender, and the others are packed as if they were not there.
+    of every surface the same texels per area. Islands are turned upright. Those
+    with pins are neither turned, scaled nor packed, as in Blender; the others are packed as if they were not there, or,
+    by `settings.pack_around`, around them and around what the surfaces have beside the polygons that are unwrapped.
 
     Raises
     ------
     Refusal : with the index of the surface and the MeshError that says why
-    PackingError : neither packer can place the islands
+    MarginError : the margins leave no room for the islands
     """
     options = UnwrapOptions(**settings.unwrap_arguments())
     maps: list[SurfaceMap] = []
     warnings: list[tuple[int, str]] = []
+    share = PACKING_FROM / len(jobs)
     for index, job in enumerate(jobs):
         try:
             job, warning = _with_charts(job) if settings.seams == "charts" else (job, "")
-            maps.append((yield from part_of(_unwrapped(job, options), index / len(jobs), 1 / len(jobs))))
+            maps.append((yield from part_of(_unwrapped(job, options), index * share, share)))
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for text in (warning, *maps[-1].warnings) if text]
         warnings += [(index, text) for chart_map in maps[-1].maps for text in chart_map.warnings]
-    yield Progress("Packing", 1.0)
     mapped = [
         PlacedIsland(index, chart, chart_map.uv)
         for index, surface_map in enumerate(maps)
@@ -59,16 +61,32 @@ def lay_out(
     ]
     pinned = [chart_map.pinned for surface_map in maps for chart_map in surface_map.maps]
     free = [island for island, stays in zip(mapped, pinned, strict=True) if not stays]
-    if len(free) < len(mapped):
-        warnings.append((-1, _in_place(len(mapped) - len(free), len(free))))
+    staying = [island for island, stays in zip(mapped, pinned, strict=True) if stays]
+    around = []
+    if settings.pack_around:
+        around = [(i.uv, i.chart.triangles) for i in staying] + [x for job in jobs for x in _beside(job)]
+    elif staying:
+        warnings.append((-1, _in_place(len(staying), len(free))))
     triangles = [_connected_triangles(island.chart) for island in free]
-    packed, warning = pack_islands([island.uv for island in free], triangles, settings, spare_packer)
-    if warning:
-        warnings.append((-1, warning))
+    upright = turn_upright([i.chart for i in free], [i.uv for i in free], [jobs[i.owner].up for i in free])
+    steps = pack_islands(upright, triangles, settings, around)
+    packed = yield from part_of(steps, PACKING_FROM, 1 - PACKING_FROM)
     packed_uv = iter(packed.islands)
     placed = [i if stays else replace(i, uv=next(packed_uv)) for i, stays in zip(mapped, pinned, strict=True)]
     corners, uv = corner_uvs(len(maps), placed)
     return Layout(corners=corners, uv=uv, maps=maps, packing=packed, warnings=warnings)
+
+
+def _beside(job: UnwrapJob) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Corners (3k,2) and triangles (k,3) of the polygons that have UVs and are not unwrapped, each by itself."""
+    if job.uv is None or job.faces is None or job.faces.all():
+        return []
+    corners = job.surface.triangles[~job.faces[job.surface.triangle_face]]
+    points = np.asarray(job.uv, dtype=float)[corners]
+    area = signed_areas(points.reshape(-1, 2), np.arange(corners.size).reshape(-1, 3))
+    # Faces that are mirrored in the map are outlined the other way round.
+    points = np.where((area < 0)[:, None, None], points[:, ::-1], points)[area != 0]
+    return [(points.reshape(-1, 2), np.arange(points.shape[0] * 3).reshape(-1, 3))] if len(points) else []
 
 
 def _unwrapped(job: UnwrapJob, options: UnwrapOptions) -> Steps[SurfaceMap]:

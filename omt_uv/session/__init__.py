@@ -1,7 +1,7 @@
 """What goes on in Blender's window: the solver that runs, islands that follow the mouse, the last result, presets.
 
 Imports pipelines, blender and, of the solver, editing and parameterization.
-Main names: Run, Disturbed, aside, in_front, Session, Summary, figures.
+Main names: Run, Disturbed, aside, Session, Summary, figures.
 """
 
 from ..solver.lazy import lazy
@@ -10,5 +10,5 @@ __getattr__, __all__ = lazy(
     __name__,
     last_run="Summary figures",
     live="Session",
-    run="Disturbed Run aside in_front",
+    run="Disturbed Run aside",
 )

@@ -7,10 +7,7 @@ its own (`aside`); whatever touches Blender stays in front.
 from __future__ import annotations
 
 import gc
-import queue
-import threading
 import time
-from collections.abc import Callable
 
 import bpy
 
@@ -47,7 +44,6 @@ class Run:
 
         begin = time.monotonic()
         self._watch.check()
-        serve()
         more = True
         while more:
             try:
@@ -120,7 +116,6 @@ class Watch:
 current: Run | None = None
 # Whether solvers may work on a thread of their own; a preference.
 threads = True
-_calls: queue.SimpleQueue = queue.SimpleQueue()
 
 
 # Solvers at work on threads of their own; those of runs that were cancelled end a little later.
@@ -159,31 +154,3 @@ def _collecting(steps):
             return stop.value
         gc.collect(0)
         yield progress
-
-
-def in_front(function: Callable) -> Callable:
-    """A function that touches Blender, for solvers that may run aside: they wait until the next slice calls it."""
-
-    def call(*arguments):
-        if threading.current_thread() is threading.main_thread():
-            return function(*arguments)
-        answer: queue.SimpleQueue = queue.SimpleQueue()
-        _calls.put((current, function, arguments, answer))
-        value, error = answer.get()
-        if error is not None:
-            raise error
-        return value
-
-    return call
-
-
-def serve() -> None:
-    """Make the calls that the solver of the present run has asked for, and refuse those of runs that are over."""
-    while not _calls.empty():
-        run, function, arguments, answer = _calls.get()
-        try:
-            if run is None or run is not current:
-                raise Disturbed("The run was cancelled")
-            answer.put((function(*arguments), None))
-        except Exception as error:  # noqa: BLE001, it belongs to the one who asked
-            answer.put((None, error))

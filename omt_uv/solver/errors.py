@@ -239,3 +239,9 @@ def positive_density(density: np.ndarray) -> np.ndarray:
     if len(wrong):
         raise DensityError("A density is not positive and finite", kind="face", elements=wrong)
     return density
+
+
+class MarginError(MeshError):
+    """The margins leave no room for the islands."""
+
+    remedy = "Lower the margin or raise the texture size"

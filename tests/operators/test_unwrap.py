@@ -353,28 +353,6 @@ def test_other_modifiers_do_not_matter():
     assert (scenes.uv_of(obj) == expected).all()
 
 
-def test_where_xatlas_fails_blender_packs_and_says_so(package, monkeypatch):
-    packing = package("xatlas.packing")
-
-    def fail(*_):
-        raise packing.PackingError("xatlas failed: on purpose")
-
-    monkeypatch.setattr(packing, "_place", fail)
-    a, b = scenes.bump(name="A"), scenes.cube()
-    scenes.edit(a)
-    scenes.leave_edit()
-    scenes.select([a, b])
-    unwrap(margin=8)
-    for obj in (a, b):
-        assert_inside(obj)
-    assert density(a) == pytest.approx(density(b), rel=1e-3)
-    corners = np.concatenate([scenes.triangles_of(obj)[1] for obj in (a, b)])
-    owner = np.repeat([0, 1], [len(scenes.areas(obj)[0]) for obj in (a, b)])
-    assert nearest_of_different_owner(corners, owner) >= 0.9 * 8 / 1024
-    assert len(bpy.data.scenes) == 1
-    assert {obj.name for obj in bpy.data.objects} == {"A", "Cube"}
-
-
 def test_menus_show_the_operators_once():
     for name in ("IMAGE_MT_uvs_unwrap", "VIEW3D_MT_object"):
         functions = getattr(bpy.types, name).draw._draw_funcs

@@ -106,7 +106,6 @@ def test_every_layout_is_whole_or_refused_by_name(seams):
     from omt_uv.pipelines.layout import Refusal, UnwrapJob
     from omt_uv.pipelines.unwrap import lay_out
     from omt_uv.settings import Settings
-    from omt_uv.xatlas import packing
 
     for seed in range(300, 316):
         surface, faces, _ = broken_mesh(seed)
@@ -114,7 +113,7 @@ def test_every_layout_is_whole_or_refused_by_name(seams):
         settings = Settings("free", "draft", texture_size=256, seams=seams, max_shear=bound)
         before = arrays(surface)
         try:
-            layout = drain(lay_out([UnwrapJob(surface, faces)], settings, lambda islands, *_: packing.stack(islands)))
+            layout = drain(lay_out([UnwrapJob(surface, faces)], settings))
         except Refusal as refusal:
             check_error(refusal.error, surface)
         else:

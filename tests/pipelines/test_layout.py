@@ -13,7 +13,6 @@ from omt_uv.solver.errors import EmptyMeshError
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
-from omt_uv.xatlas import packing
 
 
 def square(shift=(0.0, 0.0), owner=0):
@@ -25,40 +24,18 @@ def square(shift=(0.0, 0.0), owner=0):
 
 def test_every_udim_tile_has_its_own_origin_and_holds_what_the_first_holds():
     island = square()
-    first, _ = pack_islands([island.uv], [island.chart.triangles], Settings(), None)
+    first = drain(pack_islands([island.uv], [island.chart.triangles], Settings()))
     origins = set()
     for tile in range(FIRST_TILE, FIRST_TILE + 100):
         settings = Settings(tile=tile)
-        found, warning = pack_islands([island.uv], [island.chart.triangles], settings, None)
-        assert warning == "" and np.array_equal(found.islands[0], first.islands[0] + settings.tile_origin)
+        found = drain(pack_islands([island.uv], [island.chart.triangles], settings))
+        assert np.array_equal(found.islands[0], first.islands[0] + settings.tile_origin)
         origins.add(settings.tile_origin)
     assert origins == {(column, row) for column in range(10) for row in range(10)}
 
 
 def test_nothing_to_pack_is_packed_as_nothing():
-    found, warning = pack_islands([], [], Settings(), None)
-    assert found.islands == [] and warning == ""
-
-
-def test_the_spare_packer_takes_over_where_the_packer_fails_but_not_where_margins_do(monkeypatch):
-    island = square()
-    arguments = [island.uv], [island.chart.triangles], Settings(margin=5)
-
-    def fail(*_):
-        raise packing.PackingError("no packer")
-
-    def spare(islands, triangles, margin, texture_size):
-        assert margin == 5 and len(triangles) == 1
-        return packing.stack(islands)
-
-    monkeypatch.setattr(packing, "pack", fail)
-    found, warning = pack_islands(*arguments, spare)
-    assert warning == "no packer; packed with none instead" and len(found.islands) == 1
-    with pytest.raises(packing.PackingError):
-        pack_islands(*arguments, None)
-    monkeypatch.undo()
-    with pytest.raises(packing.MarginError):
-        pack_islands(*arguments[:2], Settings(margin=600), spare)
+    assert drain(pack_islands([], [], Settings())).islands == []
 
 
 def test_corners_come_once_and_in_order_also_where_a_surface_has_no_island():
@@ -90,7 +67,6 @@ def test_a_refusal_is_what_a_user_can_mend_and_names_the_surface():
 
 
 def test_different_surfaces_in_one_run_have_one_texel_density():
-    pytest.importorskip("xatlas")
     surfaces = [meshes.grid(4, 4), meshes.hemisphere(5, 16), meshes.cone(4, 12)]
     layout = drain(lay_out([UnwrapJob(triangle_surface(V, F)) for V, F in surfaces], Settings(quality="draft")))
     ratio = []

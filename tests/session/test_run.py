@@ -242,27 +242,6 @@ def test_a_solver_aside_complains_as_any_other(threads):
     assert operator.reports[0][0] == {"ERROR"}
 
 
-def test_the_spare_packer_is_called_in_front(threads, package, monkeypatch):
-    """Blender's own packer must not run on another thread."""
-    packing, spare = package("xatlas.packing"), package("blender.uv_packer")
-    seen, own = [], spare.pack
-
-    def broken(*_, **__):
-        raise packing.PackingError("xatlas failed")
-
-    def watched(*arguments):
-        seen.append(threading.current_thread() is threading.main_thread())
-        return own(*arguments)
-
-    monkeypatch.setattr(packing, "pack", broken)
-    monkeypatch.setattr(spare, "pack", watched)
-    scene("uv.omt_unwrap", "OBJECT")
-    operator = scenes.stand_in("uv.omt_unwrap")
-    assert step(operator) == {"FINISHED"}
-    assert seen == [True]
-    assert "packed with" in operator.reports[0][1]
-
-
 def test_bad_input_is_refused_in_the_first_slice():
     bpy.ops.mesh.primitive_cube_add()
     operator = scenes.stand_in("uv.omt_unwrap", seams="EXISTING")

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from omt_uv.xatlas import packing
-from omt_uv.xatlas.packing import MarginError, pack, stack, turn_upright
+from omt_uv.solver.errors import MarginError
+from omt_uv.solver.packing import pack_square
+from omt_uv.solver.packing.pack_square import stack
+from omt_uv.solver.progress import drain
 
 FAN = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])
+
+
+def pack(*arguments):
+    return drain(pack_square.pack(*arguments))
 
 
 def corner(width, height, angle=0.0):
@@ -76,7 +80,7 @@ def test_one_scale_and_no_mirror_image():
 
 
 def test_many_slim_islands_fill_the_square():
-    """Left to choose a scale, xatlas fills a strip of the square, and a twelfth of it: hair cards."""
+    """Hair cards, most of which are packed in blocks."""
     rng = np.random.default_rng(0)
     sizes = rng.uniform([0.03, 0.1], [0.05, 0.8], (500, 2))
     islands = [np.array([[0, 0], [w, 0], [w, h], [0, h]]) for w, h in sizes]
@@ -102,7 +106,7 @@ def test_very_different_sizes():
 
 
 def test_specks_do_not_make_the_others_smaller():
-    """xatlas drops them, and what it says about their size stands for nothing."""
+    """They are smaller than a cell of the raster."""
     islands = corners(20)
     plain, more = pack(islands, [FAN] * 20), pack([*islands, *corners(5, 1, 1e-7)], [FAN] * 25)
     assert more.scale > 0.8 * plain.scale
@@ -122,22 +126,6 @@ def test_margins_that_leave_no_room(margin, texture_size, count):
         pack(corners(count), [FAN] * count, margin, texture_size)
 
 
-def test_smallest_rectangle():
-    points = corner(1, 10, 0.4)
-    upright = turn_upright(points)
-    size = np.ptp(upright, axis=0)
-    assert size[0] < size[1]
-    best = min(np.prod(np.ptp(points @ rotation(a).T, axis=0)) for a in np.linspace(0, np.pi, 2000))
-    assert np.prod(size) <= best * (1 + 1e-9)
-    assert turn_upright(np.zeros((3, 2))).shape == (3, 2)
-
-
-@pytest.mark.parametrize("turn", np.linspace(0, 6, 5))
-def test_of_rectangles_of_one_area_the_shortest(turn):
-    upright = turn_upright(np.array([[0, 0], [4, 0], [1, 2.0]]) @ rotation(turn).T)
-    np.testing.assert_allclose(np.ptp(upright, axis=0), [5**0.5, 8 / 5**0.5])
-
-
 def test_stack_centres_at_one_scale():
     islands = corners(5)
     result = stack(islands)
@@ -146,12 +134,6 @@ def test_stack_centres_at_one_scale():
     for before, after in zip(islands, result.islands, strict=True):
         np.testing.assert_allclose(0.5 * (after.min(axis=0) + after.max(axis=0)), 0.5)
         np.testing.assert_allclose(np.ptp(after, axis=0), result.scale * np.ptp(before, axis=0))
-
-
-def test_without_xatlas(monkeypatch):
-    monkeypatch.setitem(sys.modules, "xatlas", None)
-    with pytest.raises(packing.PackingError, match="xatlas"):
-        pack(corners(2), [FAN] * 2)
 
 
 def test_slivers_that_single_precision_turns_over_tear_no_island():
@@ -164,9 +146,3 @@ def test_slivers_that_single_precision_turns_over_tear_no_island():
     centre = [(p.min(axis=0) + p.max(axis=0)) / 2 for p in islands]
     for i, j in ((0, 1), (0, 2), (1, 2)):
         assert np.linalg.norm(centre[i] - centre[j]) > radius[i] + radius[j] + 3.9 / 1024
-
-
-def test_smallest_rectangle_of_a_round_outline():
-    turn = 2 * np.pi * np.arange(8192) / 8192
-    points = np.column_stack([np.cos(turn), 2 * np.sin(turn)]) @ rotation(0.3).T
-    np.testing.assert_allclose(np.ptp(turn_upright(points), axis=0), [2, 4], rtol=1e-5)

@@ -1,0 +1,163 @@
+"""Turn islands as an artist lays them: edges along the axes, and up in the world up in the map.
+
+The direction of an island's edges is the one, up to quarter turns, in which most length of polygon sides lies. Up in
+the map is the mean gradient of the height over the island.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mesh.charts import Chart
+from ..mesh.geometry import signed_areas
+from ..mesh.topology import halfedges, pair_keys, pair_up
+
+# Directions of edges, up to quarter turns, are counted in so many bins of half a degree.
+BINS = 180
+# Edges that differ from a direction by so many bins at most lie along it: 1.5 degrees.
+NEAR = 3
+# Share of the length of all sides along one direction that makes it the direction of an island. Directions without
+# any order put 0.04 there, three families of parallel edges 0.33, hand-made grids 0.5 and more.
+DOMINANT = 0.3
+# Share of the outline along one direction from which on the outline alone decides: squares, nets.
+STRAIGHT = 0.5
+# Heights have a direction in the map where their gradients add up to this share of what they would in parallel, ...
+PARALLEL = 0.1
+# ... and are this steep in the mean, next to an upright wall.
+STEEP = 0.1
+QUARTER = np.pi / 2
+
+
+@dataclass(frozen=True)
+class _Islands:
+    """Islands in arrays of their own: points (n,3), uv (n,2), triangles (m,3), polygons (m,) and owner (m,), of `count`
+    islands; no two share a vertex or a polygon."""
+
+    points: np.ndarray
+    uv: np.ndarray
+    triangles: np.ndarray
+    polygons: np.ndarray
+    owner: np.ndarray
+    count: int
+
+
+def turn_upright(
+    charts: Sequence[Chart], maps: Sequence[np.ndarray], up: Sequence[Sequence[float]]
+) -> list[np.ndarray]:
+    """Maps (n_i,2) of charts, each turned about the origin so that it lies straight, with `up` (3,) upwards.
+
+    Where most of the heights cancel or the island lies level, the second and third axis of space stand for `up`. An
+    island without a direction of edges is turned until its mean `up` is upright; one without either keeps its turn up
+    to quarters.
+    """
+    if not maps:
+        return []
+    angle = upright_angles(_together(charts, maps), np.asarray(up, dtype=float))
+    c, s = np.cos(angle), np.sin(angle)
+    turns = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
+    return [uv @ turn for uv, turn in zip(maps, turns, strict=True)]
+
+
+def upright_angles(islands: _Islands, up: np.ndarray) -> np.ndarray:
+    """Angle (k,) by which to turn each island counterclockwise, for its direction `up` (k,3) in space."""
+    share, edges = _edge_directions(islands)
+    upward = _upward(islands, up)
+    defined = np.isfinite(upward)
+    straight = share >= DOMINANT
+    # From the edges' direction to the vertical, by the number of quarters that leaves up nearest to it.
+    snapped = QUARTER - edges
+    error = np.where(defined, upward, QUARTER) + snapped - QUARTER
+    snapped = snapped - QUARTER * np.round(error / QUARTER)
+    free = np.where(defined, QUARTER - upward, 0.0)
+    return np.where(straight, np.where(defined, snapped, -_least_turn(edges)), free)
+
+
+def _least_turn(direction: np.ndarray) -> np.ndarray:
+    """Directions (k,) up to quarter turns, as the angle nearest to 0."""
+    return direction - QUARTER * np.round(direction / QUARTER)
+
+
+def _together(charts: Sequence[Chart], maps: Sequence[np.ndarray]) -> _Islands:
+    sizes = np.array([len(c.triangles) for c in charts])
+    first_vertex = np.cumsum([0, *(len(c.vertices) for c in charts)])[:-1]
+    owner = np.repeat(np.arange(len(charts)), sizes)
+    polygons = np.concatenate([c.faces for c in charts])
+    # Charts of several surfaces may have polygons of the same number.
+    _, polygons = np.unique(owner * (int(polygons.max(initial=0)) + 1) + polygons, return_inverse=True)
+    return _Islands(
+        points=np.concatenate([c.vertices for c in charts]),
+        uv=np.concatenate(list(maps)),
+        triangles=np.concatenate([c.triangles for c in charts]) + first_vertex[owner][:, None],
+        polygons=polygons,
+        owner=owner,
+        count=len(charts),
+    )
+
+
+def _edge_directions(islands: _Islands) -> tuple[np.ndarray, np.ndarray]:
+    """Share (k,) of the length of sides along one direction up to quarter turns, and that direction (k,).
+
+    Sides are those of the outline where it is straight enough, else those of all polygons.
+    """
+    tail, head = halfedges(islands.triangles)
+    face = np.repeat(islands.polygons, 3)
+    first, second = pair_up(pair_keys(tail, head))
+    outline = np.ones(len(tail), dtype=bool)
+    outline[first] = outline[second] = False
+    side = outline.copy()
+    side[first] = face[first] != face[second]
+    (share, direction), (straight, along) = (_main_direction(islands, tail, head, x) for x in (side, outline))
+    own = straight >= STRAIGHT
+    return np.where(own, straight, share), np.where(own, along, direction)
+
+
+def _main_direction(islands: _Islands, tail, head, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Share (k,) of the length of the halfedges `side` (3m,) bool along one direction, and that direction (k,)."""
+    owner = np.repeat(islands.owner, 3)[side]
+    along = islands.uv[head[side]] - islands.uv[tail[side]]
+    length = np.hypot(*along.T)
+    angle = np.mod(np.arctan2(along[:, 1], along[:, 0]), QUARTER)
+    cell = np.minimum((angle * (BINS / QUARTER)).astype(np.int64), BINS - 1)
+    counts = np.bincount(owner * BINS + cell, length, islands.count * BINS).reshape(-1, BINS)
+    total = np.maximum(counts.sum(axis=1), np.finfo(float).tiny)
+    near = np.sum([np.roll(counts, shift, axis=1) for shift in range(-NEAR, NEAR + 1)], axis=0)
+    # Of bins with the same edges around them the one that has most itself.
+    best = np.argmax(near + 1e-6 * counts, axis=1)
+    share = near[np.arange(islands.count), best] / total
+    # The mean of four times the angle, of the edges near the best bin.
+    off = np.abs(np.mod(cell - best[owner] + BINS // 2, BINS) - BINS // 2)
+    weight = np.where(off <= NEAR, length, 0.0)
+    x, y = (np.bincount(owner, weight * f(4 * angle), islands.count) for f in (np.cos, np.sin))
+    return share, np.arctan2(y, x) / 4
+
+
+def _upward(islands: _Islands, up: np.ndarray) -> np.ndarray:
+    """Direction (k,) in the map in which the islands rise in space; nan for those that do not rise anywhere."""
+    corner = islands.uv[islands.triangles]
+    area = signed_areas(islands.uv, islands.triangles)
+    # Gradient times area, from the heights at the corners and the sides across from them, turned.
+    side = 0.5 * (corner[:, [2, 0, 1]] - corner[:, [1, 2, 0]])
+    normal = np.stack([-side[..., 1], side[..., 0]], axis=-1)
+    whole = np.maximum(np.bincount(islands.owner, np.abs(area), islands.count), np.finfo(float).tiny)
+    upward = np.full(islands.count, np.nan)
+    # A wall rises by 1 per length where the map is as large as the surface.
+    for axis in (up, *_level(up)):
+        height = np.einsum("mkd,md->mk", islands.points[islands.triangles], axis[islands.owner])
+        rise = np.einsum("mk,mkd->md", height, normal) * np.sign(area)[:, None]
+        total = np.stack([np.bincount(islands.owner, rise[:, d], islands.count) for d in range(2)], axis=1)
+        size = np.bincount(islands.owner, np.hypot(*rise.T), islands.count)
+        sure = (np.hypot(*total.T) >= PARALLEL * size) & (size >= STEEP * whole)
+        upward = np.where(np.isnan(upward) & sure, np.arctan2(total[:, 1], total[:, 0]), upward)
+    return upward
+
+
+def _level(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two level directions (k,3) each, away from the viewer and to the right, as seen from above with `up` (k,3)."""
+    away = np.eye(3)[np.where(np.abs(up[:, 1]) < np.abs(up).max(axis=1), 1, 2)]
+    right = np.cross(away, up)
+    size = np.linalg.norm(right, axis=1, keepdims=True)
+    right /= np.where(size > 0, size, 1)
+    return np.cross(up, right), right

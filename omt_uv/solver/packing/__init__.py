@@ -1,0 +1,16 @@
+"""Islands packed into a square: on a raster, as large as a search finds them to fit, around what has to stay.
+
+Imports solver.errors, solver.mesh and solver.progress.
+Main names: pack, Packing, stack, covered_area, MarginError.
+"""
+
+from ..lazy import lazy
+
+__getattr__, __all__ = lazy(
+    __name__,
+    outline_raster="IslandOutline outline_of grown_cells",
+    pack_square="MarginError Packing covered_area pack stack",
+    placement="Item Turned place turned_masks",
+    raster_grid="RasterGrid runs_of",
+    shelves="Block blocks_of",
+)

@@ -1,0 +1,344 @@
+"""Pack islands into the unit square, as large as a search for the scale and the order finds them to fit.
+
+One scale for all, a margin in pixels that is kept exactly, no island mirrored, and none turned but by quarters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import MarginError
+from ..mesh.geometry import signed_areas
+from ..progress import Progress, Steps, part_of
+from .outline_raster import IslandOutline, grown_cells, outline_of
+from .placement import Item, Place, place, turned_masks
+from .raster_grid import RasterGrid
+from .shelves import Block, blocks_of
+
+# Cells along a side of the raster on which a scale is looked for, ...
+COARSE = 256
+# ... and of the one on which the islands are placed in the end, ...
+FINE = 512
+# ... at a scale that is greater by this factor at most: what half a cell around every island was worth.
+FINER = 1.1
+# What is placed on the raster, at most: of more islands the smallest go into blocks, which are placed as one.
+MOST_ITEMS = 128
+# Of these so many are blocks.
+BLOCKS = 64
+# Islands with less than this share of the area of all may be turned by quarters; larger ones are the picture.
+SMALL = 0.2
+# The first scale fills this share of the square; then smaller ones by this factor until one fits.
+FIRST_SHARE = 0.75
+SMALLER = 0.93
+# Larger scales are tried up to this factor, which is halved with every one that does not fit, down to the other.
+LARGER = 1.04
+EXACT = 1.004
+# A scale this much below the first one that was tried is none: the margins fill the square.
+LEAST_SCALE = 1e-3
+# Orders that are tried at a scale: what found no room comes first in the next. On the finer raster, which costs eight
+# times as much, they are fewer.
+ORDERS = 3
+FINE_ORDERS = 2
+# Another order is tried if this share of all cells found a place.
+HOPEFUL = 0.8
+# Larger scales are given up after so many that did not fit, on either raster.
+TIRED = 4
+FINE_TIRED = 2
+# Boxes of islands that go into blocks are so much apart, in cells, at least.
+APART = 1e-6
+
+
+@dataclass(frozen=True)
+class Packing:
+    """Islands (n_i,2) in the unit square, `scale` from input to UV length, the packer's name, used area share."""
+
+    islands: list[np.ndarray]
+    scale: float
+    packer: str
+    coverage: float
+
+
+@dataclass(frozen=True)
+class _PackTask:
+    """Outlines of islands, their triangles' area, and what the square is: pixels, margin, and outlines that stay."""
+
+    outlines: list[IslandOutline]
+    areas: np.ndarray
+    low: np.ndarray
+    sizes: np.ndarray
+    margin: float
+    texture_size: int
+    raster: int
+    staying: list[IslandOutline]
+
+    @property
+    def cells_per_pixel(self) -> float:
+        """Cells of the raster per pixel: half of the margin around the square is the islands' own growth."""
+        return self.raster / (self.texture_size - self.margin)
+
+    @property
+    def tries(self) -> tuple[int, int]:
+        """Orders at a scale, and scales that do not fit, before the search gives up."""
+        return (ORDERS, TIRED) if self.raster == COARSE else (FINE_ORDERS, FINE_TIRED)
+
+    @property
+    def growth(self) -> float:
+        """Half of the margin, in cells."""
+        return 0.5 * self.margin * self.cells_per_pixel
+
+
+@dataclass(frozen=True)
+class _Raster:
+    """Items at a scale in cells per length: single islands with the lower left cell of each, then blocks."""
+
+    items: list[Item]
+    single: np.ndarray
+    corners: np.ndarray
+    blocks: list[Block]
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Places of the items of a raster at a scale, and the order in which they were found."""
+
+    task: _PackTask
+    scale: float
+    raster: _Raster
+    places: list[Place]
+    order: list[int]
+
+
+def pack(
+    islands: Sequence[np.ndarray],
+    triangles: Sequence[np.ndarray],
+    margin: float = 4,
+    texture_size: int = 1024,
+    around: Sequence[tuple[np.ndarray, np.ndarray]] = (),
+) -> Steps[Packing]:
+    """Place islands in the unit square without overlap, all scaled by the same factor.
+
+    A single island is centred and never turned.
+
+    Parameters
+    ----------
+    islands : (n_i,2) positions in one common unit of length
+    triangles : (m_i,3) vertex indices; vertices that none uses come to lie in the middle of their island
+    margin : least distance between islands and to the border, in pixels
+    texture_size : pixels along a side of the unit square
+    around : points (n,2) and triangles (m,3), of islands that stay in the unit square as they are
+
+    Raises
+    ------
+    MarginError : the margins alone fill the texture
+    """
+    if 2 * margin >= texture_size:
+        raise MarginError(f"A margin of {margin:g} pixels fills a texture of {texture_size} pixels")
+    # What no triangle uses, as the centres of filled holes, is not placed.
+    used = list(map(np.unique, triangles))
+    points = [p[u] for p, u in zip(islands, used, strict=True)]
+    faces = [np.searchsorted(u, t) for u, t in zip(used, triangles, strict=True)]
+    if len(points) == 1 and not len(around):
+        placed, scale = _alone(points[0], (texture_size - 2 * margin) / texture_size)
+    else:
+        task = _task(points, faces, margin, texture_size, around)
+        found = yield from _search(task)
+        placed, scale = _filled(_placed(points, found), found.task, found.scale)
+    whole = [_spread(p, u, len(i)) for p, u, i in zip(placed, used, islands, strict=True)]
+    return Packing(whole, scale, "raster", covered_area(placed, faces))
+
+
+def stack(islands: Sequence[np.ndarray]) -> Packing:
+    """Islands centred one upon the other, all at the scale at which the largest fits the unit square."""
+    size = max(float(np.ptp(p, axis=0).max()) for p in islands)
+    centred = [(p - 0.5 * (p.min(axis=0) + p.max(axis=0))) / size + 0.5 for p in islands]
+    return Packing([np.clip(p, 0, 1) for p in centred], 1 / size, "none", float("nan"))
+
+
+def covered_area(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> float:
+    """Share of the unit square that islands (n_i,2) without overlap cover."""
+    return float(sum(_area(uv, index) for uv, index in zip(islands, triangles, strict=True)))
+
+
+def _area(points: np.ndarray, triangles: np.ndarray) -> float:
+    return float(np.abs(signed_areas(points, triangles)).sum())
+
+
+def _spread(points: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
+    """Points (k,2) in rows (k,) of (count,2), and their middle in all others."""
+    if len(rows) == count:
+        return points
+    result = np.tile(points.mean(axis=0), (count, 1))
+    result[rows] = points
+    return result
+
+
+def _alone(points: np.ndarray, width: float) -> tuple[list[np.ndarray], float]:
+    """One island (n,2) in the middle of the unit square, as large as a square of this width allows, and its scale."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    scale = width / float((high - low).max())
+    return [(points - 0.5 * (low + high)) * scale + 0.5], scale
+
+
+def _task(points, faces, margin: float, texture_size: int, around) -> _PackTask:
+    low = np.array([p.min(axis=0) for p in points])
+    pixels = texture_size / (texture_size - margin)
+    # The square is the raster, and half of the margin around it belongs to the growth of the islands.
+    staying = [outline_of((p * texture_size - 0.5 * margin) * (COARSE / texture_size) * pixels, t) for p, t in around]
+    return _PackTask(
+        outlines=[outline_of(p, t) for p, t in zip(points, faces, strict=True)],
+        areas=np.array([_area(p, t) for p, t in zip(points, faces, strict=True)]),
+        low=low,
+        sizes=np.array([p.max(axis=0) for p in points]) - low,
+        margin=margin,
+        texture_size=texture_size,
+        raster=COARSE,
+        staying=staying,
+    )
+
+
+def _search(task: _PackTask) -> Steps[_Found]:
+    """The largest scale that is found to fit on a coarse raster, and then from there on a finer one."""
+    found = yield from part_of(_first(task), 0.0, 0.2)
+    found = yield from part_of(_larger(found, np.inf), 0.2, 0.3)
+    finer = replace(task, raster=FINE, staying=[s.scaled(FINE / COARSE, np.zeros(2)) for s in task.staying])
+    start = replace(found, task=finer, scale=found.scale * FINE / COARSE)
+    better = yield from part_of(_larger(start, FINER), 0.5, 0.5)
+    return found if better is start else better
+
+
+def _first(task: _PackTask) -> Steps[_Found]:
+    """Any scale that fits: smaller ones are tried until one does.
+
+    Raises
+    ------
+    MarginError : none does
+    """
+    free = task.raster**2 - int(_grid(task, 0).taken.sum())
+    longest = float(task.sizes.min(axis=1).max())
+    start = min(np.sqrt(free / task.areas.sum()), (task.raster - 2 * task.growth) / longest)
+    order: list[int] = []
+    scale = start * np.sqrt(FIRST_SHARE)
+    while scale >= LEAST_SCALE * start:
+        yield Progress("Packing", 0.0)
+        found, order = _fit(task, scale, order)
+        if found is not None:
+            return found
+        scale *= SMALLER
+    raise MarginError(f"No room for {len(task.outlines)} islands with a margin of {task.margin:g} pixels")
+
+
+def _larger(found: _Found, most: float) -> Steps[_Found]:
+    """Larger scales than one that fits, by a factor of `most` at most, until too many in a row do not fit.
+
+    What is found is on the raster of the task of `found`, if anything is: otherwise it is what was given.
+    """
+    task, order, scale = found.task, found.order, found.scale
+    fails, tries, best = most * scale, 0, found
+    tired = task.tries[1]
+    while tries < tired and fails > EXACT * scale:
+        yield Progress("Packing", tries / tired)
+        tried = min(np.sqrt(scale * fails), LARGER * scale)
+        new, order = _fit(task, tried, order)
+        if new is None:
+            fails, tries = tried, tries + 1
+        else:
+            best, scale, order = new, tried, new.order
+    return best
+
+
+def _fit(task: _PackTask, scale: float, order: list[int]) -> tuple[_Found | None, list[int]]:
+    """The items placed at a scale, if a few orders find them a place; and the order that was tried last."""
+    raster = _rasterised(task, scale)
+    if len(order) != len(raster.items):
+        order = np.argsort([-np.prod(i.turns[0].mask.shape) for i in raster.items], kind="stable").tolist()
+    widest = max(item.widest for item in raster.items)
+    cells = np.array([item.cells for item in raster.items])
+    if cells.sum() > task.raster**2 or widest > task.raster:
+        return None, order
+    for _ in range(task.tries[0]):
+        places, stuck = place(raster.items, order, _grid(task, widest))
+        if places:
+            return _Found(task, scale, raster, places, order), order
+        hopeless = cells[order[: order.index(stuck)]].sum() < HOPEFUL * cells.sum()
+        order = [stuck, *(k for k in order if k != stuck)]
+        if hopeless:
+            break
+    return None, order
+
+
+def _grid(task: _PackTask, widest: int) -> RasterGrid:
+    """An empty raster but for the islands that stay."""
+    grid = RasterGrid(task.raster, widest + 8)
+    for outline in task.staying:
+        cells, low = grown_cells(outline, task.growth)
+        first = np.maximum(low, 0)
+        last = np.minimum(low + cells.shape[::-1], task.raster)
+        if (last > first).all():
+            rows, columns = (slice(a, b) for a, b in zip((first - low)[::-1], (last - low)[::-1], strict=True))
+            grid.take(cells[rows, columns], int(first[0]), int(first[1]))
+    return grid
+
+
+def _rasterised(task: _PackTask, scale: float) -> _Raster:
+    """What is to be placed, at so many cells per length."""
+    count = len(task.outlines)
+    largest = np.argsort(-task.sizes.prod(axis=1), kind="stable")
+    single = largest if count <= MOST_ITEMS else largest[: MOST_ITEMS - BLOCKS]
+    turnable = task.areas < SMALL * task.areas.sum()
+    items, corners = [], np.zeros((len(single), 2))
+    for k, number in enumerate(single.tolist()):
+        cells, low = grown_cells(task.outlines[number].scaled(scale, scale * task.low[number]), task.growth)
+        items.append(turned_masks(cells, (0, 1, 2, 3) if turnable[number] else (0,)))
+        corners[k] = low
+    blocks = []
+    if count > len(single):
+        rest = largest[len(single) :]
+        boxes = task.sizes[rest] * scale + 2 * task.growth + APART
+        blocks = [Block(rest[b.members], b.corners, b.size) for b in blocks_of(boxes, BLOCKS)]
+        items += [turned_masks(np.ones(np.ceil(b.size[::-1]).astype(int), dtype=bool), (0,)) for b in blocks]
+    return _Raster(items, single, corners, blocks)
+
+
+def _placed(points: list[np.ndarray], found: _Found) -> list[np.ndarray]:
+    """Islands (n_i,2) in the unit square, where the items were placed."""
+    placed, task = list(points), found.task
+    raster, unit = found.raster, 1 / (task.cells_per_pixel * task.texture_size)
+    origin = 0.5 * task.margin / task.texture_size
+
+    def put(number: int, corner: np.ndarray) -> None:
+        placed[number] = corner * unit + origin
+
+    for k, number in enumerate(raster.single.tolist()):
+        where = found.places[k]
+        upright = raster.items[k].turns[0].mask.shape
+        inside = (points[number] - task.low[number]) * found.scale - raster.corners[k]
+        put(number, _turned(inside, upright[::-1], where.quarters) + [where.x, where.y])
+    for block, where in zip(raster.blocks, found.places[len(raster.single) :], strict=True):
+        corners = block.corners + [where.x, where.y] + task.growth
+        for number, corner in zip(block.members.tolist(), corners, strict=True):
+            put(number, (points[number] - task.low[number]) * found.scale + corner)
+    return placed
+
+
+def _turned(points: np.ndarray, size: Sequence[int], quarters: int) -> np.ndarray:
+    """Points (n,2) in a box of a size (2,), turned with it counterclockwise, its lower left corner at the origin."""
+    width, height = size
+    for _ in range(quarters):
+        points = np.stack([height - points[:, 1], points[:, 0]], axis=1)
+        width, height = height, width
+    return points
+
+
+def _filled(placed: list[np.ndarray], task: _PackTask, scale: float) -> tuple[list[np.ndarray], float]:
+    """Islands enlarged together until they reach the margin at the border, unless others stay, and their scale."""
+    unit = 1 / (task.cells_per_pixel * task.texture_size)
+    if task.staying:
+        return placed, scale * unit
+    low = np.min([p.min(axis=0) for p in placed], axis=0)
+    high = np.max([p.max(axis=0) for p in placed], axis=0)
+    border = task.margin / task.texture_size
+    more = (1 - 2 * border) / float((high - low).max())
+    return [(p - low) * more + border for p in placed], scale * unit * more

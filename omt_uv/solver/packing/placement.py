@@ -1,0 +1,114 @@
+"""Place masks one after the other, each where it touches most of what is there: the bottom and the sides first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_dilation
+
+from .raster_grid import RasterGrid, runs_of
+
+# What is at most so many cells beside a mask touches it.
+BESIDE = 2
+# A turned mask is placed where it touches more than the upright one by this share of its outline.
+UPRIGHT = 0.02
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A mask (h,w) bool turned by `quarters` counterclockwise, its runs, and the cells (k,2) x, y beside it."""
+
+    mask: np.ndarray
+    quarters: int
+    runs: list[list[int]]
+    beside: np.ndarray
+
+
+@dataclass(frozen=True)
+class Item:
+    """What is placed as one, as all turns it may have."""
+
+    turns: tuple[Turned, ...]
+
+    @property
+    def widest(self) -> int:
+        """Cells along its longest side."""
+        return max(self.turns[0].mask.shape)
+
+    @property
+    def cells(self) -> int:
+        """Cells it takes."""
+        return int(self.turns[0].mask.sum())
+
+
+@dataclass(frozen=True)
+class Place:
+    """Lower left cell of an item, and by how many quarters it is turned."""
+
+    x: int
+    y: int
+    quarters: int
+
+
+def turned_masks(mask: np.ndarray, quarters: Sequence[int]) -> Item:
+    """A mask (h,w) bool in the turns it may have, the first of which is preferred."""
+    turns = []
+    for number in quarters:
+        turned = np.ascontiguousarray(np.rot90(mask, -number))
+        padded = np.pad(turned, BESIDE)
+        beside = np.argwhere(binary_dilation(padded, iterations=BESIDE) & ~padded)[:, ::-1] - BESIDE
+        turns.append(Turned(turned, number, runs_of(turned), beside))
+    return Item(tuple(turns))
+
+
+def place(items: Sequence[Item], order: Sequence[int], grid: RasterGrid) -> tuple[list[Place], int]:
+    """Places of all items in a grid, which takes them in an order (k,); or an empty list and the first without room."""
+    places: list[Place] = [Place(0, 0, 0)] * len(items)
+    for number in order:
+        found = _best(items[number], grid)
+        if found is None:
+            return [], number
+        turned, x, y = found
+        grid.take(turned.mask, x, y)
+        places[number] = Place(x, y, turned.quarters)
+    return places, -1
+
+
+def _best(item: Item, grid: RasterGrid) -> tuple[Turned, int, int] | None:
+    """The turn and place of an item that touches most; None where there is none."""
+    best, most = None, -np.inf
+    for turned in item.turns:
+        height, width = turned.mask.shape
+        free = grid.places(turned.runs, height, width)
+        if free is None:
+            continue
+        for x, y in _extremes(free):
+            # Of places that touch as much, the lowest, then the leftmost.
+            value = _touch(turned, x, y, grid) - UPRIGHT * (turned is not item.turns[0])
+            value -= 1e-3 * (y + height + 1e-3 * x) / grid.side
+            if value > most:
+                best, most = (turned, x, y), value
+    return best
+
+
+def _extremes(free: np.ndarray) -> set[tuple[int, int]]:
+    """Places (x, y) at the ends of the outermost rows and columns that have any, of (rows,columns) bool."""
+    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
+    found = set()
+    for y in (int(rows[0]), int(rows[-1])):
+        there = np.flatnonzero(free[y])
+        found |= {(int(there[0]), y), (int(there[-1]), y)}
+    for x in (int(columns[0]), int(columns[-1])):
+        there = np.flatnonzero(free[:, x])
+        found |= {(x, int(there[0])), (x, int(there[-1]))}
+    return found
+
+
+def _touch(turned: Turned, x: int, y: int, grid: RasterGrid) -> float:
+    """Share of the cells beside a mask that are taken, or outside, where it is placed at (x, y)."""
+    column, row = (turned.beside + [x, y]).T
+    outside = (column < 0) | (row < 0) | (column >= grid.side) | (row >= grid.side)
+    taken = grid.taken[np.clip(row, 0, grid.side - 1), np.clip(column, 0, grid.side - 1)]
+    return float((outside | taken).mean())

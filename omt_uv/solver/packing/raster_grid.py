@@ -1,0 +1,73 @@
+"""Find all places of a mask on a raster that is partly taken, at once, by shifted copies of the raster in bits.
+
+The rows of a mask are runs of cells, and every run is covered by two whose lengths are a power of two. The raster is
+kept with its taken cells widened by all powers of two, eight times, shifted by 0 to 7 bits: then a run takes two
+disjunctions of whole bytes for all places of the mask.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def runs_of(mask: np.ndarray) -> list[list[int]]:
+    """Runs [k, row, column], from `column` over 2^k cells of `row`, that together are the mask (h,w) bool."""
+    change = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    row, begin = np.nonzero(change == 1)
+    end = np.nonzero(change == -1)[1]
+    power = np.floor(np.log2(end - begin)).astype(np.int64)
+    runs = np.concatenate([np.stack([power, row, x], axis=1) for x in (begin, end - 2**power)])
+    return np.unique(runs, axis=0).tolist()
+
+
+class RasterGrid:
+    """A square raster of `side` cells, rows upwards, for masks of at most `widest` cells along a side."""
+
+    def __init__(self, side: int, widest: int):
+        self.side = side
+        # What lies outside is taken.
+        self._width = 8 * -(-(side + widest) // 8)
+        taken = np.ones((side + widest, self._width + 8), dtype=bool)
+        taken[:side, :side] = False
+        self._widened = [taken]
+        while 2 ** len(self._widened) <= widest:
+            wider, step = self._widened[-1].copy(), 2 ** (len(self._widened) - 1)
+            wider[:, :-step] |= self._widened[-1][:, step:]
+            self._widened.append(wider)
+        self._bits = [[np.packbits(d[:, s : s + self._width], axis=1) for s in range(8)] for d in self._widened]
+
+    @property
+    def taken(self) -> np.ndarray:
+        """Cells (side,side) bool that are taken."""
+        return self._widened[0][: self.side, : self.side]
+
+    def take(self, mask: np.ndarray, x: int, y: int) -> None:
+        """Take the cells of a mask (h,w) bool whose lower left is at column x and row y."""
+        rows, end = slice(y, y + mask.shape[0]), x + mask.shape[1]
+        self._widened[0][rows, x:end] |= mask
+        for k, wider in enumerate(self._widened):
+            step = 2**k
+            begin = max(0, x - step) // 8 * 8
+            if k:
+                narrow, half = self._widened[k - 1], step // 2
+                wider[rows, begin:end] = narrow[rows, begin:end]
+                # The copies are wider than the raster by as much as is looked at beyond its end.
+                reach = min(end, wider.shape[1] - half)
+                wider[rows, begin:reach] |= narrow[rows, begin + half : reach + half]
+            # Bits that are shifted by s come from s cells farther on.
+            begin, stop = max(0, begin - 8), min(self._width, 8 * -(-end // 8))
+            for s, bits in enumerate(self._bits[k]):
+                bits[rows, begin // 8 : stop // 8] = np.packbits(wider[rows, begin + s : stop + s], axis=1)
+
+    def places(self, runs: list[list[int]], height: int, width: int) -> np.ndarray | None:
+        """Lower left cells (rows,columns) bool at which a mask of these runs, height and width is free, or None."""
+        rows, columns = self.side - height + 1, self.side - width + 1
+        if rows <= 0 or columns <= 0:
+            return None
+        count = -(-columns // 8)
+        blocked = np.zeros((rows, count), np.uint8)
+        for k, row, column in runs:
+            start = column >> 3
+            blocked |= self._bits[k][column & 7][row : row + rows, start : start + count]
+        free = np.unpackbits(~blocked, axis=1, count=columns).view(bool)
+        return free if free.any() else None

@@ -1,0 +1,98 @@
+"""Islands as an artist lays them: edges along the axes, up in the world up in the map, mirror images mirrored."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.maps.upright import turn_upright
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.surface import triangle_surface
+
+UP = (0.0, 0.0, 1.0)
+
+
+def rotation(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def chart_of(polygons):
+    """The one chart of quads in space, (n,3) and polygons."""
+    (chart,) = strict_charts(polygons)
+    return chart
+
+
+def wall(columns=6, rows=3):
+    """A chart of quads on an upright wall, and its map without distortion: x to the right, z up."""
+    V, quads = meshes.quad_grid(columns, rows)
+    flat = np.asarray(V, float)[:, :2]
+    space = np.stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]], axis=1)
+    chart = chart_of(meshes.polygon_surface(space, quads))
+    return chart, chart.vertices[:, [0, 2]]
+
+
+@pytest.mark.parametrize("angle", np.linspace(0, 6, 7))
+def test_a_wall_stands_however_it_was_mapped(angle):
+    chart, uv = wall()
+    (found,) = turn_upright([chart], [uv @ rotation(angle).T], [UP])
+    np.testing.assert_allclose(found - found.mean(axis=0), uv - uv.mean(axis=0), atol=1e-9)
+
+
+def test_up_is_what_the_caller_says():
+    chart, uv = wall()
+    (found,) = turn_upright([chart], [uv], [(1.0, 0.0, 0.0)])
+    expected = uv @ rotation(np.pi / 2).T
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+def test_what_lies_level_is_seen_from_above_with_its_far_side_up():
+    V, quads = meshes.quad_grid(5, 3)
+    chart = chart_of(meshes.polygon_surface(np.asarray(V, float) * [1, 1, 0], quads))
+    uv = chart.vertices[:, :2]
+    (found,) = turn_upright([chart], [uv @ rotation(2.0).T], [UP])
+    np.testing.assert_allclose(found, uv, atol=1e-9)
+
+
+def test_edges_decide_over_a_slope_that_is_askew():
+    """A roof plane that rises askew to its edges keeps these along the axes."""
+    chart, uv = wall()
+    tilted = chart.vertices[:, [0, 2]] @ rotation(0.3).T
+    chart = type(chart)(
+        np.stack([tilted[:, 0], 0 * tilted[:, 0], tilted[:, 1]], axis=1),
+        chart.triangles,
+        chart.corners,
+        chart.faces,
+        chart.vertex_ids,
+    )
+    (found,) = turn_upright([chart], [uv @ rotation(1.0).T], [UP])
+    np.testing.assert_allclose(found, uv, atol=1e-9)
+
+
+def test_without_a_direction_of_edges_the_mean_rise_is_upright():
+    V, F = meshes.random_disk(count=200, height=0.0)
+    space = np.stack([V[:, 0], 0 * V[:, 0], V[:, 1]], axis=1)
+    (chart,) = strict_charts(triangle_surface(space, F))
+    flat = chart.vertices[:, [0, 2]]
+    (found,) = turn_upright([chart], [flat @ rotation(1.2345).T], [UP])
+    np.testing.assert_allclose(found, flat, atol=1e-9)
+
+
+def test_mirror_images_are_laid_out_mirrored():
+    V, F = meshes.random_disk(count=200, height=0.3)
+    space = np.stack([V[:, 0], V[:, 2], V[:, 1]], axis=1)
+    (chart,) = strict_charts(triangle_surface(space, F))
+    (other,) = strict_charts(triangle_surface(space * [-1, 1, 1], F[:, ::-1]))
+    uv = chart.vertices[:, [0, 2]] @ rotation(0.7).T
+    image = np.zeros_like(uv)
+    image[np.argsort(other.vertex_ids)] = uv[np.argsort(chart.vertex_ids)] * [-1, 1] @ rotation(2.0).T
+    one, two = turn_upright([chart, other], [uv, image], [UP, UP])
+    two = two[np.argsort(other.vertex_ids)]
+    np.testing.assert_allclose(two * [-1, 1], one[np.argsort(chart.vertex_ids)], atol=1e-9)
+
+
+def test_islands_do_not_depend_on_each_other():
+    charts, maps = zip(*(wall(*size) for size in ((6, 3), (2, 5), (4, 4))), strict=True)
+    turned = [uv @ rotation(k + 0.5).T for k, uv in enumerate(maps)]
+    together = turn_upright(charts, turned, [UP] * 3)
+    for chart, uv, found in zip(charts, turned, together, strict=True):
+        np.testing.assert_allclose(found, turn_upright([chart], [uv], [UP])[0], atol=1e-12)
+    assert turn_upright([], [], []) == []

@@ -1,0 +1,89 @@
+"""The raster under the packer: cells that an island's margin touches, every free place of a mask, blocks of boxes."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.packing.outline_raster import grown_cells, outline_of
+from omt_uv.solver.packing.placement import place, turned_masks
+from omt_uv.solver.packing.raster_grid import RasterGrid, runs_of
+from omt_uv.solver.packing.shelves import blocks_of
+
+
+def blob(rng, height, width):
+    mask = rng.random((height, width)) < 0.6
+    mask[height // 2, width // 2] = True
+    return mask
+
+
+@pytest.mark.parametrize("growth", [0.0, 0.7, 2.3, 5.0])
+def test_cells_are_those_that_the_grown_island_touches(growth):
+    V, F = meshes.random_disk(count=120)
+    points = V[:, :2] * 17.3 + [3.3, -8.1]
+    cells, low = grown_cells(outline_of(points, F), growth)
+    rng = np.random.default_rng(0)
+    # Samples of the island, and of a circle of that radius around its outline, all lie in the cells.
+    weights = rng.dirichlet(np.ones(3), (len(F), 40))
+    inside = np.einsum("mkj,mjd->mkd", weights, points[F]).reshape(-1, 2)
+    outline = outline_of(points, F)
+    t = rng.random((len(outline.tail), 60, 1))
+    on_it = (outline.tail[:, None] * (1 - t) + outline.head[:, None] * t).reshape(-1, 2)
+    angle = rng.uniform(0, 2 * np.pi, len(on_it))
+    around = on_it + growth * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    for samples in (inside, around):
+        column, row = (np.floor(samples).astype(int) - low).T
+        assert cells[row, column].all()
+    # No cell is much farther away than that.
+    rows, columns = np.nonzero(cells)
+    centres = np.stack([columns, rows], axis=1) + low + 0.5
+    samples = np.concatenate([inside, on_it])
+    nearest = np.array([np.hypot(*(samples - c).T).min() for c in centres])
+    assert nearest.max() < growth + 2 * np.sqrt(2) + 0.5
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_places_are_all_free_ones_also_after_more_is_taken(seed):
+    rng = np.random.default_rng(seed)
+    grid, taken = RasterGrid(37, 16), np.zeros((37, 37), bool)
+    for _ in range(4):
+        mask = blob(rng, *rng.integers(1, 12, 2))
+        height, width = mask.shape
+        found = grid.places(runs_of(mask), height, width)
+        expected = np.array(
+            [
+                [not (taken[y : y + height, x : x + width] & mask).any() for x in range(38 - width)]
+                for y in range(38 - height)
+            ]
+        )
+        if found is None:
+            assert not expected.any()
+            continue
+        assert np.array_equal(found, expected)
+        y, x = np.argwhere(found)[rng.integers(found.sum())]
+        grid.take(mask, int(x), int(y))
+        taken[y : y + height, x : x + width] |= mask
+        assert np.array_equal(grid.taken, taken)
+
+
+def test_placed_masks_share_no_cell():
+    rng = np.random.default_rng(3)
+    masks = [blob(rng, *rng.integers(2, 12, 2)) for _ in range(9)]
+    items = [turned_masks(mask, (0, 1, 2, 3)) for mask in masks]
+    grid = RasterGrid(48, 20)
+    places, stuck = place(items, range(9), grid)
+    assert stuck == -1 and grid.taken.sum() == sum(mask.sum() for mask in masks)
+    places, stuck = place(items, range(9), RasterGrid(12, 20))
+    assert places == [] and stuck >= 0
+
+
+def test_boxes_in_blocks_do_not_overlap():
+    rng = np.random.default_rng(0)
+    sizes = rng.uniform(0.1, 1, (500, 2))
+    blocks = blocks_of(sizes, 7)
+    assert len(blocks) <= 7 and np.array_equal(np.sort(np.concatenate([b.members for b in blocks])), np.arange(500))
+    for block in blocks:
+        low, high = block.corners, block.corners + sizes[block.members]
+        assert low.min() >= 0 and (high <= block.size + 1e-9).all()
+        apart = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
+        assert apart[~np.eye(len(low), dtype=bool)].min() > -1e-9
+        assert sizes[block.members].prod(axis=1).sum() > 0.6 * block.size.prod()
