@@ -2,7 +2,7 @@
 
 Imports solver.errors, solver.mesh and solver.linalg.
 Main names: Target, target_density, exact_density, painted_density, vertex_score, soft_weights, sharp_edges,
-SeamCosts, SymmetryPlane, Facing, face_occlusion.
+SeamCosts, SymmetryPlane, Facing, face_occlusion, straighten.
 """
 
 from ..lazy import lazy
@@ -18,6 +18,7 @@ __getattr__, __all__ = lazy(
     occlusion="face_occlusion vertex_occlusion",
     region_density="RegionDensity exact_density target_density",
     seam_costs="SeamCosts SeamPreferences",
+    straight_paths="EdgeNetwork edge_network straighten turning_angles",
     symmetry_plane="SymmetryPlane",
     vertex_scores="distance scaled_vertex_areas soft_weights vertex_score",
 )

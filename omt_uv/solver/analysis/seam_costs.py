@@ -6,13 +6,14 @@ fully. The factors of an edge multiply, within bounds, so that no seam becomes m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import ZeroAreaFaceError
 from ..mesh.geometry import halfedge_lengths, vertex_areas
 from ..mesh.gluing import polygon_sides
-from ..mesh.surface import Surface, chosen_triangles
+from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
 from ..mesh.topology import halfedges, pair_keys, pair_up
 from .facing import Facing, facing, salient_weights, towards
 from .feature_edges import fold_angles
@@ -103,20 +104,25 @@ def seam_costs(
 
     Raises
     ------
-    EmptyMeshError, NonFiniteError : nothing to cut, or not anywhere
+    EmptyMeshError, NonFiniteError, ZeroAreaFaceError : nothing to cut, not anywhere, or without any area
     """
     preferences = preferences or SeamPreferences()
     _, corners, owner = chosen_triangles(surface, faces)
-    triangles = surface.corner_vertex[corners]
-    positions = unit_size(surface.positions, triangles)
+    # Vertices of no triangle may be anywhere, and nowhere.
+    used, triangles = np.unique(surface.corner_vertex[corners], return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    space = surface.positions[used]
+    if degenerate_triangles(space, triangles).all():
+        raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     side = polygon_sides(len(surface.corner_vertex), surface.face_start, corners)
-    tail, head = (ends[side] for ends in halfedges(triangles))
-    keys = np.unique(pair_keys(tail, head))
+    keys = np.unique(pair_keys(*(ends[side] for ends in halfedges(triangles))))
     edges = np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
-    plane = symmetry_plane(surface.positions, triangles, owner)
+    positions = unit_size(space, triangles)
+    plane = symmetry_plane(positions, triangles, owner)
     seen, at_vertices = _vertex_reasons(positions, triangles, plane, preferences.up)
     if plane is not None:
-        _symmetrise(surface.positions, triangles, plane, at_vertices)
+        _symmetrise(positions, triangles, plane, at_vertices)
+        plane = _among_all(plane.carried(positions, space), used, len(surface.positions))
     reasons = {name: reason[edges].mean(axis=1) for name, reason in at_vertices.items()}
     reasons["sharp"] = _sharp(positions, triangles, keys)
     reasons["loops"] = _sides_of_quads(positions, triangles, owner, keys)
@@ -124,10 +130,20 @@ def seam_costs(
     for name, reason in reasons.items():
         cost *= getattr(preferences, name) ** reason
     cost = np.clip(cost, LEAST, MOST)
-    count = np.bincount(edges.ravel(), minlength=len(positions))
-    total = np.bincount(edges.ravel(), np.repeat(cost, 2), len(positions))
+    ends, n = used[edges], len(surface.positions)
+    count = np.bincount(ends.ravel(), minlength=n)
+    total = np.bincount(ends.ravel(), np.repeat(cost, 2), n)
     vertex_cost = np.where(count > 0, total / np.maximum(count, 1), 1.0)
-    return SeamCosts(edges, cost, reasons, vertex_cost, plane, seen)
+    return SeamCosts(ends, cost, reasons, vertex_cost, plane, seen)
+
+
+def _among_all(plane: SymmetryPlane, used: np.ndarray, n: int) -> SymmetryPlane:
+    """The plane of vertices `used` (u,) with images among all n vertices: others are their own."""
+    if plane.image is None:
+        return plane
+    image = np.arange(n)
+    image[used] = used[plane.image]
+    return replace(plane, image=image)
 
 
 def _vertex_reasons(
@@ -153,15 +169,16 @@ def _vertex_reasons(
     return seen, reasons
 
 
-def _symmetrise(space: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, reasons: dict[str, np.ndarray]) -> None:
-    """Give vertices (n,3) and the ones nearest to their images the same reasons, and tell those on the plane."""
-    used = np.unique(triangles)
-    size = float(np.linalg.norm(np.ptp(space[used], axis=0)))
-    image, far = plane.nearest_images(space, triangles)
-    image = np.where(far <= NEAR * size, image, np.arange(len(image)))
+def _symmetrise(
+    positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, reasons: dict[str, np.ndarray]
+) -> None:
+    """Give vertices (n,3) of a surface of unit size and those nearest to their images the same reasons, and say which
+    are on the plane."""
+    image, far = plane.nearest_images(positions, triangles)
+    image = np.where(far <= NEAR, image, np.arange(len(image)))
     for name, reason in reasons.items():
         reasons[name] = (reason + reason[image]) / 2
-    reasons["mirror"] = np.exp(-0.5 * (plane.distance(space) / (ON_PLANE * size)) ** 2)
+    reasons["mirror"] = np.exp(-0.5 * (plane.distance(positions) / ON_PLANE) ** 2)
 
 
 def _step(value: np.ndarray, ends: tuple[float, float]) -> np.ndarray:

@@ -46,7 +46,7 @@ class EdgeNetwork:
 
 
 def edge_network(positions: np.ndarray, triangles: np.ndarray, edges: np.ndarray, cost: np.ndarray) -> EdgeNetwork:
-    """The network of the edges (e,2) of a surface (n,3), (m,3), each with a cost (e,) > 0 per length; infinite: none."""
+    """The network of the edges (e,2) of a surface (n,3), (m,3), with costs (e,) > 0 per length; infinite: none."""
     keys = np.unique(pair_keys(*halfedges(triangles)))
     kept = np.isfinite(cost)
     (a, b), cost = edges[kept].T, cost[kept]
@@ -165,7 +165,8 @@ def _disk_about(network: EdgeNetwork, path: np.ndarray, blocked: np.ndarray) -> 
         near = ring <= k
         number = np.cumsum(near) - 1
         count, inside = int(number[-1]) + 1, sides[of_sides <= k]
+        a, b = number[inside].T
         euler = count - len(inside) + int((of_faces <= k).sum())
-        if euler == 1 and graph_components(*number[inside].T, count)[0] == 1:
+        if euler == 1 and graph_components(a, b, count)[0] == 1:
             return near
     return None

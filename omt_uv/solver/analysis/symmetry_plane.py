@@ -78,6 +78,13 @@ class SymmetryPlane:
         """Mirror images (k,3) of points (k,3)."""
         return points - 2 * self.distance(points)[:, None] * self.normal
 
+    def carried(self, old: np.ndarray, new: np.ndarray) -> SymmetryPlane:
+        """The plane where the same vertices (n,3), (n,3) are scaled and moved."""
+        span = [2 * (p.max(axis=0) / 2 - p.min(axis=0) / 2) for p in (old, new)]
+        k = int(span[0].argmax())
+        scale = float(span[1][k] / span[0][k])
+        return replace(self, offset=float(scale * self.offset + (new[0] - scale * old[0]) @ self.normal))
+
     def nearest_images(self, positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """For every vertex of a surface (n,3), (m,3) the one (n,) nearest to its image, and how far (n,) it lies.
 
@@ -171,18 +178,17 @@ def _near_plane(positions: np.ndarray, triangles: np.ndarray, near: float) -> Sy
         return None
     sign = np.sign(normal[np.abs(normal).argmax()])
     normal, offset = sign * normal, sign * offset
-    # Back from unit size: the same vertices tell scale and shift.
-    scale = float(np.linalg.norm(np.ptp(positions, axis=0)) / np.linalg.norm(np.ptp(scaled, axis=0)))
-    shift = positions.mean(axis=0) - scale * scaled.mean(axis=0)
-    return _between_pairs(
-        positions, scale, SymmetryPlane(normal, float(scale * offset + normal @ shift), residual, None)
-    )
+    plane = _between_pairs(scaled, SymmetryPlane(normal, offset, residual, None))
+    return plane.carried(scaled, positions)
 
 
-def _between_pairs(positions: np.ndarray, size: float, plane: SymmetryPlane) -> SymmetryPlane:
-    """The plane, to the last digit if most vertices (n,3) have others as images: polygons may be cut one-sidedly."""
+def _between_pairs(positions: np.ndarray, plane: SymmetryPlane) -> SymmetryPlane:
+    """The plane of a body of unit size, to the last digit if most vertices (n,3) have others as images.
+
+    Polygons may be cut one-sidedly, so that these are no images of one another.
+    """
     image, far = plane.nearest_images(positions, np.arange(len(positions))[:, None])
-    pairs = (far <= PAIR * size) & (image[image] == np.arange(len(image)))
+    pairs = (far <= PAIR) & (image[image] == np.arange(len(image)))
     if pairs.mean() < MOST_PAIRS:
         return plane
     a, b = positions[pairs], positions[image[pairs]]
