@@ -50,10 +50,12 @@ ARROWS: dict[str, str] = {
     "solver.api": "solver solver.mesh solver.analysis solver.maps solver.parameterization solver.editing solver.sphere "
     "solver.remeshing",
     "remedies": "solver",
+    "xatlas_charts": "errors solver solver.mesh",
     "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.packing solver.subdivision "
     "solver.transfer "
     "solver.refinement "
-    "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing",
+    "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
+    "xatlas_charts",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
     "files.in_place": "errors solver",
     "files": "errors supervision solver blender files.in_place",

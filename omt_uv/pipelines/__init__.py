@@ -1,6 +1,6 @@
 """The one path of each operator and command, from what was read to what is to be written; holds no Blender.
 
-Imports settings, errors, solver, and the library xatlas when it is used.
+Imports settings, errors, solver, xatlas_charts.
 Main names: lay_out, refine_islands, magnify.magnify, project, remesh_series, carry, Reading.
 """
 
@@ -21,5 +21,4 @@ __getattr__, __all__ = lazy(
     texel_density="Texels with_texel_density",
     subdivision="evaluated subdivided_target",
     unwrap="lay_out",
-    xatlas_charts="SegmentationError chart_seams",
 )

@@ -18,9 +18,9 @@ from ..solver.mesh.topology import twins
 from ..solver.parameterization.options import UnwrapOptions
 from ..solver.parameterization.unwrap import SurfaceMap, unwrap
 from ..solver.progress import Steps, part_of
+from ..xatlas_charts import SegmentationError, chart_seams
 from .layout import PACKING_FROM, Layout, PlacedIsland, Refusal, UnwrapJob, corner_uvs, pack_islands
 from .subdivision import refinable, refined_on_subdivision, subdivided_target
-from .xatlas_charts import SegmentationError, chart_seams
 
 # Share of the time that the cage's own maps take where those of its subdivided surface follow.
 CAGE_SHARE = 0.5

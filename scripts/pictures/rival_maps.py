@@ -14,7 +14,6 @@ from benchmarks.rivals import METHODS
 from benchmarks.timing import timed
 from omt_uv.blender.mesh import read
 from omt_uv.blender.seams import mark_seams
-from omt_uv.blender.uv_packer import pack
 from omt_uv.files.meshes import load
 from omt_uv.pipelines.layout import UnwrapJob
 from omt_uv.pipelines.reading import Reading
@@ -47,7 +46,7 @@ def ours(obj, **settings) -> DrawnMap:
     """One click on the object in Object Mode, with its seams, and settings other than the defaults."""
     reading = read(obj)
     job = UnwrapJob(reading.surface, reading.faces)
-    layout, seconds = timed(lambda: drain(lay_out([job], Settings(**settings), pack)))
+    layout, seconds = timed(lambda: drain(lay_out([job], Settings(**settings))))
     uv = np.zeros((len(reading.surface.corner_vertex), 2))
     uv[layout.corners[0]] = layout.uv[0]
     return mapped(replace(reading, uv=uv), seconds)

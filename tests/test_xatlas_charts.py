@@ -6,10 +6,10 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.pipelines.xatlas_charts import chart_seams
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.errors import EmptyMeshError
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.xatlas_charts import chart_seams
 
 pytest.importorskip("xatlas")
 

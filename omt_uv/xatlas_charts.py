@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import UserError
-from ..solver.mesh.surface import Surface, chosen_triangles
-from ..solver.mesh.topology import graph_components, halfedges, pair_keys, pair_up
+from .errors import UserError
+from .solver.mesh.surface import Surface, chosen_triangles
+from .solver.mesh.topology import graph_components, halfedges, pair_keys, pair_up
 
 # Extent of the mesh for xatlas, which drops faces of meshes with small units.
 EXTENT = 100.0
