@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import DISSOLVE, ZeroAreaFaceError
-from ..mesh.charts import Chart, charts_of, check_disk, check_edges, strict_charts
-from ..mesh.repair import repaired_gluing, with_area
+from ..mesh.charts import Chart, charts_of, check_disks, strict_charts
+from ..mesh.repair import charts_without_area, repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
 from .cuts import MOST_EXTREMITIES, Cuts, cut_gluing, sieved
 from .hole_filling import fill_holes as fill_holes_of
@@ -93,9 +93,7 @@ def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int
 
 def _sound(charts: list[Chart], extent: float) -> tuple[list[Chart], int]:
     """Charts of a mesh of some extent, checked to be disks, with no triangle without area, and how many had none."""
-    sound = []
-    for chart in charts:
-        check_edges(chart)
-        check_disk(chart)
-        sound.append(with_area(chart, extent))
-    return [chart for chart, _ in sound], sum(count for _, count in sound)
+    check_disks(charts)
+    flat = charts_without_area(charts)
+    found = {k: with_area(charts[k], extent) for k in np.flatnonzero(flat)}
+    return [found[k][0] if flat[k] else chart for k, chart in enumerate(charts)], sum(n for _, n in found.values())

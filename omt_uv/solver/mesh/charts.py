@@ -6,7 +6,8 @@ that ends inside a chart, and a vertex where two fans meet, are cut open for the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,9 +17,9 @@ from ..errors import (
     SeveralBoundariesError,
     TouchingBoundariesError,
 )
-from .gluing import Gluing, components, corner_classes, groups
+from .gluing import Gluing, components, corner_classes
 from .surface import Surface, strict_gluing
-from .topology import boundary_loops, halfedges, pair_keys
+from .topology import boundary_loops, graph_components, halfedges, pair_keys
 
 
 @dataclass(frozen=True)
@@ -53,36 +54,65 @@ def strict_charts(surface: Surface, faces: np.ndarray | None = None) -> list[Cha
     OrientationError, NotADiskError : with the indices of the offending elements of the surface
     """
     charts = charts_of(surface, strict_gluing(surface, faces))
-    for chart in charts:
-        check_edges(chart)
-        check_disk(chart)
+    check_disks(charts)
     return charts
 
 
+def check_disks(charts: Sequence[Chart]) -> None:
+    """Raise what `check_edges` and `check_disk` raise about the first chart that is no disk."""
+    for k in np.flatnonzero(~sound_disks(charts)):
+        check_edges(charts[k])
+        check_disk(charts[k])
+
+
 def charts_of(surface: Surface, gluing: Gluing) -> list[Chart]:
-    """One chart per component of the glued triangles, in the order of their first triangles."""
-    corner_class = corner_classes(gluing)
-    return [_chart(surface, c, gluing, corner_class) for c in groups(components(gluing))]
+    """One chart per component of the glued triangles, in the order of their first triangles.
 
-
-def _chart(surface: Surface, members: np.ndarray, gluing: Gluing, corner_class: np.ndarray) -> Chart:
-    """The chart of the triangles `members` (k,), one of whose vertices is a class of corners, (c,)."""
-    corners, owner = gluing.triangles[members], gluing.owner[members]
-    _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
-    vertex_ids = gluing.vertex[corners.ravel()[index]]
-    local = inverse.reshape(-1, 3).astype(np.int64)
+    Its vertices are classes of corners.
+    """
+    component = components(gluing)
+    order = np.argsort(component, kind="stable")
+    component, owner, corners = component[order], gluing.owner[order], gluing.triangles[order]
+    _, index, inverse = np.unique(corner_classes(gluing)[corners], return_index=True, return_inverse=True)
+    of_vertex = component[index // 3]
+    by_chart = np.argsort(of_vertex, kind="stable")
+    place = np.empty(len(by_chart), np.int64)
+    place[by_chart] = np.arange(len(by_chart))
+    triangles = place[inverse].reshape(-1, 3).astype(np.int64)
+    vertex_ids = gluing.vertex[corners.ravel()[index[by_chart]]]
+    positions = surface.positions[vertex_ids]
     # Triangles of no polygon fill holes; vertices that only they use are no vertices of the mesh.
     real = owner >= 0
     own = np.zeros(len(vertex_ids), dtype=bool)
-    own[local[real]] = True
-    positions, ids = surface.positions[vertex_ids], np.where(own, vertex_ids, -1)
-    return Chart(
-        vertices=positions,
-        triangles=local[real],
-        corners=corners[real],
-        faces=owner[real],
-        vertex_ids=ids,
-        patches=local[~real],
+    own[triangles[real]] = True
+    vertex_ids = np.where(own, vertex_ids, -1)
+    count = int(component[-1]) + 1
+    first = np.searchsorted(of_vertex[by_chart], np.arange(count + 1))
+    begin = np.searchsorted(component, np.arange(count + 1))
+    triangles = triangles - first[component][:, None]
+    charts = []
+    for k in range(count):
+        members, vertices = slice(begin[k], begin[k + 1]), slice(first[k], first[k + 1])
+        chart = Chart(
+            vertices=positions[vertices],
+            triangles=triangles[members],
+            corners=corners[members],
+            faces=owner[members],
+            vertex_ids=vertex_ids[vertices],
+        )
+        charts.append(chart if real[members].all() else _with_patches(chart))
+    return charts
+
+
+def _with_patches(chart: Chart) -> Chart:
+    """The chart with its triangles of no polygon as patches."""
+    real = chart.faces >= 0
+    return replace(
+        chart,
+        triangles=chart.triangles[real],
+        corners=chart.corners[real],
+        faces=chart.faces[real],
+        patches=chart.triangles[~real],
     )
 
 
@@ -116,6 +146,29 @@ def check_edges(chart: Chart) -> None:
             kind="edge",
             elements=chart.vertex_ids[np.stack([tail[wrong], head[wrong]], axis=1)],
         )
+
+
+def sound_disks(charts: Sequence[Chart]) -> np.ndarray:
+    """Which charts (c,) bool neither `check_edges` nor `check_disk` refuses, all of them looked at together."""
+    count = len(charts)
+    first = np.cumsum([0, *(len(c.vertices) for c in charts)])
+    disks = [c.disk for c in charts]
+    of_face = np.repeat(np.arange(count), [len(d) for d in disks])
+    triangles = np.concatenate(disks) + first[of_face][:, None]
+    tail, head = halfedges(triangles)
+    _, index, label, shared = np.unique(
+        pair_keys(tail, head), return_index=True, return_inverse=True, return_counts=True
+    )
+    wrong = np.zeros(count, bool)
+    wrong[of_face[index[shared > 2] // 3]] = True
+    boundary = np.flatnonzero(shared[label.ravel()] != 2)
+    of_boundary = of_face[boundary // 3]
+    # Every loop once, by its least vertex.
+    _, loop = graph_components(tail[boundary], head[boundary], int(first[-1]))
+    loops = np.bincount(of_boundary[np.unique(loop[tail[boundary]], return_index=True)[1]], minlength=count)
+    edges = (3 * np.bincount(of_face, minlength=count) + np.bincount(of_boundary, minlength=count)) // 2
+    euler = np.diff(first) - edges + np.bincount(of_face, minlength=count)
+    return ~wrong & (loops == 1) & (euler == 1)
 
 
 def check_disk(chart: Chart) -> None:

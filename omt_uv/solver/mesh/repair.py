@@ -6,6 +6,7 @@ are turned over, and triangles without area are given a little.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -138,6 +139,16 @@ def _healed(gluing: Gluing) -> Gluing:
         first=np.concatenate([gluing.first, first[slit]]),
         second=np.concatenate([gluing.second, second[slit]]),
     )
+
+
+def charts_without_area(charts: Sequence[Chart]) -> np.ndarray:
+    """Which charts (c,) bool have a triangle without area that `with_area` would move."""
+    disks = [chart.disk for chart in charts]
+    owner = np.repeat(np.arange(len(charts)), [len(disk) for disk in disks])
+    first = np.cumsum([0, *(len(chart.vertices) for chart in charts)])
+    positions = np.concatenate([chart.vertices for chart in charts])
+    bad = degenerate_triangles(positions, np.concatenate(disks) + first[owner][:, None], NEEDLE, owner)
+    return np.bincount(owner, bad, len(charts)) > 0
 
 
 def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:

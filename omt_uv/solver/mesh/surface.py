@@ -96,10 +96,13 @@ def check_finite(positions: np.ndarray, triangles: np.ndarray) -> None:
         raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
 
 
-def degenerate_triangles(positions: np.ndarray, triangles: np.ndarray, flat: float = DEGENERATE) -> np.ndarray:
+def degenerate_triangles(
+    positions: np.ndarray, triangles: np.ndarray, flat: float = DEGENERATE, owner: np.ndarray | None = None
+) -> np.ndarray:
     """Triangles (m,3) of positions (n,3) that are a line or a point next to the extent of them all, (m,) bool.
 
-    flat : share of the square of its longest side that the area of a line does not exceed
+    flat : share of the square of its longest side that the area of a line does not exceed; owner (m,) : ascending from
+    0, of triangles that only count next to those of the same one
     """
     p = positions[triangles]
     # Halves: the difference of two huge numbers may be infinite.
@@ -108,7 +111,12 @@ def degenerate_triangles(positions: np.ndarray, triangles: np.ndarray, flat: flo
     # Scaling first keeps tiny and huge meshes clear of underflow and overflow.
     side = side / np.where(size > 0, size, 1)[:, None, None]
     area = 0.5 * np.linalg.norm(np.cross(side[:, 1], side[:, 2]), axis=1)
-    extent = np.ptp(p.reshape(-1, 3) / 2, axis=0).max()
+    if owner is None:
+        extent = np.ptp(p.reshape(-1, 3) / 2, axis=0).max()
+    else:
+        begin = np.searchsorted(owner, np.arange(int(owner[-1]) + 1))
+        high, low = np.maximum.reduceat(p.max(axis=1), begin), np.minimum.reduceat(p.min(axis=1), begin)
+        extent = (high / 2 - low / 2).max(axis=1)[owner]
     return (area <= flat) | (size <= 1e-9 * extent)
 
 

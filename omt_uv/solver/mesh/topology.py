@@ -94,26 +94,26 @@ def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
 
     The mesh must be an oriented manifold with one fan per vertex (`charts.strict_charts` guarantees it).
     """
-    tail, head = halfedges(triangles)
-    boundary = np.flatnonzero(twins(triangles) < 0)
-    if len(boundary) == 0:
+    edges = boundary_edges(triangles)
+    if len(edges) == 0:
         return []
-    vertices = tail[boundary]
-    successor = np.full(int(triangles.max()) + 1, -1, dtype=np.int64)
-    successor[vertices] = head[boundary]
-    label = graph_components(vertices, head[boundary], len(successor))[1][vertices]
-    loops = [_walk(successor, vertices[label == c]) for c in np.unique(label)]
+    edges = edges[np.argsort(edges[:, 0], kind="stable")]
+    vertices = edges[:, 0]
+    following = np.minimum(np.searchsorted(vertices, edges[:, 1]), len(vertices) - 1)
+    label = graph_components(np.arange(len(vertices)), following, len(vertices))[1]
+    size = np.bincount(label)
+    start = np.unique(label, return_index=True)[1]
+    ahead = _steps_to(following, start, int(size.max()))
+    order = np.lexsort((size[label] - ahead, ahead > 0, label))
+    loops = np.split(vertices[order], np.cumsum(size)[:-1])
     return sorted(loops, key=len, reverse=True)
 
 
-def _walk(successor: np.ndarray, members: np.ndarray) -> np.ndarray:
-    """Order one cycle by pointer doubling: position 2^k steps ahead is known after k rounds."""
-    start = int(members.min())
-    local = np.full(len(successor), -1, dtype=np.int64)
-    local[members] = np.arange(len(members))
-    jump = local[successor[members]]
-    order = np.array([local[start]])
-    while len(order) < len(members):
-        order = np.concatenate([order, jump[order]])
+def _steps_to(following: np.ndarray, goals: np.ndarray, most: int) -> np.ndarray:
+    """Steps (b,) from every node to the goal on its cycle, by pointer doubling; cycles have `most` nodes at most."""
+    jump, steps = following.copy(), np.ones(len(following), np.int64)
+    jump[goals], steps[goals] = goals, 0
+    for _ in range(most.bit_length()):
+        steps = steps + steps[jump]
         jump = jump[jump]
-    return members[order[: len(members)]]
+    return steps

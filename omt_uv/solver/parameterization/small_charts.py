@@ -9,9 +9,11 @@ import numpy as np
 from ..analysis.density import Target
 from ..errors import MeshError, positive_density
 from ..mesh.charts import Chart
+from ..mesh.geometry import signed_areas
+from ..mesh.polygon_areas import polygon_areas
 from ..progress import Steps, part_of
 from ..refinement.batch_refine import BatchMaps, refine_batch
-from .chart_map import ChartMap, in_unit_box, placed_chart
+from .chart_map import ChartMap, in_unit_box
 from .options import MapOptions
 
 # Most triangles of a chart that is solved together with others.
@@ -59,13 +61,29 @@ def _map_batch(charts: list[Chart], targets: list[Target | None], options: MapOp
     except MeshError:
         return [None] * len(charts)  # the one with the error has it alone, too, and says so
     seconds = (time.perf_counter() - begin) / len(charts)
-    coordinates = np.split(maps.uv, np.cumsum([len(v) for v, _ in meshes])[:-1])
-    found: list[ChartMap | None] = []
-    for k, ((vertices, unit), chart, uv) in enumerate(zip(boxes, charts, coordinates, strict=True)):
-        density = None if (target := targets[k]) is None else target.density
-        placed = placed_chart(uv, vertices, chart, density, unit, None) if maps.solved[k] else None
-        found.append(None if placed is None else _of_many(maps, k, placed, seconds))
-    return found
+    placed = _placed(charts, boxes, maps.uv, None if not given else given["density"])
+    solved = maps.solved
+    return [_of_many(maps, k, placed[k], seconds) if solved[k] else None for k in range(len(charts))]
+
+
+def _placed(charts: list[Chart], boxes, uv: np.ndarray, density: np.ndarray | None) -> list[np.ndarray]:
+    """Maps (n,2) of all charts as `chart_map.placed_chart` places each of them; boxes: see `chart_map.in_unit_box`."""
+    count = len(charts)
+    first = np.cumsum([0, *(len(v) for v, _ in boxes)])
+    owner = np.repeat(np.arange(count), [len(c.triangles) for c in charts])
+    triangles = np.concatenate([c.triangles for c in charts]) + first[owner][:, None]
+    faces = np.concatenate([c.faces for c in charts])
+    faces = np.unique(np.column_stack([owner, faces]), axis=0, return_inverse=True)[1].ravel()
+    area = polygon_areas(np.concatenate([v for v, _ in boxes]), triangles, faces)
+    target = np.bincount(owner, area if density is None else area * density, count)
+    covered = signed_areas(uv, triangles)
+    total = np.bincount(owner, covered, count)
+    middle = covered[:, None] * uv[triangles].mean(axis=1)
+    middle = np.column_stack([np.bincount(owner, middle[:, k], count) for k in range(2)]) / total[:, None]
+    # A chart that is to go alone may be folded here.
+    scale = np.sqrt(np.maximum(target / total, 0)) * np.array([unit for _, unit in boxes])
+    of_vertex = np.repeat(np.arange(count), np.diff(first))
+    return np.split((uv - middle[of_vertex]) * scale[of_vertex][:, None], first[1:-1])
 
 
 def _side_by_side(targets: list[Target | None]) -> dict:

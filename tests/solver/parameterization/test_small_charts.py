@@ -1,14 +1,16 @@
 """Many small charts solved together."""
 
+import hard_meshes
 import meshes
 import numpy as np
 import pytest
+from work import counted_work
 
 from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.mesh.charts import triangle_rows
-from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.geometry import face_areas, halfedge_lengths, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import small_charts as batches
 from omt_uv.solver.parameterization.options import UnwrapOptions
@@ -104,3 +106,14 @@ def test_regions_get_their_shares_together_as_one_by_one(monkeypatch):
         assert figures.overlap <= 1e-4 and figures.area_l1 == pytest.approx(a.area_l1, abs=1e-9)
         assert figures.angle_mean == pytest.approx(a.angle_mean, rel=1e-6)
         assert a.angle_mean <= 1.05 * b.angle_mean and a.area_l1 <= max(1.5 * b.area_l1, 1e-3)
+
+
+def test_thousands_of_pieces_take_no_more_factorisations_than_a_few():
+    V, F = hard_meshes.pieces(2000)
+    with counted_work() as work:
+        result = drain(unwrap(triangle_surface(V, F)))
+    assert len(result.charts) == 2000
+    assert work.factorisations < 20
+    for chart, chart_map in zip(result.charts[::100], result.maps[::100], strict=True):
+        lengths = (halfedge_lengths(x, chart.triangles) for x in (chart.vertices, chart_map.uv))
+        np.testing.assert_allclose(*lengths, rtol=1e-6)
