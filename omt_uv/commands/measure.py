@@ -42,11 +42,13 @@ def run(options: argparse.Namespace) -> None:
 def _draw(path: Path, readings: list) -> None:
     from ..display.canvas import save
     from ..display.histogram import histogram
+    from ..files.images import check_whole
     from ..files.silence import silence
     from ..files.verified import staged
 
     try:
         with staged(path) as made, silence():
             save(made, histogram(readings))
+            check_whole(made)
     except (OSError, RuntimeError) as error:
         raise CommandError(f"{path}: {error}") from error

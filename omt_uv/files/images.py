@@ -29,6 +29,9 @@ FORMATS = {
 }
 # Formats that hold alpha.
 WITH_ALPHA = {"PNG", "OPEN_EXR", "TIFF", "TARGA"}
+# How a PNG begins, and ends: readers take one without its end for whole.
+PNG_START = b"\x89PNG"
+PNG_END = b"IEND\xaeB`\x82"
 # Bits per channel of formats that hold more than 8.
 DEPTHS = {"PNG": "16", "TIFF": "16", "OPEN_EXR": "32", "HDR": "32"}
 
@@ -121,21 +124,24 @@ def save(path: Path, pixels: np.ndarray, like: bpy.types.Image) -> None:
             else:
                 image.filepath_raw, image.file_format = str(made), file_format
                 image.save()
-            _check_size(made, image)
+            check_whole(made, tuple(image.size))
     except RuntimeError as error:
         raise ImageError(f"{path}: {str(error).strip() or 'cannot be written'}") from error
     finally:
         bpy.data.images.remove(image)
 
 
-def _check_size(path: Path, image: bpy.types.Image) -> None:
-    """Raise RuntimeError unless a file has the pixels of an image, as far as its size tells."""
+def check_whole(path: Path, size: tuple[int, ...] = ()) -> None:
+    """Raise RuntimeError unless a file reads as an image, of a size if one is given."""
     if not path.is_file():
         raise RuntimeError("nothing was written. Is the disk full?")
+    data = path.read_bytes()
+    if data.startswith(PNG_START) and not data.endswith(PNG_END):
+        raise RuntimeError("the end of the picture is missing. Is the disk full?")
     there = bpy.data.images.load(str(path), check_existing=False)
     try:
         # Reading a pixel reads the file.
-        whole = tuple(there.size) == tuple(image.size) and len(there.pixels) > 0 and there.has_data
+        whole = tuple(there.size) == (size or tuple(there.size)) and len(there.pixels) > 0 and there.has_data
     finally:
         bpy.data.images.remove(there)
     if not whole:

@@ -186,7 +186,5 @@ def _lost_kinds(source: Path, made: Path) -> list[str]:
         return ["What Blender does not read of an FBX file is lost"]
     lost = before - count(made.read_bytes()).kinds
     # Curves are sampled anew, and as many as there is movement.
-    lost = {kind: n for kind, n in lost.items() if not kind.startswith("AnimationCurve")}
-    if not lost:
-        return []
-    return ["Blender does not carry all of an FBX file; lost: " + ", ".join(f"{k} ({n})" for k, n in lost.items())]
+    names = [f"{kind} ({n})" for kind, n in lost.items() if not kind.startswith("AnimationCurve")]
+    return ["Blender does not carry all of an FBX file; lost: " + ", ".join(names)] if names else []

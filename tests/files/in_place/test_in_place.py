@@ -1,0 +1,201 @@
+"""UVs put into the bytes of OBJ, PLY and glTF files: they read as wished, and no other byte differs."""
+
+from __future__ import annotations
+
+import re
+import struct
+import warnings
+
+import mesh_bytes
+import numpy as np
+import pytest
+from mesh_bytes import CUBE, QUADS, TRIANGLES
+
+from omt_uv.files.in_place import glb, glb_data, obj, obj_text, ply
+from omt_uv.files.in_place.imported import InPlaceError
+
+PLY_FORMS = ("ascii", "binary_little_endian", "binary_big_endian")
+FACES = [QUADS[0], QUADS[1], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+
+
+def stripped(data):
+    """An OBJ file without UVs: no lines of them, and no index of them in faces."""
+    lines = [line for line in data.split(b"\n") if not line.lstrip().startswith(b"vt")]
+    joined = b"\n".join(lines)
+    return re.sub(rb"(?<=[\s\d])(-?\d+)/-?\d*(/-?\d+)?", lambda m: m[1] + ((m[2] and b"/" + m[2]) or b""), joined)
+
+
+def uv_of(data):
+    """UVs (c,2) of all corners of an OBJ file, NaN where there are none."""
+    text = obj_text.read(data)
+    return np.append(text.uv, [[np.nan, np.nan]], axis=0)[text.corner_uv].astype(np.float32), text
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("seams", [True, False])
+def test_obj_changes_uvs_and_nothing_else(end, seams):
+    data = mesh_bytes.obj_bytes(end)
+    wished = mesh_bytes.spread(24) if seams else mesh_bytes.spread(8)[np.concatenate(FACES)]
+    new, told = obj.put(data, [mesh_bytes.imported(FACES, wished)])
+    assert stripped(new) == stripped(data)
+    uv, text = uv_of(new)
+    kept = text.is_face & np.isin(np.arange(len(text.is_face)), [0, 1, 2, 3, 6, 8])
+    assert (uv[np.repeat(kept, np.diff(text.face_start))] == wished).all()
+    assert len(told) == 1
+    assert "2 faces" in told[0]
+    # Polylines and the faces that Blender drops keep their UVs.
+    old, was = uv_of(data)
+    rest = np.repeat(~kept, np.diff(text.face_start))
+    assert np.array_equal(uv[rest], old[rest], equal_nan=True)
+
+
+def test_uvs_that_stay_leave_every_byte():
+    for seed in range(3):
+        once = obj.put(mesh_bytes.obj_bytes(), [mesh_bytes.imported(FACES, mesh_bytes.spread(24, seed))])[0]
+        assert obj.put(once, [mesh_bytes.imported(FACES, mesh_bytes.spread(24, seed))])[0] == once
+        # And the lines of the run before are used again.
+        again = obj.put(once, [mesh_bytes.imported(FACES, mesh_bytes.spread(24, seed + 9))])[0]
+        assert again.count(b"\n") == once.count(b"\n")
+        for line, before in zip(again.split(b"\n"), once.split(b"\n"), strict=True):
+            assert line == before or line.startswith(b"vt")
+    for form in PLY_FORMS:
+        once = ply.put(mesh_bytes.ply_bytes(form), [mesh_bytes.imported(QUADS, mesh_bytes.spread(24))])[0]
+        found = ply.read_uv(once)[0]
+        here = mesh_bytes.imported(found.corner_vertex.reshape(-1, 4), mesh_bytes.spread(24), found.positions)
+        assert ply.put(once, [here])[0] == once
+    once = glb.put(mesh_bytes.glb_bytes(), [mesh_bytes.imported_triangles(mesh_bytes.spread(36) / 4)])[0]
+    read = glb_data.read(once)
+    corners = glb_data.triangles(read, read.doc["meshes"][0]["primitives"][0])
+    here = mesh_bytes.imported(corners, mesh_bytes.spread(36) / 4, CUBE[np.concatenate([np.arange(8), copied(read)])])
+    assert glb.put(once, [here])[0] == once
+
+
+def copied(read):
+    """The vertices of which the new ones of the cube are copies."""
+    values = glb_data.accessor(read, read.doc["meshes"][0]["primitives"][0]["attributes"]["_CUSTOM"])[:, 0]
+    return values[8:].astype(int)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("form", PLY_FORMS)
+@pytest.mark.parametrize(
+    "names, corners", [(("s", "t"), True), (("texture_u", "texture_v"), False), ((), True), ((), False)]
+)
+def test_ply_changes_uvs_and_nothing_else(form, names, corners, end):
+    data = mesh_bytes.ply_bytes(form, names, corners, end)
+    wished = mesh_bytes.spread(24)
+    new, told = ply.put(data, [mesh_bytes.imported(QUADS, wished)])
+    assert told == []
+    old_mesh, mesh = ply.read(data), ply.read(new)
+    assert (ply.read_uv(new)[1].astype(np.float32) == wished).all()
+    # Corners lie where they lay, on copies of all that their vertices had.
+    splits = bool(names) or not corners
+    assert len(mesh.positions) == (24 if splits else 8)
+    assert (mesh.positions[:8] == CUBE).all()
+    assert (mesh.positions[mesh.corner_vertex] == CUBE[QUADS.ravel()]).all()
+    for name in ("red", "weight"):
+        values = [
+            ply.scalars(m.data, m.header, m.header.find("vertex"), m.rows["vertex"], name) for m in (old_mesh, mesh)
+        ]
+        assert (values[1][mesh.corner_vertex] == values[0][QUADS.ravel()]).all()
+    assert data[-2 if form == "ascii" else -8 :] == new[-2 if form == "ascii" else -8 :]
+    header = [line for line in new[: mesh.header.size].split(b"\n") if not line.startswith(b"element vertex")]
+    added = [line for line in header if line.rstrip() in (b"property float s", b"property float t")]
+    assert [line for line in header if splits and not names and line in added] == (added if not names else [])
+    kept = [line for line in data[: old_mesh.header.size].split(b"\n") if not line.startswith(b"element vertex")]
+    assert kept == [line for line in header if names or line not in added]
+
+
+@pytest.mark.parametrize("shared, mode, uvs", [(False, 4, True), (True, 4, True), (False, 5, True), (True, 4, False)])
+def test_gltf_changes_uvs_and_nothing_else(shared, mode, uvs):
+    data = mesh_bytes.glb_bytes(shared, mode, uvs)
+    old = glb_data.read(data)
+    if mode == 5:
+        faces = glb_data.triangles(old, old.doc["meshes"][0]["primitives"][0])
+        mesh = mesh_bytes.imported(faces, mesh_bytes.spread(len(faces) * 3))
+    else:
+        mesh = mesh_bytes.imported_triangles(mesh_bytes.spread(36), shared)
+    new = glb_data.read(glb.put(data, [mesh])[0])
+    at = 0
+    for was, now in zip(*(g.doc["meshes"][0]["primitives"] for g in (old, new)), strict=True):
+        before, after = glb_data.triangles(old, was).ravel(), glb_data.triangles(new, now).ravel()
+        for a, b in ((was["attributes"], now["attributes"]), *zip(was["targets"], now["targets"], strict=True)):
+            for name in set(a) - {"TEXCOORD_0"}:
+                assert (glb_data.accessor(old, a[name])[before] == glb_data.accessor(new, b[name])[after]).all()
+        uv = glb_data.accessor(new, now["attributes"]["TEXCOORD_0"])[after]
+        wished = mesh.uv[at : at + len(after)]
+        at += len(after)
+        assert uv[:, 0] == pytest.approx(wished[:, 0], abs=0)
+        assert 1 - uv[:, 1] == pytest.approx(wished[:, 1], abs=1.2e-7)
+    for key in ("asset", "scenes", "nodes", "images", "extensions"):
+        assert old.doc[key] == new.doc[key]
+    picture = new.doc["bufferViews"][new.doc["images"][0]["bufferView"]]
+    assert new.binary[picture["byteOffset"] :][:5] == b"\x89PNG!"
+    # Nothing of what was replaced is left behind.
+    assert sum(view["byteLength"] for view in new.doc["bufferViews"]) > new.doc["buffers"][0]["byteLength"] - 64
+
+
+def test_gltf_without_new_seams_has_only_the_bytes_of_its_uvs_changed():
+    data = mesh_bytes.glb_bytes()
+    mesh = mesh_bytes.imported_triangles(mesh_bytes.spread(8, 7)[TRIANGLES.ravel()])
+    new = glb.put(data, [mesh])[0]
+    assert len(new) == len(data)
+    view = glb_data.read(data).doc["bufferViews"][1]
+    (size,) = struct.unpack_from("<I", data, 12)
+    begin = 28 + size + view["byteOffset"]
+    assert new[:begin] == data[:begin]
+    assert new[begin + view["byteLength"] :] == data[begin + view["byteLength"] :]
+    assert new != data
+
+
+def compressed(doc, name):
+    doc["meshes"][0]["primitives"][0]["extensions"] = {name: {}}
+    doc["extensionsUsed"] = [name]
+
+
+@pytest.mark.parametrize("name", ["KHR_draco_mesh_compression", "EXT_meshopt_compression"])
+def test_compressed_files_are_refused_by_name(name):
+    read = glb_data.read(mesh_bytes.glb_bytes())
+    compressed(read.doc, name)
+    with pytest.raises(InPlaceError, match=name):
+        glb.put(glb_data.write(read), [mesh_bytes.imported_triangles(mesh_bytes.spread(36))])
+
+
+@pytest.mark.parametrize("put, data", [(obj.put, mesh_bytes.obj_bytes()), (ply.put, mesh_bytes.ply_bytes())])
+def test_another_mesh_is_refused(put, data):
+    for faces, positions in ((QUADS[:, ::-1], CUBE), (QUADS, CUBE[:, ::-1] * 2 + np.arange(24).reshape(8, 3))):
+        with pytest.raises(InPlaceError):
+            put(data, [mesh_bytes.imported(faces, mesh_bytes.spread(24), positions.astype(np.float32))])
+
+
+def test_survey_coordinates_that_blender_rounds_or_shifts_are_kept():
+    """The mesh is found again where Blender holds it without its offset, and with it rounded to half a metre."""
+    place = np.array([4567890.12, 512345.67, 812.5])
+    lines = ["v {:.17g} {:.17g} {:.17g}".format(*p) for p in (CUBE + place).tolist()]
+    lines += ["f " + " ".join(str(k + 1) for k in face) for face in QUADS.tolist()]
+    data = "\n".join(lines).encode()
+    for positions in (CUBE, (CUBE + place).astype(np.float32)):
+        new, _ = obj.put(data, [mesh_bytes.imported(QUADS, mesh_bytes.spread(24), positions)])
+        assert stripped(new) == data
+
+
+@pytest.mark.parametrize("kind", ["obj", *PLY_FORMS, "glb", "glb shared"])
+def test_damaged_files_are_one_named_error_or_done(kind):
+    meshes = [mesh_bytes.imported(FACES, mesh_bytes.spread(24))]
+    if kind == "obj":
+        put, data = obj.put, mesh_bytes.obj_bytes()
+    elif kind in PLY_FORMS:
+        put, data, meshes = ply.put, mesh_bytes.ply_bytes(kind), [mesh_bytes.imported(QUADS, mesh_bytes.spread(24))]
+    else:
+        put, data = glb.put, mesh_bytes.glb_bytes("shared" in kind)
+        meshes = [mesh_bytes.imported_triangles(mesh_bytes.spread(36), "shared" in kind)]
+    done = 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for raw in mesh_bytes.mutants(data, 250, seed=3):
+            try:
+                put(raw, meshes)
+                done += 1
+            except InPlaceError as error:
+                assert str(error)
+    assert 0 < done < 250

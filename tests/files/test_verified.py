@@ -1,0 +1,124 @@
+"""Files come whole or not at all, and what killed processes left goes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from omt_uv.files import verified
+from omt_uv.files.verified import FileError
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_block_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
+    (tmp_path / "a.txt").write_text("old")
+    for error in (OSError(28, "No space left on device"), FileError("no"), KeyboardInterrupt(), MemoryError()):
+        with pytest.raises((FileError, KeyboardInterrupt, MemoryError)), verified.staged(tmp_path / "a.txt") as made:
+            made.write_text("half")
+            raise error
+        assert names(tmp_path) == ["a.txt"]
+        assert (tmp_path / "a.txt").read_text() == "old"
+    with pytest.raises(FileError, match="nothing was written"), verified.staged(tmp_path / "a.txt"):
+        pass
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_what_does_not_read_as_written_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(type(tmp_path), "write_bytes", lambda path, data: path.write_text("whol"))
+    with pytest.raises(FileError, match="disk full"):
+        verified.write_text(tmp_path / "a.txt", "whole")
+    assert names(tmp_path) == []
+
+
+def test_disks_that_cannot_flush_are_errors(tmp_path, monkeypatch):
+    (tmp_path / "a.txt").write_text("old")
+
+    def broken(handle):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", broken)
+    with pytest.raises(FileError, match="Input/output"):
+        verified.write_text(tmp_path / "a.txt", "new")
+    assert (tmp_path / "a.txt").read_text() == "old"
+    assert names(tmp_path) == ["a.txt"]
+
+
+def test_links_stay_links_and_companions_come_first(tmp_path):
+    (tmp_path / "real.txt").write_text("old")
+    (tmp_path / "link.txt").symlink_to("real.txt")
+    companions = {}
+    with verified.staged(tmp_path / "link.txt", companions) as made:
+        made.write_text("new")
+        other = made.with_suffix(".mtl")
+        other.write_text("more")
+        companions[other] = tmp_path / "more.mtl"
+    assert (tmp_path / "link.txt").is_symlink()
+    assert (tmp_path / "real.txt").read_text() == "new"
+    assert names(tmp_path) == ["link.txt", "more.mtl", "real.txt"]
+
+
+def test_leftovers_of_the_dead_go_and_files_of_the_living_stay(tmp_path):
+    program = (
+        "import sys, time; from pathlib import Path; from omt_uv.files import verified\n"
+        "with verified.staged(Path(sys.argv[1])) as made:\n"
+        "    made.write_text('half'); made.with_suffix('.mtl').write_text('x')\n"
+        "    print(made.name, flush=True); time.sleep(60)"
+    )
+    here = os.path.dirname(os.path.dirname(os.path.dirname(verified.__file__)))
+    started = [
+        subprocess.Popen([sys.executable, "-c", program, str(tmp_path / "a.txt")], cwd=here, stdout=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    made = [process.stdout.readline().decode().strip() for process in started]
+    started[0].kill()
+    started[0].wait()
+    assert (tmp_path / made[0]).exists()
+    verified.write_text(tmp_path / "b.txt", "new")
+    rest = names(tmp_path)
+    assert not [name for name in rest if name.startswith(made[0].removesuffix(".txt"))]
+    assert len([name for name in rest if name.startswith(made[1].removesuffix(".txt"))]) == 3
+    started[1].kill()
+    started[1].wait()
+    verified.sweep(tmp_path)
+    assert names(tmp_path) == ["b.txt"]
+
+
+def test_old_leftovers_without_a_lock_go(tmp_path):
+    (tmp_path / ".omt_uv_1_x.obj").write_text("half")
+    (tmp_path / ".omt_uv_old").mkdir()
+    verified.sweep(tmp_path)
+    assert len(names(tmp_path)) == 2
+    for path in tmp_path.iterdir():
+        os.utime(path, (time.time() - 1e6,) * 2)
+    verified.sweep(tmp_path)
+    assert names(tmp_path) == []
+
+
+def test_paths_that_lead_to_one_file_clash(tmp_path):
+    (tmp_path / "a").write_text("")
+    os.link(tmp_path / "a", tmp_path / "b")
+    (tmp_path / "c").symlink_to("a")
+    (tmp_path / "d").mkdir()
+    for other in ("a", "b", "c", "d/../a"):
+        assert verified.clash([("x", tmp_path / "a"), ("y", tmp_path / other)]) == ("x", "y")
+    assert verified.clash([("x", tmp_path / "a"), ("y", tmp_path / "new")]) is None
+    assert verified.clash([("x", tmp_path / "new"), ("y", tmp_path / "d/../new")]) == ("x", "y")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is forbidden to root")
+def test_missing_rights_are_told_beforehand(tmp_path):
+    (tmp_path / "a").write_text("")
+    (tmp_path / "a").chmod(0o400)
+    with pytest.raises(FileError, match="write-protected"):
+        verified.check_writable(tmp_path / "a")
+    tmp_path.chmod(0o500)
+    with pytest.raises(FileError, match="nothing can be written"):
+        verified.check_writable(tmp_path / "b")
+    tmp_path.chmod(0o700)
