@@ -14,7 +14,7 @@ import numpy as np
 
 from .glb_data import COMPRESSIONS, DRACO, Glb, accessor, normalized, read, triangles, write
 from .glb_layout import ATTRIBUTES, ELEMENTS, GlbChange, rows_of
-from .imported import Imported, InPlaceError, check_found, dropped_warning, find_corners
+from .imported import Imported, InPlaceError, check_found, dropped_warning, find_corners, numbered
 
 # What Blender appends to a name that is taken.
 NUMBERED = re.compile(r"\.\d{3,}$")
@@ -238,8 +238,8 @@ def _split(before: np.ndarray, corners: np.ndarray, uv: np.ndarray) -> tuple[np.
     """Vertices (c,) of corners once each has one UV, the old ones (k,) of which the new are copies, and the UVs
     (n+k,w) of all; the old one keeps the UV it had, if that is among them, or takes the first."""
     n = len(before)
-    pairs = np.concatenate([corners[:, None], (uv + np.float32(0)).view(np.int32)], axis=1)
-    _, first, pair = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    values = numbered(uv)
+    _, first, pair = np.unique(corners * (values.max(initial=0) + 1) + values, return_index=True, return_inverse=True)
     vertex = corners[first]
     moved = (before[vertex] != uv[first]).any(axis=1)
     order = np.lexsort((first, moved, vertex))

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .imported import Imported, InPlaceError, check_found, dropped_warning, find_corners, same_places
+from .imported import Imported, InPlaceError, check_found, dropped_warning, find_corners, numbered, same_places
 from .obj_text import WORD, ObjText, read, words
 
 
@@ -70,7 +70,7 @@ def _groups(text: ObjText, here: np.ndarray, wished: np.ndarray) -> tuple[np.nda
 
     They have one UV, and either one vertex or one line before.
     """
-    values = np.unique(wished + np.float32(0), axis=0, return_inverse=True)[1].ravel()
+    values = numbered(wished)
     vertex, old = text.corner_vertex[here], text.corner_uv[here]
     at_vertex = np.unique(vertex * (values.max(initial=0) + 1) + values, return_inverse=True)[1].ravel()
     at_line = np.unique(old * (values.max(initial=0) + 1) + values, return_inverse=True)[1].ravel()
@@ -127,26 +127,29 @@ def _written(text: ObjText, here: np.ndarray, group: np.ndarray, plan: Plan) -> 
     inserted: dict[int, list[int]] = {}
     for g in np.flatnonzero(plan.after >= 0).tolist():
         inserted.setdefault(int(plan.after[g]), []).append(g)
-    old_at, new_at = np.full(len(text.uv), -1), np.full(len(plan.values), -1)
+    old_at, new_at = [-1] * len(text.uv), [-1] * len(plan.values)
+    slot, kept = plan.slot.tolist(), plan.kept.tolist()
     line_of_uv = {line: k for k, line in enumerate(text.uv_line.tolist())}
     face_of_line = {line: f for f, line in enumerate(text.face_line.tolist())}
     goal = np.full(len(here), -1)
     goal[here] = group
+    goals, olds, start = goal.tolist(), text.corner_uv.tolist(), text.face_start.tolist()
     out: list[bytes] = []
     count = 0
     for i, line in enumerate(text.lines):
         face, k = face_of_line.get(i), line_of_uv.get(i)
         if face is not None:
-            corners = slice(text.face_start[face], text.face_start[face + 1])
-            pairs = zip(goal[corners].tolist(), text.corner_uv[corners].tolist(), strict=True)
-            out.append(_face(line, [new_at[g] if g >= 0 else old_at[u] if u >= 0 else -1 for g, u in pairs], count))
+            corners = slice(start[face], start[face + 1])
+            pairs = zip(goals[corners], olds[corners], strict=True)
+            uvs = [new_at[g] if g >= 0 else old_at[u] if u >= 0 else -1 for g, u in pairs]
+            out.append(line if uvs == olds[corners] and b"-" not in line else _face(line, uvs, count))
         elif k is None:
             out.append(line)
-        elif plan.kept[k] or plan.slot[k] >= 0:
+        elif kept[k] or slot[k] >= 0:
             old_at[k] = count
-            if plan.slot[k] >= 0:
-                new_at[plan.slot[k]] = count
-                line = _uv_line(line, text.uv[k], plan.values[plan.slot[k]])
+            if slot[k] >= 0:
+                new_at[slot[k]] = count
+                line = _uv_line(line, text.uv[k], plan.values[slot[k]])
             out.append(line)
             count += 1
         for g in inserted.get(i, ()):
@@ -177,14 +180,17 @@ def _digits(uv: np.ndarray) -> list[bytes]:
 
 def _face(line: bytes, uvs: Sequence[int], count: int) -> bytes:
     """A line of a face with other indices of UVs from 0, -1 for corners that stay; `count` UVs have come before it."""
-    fresh = {}
-    for k, (word, uv) in enumerate(zip(words(line)[1:], uvs, strict=True), 1):
+    fresh, said = {}, words(line)
+    for k, (word, uv) in enumerate(zip(said[1:], uvs, strict=True), 1):
         if uv < 0:
             continue
         vertex, *more = word.split(b"/")
         backward = (more[0] if more and more[0] else vertex).startswith(b"-")
         more[:1] = [str(uv - count if backward else uv + 1).encode()]
         fresh[k] = b"/".join([vertex, *more])
+    bare = line.rstrip()
+    if b" ".join(said) == bare:
+        return b" ".join([fresh.get(k, word) for k, word in enumerate(said)]) + line[len(bare) :]
     return _replaced(line, fresh)
 
 

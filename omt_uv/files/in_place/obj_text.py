@@ -80,10 +80,11 @@ def read(data: bytes) -> ObjText:
 
 def words(line: bytes) -> list[bytes]:
     """What a line says, without its comment."""
-    found = WORD.findall(line)
-    for k, word in enumerate(found):
-        if word.startswith(b"#"):
-            return found[:k]
+    found = WORD.findall(line) if b"\\" in line else line.split()
+    if b"#" in line:
+        for k, word in enumerate(found):
+            if word.startswith(b"#"):
+                return found[:k]
     return found
 
 
@@ -117,23 +118,37 @@ def _numbers(lines: Sequence[bytes], columns: int) -> np.ndarray:
 
 def _corners(lines: list[bytes], faces: list) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """face_start (f+1,), vertices (c,) and UVs (c,) of face lines; -1 for what is not there."""
-    start = [0]
-    vertices: list[int] = []
-    uvs: list[int] = []
-    for i, n, m, *_ in faces:
-        for word in words(lines[i])[1:]:
-            parts = word.split(b"/", 2)
-            vertices.append(_index(parts[0], n))
-            uvs.append(_index(parts[1], m) if len(parts) > 1 else -1)
-        start.append(len(vertices))
-    return np.array(start), np.array(vertices, np.int64), np.array(uvs, np.int64)
+    of = [words(lines[i])[1:] for i, *_ in faces]
+    sizes = np.array([len(row) for row in of], np.int64)
+    said = _indices([word for row in of for word in row])
+    before = np.array([(n, m) for _, n, m, *_ in faces], np.int64).reshape(-1, 2)
+    there = np.repeat(before, sizes, axis=0)
+    index = np.where(said > 0, said - 1, np.where(said < 0, said + there, -1))
+    index[(index < 0) | (index >= there)] = -1
+    return np.append(0, np.cumsum(sizes)), index[:, 0], index[:, 1]
 
 
-def _index(word: bytes, count: int) -> int:
-    """The index from 0 that a word stands for, where `count` elements have come; -1 for none of these."""
+def _indices(corners: list[bytes]) -> np.ndarray:
+    """Numbers (c,2) of vertices and UVs that corners say, 0 for none."""
+    kinds = {word.count(b"/") for word in corners}
+    if len(kinds) == 1 and max(kinds) <= 2:
+        # As a rule all corners are alike.
+        (slashes,) = kinds
+        text = b" ".join(corners).replace(b"//", b"/0/").replace(b"/", b" ")
+        try:
+            found = np.array(text.split()).astype(np.int64).reshape(len(corners), slashes + 1)
+            return np.concatenate([found, np.zeros_like(found)], axis=1)[:, :2] if slashes == 0 else found[:, :2]
+        except (ValueError, OverflowError):
+            pass
+    rows = [word.split(b"/", 2) for word in corners]
+    return np.array([[_number(row[0]), _number(row[1]) if len(row) > 1 else 0] for row in rows], np.int64).reshape(
+        -1, 2
+    )
+
+
+def _number(word: bytes) -> int:
+    """The number that a word says, 0 if it says none that an index can be."""
     try:
-        value = int(word)
+        return int(word) if len(word) < 18 else 0
     except ValueError:
-        return -1
-    value = value - 1 if value > 0 else value + count if value < 0 else -1
-    return value if 0 <= value < count else -1
+        return 0

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .imported import Imported, InPlaceError, check_found, dropped_warning, find_corners, same_places
+from .imported import Imported, InPlaceError, check_found, dropped_warning, find_corners, numbered, same_places
 from .ply_rows import TOKEN, Header, Property, Rows, lists, read_header, read_rows, scalars, spans
 
 # Names under which programs store UVs of vertices, and of the corners of a face; Blender reads the first pair.
@@ -174,7 +174,7 @@ class Split:
 def _split(ply: PlyMesh, old: np.ndarray | None, here: np.ndarray, wished: np.ndarray) -> Split:
     """Split vertices with several UVs; the old one keeps the UV that it had, if that is among them, or the first."""
     n = len(ply.positions)
-    values = np.unique(wished + np.float32(0), axis=0, return_inverse=True)[1].ravel()
+    values = numbered(wished)
     key = ply.corner_vertex[here] * (values.max(initial=0) + 1) + values
     _, first, pair = np.unique(key, return_index=True, return_inverse=True)
     vertex, uv = ply.corner_vertex[here][first], wished[first]
