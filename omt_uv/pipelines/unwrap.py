@@ -16,8 +16,9 @@ from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.topology import twins
 from ..solver.parameterization.options import UnwrapOptions
-from ..solver.parameterization.unwrap import SurfaceMap, unwrap
-from ..solver.progress import Steps, part_of
+from ..solver.parameterization.small_charts import SMALL
+from ..solver.parameterization.unwrap import CutCharts, SurfaceMap, cut_charts, map_small_charts, unwrap
+from ..solver.progress import Progress, Steps, part_of
 from ..xatlas_charts import SegmentationError, chart_seams
 from .layout import PACKING_FROM, Layout, PlacedIsland, Refusal, UnwrapJob, corner_uvs, pack_islands
 from .subdivision import refinable, refined_on_subdivision, subdivided_target
@@ -45,14 +46,19 @@ def lay_out(
     options = UnwrapOptions(**settings.unwrap_arguments())
     maps: list[SurfaceMap] = []
     warnings: list[tuple[int, str]] = []
+    if settings.seams == "charts":
+        seamed = [_with_charts(job) for job in jobs]
+        jobs = [job for job, _ in seamed]
+        warnings += [(index, warning) for index, (_, warning) in enumerate(seamed) if warning]
     share = PACKING_FROM / len(jobs)
+    cuts = yield from _cut_together(jobs, options)
     for index, job in enumerate(jobs):
         try:
-            job, warning = _with_charts(job) if settings.seams == "charts" else (job, "")
-            maps.append((yield from part_of(_unwrapped(job, options), index * share, share)))
+            steps = _unwrapped(job, options, cuts.get(index))
+            maps.append((yield from part_of(steps, index * share, share)))
         except MeshError as error:
             raise Refusal(index, error) from error
-        warnings += [(index, text) for text in (warning, *maps[-1].warnings) if text]
+        warnings += [(index, text) for text in maps[-1].warnings]
         warnings += [(index, text) for chart_map in maps[-1].maps for text in chart_map.warnings]
     mapped = [
         PlacedIsland(index, chart, chart_map.uv)
@@ -89,7 +95,26 @@ def _beside(job: UnwrapJob) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(points.reshape(-1, 2), np.arange(points.shape[0] * 3).reshape(-1, 3))] if len(points) else []
 
 
-def _unwrapped(job: UnwrapJob, options: UnwrapOptions) -> Steps[SurfaceMap]:
+def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[dict[int, CutCharts]]:
+    """Charts of several small surfaces, by the numbers of these, those mapped that can be solved together."""
+    small = [k for k, job in enumerate(jobs) if len(job.surface.triangles) <= SMALL and job.subdivision is None]
+    if len(small) < 2 or options.max_shear:
+        return {}
+    cuts = []
+    for k in small:
+        yield Progress("Charts", 0.0)
+        job = jobs[k]
+        try:
+            cuts.append(
+                cut_charts(job.surface, job.faces, options=options, pins=job.pins, target=job.target, avoid=job.avoid)
+            )
+        except MeshError as error:
+            raise Refusal(k, error) from error
+    cuts = yield from part_of(map_small_charts(cuts, options), 0.0, 0.0)
+    return dict(zip(small, cuts, strict=True))
+
+
+def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = None) -> Steps[SurfaceMap]:
     """The maps of the charts of a surface, for the areas of its subdivided surface where it has a modifier for that."""
     target, modifier = job.target, job.subdivision
     share = 1.0
@@ -97,7 +122,7 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions) -> Steps[SurfaceMap]:
         share = CAGE_SHARE
         if options.boundary != "free" or not refinable(job.surface):
             target = subdivided_target(job.surface, modifier)
-    steps = unwrap(job.surface, job.faces, options=options, pins=job.pins, target=target, avoid=job.avoid)
+    steps = unwrap(job.surface, job.faces, options=options, pins=job.pins, target=target, avoid=job.avoid, cut=cut)
     found = yield from part_of(steps, 0.0, share)
     if modifier is None:
         return found

@@ -130,6 +130,10 @@ def cut_gluing(
     positions, unit = _in_unit_box(surface, repaired.gluing)
     gluing, one_sided = _oriented(repaired.gluing, positions)
     twisted = one_sided
+    component_of = components(gluing)
+    topology = classify(gluing, corner_classes(gluing), component_of, one_sided)
+    if topology.is_disk.all():
+        return _uncut(surface, gluing, repaired, component_of, unit)
     gone = np.zeros(len(gluing.first), dtype=bool)
     if sieve is not None:
         gone = partition_pairs(gluing, positions, one_sided)
@@ -158,6 +162,18 @@ def cut_gluing(
     backwards, mirrored = (len(np.unique(repaired.gluing.owner[turned & k])) for k in (~twisted, twisted))
     warnings = (*repaired.warnings, *_warnings(len(parting), backwards, mirrored, holes * sieves, touching))
     cuts = Cuts(edges=edges, length=length, components=tuple(report), torn=repaired.torn, warnings=warnings)
+    return CutSurface(surface=surface, gluing=gluing, cuts=cuts, extent=unit)
+
+
+def _uncut(surface: Surface, gluing: Gluing, repaired: Repaired, component_of: np.ndarray, unit: float) -> CutSurface:
+    """What `cut_gluing` returns where all components (m,) are disks."""
+    turned = gluing.triangles[:, 1] != repaired.gluing.triangles[:, 1]
+    every = np.ones(int(component_of.max()) + 1, dtype=bool)
+    touching = coincident_boundary_vertices(surface, gluing, component_of, every)
+    backwards = len(np.unique(repaired.gluing.owner[turned]))
+    warnings = (*repaired.warnings, *_warnings(0, backwards, 0, 0, touching))
+    edges = repaired.torn.astype(np.int64)
+    cuts = Cuts(edges=edges, length=0.0, components=(), torn=repaired.torn, warnings=warnings)
     return CutSurface(surface=surface, gluing=gluing, cuts=cuts, extent=unit)
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..analysis.density import Target
-from ..cutting.disk_charts import cut_to_disks
+from ..cutting.disk_charts import DiskCharts, cut_to_disks
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError
 from ..mesh.charts import Chart
@@ -48,6 +49,26 @@ class SurfaceMap:
         return [m.report(c) for c, m in zip(self.charts, self.maps, strict=True)]
 
 
+@dataclass(frozen=True)
+class CutCharts:
+    """A surface cut into charts that are to be mapped, for `unwrap`; maps (by number) are there already.
+
+    joined : the charts with the quads of mirror images cut alike; pairs : see `mirrored_charts.mirror_partners`
+    """
+
+    prepared: DiskCharts
+    pins: list[ChartPins | None]
+    targets: list[Target | None]
+    joined: list[Chart]
+    pairs: dict[int, tuple[int, np.ndarray]]
+    maps: dict[int, ChartMap]
+
+    @property
+    def alike(self) -> list[int]:
+        """The numbers of charts that may be solved together with others."""
+        return [k for k, c in enumerate(self.joined) if self.pins[k] is None and is_small(c) and k not in self.pairs]
+
+
 def unwrap(
     surface: Surface,
     faces: np.ndarray | None = None,
@@ -56,6 +77,7 @@ def unwrap(
     pins: CornerPins | None = None,
     target: Target | None = None,
     avoid: np.ndarray | None = None,
+    cut: CutCharts | None = None,
 ) -> Steps[SurfaceMap]:
     """Map the polygons `faces` (f,) bool of a surface, all by default, so that areas are kept.
 
@@ -64,29 +86,75 @@ def unwrap(
     pins : corners that keep their places, with a free boundary
     target : density (m,) of the triangles of the surface, and a region; every triangle its own area by default
     avoid : (n,) in [0,1], vertices to keep free of cuts; cuts avoid pinned vertices, too
+    cut : what `cut_charts` made of all this; then it counts
 
     Raises
     ------
     MeshError : see `disk_charts.cut_to_disks` and `chart_map.map_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
-    task = _Task(surface, options or UnwrapOptions(), pins, target)
-    avoid = clear_of_pins(surface, pins, avoid)
-    seams, fill_holes, bound = task.options.seams, task.options.fill_holes, task.options.max_shear
-    if bound:
+    options = options or UnwrapOptions()
+    task = _Task(surface, options, pins, target)
+    if options.max_shear:
+        avoid = clear_of_pins(surface, pins, avoid)
         found = yield from bound_shear(
-            surface, faces, task.map_one, bound, seams=seams, fill_holes=fill_holes, avoid=avoid
+            surface,
+            faces,
+            task.map_one,
+            options.max_shear,
+            seams=options.seams,
+            fill_holes=options.fill_holes,
+            avoid=avoid,
         )
         charts, maps, cuts, warnings = found.prepared.charts, found.maps, found.cuts, found.warnings
         chart_pins = [pins_of_chart(pins, chart) for chart in charts]
     else:
-        prepared = cut_to_disks(surface, faces, seams=seams, fill_holes=fill_holes, sieve=MANY, avoid=avoid)
-        charts, warnings = prepared.charts, prepared.warnings
-        chart_pins = [pins_of_chart(pins, chart) for chart in charts]
-        maps = yield from task.map_symmetric(charts, chart_pins)
-        cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
-    maps = with_convex_polygons(surface, charts, maps, chart_pins, task.options, target)
+        if cut is None:
+            cut = cut_charts(surface, faces, options=options, pins=pins, target=target, avoid=avoid)
+        charts, warnings, chart_pins = cut.prepared.charts, cut.prepared.warnings, cut.pins
+        maps = yield from task.map_symmetric(cut)
+        cuts = np.zeros((0, 2), np.int64) if cut.prepared.cuts is None else cut.prepared.cuts.edges
+    maps = with_convex_polygons(surface, charts, maps, chart_pins, options, target)
     return SurfaceMap(charts, maps, cuts, warnings)
+
+
+def cut_charts(
+    surface: Surface,
+    faces: np.ndarray | None = None,
+    *,
+    options: UnwrapOptions,
+    pins: CornerPins | None = None,
+    target: Target | None = None,
+    avoid: np.ndarray | None = None,
+) -> CutCharts:
+    """The charts of a surface, none of them mapped; see `unwrap`.
+
+    Raises
+    ------
+    MeshError : see `disk_charts.cut_to_disks`
+    """
+    avoid = clear_of_pins(surface, pins, avoid)
+    prepared = cut_to_disks(surface, faces, seams=options.seams, fill_holes=options.fill_holes, sieve=MANY, avoid=avoid)
+    charts = prepared.charts
+    chart_pins = [pins_of_chart(pins, chart) for chart in charts]
+    free = all(p is None for p in chart_pins)
+    joined = with_mirrored_quads(surface, charts) if free else charts
+    targets = [chart_target(target, surface, chart) for chart in joined]
+    pairs = mirror_partners(joined, targets) if free else {}
+    return CutCharts(prepared=prepared, pins=chart_pins, targets=targets, joined=joined, pairs=pairs, maps={})
+
+
+def map_small_charts(several: Sequence[CutCharts], options: UnwrapOptions) -> Steps[list[CutCharts]]:
+    """Surfaces with their small charts mapped together where boundaries are free, but those that have to go alone."""
+    alike = [cut.alike if options.boundary == "free" else [] for cut in several]
+    where = [(i, k) for i, numbers in enumerate(alike) for k in numbers]
+    charts, targets = [several[i].joined[k] for i, k in where], [several[i].targets[k] for i, k in where]
+    found = yield from map_together(charts, targets, options)
+    maps: list[dict[int, ChartMap]] = [{} for _ in several]
+    for (i, k), chart_map in zip(where, found, strict=True):
+        if chart_map is not None:
+            maps[i][k] = chart_map
+    return [replace(cut, maps=mine) for cut, mine in zip(several, maps, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -107,39 +175,38 @@ class _Task:
         except MeshError as error:
             raise located(error, chart) from error
 
-    def map_symmetric(self, charts: list[Chart], pins: list[ChartPins | None]) -> Steps[list[ChartMap]]:
+    def map_symmetric(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, symmetric ones also where their mirror images are cut along other diagonals."""
-        joined = charts if any(p is not None for p in pins) else with_mirrored_quads(self.surface, charts)
-        maps = yield from self.map_all(joined, pins)
-        changed = [k for k, (a, b) in enumerate(zip(charts, joined, strict=True)) if (a.faces != b.faces).any()]
+        charts = cut.prepared.charts
+        maps = yield from self.map_all(cut)
+        changed = [k for k, (a, b) in enumerate(zip(charts, cut.joined, strict=True)) if (a.faces != b.faces).any()]
         goal = QUALITIES[self.options.quality].area_error if self.options.balance == 0 else np.inf
         for k in changed:
             target = chart_target(self.target, self.surface, charts[k])
             found = as_given(charts[k], maps[k], None if target is None else target.density, goal)
             if found is None:
-                return (yield from self.map_all(charts, pins))
+                targets = [chart_target(self.target, self.surface, chart) for chart in charts]
+                pairs = mirror_partners(charts, targets)
+                as_it_was = replace(cut, joined=charts, targets=targets, pairs=pairs, maps={})
+                return (yield from self.map_all(as_it_was))
             maps[k] = found
         return maps
 
-    def map_all(self, charts: list[Chart], pins: list[ChartPins | None]) -> Steps[list[ChartMap]]:
+    def map_all(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, small ones without pins together, one for two that are each other's mirror image."""
+        charts, pairs = cut.joined, cut.pairs
         total = sum(len(c.triangles) for c in charts)
-        free = self.options.boundary == "free"
-        every = [chart_target(self.target, self.surface, chart) for chart in charts]
-        pairs = {} if any(p is not None for p in pins) else mirror_partners(charts, every)
-        alike = [k for k, c in enumerate(charts) if free and pins[k] is None and is_small(c) and k not in pairs]
-        done = sum(len(charts[k].triangles) for k in alike) / total
-        targets = [every[k] for k in alike]
-        found = yield from part_of(map_together([charts[k] for k in alike], targets, self.options), 0.0, done)
-        ready = dict(zip(alike, found, strict=True))
+        done = sum(len(charts[k].triangles) for k in cut.alike) / total if self.options.boundary == "free" else 0.0
+        if not cut.maps:
+            (cut,) = yield from part_of(map_small_charts([cut], self.options), 0.0, done)
         maps: list[ChartMap] = []
         for k, chart in enumerate(charts):
             if k in pairs:
                 maps.append(mirrored_map(maps[pairs[k][0]], pairs[k][1]))
                 continue
-            chart_map = ready.get(k)
+            chart_map = cut.maps.get(k)
             if chart_map is None:
-                share = 0.0 if k in ready else len(chart.triangles) / total
+                share = min(len(chart.triangles) / total, 1 - done)
                 chart_map = yield from part_of(self.map_one(chart), done, share)
                 done += share
             maps.append(chart_map)
