@@ -26,6 +26,8 @@ LEAST = 0.2
 MOST = 5.0
 # Occlusion where an edge begins to be hidden, and where it is.
 HIDDEN = (0.05, 0.5)
+# Occlusion where an edge is not to be seen from the front any more, and where nothing of it is.
+BURIED = (0.5, 0.9)
 # Angles between faces that are smooth, and sharp, in radians.
 SHARP = (np.pi / 6, np.pi / 2)
 # Curvature of a valley, negative and over the size, where it begins and where it is a crease; a sphere has 3.5.
@@ -48,8 +50,8 @@ class SeamPreferences:
 
     Attributes
     ----------
-    hidden : other parts of the surface hide it
-    crease : it lies in a valley; sharp : its faces meet at a right angle or sharper
+    hidden : other parts of the surface hide it, and it is on no front
+    crease : it lies in a valley, but on no front; sharp : its faces meet at a right angle or sharper
     underside, back : it looks down, or away from where the body looks to
     front, salient : it looks to where the body does; it stands out, and is not hidden
     mirror : it lies in the mirror plane
@@ -79,6 +81,7 @@ class SeamCosts:
     cost (e,) : per length, between LEAST and MOST; 1 is neutral
     reasons : (e,) in [0, 1] for everything that has a factor, by its name in `SeamPreferences`
     vertex_cost (n,) : mean over the edges at a vertex, 1 where there is none
+    face (n,) : in [0, 1], 1 where no seam should end, on the front of a body that has one
     plane : in which the surface is its own mirror image; facing : where it looks to
     """
 
@@ -86,6 +89,7 @@ class SeamCosts:
     cost: np.ndarray
     reasons: dict[str, np.ndarray]
     vertex_cost: np.ndarray
+    face: np.ndarray
     plane: SymmetryPlane | None
     facing: Facing
 
@@ -134,7 +138,9 @@ def seam_costs(
     count = np.bincount(ends.ravel(), minlength=n)
     total = np.bincount(ends.ravel(), np.repeat(cost, 2), n)
     vertex_cost = np.where(count > 0, total / np.maximum(count, 1), 1.0)
-    return SeamCosts(ends, cost, reasons, vertex_cost, plane, seen)
+    face = np.zeros(n)
+    face[used] = at_vertices["front"]
+    return SeamCosts(ends, cost, reasons, vertex_cost, face, plane, seen)
 
 
 def _among_all(plane: SymmetryPlane, used: np.ndarray, n: int) -> SymmetryPlane:
@@ -154,15 +160,18 @@ def _vertex_reasons(
     means = curvature_means(positions, triangles)
     saliency = saliency_of(means, triangles)
     seen = facing(positions, triangles, saliency, plane, None if up is None else np.array(up))
-    hidden = _step(vertex_occlusion(positions, triangles), HIDDEN)
+    occlusion = vertex_occlusion(positions, triangles)
     ahead = seen.certainty * towards(positions, triangles, seen.front)
     below = towards(positions, triangles, -seen.up)
+    # Sockets and nostrils are hidden from most sides, but not from the front, from where a face is looked at.
+    front = _step(ahead, SIDE) * (1 - _step(occlusion, BURIED))
+    hidden = _step(occlusion, HIDDEN) * (1 - front)
     reasons = {
         "hidden": hidden,
-        "crease": _step(-means[CREASE_SCALE], CREASE),
+        "crease": _step(-means[CREASE_SCALE], CREASE) * (1 - front),
         "underside": _step(below, SIDE),
         "back": _step(-ahead, SIDE),
-        "front": _step(ahead, SIDE),
+        "front": front,
         "salient": salient_weights(saliency, area, SALIENT) * (1 - hidden),
         "mirror": np.zeros(n),
     }

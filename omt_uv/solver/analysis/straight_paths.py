@@ -21,7 +21,7 @@ from ..mesh.topology import expand, graph_components, halfedges, pair_keys
 # Rings of vertices beside a path in which a straighter one is looked for.
 RINGS = 4
 # Price of a turn by a right angle, over the mean of the edges that meet there.
-TURN = 0.5
+TURN = 1.0
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.seam_costs import LEAST, MOST, SeamPreferences, seam_costs
+from omt_uv.solver.errors import ZeroAreaFaceError
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import pair_keys
 
@@ -27,6 +28,7 @@ def test_the_face_is_dear_and_the_back_of_the_head_cheap():
     V, costs = head_costs()
     along = V[:, 0] / V[:, 0].max()
     assert costs.vertex_cost[along > 1 / 3].min() > 1
+    assert costs.face[along > 2 / 3].min() > 0.5 and costs.face[along < 0].max() < 0.1
     middle = np.abs(V[:, 1]) < 0.05
     assert costs.vertex_cost[(along < -0.4) & middle].max() < 0.7
     assert costs.cost.min() >= LEAST and costs.cost.max() <= MOST
@@ -85,3 +87,13 @@ def test_only_chosen_faces_count():
     chosen = V[F].mean(axis=1)[:, 2] > 0
     costs = seam_costs(triangle_surface(V, F), faces=chosen)
     assert set(np.unique(costs.edges)) == set(np.unique(F[chosen]))
+
+
+def test_what_lies_nowhere_and_in_no_face_does_not_count():
+    V, F = meshes.head(20)
+    costs = seam_costs(triangle_surface(np.concatenate([[[np.nan] * 3], 1e-150 * V]), F + 1))
+    same = seam_costs(triangle_surface(V, F))
+    np.testing.assert_allclose(costs.cost, same.cost, rtol=1e-5)
+    assert costs.vertex_cost[0] == 1 and not costs.face[0]
+    with pytest.raises(ZeroAreaFaceError):
+        seam_costs(triangle_surface(0 * V, F))
