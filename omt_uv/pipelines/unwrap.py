@@ -54,8 +54,8 @@ def lay_out(
     cuts = yield from _cut_together(jobs, options)
     for index, job in enumerate(jobs):
         try:
-            steps = _unwrapped(job, options, cuts.get(index))
-            maps.append((yield from part_of(steps, index * share, share)))
+            unwrapping = _unwrapped(job, options, cuts.get(index))
+            maps.append((yield from part_of(unwrapping, index * share, share)))
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for text in maps[-1].warnings]

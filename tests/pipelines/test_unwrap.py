@@ -1,0 +1,54 @@
+"""Many objects unwrapped at once."""
+
+import meshes
+import numpy as np
+import pytest
+from work import counted_work
+
+from omt_uv.pipelines.layout import Refusal, UnwrapJob
+from omt_uv.pipelines.unwrap import lay_out
+from omt_uv.settings import Settings
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.progress import drain
+
+
+def wavy(count, seed=0):
+    """Small height fields, each another one, and the area of each."""
+    rng = np.random.default_rng(seed)
+    surfaces = []
+    for _ in range(count):
+        V, F = meshes.bumpy(int(rng.integers(3, 6)), 4, height=rng.uniform(0.1, 0.5))
+        surfaces.append(triangle_surface(V * rng.uniform(0.5, 2), F))
+    return surfaces
+
+
+def test_many_objects_take_no_more_factorisations_than_one_of_many_parts():
+    surfaces = wavy(40)
+    with counted_work() as work:
+        layout = drain(lay_out([UnwrapJob(s) for s in surfaces], Settings(pack=False)))
+    assert work.factorisations < 100
+    for surface, surface_map in zip(surfaces, layout.maps, strict=True):
+        assert len(surface_map.charts) == 1 and surface_map.maps[0].folds == 0
+        assert surface_map.maps[0].area_l1 < 0.01
+
+
+def test_an_object_among_many_has_the_map_that_it_has_alone():
+    surfaces = wavy(12)
+    together = drain(lay_out([UnwrapJob(s) for s in surfaces], Settings(pack=False, quality="exact"))).maps
+    alone = drain(lay_out([UnwrapJob(surfaces[5])], Settings(pack=False, quality="exact"))).maps[0]
+    figures = ("area_l1", "angle_mean")
+    for name in figures:
+        assert getattr(together[5].maps[0], name) == pytest.approx(getattr(alone.maps[0], name), abs=2e-3)
+    areas = [signed_areas(m.maps[0].uv, m.charts[0].triangles) for m in (together[5], alone)]
+    np.testing.assert_allclose(*areas, rtol=0.02)
+
+
+def test_the_object_that_cannot_be_unwrapped_is_named_by_its_number():
+    surfaces = wavy(3)
+    V, F = meshes.bumpy(3, 3)
+    V[4] = np.nan
+    jobs = [UnwrapJob(s) for s in [*surfaces[:2], triangle_surface(V, F), surfaces[2]]]
+    with pytest.raises(Refusal) as refused:
+        drain(lay_out(jobs, Settings()))
+    assert refused.value.index == 2
