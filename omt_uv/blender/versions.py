@@ -19,6 +19,12 @@ def uv_values(mesh: bpy.types.Mesh, layer: str) -> tuple:
     return mesh.attributes[layer].data, "vector"
 
 
+def known_options(operator, **options) -> dict:
+    """Those of the options that an operator has in this version."""
+    names = operator.get_rna_type().properties.keys()
+    return {name: value for name, value in options.items() if name in names}
+
+
 def register_command(name: str, function):
     """A handle of the command `blender --command name`, None where Blender knows no commands."""
     register = getattr(bpy.utils, "register_cli_command", None)

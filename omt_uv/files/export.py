@@ -10,6 +10,7 @@ import bpy
 import bmesh
 import numpy as np
 
+from ..blender.versions import known_options
 from .meshes import AXES
 from .obj_precision import restore_precision
 
@@ -37,12 +38,6 @@ def _select_only(objects: Objects) -> None:
         obj.hide_viewport = obj.hide_select = False
         obj.select_set(True)
     bpy.context.view_layer.objects.active = objects[0]
-
-
-def _known(operator, **options):
-    """Those of the options that this Blender's operator has."""
-    names = operator.get_rna_type().properties.keys()
-    return {name: value for name, value in options.items() if name in names}
 
 
 def _write_obj(path: Path, objects: Objects, everything: bool) -> list[str]:
@@ -146,7 +141,7 @@ def _write_glb(path: Path, objects: Objects, everything: bool) -> list[str]:
     if not everything:
         _select_only(objects)
     meshes = [obj.data for obj in exported_meshes(objects, everything)]
-    options = _known(
+    options = known_options(
         bpy.ops.export_scene.gltf,
         # Colours are left out unless a material uses them, by default.
         export_vertex_color="ACTIVE" if any(mesh.color_attributes for mesh in meshes) else "MATERIAL",

@@ -10,6 +10,8 @@ import bpy
 import numpy as np
 
 from ..blender.mesh import new_mesh
+from ..blender.versions import known_options
+from .ply_uvs import add_uvs
 from .silence import silence
 from .verified import FileError, check_length
 
@@ -106,18 +108,30 @@ def _read_fbx(path: str) -> None:
             obj.matrix_basis = matrix.round().T
 
 
+def _read_glb(path: str) -> None:
+    """Read a binary glTF file."""
+    # Shapes of bones would be meshes that the file does not have.
+    options = known_options(bpy.ops.import_scene.gltf, disable_bone_shape=True)
+    bpy.ops.import_scene.gltf(filepath=path, merge_vertices=False, **options)
+
+
+def _read_ply(path: str) -> None:
+    """Read a PLY file, with UVs under any of the names that are in use."""
+    bpy.ops.wm.ply_import(filepath=path, merge_verts=False, **AXES)
+    for obj in bpy.context.scene.objects:
+        if obj.type == "MESH":
+            add_uvs(Path(path), obj)
+
+
 # Validation would drop faces; what is wrong with them is reported later, by name.
 _READERS: dict[str, Callable[[str], None]] = {
     ".blend": _read_blend,
     ".obj": _reader(
         lambda path: bpy.ops.wm.obj_import(filepath=path, validate_meshes=False, use_split_objects=False, **AXES)
     ),
-    ".ply": _reader(lambda path: bpy.ops.wm.ply_import(filepath=path, merge_verts=False, **AXES)),
+    ".ply": _reader(_read_ply),
     ".stl": _reader(lambda path: bpy.ops.wm.stl_import(filepath=path, use_mesh_validate=False, **AXES)),
-    # Shapes of bones would be meshes that the file does not have.
-    ".glb": _reader(
-        lambda path: bpy.ops.import_scene.gltf(filepath=path, merge_vertices=False, disable_bone_shape=True)
-    ),
+    ".glb": _reader(_read_glb),
     ".fbx": _reader(_read_fbx),
     ".off": _reader(_read_off),
 }
