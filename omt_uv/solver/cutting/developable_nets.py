@@ -14,9 +14,12 @@ from ..analysis.feature_edges import fold_angles
 from ..mesh.geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
 from .component import CutComponent
 from .cut_graph import greedy_arcs
+from .hard_surface import net_factors, rounded_corners
 
 # An edge at which the normal turns by more is hard. Prisms with 4, 5, 6 and 8 sides are clear of it.
 HARD = np.radians(52)
+# On bodies with rounded edges, one at which it turns by more: the bands that are bevels, not the flat sides.
+BENT = np.radians(5)
 # A vertex with less curvature, in radians, is flat. Those of hard edges that are many, and have much of it together
 # alone, as around a cap of thousands of sides, are flat if they have less than this share of their mean.
 FLAT = 1e-3
@@ -38,26 +41,34 @@ def net(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
 
     None if there are none, or if seams would pass through vertices to be kept free of them.
     """
-    length = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
-    on_boundary = component.on_boundary()
-    curvature = np.abs(
-        angle_defects(
-            component.triangles, angles_from_lengths(length), np.flatnonzero(on_boundary), component.vertex_count
-        )
-    )
-    curvature[on_boundary] = 0
-    folded = np.abs(fold_angles(component.positions, component.triangles, component.pair)) > HARD
+    defects = _defects(component)
+    curvature = np.abs(defects)
+    fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
+    folded = fold > HARD
     hard = np.zeros(component.vertex_count, dtype=bool)
     hard[component.ends[folded]] = True
     spike = ~hard & (curvature > SPIKE)
     corner = (hard & (curvature > _flat(curvature[hard]))) | spike
     tips = np.flatnonzero(corner)
-    curved = spike.sum() > MOST_SPIKES or curvature[~corner].sum() > MOST_LEFT
+    if spike.sum() > MOST_SPIKES or curvature[~corner].sum() > MOST_LEFT:
+        found = rounded_corners(component, defects, face_areas(component.positions, component.triangles))
+        folded = fold > BENT
+        tips = np.zeros(0, np.int64) if found is None else found
     # A closed surface needs a cut of two edges at least.
-    if curved or len(tips) < 3 or (component.avoid[tips] > 0).any():
+    if len(tips) < 3 or (component.avoid[tips] > 0).any():
         return None
-    chosen = greedy_arcs(replace(component, cost=np.where(folded, component.cost, ACROSS * component.cost)), tips)
-    return chosen, tips
+    cost = np.where(folded, component.cost, ACROSS * component.cost) * net_factors(component, folded)
+    return greedy_arcs(replace(component, cost=cost), tips), tips
+
+
+def _defects(component: CutComponent) -> np.ndarray:
+    """Curvature (n,) of the vertices, in radians, 0 on the boundary."""
+    length = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
+    on_boundary = component.on_boundary()
+    defects = angle_defects(
+        component.triangles, angles_from_lengths(length), np.flatnonzero(on_boundary), component.vertex_count
+    )
+    return np.where(on_boundary, 0.0, defects)
 
 
 def _flat(curvature: np.ndarray) -> float:
