@@ -57,8 +57,9 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas_charts",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
+    "files.formats": "solver",
     "files.in_place": "errors solver",
-    "files": "errors supervision solver blender files.in_place",
+    "files": "errors supervision solver blender files.formats files.in_place",
     "display": "solver solver.mesh solver.maps pipelines blender",
     "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
     "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "

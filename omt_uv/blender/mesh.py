@@ -149,10 +149,24 @@ def read_pinned(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
     return _get(attribute.data, "value", len(mesh.loops), bool)
 
 
-def check_target(mesh: bpy.types.Mesh, name: str) -> None:
-    """Raise TargetError if UVs cannot be written to the layer `name` (the active one if empty)."""
-    if mesh.library is not None:
-        raise TargetError(f"{mesh.name} is linked from a library. Make it local first.")
+def linked(obj: bpy.types.Object) -> str:
+    """Why changes of the mesh of an object are not saved with this file, or an empty text."""
+    if obj.library is not None or obj.data.library is not None:
+        return "is linked from a library"
+    # Of an override, Blender saves the properties that it knows to be overridden; UVs and groups are none.
+    return "is a library override" if obj.data.override_library is not None else ""
+
+
+def check_local(obj: bpy.types.Object) -> None:
+    """Raise TargetError if what is written to the mesh of an object would not be saved."""
+    if linked(obj):
+        raise TargetError(f"{obj.name} {linked(obj)}. Make it and its mesh local first.")
+
+
+def check_target(obj: bpy.types.Object, name: str) -> None:
+    """Raise TargetError if UVs cannot be written to the layer `name` (the active one if empty) of an object's mesh."""
+    check_local(obj)
+    mesh = obj.data
     if len(name.encode()) > UV_LAYER_NAME_BYTES:
         raise TargetError(f"The UV layer name {name!r} is too long. Use at most {UV_LAYER_NAME_BYTES} bytes.")
     missing = name not in mesh.uv_layers if name else len(mesh.uv_layers) == 0
@@ -173,12 +187,13 @@ def _attribute_names(mesh: bpy.types.Mesh) -> set[str]:
         bpy.data.meshes.remove(copy)
 
 
-def target_layer(mesh: bpy.types.Mesh, name: str) -> str:
+def target_layer(obj: bpy.types.Object, name: str) -> str:
     """Name of the UV layer to write: the active one, or `name`, made and made active as needed.
 
     A new layer starts as a copy of the active one, so that faces that are not unwrapped keep their UVs.
     """
-    check_target(mesh, name)
+    check_target(obj, name)
+    mesh = obj.data
     if not name and mesh.uv_layers.active:
         return mesh.uv_layers.active.name
     name = name or UV_LAYER_NAME

@@ -8,6 +8,7 @@ import bmesh
 import numpy as np
 
 from ..errors import UserError
+from .mesh import check_local
 
 
 class GroupError(UserError):
@@ -58,11 +59,10 @@ def selected_vertices(obj: bpy.types.Object) -> np.ndarray:
 
 
 def check_group_target(obj: bpy.types.Object, name: str) -> None:
-    """Raise GroupError if weights cannot be written to the vertex group `name`."""
+    """Raise GroupError or TargetError if weights cannot be written to the vertex group `name`."""
     if not name:
         raise GroupError(f"{obj.name}: The vertex group has no name. Name the one to write.")
-    if obj.library is not None or obj.data.library is not None:
-        raise GroupError(f"{obj.name} is linked from a library. Make it local first.")
+    check_local(obj)
     group = obj.vertex_groups.get(name)
     if group is not None and group.lock_weight:
         raise GroupError(f"{obj.name}: The vertex group {name!r} is locked. Unlock it, or choose another name.")

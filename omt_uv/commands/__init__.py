@@ -8,6 +8,7 @@ from ..solver.lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
-    common="CommandError read_file write_report",
+    common="CommandError write_report",
     layers="read_layers write_layers",
+    selection="read_file",
 )

@@ -60,27 +60,6 @@ def refusals(objects: Sequence = (), name: str = "", others: tuple[type[Exceptio
         raise CommandError(str(error)) from error
 
 
-def read_file(path: Path, layer: str = "") -> list:
-    """Pairs of object and Reading of a UV layer (the active one by default) of all meshes with faces."""
-    from ..blender.mesh import read, weld_split_vertices
-    from ..files.meshes import load
-
-    unique = {obj.data: obj for obj in reversed(load(path))}
-    pairs = []
-    for obj in reversed(unique.values()):
-        with refusals(name=obj.name):
-            reading = read(obj, layer)
-        if path.suffix.lower() == ".glb":
-            reading = weld_split_vertices(reading)
-        if reading.faces.any():
-            pairs.append((obj, reading))
-        elif len(unique) > 1:
-            print(f"{PROGRAM}: warning: {obj.name} has no faces and is left alone", file=sys.stderr)
-    if not pairs:
-        raise CommandError(f"{path}: The mesh has no faces. Give a file with faces.")
-    return pairs
-
-
 def check_paths(options: argparse.Namespace, outputs: Sequence[Path] | None = None) -> None:
     """Refuse what cannot be written before the long work: all files of the options, and whatever names one twice.
 
@@ -133,12 +112,17 @@ def warn(objects: list, solver_warnings: list[tuple[int, str]], warnings: list[s
     for index, text in dict.fromkeys(solver_warnings):
         told.append(f"{objects[index].name}: {advise(text)}" if index >= 0 else advise(text))
     for text in told:
-        print(f"{PROGRAM}: warning: {text}", file=sys.stderr)
+        warn_of(text)
     return told
 
 
-def write_report(options: argparse.Namespace, more: dict, objects: list, charts: list, warnings: list[str]) -> None:
-    """Settings, `more`, the figures of the charts of every object, and warnings as JSON."""
+def warn_of(text: str) -> None:
+    """Print a warning on a line of its own."""
+    print(f"{PROGRAM}: warning: {text}", file=sys.stderr)
+
+
+def write_report(options: argparse.Namespace, more: dict, objects: list, charts: list, written) -> None:
+    """Settings, `more`, the figures of the charts of every object, and what was written (`layers.Written`), as JSON."""
     from ..files.verified import write_text
 
     report = {
@@ -153,6 +137,7 @@ def write_report(options: argparse.Namespace, more: dict, objects: list, charts:
             for obj, mine in zip(objects, charts, strict=True)
             for k, figures in enumerate(mine)
         ],
-        "warnings": warnings,
+        "gate": written.gate.report(),
+        "warnings": [*options.told, *written.warnings],
     }
     write_text(options.report, json.dumps(report, indent=1) + "\n")

@@ -100,14 +100,14 @@ def run(options: argparse.Namespace) -> None:
         ]
         result = drain_shown(magnify(regions, settings))
         result = replace(result, warnings=[*told, *result.warnings])
-        warnings = write_layers(options, objects, result)
+        written = write_layers(options, zip(objects, readings, strict=True), result, existed=options.source == "uv")
     if picture is not None:
         _write_picture(options, warped_picture(picture[0], regions, result, options.margin, picture[1]))
     print(result.shares.text())
     if options.report:
         more = {"weights": options.weights, "factor": options.factor, "exact": options.exact, "source": options.source}
         shares = {"share": result.shares.report()}
-        write_report(options, {**more, "cascade": options.cascade, **shares}, objects, result.reports, warnings)
+        write_report(options, {**more, "cascade": options.cascade, **shares}, objects, result.reports, written)
 
 
 def _picture(options: argparse.Namespace):

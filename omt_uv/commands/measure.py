@@ -7,8 +7,9 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from .common import CommandError, check_paths, read_file, refusals, require_blender
+from .common import CommandError, check_paths, refusals, require_blender
 from .options import add_input
+from .selection import read_file
 
 
 def add(commands) -> None:
@@ -30,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
         raise CommandError(f"{options.histogram}: a histogram is a picture. Name a .png file.")
     check_paths(options)
     with refusals(name=str(options.input)):
-        readings = [reading for _, reading in read_file(options.input)]
+        readings = [reading for _, reading in read_file(options)]
         figures = measure_readings(readings)
         if options.histogram:
             _draw(options.histogram, [evaluated(reading) for reading in readings])

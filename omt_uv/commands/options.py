@@ -27,6 +27,7 @@ def add_files(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off"
 
 def add_input(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off") -> None:
     """What is read, how strictly, and how much time and memory that may take."""
+    command.set_defaults(told=[])
     command.add_argument("input", type=Path, metavar="IN", help=accepts)
     command.add_argument(
         "--object", action="append", default=[], metavar="NAME", help="take this object of IN alone; may be repeated"

@@ -30,6 +30,6 @@ def run(options: argparse.Namespace) -> None:
     settings = RefineSettings(quality=options.quality, balance=options.balance, keep_boundary=options.keep_boundary)
     with refusals(objects):
         refined = drain_shown(refine_islands([(r.surface, r.faces, r.all_pins) for r in readings], settings))
-        warnings = write_layers(options, objects, refined)
+        written = write_layers(options, zip(objects, readings, strict=True), refined, existed=True)
     if options.report:
-        write_report(options, {"keep_boundary": options.keep_boundary}, objects, refined.reports, warnings)
+        write_report(options, {"keep_boundary": options.keep_boundary}, objects, refined.reports, written)

@@ -8,8 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
-from .common import UsageError, check_paths, drain_shown, read_file, refusals, require_blender, warn
+from .common import UsageError, check_paths, drain_shown, refusals, require_blender, warn
 from .options import add_files, angle, faces, names, number, positive, vertices
+from .selection import read_file
 
 KINDS = ("uniform", "curvature", "gaussian", "saliency")
 
@@ -85,7 +86,7 @@ def run(options: argparse.Namespace) -> None:
     if any(same_file(options.input, path) for path in targets):
         raise UsageError(f"{options.input}: the new mesh would replace the input. Give another name.")
     common = _settings(options)
-    objects = [obj for obj, _ in read_file(options.input)]
+    objects = [obj for obj, _ in read_file(options)]
     results = []
     for obj in objects:
         with refusals(name=obj.name):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from .common import CommandError, check_paths, read_file, refusals, require_blender, warn
+from .common import CommandError, check_paths, refusals, require_blender, warn
 from .options import add_cut_options, add_files
+from .selection import read_file
 
 
 def add(commands) -> None:
@@ -17,6 +18,7 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
+    from ..blender.mesh import check_local
     from ..blender.seams import mark_seams
     from ..blender.vertex_groups import avoided
     from ..files.saving import save
@@ -26,8 +28,10 @@ def run(options: argparse.Namespace) -> None:
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")
     check_paths(options)
-    pairs = read_file(options.input)
+    pairs = read_file(options)
     objects = [obj for obj, _ in pairs]
+    for obj in objects:
+        check_local(obj)
     told = []
     free = avoided(objects, options.keep_free)
     for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):

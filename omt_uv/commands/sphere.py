@@ -57,13 +57,13 @@ def run(options: argparse.Namespace) -> None:
         jobs = globe_jobs(readings, densities, markers)
         globes = drain_shown(project(jobs, settings))
         image = _redrawn(options)
-        warnings = write_layers(options, objects, globes)
+        written = write_layers(options, zip(objects, readings, strict=True), globes, apart=True)
         if image is not None:
             _write_image(options, *image)
     if options.report:
         reports = [[globe.report() for globe in mine] for mine in globes.globes]
         more = {"projection": options.projection, "method": options.method}
-        write_report(options, more, objects, reports, warnings)
+        write_report(options, more, objects, reports, written)
 
 
 def _check_image(options: argparse.Namespace) -> None:

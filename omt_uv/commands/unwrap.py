@@ -96,10 +96,10 @@ def run(options: argparse.Namespace) -> None:
         layout = drain_shown(lay_out(jobs, settings))
         if options.subdivision != 0:
             layout.warnings.extend(subdivision_warnings(objects))
-        warnings = write_layers(options, objects, layout)
+        written = write_layers(options, zip(objects, readings, strict=True), layout, apart=options.no_pack)
     if options.report:
         charts = [surface_map.report() for surface_map in layout.maps]
         packing = {"packer": layout.packing.packer, "scale": layout.packing.scale}
         if not options.no_pack:
             packing["coverage"] = layout.packing.coverage
-        write_report(options, {"boundary": options.boundary, "packing": packing}, objects, charts, warnings)
+        write_report(options, {"boundary": options.boundary, "packing": packing}, objects, charts, written)

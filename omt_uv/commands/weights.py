@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 
 from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
-from .common import CommandError, check_paths, read_file, refusals, require_blender, warn
+from .common import CommandError, check_paths, refusals, require_blender, warn
 from .options import add_files, names, share
+from .selection import read_file
 
 
 def add(commands) -> None:
@@ -29,10 +30,11 @@ def run(options: argparse.Namespace) -> None:
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep vertex groups. Write one of these.")
     check_paths(options)
-    pairs = read_file(options.input)
+    pairs = read_file(options)
     objects, found = [obj for obj, _ in pairs], []
-    for obj, reading in pairs:
+    for obj in objects:
         check_group_target(obj, options.group)
+    for obj, reading in pairs:
         with refusals(name=obj.name):
             selected = selected_vertices(obj)
             found.append(computed_weights(reading, options.kind, options.low, options.high, options.invert, selected))

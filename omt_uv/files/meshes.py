@@ -11,6 +11,8 @@ import numpy as np
 
 from ..blender.mesh import new_mesh
 from ..blender.versions import known_options
+from .formats.headers import check_header
+from .formats.off import read_off
 from .ply_uvs import add_uvs
 from .silence import silence
 from .verified import FileError, check_length
@@ -21,7 +23,7 @@ AXES = {"forward_axis": "Y", "up_axis": "Z"}
 
 
 def load(path: Path) -> list[bpy.types.Object]:
-    """Open a file in an emptied session and return its mesh objects, in order.
+    """Open a file in an emptied session and return its mesh objects, in order, those of the active scene first.
 
     Raises
     ------
@@ -32,16 +34,21 @@ def load(path: Path) -> list[bpy.types.Object]:
     if not path.is_file():
         raise FileError(f"{path}: there is no such file")
     try:
+        check_header(path)
         with silence() as log:
             _READERS[path.suffix.lower()](str(path.resolve()))
-    except (RuntimeError, ValueError, IndexError, OSError) as error:
+    except (RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, SystemError, OSError) as error:
+        if isinstance(error, FileError):
+            raise
         raise FileError(f"{path}: {last_line(str(error)) or 'cannot be read'}") from error
-    objects = [obj for obj in bpy.context.scene.objects if obj.type == "MESH"]
+    scenes = [bpy.context.scene, *(scene for scene in bpy.data.scenes if scene != bpy.context.scene)]
+    for scene in scenes:
+        for layer in scene.view_layers:
+            layer.update()
+    objects = list(dict.fromkeys(obj for scene in scenes for obj in scene.objects if obj.type == "MESH"))
     if not objects:
-        printed = last_line(log())
-        # Readers that find nothing to read may say no more than how long that took.
-        raise FileError(f"{path}: {printed if printed and 'took' not in printed else 'the file has no mesh'}")
-    bpy.context.view_layer.update()
+        lines = [line for line in log().splitlines() if "error" in line.lower()]
+        raise FileError(f"{path}: {last_line(lines[-1]) if lines else 'the file has no mesh'}")
     return objects
 
 
@@ -53,7 +60,9 @@ def check_suffix(path: Path, known: tuple[str, ...]) -> None:
 
 def last_line(text: str) -> str:
     """The last line of what Blender printed that says anything."""
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    lines = [line.strip() for line in text.splitlines()]
+    # Where in Blender's own files it happened says nothing.
+    lines = [line for line in lines if line and not line.startswith(("Location:", "INFO", "Info:"))]
     return lines[-1].removeprefix("Error: ") if lines else ""
 
 
@@ -75,22 +84,10 @@ def _reader(read: Callable[[str], object]) -> Callable[[str], None]:
 
 
 def _read_off(path: str) -> None:
-    """Object File Format: OFF, counts, vertices, faces as vertex counts and indices; colours are ignored."""
-    lines = [line.split("#")[0].split() for line in Path(path).read_text().splitlines()]
-    lines = [line for line in lines if line]
-    if not lines or lines[0][0] not in {"OFF", "COFF"}:
-        raise ValueError("the first word is not OFF")
-    lines[0] = lines[0][1:]
-    lines = [line for line in lines if line]
-    n, f = int(lines[0][0]), int(lines[0][1])
-    if len(lines) < 1 + n + f:
-        raise ValueError("the file ends too early")
-    positions = [tuple(map(float, line[:3])) for line in lines[1 : 1 + n]]
-    faces = [tuple(map(int, line[1 : 1 + int(line[0])])) for line in lines[1 + n : 1 + n + f]]
-    if faces and not 0 <= min(map(min, faces)) <= max(map(max, faces)) < n:
-        raise ValueError("a face has a vertex that does not exist")
+    """Open an OFF file."""
+    positions, faces = read_off(Path(path))
     name = Path(path).stem
-    mesh = new_mesh(name, positions, faces)
+    mesh = new_mesh(name, positions.tolist(), faces)
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
 
 

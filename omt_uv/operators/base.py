@@ -82,7 +82,7 @@ def read_writable(context: bpy.types.Context, layer: str = "") -> tuple[list[bpy
     objects = [obj for obj, _ in pairs]
     with complaints():
         for obj in objects:
-            check_target(obj.data, layer)
+            check_target(obj, layer)
     return objects, [reading for _, reading in pairs]
 
 
@@ -91,7 +91,7 @@ def write_layers(objects: list[bpy.types.Object], layer: str, result) -> None:
     from ..blender.mesh import target_layer, write_uv
 
     for obj, corners, uv in zip(objects, result.corners, result.uv, strict=True):
-        write_uv(obj, target_layer(obj.data, layer), corners, uv)
+        write_uv(obj, target_layer(obj, layer), corners, uv)
 
 
 @contextmanager

@@ -73,8 +73,8 @@ def test_split_vertices_become_one_and_the_faces_stay(blender_mesh):
 def test_a_new_layer_is_a_copy_and_becomes_the_active_one(blender_mesh):
     obj = scenes.bump()
     scenes.set_uv(obj, scenes.seen_from_above(obj))
-    assert blender_mesh.target_layer(obj.data, "") == "UVMap"
-    assert blender_mesh.target_layer(obj.data, "New") == "New" == obj.data.uv_layers.active.name
+    assert blender_mesh.target_layer(obj, "") == "UVMap"
+    assert blender_mesh.target_layer(obj, "New") == "New" == obj.data.uv_layers.active.name
     assert (scenes.uv_of(obj, "New") == scenes.uv_of(obj, "UVMap")).all()
     with pytest.raises(blender_mesh.TargetError, match="too long"):
-        blender_mesh.check_target(obj.data, "ä" * 32)
+        blender_mesh.check_target(obj, "ä" * 32)

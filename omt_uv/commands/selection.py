@@ -1,0 +1,91 @@
+"""Read the objects of a file that a command works on: by name, by scene, and what is linked or left out."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from .common import CommandError, refusals, warn_of
+
+if TYPE_CHECKING:
+    from ..files.loaded import Loaded
+
+
+def read_file(options: argparse.Namespace, layer: str = "") -> list:
+    """Pairs of object and Reading of a UV layer (the active one by default) of the chosen meshes with faces."""
+    from ..blender.mesh import read, weld_split_vertices
+    from ..files.loaded import compare
+    from ..files.meshes import load
+
+    path = options.input
+    objects = load(path)
+    _tell(options, compare(path, objects))
+    unique = {obj.data: obj for obj in reversed(_chosen(options, objects))}
+    pairs = []
+    for obj in reversed(unique.values()):
+        with refusals(name=obj.name):
+            reading = read(obj, layer)
+        if path.suffix.lower() == ".glb":
+            reading = weld_split_vertices(reading)
+        if reading.faces.any():
+            pairs.append((obj, reading))
+        elif len(unique) > 1:
+            warn_of(f"{obj.name} has no faces and is left alone")
+    if not pairs:
+        raise CommandError(f"{path}: The mesh has no faces. Give a file with faces.")
+    return pairs
+
+
+def _tell(options: argparse.Namespace, loaded: Loaded) -> None:
+    """Warn of what the file holds that was not read, in one line.
+
+    Raises
+    ------
+    CommandError : `--strict` does not let that pass
+    """
+    texts = list(loaded.texts)
+    output = getattr(options, "output", None)
+    if loaded.moved and output is not None and output.suffix.lower() not in (".blend", options.input.suffix.lower()):
+        texts.append(f"Single precision rounds coordinates by up to {loaded.loss:.2g} in {output.name}")
+    if texts and options.strict:
+        raise CommandError(f"{options.input}: {'; '.join(texts)}. Nothing was written, as --strict asks.")
+    texts = [*texts, *([loaded.moved] if loaded.moved else [])]
+    if texts:
+        options.told.append(f"{options.input.name}: {'; '.join(texts)}")
+        warn_of(options.told[-1])
+
+
+def _chosen(options: argparse.Namespace, objects: list) -> list:
+    """Those of the objects that `--object` and `--scene` name, without linked ones where `--skip-linked` says so.
+
+    Raises
+    ------
+    CommandError : there is no such object or scene, or nothing is left
+    """
+    import bpy
+
+    from ..blender.mesh import linked
+
+    if options.scene:
+        scene = bpy.data.scenes.get(options.scene)
+        if scene is None:
+            every = ", ".join(s.name for s in bpy.data.scenes)
+            raise CommandError(f"{options.input}: there is no scene {options.scene!r}. It has {every}.")
+        objects = [obj for obj in objects if obj.name in scene.objects]
+    if options.object:
+        names = [obj.name for obj in objects]
+        missing = [name for name in options.object if name not in names]
+        if missing:
+            raise CommandError(
+                f"{options.input}: there is no mesh {missing[0]!r}. It has {', '.join(names) or 'none'}."
+            )
+        objects = [obj for obj in objects if obj.name in options.object]
+    if options.skip_linked:
+        skipped = [obj for obj in objects if linked(obj)]
+        for obj in skipped:
+            options.told.append(f"{obj.name} {linked(obj)} and is left out")
+            warn_of(options.told[-1])
+        objects = [obj for obj in objects if obj not in skipped]
+    if not objects:
+        raise CommandError(f"{options.input}: No mesh is left to work on. Choose other objects.")
+    return objects

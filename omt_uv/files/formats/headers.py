@@ -1,0 +1,76 @@
+"""Compare what the header of a mesh file declares with the size of the file, before Blender asks for memory for it."""
+
+from __future__ import annotations
+
+import re
+import struct
+from pathlib import Path
+
+# Bytes of the types of PLY.
+SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2}
+SIZES |= {"int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4, "double": 8, "float64": 8}
+# A value of an ASCII file and what separates it from the next.
+LEAST_TEXT = 2
+# Longer headers are none.
+MOST_HEADER = 1 << 20
+STL_HEADER = 84
+STL_FACE = 50
+
+
+def check_header(path: Path) -> int | None:
+    """The number of faces that a file declares, None where its format has no such number.
+
+    Raises
+    ------
+    ValueError : the file is too short for what it declares. Faces of PLY may be as short as their count of vertices, so
+        that files that were cut off pass, and have fewer faces than they declare
+    """
+    check = {".ply": _ply, ".stl": _stl, ".glb": _glb}.get(path.suffix.lower())
+    if check is None:
+        return None
+    with path.open("rb") as file:
+        begin = file.read(MOST_HEADER)
+    return check(begin, path.stat().st_size)
+
+
+def _too_short(text: str) -> ValueError:
+    return ValueError(f"{text}. The file was cut off, or is damaged.")
+
+
+def _ply(begin: bytes, size: int) -> int | None:
+    end = re.search(rb"end_header[ \t\r]*\n", begin)
+    if not begin.startswith(b"ply") or end is None:
+        return None
+    ascii_file = b"format ascii" in begin[: end.start()]
+    elements: list[list] = []
+    for line in begin[: end.start()].decode("latin-1").splitlines():
+        match line.split():
+            case ["element", name, count] if re.fullmatch(r"-?\d+", count):
+                elements.append([name, int(count), 0])
+            case ["property", "list", kind, *_] if elements:
+                elements[-1][2] += LEAST_TEXT if ascii_file else SIZES.get(kind, 1)
+            case ["property", kind, *_] if elements:
+                elements[-1][2] += LEAST_TEXT if ascii_file else SIZES.get(kind, 1)
+    rest, faces = size - end.end() + 1, None
+    for name, count, least in elements:
+        if count < 0 or count * least > rest:
+            raise _too_short(f"it declares {count} of the element {name!r} and has {rest} bytes for them")
+        rest -= count * least
+        faces = count if name == "face" else faces
+    return faces
+
+
+def _stl(begin: bytes, size: int) -> int | None:
+    if begin.lstrip().startswith(b"solid") and b"facet" in begin[:1000]:
+        return begin.count(b"endfacet") if size == len(begin) else None
+    if size < STL_HEADER:
+        return None
+    (faces,) = struct.unpack_from("<I", begin, STL_HEADER - 4)
+    if faces * STL_FACE > size - STL_HEADER:
+        raise _too_short(f"it declares {faces} faces and holds {(size - STL_HEADER) // STL_FACE}")
+    return faces
+
+
+def _glb(begin: bytes, size: int) -> None:
+    if begin.startswith(b"glTF") and len(begin) >= 12 and struct.unpack_from("<I", begin, 8)[0] > size:
+        raise _too_short(f"it declares {struct.unpack_from('<I', begin, 8)[0]} bytes and has {size}")
