@@ -75,17 +75,27 @@ def _faces(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
 
 
 def _coordinates(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
-    """What is to be said of coordinates that are no finite numbers, or huge ones."""
-    every = [positions_of(obj.data) for obj in objects]
+    """What is to be said of coordinates that are no finite numbers, or huge ones.
+
+    Those that Blender holds and a face needs are an error later on, which names them.
+    """
+    strange = sum(int((~np.isfinite(positions_of(obj.data)).all(axis=1) & ~_used(obj.data)).sum()) for obj in objects)
     if path.suffix.lower() in TEXT and STRANGE.search(path.read_bytes()):
         exact = _exact_positions(path)
-        every = every if exact is None else [exact]
-    with np.errstate(over="ignore"):
-        every = [np.abs(x.astype(np.float32)) for x in every]
-    strange = sum(int((~np.isfinite(x)).any(axis=1).sum()) for x in every)
-    huge = sum(int(((x > HUGE) & np.isfinite(x)).any(axis=1).sum()) for x in every)
-    texts = [f"{strange} vertices have coordinates that are no numbers of single precision"] if strange else []
-    return [*texts, *([f"{huge} vertices have coordinates above {HUGE:.0e}"] if huge else [])]
+        if exact is not None and all(np.isfinite(positions_of(obj.data)).all() for obj in objects):
+            with np.errstate(over="ignore"):
+                strange = int((~np.isfinite(exact.astype(np.float32))).any(axis=1).sum())
+    huge = sum(int((np.abs(positions_of(obj.data)) > HUGE).any(axis=1).sum()) for obj in objects)
+    texts = [f"{strange} of its vertices have coordinates beyond single precision, or none"] if strange else []
+    return [*texts, *([f"{huge} of its vertices have coordinates above {HUGE:.0e}"] if huge else [])]
+
+
+def _used(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Which vertices (n,) bool are corners of faces."""
+    corner, used = np.zeros(len(mesh.loops), np.int32), np.zeros(len(mesh.vertices), bool)
+    mesh.loops.foreach_get("vertex_index", corner)
+    used[corner] = True
+    return used
 
 
 def _is_far(positions: np.ndarray) -> bool:
