@@ -12,7 +12,7 @@ __getattr__, __all__ = lazy(
     curvature="gaussian_curvature mean_curvature sharpness",
     density="Target checked_density from_polygons from_vertices gaussian_curvature_density graded_density "
     "mean_curvature_density normalised_density painted_density region_share relative_entropy",
-    facing="Facing towards",
+    facing="Facing ahead towards",
     feature_edges="edge_union fold_angles region_borders resolved_features sharp_edges value_jumps",
     heat_means="HeatMeans",
     occlusion="face_occlusion vertex_occlusion",

@@ -73,13 +73,19 @@ def facing(
 def towards(positions: np.ndarray, triangles: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """How far the vertices (n,) of a surface (n,3), (m,3) look and lie towards a direction (3,), in [-1, 1].
 
-    The mean of the cosine of the normal, and of the way along the direction from the middle to the farthest vertex.
+    The mean of the cosine of the normal and of `ahead`.
     """
+    return 0.5 * (vertex_normals(positions, triangles) @ direction + ahead(positions, triangles, direction))
+
+
+def ahead(positions: np.ndarray, triangles: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """How far the vertices (n,) of a surface (n,3), (m,3) lie along a direction (3,): 0 in the middle, 1 and -1 where
+    they lie farthest."""
     area = vertex_areas(positions, triangles)
     along = (positions - area @ positions / area.sum()) @ direction
     used = area > 0
     ends = [max(float((sign * along[used]).max()), np.finfo(float).tiny) for sign in (1, -1)]
-    return 0.5 * (vertex_normals(positions, triangles) @ direction + np.clip(along / np.where(along > 0, *ends), -1, 1))
+    return np.clip(along / np.where(along > 0, *ends), -1, 1)
 
 
 def salient_weights(saliency: np.ndarray, area: np.ndarray, shares: tuple[float, float]) -> np.ndarray:

@@ -15,7 +15,7 @@ from ..mesh.geometry import halfedge_lengths, vertex_areas
 from ..mesh.gluing import polygon_sides
 from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
 from ..mesh.topology import halfedges, pair_keys, pair_up
-from .facing import Facing, facing, salient_weights, towards
+from .facing import Facing, ahead, facing, salient_weights, towards
 from .feature_edges import fold_angles
 from .occlusion import vertex_occlusion
 from .saliency import curvature_means, saliency_of, unit_size
@@ -54,7 +54,7 @@ class SeamPreferences:
     crease : it lies in a valley, but on no front; sharp : its faces meet at a right angle or sharper
     underside, back : it looks down, or away from where the body looks to
     front, salient : it looks to where the body does; it stands out, and is not hidden
-    mirror : it lies in the mirror plane
+    mirror : it lies in the mirror plane, but on no front
     loops : it is a side of quads on both sides
     up (3,) : what is up in the scene; None where nothing is
     """
@@ -81,7 +81,7 @@ class SeamCosts:
     cost (e,) : per length, between LEAST and MOST; 1 is neutral
     reasons : (e,) in [0, 1] for everything that has a factor, by its name in `SeamPreferences`
     vertex_cost (n,) : mean over the edges at a vertex, 1 where there is none
-    face (n,) : in [0, 1], 1 where no seam should end, on the front of a body that has one
+    face (n,) : in [0, 1], 1 on the front of a body that has one, and within it: seams should not end there
     plane : in which the surface is its own mirror image; facing : where it looks to
     """
 
@@ -127,6 +127,7 @@ def seam_costs(
     if plane is not None:
         _symmetrise(positions, triangles, plane, at_vertices)
         plane = _among_all(plane.carried(positions, space), used, len(surface.positions))
+    in_face = at_vertices.pop("face")
     reasons = {name: reason[edges].mean(axis=1) for name, reason in at_vertices.items()}
     reasons["sharp"] = _sharp(positions, triangles, keys)
     reasons["loops"] = _sides_of_quads(positions, triangles, owner, keys)
@@ -139,7 +140,7 @@ def seam_costs(
     total = np.bincount(ends.ravel(), np.repeat(cost, 2), n)
     vertex_cost = np.where(count > 0, total / np.maximum(count, 1), 1.0)
     face = np.zeros(n)
-    face[used] = at_vertices["front"]
+    face[used] = in_face
     return SeamCosts(ends, cost, reasons, vertex_cost, face, plane, seen)
 
 
@@ -161,19 +162,21 @@ def _vertex_reasons(
     saliency = saliency_of(means, triangles)
     seen = facing(positions, triangles, saliency, plane, None if up is None else np.array(up))
     occlusion = vertex_occlusion(positions, triangles)
-    ahead = seen.certainty * towards(positions, triangles, seen.front)
+    forwards = seen.certainty * towards(positions, triangles, seen.front)
     below = towards(positions, triangles, -seen.up)
     # Sockets and nostrils are hidden from most sides, but not from the front, from where a face is looked at.
-    front = _step(ahead, SIDE) * (1 - _step(occlusion, BURIED))
+    front = _step(forwards, SIDE) * (1 - _step(occlusion, BURIED))
     hidden = _step(occlusion, HIDDEN) * (1 - front)
     reasons = {
         "hidden": hidden,
         "crease": _step(-means[CREASE_SCALE], CREASE) * (1 - front),
         "underside": _step(below, SIDE),
-        "back": _step(-ahead, SIDE),
+        "back": _step(-forwards, SIDE),
         "front": front,
         "salient": salient_weights(saliency, area, SALIENT) * (1 - hidden),
         "mirror": np.zeros(n),
+        # Within, too: whoever cuts in a mouth has come across the lips.
+        "face": np.maximum(front, _step(seen.certainty * ahead(positions, triangles, seen.front), SIDE)),
     }
     return seen, reasons
 
@@ -182,12 +185,12 @@ def _symmetrise(
     positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane, reasons: dict[str, np.ndarray]
 ) -> None:
     """Give vertices (n,3) of a surface of unit size and those nearest to their images the same reasons, and say which
-    are on the plane."""
+    are on the plane and may be cut there."""
     image, far = plane.nearest_images(positions, triangles)
     image = np.where(far <= NEAR, image, np.arange(len(image)))
     for name, reason in reasons.items():
         reasons[name] = (reason + reason[image]) / 2
-    reasons["mirror"] = np.exp(-0.5 * (plane.distance(positions) / ON_PLANE) ** 2)
+    reasons["mirror"] = np.exp(-0.5 * (plane.distance(positions) / ON_PLANE) ** 2) * (1 - reasons["front"])
 
 
 def _step(value: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
