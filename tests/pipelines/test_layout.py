@@ -74,3 +74,31 @@ def test_different_surfaces_in_one_run_have_one_texel_density():
         assert np.array_equal(corners, np.arange(F.size)) and uv.min() >= 0 and uv.max() <= 1
         ratio.append(np.abs(signed_areas(uv, np.arange(F.size).reshape(-1, 3))).sum() / face_areas(V, F).sum())
     assert ratio == pytest.approx([layout.packing.scale**2] * 3, rel=1e-6)
+
+
+def test_faces_that_are_not_unwrapped_are_packed_around():
+    """Of two squares, the one that is not chosen stays where its UVs are."""
+    V, F = meshes.grid(4, 4)
+    V, F = np.concatenate([V, V + [3, 0, 0]]), np.concatenate([F, F + len(V)])
+    surface = triangle_surface(V, F)
+    faces = np.arange(len(F)) < len(F) // 2
+    uv = 0.6 * V[F.ravel(), :2] - [1.8, 0]
+    job = UnwrapJob(surface, faces, uv=uv)
+    stays = uv[np.repeat(~faces, 3)]
+    for around in (True, False):
+        layout = drain(lay_out([job], Settings(quality="draft", pack_around=around)))
+        low, high = layout.uv[0].min(axis=0), layout.uv[0].max(axis=0)
+        apart = np.maximum(low - stays.max(axis=0), stays.min(axis=0) - high).max()
+        assert (apart >= 4 / 1024 - 1e-9) == around
+
+
+def test_islands_stand_upright_in_the_layout():
+    """A wall that is mapped askew, in an object that says where up is."""
+    V, F = meshes.grid(6, 3)
+    for up, height in (((0.0, 0.0, 1.0), 2), ((1.0, 0.0, 0.0), 0)):
+        wall = V[:, [0, 2, 1]]
+        layout = drain(lay_out([UnwrapJob(triangle_surface(wall, F), up=up)], Settings(quality="draft")))
+        rise = np.polyfit(wall[F.ravel(), height], layout.uv[0][:, 1], 1)[0]
+        side = np.polyfit(wall[F.ravel(), height], layout.uv[0][:, 0], 1)[0]
+        assert rise > 0 and side == pytest.approx(0, abs=1e-6 * rise)
+        np.testing.assert_allclose(0.5 * (layout.uv[0].min(axis=0) + layout.uv[0].max(axis=0)), 0.5)

@@ -28,9 +28,11 @@ FINER = 1.1
 MOST_ITEMS = 128
 # Of these so many are blocks.
 BLOCKS = 64
-# Islands with less than this share of the area of all may be turned by quarters; larger ones are the picture.
+# Islands with less than this share of the area of all may be turned by quarters, but never upside down; larger ones are
+# the picture.
 SMALL = 0.2
-# The first scale fills this share of the square; then smaller ones by this factor until one fits.
+QUARTERS = (0, 1, 3)
+# The first scale fills this share of the square; then smaller ones until one does, by this factor, its square, its cube.
 FIRST_SHARE = 0.75
 SMALLER = 0.93
 # Larger scales are tried up to this factor, which is halved with every one that does not fit, down to the other.
@@ -221,12 +223,14 @@ def _first(task: _PackTask) -> Steps[_Found]:
     start = min(np.sqrt(free / task.areas.sum()), (task.raster - 2 * task.growth) / longest)
     order: list[int] = []
     scale = start * np.sqrt(FIRST_SHARE)
+    step = SMALLER
     while scale >= LEAST_SCALE * start:
         yield Progress("Packing", 0.0)
         found, order = _fit(task, scale, order)
         if found is not None:
             return found
-        scale *= SMALLER
+        scale *= step
+        step *= SMALLER
     raise MarginError(f"No room for {len(task.outlines)} islands with a margin of {task.margin:g} pixels")
 
 
@@ -291,7 +295,7 @@ def _rasterised(task: _PackTask, scale: float) -> _Raster:
     items, corners = [], np.zeros((len(single), 2))
     for k, number in enumerate(single.tolist()):
         cells, low = grown_cells(task.outlines[number].scaled(scale, scale * task.low[number]), task.growth)
-        items.append(turned_masks(cells, (0, 1, 2, 3) if turnable[number] else (0,)))
+        items.append(turned_masks(cells, QUARTERS if turnable[number] else (0,)))
         corners[k] = low
     blocks = []
     if count > len(single):

@@ -43,8 +43,9 @@ def least_distance(islands):
     return min(a.query(b.data)[0].min() for i, a in enumerate(trees) for b in trees[:i])
 
 
-@pytest.mark.parametrize("count", [1, 2, 25])
-@pytest.mark.parametrize("margin, texture_size", [(0, 1024), (4, 1024), (16, 1024), (3, 128), (2, 8192)])
+@pytest.mark.parametrize(
+    "count, margin, texture_size", [(1, 0, 1024), (2, 4, 1024), (6, 16, 1024), (6, 3, 128), (6, 2, 8192)]
+)
 def test_inside_and_apart(count, margin, texture_size):
     result = pack(corners(count), [FAN] * count, margin, texture_size)
     points = np.concatenate(result.islands)
@@ -58,7 +59,7 @@ def test_inside_and_apart(count, margin, texture_size):
         assert distance >= border
 
 
-@pytest.mark.parametrize("count", [1, 2, 25])
+@pytest.mark.parametrize("count", [1, 5])
 def test_vertices_that_no_triangle_uses_take_no_room(count):
     """Centres of filled holes: the packer leaves them anywhere."""
     islands = corners(count)
@@ -70,8 +71,8 @@ def test_vertices_that_no_triangle_uses_take_no_room(count):
 
 
 def test_one_scale_and_no_mirror_image():
-    islands = corners(30)
-    result = pack(islands, [FAN] * 30)
+    islands = corners(10)
+    result = pack(islands, [FAN] * 10)
     for before, after in zip(islands, result.islands, strict=True):
         linear = np.linalg.lstsq(before - before.mean(axis=0), after - after.mean(axis=0), rcond=None)[0]
         np.testing.assert_allclose(linear @ linear.T, result.scale**2 * np.eye(2), atol=1e-9)
@@ -82,33 +83,33 @@ def test_one_scale_and_no_mirror_image():
 def test_many_slim_islands_fill_the_square():
     """Hair cards, most of which are packed in blocks."""
     rng = np.random.default_rng(0)
-    sizes = rng.uniform([0.03, 0.1], [0.05, 0.8], (500, 2))
+    sizes = rng.uniform([0.03, 0.1], [0.05, 0.8], (150, 2))
     islands = [np.array([[0, 0], [w, 0], [w, h], [0, h]]) for w, h in sizes]
-    result = pack(islands, [np.array([[0, 1, 2], [0, 2, 3]])] * 500)
+    result = pack(islands, [np.array([[0, 1, 2], [0, 2, 3]])] * 150)
     assert result.coverage > 0.25
     low, high = (np.array([f(p, axis=0) for p in result.islands]) for f in (np.min, np.max))
     gap = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
-    assert gap[~np.eye(500, dtype=bool)].min() >= 4 / 1024
+    assert gap[~np.eye(150, dtype=bool)].min() >= 4 / 1024
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_units_do_not_matter(unit):
-    plain, scaled = (pack(corners(9, unit=u), [FAN] * 9) for u in (1.0, unit))
+    plain, scaled = (pack(corners(5, unit=u), [FAN] * 5) for u in (1.0, unit))
     # Single precision may change a choice of the packer, but not how well it does.
     assert scaled.scale * unit == pytest.approx(plain.scale, rel=0.1)
 
 
 def test_very_different_sizes():
-    islands = [corner(100, 100), *corners(40, unit=1e-3)]
-    result = pack(islands, [FAN] * 41, 2, 1024)
+    islands = [corner(100, 100), *corners(12, unit=1e-3)]
+    result = pack(islands, [FAN] * 13, 2, 1024)
     assert least_distance(result.islands) >= 2 / 1024
     assert np.ptp(result.islands[0], axis=0).max() == pytest.approx(100 * result.scale)
 
 
 def test_specks_do_not_make_the_others_smaller():
     """They are smaller than a cell of the raster."""
-    islands = corners(20)
-    plain, more = pack(islands, [FAN] * 20), pack([*islands, *corners(5, 1, 1e-7)], [FAN] * 25)
+    islands = corners(6)
+    plain, more = pack(islands, [FAN] * 6), pack([*islands, *corners(3, 1, 1e-7)], [FAN] * 9)
     assert more.scale > 0.8 * plain.scale
     assert least_distance(more.islands) >= 4 / 1024
 
@@ -146,3 +147,33 @@ def test_slivers_that_single_precision_turns_over_tear_no_island():
     centre = [(p.min(axis=0) + p.max(axis=0)) / 2 for p in islands]
     for i, j in ((0, 1), (0, 2), (1, 2)):
         assert np.linalg.norm(centre[i] - centre[j]) > radius[i] + radius[j] + 3.9 / 1024
+
+
+@pytest.mark.parametrize("size", [0.5, 0.8])
+def test_islands_are_packed_around_those_that_stay(size):
+    stays = size * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + 0.1
+    square = np.array([[0, 1, 2], [0, 2, 3]])
+    found = pack(corners(4), [FAN] * 4, 8, 1024, [(stays, square)])
+    points = np.concatenate([outline(p) for p in found.islands])
+    away = np.maximum(stays.min(axis=0) - points, points - stays.max(axis=0)).max(axis=1)
+    assert away.min() >= 8 / 1024 - 1e-9
+    assert points.min() >= 8 / 1024 - 1e-9 and points.max() <= 1 - 8 / 1024 + 1e-9
+    assert least_distance(found.islands) >= 8 / 1024
+
+
+def test_the_largest_island_stays_upright_and_none_is_upside_down():
+    islands = [corner(10, 9), *corners(6, 2)]
+    found = pack(islands, [FAN] * 7)
+    turns = []
+    for before, after in zip(islands, found.islands, strict=True):
+        turns.append(np.linalg.lstsq(before - before.mean(axis=0), after - after.mean(axis=0), rcond=None)[0])
+    np.testing.assert_allclose(turns[0] / found.scale, np.eye(2), atol=1e-9)
+    assert min(turn[0, 0] for turn in turns) > -1e-9
+
+
+def test_a_single_island_is_in_the_middle_as_it_was():
+    island = corner(2, 3, 0.4)
+    packed = pack([island], [FAN])
+    (found,) = packed.islands
+    np.testing.assert_allclose(0.5 * (found.min(axis=0) + found.max(axis=0)), 0.5)
+    np.testing.assert_allclose(found - found[0], packed.scale * (island - island[0]))
