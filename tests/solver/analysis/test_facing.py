@@ -15,9 +15,9 @@ def looks_to(V, F, up=None):
     return facing(P, F, saliency(V, F), symmetry_plane(V, F), up)
 
 
-@pytest.mark.parametrize("turn", [np.eye(3), *Rotation.random(2, random_state=1).as_matrix()])
+@pytest.mark.parametrize("turn", [np.eye(3), *Rotation.random(1, random_state=1).as_matrix()])
 def test_a_head_looks_where_its_nose_is(turn):
-    V, F = meshes.head(40)
+    V, F = meshes.head(30)
     unknown = looks_to(V @ turn.T, F)
     assert unknown.front @ turn[:, 0] > np.cos(np.pi / 4) and unknown.certainty == 1 and not unknown.up.any()
     known = looks_to(V @ turn.T, F, up=turn[:, 2])

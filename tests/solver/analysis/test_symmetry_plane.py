@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from omt_uv.solver.analysis.symmetry_plane import NEAR, symmetry_plane
 
-TURNS = [np.eye(3), *Rotation.random(2, random_state=1).as_matrix()]
+TURNS = [np.eye(3), *Rotation.random(1, random_state=1).as_matrix()]
 
 
 def rough_head(noise=0.0):
