@@ -54,10 +54,10 @@ def write_layers(options: argparse.Namespace, pairs, result, apart: bool = False
         final.append(replace(reading, uv=read_uv(obj.data, layer)))
     found = gate(final, apart)
     told = found.warnings()
-    if told and existed:
-        told = found.warnings(gate([reading for _, reading in pairs], apart))
     if told and options.strict:
         raise CommandError(f"{options.input}: {'; '.join(told)}. Nothing was written, as --strict asks.")
+    if told and existed:
+        told = found.warnings(gate([reading for _, reading in pairs], apart))
     objects = [obj for obj, _ in pairs]
     warnings = [*result.warnings, *((-1, text) for text in told)]
     return Written(warn(objects, warnings, save_uvs(options.output, objects, options.input)), found)

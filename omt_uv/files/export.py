@@ -19,6 +19,10 @@ Objects = Sequence[bpy.types.Object]
 
 def export(path: Path, suffix: str, objects: Objects, everything: bool) -> list[str]:
     """Write objects in the format of a suffix, with all that stands around them if the format holds it; warnings."""
+    for obj in objects:
+        # Of another scene, or in a collection that the view layer leaves out.
+        if obj.name not in bpy.context.view_layer.objects:
+            bpy.context.scene.collection.objects.link(obj)
     return _WRITERS[suffix](path, objects, everything)
 
 

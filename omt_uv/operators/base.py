@@ -86,6 +86,21 @@ def read_writable(context: bpy.types.Context, layer: str = "") -> tuple[list[bpy
     return objects, [reading for _, reading in pairs]
 
 
+def check_all_local(pairs: list) -> list:
+    """The pairs of object and Reading, if what is written to their meshes is saved.
+
+    Raises
+    ------
+    Complaint : a mesh is linked, or an override
+    """
+    from ..blender.mesh import check_local
+
+    with complaints():
+        for obj, _ in pairs:
+            check_local(obj)
+    return pairs
+
+
 def write_layers(objects: list[bpy.types.Object], layer: str, result) -> None:
     """Write `result.uv` to `result.corners` of the layer of every object (the active one if empty)."""
     from ..blender.mesh import target_layer, write_uv

@@ -8,7 +8,7 @@ from bpy.props import EnumProperty
 from ..display import overlay
 from ..session import last_run
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .base import QuickOperator, read_objects
+from .base import QuickOperator, check_all_local, read_objects
 
 KINDS = (
     ("NONE", "Off", "No colours; attributes and shading are as before", "X", 0),
@@ -51,7 +51,7 @@ class UV_OT_omt_overlay(QuickOperator, bpy.types.Operator):
         if self.show == "NONE":
             overlay.hide(context)
         else:
-            overlay.show(context, read_objects(context), self.show)
+            overlay.show(context, check_all_local(read_objects(context)), self.show)
 
 
 class UV_OT_omt_histogram(QuickOperator, bpy.types.Operator):

@@ -10,7 +10,7 @@ from ..display import overlay
 from ..session import last_run
 from ..session.run import Disturbed
 from ..settings import DEFAULT_TEXTURE_SIZE
-from .base import Complaint, complaints, read_objects, ready, tell
+from .base import Complaint, check_all_local, complaints, read_objects, ready, tell
 
 if TYPE_CHECKING:
     from ..session.live import Session
@@ -59,7 +59,7 @@ class UV_OT_omt_live(bpy.types.Operator):
         from ..session.live import Session
 
         try:
-            pairs = read_objects(context)
+            pairs = check_all_local(read_objects(context))
             with complaints(objects=[obj for obj, _ in pairs]):
                 current = Session(context, pairs)
         except Complaint as complaint:

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..session import run
-from .base import SolverOperator, complaints, read_objects, warn
+from .base import SolverOperator, check_all_local, complaints, read_objects, warn
 from .properties import choose_group
 
 
@@ -40,7 +40,7 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
     def steps(self, context: bpy.types.Context):
         from ..blender.vertex_groups import avoided
 
-        pairs = read_objects(context)
+        pairs = check_all_local(read_objects(context))
         objects = [obj for obj, _ in pairs]
         options = {"fill": self.fill_holes, "extremities": self.extremities}
         with complaints(objects=objects):

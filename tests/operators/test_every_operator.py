@@ -28,3 +28,41 @@ def test_every_float_refuses_nan_and_what_blender_makes_of_infinity(package):
                 assert not obj.data.uv_layers and list(bpy.data.objects) == [obj]
                 tried += 1
     assert tried >= 12
+
+
+# What reads meshes, or looks at none.
+READ_ONLY = {"uv.omt_measure", "uv.omt_histogram", "uv.omt_density_get", "object.omt_remesh"}
+OTHERS = {"uv.omt_preset", "wm.omt_copy_report"}
+
+
+@pytest.mark.parametrize("override", [False, True], ids=["linked", "override"])
+def test_linked_meshes_are_refused_by_name_by_every_operator_that_writes(package, tmp_path, override):
+    """Never said to be done: Blender would not save it."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8)
+    bpy.context.object.name = "Far"
+    bpy.context.object.vertex_groups.new(name="region").add(list(range(9)), 1.0, "REPLACE")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, data):
+        data.objects = ["Far"]
+    obj = data.objects[0]
+    bpy.context.scene.collection.objects.link(obj)
+    if override:
+        obj = obj.override_create(remap_local_usages=True)
+        obj.data.override_create(remap_local_usages=True)
+    before = scenes.uv_of(obj).copy()
+    names = {cls.bl_idname for *_, cls in operators(package)}
+    assert READ_ONLY | OTHERS < names
+    for name in sorted(names - OTHERS):
+        module, operator = name.split(".")
+        run = getattr(getattr(bpy.ops, module), operator)
+        for other in bpy.context.view_layer.objects:
+            other.select_set(other == obj)
+        bpy.context.view_layer.objects.active = obj
+        if name in READ_ONLY:
+            assert run(**({"target_vertices": 50} if "remesh" in name else {})) == {"FINISHED"}, name
+            continue
+        with pytest.raises(RuntimeError, match="^Error: Far is (linked from|a library)"):
+            run()
+        assert (scenes.uv_of(obj) == before).all() and not any(edge.use_seam for edge in obj.data.edges), name
+        assert not obj.data.color_attributes and len(obj.vertex_groups) == 1, name
