@@ -1,7 +1,7 @@
 """Files in and out of Blender: meshes in several formats with all their digits, and images as arrays.
 
-Imports errors and blender.
-Main names: meshes.load, meshes.save, images.load, images.save, pixels_of.
+Imports errors, supervision, blender and in_place.
+Main names: meshes.load, saving.save, saving.save_uvs, verified.staged, images.load, images.save, pixels_of.
 """
 
 from ..solver.lazy import lazy

@@ -49,7 +49,7 @@ def check_writable(path: Path) -> None:
     if path.exists() and not os.access(path, os.W_OK):
         raise FileError(f"{path}: is write-protected. Allow writing, or name another file.")
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=temporary_prefix()):
+        with _own_name(path.parent):
             pass
     except OSError as error:
         raise FileError(f"{path}: nothing can be written into this folder ({error.strerror})") from error
@@ -189,13 +189,25 @@ def _is_abandoned(path: Path, lock: Path) -> bool:
         if fcntl is None or path.is_dir():
             return age > ABANDONED_WITHOUT_LOCKS
         if not lock.exists():
-            return age > ABANDONED
+            return age > ABANDONED or not _lives(path.name)
         with open(lock, "rb") as held:
             fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
         return True
     except OSError:
         # Locked, of another user, or removed meanwhile.
         return False
+
+
+def _lives(name: str) -> bool:
+    """Whether the process that a temporary file is named after may be alive."""
+    number = name.removeprefix(PREFIX).split("_")[0]
+    try:
+        os.kill(int(number), 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except (ValueError, PermissionError):
+        pass
+    return True
 
 
 def _keep_rights(target: Path, made: Path) -> None:

@@ -90,10 +90,13 @@ def test_leftovers_of_the_dead_go_and_files_of_the_living_stay(tmp_path):
 
 
 def test_old_leftovers_without_a_lock_go(tmp_path):
-    (tmp_path / ".omt_uv_1_x.obj").write_text("half")
     (tmp_path / ".omt_uv_old").mkdir()
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    (tmp_path / f".omt_uv_{gone.pid}_x.lock.new").write_text("")
+    (tmp_path / f".omt_uv_{os.getpid()}_x.obj").write_text("half")
     verified.sweep(tmp_path)
-    assert len(names(tmp_path)) == 2
+    assert names(tmp_path) == [f".omt_uv_{os.getpid()}_x.obj", ".omt_uv_old"]
     for path in tmp_path.iterdir():
         os.utime(path, (0, 0))
     verified.sweep(tmp_path)
