@@ -206,7 +206,7 @@ def _lives(name: str) -> bool:
     except (ProcessLookupError, OverflowError):
         return False
     except (ValueError, PermissionError):
-        pass
+        return True
     return True
 
 
