@@ -32,9 +32,11 @@ BLOCKS = 64
 # the picture.
 SMALL = 0.2
 QUARTERS = (0, 1, 3)
-# The first scale fills this share of the square; then smaller ones until one does, by this factor, its square, its cube.
+# The first scale fills this share of the square; then come smaller ones until one fits, by this factor first, and by one
+# that is smaller every time.
 FIRST_SHARE = 0.75
-SMALLER = 0.93
+SMALLER = 0.95
+HASTE = 0.99
 # Larger scales are tried up to this factor, which is halved with every one that does not fit, down to the other.
 LARGER = 1.04
 EXACT = 1.004
@@ -230,7 +232,7 @@ def _first(task: _PackTask) -> Steps[_Found]:
         if found is not None:
             return found
         scale *= step
-        step *= SMALLER
+        step *= HASTE
     raise MarginError(f"No room for {len(task.outlines)} islands with a margin of {task.margin:g} pixels")
 
 
@@ -249,7 +251,7 @@ def _larger(found: _Found, most: float) -> Steps[_Found]:
         if new is None:
             fails, tries = tried, tries + 1
         else:
-            best, scale, order = new, tried, new.order
+            best, scale, order, tries = new, tried, new.order, 0
     return best
 
 
