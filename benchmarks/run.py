@@ -18,6 +18,7 @@ from benchmarks.part import Option, Part
 from benchmarks.parts import (
     cascade,
     cuts,
+    hard,
     latency,
     magnify,
     memory,
@@ -30,7 +31,7 @@ from benchmarks.parts import (
     unwrap,
 )
 
-MODULES = (transport, unwrap, profile, memory, speed, magnify, cascade, saliency, latency, sphere, remesh, cuts)
+MODULES = (transport, unwrap, profile, memory, speed, magnify, cascade, saliency, latency, sphere, remesh, cuts, hard)
 PARTS: dict[str, Part] = {part.name: part for module in MODULES for part in module.PARTS}
 OPTIONS: dict[str, Option] = {option.name: option for part in PARTS.values() for option in part.options}
 

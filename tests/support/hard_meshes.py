@@ -131,3 +131,20 @@ def terrain(side: int = 1000, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     V = np.column_stack([u.ravel(), v.ravel(), height.ravel()])
     i = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
     return V, np.column_stack([i, i + side + 1, i + side + 2, i + 1])
+
+
+def surface(V: np.ndarray, polygons: np.ndarray):
+    """The `Surface` of polygons (f,k) that all have k corners, cut into fans."""
+    from omt_uv.solver.mesh.surface import Surface
+
+    f, k = polygons.shape
+    start = k * np.arange(f)
+    fans = np.stack([np.column_stack([start, start + i, start + i + 1]) for i in range(1, k - 1)], axis=1)
+    return Surface(
+        positions=V,
+        corner_vertex=polygons.ravel(),
+        face_start=k * np.arange(f + 1),
+        triangles=fans.reshape(-1, 3),
+        triangle_face=np.repeat(np.arange(f), k - 2),
+        seams=np.zeros((0, 2), np.int64),
+    )

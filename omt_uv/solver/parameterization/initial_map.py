@@ -16,6 +16,7 @@ from ..conformal.rectangle_to_disk import centre_in_disk
 from ..errors import PrecisionError, TransportError
 from ..maps.energy import elements
 from ..maps.tutte import arc_length_parameters, tutte
+from ..maps.untangle import map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
@@ -145,6 +146,9 @@ def coarse_initial_map(
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
         uv = yield from part_of(_smoothed(disk, uv, far), *SMOOTHING)
+        # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
+        if not far and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
+            return InitialChartMap(flat)
     return InitialChartMap(uv, found.conformal, found.cells, far, refined.multiplier)
 
 

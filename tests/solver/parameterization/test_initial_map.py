@@ -1,13 +1,17 @@
 """The map from which the refinement of a chart starts."""
 
+import hard_meshes
 import meshes
 import numpy as np
 import pytest
 
 from omt_uv.solver.conformal.disk_map import sharpest_corners
-from omt_uv.solver.maps.untangle import count_folds
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.maps.untangle import count_folds, map_energy
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization import initial_map as initial_maps
 from omt_uv.solver.parameterization.initial_map import (
     DiskMesh,
     centroid_map,
@@ -74,3 +78,14 @@ def test_a_coarse_mesh_leads_to_a_map_without_folds():
 
 def test_a_mesh_of_boundary_vertices_is_not_coarsened():
     assert drain(coarse_initial_map(disk_of(*meshes.spiral_strip(1.0, 20), "disk"), 0.0, RunLog())) is None
+
+
+def test_slivers_start_from_no_worse_than_a_mean_value_map(monkeypatch):
+    V, F = hard_meshes.sliver_sphere(20_000)
+    chart = cut_to_disks(triangle_surface(V, F)).charts[0]
+    disk = disk_of(chart.vertices, chart.triangles)
+    monkeypatch.setattr(initial_maps, "COARSER", 64)
+    found = drain(coarse_initial_map(disk, 0.0, RunLog()))
+    flat = mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk())
+    energies = [map_energy(uv, disk.vertices, disk.triangles) for uv in (found.uv, flat)]
+    assert energies[0] <= 1.001 * energies[1]
