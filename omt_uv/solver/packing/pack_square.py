@@ -32,8 +32,8 @@ BLOCKS = 64
 # the picture.
 SMALL = 0.2
 QUARTERS = (0, 1, 3)
-# The first scale fills this share of the square; then come smaller ones until one fits, by this factor first, and by one
-# that is smaller every time.
+# The first scale fills this share of the square; then come smaller ones until one fits, by this factor first, and then
+# by one that is smaller every time.
 FIRST_SHARE = 0.75
 SMALLER = 0.95
 HASTE = 0.99
