@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import UserError
 from ..pipelines.attributes import Attributes, followed, marked_sharp, material_borders, uv_seams
 from ..pipelines.carry_attributes import carry
+from ..pipelines.gate import gate
 from ..pipelines.remesh import LevelOfDetail, RemeshJob, Series, oriented
 from ..settings import RemeshSettings
 from ..solver.analysis.density import from_polygons, from_vertices
@@ -222,3 +223,15 @@ def lost(obj: bpy.types.Object, request: Request, carried: list[Attributes], by_
     if bound and not request.evaluated:
         texts.append(f"Modifiers bound to the vertices of the old mesh are left out: {', '.join(bound)}")
     return texts
+
+
+def carried_gate(obj: bpy.types.Object, made: list[str]) -> list[tuple[str, ...]]:
+    """What the last gate says of the active UVs that each new object carries, next to those of the old one."""
+    before = None
+    told = []
+    for name in made:
+        found = gate([blender_mesh.read(bpy.data.objects[name])])
+        if found.warnings() and before is None:
+            before = gate([blender_mesh.read(obj)])
+        told.append(tuple(f"{name}: {text}" for text in found.warnings(before)))
+    return told

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
-from .common import UsageError, check_paths, drain_shown, refusals, require_blender, warn
+from .common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn
 from .options import add_files, angle, faces, names, number, positive, vertices
 from .selection import read_file
 
@@ -77,7 +77,7 @@ def _ratio(text: str) -> float:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ..blender.remesh_objects import carried_attributes, lost, new_objects, read_request, source_of
+    from ..blender.remesh_objects import carried_attributes, carried_gate, lost, new_objects, read_request, source_of
     from ..files.verified import same_file
     from ..pipelines.remesh import remesh_series
 
@@ -99,6 +99,10 @@ def run(options: argparse.Namespace) -> None:
     for k, (obj, request, series, carried) in enumerate(results):
         told += [(k, text) for text in (*lost(obj, request, carried, by_hand), *series.warnings)]
         made.append(new_objects([obj], request, series, carried))
+        found = [text for texts in carried_gate(obj, made[-1]) for text in texts]
+        if found and options.strict:
+            raise CommandError(f"{options.input}: {'; '.join(found)}. Nothing was written, as --strict asks.")
+        told += [(-1, text) for text in found]
     warn(objects, told, _save(options.output, made, options.input))
 
 

@@ -168,12 +168,16 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         return [(group, request, *result) for group, request, result in zip(groups, requests, results, strict=True)]
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender.remesh_objects import lost, new_objects
+        from ..blender.remesh_objects import carried_gate, lost, new_objects
 
         names, warnings = [], []
         for k, (group, request, series, carried) in enumerate(result):
             warnings += [(k, text) for text in (*lost(group[0], request, carried), *series.warnings)]
-            names += new_objects(group, request, series, carried)
+            new_names = new_objects(group, request, series, carried)
+            # Objects that share a mesh have its UVs in common.
+            told = carried_gate(group[0], new_names[:: len(group)])
+            warnings += [(-1, text) for texts in told for text in texts]
+            names += new_names
         for obj in context.selected_objects:
             obj.select_set(False)
         # Those in a collection that the view layer leaves out cannot be selected.

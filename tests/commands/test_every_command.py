@@ -140,3 +140,21 @@ def test_meshes_of_other_scenes_go_to_every_format(package, run, tmp_path, targe
     assert status == 0, err
     found = package("files.meshes").load(tmp_path / f"out{target}")
     assert sum(len(obj.data.polygons) for obj in found) >= 2 * 8 * 6
+
+
+def test_uvs_that_a_new_mesh_carries_pass_the_gate(run, tmp_path):
+    """Those that lay on one another before still do, and that is said."""
+    obj = scenes.bump()
+    obj.data.uv_layers.new(name="UVMap")
+    middle = sum(v.co.x for v in obj.data.vertices) / len(obj.data.vertices)
+    for loop in obj.data.loops:
+        x, y, _ = obj.data.vertices[loop.vertex_index].co
+        obj.data.uv_layers.active.uv[loop.index].vector = (abs(x - middle), y)
+    save(tmp_path / "in.blend")
+    words = ["remesh", tmp_path / "in.blend", "-o", tmp_path / "out.blend", "--vertices", "300"]
+    status, _, err = run(*words)
+    assert status == 0 and "of the UV area is under several faces, as before" in err
+    (tmp_path / "out.blend").unlink()
+    assert run(*words, "--strict")[0] == 1 and not (tmp_path / "out.blend").exists()
+    plain = [*words, "--no-attributes", "--strict"]
+    assert run(*plain)[0] == 0
