@@ -15,7 +15,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,8 +32,11 @@ INTERRUPTED = 128 + signal.SIGINT
 OWN = {0, FAILURE, USAGE, MEMORY, DEFECT, INTERRUPTED}
 
 GIGABYTE = 10**9
-# Says to a process that it is the child.
+# Says to a process that it is the child, and which folder for temporary files the parent has made for it.
 MARK = "OMT_UV_CHILD"
+# A file in that folder with the number of the parent: no other folder is ever removed.
+OWNER = "omt_uv_parent"
+FOLDER = "omt_uv_"
 MEMORY_IS_LIMITED = sys.platform.startswith("linux")
 # What a user or a system ends a program with; Windows knows the first two alone.
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -65,21 +68,29 @@ def is_child() -> bool:
 
 def begin_child(gigabytes: float) -> None:
     """Take up the life of a child: no more than so much memory, 0 for all there is, and an end with the parent."""
-    os.environ.pop(MARK, None)
+    folder = os.environ.pop(MARK, "")
     if gigabytes and MEMORY_IS_LIMITED:
         import resource
 
         # What is written to: the address space counts libraries and reserves of threads as well.
         resource.setrlimit(resource.RLIMIT_DATA, (int(gigabytes * GIGABYTE),) * 2)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(Path(folder), os.getppid()), daemon=True).start()
 
 
-def _end_with_parent() -> None:
+def _end_with_parent(folder: Path, parent: int) -> None:
     """Wait for the end of the standard input, which the parent holds open and never writes to."""
     # Not sys.stdin, whose lock would be held while the interpreter shuts down.
     while os.read(0, 1):
         pass
+    _remove_own(folder, parent)
     os._exit(CRASH)
+
+
+def _remove_own(folder: Path, parent: int) -> None:
+    """Remove the folder that a parent has made for its child, and no other."""
+    with suppress(OSError):
+        if folder.name.startswith(FOLDER) and (folder / OWNER).read_text() == str(parent):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def leave(status: int) -> None:
@@ -97,11 +108,12 @@ def leave(status: int) -> None:
 
 def supervise(errand: Errand) -> int:
     """Run the child to its end and say what ended it unless it did so itself; returns the exit status."""
-    with tempfile.TemporaryDirectory(prefix="omt_uv_", ignore_cleanup_errors=True) as folder:
+    with tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True) as folder:
+        (Path(folder) / OWNER).write_text(str(os.getpid()))
         places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
         child = subprocess.Popen(
             errand.words,
-            env={**os.environ, **places, MARK: "1"},
+            env={**os.environ, **places, MARK: folder},
             stdin=subprocess.PIPE,
             # Ctrl-C in a terminal is for the parent alone, which ends the child at once.
             start_new_session=True,

@@ -80,15 +80,44 @@ def test_a_signal_ends_the_child_leaves_nothing_and_is_one_line(tmp_path, number
     assert not Path(folder).exists()
 
 
+CHILD = """
+import os, time
+from omt_uv import supervision
+folder = os.environ[supervision.MARK]
+supervision.begin_child(0)
+print(os.getpid(), folder, flush=True)
+time.sleep(50)
+"""
+
+
 @posix
-def test_a_child_ends_with_its_parent_and_removes_nothing(tmp_path):
+def test_a_child_ends_with_a_killed_parent_and_takes_its_folder_along(tmp_path):
     (tmp_path / "somebody.txt").write_text("work")
+    words = [sys.executable, "-c", PARENT, CHILD, str(tmp_path)]
+    more = {"TMPDIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    parent = subprocess.Popen(words, stdout=subprocess.PIPE, cwd=ROOT, text=True, env={**os.environ, **more})
+    _, folder = parent.stdout.readline().split()
+    assert Path(folder).parent == tmp_path and Path(folder).is_dir()
+    parent.kill()
+    # The pipe is the child's as well, and ends with it.
+    assert parent.stdout.read() == ""
+    assert [p.name for p in tmp_path.iterdir()] == ["somebody.txt"]
+
+
+@posix
+@pytest.mark.parametrize("name", ["omt_uv_x", "other", "."])
+def test_a_child_removes_no_folder_that_is_not_its_parents(tmp_path, name):
+    """Whatever the environment names: one without the number of the parent in it is somebody's."""
+    folder = tmp_path / name
+    folder.mkdir(exist_ok=True)
+    (folder / "somebody.txt").write_text("work")
+    (folder / "omt_uv_parent").write_text("1" if name == "omt_uv_x" else str(os.getpid()))
     code = "from omt_uv import supervision; import time; supervision.begin_child(0); time.sleep(50)"
-    more = {"OMT_UV_CHILD": "1", "TMPDIR": str(tmp_path)}
+    more = {"OMT_UV_CHILD": str(folder), "TMPDIR": str(tmp_path)}
     child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, cwd=ROOT, env={**os.environ, **more})
     child.stdin.close()
     assert child.wait(20) == 3
-    assert (tmp_path / "somebody.txt").read_text() == "work"
+    assert (folder / "somebody.txt").read_text() == "work"
 
 
 def test_leaving_removes_nothing_and_runs_no_end_of_blender(package, tmp_path, monkeypatch):
