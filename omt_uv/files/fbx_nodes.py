@@ -43,7 +43,7 @@ def count(data: bytes) -> FbxCounts:
             ended |= path == ("",)
             if path[:1] == ("Objects",) and len(path) == 2 and kind:
                 kinds[kind] += 1
-            elif path[:2] == ("Objects", "Geometry"):
+            elif path[:2] == ("Objects", "Geometry Mesh"):
                 totals["/".join(path[2:])] += length
     except (struct.error, IndexError, RecursionError) as error:
         raise FileError("the file ends too early") from error
@@ -66,7 +66,11 @@ def _records(data: bytes, at: int, end: int, long: bool, path: tuple) -> Iterato
         if not body <= body + size <= until <= end:
             raise IndexError
         length, kind = _values(data, body, values, body + size)
-        yield here, length, f"{here[-1]} {kind}".strip()
+        label = f"{here[-1]} {kind}".strip()
+        if len(here) == 2:
+            # Shapes of morphs are geometry, too.
+            here = (*path, label)
+        yield here, length, label
         if len(here) < 4 and (here[0] == "Objects"):
             yield from _records(data, body + size, until, long, here)
         at = until

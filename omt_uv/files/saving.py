@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from urllib.parse import unquote
 
 import bpy
 
@@ -16,7 +17,7 @@ import numpy as np
 from ..blender.mesh import read_uv
 from .export import export, exported_meshes
 from .fbx_nodes import count
-from .in_place import glb, ply
+from .in_place import glb, glb_data, ply
 from .in_place import obj as obj_file
 from .in_place.imported import Imported, InPlaceError
 from .losses import losses
@@ -108,13 +109,19 @@ def _imported(obj: bpy.types.Object) -> Imported:
 
 
 def _left_behind(data: bytes, suffix: str, source: Path, path: Path) -> list[str]:
-    """A warning if a file in another folder names materials that are not there."""
-    if suffix != ".obj" or source.resolve().parent == path.resolve().parent:
+    """Warnings if a file in another folder names materials or images that are not there."""
+    if suffix == ".ply" or source.resolve().parent == path.resolve().parent:
         return []
-    lines = [line.split(None, 1) for line in data.splitlines() if line.lstrip().startswith(b"mtllib ")]
-    names = [line[1].strip().decode(errors="replace") for line in lines if len(line) > 1]
+    if suffix == ".obj":
+        lines = [line.split(None, 1) for line in data.splitlines() if line.lstrip().startswith(b"mtllib ")]
+        names = [line[1].strip().decode(errors="replace") for line in lines if len(line) > 1]
+    else:
+        images = glb_data.read(data).doc.get("images", [])
+        names = [unquote(image["uri"]) for image in images if not image.get("uri", "data:").startswith("data:")]
     missing = [name for name in dict.fromkeys(names) if not (path.resolve().parent / name).exists()]
-    return [f"{path.name} names {name}, which is not in its folder. Copy it there, with its images" for name in missing]
+    return [
+        f"{path.name} names {name}, which is not in its folder. Copy it there, with what it names" for name in missing
+    ]
 
 
 def _save_blend(path: Path, objects: Objects, source: Path | None) -> list[str]:
@@ -131,7 +138,8 @@ def _save_blend(path: Path, objects: Objects, source: Path | None) -> list[str]:
                     compress=source is not None and _is_compressed(source),
                 )
         except RuntimeError as error:
-            raise FileError(f"{path}: {last_line(str(error)) or 'cannot be written'}") from error
+            reason = last_line(str(error))
+            raise FileError(f"{path}: cannot be written ({reason}). Is the disk full?") from error
         with silence():
             _named(path, check_blend, made, objects)
     return []

@@ -58,7 +58,7 @@ def ply_bytes(form="ascii", names=("s", "t"), corners=True, end="\n"):
     head += ["element edge 1", "property int vertex1", "property int vertex2", "end_header", ""]
     rng = np.random.default_rng(1)
     vertices = [
-        [*p, 7 + k, *rng.random(len(names)).astype(np.float32).tolist(), 1.5] for k, p in enumerate(CUBE.tolist())
+        [*p, 7 + k, *rng.random(len(names)).astype(np.float32).tolist(), k / 7] for k, p in enumerate(CUBE.tolist())
     ]
     faces = [
         [3, 4, *quad, *([8, *rng.random(8).astype(np.float32).tolist()] if corners else [])] for quad in QUADS.tolist()
