@@ -48,6 +48,8 @@ def check_layout(F: np.ndarray, uv: np.ndarray, apart: bool = False) -> LayoutCh
     F, uv = np.asarray(F, np.int64), np.asarray(uv, float)
     if not len(F):
         return LayoutCheck(np.zeros(0, bool), 0.0)
+    # A triangle whose UVs are no numbers has no area, and so is folded.
+    uv = np.where(np.isfinite(uv).all((1, 2), keepdims=True), uv, 0.0)
     T = _uv_vertices(F, uv)
     area = cross2(uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0])
     edges = _edges(T, area < 0)

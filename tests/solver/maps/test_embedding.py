@@ -103,3 +103,11 @@ def test_folds_are_counted_chart_by_chart():
     found = check_layout(F, P[F])
     e, f = P[F][:, 1] - P[F][:, 0], P[F][:, 2] - P[F][:, 0]
     assert (found.folded == (e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0] <= 0)).all() and found.folded.any()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_uvs_that_are_no_numbers_are_folds(value):
+    P, F = grid(5)
+    uv = P[F]
+    uv[[3, 7], 1] = value
+    assert np.flatnonzero(check_layout(F, uv).folded).tolist() == [3, 7]
