@@ -30,6 +30,8 @@ from .polygon_disk import of_polygon_disk, polygon_disk
 # Where the time of a chart goes, roughly, as start and width in [0, 1]: a bar that moves evenly needs no more.
 INITIAL = (0.0, 0.4)
 REFINEMENT = (0.4, 0.6)
+# What is said, after their number, of faces of a map that is returned all the same.
+FOLDED = "faces are folded or without area in the map"
 
 
 @dataclass(frozen=True)
@@ -120,7 +122,7 @@ def map_chart(
     if target is not None and options.balance == 0:
         log.warnings += area_error_warnings(figures.area_l1, QUALITIES[options.quality].area_error)
     if figures.folds:
-        log.warnings.append(f"{figures.folds} faces are folded or without area in the map")
+        log.warnings.append(f"{figures.folds} {FOLDED}")
     uv = refined.uv
     if places is None:
         uv = placed_chart(uv, vertices, chart, density, unit, pins, disk.boundary == "free")

@@ -15,7 +15,7 @@ from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops
 from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import chart_target
-from .chart_map import ChartMap, in_unit_box, measured_chart
+from .chart_map import FOLDED, ChartMap, in_unit_box, measured_chart
 from .chart_pins import ChartPins
 from .convexity import keep_convex
 from .options import MapOptions
@@ -54,9 +54,9 @@ def with_convex_polygons(
         if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and not figures.folds:
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
-            new[k] = replace(
-                old, uv=uv, area_l1=figures.area_l1, area_sd=figures.area_sd, angle_mean=figures.angle_mean
-            )
+            names = ("area_l1", "area_sd", "angle_mean", "folds")
+            warnings = tuple(text for text in old.warnings if not text.endswith(FOLDED))
+            new[k] = replace(old, uv=uv, warnings=warnings, **{name: getattr(figures, name) for name in names})
     return new
 
 

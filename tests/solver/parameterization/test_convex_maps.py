@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import hard_meshes
 import meshes
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.chart_pins import ChartPins
 from omt_uv.solver.parameterization.convex_maps import with_convex_polygons
-from omt_uv.solver.parameterization.options import MapOptions
+from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.polygon_corners import convex_corners
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
 
@@ -66,3 +68,12 @@ def test_triangles_are_left_alone():
     (chart,) = strict_charts(surface)
     maps = [drain(map_chart(chart))]
     assert with_convex_polygons(surface, [chart], maps, [None], MapOptions()) is maps
+
+
+def test_folds_that_were_mended_are_not_warned_of():
+    V, quads = hard_meshes.percolation(64, 0.12)
+    result = drain(unwrap(hard_meshes.surface(V, quads), options=UnwrapOptions()))
+    (chart,), (chart_map,) = result.charts, result.maps
+    folded = (signed_areas(chart_map.uv, chart.triangles) <= 0).sum()
+    assert folded == chart_map.folds == 0
+    assert not chart_map.warnings
