@@ -43,7 +43,7 @@ class CutComponent:
     pair (e,2) : the two halfedges of every inner edge; gluing_pair (e,) : its number among the pairs of the gluing
     ends (e,2), length (e,), cost (e,) : of the inner edges; the cost of diagonals of polygons is infinite
     boundary (b,) : halfedges
-    members (m,) : triangles of the gluing; vertex_ids (n,) : vertices of the surface
+    members (m,) : triangles of the gluing; polygons (m,) : that own them; vertex_ids (n,) : vertices of the surface
     avoid (n,) : in [0,1]
     """
 
@@ -56,6 +56,7 @@ class CutComponent:
     cost: np.ndarray
     boundary: np.ndarray
     members: np.ndarray
+    polygons: np.ndarray
     vertex_ids: np.ndarray
     avoid: np.ndarray
 
@@ -170,6 +171,7 @@ def make_component(
         cost=cost,
         boundary=_open_halfedges(3 * len(triangles), pair[:, 0], pair[:, 1]),
         members=members,
+        polygons=gluing.owner[members],
         vertex_ids=vertex_ids,
         avoid=avoid[vertex_ids],
     )

@@ -1,0 +1,119 @@
+"""Carry a cut from the coarse surface to the fine one: along its edges, near where it ran."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from ..cutting.component import CutComponent
+from ..mesh.topology import halfedges, pair_keys
+from .coarse_surface import CoarseSurface
+from .cut_tree import stretches
+from .path_graph import PathGraph
+
+# How far from the coarse path a fine one may run, in lengths of coarse edges.
+REACH = 6.0
+# At one coarse edge from the coarse path, an edge counts so many times more.
+ASTRAY = 0.5
+
+
+@dataclass(frozen=True)
+class FineMirror:
+    """The mirror image (n,) of every vertex of a component, and which are on the one side or in the plane, (n,)."""
+
+    image: np.ndarray
+    side: np.ndarray
+
+
+def carried(
+    component: CutComponent,
+    coarse: CoarseSurface,
+    graph: PathGraph,
+    steps: np.ndarray,
+    start: np.ndarray,
+    mirror: FineMirror | None,
+) -> np.ndarray:
+    """Edges (e,) bool of a component along steps (k,) over its coarse surface.
+
+    start (n,) bool: vertices that are on a boundary or cut already, from which paths set out.
+    """
+    fine = _FineGraph.of(component)
+    used = start.copy()
+    spacing = coarse.size * float(np.median(graph.cost)) if len(graph.cost) else 0.0
+    allowed = np.ones(component.vertex_count, dtype=bool) if mirror is None else mirror.side
+    paths = []
+    for stretch, end in _outwards(graph, steps):
+        along = coarse.kept[np.unique(graph.ends[stretch])]
+        path = fine.path(used, int(coarse.kept[end]), along, spacing, allowed)
+        used[path] = True
+        paths.append(path)
+    if mirror is not None:
+        paths += [mirror.image[path] for path in paths]
+    chosen = np.zeros(len(component.pair), dtype=bool)
+    if paths:
+        keys = pair_keys(np.concatenate([p[:-1] for p in paths]), np.concatenate([p[1:] for p in paths]))
+        chosen = np.isin(pair_keys(*component.ends.T), keys)
+    return chosen
+
+
+def _outwards(graph: PathGraph, steps: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    """Stretches of a cut with their far ends, each after those between it and the boundary."""
+    if len(steps) == 0:
+        return []
+    n = len(graph.boundary)
+    a, b = graph.ends[steps].T
+    tree = csr_matrix((graph.cost[steps], (a, b)), shape=(n, n))
+    depth = dijkstra(tree, directed=False, indices=np.flatnonzero(graph.boundary), min_only=True)
+    found = []
+    for stretch in stretches(graph, steps):
+        vertices = np.unique(graph.ends[stretch])
+        found.append((depth[vertices].min(), stretch, int(vertices[np.argmax(depth[vertices])])))
+    return [(stretch, end) for _, stretch, end in sorted(found, key=lambda item: item[0])]
+
+
+@dataclass(frozen=True)
+class _FineGraph:
+    """Edges of a component that can be cut, and those of its boundary: what they cost, and their length, (n,n)."""
+
+    cost: csr_matrix
+    length: csr_matrix
+
+    @staticmethod
+    def of(component: CutComponent) -> _FineGraph:
+        """The graph of a component; diagonals of polygons are no edges."""
+        inner = np.isfinite(component.cost)
+        tail, head = halfedges(component.triangles)
+        boundary = component.boundary
+        ends = np.concatenate([component.ends[inner], np.column_stack([tail[boundary], head[boundary]])])
+        length = np.linalg.norm(component.positions[ends[:, 0]] - component.positions[ends[:, 1]], axis=1)
+        length = length + 1e-9 * max(float(length.mean()), 1e-30)
+        cost = np.concatenate([component.cost[inner], length[inner.sum() :]])
+        rows, columns = np.concatenate([ends, ends[:, ::-1]]).T
+        shape = (component.vertex_count,) * 2
+        return _FineGraph(
+            csr_matrix((np.tile(cost, 2), (rows, columns)), shape=shape),
+            csr_matrix((np.tile(length, 2), (rows, columns)), shape=shape),
+        )
+
+    def path(self, start: np.ndarray, end: int, along: np.ndarray, spacing: float, allowed: np.ndarray) -> np.ndarray:
+        """Vertices (k,) of the cheapest path from `end` to any of `start` (n,) bool, near the vertices `along` (a,).
+
+        spacing: length of a coarse edge; allowed (n,) bool: vertices that it may run over. Empty if there is none.
+        """
+        astray = dijkstra(self.length, indices=along, min_only=True, limit=REACH * spacing)
+        near = np.flatnonzero(np.isfinite(astray) & allowed)
+        if not start[near].any() or not allowed[end]:
+            return np.zeros(0, np.int64)
+        far = astray[near] / max(spacing, 1e-300)
+        graph = self.cost[near][:, near].tocoo()
+        cost = graph.data * (1 + ASTRAY * (far[graph.row] + far[graph.col]) ** 2)
+        graph = csr_matrix((cost, (graph.row, graph.col)), shape=graph.shape)
+        begin = np.flatnonzero(start[near])
+        _, before, _ = dijkstra(graph, indices=begin, min_only=True, return_predecessors=True)
+        path = [int(np.searchsorted(near, end))]
+        while before[path[-1]] >= 0:
+            path.append(int(before[path[-1]]))
+        return near[path] if start[near[path[-1]]] else np.zeros(0, np.int64)

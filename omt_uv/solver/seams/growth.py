@@ -1,0 +1,78 @@
+"""Grow a cut: the path to an extremity, or part of it, that saves most for its length, again and again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .cut_tree import Cut, Task, cut_along
+from .path_graph import PathGraph
+from .predicted_scale import ScaleModel
+
+# Extremities that paths are tried to.
+MOST_TIPS = 12
+# Shares of the way to an extremity at which a path may end.
+STOPS = (1.0, 0.8, 0.6)
+
+
+@dataclass(frozen=True)
+class _Arc:
+    """A path to be added: its vertices (k,) from tip to cut, and by how much the spread falls for a unit of cost."""
+
+    path: np.ndarray
+    worth: float
+
+
+def grow(task: Task, cut: Cut, most: int) -> Cut:
+    """The cut with arcs added until the spread is within the bound; at most so many, each where it pays most."""
+    model = None
+    for _ in range(most):
+        if cut.spread <= task.bound:
+            break
+        model = task.model.cut(cut.vertices) if model is None else model
+        arc = _best_arc(task.graph, cut, model)
+        if arc is None:
+            break
+        grown = cut_along(task, np.concatenate([cut.steps, task.graph.steps_of(arc.path)]))
+        model = model.cut(np.setdiff1d(grown.vertices, cut.vertices))
+        cut = grown
+    return cut
+
+
+def _best_arc(graph: PathGraph, cut: Cut, model: ScaleModel) -> _Arc | None:
+    start = np.union1d(np.flatnonzero(graph.boundary), cut.vertices)
+    cost, before = graph.paths_from(start)
+    best = None
+    for tip in _tips(graph, model, cost):
+        path = path_to(before, int(tip))
+        reach = cost[path]
+        for stop in STOPS:
+            # From the first vertex that is near enough; the last is on the cut already.
+            part = path[int(np.argmax(reach <= stop * reach[0] + 1e-12)) :]
+            new = np.union1d(part[:-1], graph.image[part[:-1]])
+            if len(new) == 0:
+                continue
+            worth = (cut.spread - model.spread(model.scale_cut(new))) / cost[part[0]]
+            if worth > 0 and (best is None or worth > best.worth):
+                best = _Arc(part, worth)
+    return best
+
+
+def _tips(graph: PathGraph, model: ScaleModel, cost: np.ndarray) -> np.ndarray:
+    """Extremities (k,): peaks of the log scale that can be reached, those of most gain for their cost."""
+    height = np.abs(model.scale)
+    around = np.zeros(len(height))
+    np.maximum.at(around, graph.ends[:, 0], height[graph.ends[:, 1]])
+    np.maximum.at(around, graph.ends[:, 1], height[graph.ends[:, 0]])
+    peaks = np.flatnonzero((height >= around) & (height > 0) & np.isfinite(cost) & (cost > 0))
+    worth = model.gain(peaks) / cost[peaks]
+    return peaks[np.argsort(-worth, kind="stable")[:MOST_TIPS]]
+
+
+def path_to(before: np.ndarray, end: int) -> np.ndarray:
+    """Vertices (k,) from `end` back to where the predecessors (n,) stop."""
+    path = [end]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return np.array(path)

@@ -1,0 +1,100 @@
+"""Make a cut shorter at the same spread: take some of it back, grow it anew, and keep what is better.
+
+Greedy growth leaves arcs that later ones have made needless, and forks where they happened to be near. A large
+neighbourhood search (Shaw 1998) takes back the leaf that is worth least, or some at random, and grows others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..mesh.topology import graph_components
+from .cut_tree import Cut, Task, cut_along, leaves, stretches
+from .growth import grow, path_to
+
+# Shares of a leaf that may be taken off its end.
+PARTS = (1.0, 0.5, 0.25)
+# Share of the leaves that is taken back at random.
+RANDOM_SHARE = 0.4
+# A better cut has a score lower by this share.
+BETTER = 1e-3
+# Arcs that replace those taken back, at most.
+MOST_REGROWN = 12
+
+
+def improved(task: Task, cut: Cut, trials: int) -> Iterator[Cut]:
+    """Cuts within the bound, each as good as the one before or better, one for each of so many trials."""
+    rng = np.random.default_rng(0)
+    in_vain = 0
+    for _ in range(trials):
+        found = leaves(task.graph, cut.steps)
+        if not found:
+            return
+        base = _taken_back(task, cut, found, in_vain, rng)
+        other = trimmed(task, rerouted(task, grow(task, base, MOST_REGROWN)))
+        within = other.spread <= max(task.bound, cut.spread)
+        better = within and other.score(task.bound) < cut.score(task.bound) * (1 - BETTER)
+        cut, in_vain = (other, 0) if better else (cut, in_vain + 1)
+        yield cut
+
+
+def _taken_back(task: Task, cut: Cut, found: list[np.ndarray], in_vain: int, rng: np.random.Generator) -> Cut:
+    """The cut without the leaf that is worth least for its length, or, where those were in vain, without some."""
+    cost = np.array([task.graph.cost[leaf].sum() for leaf in found])
+    loss = np.array([cut_along(task, np.setdiff1d(cut.steps, leaf)).spread - cut.spread for leaf in found])
+    order = np.argsort(loss / cost, kind="stable")
+    if in_vain < len(found):
+        gone = [found[order[in_vain]]]
+    else:
+        gone = [found[k] for k in np.flatnonzero(rng.random(len(found)) < RANDOM_SHARE)] or [found[order[0]]]
+    return cut_along(task, np.setdiff1d(cut.steps, np.concatenate(gone)))
+
+
+def trimmed(task: Task, cut: Cut) -> Cut:
+    """The cut with the ends of its leaves taken off where the bound leaves room, those first that lose least."""
+    while True:
+        shorter = []
+        for leaf in leaves(task.graph, cut.steps):
+            for part in PARTS:
+                other = cut_along(task, np.setdiff1d(cut.steps, leaf[: max(int(part * len(leaf)), 1)]))
+                if other.spread <= task.bound:
+                    shorter.append(((other.spread - cut.spread) / (cut.cost - other.cost), other))
+        if not shorter:
+            return cut
+        cut = min(shorter, key=lambda pair: pair[0])[1]
+
+
+def rerouted(task: Task, cut: Cut) -> Cut:
+    """The cut with stretches replaced by the cheapest that join the same parts, where that is better."""
+    for stretch in stretches(task.graph, cut.steps):
+        if not np.isin(stretch, cut.steps).all():
+            continue
+        rest = np.setdiff1d(cut.steps, stretch)
+        path = _bridge(task, stretch, rest)
+        if path is None:
+            continue
+        other = cut_along(task, np.concatenate([rest, task.graph.steps_of(path)]))
+        if other.score(task.bound) < cut.score(task.bound) * (1 - BETTER):
+            cut = other
+    return cut
+
+
+def _bridge(task: Task, stretch: np.ndarray, rest: np.ndarray) -> np.ndarray | None:
+    """Vertices (k,) of the cheapest path between the two parts of a cut that a stretch joins; None if not two."""
+    graph = task.graph
+    n = len(graph.boundary)
+    boundary = np.flatnonzero(graph.boundary)
+    a, b = graph.ends[rest].T
+    label = graph_components(np.concatenate([a, boundary]), np.concatenate([b, np.full(len(boundary), n)]), n + 1)[1]
+    used = np.zeros(n, dtype=bool)
+    used[a] = used[b] = used[boundary] = True
+    touched = np.unique(graph.ends[stretch])
+    parts = np.unique(label[touched[used[touched]]])
+    if len(parts) != 2:
+        return None
+    one, other = (np.flatnonzero(used & (label[:n] == part)) for part in parts)
+    cost, before = graph.paths_from(one)
+    nearest = other[np.argmin(cost[other])]
+    return path_to(before, int(nearest)) if np.isfinite(cost[nearest]) else None

@@ -1,0 +1,30 @@
+"""State how far seams are to be searched, in one dataclass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# Vertices of the coarse surface that seams are searched on.
+COARSE_VERTICES = 1200
+# Arcs that one component gets at most.
+MOST_ARCS = 64
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How far seams are searched.
+
+    Attributes
+    ----------
+    spread : mean square over the surface of the predicted log scale that is to be reached
+    vertices : of the coarse surface
+    arcs : that are added at most
+    rounds : of taking arcs back and growing others; 0 for none
+    symmetric : seams of a surface that is its own mirror image are their own, too
+    """
+
+    spread: float
+    vertices: int = COARSE_VERTICES
+    arcs: int = MOST_ARCS
+    rounds: int = 8
+    symmetric: bool = True

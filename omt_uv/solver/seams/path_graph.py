@@ -1,0 +1,104 @@
+"""Paths over a coarse surface: along its edges, and across them from corner to corner, as long as they would be flat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from ..mesh.topology import halfedges, next_halfedge, twins
+from .coarse_surface import CoarseSurface
+
+
+@dataclass(frozen=True)
+class PathGraph:
+    """Steps that a path may take.
+
+    Attributes
+    ----------
+    ends (e,2), cost (e,) : of every step, cost in lengths over the size of the surface
+    boundary (n,) bool : vertices where cuts may begin for nothing
+    image (n,) : vertex that is cut together with each, its mirror image; itself where there is no mirror
+    matrix (n,n) : cost; number (n,n) : of the step, from 1
+    """
+
+    ends: np.ndarray
+    cost: np.ndarray
+    boundary: np.ndarray
+    image: np.ndarray
+    matrix: csr_matrix
+    number: csr_matrix
+
+    def paths_from(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Cost (n,) of the cheapest path from the vertices `start` (k,), and the vertex before (n,), < 0 for none."""
+        cost, before, _ = dijkstra(self.matrix, indices=start, min_only=True, return_predecessors=True)
+        return cost, before
+
+    def steps_of(self, path: np.ndarray) -> np.ndarray:
+        """Steps (k,) between the vertices (k+1,) of a path."""
+        return np.asarray(self.number[path[:-1], path[1:]]).ravel() - 1
+
+    def vertices_of(self, steps: np.ndarray) -> np.ndarray:
+        """Vertices (k,) of steps and of their mirror images, off the boundary, sorted."""
+        vertices = self.ends[steps].ravel()
+        vertices = np.union1d(vertices, self.image[vertices])
+        return vertices[~self.boundary[vertices]]
+
+
+@dataclass(frozen=True)
+class Mirrored:
+    """The mirror image (n,) of every vertex, and which are on the one side or in the plane, (n,) bool."""
+
+    image: np.ndarray
+    side: np.ndarray
+
+
+def path_graph(
+    surface: CoarseSurface, factor: np.ndarray, boundary: np.ndarray, mirrored: Mirrored | None = None
+) -> PathGraph:
+    """The steps over a coarse surface.
+
+    factor (n,): cost of a cut per length; boundary (n,) bool: where cuts may begin. Of a mirrored surface, steps are
+    those of one half, and count twice but for those in the plane.
+    """
+    n = len(surface.positions)
+    tail, head = halfedges(surface.triangles)
+    twin = twins(surface.triangles)
+    once = np.flatnonzero(twin < np.arange(len(twin)))
+    ends = np.column_stack([tail[once], head[once]])
+    length = np.linalg.norm(surface.positions[ends[:, 0]] - surface.positions[ends[:, 1]], axis=1)
+    across, straight = _across(surface.positions, tail, head, twin)
+    ends, length = np.concatenate([ends, across]), np.concatenate([length, straight])
+    image = np.arange(n)
+    if mirrored is not None:
+        image = mirrored.image
+        keep = mirrored.side[ends].all(axis=1)
+        ends, length = ends[keep], length[keep]
+        length = np.where((image[ends] == ends).all(axis=1), length, 2 * length)
+    ends = np.sort(ends, axis=1)
+    _, first = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True)
+    ends, length = ends[first], length[first]
+    # A step without length still costs something: sparse graphs take a zero for no step.
+    floor = 1e-9 * max(float(length.mean()), 1e-30)
+    cost = (length + floor) * factor[ends].mean(axis=1) / surface.size
+    rows, columns = np.concatenate([ends, ends[:, ::-1]]).T
+    matrix = csr_matrix((np.tile(cost, 2), (rows, columns)), shape=(n, n))
+    number = csr_matrix((np.tile(np.arange(len(cost)) + 1, 2), (rows, columns)), shape=(n, n))
+    return PathGraph(ends=ends, cost=cost, boundary=boundary, image=image, matrix=matrix, number=number)
+
+
+def _across(positions, tail, head, twin) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (k,2) opposite each other across an edge, and the length (k,) of the straight line between them."""
+    h = np.flatnonzero(twin > np.arange(len(twin)))
+    a, b = positions[tail[h]], positions[head[h]]
+    corners = np.column_stack([head[next_halfedge(h)], head[next_halfedge(twin[h])]])
+    length = np.maximum(np.linalg.norm(b - a, axis=1), 1e-300)
+    axis = (b - a) / length[:, None]
+    offset = [positions[corner] - a for corner in corners.T]
+    along = [(d * axis).sum(axis=1) for d in offset]
+    away = [np.linalg.norm(d - x[:, None] * axis, axis=1) for d, x in zip(offset, along, strict=True)]
+    crossing = along[0] + (along[1] - along[0]) * away[0] / np.maximum(away[0] + away[1], 1e-300)
+    seen = (crossing > 0) & (crossing < length) & (corners[:, 0] != corners[:, 1])
+    return corners[seen], np.hypot(along[1] - along[0], away[0] + away[1])[seen]
