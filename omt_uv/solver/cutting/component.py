@@ -140,7 +140,7 @@ def make_component(
     positions : (n,3) of the surface, in a unit box
     corner_class : (c,) vertices as classes of corners
     avoid : (n,) in [0,1], vertices of the surface to keep free of cuts
-    factor : (p,) on the cost of cutting each pair, see `cuts.cost_factors`
+    factor : (p,) on the cost of cutting each pair, see `gluing_facts.cost_factors`
     """
     corners = gluing.triangles[members]
     _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
@@ -16,12 +17,10 @@ from ..errors import MERGING, TURN_OUTSIDE
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups, orientations, turn_over
 from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluing
-from ..mesh.surface import Surface, chosen_triangles, is_seam, is_sharp
-from ..mesh.topology import pair_keys
+from ..mesh.surface import Surface, chosen_triangles
+from ..progress import Steps, drain, part_of
 from .component import (
     NOISE,
-    SEAM,
-    SHARP,
     CutComponent,
     Topology,
     boundary_vertices,
@@ -32,6 +31,7 @@ from .component import (
 )
 from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import is_long, net
+from .gluing_facts import cost_factors, marked_triangles, total_curvature
 from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes
 from .protrusions import log_scale, spread
@@ -44,8 +44,20 @@ MOST_EXTREMITIES = 8
 BEARABLE = 0.5**2
 # Vertices from which loops through handles are tried.
 ROOT_TRIALS = 4
+# A component with less curvature than this within, in radians and summed without sign, is not searched for seams.
+CURVED = 0.2
 # A net may be so many times as long as another cut, and as long as `developable_nets.is_long` says anyway.
 LONGER = 1.5
+
+
+class SeamFinder(Protocol):
+    """What finds the seams of components, beyond what makes them disks; see `seams.search.SeamSearch`."""
+
+    def wants(self, polygons: np.ndarray, marked: bool) -> bool:
+        """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
+
+    def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
+        """Edges (e,) bool to cut, of a component that is a disk, or a disk once the edges `base` (e,) bool are cut."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +108,7 @@ def cut(
     fill: bool = False,
     sieve: int | None = MANY,
     extremities: int = MOST_EXTREMITIES,
+    search: SeamFinder | None = None,
 ) -> Cuts:
     """Find edges to mark as seams so that every component of the polygons `faces` (f,) bool is a disk; disks stay.
 
@@ -106,6 +119,7 @@ def cut(
     sieve : without `fill`, take holes for filled where a component has more than so many, and take those with many
         handles apart, see `handle_partition.partition_pairs`; None: nowhere
     extremities : tips that a surface is cut open through, at most, where it has no net
+    search : finds the seams of components, disks too, that have no net
 
     Raises
     ------
@@ -113,7 +127,8 @@ def cut(
     """
     faces, triangles, owner = chosen_triangles(surface, faces)
     repaired = repaired_gluing(surface, faces, triangles, owner)
-    return cut_gluing(surface, repaired, avoid=avoid, fill=fill, sieve=sieve, extremities=extremities).cuts
+    options = {"avoid": avoid, "fill": fill, "sieve": sieve, "extremities": extremities, "search": search}
+    return drain(cut_gluing(surface, repaired, **options)).cuts
 
 
 def cut_gluing(
@@ -124,7 +139,8 @@ def cut_gluing(
     fill: bool = False,
     sieve: int | None = None,
     extremities: int = MOST_EXTREMITIES,
-) -> CutSurface:
+    search: SeamFinder | None = None,
+) -> Steps[CutSurface]:
     """A repaired gluing cut into disks; see `cut`."""
     vertex_count = len(surface.positions)
     positions, unit = _in_unit_box(surface, repaired.gluing)
@@ -149,9 +165,8 @@ def cut_gluing(
     keep_free[:vertex_count] = 0
     if avoid is not None:
         keep_free[:vertex_count] = np.clip(np.asarray(avoid, float), 0, 1)
-    gone, report, touching = _cut_components(
-        surface, gluing, one_sided, positions, unit, keep_free, extremities, sieves
-    )
+    cutter = _Cutter(surface, gluing, positions, keep_free, extremities, search)
+    gone, report, touching = yield from cutter.cut(one_sided, unit, sieves)
     edges = np.stack(gluing.ends(gluing.first[gone]), axis=1)
     edges = edges[(edges < vertex_count).all(axis=1)]
     # What could not be oriented can be, now that it is cut.
@@ -198,52 +213,116 @@ def _warnings(parting: int, backwards: int, mirrored: int, holes: int, touching:
         yield f"{touching} boundary vertices lie on one another; {MERGING} joins the parts there"
 
 
-def _cut_components(
-    surface, gluing, one_sided, positions, unit, avoid, extremities, sieves
-) -> tuple[np.ndarray, list[ComponentCut], int]:
-    """Pairs (p,) bool to cut so that every component is a disk, what was done to those that were none, and how many
-    vertices a weld would join.
+@dataclass(frozen=True)
+class _Cutter:
+    """Cuts the components of a gluing, positions (n,3) in a unit box, clear of the vertices `avoid` (n,) in [0,1]."""
 
-    sieves : what has been filled are sieves, which are cut to extremities as closed components are, disks too
-    """
-    component_of = components(gluing)
-    whole = classify(gluing, corner_classes(gluing), component_of, one_sided)
-    gone = turning_lines(gluing, component_of, one_sided)
-    opened = np.bincount(component_of[gluing.first[gone] // 3], minlength=int(component_of.max()) + 1) > 0
-    left = gluing.without(gone)
-    number, line = np.flatnonzero(~gone), np.flatnonzero(gone)
-    a, b = gluing.ends(gluing.first[line])
-    line_length = np.linalg.norm(positions[a] - positions[b], axis=1)
-    line_of = component_of[gluing.first[line] // 3]
-    corner_class = corner_classes(left)
-    topology = classify(left, corner_class, component_of, one_sided & ~opened[component_of])
-    factor = cost_factors(surface, left)
-    members = groups(component_of)
-    order, start = _by_component(component_of[left.first // 3], len(members))
-    report = []
-    # A mesh may hold the same component many times: rivets, teeth, leaves.
-    known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
-    patched = np.zeros(len(members), dtype=bool)
-    patched[component_of[gluing.owner < 0]] = True
-    for k in np.flatnonzero(~whole.is_disk | (patched & sieves)):
-        pairs = order[start[k] : start[k + 1]]
-        component = make_component(left, positions, corner_class, members[k], pairs, avoid, factor)
-        name = fingerprint(component)
-        if name not in known:
-            known[name] = _best_cut(component, topology, k, extremities, bool(patched[k]) and not sieves)
-        chosen, tips = known[name]
-        gone[number[component.gluing_pair[chosen]]] = True
-        report.append(
-            ComponentCut(
-                triangles=len(component.triangles),
-                boundaries=int(whole.boundaries[k]),
-                handles=int(whole.handles[k]),
-                one_sided=bool(whole.one_sided[k]),
-                length=float(component.length[chosen].sum() + line_length[line_of == k].sum()) * unit,
-                extremities=component.vertex_ids[tips],
-            )
-        )
-    return gone, report, coincident_boundary_vertices(surface, gluing, component_of, whole.is_disk)
+    surface: Surface
+    gluing: Gluing
+    positions: np.ndarray
+    avoid: np.ndarray
+    extremities: int
+    search: SeamFinder | None
+
+    def cut(self, one_sided: np.ndarray, unit: float, sieves: bool) -> Steps[tuple[np.ndarray, list, int]]:
+        """Pairs (p,) bool to cut so that every component is a disk, what was done to each that was cut, and how many
+        vertices a weld would join.
+
+        sieves : what has been filled are sieves, which are cut to extremities as closed components are, disks too
+        """
+        component_of = components(self.gluing)
+        whole = classify(self.gluing, corner_classes(self.gluing), component_of, one_sided)
+        gone = turning_lines(self.gluing, component_of, one_sided)
+        lines = _Lines.of(self.gluing, gone, component_of, self.positions)
+        left = self.gluing.without(gone)
+        corner_class = corner_classes(left)
+        topology = classify(left, corner_class, component_of, one_sided & ~lines.opened[component_of])
+        factor = cost_factors(self.surface, left)
+        members = groups(component_of)
+        order, start = _by_component(component_of[left.first // 3], len(members))
+        number = np.flatnonzero(~gone)
+        report = []
+        # A mesh may hold the same component many times: rivets, teeth, leaves.
+        known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
+        patched = np.zeros(len(members), dtype=bool)
+        patched[component_of[self.gluing.owner < 0]] = True
+        wanted = self._wanted(component_of, corner_class, members)
+        chosen_ones = np.flatnonzero(~whole.is_disk | (patched & sieves) | wanted)
+        for count, k in enumerate(chosen_ones):
+            pairs = order[start[k] : start[k + 1]]
+            component = make_component(left, self.positions, corner_class, members[k], pairs, self.avoid, factor)
+            name = (*fingerprint(component), bytes([wanted[k]]))
+            if name not in known:
+                finding = self._best_cut(component, topology, k, bool(patched[k]) and not sieves, bool(wanted[k]))
+                known[name] = yield from part_of(finding, count / len(chosen_ones), 1 / len(chosen_ones))
+            chosen, tips = known[name]
+            gone[number[component.gluing_pair[chosen]]] = True
+            if chosen.any() or not whole.is_disk[k]:
+                report.append(
+                    ComponentCut(
+                        triangles=len(component.triangles),
+                        boundaries=int(whole.boundaries[k]),
+                        handles=int(whole.handles[k]),
+                        one_sided=bool(whole.one_sided[k]),
+                        length=float(component.length[chosen].sum() + lines.length[k]) * unit,
+                        extremities=component.vertex_ids[tips],
+                    )
+                )
+        return gone, report, coincident_boundary_vertices(self.surface, self.gluing, component_of, whole.is_disk)
+
+    def _wanted(self, component_of: np.ndarray, corner_class: np.ndarray, members: list[np.ndarray]) -> np.ndarray:
+        """Components (k,) bool whose seams are to be searched."""
+        wanted = np.zeros(len(members), dtype=bool)
+        if self.search is None:
+            return wanted
+        curved = total_curvature(self.gluing, corner_class, component_of, self.positions) > CURVED
+        marked = np.zeros(len(members), dtype=bool)
+        marked[component_of[marked_triangles(self.surface, self.gluing)]] = True
+        for k in np.flatnonzero(curved):
+            wanted[k] = self.search.wants(self.gluing.owner[members[k]], bool(marked[k]))
+        return wanted
+
+    def _best_cut(
+        self, component: CutComponent, topology: Topology, k: int, filled: bool, wanted: bool
+    ) -> Steps[tuple[np.ndarray, np.ndarray]]:
+        """The net of component k, if it has one that is not much longer than other cuts; else those."""
+        unrolled = net(component) if (self.extremities or wanted) and not filled else None
+        if unrolled is not None and not is_long(component, unrolled[0]):
+            return unrolled
+        if wanted:
+            other = yield from self._searched(component, topology, k)
+        else:
+            other = cut_component(component, topology, k, self.extremities)
+        if unrolled is not None and component.length[unrolled[0]].sum() <= LONGER * component.length[other[0]].sum():
+            return unrolled
+        return other
+
+    def _searched(self, component: CutComponent, topology: Topology, k: int) -> Steps[tuple[np.ndarray, np.ndarray]]:
+        """Seams that were searched, with what has to be cut for a disk; and their tips."""
+        base = np.zeros(len(component.pair), dtype=bool)
+        closed = topology.boundaries[k] == 0 and topology.handles[k] == 0
+        if not (closed or topology.is_disk[k]):
+            base = cut_component(component, topology, k, 0)[0]
+        chosen = base | (yield from self.search(component, base))
+        # A slit of a single edge would not open anything.
+        if closed and chosen.sum() < 2:
+            return cut_component(component, topology, k, self.extremities)
+        return chosen, _tips(component, chosen)
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """Components (k,) bool that are opened along turning lines, and the length (k,) of these."""
+
+    opened: np.ndarray
+    length: np.ndarray
+
+    @staticmethod
+    def of(gluing: Gluing, lines: np.ndarray, component_of: np.ndarray, positions: np.ndarray) -> _Lines:
+        a, b = gluing.ends(gluing.first[lines])
+        component, count = component_of[gluing.first[lines] // 3], int(component_of.max()) + 1
+        length = np.bincount(component, np.linalg.norm(positions[a] - positions[b], axis=1), count)
+        return _Lines(np.bincount(component, minlength=count) > 0, length)
 
 
 def turning_lines(gluing: Gluing, component_of: np.ndarray, one_sided: np.ndarray) -> np.ndarray:
@@ -259,28 +338,10 @@ def turning_lines(gluing: Gluing, component_of: np.ndarray, one_sided: np.ndarra
     return lines & (parts == 1)[pair_component]
 
 
-def _best_cut(
-    component: CutComponent, topology: Topology, k: int, extremities: int, filled: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """The net of the component, if it has one that is not much longer than other cuts; else those."""
-    unrolled = net(component) if extremities and not filled else None
-    if unrolled is not None and not is_long(component, unrolled[0]):
-        return unrolled
-    other = cut_component(component, topology, k, extremities)
-    if unrolled is not None and component.length[unrolled[0]].sum() <= LONGER * component.length[other[0]].sum():
-        return unrolled
-    return other
-
-
-def cost_factors(surface: Surface, gluing: Gluing) -> np.ndarray:
-    """Factor (p,) on the cost of cutting each pair: less where the artist marked a seam or a sharp edge.
-
-    What cannot be oriented is rather cut where its faces look to opposite sides: then none has to be turned over.
-    """
-    key = pair_keys(*gluing.ends(gluing.first))
-    factor = np.where(is_sharp(surface, key) | gluing.parallel(), SHARP, 1.0)
-    factor[is_seam(surface, key)] = SEAM
-    return factor
+def _tips(component: CutComponent, chosen: np.ndarray) -> np.ndarray:
+    """Vertices (t,) inside the component at which edges (e,) bool end."""
+    degree = np.bincount(component.ends[chosen].ravel(), minlength=component.vertex_count)
+    return np.flatnonzero((degree == 1) & ~component.on_boundary())
 
 
 def _turned_warning(count: int) -> str:

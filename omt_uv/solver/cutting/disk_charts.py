@@ -10,7 +10,8 @@ from ..errors import DISSOLVE, ZeroAreaFaceError
 from ..mesh.charts import Chart, charts_of, check_disks, strict_charts
 from ..mesh.repair import charts_without_area, repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
-from .cuts import MOST_EXTREMITIES, Cuts, cut_gluing, sieved
+from ..progress import Steps, drain
+from .cuts import MOST_EXTREMITIES, Cuts, SeamFinder, cut_gluing, sieved
 from .hole_filling import fill_holes as fill_holes_of
 
 SEAMS = ("existing", "auto")
@@ -25,7 +26,12 @@ class DiskCharts:
     warnings: tuple[str, ...]
 
 
-def cut_to_disks(
+def cut_to_disks(surface: Surface, faces: np.ndarray | None = None, **options) -> DiskCharts:
+    """Disk charts of the polygons `faces` (f,) bool, at once; options and errors are those of `disk_charts`."""
+    return drain(disk_charts(surface, faces, **options))
+
+
+def disk_charts(
     surface: Surface,
     faces: np.ndarray | None = None,
     *,
@@ -34,7 +40,8 @@ def cut_to_disks(
     sieve: int | None = None,
     avoid: np.ndarray | None = None,
     extremities: int = MOST_EXTREMITIES,
-) -> DiskCharts:
+    search: SeamFinder | None = None,
+) -> Steps[DiskCharts]:
     """Disk charts of the polygons `faces` (f,) bool, all by default.
 
     Parameters
@@ -47,6 +54,7 @@ def cut_to_disks(
         one that has many handles comes apart, see `handle_partition.partition_pairs`
     avoid : (n,) in [0,1], vertices to keep free of seams
     extremities : tips that a surface is cut open through, at most, where "auto" cuts; 0 for the fastest cuts
+    search : finds the seams of components that "auto" may cut, and that have no net
 
     Raises
     ------
@@ -61,7 +69,8 @@ def cut_to_disks(
     if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     repaired = repaired_gluing(surface, faces, triangles, owner)
-    found = cut_gluing(surface, repaired, avoid=avoid, fill=fill_holes, sieve=sieve, extremities=extremities)
+    options = {"avoid": avoid, "fill": fill_holes, "sieve": sieve, "extremities": extremities, "search": search}
+    found = yield from cut_gluing(surface, repaired, **options)
     charts, flat = _sound(charts_of(found.surface, found.gluing), found.extent)
     warnings = list(found.cuts.warnings)
     if flat:

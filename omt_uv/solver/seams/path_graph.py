@@ -1,4 +1,4 @@
-"""Paths over a coarse surface: along its edges, and across them from corner to corner, as long as they would be flat."""
+"""Paths over a coarse surface: along its edges, and across them from corner to corner, where that is straight."""
 
 from __future__ import annotations
 

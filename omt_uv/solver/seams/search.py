@@ -15,7 +15,7 @@ from ..cutting.component import CutComponent
 from ..mesh.mirror import find_mirror
 from ..progress import Progress, Steps
 from .coarse_surface import CoarseSurface, coarse_surface
-from .cut_tree import Cut, Task, cut_along
+from .cut_tree import Task, cut_along
 from .fine_paths import FineMirror, carried
 from .growth import grow
 from .improvement import improved, rerouted, trimmed
