@@ -98,16 +98,15 @@ def _beside(job: UnwrapJob) -> list[tuple[np.ndarray, np.ndarray]]:
 def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[dict[int, CutCharts]]:
     """Charts of several small surfaces, by the numbers of these, those mapped that can be solved together."""
     small = [k for k, job in enumerate(jobs) if len(job.surface.triangles) <= SMALL and job.subdivision is None]
-    if len(small) < 2 or options.max_shear:
+    if len(small) < 2:
         return {}
     cuts = []
     for k in small:
         yield Progress("Charts", 0.0)
         job = jobs[k]
         try:
-            cuts.append(
-                cut_charts(job.surface, job.faces, options=options, pins=job.pins, target=job.target, avoid=job.avoid)
-            )
+            given = {"pins": job.pins, "target": job.target, "avoid": job.avoid}
+            cuts.append((yield from part_of(cut_charts(job.surface, job.faces, options=options, **given), 0.0, 0.0)))
         except MeshError as error:
             raise Refusal(k, error) from error
     cuts = yield from part_of(map_small_charts(cuts, options), 0.0, 0.0)

@@ -23,7 +23,7 @@ from .symmetry_plane import NEAR, SymmetryPlane, symmetry_plane
 
 # Bounds of the product of all factors.
 LEAST = 0.2
-MOST = 5.0
+MOST = 6.0
 # Occlusion where an edge begins to be hidden, and where it is.
 HIDDEN = (0.05, 0.5)
 # Occlusion where an edge is not to be seen from the front any more, and where nothing of it is.
@@ -64,7 +64,7 @@ class SeamPreferences:
     sharp: float = 0.6
     underside: float = 0.75
     back: float = 0.75
-    front: float = 4.0
+    front: float = 6.0
     salient: float = 2.0
     mirror: float = 0.7
     loops: float = 0.85

@@ -2,11 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from ..analysis.seam_costs import SeamPreferences
 from ..cutting.disk_charts import SEAMS
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.refine import BOUNDARIES
+
+# Mean shear above which a checker is seen to be sheared: a default that artists need not change.
+MAX_SHEAR = 1.35
+
+
+@dataclass(frozen=True)
+class ShearBound:
+    """A bound of the mean shear s1/s2 of charts, > 1; further: of those whose seams were marked by hand, too;
+    preferences: where the cuts for it had better be.
+
+    With balance the areas are not exact: the shear then stands for that of the map with exact areas that has the same
+    symmetric Dirichlet energy (r + 1/r) (q + 1/q), from the area ratio r and the shear q.
+    """
+
+    bound: float
+    further: bool = False
+    preferences: SeamPreferences = field(default_factory=SeamPreferences)
+
+    def __post_init__(self):
+        if not self.bound > 1:
+            raise ValueError(f"no map shears less than 1; the bound must be greater, not {self.bound}")
 
 
 @dataclass(frozen=True)
@@ -44,7 +66,10 @@ class UnwrapOptions(MapOptions):
     seams : "auto" repairs and cuts, for the map only; "existing" splits along the seams of the surface alone and
         refuses what is no disk
     fill_holes : fill all boundaries of a component but the longest, for the map only, instead of cutting to them
-    max_shear : charts are slit until their mean shear s1/s2 is at most this, > 1; 0 for no slits
+    max_shear : with "auto", and a free boundary, seams are added until the mean shear s1/s2 of charts is at most this,
+        > 1; 0 for none that no disk needs. Parts whose seams were marked by hand are left as they are
+    cut_further : parts whose seams were marked by hand get more of them, too
+    preferences : where these seams had better be
 
     Raises
     ------
@@ -53,13 +78,21 @@ class UnwrapOptions(MapOptions):
 
     seams: str = "auto"
     fill_holes: bool = False
-    max_shear: float = 0.0
+    max_shear: float = MAX_SHEAR
+    cut_further: bool = False
+    preferences: SeamPreferences = field(default_factory=SeamPreferences)
 
     def __post_init__(self):
         super().__post_init__()
         _check("seams", self.seams, SEAMS)
         if self.max_shear and not self.max_shear > 1:
             raise ValueError(f"no map shears less than 1; the bound must be greater, not {self.max_shear}")
+
+    def shear_bound(self) -> ShearBound | None:
+        """The bound of the shear that seams are searched for; None where none are."""
+        if not self.max_shear or self.seams != "auto" or self.boundary != "free":
+            return None
+        return ShearBound(self.max_shear, self.cut_further, self.preferences)
 
 
 def _check(name: str, value: str, allowed) -> None:

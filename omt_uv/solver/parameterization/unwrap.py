@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..analysis.density import Target
-from ..cutting.disk_charts import DiskCharts, cut_to_disks
+from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError
 from ..mesh.charts import Chart
@@ -21,8 +21,12 @@ from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons
 from .mirrored_charts import as_given, mirror_partners, mirrored_map, with_mirrored_quads
 from .options import UnwrapOptions
-from .shear_bound import bound_shear
+from .shear_bound import ShearSearch, bound_shear
 from .small_charts import is_small, map_together
+
+# Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps.
+CUTTING = 0.15
+MAPPING = 0.7
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,8 @@ class SurfaceMap:
 class CutCharts:
     """A surface cut into charts that are to be mapped, for `unwrap`; maps (by number) are there already.
 
-    joined : the charts with the quads of mirror images cut alike; pairs : see `mirrored_charts.mirror_partners`
+    joined : the charts with the quads of mirror images cut alike; pairs : see `mirrored_charts.mirror_partners`; search : that found
+    the seams for a bound of the shear, if there is one
     """
 
     prepared: DiskCharts
@@ -62,6 +67,7 @@ class CutCharts:
     joined: list[Chart]
     pairs: dict[int, tuple[int, np.ndarray]]
     maps: dict[int, ChartMap]
+    search: ShearSearch | None = None
 
     @property
     def alike(self) -> list[int]:
@@ -93,29 +99,22 @@ def unwrap(
     MeshError : see `disk_charts.cut_to_disks` and `chart_map.map_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
-    options = options or UnwrapOptions()
-    task = _Task(surface, options, pins, target)
-    if options.max_shear:
-        avoid = clear_of_pins(surface, pins, avoid)
-        found = yield from bound_shear(
-            surface,
-            faces,
-            task.map_one,
-            options.max_shear,
-            seams=options.seams,
-            fill_holes=options.fill_holes,
-            avoid=avoid,
-        )
-        charts, maps, cuts, warnings = found.prepared.charts, found.maps, found.cuts, found.warnings
-        chart_pins = [pins_of_chart(pins, chart) for chart in charts]
-    else:
-        if cut is None:
-            cut = cut_charts(surface, faces, options=options, pins=pins, target=target, avoid=avoid)
-        charts, warnings, chart_pins = cut.prepared.charts, cut.prepared.warnings, cut.pins
-        maps = yield from task.map_symmetric(cut)
-        cuts = np.zeros((0, 2), np.int64) if cut.prepared.cuts is None else cut.prepared.cuts.edges
-    maps = with_convex_polygons(surface, charts, maps, chart_pins, options, target)
-    return SurfaceMap(charts, maps, cuts, warnings)
+    task = _Task(surface, options or UnwrapOptions(), pins, target)
+    begin = 0.0
+    if cut is None:
+        begin = CUTTING
+        cutting = cut_charts(surface, faces, options=task.options, pins=pins, target=target, avoid=avoid)
+        cut = yield from part_of(cutting, 0.0, begin)
+    prepared, width = cut.prepared, (1 - begin) * (1 if cut.search is None else MAPPING)
+    maps = yield from part_of(task.map_symmetric(cut), begin, width)
+    if cut.search is not None:
+        further = bound_shear(cut.search, prepared, maps, task.map_charts)
+        found = yield from part_of(further, begin + width, 1 - begin - width)
+        prepared, maps = found.prepared, found.maps
+    charts, chart_pins = prepared.charts, [pins_of_chart(pins, chart) for chart in prepared.charts]
+    maps = with_convex_polygons(surface, charts, maps, chart_pins, task.options, target)
+    cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
+    return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
 
 def cut_charts(
@@ -126,7 +125,7 @@ def cut_charts(
     pins: CornerPins | None = None,
     target: Target | None = None,
     avoid: np.ndarray | None = None,
-) -> CutCharts:
+) -> Steps[CutCharts]:
     """The charts of a surface, none of them mapped; see `unwrap`.
 
     Raises
@@ -134,7 +133,15 @@ def cut_charts(
     MeshError : see `disk_charts.cut_to_disks`
     """
     avoid = clear_of_pins(surface, pins, avoid)
-    prepared = cut_to_disks(surface, faces, seams=options.seams, fill_holes=options.fill_holes, sieve=MANY, avoid=avoid)
+    bound = options.shear_bound()
+    given = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}
+    search = None if bound is None else ShearSearch(surface, faces, bound, target, given)
+    finder = None if search is None else search.first()
+    prepared = yield from disk_charts(surface, faces, seams=options.seams, search=finder, **given)
+    return replace(_to_be_mapped(surface, prepared, pins, target), search=search)
+
+
+def _to_be_mapped(surface: Surface, prepared: DiskCharts, pins: CornerPins | None, target: Target | None) -> CutCharts:
     charts = prepared.charts
     chart_pins = [pins_of_chart(pins, chart) for chart in charts]
     free = all(p is None for p in chart_pins)
@@ -175,6 +182,12 @@ class _Task:
         except MeshError as error:
             raise located(error, chart) from error
 
+    def map_charts(self, charts: list[Chart]) -> Steps[list[ChartMap]]:
+        """Maps of charts by themselves."""
+        if not charts:
+            return []
+        return (yield from self.map_symmetric(_to_be_mapped(self.surface, _only(charts), self.pins, self.target)))
+
     def map_symmetric(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, symmetric ones also where their mirror images are cut along other diagonals."""
         charts = cut.prepared.charts
@@ -211,3 +224,7 @@ class _Task:
                 done += share
             maps.append(chart_map)
         return maps
+
+
+def _only(charts: list[Chart]) -> DiskCharts:
+    return DiskCharts(charts, None, ())

@@ -18,11 +18,13 @@ EXCHANGE = 0.3
 
 @dataclass(frozen=True)
 class Task:
-    """Where to cut: the steps, the log scale, and the spread of it that is to be reached."""
+    """Where to cut: the steps, the log scale, the spread of it that is to be reached, and the factor (n,) on what cuts
+    are worth that end at a vertex."""
 
     graph: PathGraph
     model: ScaleModel
     bound: float
+    tip_factor: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,9 @@ def _by_stretch(graph: PathGraph, steps: np.ndarray) -> tuple[list[np.ndarray], 
     ends = graph.ends[steps]
     degree = np.bincount(ends.ravel(), minlength=n)
     node = (degree != 2) | graph.boundary
+    # Where a path leaves the mirror plane, its mirror image branches off.
+    leaving = graph.in_plane[ends[:, 0]] != graph.in_plane[ends[:, 1]]
+    node[ends[leaving][graph.in_plane[ends[leaving]]]] = True
     # Steps are joined through vertices that are no nodes; each has a place of its own for its ends at nodes.
     place = np.where(node[ends], n + np.arange(2 * k).reshape(k, 2), ends)
     label = graph_components(*place.T, n + 2 * k)[1][place[:, 0]]

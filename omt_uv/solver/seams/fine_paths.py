@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from ..cutting.component import CutComponent
-from ..mesh.topology import halfedges, pair_keys
+from ..mesh.topology import graph_components, halfedges, pair_keys
 from .coarse_surface import CoarseSurface
 from .cut_tree import stretches
 from .path_graph import PathGraph
@@ -22,10 +22,12 @@ ASTRAY = 0.5
 
 @dataclass(frozen=True)
 class FineMirror:
-    """The mirror image (n,) of every vertex of a component, and which are on the one side or in the plane, (n,)."""
+    """The mirror image (n,) of every vertex of a component, and which are on the one side, (n,) bool, and in the plane
+    or within an edge of it, where no vertices are quite in it."""
 
     image: np.ndarray
     side: np.ndarray
+    plane: np.ndarray
 
 
 def carried(
@@ -43,20 +45,48 @@ def carried(
     fine = _FineGraph.of(component)
     used = start.copy()
     spacing = coarse.size * float(np.median(graph.cost)) if len(graph.cost) else 0.0
-    allowed = np.ones(component.vertex_count, dtype=bool) if mirror is None else mirror.side
     paths = []
     for stretch, end in _outwards(graph, steps):
         along = coarse.kept[np.unique(graph.ends[stretch])]
+        in_plane = bool(graph.in_plane[graph.ends[stretch]].all())
+        allowed = np.ones(component.vertex_count, dtype=bool)
+        if mirror is not None:
+            # Off the plane nothing comes back to it: that would, with its mirror image, close a loop.
+            allowed = mirror.plane | used if in_plane else (mirror.side & ~mirror.plane) | used
         path = fine.path(used, int(coarse.kept[end]), along, spacing, allowed)
         used[path] = True
         paths.append(path)
-    if mirror is not None:
-        paths += [mirror.image[path] for path in paths]
+        if mirror is not None and not in_plane and len(path):
+            image = mirror.image[path]
+            # Where the mesh is not quite its own image, the image is led along its own edges.
+            if not (fine.joined(image) and used[image[-1]]):
+                allowed = ~(mirror.side | mirror.plane) | used
+                image = fine.path(used, int(image[0]), image, spacing / 2, allowed)
+            used[image] = True
+            paths.append(image)
     chosen = np.zeros(len(component.pair), dtype=bool)
     if paths:
         keys = pair_keys(np.concatenate([p[:-1] for p in paths]), np.concatenate([p[1:] for p in paths]))
         chosen = np.isin(pair_keys(*component.ends.T), keys)
-    return chosen
+    return _forest(component, chosen, start)
+
+
+def _forest(component: CutComponent, chosen: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Of the edges (e,) bool, those of a forest that hangs on the vertices `start` (n,) bool: a disk stays a disk."""
+    edges = np.flatnonzero(chosen)
+    # All of `start` is one vertex, number 0.
+    number = np.where(start, 0, 1 + np.arange(len(start)))
+    a, b = np.sort(number[component.ends[edges]], axis=1).T
+    order = np.lexsort((component.cost[edges], b, a))
+    first = order[np.unique(np.stack([a, b], axis=1)[order], axis=0, return_index=True)[1]]
+    first = first[a[first] != b[first]]
+    n = len(start) + 1
+    tree = minimum_spanning_tree(csr_matrix((1.0 + np.arange(len(first)), (a[first], b[first])), shape=(n, n)))
+    kept = first[tree.data.astype(np.int64) - 1]
+    label = graph_components(a[kept], b[kept], n)[1]
+    forest = np.zeros(len(chosen), dtype=bool)
+    forest[edges[kept[label[a[kept]] == label[0]]]] = True
+    return forest
 
 
 def _outwards(graph: PathGraph, steps: np.ndarray) -> list[tuple[np.ndarray, int]]:
@@ -97,6 +127,11 @@ class _FineGraph:
             csr_matrix((np.tile(cost, 2), (rows, columns)), shape=shape),
             csr_matrix((np.tile(length, 2), (rows, columns)), shape=shape),
         )
+
+    def joined(self, path: np.ndarray) -> bool:
+        """Whether there is an edge between all vertices (k,) that follow each other, or they are one."""
+        a, b = path[:-1], path[1:]
+        return bool((np.asarray(self.cost[a, b]).ravel() > 0)[a != b].all()) if len(a) else True
 
     def path(self, start: np.ndarray, end: int, along: np.ndarray, spacing: float, allowed: np.ndarray) -> np.ndarray:
         """Vertices (k,) of the cheapest path from `end` to any of `start` (n,) bool, near the vertices `along` (a,).

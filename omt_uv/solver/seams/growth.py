@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .cut_tree import Cut, Task, cut_along
-from .path_graph import PathGraph
 from .predicted_scale import ScaleModel
 
 # Extremities that paths are tried to.
 MOST_TIPS = 12
+# An arc as long as a side of a square of the same area is to lower the spread by this share of the bound, at least.
+LEAST_WORTH = 0.1
 # Shares of the way to an extremity at which a path may end.
 STOPS = (1.0, 0.8, 0.6)
 
@@ -31,8 +32,8 @@ def grow(task: Task, cut: Cut, most: int) -> Cut:
         if cut.spread <= task.bound:
             break
         model = task.model.cut(cut.vertices) if model is None else model
-        arc = _best_arc(task.graph, cut, model)
-        if arc is None:
+        arc = _best_arc(task, cut, model)
+        if arc is None or (arc.worth < LEAST_WORTH * task.bound and len(cut.steps)):
             break
         grown = cut_along(task, np.concatenate([cut.steps, task.graph.steps_of(arc.path)]))
         model = model.cut(np.setdiff1d(grown.vertices, cut.vertices))
@@ -40,11 +41,12 @@ def grow(task: Task, cut: Cut, most: int) -> Cut:
     return cut
 
 
-def _best_arc(graph: PathGraph, cut: Cut, model: ScaleModel) -> _Arc | None:
+def _best_arc(task: Task, cut: Cut, model: ScaleModel) -> _Arc | None:
+    graph = task.graph
     start = np.union1d(np.flatnonzero(graph.boundary), cut.vertices)
     cost, before = graph.paths_from(start)
     best = None
-    for tip in _tips(graph, model, cost):
+    for tip in _tips(task, model, cost):
         path = path_to(before, int(tip))
         reach = cost[path]
         for stop in STOPS:
@@ -53,20 +55,21 @@ def _best_arc(graph: PathGraph, cut: Cut, model: ScaleModel) -> _Arc | None:
             new = np.union1d(part[:-1], graph.image[part[:-1]])
             if len(new) == 0:
                 continue
-            worth = (cut.spread - model.spread(model.scale_cut(new))) / cost[part[0]]
+            fall = cut.spread - model.spread(model.scale_cut(new))
+            worth = task.tip_factor[part[0]] * fall / cost[part[0]]
             if worth > 0 and (best is None or worth > best.worth):
                 best = _Arc(part, worth)
     return best
 
 
-def _tips(graph: PathGraph, model: ScaleModel, cost: np.ndarray) -> np.ndarray:
+def _tips(task: Task, model: ScaleModel, cost: np.ndarray) -> np.ndarray:
     """Extremities (k,): peaks of the log scale that can be reached, those of most gain for their cost."""
-    height = np.abs(model.scale)
+    graph, height = task.graph, np.abs(model.scale)
     around = np.zeros(len(height))
     np.maximum.at(around, graph.ends[:, 0], height[graph.ends[:, 1]])
     np.maximum.at(around, graph.ends[:, 1], height[graph.ends[:, 0]])
     peaks = np.flatnonzero((height >= around) & (height > 0) & np.isfinite(cost) & (cost > 0))
-    worth = model.gain(peaks) / cost[peaks]
+    worth = model.gain(peaks) * task.tip_factor[peaks] / cost[peaks]
     return peaks[np.argsort(-worth, kind="stable")[:MOST_TIPS]]
 
 

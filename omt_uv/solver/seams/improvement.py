@@ -76,7 +76,7 @@ def rerouted(task: Task, cut: Cut) -> Cut:
         if path is None:
             continue
         other = cut_along(task, np.concatenate([rest, task.graph.steps_of(path)]))
-        if other.score(task.bound) < cut.score(task.bound) * (1 - BETTER):
+        if other.score(task.bound) < cut.score(task.bound) * (1 - BETTER) and task.graph.is_open(other.steps):
             cut = other
     return cut
 

@@ -16,14 +16,12 @@ class SearchOptions:
 
     Attributes
     ----------
-    spread : mean square over the surface of the predicted log scale that is to be reached
     vertices : of the coarse surface
     arcs : that are added at most
     rounds : of taking arcs back and growing others; 0 for none
     symmetric : seams of a surface that is its own mirror image are their own, too
     """
 
-    spread: float
     vertices: int = COARSE_VERTICES
     arcs: int = MOST_ARCS
     rounds: int = 8

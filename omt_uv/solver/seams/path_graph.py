@@ -22,6 +22,8 @@ class PathGraph:
     boundary (n,) bool : vertices where cuts may begin for nothing
     image (n,) : vertex that is cut together with each, its mirror image; itself where there is no mirror
     matrix (n,n) : cost; number (n,n) : of the step, from 1
+    in_plane (n,) bool : vertices in the mirror plane. A path may leave the plane but never come back to it, since it
+        would, with its mirror image, close a loop: `matrix` has no such steps
     """
 
     ends: np.ndarray
@@ -30,11 +32,23 @@ class PathGraph:
     image: np.ndarray
     matrix: csr_matrix
     number: csr_matrix
+    in_plane: np.ndarray
 
     def paths_from(self, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Cost (n,) of the cheapest path from the vertices `start` (k,), and the vertex before (n,), < 0 for none."""
         cost, before, _ = dijkstra(self.matrix, indices=start, min_only=True, return_predecessors=True)
         return cost, before
+
+    def is_open(self, steps: np.ndarray) -> bool:
+        """Whether steps (k,) from the boundary outwards never come back to the mirror plane."""
+        if not self.in_plane.any():
+            return True
+        n = len(self.boundary)
+        tree = csr_matrix((self.cost[steps], self.ends[steps].T), shape=(n, n))
+        depth = dijkstra(tree, directed=False, indices=np.flatnonzero(self.boundary), min_only=True)
+        ends = self.ends[steps]
+        first, last = np.take_along_axis(ends, np.argsort(depth[ends], axis=1), axis=1).T
+        return not (~self.in_plane[first] & self.in_plane[last]).any()
 
     def steps_of(self, path: np.ndarray) -> np.ndarray:
         """Steps (k,) between the vertices (k+1,) of a path."""
@@ -83,10 +97,14 @@ def path_graph(
     # A step without length still costs something: sparse graphs take a zero for no step.
     floor = 1e-9 * max(float(length.mean()), 1e-30)
     cost = (length + floor) * factor[ends].mean(axis=1) / surface.size
-    rows, columns = np.concatenate([ends, ends[:, ::-1]]).T
-    matrix = csr_matrix((np.tile(cost, 2), (rows, columns)), shape=(n, n))
+    (rows, columns), both = np.concatenate([ends, ends[:, ::-1]]).T, np.tile(cost, 2)
     number = csr_matrix((np.tile(np.arange(len(cost)) + 1, 2), (rows, columns)), shape=(n, n))
-    return PathGraph(ends=ends, cost=cost, boundary=boundary, image=image, matrix=matrix, number=number)
+    in_plane = np.zeros(n, dtype=bool) if mirrored is None else image == np.arange(n)
+    onwards = in_plane[rows] | ~in_plane[columns]
+    matrix = csr_matrix((both[onwards], (rows[onwards], columns[onwards])), shape=(n, n))
+    return PathGraph(
+        ends=ends, cost=cost, boundary=boundary, image=image, matrix=matrix, number=number, in_plane=in_plane
+    )
 
 
 def _across(positions, tail, head, twin) -> tuple[np.ndarray, np.ndarray]:

@@ -6,46 +6,99 @@ and grown anew (`improvement`), and only then led along edges (`fine_paths`). No
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
+from ..analysis.seam_costs import SeamCosts
 from ..cutting.component import CutComponent
-from ..mesh.mirror import find_mirror
+from ..mesh.surface import Surface
 from ..progress import Progress, Steps
 from .coarse_surface import CoarseSurface, coarse_surface
-from .cut_tree import Task, cut_along
+from .cut_tree import Cut, Task, cut_along
 from .fine_paths import FineMirror, carried
 from .growth import grow
 from .improvement import improved, rerouted, trimmed
 from .options import SearchOptions
-from .path_graph import Mirrored, path_graph
+from .path_graph import Mirrored, PathGraph, path_graph
 from .predicted_scale import ScaleModel
 
-# Vertices are on a side of a mirror plane if they are farther from it than this share of the extent.
-IN_PLANE = 1e-4
+# Share of the vertices that have an image in a component with a mirror plane.
+MIRRORED_SHARE = 0.97
+# Distance of a vertex from where its image belongs, or from the plane, over the extent.
+EXACT = 1e-4
+# A vertex is in a face if it is so with more than this certainty, and cuts that end there are worth so much less.
+IN_FACE = 0.5
+BARRED = 1e-3
 # Where the time of a search goes, roughly: growth ends at this share of it.
 GROWN = 0.5
 
 
 @dataclass(frozen=True)
 class SeamSearch:
-    """A search for seams, to be called with each component; yields progress and returns edges (e,) bool to cut."""
+    """A search for seams, to be called with each component; yields progress and returns edges (e,) bool to cut.
 
-    options: SearchOptions
+    Attributes
+    ----------
+    spread (f,) : mean square of the log scale to be reached, of every polygon, infinite where nothing is searched; if
+        relative, a share of that of the component
+    surface : whose components they are
+    costs : gives what cutting its edges costs, when that is known to be needed
+    density (f,) : area that polygons ask for, over their own; None for 1
+    further : components whose seams were marked by hand are searched, too
+    options : see `SearchOptions`
+    """
+
+    spread: np.ndarray
+    surface: Surface
+    costs: Callable[[], SeamCosts]
+    relative: bool = False
+    density: np.ndarray | None = None
+    further: bool = False
+    options: SearchOptions = field(default_factory=SearchOptions)
+
+    def wants(self, polygons: np.ndarray, marked: bool) -> bool:
+        """Whether a component of these polygons (m,) is searched, some of whose boundary is marked as a seam or not."""
+        polygons = polygons[polygons >= 0]
+        return (self.further or not marked) and bool(np.isfinite(self.spread[polygons]).any())
 
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
         """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut."""
         yield Progress("Seams", 0.0)
-        mirror = _mirror(component) if self.options.symmetric and not base.any() else None
+        component = self._with_costs(component)
+        mirror = None if base.any() else self._mirror(component)
         coarse = coarse_surface(
             component.positions,
             component.triangles,
             self.options.vertices,
-            None if mirror is None else mirror.image == np.arange(component.vertex_count),
+            None if mirror is None else mirror.plane,
         )
-        task = _task(component, coarse, base, mirror, self.options.spread)
+        log_density, tips = self._log_density(component, coarse), self._tip_factor(component)
+        setting = _Setting.of(component, coarse, base, mirror, log_density, tips)
+        bound = float(self.spread[component.polygons[component.polygons >= 0]].min())
+        if self.relative:
+            bound *= setting.model.spread(setting.model.scale)
+        task = setting.task(bound, setting.extremity())
+        cut = yield from self._grown(task)
+        if setting.is_closed:
+            task = setting.task(bound, _hub(task.graph, cut.steps))
+            cut = cut_along(task, cut.steps)
+        cut = trimmed(task, rerouted(task, cut))
+        for k, better in enumerate(improved(task, cut, self.options.rounds)):
+            cut = better
+            yield Progress("Seams", GROWN + (0.9 - GROWN) * (k + 1) / self.options.rounds)
+        start = component.on_boundary()
+        start[component.ends[base].ravel()] = True
+        if setting.is_closed:
+            start[coarse.kept[task.graph.boundary]] = True
+        return carried(component, coarse, task.graph, cut.steps, start, mirror)
+
+    def _grown(self, task: Task) -> Steps[Cut]:
+        """The cut of arcs that pay most, one after another."""
         cut = cut_along(task, np.zeros(0, np.int64))
         begin = max(cut.spread, task.bound)
         for count in range(self.options.arcs):
@@ -55,54 +108,119 @@ class SeamSearch:
             cut = grown
             done = np.log(begin / cut.spread) / max(np.log(begin / task.bound), 1e-9)
             yield Progress(f"Seams, cut {count + 1}", GROWN * min(max(done, 0.0), 1.0))
-        cut = trimmed(task, rerouted(task, cut))
-        for k, better in enumerate(improved(task, cut, self.options.rounds)):
-            cut = better
-            yield Progress("Seams", GROWN + (0.9 - GROWN) * (k + 1) / self.options.rounds)
-        start = component.on_boundary()
-        start[component.ends[base].ravel()] = True
-        start[coarse.kept[task.graph.boundary & ~coarse.boundary]] |= not base.any()
-        return carried(component, coarse, task.graph, cut.steps, start, mirror)
+        return cut
+
+    def _with_costs(self, component: CutComponent) -> CutComponent:
+        """The component with the costs of where an artist would cut; what fills holes costs as before."""
+        known = len(self.surface.positions)
+        ends = component.vertex_ids[component.ends]
+        real = (ends < known).all(axis=1)
+        cost = component.cost.copy()
+        cost[real] *= self.costs().of(*ends[real].T)
+        return replace(component, cost=cost)
+
+    def _mirror(self, component: CutComponent) -> FineMirror | None:
+        """The mirror image of the component in itself, if its vertices have one, and some are in the plane."""
+        plane = self.costs().plane
+        real = component.vertex_ids < len(self.surface.positions)
+        if plane is None or not self.options.symmetric:
+            return None
+        points, own = component.positions, self.surface.positions[component.vertex_ids[real]]
+        scale = np.ptp(points, axis=0).max() / max(np.ptp(own, axis=0).max(), 1e-300)
+        height = points @ plane.normal
+        height = height - np.mean(height[real] - scale * (own @ plane.normal - plane.offset))
+        distance, image = cKDTree(points).query(points - 2 * height[:, None] * plane.normal)
+        in_plane = (image == np.arange(len(image))) & (np.abs(height) <= EXACT)
+        if np.mean(distance <= EXACT) < MIRRORED_SHARE or not in_plane.any():
+            return None
+        return FineMirror(image, height >= 0, in_plane)
+
+    def _tip_factor(self, component: CutComponent) -> np.ndarray:
+        """Factor (n,) on what cuts are worth that end at a vertex: hardly anything on a face."""
+        face = np.zeros(component.vertex_count)
+        real = component.vertex_ids < len(self.surface.positions)
+        face[real] = self.costs().face[component.vertex_ids[real]]
+        return component.tip_factor() * np.where(face > IN_FACE, BARRED, 1.0)
+
+    def _log_density(self, component: CutComponent, coarse: CoarseSurface) -> np.ndarray | None:
+        """Half the logarithm of the density at the vertices (c,) of the coarse surface."""
+        if self.density is None:
+            return None
+        real = component.polygons >= 0
+        value = np.repeat(0.5 * np.log(self.density[component.polygons[real]]), 3)
+        vertices, n = component.triangles[real].ravel(), component.vertex_count
+        total = np.bincount(vertices, value, n) / np.maximum(np.bincount(vertices, minlength=n), 1)
+        return (total - total.mean())[coarse.kept]
 
 
-def _mirror(component: CutComponent) -> FineMirror | None:
-    """The mirror image of the component in itself, if it has one and there are vertices in the plane."""
-    found = find_mirror(component.positions, component.triangles, component.polygons)
-    if found is None or (component.avoid != component.avoid[found.image]).any():
-        return None
-    height = component.positions @ found.normal
-    height = height - (height + height[found.image]).mean() / 2
-    return FineMirror(found.image, height >= -IN_PLANE) if (found.image == np.arange(len(height))).any() else None
+@dataclass(frozen=True)
+class _Setting:
+    """A coarse surface to be cut, from the vertices `start` (n,) bool on: its boundary, or what is cut already."""
+
+    coarse: CoarseSurface
+    model: ScaleModel
+    factor: np.ndarray
+    tip_factor: np.ndarray
+    start: np.ndarray
+    mirrored: Mirrored | None
+
+    @staticmethod
+    def of(component: CutComponent, coarse: CoarseSurface, base, mirror, log_density, tip_factor) -> _Setting:
+        tree = cKDTree(coarse.positions)
+        mirrored = None
+        if mirror is not None:
+            image = tree.query(component.positions[mirror.image[coarse.kept]])[1]
+            plane = mirror.plane[coarse.kept]
+            image[plane] = np.flatnonzero(plane)
+            # Nothing else is its own image, or a path there would count once and have none.
+            other = ~plane & (image == np.arange(len(image)))
+            mirrored = Mirrored(image, (mirror.side[coarse.kept] & ~other) | plane)
+        start = coarse.boundary.copy()
+        if base.any():
+            start[tree.query(component.positions[np.unique(component.ends[base])])[1]] = True
+        return _Setting(
+            coarse=coarse,
+            model=ScaleModel.of(coarse, log_density),
+            factor=_cost_factor(component)[coarse.kept],
+            tip_factor=tip_factor[coarse.kept],
+            start=start,
+            mirrored=mirrored,
+        )
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether there is nowhere for cuts to begin, so that they need a root."""
+        return not self.start.any()
+
+    def extremity(self) -> int:
+        """The vertex at which a closed surface is opened: a sharp one, in the mirror plane if there is one."""
+        scale = self.model.green @ (self.coarse.curvature - self.coarse.curvature.sum() * self.coarse.area)
+        worth = np.abs(scale) * self.tip_factor / self.factor
+        if self.mirrored is not None:
+            worth[self.mirrored.image != np.arange(len(worth))] = -1
+        return int(np.argmax(worth))
+
+    def task(self, bound: float, root: int) -> Task:
+        """The search for a spread within a bound; root: where cuts of a closed surface begin."""
+        start = self.start.copy()
+        if self.is_closed:
+            start[root] = True
+        more = np.flatnonzero(start & ~self.coarse.boundary)
+        graph = path_graph(self.coarse, self.factor, start, self.mirrored)
+        return Task(graph, self.model.cut(more), bound, self.tip_factor)
 
 
-def _task(
-    component: CutComponent, coarse: CoarseSurface, base: np.ndarray, mirror: FineMirror | None, bound: float
-) -> Task:
-    """The search on the coarse surface: cuts begin at its boundary, at the edges `base`, or at the root of a sphere."""
-    n = len(coarse.kept)
-    tree = cKDTree(coarse.positions)
-    mirrored, image = None, np.arange(n)
-    if mirror is not None:
-        image = tree.query(component.positions[mirror.image[coarse.kept]])[1]
-        mirrored = Mirrored(image, mirror.side[coarse.kept])
-    model = ScaleModel.of(coarse)
-    factor = _cost_factor(component)[coarse.kept]
-    start = coarse.boundary.copy()
-    if base.any():
-        start[tree.query(component.positions[np.unique(component.ends[base])])[1]] = True
-    elif not start.any():
-        start[_root(component, coarse, model, image, mirrored)] = True
-    more = np.flatnonzero(start & ~coarse.boundary)
-    return Task(path_graph(coarse, factor, start, mirrored), model.cut(more), bound)
-
-
-def _root(component: CutComponent, coarse: CoarseSurface, model: ScaleModel, image, mirrored) -> int:
-    """The vertex at which a closed surface is opened: its sharpest extremity, in the mirror plane if there is one."""
-    scale = model.green @ (coarse.curvature - coarse.curvature.sum() * coarse.area)
-    worth = np.abs(scale) * component.tip_factor()[coarse.kept] / _cost_factor(component)[coarse.kept]
-    if mirrored is not None:
-        worth[image != np.arange(len(image))] = -1
-    return int(np.argmax(worth))
+def _hub(graph: PathGraph, steps: np.ndarray) -> int:
+    """The vertex of a cut where most of it meets, and of those in its middle: a root that is no tip."""
+    vertices, degree = np.unique(graph.ends[steps], return_counts=True)
+    if len(vertices) == 0:
+        return int(np.flatnonzero(graph.boundary)[0])
+    n = len(graph.boundary)
+    tree = csr_matrix((graph.cost[steps], graph.ends[steps].T), shape=(n, n))
+    reach = dijkstra(tree, directed=False, indices=vertices)[:, vertices].max(axis=1)
+    if graph.in_plane.any():
+        degree = np.where(graph.in_plane[vertices], degree, 0)
+    return int(vertices[np.lexsort((reach, -degree))[0]])
 
 
 def _cost_factor(component: CutComponent) -> np.ndarray:
