@@ -36,6 +36,8 @@ REMEDIES: dict[type[errors.MeshError], str] = {
 ADVICE: dict[str, str] = {
     errors.MERGE: "use Merge by Distance",
     errors.MERGING: "Merge by Distance",
+    errors.CUT_FURTHER: "turn on Cut Further, or raise Max Shear",
+    errors.MORE_SEAMS: "no seams were found that would pay; mark some yourself, or raise Max Shear",
     errors.DISSOLVE: "use Mesh > Clean Up > Degenerate Dissolve",
     errors.TURN_OUTSIDE: "Use Mesh > Normals > Recalculate Outside",
 }

@@ -32,10 +32,11 @@ ARROWS: dict[str, str] = {
     "solver.packing": "solver solver.mesh",
     "solver.transport": "solver solver.mesh solver.linalg",
     "solver.cutting": "solver solver.mesh solver.linalg solver.analysis",
+    "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.cutting",
     "solver.conformal": "solver solver.mesh solver.linalg solver.maps",
     "solver.refinement": "solver solver.mesh solver.linalg solver.analysis solver.maps",
     "solver.parameterization": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.transport "
-    "solver.cutting solver.conformal solver.refinement",
+    "solver.cutting solver.seams solver.conformal solver.refinement",
     "solver.editing": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement",
     "solver.sphere": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal solver.refinement",
     "solver.globe": "solver solver.mesh solver.linalg solver.sphere",

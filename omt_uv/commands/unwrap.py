@@ -8,6 +8,7 @@ from ..settings import (
     BOUNDARIES,
     DEFAULT_BOUNDARY,
     DEFAULT_MARGIN,
+    DEFAULT_MAX_SHEAR,
     DEFAULT_SEAMS,
     DEFAULT_TEXTURE_SIZE,
     FIRST_TILE,
@@ -41,8 +42,14 @@ def add(commands) -> None:
     command.add_argument("--seams", choices=names(SEAMS), default=DEFAULT_SEAMS.lower(), help="where islands are cut")
     add_cut_options(command)
     command.add_argument(
-        "--max-shear", type=shear, default=0.0, metavar="S", help="cut further until the mean shear is below S > 1"
+        "--max-shear",
+        type=shear,
+        default=DEFAULT_MAX_SHEAR,
+        metavar="S",
+        help="add seams until the mean shear of islands is below S > 1; 0: only those that open a part",
     )
+    command.add_argument("--cut-further", action="store_true", help="add seams to islands whose seams are marked, too")
+    command.add_argument("--mark-seams", action="store_true", help="mark the edges that were cut as seams")
     command.add_argument(
         "--udim", type=tile, default=FIRST_TILE, metavar="TILE", help="tile to pack into; 1001 is the unit square"
     )
@@ -67,6 +74,7 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     objects, readings = read_layers(options)
+    from ..blender.seams import mark_seams
     from ..blender.subdivision import subdivision_warnings, with_levels
     from ..blender.vertex_groups import avoided
     from ..pipelines.layout import UnwrapJob
@@ -84,6 +92,7 @@ def run(options: argparse.Namespace) -> None:
         seams=options.seams,
         fill_holes=options.fill_holes,
         max_shear=options.max_shear,
+        cut_further=options.cut_further,
     )
     with refusals(objects):
         free = avoided(objects, options.keep_free)
@@ -96,6 +105,9 @@ def run(options: argparse.Namespace) -> None:
         layout = drain_shown(lay_out(jobs, settings))
         if options.subdivision != 0:
             layout.warnings.extend(subdivision_warnings(objects))
+        if options.mark_seams:
+            for obj, surface_map in zip(objects, layout.maps, strict=True):
+                mark_seams(obj, surface_map.seams)
         written = write_layers(options, zip(objects, readings, strict=True), layout, apart=options.no_pack)
     if options.report:
         charts = [surface_map.report() for surface_map in layout.maps]

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..session import run
-from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_SEAMS, SEAMS, Settings
+from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_MAX_SHEAR, DEFAULT_SEAMS, SEAMS, Settings
 from .base import SolverOperator, complaints, read_writable, warn, write_layers
 from .properties import AreaSettings, MarginSettings, choose_group, choose_layer, draw_balance, draw_margin
 
@@ -34,11 +34,17 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
     )
     max_shear: FloatProperty(
         name="Max Shear",
-        description="Cut islands further until their mean shear is below this. 0: no such cuts. 1.3 is hardly visible; "
-        "every cut takes another run",
-        default=0.0,
+        description="Seams are added until the mean shear of islands is below this, where they are seen least. "
+        "0: only those that are needed to open a part. Islands whose seams you marked are left as they are",
+        default=DEFAULT_MAX_SHEAR,
         min=0.0,
         soft_max=3.0,
+    )
+    cut_further: BoolProperty(
+        name="Cut Further", description="Add seams to islands whose seams you marked, too", default=False
+    )
+    mark_seams: BoolProperty(
+        name="Mark Seams", description="Mark the edges that were cut as seams of the mesh", default=False
     )
     pack: BoolProperty(
         name="Pack Islands",
@@ -81,6 +87,7 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             seams=self.seams.lower(),
             fill_holes=self.fill_holes,
             max_shear=self.max_shear if self.max_shear > 1 else 0.0,
+            cut_further=self.cut_further,
         )
 
     def steps(self, context: bpy.types.Context):
@@ -102,10 +109,14 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         return objects, layout
 
     def finish(self, context: bpy.types.Context, result) -> None:
+        from ..blender.seams import mark_seams
         from ..blender.subdivision import subdivision_warnings
 
         objects, layout = result
         write_layers(objects, self.uv_layer, layout)
+        if self.mark_seams:
+            for obj, surface_map in zip(objects, layout.maps, strict=True):
+                mark_seams(obj, surface_map.seams)
         warn(self, objects, layout.warnings + (subdivision_warnings(objects) if self.use_subdivision else []))
 
 
@@ -134,7 +145,11 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     column.active = properties.seams != "EXISTING"
     choose_group(column, properties, "keep_free")
     layout.prop(properties, "fill_holes")
-    layout.prop(properties, "max_shear")
+    column = layout.column()
+    column.active = properties.seams == "AUTO" and properties.boundary == "FREE"
+    column.prop(properties, "max_shear")
+    column.prop(properties, "cut_further")
+    layout.prop(properties, "mark_seams")
     layout.prop(properties, "use_subdivision")
     layout.separator()
     layout.prop(properties, "pack")

@@ -105,8 +105,8 @@ def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[di
         yield Progress("Charts", 0.0)
         job = jobs[k]
         try:
-            given = {"pins": job.pins, "target": job.target, "avoid": job.avoid}
-            cuts.append((yield from part_of(cut_charts(job.surface, job.faces, options=options, **given), 0.0, 0.0)))
+            given = {"options": _looking_up(options, job), "pins": job.pins, "target": job.target, "avoid": job.avoid}
+            cuts.append((yield from part_of(cut_charts(job.surface, job.faces, **given), 0.0, 0.0)))
         except MeshError as error:
             raise Refusal(k, error) from error
     cuts = yield from part_of(map_small_charts(cuts, options), 0.0, 0.0)
@@ -121,12 +121,20 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
         share = CAGE_SHARE
         if options.boundary != "free" or not refinable(job.surface):
             target = subdivided_target(job.surface, modifier)
-    steps = unwrap(job.surface, job.faces, options=options, pins=job.pins, target=target, avoid=job.avoid, cut=cut)
+    given = {"options": _looking_up(options, job), "pins": job.pins, "target": target, "avoid": job.avoid}
+    steps = unwrap(job.surface, job.faces, cut=cut, **given)
     found = yield from part_of(steps, 0.0, share)
     if modifier is None:
         return found
     rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary)
     return (yield from part_of(rest, share, 1 - share))
+
+
+def _looking_up(options: UnwrapOptions, job: UnwrapJob) -> UnwrapOptions:
+    """The options for a surface in a scene, where it is known what is up."""
+    if job.up is None:
+        return options
+    return replace(options, preferences=replace(options.preferences, up=tuple(map(float, job.up))))
 
 
 def _with_charts(job: UnwrapJob) -> tuple[UnwrapJob, str]:

@@ -225,6 +225,8 @@ MERGE = "merge vertices that coincide"
 MERGING = "merging vertices that coincide"
 DISSOLVE = "dissolve faces without area"
 TURN_OUTSIDE = OrientationError.remedy
+CUT_FURTHER = "cut further for less shear, or allow for more"
+MORE_SEAMS = "no seams were found that would pay; allow for more shear, or mark some yourself"
 
 
 def positive_density(density: np.ndarray) -> np.ndarray:

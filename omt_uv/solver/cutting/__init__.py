@@ -1,7 +1,7 @@
 """Any surface to disk charts: repaired, taken apart, filled and cut along short paths where they are least seen.
 
 Imports solver.errors, solver.mesh, solver.linalg and solver.analysis.
-Main names: cut_to_disks, DiskCharts, cut, Cuts, fill_holes, slit.
+Main names: cut_to_disks, DiskCharts, cut, Cuts, fill_holes.
 """
 
 from ..lazy import lazy
@@ -12,5 +12,4 @@ __getattr__, __all__ = lazy(
     cuts="ComponentCut Cuts cut",
     disk_charts="DiskCharts cut_to_disks",
     hole_filling="fill_holes",
-    shear_slit="slit",
 )

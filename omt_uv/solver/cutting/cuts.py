@@ -31,7 +31,7 @@ from .component import (
 )
 from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import is_long, net
-from .gluing_facts import cost_factors, marked_triangles, total_curvature
+from .gluing_facts import TurningLines, cost_factors, marked_triangles, total_curvature, turning_lines
 from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes
 from .protrusions import log_scale, spread
@@ -146,9 +146,11 @@ def cut_gluing(
     positions, unit = _in_unit_box(surface, repaired.gluing)
     gluing, one_sided = _oriented(repaired.gluing, positions)
     twisted = one_sided
-    component_of = components(gluing)
-    topology = classify(gluing, corner_classes(gluing), component_of, one_sided)
-    if topology.is_disk.all():
+    component_of, classes = components(gluing), corner_classes(gluing)
+    is_disk = classify(gluing, classes, component_of, one_sided).is_disk
+    if is_disk.all() and (
+        search is None or (total_curvature(gluing, classes, component_of, positions) <= CURVED).all()
+    ):
         return _uncut(surface, gluing, repaired, component_of, unit)
     gone = np.zeros(len(gluing.first), dtype=bool)
     if sieve is not None:
@@ -233,7 +235,7 @@ class _Cutter:
         component_of = components(self.gluing)
         whole = classify(self.gluing, corner_classes(self.gluing), component_of, one_sided)
         gone = turning_lines(self.gluing, component_of, one_sided)
-        lines = _Lines.of(self.gluing, gone, component_of, self.positions)
+        lines = TurningLines.of(self.gluing, gone, component_of, self.positions)
         left = self.gluing.without(gone)
         corner_class = corner_classes(left)
         topology = classify(left, corner_class, component_of, one_sided & ~lines.opened[component_of])
@@ -246,14 +248,14 @@ class _Cutter:
         known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
         patched = np.zeros(len(members), dtype=bool)
         patched[component_of[self.gluing.owner < 0]] = True
-        wanted = self._wanted(component_of, corner_class, members)
-        chosen_ones = np.flatnonzero(~whole.is_disk | (patched & sieves) | wanted)
+        searched = self._to_search(component_of, corner_class, members)
+        chosen_ones = np.flatnonzero(~whole.is_disk | (patched & sieves) | searched)
         for count, k in enumerate(chosen_ones):
             pairs = order[start[k] : start[k + 1]]
             component = make_component(left, self.positions, corner_class, members[k], pairs, self.avoid, factor)
-            name = (*fingerprint(component), bytes([wanted[k]]))
+            name = (*fingerprint(component), searched[k].tobytes())
             if name not in known:
-                finding = self._best_cut(component, topology, k, bool(patched[k]) and not sieves, bool(wanted[k]))
+                finding = self._best_cut(component, topology, k, bool(patched[k]) and not sieves, bool(searched[k]))
                 known[name] = yield from part_of(finding, count / len(chosen_ones), 1 / len(chosen_ones))
             chosen, tips = known[name]
             gone[number[component.gluing_pair[chosen]]] = True
@@ -270,34 +272,36 @@ class _Cutter:
                 )
         return gone, report, coincident_boundary_vertices(self.surface, self.gluing, component_of, whole.is_disk)
 
-    def _wanted(self, component_of: np.ndarray, corner_class: np.ndarray, members: list[np.ndarray]) -> np.ndarray:
+    def _to_search(self, component_of: np.ndarray, corner_class: np.ndarray, members: list[np.ndarray]) -> np.ndarray:
         """Components (k,) bool whose seams are to be searched."""
-        wanted = np.zeros(len(members), dtype=bool)
+        searched = np.zeros(len(members), dtype=bool)
         if self.search is None:
-            return wanted
+            return searched
         curved = total_curvature(self.gluing, corner_class, component_of, self.positions) > CURVED
         marked = np.zeros(len(members), dtype=bool)
         marked[component_of[marked_triangles(self.surface, self.gluing)]] = True
         for k in np.flatnonzero(curved):
-            wanted[k] = self.search.wants(self.gluing.owner[members[k]], bool(marked[k]))
-        return wanted
+            searched[k] = self.search.wants(self.gluing.owner[members[k]], bool(marked[k]))
+        return searched
 
     def _best_cut(
-        self, component: CutComponent, topology: Topology, k: int, filled: bool, wanted: bool
+        self, component: CutComponent, topology: Topology, k: int, filled: bool, searched: bool
     ) -> Steps[tuple[np.ndarray, np.ndarray]]:
         """The net of component k, if it has one that is not much longer than other cuts; else those."""
-        unrolled = net(component) if (self.extremities or wanted) and not filled else None
+        unrolled = net(component) if (self.extremities or searched) and not filled else None
         if unrolled is not None and not is_long(component, unrolled[0]):
             return unrolled
-        if wanted:
-            other = yield from self._searched(component, topology, k)
+        if searched:
+            other = yield from self._search_component(component, topology, k)
         else:
             other = cut_component(component, topology, k, self.extremities)
         if unrolled is not None and component.length[unrolled[0]].sum() <= LONGER * component.length[other[0]].sum():
             return unrolled
         return other
 
-    def _searched(self, component: CutComponent, topology: Topology, k: int) -> Steps[tuple[np.ndarray, np.ndarray]]:
+    def _search_component(
+        self, component: CutComponent, topology: Topology, k: int
+    ) -> Steps[tuple[np.ndarray, np.ndarray]]:
         """Seams that were searched, with what has to be cut for a disk; and their tips."""
         base = np.zeros(len(component.pair), dtype=bool)
         closed = topology.boundaries[k] == 0 and topology.handles[k] == 0
@@ -308,34 +312,6 @@ class _Cutter:
         if closed and chosen.sum() < 2:
             return cut_component(component, topology, k, self.extremities)
         return chosen, _tips(component, chosen)
-
-
-@dataclass(frozen=True)
-class _Lines:
-    """Components (k,) bool that are opened along turning lines, and the length (k,) of these."""
-
-    opened: np.ndarray
-    length: np.ndarray
-
-    @staticmethod
-    def of(gluing: Gluing, lines: np.ndarray, component_of: np.ndarray, positions: np.ndarray) -> _Lines:
-        a, b = gluing.ends(gluing.first[lines])
-        component, count = component_of[gluing.first[lines] // 3], int(component_of.max()) + 1
-        length = np.bincount(component, np.linalg.norm(positions[a] - positions[b], axis=1), count)
-        return _Lines(np.bincount(component, minlength=count) > 0, length)
-
-
-def turning_lines(gluing: Gluing, component_of: np.ndarray, one_sided: np.ndarray) -> np.ndarray:
-    """Pairs (p,) bool at which faces look to opposite sides, of components (m,) with one side that stay in one without.
-
-    Cut there first, such a component has two sides, and no face has to be turned over.
-    """
-    pair_component = component_of[gluing.first // 3]
-    lines = gluing.parallel() & one_sided[gluing.first // 3]
-    apart = components(gluing.without(lines))
-    _, first = np.unique(apart, return_index=True)
-    parts = np.bincount(component_of[first], minlength=int(component_of.max()) + 1)
-    return lines & (parts == 1)[pair_component]
 
 
 def _tips(component: CutComponent, chosen: np.ndarray) -> np.ndarray:

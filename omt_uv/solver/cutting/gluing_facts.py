@@ -1,11 +1,13 @@
-"""Tell what decides where and whether a gluing is cut: costs of edges, curvature of components, marked seams."""
+"""Tell what decides where and whether a gluing is cut: costs, curvature, marked seams, lines where it turns over."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
-from ..mesh.gluing import Gluing
+from ..mesh.gluing import Gluing, components
 from ..mesh.surface import Surface, is_seam, is_sharp
 from ..mesh.topology import halfedges, pair_keys
 from .component import SEAM, SHARP
@@ -49,3 +51,32 @@ def _open(gluing: Gluing) -> np.ndarray:
     open_ = np.ones(3 * len(gluing.triangles), dtype=bool)
     open_[gluing.first] = open_[gluing.second] = False
     return open_
+
+
+@dataclass(frozen=True)
+class TurningLines:
+    """Components (k,) bool that are opened along turning lines, and the length (k,) of these."""
+
+    opened: np.ndarray
+    length: np.ndarray
+
+    @staticmethod
+    def of(gluing: Gluing, lines: np.ndarray, component_of: np.ndarray, positions: np.ndarray) -> TurningLines:
+        """What the pairs `lines` (p,) bool do to components (m,) of the triangles, positions (n,3)."""
+        a, b = gluing.ends(gluing.first[lines])
+        component, count = component_of[gluing.first[lines] // 3], int(component_of.max()) + 1
+        length = np.bincount(component, np.linalg.norm(positions[a] - positions[b], axis=1), count)
+        return TurningLines(np.bincount(component, minlength=count) > 0, length)
+
+
+def turning_lines(gluing: Gluing, component_of: np.ndarray, one_sided: np.ndarray) -> np.ndarray:
+    """Pairs (p,) bool at which faces look to opposite sides, of components (m,) with one side that stay in one without.
+
+    Cut there first, such a component has two sides, and no face has to be turned over.
+    """
+    pair_component = component_of[gluing.first // 3]
+    lines = gluing.parallel() & one_sided[gluing.first // 3]
+    apart = components(gluing.without(lines))
+    _, first = np.unique(apart, return_index=True)
+    parts = np.bincount(component_of[first], minlength=int(component_of.max()) + 1)
+    return lines & (parts == 1)[pair_component]

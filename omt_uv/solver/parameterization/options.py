@@ -9,9 +9,6 @@ from ..cutting.disk_charts import SEAMS
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.refine import BOUNDARIES
 
-# Mean shear above which a checker is seen to be sheared: a default that artists need not change.
-MAX_SHEAR = 1.35
-
 
 @dataclass(frozen=True)
 class ShearBound:
@@ -78,7 +75,7 @@ class UnwrapOptions(MapOptions):
 
     seams: str = "auto"
     fill_holes: bool = False
-    max_shear: float = MAX_SHEAR
+    max_shear: float = 0.0
     cut_further: bool = False
     preferences: SeamPreferences = field(default_factory=SeamPreferences)
 

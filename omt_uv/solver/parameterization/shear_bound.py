@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..analysis.density import Target
 from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.disk_charts import DiskCharts, disk_charts
+from ..errors import CUT_FURTHER, MORE_SEAMS
 from ..maps.distortion import face_distortion
 from ..mesh.charts import Chart
 from ..mesh.polygon_areas import polygon_areas
@@ -42,14 +43,14 @@ class BoundedShear:
     maps : of the charts
     history : length of the cuts and mean shear of the whole surface, after each round
     missed (k,) : charts whose mean shear is above the bound
-    bound : see `ShearBound`
+    warnings : which those are, and what helps
     """
 
     prepared: DiskCharts
     maps: list[ChartMap]
     history: tuple[tuple[float, float], ...]
     missed: np.ndarray
-    bound: float
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,18 @@ def bound_shear(
         mapping = _mapped(prepared.charts, charts, maps, map_charts)
         maps = yield from part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
     prepared = DiskCharts(charts, replace(first.cuts, edges=cuts, length=length), first.warnings)
-    return BoundedShear(prepared=prepared, maps=maps, history=tuple(history), missed=missed, bound=bound)
+    by_hand = np.array([k not in searched for k in missed], dtype=bool)
+    warnings = tuple(_warnings(mean[missed], by_hand, bound))
+    return BoundedShear(prepared=prepared, maps=maps, history=tuple(history), missed=missed, warnings=warnings)
+
+
+def _warnings(mean: np.ndarray, by_hand: np.ndarray, bound: float) -> Iterator[str]:
+    """Warnings of charts (k,) that shear more than a bound, those with seams marked by hand apart."""
+    for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, MORE_SEAMS)):
+        if chosen.any():
+            who = "An island shears" if chosen.sum() == 1 else f"{chosen.sum()} islands shear"
+            what = what if chosen.sum() == 1 else what.replace("its seams", "their seams")
+            yield f"{who} {mean[chosen].max():.3g} in the mean, above {bound:.3g}: {what}"
 
 
 def _is_marked(surface: Surface, chart: Chart) -> bool:

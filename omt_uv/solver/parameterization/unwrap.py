@@ -57,8 +57,8 @@ class SurfaceMap:
 class CutCharts:
     """A surface cut into charts that are to be mapped, for `unwrap`; maps (by number) are there already.
 
-    joined : the charts with the quads of mirror images cut alike; pairs : see `mirrored_charts.mirror_partners`; search : that found
-    the seams for a bound of the shear, if there is one
+    joined : the charts with the quads of mirror images cut alike; pairs : see `mirrored_charts.mirror_partners`
+    search : that found the seams for a bound of the shear, if there is one
     """
 
     prepared: DiskCharts
@@ -110,7 +110,7 @@ def unwrap(
     if cut.search is not None:
         further = bound_shear(cut.search, prepared, maps, task.map_charts)
         found = yield from part_of(further, begin + width, 1 - begin - width)
-        prepared, maps = found.prepared, found.maps
+        prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps
     charts, chart_pins = prepared.charts, [pins_of_chart(pins, chart) for chart in prepared.charts]
     maps = with_convex_polygons(surface, charts, maps, chart_pins, task.options, target)
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges

@@ -11,6 +11,9 @@ from scipy.sparse.csgraph import dijkstra
 from ..mesh.topology import halfedges, next_halfedge, twins
 from .coarse_surface import CoarseSurface
 
+# Share of the vertices in a mirror plane that symmetric cuts have to be able to reach.
+REACHED = 0.9
+
 
 @dataclass(frozen=True)
 class PathGraph:
@@ -38,6 +41,11 @@ class PathGraph:
         """Cost (n,) of the cheapest path from the vertices `start` (k,), and the vertex before (n,), < 0 for none."""
         cost, before, _ = dijkstra(self.matrix, indices=start, min_only=True, return_predecessors=True)
         return cost, before
+
+    def is_whole(self) -> bool:
+        """Whether the vertices in the mirror plane can be reached from the boundary, nearly all."""
+        cost, _ = self.paths_from(np.flatnonzero(self.boundary))
+        return float(np.isfinite(cost[self.in_plane]).mean()) >= REACHED
 
     def is_open(self, steps: np.ndarray) -> bool:
         """Whether steps (k,) from the boundary outwards never come back to the mirror plane."""

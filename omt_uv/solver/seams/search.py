@@ -33,7 +33,7 @@ MIRRORED_SHARE = 0.97
 EXACT = 1e-4
 # A vertex is in a face if it is so with more than this certainty, and cuts that end there are worth so much less.
 IN_FACE = 0.5
-BARRED = 1e-3
+BARRED = 0.3
 # Where the time of a search goes, roughly: growth ends at this share of it.
 GROWN = 0.5
 
@@ -83,6 +83,10 @@ class SeamSearch:
         if self.relative:
             bound *= setting.model.spread(setting.model.scale)
         task = setting.task(bound, setting.extremity())
+        if mirror is not None and not task.graph.is_whole():
+            # The plane runs between the vertices: there is hardly a symmetric cut.
+            mirror, setting = None, replace(setting, mirrored=None)
+            task = setting.task(bound, setting.extremity())
         cut = yield from self._grown(task)
         if setting.is_closed:
             task = setting.task(bound, _hub(task.graph, cut.steps))
@@ -136,7 +140,7 @@ class SeamSearch:
         return FineMirror(image, height >= 0, in_plane)
 
     def _tip_factor(self, component: CutComponent) -> np.ndarray:
-        """Factor (n,) on what cuts are worth that end at a vertex: hardly anything on a face."""
+        """Factor (n,) on what cuts are worth that end at a vertex: less on a face."""
         face = np.zeros(component.vertex_count)
         real = component.vertex_ids < len(self.surface.positions)
         face[real] = self.costs().face[component.vertex_ids[real]]

@@ -4,42 +4,88 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.errors import CUT_FURTHER
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.parameterization.chart_map import map_chart
-from omt_uv.solver.parameterization.options import MapOptions
-from omt_uv.solver.parameterization.shear_bound import bound_shear
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.options import ShearBound, UnwrapOptions
+from omt_uv.solver.parameterization.shear_bound import MOST_ROUNDS
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
 
-def draft(chart):
-    return map_chart(chart, options=MapOptions(quality="draft"))
+def unwrapped(surface, bound, **options):
+    return drain(unwrap(surface, options=UnwrapOptions(quality="draft", max_shear=bound, **options)))
 
 
-def test_slits_bring_the_shear_under_the_bound():
+def mean_shear(result):
+    return [chart_map.angle_mean for chart_map in result.maps]
+
+
+def test_seams_bring_the_shear_under_the_bound():
     V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
-    result = drain(bound_shear(triangle_surface(V, F), None, draft, 1.25))
-    assert result.reached and len(result.slits)
-    lengths, shears = zip(*result.history, strict=True)
-    assert shears[0] > 1.25 >= shears[-1] and (np.diff(lengths) > 0).all()
-    # The slits are seams that leave one disk.
-    (chart,) = strict_charts(triangle_surface(V, F, result.slits))
+    surface = triangle_surface(V, F)
+    assert max(mean_shear(unwrapped(surface, 0))) > 1.3
+    result = unwrapped(surface, 1.3)
+    assert max(mean_shear(result)) <= 1.3 and len(result.seams) and not result.warnings
+    # What was cut are seams that leave one disk.
+    (chart,) = strict_charts(triangle_surface(V, F, result.seams))
     assert len(chart.triangles) == len(F)
 
 
+def test_a_lower_bound_takes_longer_seams():
+    V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
+    length = [
+        np.linalg.norm(V[seams[:, 0]] - V[seams[:, 1]], axis=1).sum()
+        for seams in (unwrapped(triangle_surface(V, F), bound).seams for bound in (1.6, 1.2))
+    ]
+    assert 0 < length[0] < length[1]
+
+
 def test_a_chart_within_the_bound_is_left_alone():
-    V, F = meshes.bumpy()
-    result = drain(bound_shear(triangle_surface(V, F), None, draft, 3.0))
-    assert result.reached and len(result.slits) == 0 and len(result.history) == 1
+    result = unwrapped(triangle_surface(*meshes.bumpy()), 3.0)
+    assert len(result.seams) == 0 and not result.warnings
 
 
-def test_only_the_bad_chart_is_slit():
+def test_only_the_bad_chart_is_cut():
     (V, F), (W, G) = meshes.grid(6, 6), meshes.cap(rings=10, sectors=20, opening=0.9)
     both = triangle_surface(np.concatenate([V, W + 3]), np.concatenate([F, G + len(V)]))
-    result = drain(bound_shear(both, None, draft, 1.3))
-    assert result.reached and result.slits.min() >= len(V)
+    result = unwrapped(both, 1.3)
+    assert max(mean_shear(result)) <= 1.3 and result.seams.min() >= len(V)
 
 
-def test_the_bound_must_be_possible():
+def test_seams_marked_by_hand_are_not_added_to_unless_asked():
+    V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
+    marked = triangle_surface(V, F, first_edges_from_boundary(F))
+    left = unwrapped(marked, 1.15)
+    assert len(left.seams) == 0
+    (warning,) = left.warnings
+    assert CUT_FURTHER in warning and "by hand" in warning
+    further = unwrapped(marked, 1.15, cut_further=True)
+    assert len(further.seams) and max(mean_shear(further)) < max(mean_shear(left))
+
+
+def first_edges_from_boundary(F):
+    """A short seam (1,2) from the boundary inwards."""
+    loop = boundary_loops(F)[0]
+    neighbours = np.unique(F[(loop[0] == F).any(axis=1)])
+    inner = np.setdiff1d(neighbours, loop)
+    return np.array([[loop[0], inner[0]]])
+
+
+def test_what_misses_the_bound_says_so():
+    V, F = meshes.cap(rings=8, sectors=16, opening=0.9)
+    result = unwrapped(triangle_surface(V, F), 1.0001)
+    assert any("above 1" in warning for warning in result.warnings)
+
+
+def test_charts_of_disks_and_squares_are_not_cut_for_shear():
+    V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
+    assert len(unwrapped(triangle_surface(V, F), 1.2, boundary="disk").seams) == 0
+
+
+@pytest.mark.parametrize("bound", [1.0, 0.5, float("nan")])
+def test_the_bound_must_be_possible(bound):
     with pytest.raises(ValueError, match="bound"):
-        drain(bound_shear(triangle_surface(*meshes.bumpy()), None, draft, 1.0))
+        ShearBound(bound)
+    assert MOST_ROUNDS >= 1

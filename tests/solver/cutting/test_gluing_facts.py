@@ -1,0 +1,34 @@
+"""What decides where a gluing is cut: curvature by component, and seams that were marked."""
+
+import meshes
+import numpy as np
+
+from omt_uv.solver.cutting.gluing_facts import cost_factors, marked_triangles, total_curvature, turning_lines
+from omt_uv.solver.mesh.gluing import components, corner_classes
+from omt_uv.solver.mesh.surface import strict_gluing, triangle_surface
+
+
+def glued(V, F, seams=()):
+    surface = triangle_surface(V, F, seams)
+    return surface, strict_gluing(surface)
+
+
+def test_curvature_of_a_sphere_is_that_of_gauss_and_bonnet_and_of_a_plane_none():
+    (V, F), (W, G) = meshes.icosphere(2), meshes.grid(4, 4)
+    surface, gluing = glued(np.concatenate([V, W * [1, 1, 0] + 5]), np.concatenate([F, G + len(V)]))
+    curvature = total_curvature(gluing, corner_classes(gluing), components(gluing), surface.positions)
+    assert np.allclose(np.sort(curvature), [0, 4 * np.pi])
+
+
+def test_a_marked_boundary_is_no_marked_seam():
+    V, F = meshes.grid(4, 4)
+    inner, outer = np.array([[6, 7]]), np.array([[0, 1]])
+    assert len(marked_triangles(*glued(V, F, outer))) == 0
+    beside = F[marked_triangles(*glued(V, F, inner))]
+    assert len(beside) == 2 and (np.isin(beside, inner).sum(axis=1) == 2).all()
+
+
+def test_what_is_wound_alike_has_no_lines_where_it_turns():
+    surface, gluing = glued(*meshes.icosphere(1))
+    none = turning_lines(gluing, components(gluing), np.zeros(len(gluing.triangles), dtype=bool))
+    assert not none.any() and (cost_factors(surface, gluing) == 1).all()

@@ -1,0 +1,97 @@
+"""The search for seams: what it promises of the predicted scale, of symmetry, and of what is left to be a disk."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.analysis.seam_costs import seam_costs
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.seams.coarse_surface import coarse_surface
+from omt_uv.solver.seams.cut_tree import Task, cut_along, leaves, stretches
+from omt_uv.solver.seams.growth import grow
+from omt_uv.solver.seams.improvement import improved, trimmed
+from omt_uv.solver.seams.options import SearchOptions
+from omt_uv.solver.seams.path_graph import path_graph
+from omt_uv.solver.seams.predicted_scale import ScaleModel
+from omt_uv.solver.seams.search import SeamSearch
+
+
+@pytest.fixture(scope="module")
+def cap():
+    return coarse_surface(*meshes.cap(20, 40, 0.9), 300)
+
+
+def task_of(coarse, bound):
+    n = len(coarse.kept)
+    graph = path_graph(coarse, np.ones(n), coarse.boundary)
+    return Task(graph, ScaleModel.of(coarse), bound, np.ones(n))
+
+
+def test_a_cut_by_green_functions_is_that_of_a_new_solve(cap):
+    model, vertices = ScaleModel.of(cap), np.flatnonzero(~cap.boundary)[:12]
+    cut = model.cut(vertices)
+    assert np.allclose(cut.scale, model.scale_cut(vertices), atol=1e-8)
+    assert np.abs(cut.scale[vertices]).max() < 1e-6
+    # Cut one after another, it is the same.
+    twice = model.cut(vertices[:5]).cut(vertices[5:])
+    assert np.allclose(twice.scale, cut.scale, atol=1e-6)
+    one = vertices[:1]
+    assert np.isclose(model.gain(one)[0], model.spread(model.scale) - model.spread(model.scale_cut(one)), rtol=1e-6)
+
+
+def test_a_flat_surface_has_no_scale():
+    V, F = meshes.grid(12, 12)
+    assert np.abs(ScaleModel.of(coarse_surface(V * [1, 1, 0], F, 1000)).scale).max() < 1e-9
+
+
+def test_growth_keeps_the_bound_and_lowers_the_spread_with_every_arc(cap):
+    task = task_of(cap, 0.02)
+    cut = cut_along(task, np.zeros(0, np.int64))
+    spreads = [cut.spread]
+    while cut.spread > task.bound:
+        cut = grow(task, cut, 1)
+        spreads.append(cut.spread)
+    assert (np.diff(spreads) < 0).all() and len(spreads) < 30
+    short = trimmed(task, cut)
+    assert short.spread <= task.bound and short.cost <= cut.cost
+    *_, better = improved(task, short, 4)
+    assert better.spread <= task.bound and better.score(task.bound) <= short.score(task.bound)
+    parts = stretches(task.graph, better.steps)
+    assert np.array_equal(np.sort(np.concatenate(parts)), better.steps)
+    assert 0 < len(leaves(task.graph, better.steps)) <= len(parts)
+
+
+def found(V, F, spread=0.03):
+    surface = triangle_surface(V, F)
+    search = SeamSearch(np.full(len(F), spread), surface, lambda: seam_costs(surface))
+    return cut_to_disks(surface, search=search)
+
+
+@pytest.mark.parametrize("name", ["cap", "icosphere", "torus"])
+def test_what_is_cut_is_one_disk(name):
+    V, F = {"icosphere": lambda: meshes.icosphere(3), "cap": lambda: meshes.cap(20, 40, 0.8), "torus": meshes.torus}[
+        name
+    ]()
+    charts = found(V, F).charts
+    # `cut_to_disks` refuses what is no disk.
+    assert len(charts) == 1 and len(charts[0].triangles) == len(F)
+
+
+def test_seams_of_a_symmetric_body_are_symmetric():
+    V, F = meshes.icosphere(3)
+    V = V * [1.0, 1.3, 1.7] + 0.3 * np.stack([0 * V[:, 0], V[:, 2] ** 2, V[:, 1] * V[:, 2]], axis=1)
+    edges = np.sort(found(V, F, 0.01).cuts.edges, axis=1)
+    image = np.array([np.argmin(np.linalg.norm(V - p * [-1, 1, 1], axis=1)) for p in V])
+    keys = set(map(tuple, edges.tolist()))
+    assert keys == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
+
+
+def test_scale_does_not_matter():
+    V, F = meshes.cap(12, 24, 0.9)
+    a, b = found(V, F).cuts.edges, found(128.0 * V, F).cuts.edges
+    assert np.array_equal(a, b)
+
+
+def test_options_have_to_be_sound():
+    assert SearchOptions().rounds > 0
