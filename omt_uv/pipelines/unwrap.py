@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -105,7 +106,12 @@ def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[di
         yield Progress("Charts", 0.0)
         job = jobs[k]
         try:
-            given = {"options": _looking_up(options, job), "pins": job.pins, "target": job.target, "avoid": job.avoid}
+            given: dict[str, Any] = {
+                "options": _looking_up(options, job),
+                "pins": job.pins,
+                "target": job.target,
+                "avoid": job.avoid,
+            }
             cuts.append((yield from part_of(cut_charts(job.surface, job.faces, **given), 0.0, 0.0)))
         except MeshError as error:
             raise Refusal(k, error) from error
@@ -121,7 +127,12 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
         share = CAGE_SHARE
         if options.boundary != "free" or not refinable(job.surface):
             target = subdivided_target(job.surface, modifier)
-    given = {"options": _looking_up(options, job), "pins": job.pins, "target": target, "avoid": job.avoid}
+    given: dict[str, Any] = {
+        "options": _looking_up(options, job),
+        "pins": job.pins,
+        "target": target,
+        "avoid": job.avoid,
+    }
     steps = unwrap(job.surface, job.faces, cut=cut, **given)
     found = yield from part_of(steps, 0.0, share)
     if modifier is None:
@@ -134,7 +145,8 @@ def _looking_up(options: UnwrapOptions, job: UnwrapJob) -> UnwrapOptions:
     """The options for a surface in a scene, where it is known what is up."""
     if job.up is None:
         return options
-    return replace(options, preferences=replace(options.preferences, up=tuple(map(float, job.up))))
+    x, y, z = map(float, job.up)
+    return replace(options, preferences=replace(options.preferences, up=(x, y, z)))
 
 
 def _with_charts(job: UnwrapJob) -> tuple[UnwrapJob, str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
@@ -127,7 +127,13 @@ def cut(
     """
     faces, triangles, owner = chosen_triangles(surface, faces)
     repaired = repaired_gluing(surface, faces, triangles, owner)
-    options = {"avoid": avoid, "fill": fill, "sieve": sieve, "extremities": extremities, "search": search}
+    options: dict[str, Any] = {
+        "avoid": avoid,
+        "fill": fill,
+        "sieve": sieve,
+        "extremities": extremities,
+        "search": search,
+    }
     return drain(cut_gluing(surface, repaired, **options)).cuts
 
 
@@ -291,8 +297,8 @@ class _Cutter:
         unrolled = net(component) if (self.extremities or searched) and not filled else None
         if unrolled is not None and not is_long(component, unrolled[0]):
             return unrolled
-        if searched:
-            other = yield from self._search_component(component, topology, k)
+        if searched and self.search is not None:
+            other = yield from self._search_component(component, topology, k, self.search)
         else:
             other = cut_component(component, topology, k, self.extremities)
         if unrolled is not None and component.length[unrolled[0]].sum() <= LONGER * component.length[other[0]].sum():
@@ -300,14 +306,14 @@ class _Cutter:
         return other
 
     def _search_component(
-        self, component: CutComponent, topology: Topology, k: int
+        self, component: CutComponent, topology: Topology, k: int, search: SeamFinder
     ) -> Steps[tuple[np.ndarray, np.ndarray]]:
-        """Seams that were searched, with what has to be cut for a disk; and their tips."""
+        """Seams that are searched, with what has to be cut for a disk; and their tips."""
         base = np.zeros(len(component.pair), dtype=bool)
         closed = topology.boundaries[k] == 0 and topology.handles[k] == 0
         if not (closed or topology.is_disk[k]):
             base = cut_component(component, topology, k, 0)[0]
-        chosen = base | (yield from self.search(component, base))
+        chosen = base | (yield from search(component, base))
         # A slit of a single edge would not open anything.
         if closed and chosen.sum() < 2:
             return cut_component(component, topology, k, self.extremities)

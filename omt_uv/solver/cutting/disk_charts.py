@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -69,7 +70,13 @@ def disk_charts(
     if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     repaired = repaired_gluing(surface, faces, triangles, owner)
-    options = {"avoid": avoid, "fill": fill_holes, "sieve": sieve, "extremities": extremities, "search": search}
+    options: dict[str, Any] = {
+        "avoid": avoid,
+        "fill": fill_holes,
+        "sieve": sieve,
+        "extremities": extremities,
+        "search": search,
+    }
     found = yield from cut_gluing(surface, repaired, **options)
     charts, flat = _sound(charts_of(found.surface, found.gluing), found.extent)
     warnings = list(found.cuts.warnings)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..analysis.density import Target
 from ..analysis.seam_costs import SeamCosts, seam_costs
+from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import CUT_FURTHER, MORE_SEAMS
 from ..maps.distortion import face_distortion
@@ -112,7 +113,8 @@ def bound_shear(
     Errors are those of `disk_charts.disk_charts` and of `map_charts`.
     """
     prepared, bound = first, search.shear.bound
-    cuts, length = first.cuts.edges, first.cuts.length
+    first_cuts = _cuts(first)
+    cuts, length = first_cuts.edges, first_cuts.length
     history: list[tuple[float, float]] = []
     while True:
         charts = prepared.charts
@@ -126,15 +128,23 @@ def bound_shear(
         width = (1 - begin) / 2
         again = search.again(cuts, charts, searched, mean)
         prepared = yield from part_of(again, begin, width * SEARCHING)
-        if len(prepared.cuts.edges) == 0:
+        more = _cuts(prepared)
+        if len(more.edges) == 0:
             break
-        cuts, length = np.concatenate([cuts, prepared.cuts.edges]), length + prepared.cuts.length
+        cuts, length = np.concatenate([cuts, more.edges]), length + more.length
         mapping = _mapped(prepared.charts, charts, maps, map_charts)
         maps = yield from part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
-    prepared = DiskCharts(charts, replace(first.cuts, edges=cuts, length=length), first.warnings)
+    prepared = DiskCharts(charts, replace(first_cuts, edges=cuts, length=length), first.warnings)
     by_hand = np.array([k not in searched for k in missed], dtype=bool)
     warnings = tuple(_warnings(mean[missed], by_hand, bound))
     return BoundedShear(prepared=prepared, maps=maps, history=tuple(history), missed=missed, warnings=warnings)
+
+
+def _cuts(prepared: DiskCharts) -> Cuts:
+    """The cuts of charts that were searched."""
+    if prepared.cuts is None:
+        raise ValueError("charts along existing seams alone have no cuts to add to")
+    return prepared.cuts
 
 
 def _warnings(mean: np.ndarray, by_hand: np.ndarray, bound: float) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -134,7 +135,7 @@ def cut_charts(
     """
     avoid = clear_of_pins(surface, pins, avoid)
     bound = options.shear_bound()
-    given = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}
+    given: dict[str, Any] = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}
     search = None if bound is None else ShearSearch(surface, faces, bound, target, given)
     finder = None if search is None else search.first()
     prepared = yield from disk_charts(surface, faces, seams=options.seams, search=finder, **given)

@@ -79,7 +79,7 @@ def _by_stretch(graph: PathGraph, steps: np.ndarray) -> tuple[list[np.ndarray], 
     node[ends[leaving][graph.in_plane[ends[leaving]]]] = True
     # Steps are joined through vertices that are no nodes; each has a place of its own for its ends at nodes.
     place = np.where(node[ends], n + np.arange(2 * k).reshape(k, 2), ends)
-    label = graph_components(*place.T, n + 2 * k)[1][place[:, 0]]
+    label = graph_components(place[:, 0], place[:, 1], n + 2 * k)[1][place[:, 0]]
     total = np.bincount(label, graph.cost[steps])
     order = np.argsort(-total, kind="stable")[: len(np.unique(label))]
     return [steps[label == c] for c in order], degree
