@@ -228,6 +228,10 @@ def test_garbage_is_collected_in_front(threads, package, monkeypatch):
             assert len([[] for _ in range(2000)]) == 2000
             yield package("solver.progress").Progress("Making garbage", k / 200)
 
+    # A solver that was cancelled before ends at its next step.
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread():
+            thread.join(30)
     with monkeypatch.context() as patch:
         patch.setattr(package("session.run"), "current", object())
         package("solver.progress").drain(package("session.run").aside(solver()))

@@ -220,7 +220,8 @@ def stand_in(name, **settings):
     for base in reversed(cls.__mro__):
         if not base.__module__.startswith("bpy") and base is not object:
             body |= {k: v for k, v in vars(base).items() if not k.startswith("__") and k != "bl_rna"}
-    for prop in bpy.context.window_manager.operator_properties_last(name).bl_rna.properties:
+    body["rna_type"] = bpy.context.window_manager.operator_properties_last(name).bl_rna
+    for prop in body["rna_type"].properties:
         if not prop.is_readonly and prop.identifier != "rna_type":
             body[prop.identifier] = prop.default
     body |= settings
