@@ -48,7 +48,7 @@ def lay_out(
     maps: list[SurfaceMap] = []
     warnings: list[tuple[int, str]] = []
     if settings.seams == "charts":
-        seamed = [_with_charts(job) for job in jobs]
+        seamed = [_with_charts(index, job) for index, job in enumerate(jobs)]
         jobs = [job for job, _ in seamed]
         warnings += [(index, warning) for index, (_, warning) in enumerate(seamed) if warning]
     share = PACKING_FROM / len(jobs)
@@ -149,10 +149,12 @@ def _looking_up(options: UnwrapOptions, job: UnwrapJob) -> UnwrapOptions:
     return replace(options, preferences=replace(options.preferences, up=(x, y, z)))
 
 
-def _with_charts(job: UnwrapJob) -> tuple[UnwrapJob, str]:
+def _with_charts(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
     """The job with the seams of charts of low distortion added, or as it is and a warning."""
     try:
         more = chart_seams(job.surface, job.faces)
+    except MeshError as error:
+        raise Refusal(index, error) from error
     except SegmentationError as error:
         return job, f"{error}; cut only where it has to be"
     seams = np.concatenate([job.surface.seams, more])

@@ -18,7 +18,7 @@ from omt_uv.files.meshes import load
 from omt_uv.pipelines.layout import UnwrapJob
 from omt_uv.pipelines.reading import Reading
 from omt_uv.pipelines.unwrap import lay_out
-from omt_uv.settings import Settings
+from omt_uv.settings import DEFAULT_MAX_SHEAR, Settings
 from omt_uv.solver.analysis.feature_edges import value_jumps
 from omt_uv.solver.maps.distortion import distortion, face_distortion
 from omt_uv.solver.mesh.geometry import cross2, face_areas
@@ -45,8 +45,9 @@ class DrawnMap:
 def ours(obj, **settings) -> DrawnMap:
     """One click on the object in Object Mode, with its seams, and settings other than the defaults."""
     reading = read(obj)
-    job = UnwrapJob(reading.surface, reading.faces)
-    layout, seconds = timed(lambda: drain(lay_out([job], Settings(**settings))))
+    job = UnwrapJob(reading.surface, reading.faces, up=reading.up)
+    chosen = Settings(**{"max_shear": DEFAULT_MAX_SHEAR} | settings)
+    layout, seconds = timed(lambda: drain(lay_out([job], chosen)))
     uv = np.zeros((len(reading.surface.corner_vertex), 2))
     uv[layout.corners[0]] = layout.uv[0]
     return mapped(replace(reading, uv=uv), seconds)

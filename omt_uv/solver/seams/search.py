@@ -69,19 +69,19 @@ class SeamSearch:
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
         """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut."""
         yield Progress("Seams", 0.0)
-        component = self._with_costs(component)
-        mirror = None if base.any() else self._mirror(component)
-        coarse = coarse_surface(
-            component.positions,
-            component.triangles,
-            self.options.vertices,
-            None if mirror is None else mirror.plane,
-        )
-        log_density, tips = self._log_density(component, coarse), self._tip_factor(component)
-        setting = _Setting.of(component, coarse, base, mirror, log_density, tips)
+        coarse = coarse_surface(component.positions, component.triangles, self.options.vertices)
+        model = ScaleModel.of(coarse, self._log_density(component, coarse))
         bound = float(self.spread[component.polygons[component.polygons >= 0]].min())
         if self.relative:
-            bound *= setting.model.spread(setting.model.scale)
+            bound *= model.spread(model.scale)
+        elif coarse.boundary.any() and model.spread(model.scale) <= bound:
+            return np.zeros(len(component.pair), dtype=bool)
+        component = self._with_costs(component)
+        mirror = None if base.any() else self._mirror(component)
+        if mirror is not None:
+            coarse = coarse_surface(component.positions, component.triangles, self.options.vertices, mirror.plane)
+            model = ScaleModel.of(coarse, self._log_density(component, coarse))
+        setting = _Setting.of(component, coarse, base, mirror, model, self._tip_factor(component))
         task = setting.task(bound, setting.extremity())
         if mirror is not None and not task.graph.is_whole():
             # The plane runs between the vertices: there is hardly a symmetric cut.
@@ -169,7 +169,7 @@ class _Setting:
     mirrored: Mirrored | None
 
     @staticmethod
-    def of(component: CutComponent, coarse: CoarseSurface, base, mirror, log_density, tip_factor) -> _Setting:
+    def of(component: CutComponent, coarse: CoarseSurface, base, mirror, model, tip_factor) -> _Setting:
         tree = cKDTree(coarse.positions)
         mirrored = None
         if mirror is not None:
@@ -184,7 +184,7 @@ class _Setting:
             start[tree.query(component.positions[np.unique(component.ends[base])])[1]] = True
         return _Setting(
             coarse=coarse,
-            model=ScaleModel.of(coarse, log_density),
+            model=model,
             factor=_cost_factor(component)[coarse.kept],
             tip_factor=tip_factor[coarse.kept],
             start=start,

@@ -13,9 +13,9 @@ from omt_uv.solver.seams.fine_paths import carried
 from omt_uv.solver.seams.search import SeamSearch
 
 
-@pytest.mark.parametrize("spread", [0.3, 0.05, 0.01])
+@pytest.mark.parametrize("spread", [0.3, 0.05])
 def test_what_is_carried_is_a_forest_that_hangs_on_the_boundary(monkeypatch, spread):
-    V, F = meshes.cap(20, 40, 0.9)
+    V, F = meshes.cap(14, 28, 0.9)
     seen = []
 
     def watched(component, coarse, graph, steps, start, mirror):

@@ -81,7 +81,7 @@ def test_what_is_cut_is_one_disk(name):
 def test_seams_of_a_symmetric_body_are_symmetric():
     V, F = meshes.icosphere(3)
     V = V * [1.0, 1.3, 1.7] + 0.3 * np.stack([0 * V[:, 0], V[:, 2] ** 2, V[:, 1] * V[:, 2]], axis=1)
-    edges = np.sort(found(V, F, 0.01).cuts.edges, axis=1)
+    edges = np.sort(found(V, F, 0.03).cuts.edges, axis=1)
     image = np.array([np.argmin(np.linalg.norm(V - p * [-1, 1, 1], axis=1)) for p in V])
     keys = set(map(tuple, edges.tolist()))
     assert keys == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
