@@ -107,7 +107,7 @@ def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[di
         job = jobs[k]
         try:
             given: dict[str, Any] = {
-                "options": _looking_up(options, job),
+                "options": options,
                 "pins": job.pins,
                 "target": job.target,
                 "avoid": job.avoid,
@@ -128,7 +128,7 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
         if options.boundary != "free" or not refinable(job.surface):
             target = subdivided_target(job.surface, modifier)
     given: dict[str, Any] = {
-        "options": _looking_up(options, job),
+        "options": options,
         "pins": job.pins,
         "target": target,
         "avoid": job.avoid,
@@ -139,14 +139,6 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
         return found
     rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary)
     return (yield from part_of(rest, share, 1 - share))
-
-
-def _looking_up(options: UnwrapOptions, job: UnwrapJob) -> UnwrapOptions:
-    """The options for a surface in a scene, where it is known what is up."""
-    if job.up is None:
-        return options
-    x, y, z = map(float, job.up)
-    return replace(options, preferences=replace(options.preferences, up=(x, y, z)))
 
 
 def _with_charts(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:

@@ -298,9 +298,8 @@ class _Cutter:
         if unrolled is not None and not is_long(component, unrolled[0]):
             return unrolled
         if searched and self.search is not None:
-            other = yield from self._search_component(component, topology, k, self.search)
-        else:
-            other = cut_component(component, topology, k, self.extremities)
+            return (yield from self._search_component(component, topology, k, self.search))
+        other = cut_component(component, topology, k, self.extremities)
         if unrolled is not None and component.length[unrolled[0]].sum() <= LONGER * component.length[other[0]].sum():
             return unrolled
         return other

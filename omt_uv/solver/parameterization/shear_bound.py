@@ -29,7 +29,7 @@ MOST_ROUNDS = 3
 # s is this times the square of log(s). Measured on heads, animals and figures, where it lies between 0.2 and 0.9.
 SPREAD_OF_SHEAR = 0.3
 # What a further search aims below the bound, so that it need not be the last but one.
-MARGIN = 0.85
+MARGIN = 0.7
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
 

@@ -11,8 +11,10 @@ from .predicted_scale import ScaleModel
 
 # Extremities that paths are tried to.
 MOST_TIPS = 12
-# An arc as long as a side of a square of the same area is to lower the spread by this share of the bound, at least.
-LEAST_WORTH = 0.1
+# An arc that costs as much as a side of a square of the same area is to lower the spread by this share, at least.
+LEAST_WORTH = 0.04
+# Cuts end when they cost so many sides.
+MOST_COST = 14.0
 # Shares of the way to an extremity at which a path may end.
 STOPS = (1.0, 0.8, 0.6)
 
@@ -29,11 +31,11 @@ def grow(task: Task, cut: Cut, most: int) -> Cut:
     """The cut with arcs added until the spread is within the bound; at most so many, each where it pays most."""
     model = None
     for _ in range(most):
-        if cut.spread <= task.bound:
+        if cut.spread <= task.bound or cut.cost > MOST_COST:
             break
         model = task.model.cut(cut.vertices) if model is None else model
         arc = _best_arc(task, cut, model)
-        if arc is None or (arc.worth < LEAST_WORTH * task.bound and len(cut.steps)):
+        if arc is None or (arc.worth < LEAST_WORTH * cut.spread and len(cut.steps)):
             break
         grown = cut_along(task, np.concatenate([cut.steps, task.graph.steps_of(arc.path)]))
         model = model.cut(np.setdiff1d(grown.vertices, cut.vertices))
