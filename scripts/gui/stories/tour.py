@@ -7,10 +7,10 @@ import bpy
 # Places in an editor, pixels from its upper right corner, before and after the box with figures has come.
 TAB = (10, 213)
 UNWRAP = (127, 105)
-AREA = (127, 432)
-SHEAR = (68, 432)
-OFF = (185, 432)
-HISTOGRAM = (81, 485)
+AREA = (127, 453)
+SHEAR = (68, 453)
+OFF = (185, 453)
+HISTOGRAM = (81, 506)
 # The redo panel, pixels of the window from its lower left corner.
 REDO = (150, 104)
 
