@@ -367,3 +367,28 @@ def test_poll_names_the_modes():
     bpy.ops.object.mode_set(mode="SCULPT")
     assert not bpy.ops.uv.omt_unwrap.poll()
     assert "Object Mode" in scenes.error_of(bpy.ops.uv.omt_unwrap)
+
+
+def ball(name="Ball"):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=12)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+def seams_of(obj):
+    return {tuple(sorted(e.vertices)) for e in obj.data.edges if e.use_seam}
+
+
+def test_what_was_cut_is_marked_only_on_request():
+    obj = ball()
+    unwrap()
+    first = scenes.uv_of(obj)
+    assert not seams_of(obj)
+    unwrap(mark_seams=True)
+    marked = seams_of(obj)
+    assert marked and (scenes.uv_of(obj) == first).all()
+    # Seams that are there now are followed, and not added to.
+    unwrap(mark_seams=True, max_shear=1.05)
+    assert seams_of(obj) == marked
+    unwrap(mark_seams=True, max_shear=1.05, cut_further=True)
+    assert seams_of(obj) > marked
