@@ -42,15 +42,11 @@ class BoundedShear:
     ----------
     prepared : the charts, and all cuts
     maps : of the charts
-    history : length of the cuts and mean shear of the whole surface, after each round
-    missed (k,) : charts whose mean shear is above the bound
-    warnings : which those are, and what helps
+    warnings : which of them miss it, and what helps
     """
 
     prepared: DiskCharts
     maps: list[ChartMap]
-    history: tuple[tuple[float, float], ...]
-    missed: np.ndarray
     warnings: tuple[str, ...]
 
 
@@ -75,16 +71,14 @@ class ShearSearch:
     def first(self) -> SeamSearch:
         """The search to begin with."""
         spread = np.full(self._count, SPREAD_OF_SHEAR * np.log(self.shear.bound) ** 2)
-        density = _polygon_density(self.surface, self.target)
-        return SeamSearch(spread, self.surface, self.costs, density=density, further=self.shear.further)
+        return SeamSearch(spread, self.surface, self.costs, density=self._density, further=self.shear.further)
 
     def again(self, cuts: np.ndarray, charts: list[Chart], missed: list[int], mean: np.ndarray) -> Steps[DiskCharts]:
         """The charts with the edges cut (k,2), and further those that missed the bound with this mean shear."""
         share = np.full(self._count, np.inf)
         for k in missed:
             share[charts[k].faces] = MARGIN * (np.log(self.shear.bound) / np.log(mean[k])) ** 2
-        density = _polygon_density(self.surface, self.target)
-        search = SeamSearch(share, self.surface, self.costs, relative=True, density=density, further=True)
+        search = SeamSearch(share, self.surface, self.costs, relative=True, density=self._density, further=True)
         surface = replace(self.surface, seams=np.concatenate([self.surface.seams, cuts]))
         return disk_charts(surface, self.faces, search=search, **self.cutting)
 
@@ -95,6 +89,10 @@ class ShearSearch:
     @cached_property
     def _costs(self) -> SeamCosts:
         return seam_costs(self.surface, self.shear.preferences, self.faces)
+
+    @cached_property
+    def _density(self) -> np.ndarray | None:
+        return _polygon_density(self.surface, self.target)
 
     @property
     def _count(self) -> int:
@@ -115,16 +113,16 @@ def bound_shear(
     prepared, bound = first, search.shear.bound
     first_cuts = _cuts(first)
     cuts, length = first_cuts.edges, first_cuts.length
-    history: list[tuple[float, float]] = []
+    rounds = 0
     while True:
         charts = prepared.charts
         mean = np.array([_mean_shear(c, m) for c, m in zip(charts, maps, strict=True)])
-        history.append((length, _overall(charts, mean)))
+        rounds += 1
         missed = np.flatnonzero(mean > bound)
         searched = [k for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
-        if len(history) == MOST_ROUNDS or not searched:
+        if rounds == MOST_ROUNDS or not searched:
             break
-        begin = 1 - 0.5 ** (len(history) - 1)
+        begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
         again = search.again(cuts, charts, searched, mean)
         prepared = yield from part_of(again, begin, width * SEARCHING)
@@ -137,7 +135,7 @@ def bound_shear(
     prepared = DiskCharts(charts, replace(first_cuts, edges=cuts, length=length), first.warnings)
     by_hand = np.array([k not in searched for k in missed], dtype=bool)
     warnings = tuple(_warnings(mean[missed], by_hand, bound))
-    return BoundedShear(prepared=prepared, maps=maps, history=tuple(history), missed=missed, warnings=warnings)
+    return BoundedShear(prepared, maps, warnings)
 
 
 def _cuts(prepared: DiskCharts) -> Cuts:
@@ -190,8 +188,3 @@ def _mean_shear(chart: Chart, chart_map: ChartMap) -> float:
     energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
     area = polygon_areas(chart.vertices, chart.triangles, chart.faces)
     return float(area @ (energy + np.sqrt(energy**2 - 1)) / area.sum())
-
-
-def _overall(charts: list[Chart], mean: np.ndarray) -> float:
-    area = np.array([polygon_areas(c.vertices, c.triangles, c.faces).sum() for c in charts])
-    return float(area @ mean / area.sum())

@@ -93,10 +93,7 @@ def _outwards(graph: PathGraph, steps: np.ndarray) -> list[tuple[np.ndarray, int
     """Stretches of a cut with their far ends, each after those between it and the boundary."""
     if len(steps) == 0:
         return []
-    n = len(graph.boundary)
-    a, b = graph.ends[steps].T
-    tree = csr_matrix((graph.cost[steps], (a, b)), shape=(n, n))
-    depth = dijkstra(tree, directed=False, indices=np.flatnonzero(graph.boundary), min_only=True)
+    depth = graph.depth(steps)
     found = []
     for stretch in stretches(graph, steps):
         vertices = np.unique(graph.ends[stretch])

@@ -47,14 +47,17 @@ class PathGraph:
         cost, _ = self.paths_from(np.flatnonzero(self.boundary))
         return float(np.isfinite(cost[self.in_plane]).mean()) >= REACHED
 
+    def depth(self, steps: np.ndarray) -> np.ndarray:
+        """Cost (n,) of the way from the boundary along steps (k,) alone."""
+        n = len(self.boundary)
+        tree = csr_matrix((self.cost[steps], self.ends[steps].T), shape=(n, n))
+        return dijkstra(tree, directed=False, indices=np.flatnonzero(self.boundary), min_only=True)
+
     def is_open(self, steps: np.ndarray) -> bool:
         """Whether steps (k,) from the boundary outwards never come back to the mirror plane."""
         if not self.in_plane.any():
             return True
-        n = len(self.boundary)
-        tree = csr_matrix((self.cost[steps], self.ends[steps].T), shape=(n, n))
-        depth = dijkstra(tree, directed=False, indices=np.flatnonzero(self.boundary), min_only=True)
-        ends = self.ends[steps]
+        depth, ends = self.depth(steps), self.ends[steps]
         first, last = np.take_along_axis(ends, np.argsort(depth[ends], axis=1), axis=1).T
         return not (~self.in_plane[first] & self.in_plane[last]).any()
 
