@@ -119,9 +119,10 @@ def share(text: str) -> float:
 
 
 def shear(text: str) -> float:
+    """A bound of the shear, or 0 for none."""
     value = number(text)
-    if value <= 1:
-        raise argparse.ArgumentTypeError(f"{text} is not greater than 1, which is no shear")
+    if value and value <= 1:
+        raise argparse.ArgumentTypeError(f"{text} is not greater than 1, which is no shear, nor 0 for no bound")
     return value
 
 
