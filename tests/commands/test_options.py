@@ -7,11 +7,12 @@ import argparse
 import pytest
 
 GOOD = [("share", "0", 0.0), ("share", "1", 1.0), ("shear", "1.01", 1.01), ("shear", "0", 0.0), ("margin", "0", 0.0),
-        ("tile", "1999", 1999), ("tile", "1001", 1001), ("texture_size", "1", 1), ("positive", "1e-9", 1e-9), ("angle", "180", 180.0),
-        ("vertices", "357913941", 357913941), ("faces", "1", 1)]  # fmt: skip
+        ("tile", "1999", 1999), ("tile", "1001", 1001), ("texture_size", "1", 1), ("positive", "1e-9", 1e-9),
+        ("angle", "180", 180.0), ("vertices", "357913941", 357913941), ("faces", "1", 1)]  # fmt: skip
 BAD = [("share", "-0.1"), ("share", "nan"), ("shear", "1"), ("shear", "0.5"), ("shear", "-1"), ("shear", "inf"),
-       ("margin", "-1"), ("margin", "nan"), ("tile", "1000"), ("tile", "2000"), ("texture_size", "0"), ("positive", "0"), ("positive", "-inf"),
-       ("angle", "181"), ("angle", "nan"), ("vertices", "0"), ("vertices", "357913942"), ("faces", "-1"),
+       ("margin", "-1"), ("margin", "nan"), ("tile", "1000"), ("tile", "2000"), ("texture_size", "0"),
+       ("positive", "0"), ("positive", "-inf"), ("angle", "181"), ("angle", "nan"),
+       ("vertices", "0"), ("vertices", "357913942"), ("faces", "-1"),
        ("gigabytes", "0.4")]  # fmt: skip
 
 
