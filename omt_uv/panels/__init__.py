@@ -1,7 +1,7 @@
 """Menus, the sidebar's tab and the preferences: they draw, and run nothing themselves.
 
 Imports operators, session, display and blender.
-Main names: OMTUVPreferences, MainPanel, SectionPanel, draw_unwrap.
+Main names: OMTUVPreferences, Section, TabPanel, draw_unwrap.
 """
 
 from ..solver.lazy import lazy
@@ -10,5 +10,6 @@ __getattr__, __all__ = lazy(
     __name__,
     menus="draw_unwrap",
     preferences="OMTUVPreferences",
-    sidebar="MainPanel SectionPanel",
+    section="Section operator_section",
+    sidebar="MainPanel TabPanel",
 )
