@@ -5,8 +5,11 @@ from __future__ import annotations
 import bpy
 
 from .blender.versions import register_command, unregister_command
-from .display import overlay
+from .display import colour_bar, overlay
 from .operators.distortion import UV_OT_omt_histogram, UV_OT_omt_measure, UV_OT_omt_overlay
+from .operators.inspection.checker import UV_OT_omt_checker, UV_OT_omt_checker_remove
+from .operators.inspection.remedy import UV_OT_omt_notices, UV_OT_omt_remedy
+from .operators.inspection.worst import UV_OT_omt_worst
 from .operators.live import UV_OT_omt_live
 from .operators.magnify import UV_OT_omt_magnify
 from .operators.preset import UV_OT_omt_preset
@@ -21,6 +24,7 @@ from .operators.weights import OBJECT_OT_omt_weights
 from .panels.menus import draw_remesh, draw_unwrap, draw_weights, menus, remesh_menus, weights_menus
 from .panels.preferences import OMTUVPreferences, apply_soon
 from .panels.sidebar import PANELS
+from .session import last_run
 from .session.presets import register_folder, unregister_folder
 
 CLASSES = (
@@ -37,6 +41,11 @@ CLASSES = (
     UV_OT_omt_histogram,
     UV_OT_omt_density_get,
     UV_OT_omt_density_set,
+    UV_OT_omt_checker,
+    UV_OT_omt_checker_remove,
+    UV_OT_omt_worst,
+    UV_OT_omt_remedy,
+    UV_OT_omt_notices,
     UV_OT_omt_preset,
     WM_OT_omt_copy_report,
     OMTUVPreferences,
@@ -76,6 +85,8 @@ def unregister() -> None:
 def _clear(_) -> None:
     """What lives outside of classes and menus."""
     overlay.forget()
+    colour_bar.forget()
+    last_run.forget()
     unregister_folder()
 
 

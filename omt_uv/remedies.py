@@ -42,6 +42,38 @@ ADVICE: dict[str, str] = {
     errors.TURN_OUTSIDE: "Use Mesh > Normals > Recalculate Outside",
 }
 
+# What a button can do at once: identifier, label, description.
+ACTIONS = (
+    ("CUT_FURTHER", "Cut Further", "Unwrap again, and add seams to islands whose seams were marked by hand, too"),
+    ("NORMALS", "Recalculate Normals", "Turn faces over until all of them look outside"),
+    ("MERGE", "Merge by Distance", "Join vertices that lie on one another"),
+    ("DISSOLVE", "Degenerate Dissolve", "Dissolve faces without area and edges without length"),
+)
+_ACTION_FOR: dict[type[errors.MeshError], str] = {
+    errors.OrientationError: "NORMALS",
+    errors.ZeroAreaFaceError: "DISSOLVE",
+    errors.RepeatedVertexError: "DISSOLVE",
+    errors.TouchingBoundariesError: "MERGE",
+    errors.CrowdedError: "MERGE",
+}
+_ACTION_ADVISED: dict[str, str] = {
+    errors.MERGE: "MERGE",
+    errors.MERGING: "MERGE",
+    errors.CUT_FURTHER: "CUT_FURTHER",
+    errors.DISSOLVE: "DISSOLVE",
+    errors.TURN_OUTSIDE: "NORMALS",
+}
+
+
+def action_for(error: errors.MeshError) -> str:
+    """The action that mends what an error complains about, or an empty text."""
+    return next((action for kind, action in _ACTION_FOR.items() if isinstance(error, kind)), "")
+
+
+def action_advised(warning: str) -> str:
+    """The action that a warning of the solver, in its own words, advises, or an empty text."""
+    return next((action for words, action in _ACTION_ADVISED.items() if words in warning), "")
+
 
 def explain(error: errors.MeshError) -> str:
     """Say cause, place and remedy of an error, the remedy by the table unless it was given for this very case."""

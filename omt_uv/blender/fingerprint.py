@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..pipelines.attributes import TYPES
+from .versions import uv_values
 
 # Blender's own caches, made and dropped as it likes.
 _DERIVED = (".select_", ".uv_select_", ".hide_")
@@ -31,6 +32,37 @@ def fingerprint(obj: bpy.types.Object) -> bytes:
     finally:
         bpy.data.meshes.remove(copy)
     return digest.digest()
+
+
+def uv_mark(obj: bpy.types.Object) -> bytes:
+    """A hash of what figures of the active UVs depend on: scale, positions, faces, and these UVs."""
+    digest = hashlib.blake2b(digest_size=16)
+    digest.update(repr([round(x, 6) for x in obj.matrix_world.to_scale()]).encode())
+    mesh = obj.data
+    if obj.mode == "EDIT":
+        obj.update_from_editmode()
+        mesh = obj.data.copy()
+    try:
+        _digest_uv(mesh, digest)
+    finally:
+        if mesh is not obj.data:
+            bpy.data.meshes.remove(mesh)
+    return digest.digest()
+
+
+def _digest_uv(mesh: bpy.types.Mesh, digest) -> None:
+    fields = [
+        (mesh.vertices, "co", 3 * len(mesh.vertices), np.float32),
+        (mesh.loops, "vertex_index", len(mesh.loops), np.int32),
+        (mesh.polygons, "loop_start", len(mesh.polygons), np.int32),
+    ]
+    if mesh.uv_layers.active is not None:
+        collection, field = uv_values(mesh, mesh.uv_layers.active.name)
+        fields.append((collection, field, 2 * len(mesh.loops), np.float32))
+    for collection, name, count, dtype in fields:
+        values: np.ndarray = np.zeros(count, dtype)
+        collection.foreach_get(name, values)
+        digest.update(values.tobytes())
 
 
 def _digest(mesh: bpy.types.Mesh, digest) -> None:

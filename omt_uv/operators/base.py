@@ -15,7 +15,7 @@ import bpy
 from ..display import overlay
 from ..errors import UserError
 from ..session import last_run, run
-from ..settings import DEFAULT_TEXTURE_SIZE
+from ..settings import DEFAULT_MAX_SHEAR, DEFAULT_TEXTURE_SIZE
 
 # What Blender makes of infinity is above, and nothing that is meant.
 LARGEST = 3e38
@@ -140,24 +140,30 @@ def complaints(about=None, objects: Sequence = (), others: tuple[type[Exception]
 
 def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Complaint) -> set[str]:
     """Select what is wrong, report it, and cancel."""
+    names, action = [obj.name for obj in last_run.chosen_objects(context)], ""
     if complaint.error is not None:
         from ..blender.mesh import select_culprits
+        from ..remedies import action_for
 
         select_culprits(context, complaint.obj, complaint.error)
+        names, action = [complaint.obj.name] if complaint.obj else names, action_for(complaint.error)
     last_run.state.error = str(complaint)
+    notice = last_run.Notice(str(complaint), action)
+    last_run.keep(last_run.Summary(operator.bl_label, (), (notice,), tuple(names), refused=True))
     operator.report({"ERROR"}, str(complaint))
     return {"CANCELLED"}
 
 
 def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, str]]) -> None:
     """Report warnings, pairs of an index into objects (-1: of none) and a text, each once."""
-    from ..remedies import advise
+    from ..remedies import action_advised, advise
 
-    for (index, text), count in Counter((index, advise(text)) for index, text in warnings).items():
+    for (index, raw), count in Counter(warnings).items():
         name = f"{objects[index].name}: " if index >= 0 else ""
         several = f" ({count} islands)" if count > 1 else ""
-        last_run.state.warnings.append(text + several)
-        operator.report({"WARNING"}, f"{name}{text}{several}")
+        text = advise(raw) + several
+        last_run.state.notices.append(last_run.Notice(text, action_advised(raw)))
+        operator.report({"WARNING"}, name + text)
 
 
 def _is_finite(value) -> bool:
@@ -280,31 +286,34 @@ class SolverOperator:
 
     def _finish(self, context: bpy.types.Context, result, seconds: float) -> None:
         """Write the result, and keep what the panel says about it."""
-        last_run.state.warnings.clear()
+        last_run.state.notices.clear()
         self.finish(context, result)
-        rows: tuple = ()
+        found = last_run.Figures()
         if self.makes_uvs:
             pairs = read_objects(context)
-            scale = context.scene.unit_settings.scale_length
-            rows = last_run.figures([r for _, r in pairs], getattr(self, "texture_size", DEFAULT_TEXTURE_SIZE), scale)
-            rows += self._gate([r for _, r in pairs])
+            readings = [reading for _, reading in pairs]
+            found = figures_of(context, readings, self)
+            overlap = self._gate(readings)
+            found = last_run.Figures(found.rows + overlap.rows, found.beyond | overlap.beyond)
             overlay.refresh(context, pairs)
         told = {name for name, _ in self.said}
-        rows = (*self.said, *(row for row in rows if row[0] not in told), ("Time", last_run.seconds(seconds)))
-        last_run.state.summary = last_run.Summary(self.bl_label, rows, tuple(last_run.state.warnings))
+        rows = (*self.said, *(row for row in found.rows if row[0] not in told), ("Time", last_run.seconds(seconds)))
+        names = tuple(obj.name for obj in last_run.chosen_objects(context))
+        notices = tuple(last_run.state.notices)
+        last_run.keep(last_run.Summary(self.bl_label, rows, notices, names, found.beyond - told))
         last_run.state.error = ""
 
     def stacks(self) -> bool:
         """Whether islands may lie on one another, so that only overlap inside of them is told."""
         return False
 
-    def _gate(self, readings: list) -> tuple[tuple[str, str], ...]:
+    def _gate(self, readings: list) -> last_run.Figures:
         """Tell of folds and overlap in the UVs that were written; a row for the panel."""
         from ..pipelines.gate import gate
 
         found = gate(readings, apart=self.stacks())
         warn(self, [], [(-1, text) for text in found.warnings()])
-        return (("Overlap", f"{100 * found.overlap:.2g} %"),)
+        return last_run.overlap_row(found.overlap)
 
     def _advance(self, context: bpy.types.Context) -> set[str]:
         current, ended = run.current, True
@@ -327,6 +336,14 @@ class SolverOperator:
             if ended:
                 self.cancel(context)
         return {"FINISHED"}
+
+
+def figures_of(context: bpy.types.Context, readings: list, operator=None) -> last_run.Figures:
+    """Figures of the active UVs of readings, for the texture and within the bound that an operator has."""
+    scale = context.scene.unit_settings.scale_length
+    bound = getattr(operator, "max_shear", 0.0)
+    size = getattr(operator, "texture_size", DEFAULT_TEXTURE_SIZE)
+    return last_run.figures(readings, size, scale, bound if bound > 1 else DEFAULT_MAX_SHEAR)
 
 
 class QuickOperator:

@@ -7,8 +7,7 @@ from bpy.props import EnumProperty
 
 from ..display import overlay
 from ..session import last_run
-from ..settings import DEFAULT_TEXTURE_SIZE
-from .base import QuickOperator, check_all_local, read_objects
+from .base import QuickOperator, check_all_local, figures_of, read_objects
 
 KINDS = (
     ("NONE", "Off", "No colours; attributes and shading are as before", "X", 0),
@@ -28,10 +27,15 @@ class UV_OT_omt_measure(QuickOperator, bpy.types.Operator):
     def act(self, context: bpy.types.Context) -> None:
         from ..pipelines.distortion import measure_readings, on_subdivision, summary
 
-        readings = [reading for _, reading in read_objects(context)]
-        self.report({"INFO"}, summary(measure_readings(readings), on_subdivision(readings)))
-        rows = last_run.figures(readings, DEFAULT_TEXTURE_SIZE, context.scene.unit_settings.scale_length)
-        last_run.state.summary = last_run.Summary(self.bl_label, rows)
+        pairs = read_objects(context)
+        readings = [reading for _, reading in pairs]
+        measured = measure_readings(readings)
+        self.report({"INFO"}, summary(measured, on_subdivision(readings)))
+        found, overlap = figures_of(context, readings), last_run.overlap_row(measured.overlap or 0.0)
+        names = tuple(obj.name for obj, _ in pairs)
+        last_run.keep(
+            last_run.Summary(self.bl_label, found.rows + overlap.rows, (), names, found.beyond | overlap.beyond)
+        )
 
 
 class UV_OT_omt_overlay(QuickOperator, bpy.types.Operator):

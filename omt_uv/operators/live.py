@@ -9,8 +9,7 @@ import bpy
 from ..display import overlay
 from ..session import last_run
 from ..session.run import Disturbed
-from ..settings import DEFAULT_TEXTURE_SIZE
-from .base import Complaint, check_all_local, complaints, read_objects, ready, tell
+from .base import Complaint, check_all_local, complaints, figures_of, read_objects, ready, tell
 
 if TYPE_CHECKING:
     from ..session.live import Session
@@ -117,8 +116,8 @@ def _show_figures(title: str, context: bpy.types.Context) -> None:
     except Complaint:
         # The objects are gone, or nothing is selected any more: there is nothing to show.
         return
-    scale = context.scene.unit_settings.scale_length
-    rows = last_run.figures([reading for _, reading in pairs], DEFAULT_TEXTURE_SIZE, scale)
-    last_run.state.summary = last_run.Summary(title, rows)
-    if rows:
+    found = figures_of(context, [reading for _, reading in pairs])
+    names = tuple(obj.name for obj, _ in pairs)
+    last_run.keep(last_run.Summary(title, found.rows, (), names, found.beyond))
+    if found.rows:
         overlay.refresh(context, pairs)

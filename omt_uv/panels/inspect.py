@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..display import overlay
+from ..display import colour_bar, overlay
 from ..operators.distortion import HISTOGRAM, KINDS
+from ..operators.inspection.worst import FIGURES
 from .section import Section, settings_of, split
 
 SHOW = "uv.omt_overlay"
@@ -16,16 +17,38 @@ def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     row = layout.row(align=True)
     for name, title, _, _, _ in KINDS:
         row.operator(SHOW, text=title, depress=overlay.kind() == name).show = name
-    if overlay.kind() == "AREA":
-        layout.label(text="Blue: less, red: more", icon="INFO")
-    elif overlay.kind() == "SHEAR":
-        layout.label(text="Dark: none, yellow: 4x", icon="INFO")
+    draw_bar(layout, overlay.kind())
+    row = layout.row(align=True)
+    row.operator("uv.omt_checker", text="Checker", icon="TEXTURE")
+    row.operator("uv.omt_checker_remove", text="", icon="X")
     row = layout.row(align=True)
     row.operator("uv.omt_measure", text="Measure", icon="DRIVER_DISTANCE")
     row.operator("uv.omt_histogram", text="Histogram", icon="RNDCURVE")
+    row = layout.row(align=True)
+    row.label(text="Worst Faces")
+    for name, title, _ in FIGURES:
+        row.operator("uv.omt_worst", text=title).figure = name
     image = bpy.data.images.get(HISTOGRAM)
     if image is not None and image.preview is not None:
         layout.template_icon(icon_value=image.preview.icon_id, scale=7.0)
+
+
+def draw_bar(layout: bpy.types.UILayout, kind: str) -> None:
+    """What the colours mean; as high as it is without colours, so that nothing moves."""
+    column = layout.column(align=True)
+    bar = column.row(align=True)
+    bar.alignment = "CENTER"
+    ends = column.split(factor=0.33)
+    if kind not in colour_bar.ENDS:
+        bar.label(text="")
+        ends.label(text="")
+        return
+    for icon in colour_bar.icons(kind):
+        bar.label(text="", icon_value=icon)
+    for text, side in zip(colour_bar.ENDS[kind], ("LEFT", "CENTER", "RIGHT"), strict=True):
+        place = ends.row()
+        place.alignment = side
+        place.label(text=text)
 
 
 def draw_density(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -39,5 +62,11 @@ def draw_density(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     row.operator(SET_DENSITY, text="Set", icon="CHECKMARK")
 
 
-SECTION = Section("inspect", "Inspect", draw, (SHOW, "uv.omt_measure", "uv.omt_histogram"), is_open=True)
+SECTION = Section(
+    "inspect",
+    "Inspect",
+    draw,
+    (SHOW, "uv.omt_measure", "uv.omt_histogram", "uv.omt_checker", "uv.omt_worst"),
+    is_open=True,
+)
 DENSITY = Section("density", "Texel Density", draw_density, (SET_DENSITY,), parent="inspect")

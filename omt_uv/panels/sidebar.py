@@ -76,8 +76,9 @@ def _panels() -> list[type]:
 
 def _panel(prefix: str, space: str, place: int) -> type:
     section = SECTIONS[place]
-    body = {
-        "bl_idname": _name(prefix, section.name),
+    name = _name(prefix, section.name)
+    body: dict[str, object] = {
+        "bl_idname": name,
         "bl_space_type": space,
         "bl_label": section.title,
         "bl_options": set() if section.is_open else {"DEFAULT_CLOSED"},
@@ -86,7 +87,7 @@ def _panel(prefix: str, space: str, place: int) -> type:
     }
     if section.parent is not None:
         body["bl_parent_id"] = _name(prefix, section.parent)
-    return type(body["bl_idname"], (TabPanel if section.name else MainPanel, bpy.types.Panel), body)
+    return type(name, (TabPanel if section.name else MainPanel, bpy.types.Panel), body)
 
 
 def _name(prefix: str, section: str) -> str:

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..solver.errors import EmptyMeshError
-from ..solver.maps.distortion import Distortion, distortion
+from ..solver.maps.distortion import NEGLIGIBLE_AREA, Distortion, distortion, face_distortion
+from ..solver.maps.embedding import check_layout
+from ..solver.mesh.geometry import face_areas
 from .reading import Reading
 from .subdivision import evaluated
 
@@ -93,3 +95,36 @@ def summary(figures: Distortion, subdivided: bool = False) -> str:
 def _number(value: float | None) -> str:
     """A figure with three decimals, or none."""
     return "none" if value is None else f"{value:.3f}"
+
+
+def worst_faces(readings: Sequence[Reading], figure: str, share: float) -> list[np.ndarray]:
+    """Polygons (k,) of each reading whose UVs are worst, together at most `share` of the surface, at least one.
+
+    figure : AREA, how far the texture of a polygon is from what is due to it, in octaves; SHEAR; FOLDS, all folded ones
+
+    Raises
+    ------
+    EmptyMeshError : no polygon is chosen, or a mesh with chosen polygons has no UVs
+    NonFiniteError, ZeroAreaFaceError : see `solver.maps.distortion.distortion`
+    """
+    found = triangles_of(readings)
+    area = face_areas(found.positions, found.triangles)
+    polygons, first = np.unique(found.polygons, return_index=True)
+    if figure == "FOLDS":
+        real = area > NEGLIGIBLE_AREA * area.sum()
+        chosen = np.unique(found.polygons[real][check_layout(found.triangles[real], found.uv[real], True).folded])
+    else:
+        octaves, shear = face_distortion(found.positions, found.triangles, found.uv, found.polygons)
+        # All triangles of a polygon have its value.
+        order = np.argsort(-(np.abs(octaves) if figure == "AREA" else shear)[first], kind="stable")
+        weight = np.bincount(found.polygons, area)[polygons[order]]
+        count = int(np.searchsorted(np.cumsum(weight), share * area.sum(), side="right"))
+        chosen = polygons[order[: max(1, count)]]
+    ends = np.cumsum([len(reading.faces) for reading in readings])
+    return [np.sort(mine) - start for mine, start in _of_each(chosen, ends)]
+
+
+def _of_each(polygons: np.ndarray, ends: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    """Those of the polygons (k,) that belong to each reading, and the number of its first one."""
+    starts = [0, *ends[:-1].tolist()]
+    return [(polygons[(polygons >= a) & (polygons < b)], a) for a, b in zip(starts, ends.tolist(), strict=True)]

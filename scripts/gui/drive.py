@@ -106,7 +106,7 @@ class Story:
         """Let the panel say nothing."""
         from omt_uv.omt_uv.session import last_run
 
-        last_run.state.summary = None
+        last_run.forget()
 
     def figures(self, obj):
         """Area error, shear and folds of the active UVs, by the add-on's own measure."""

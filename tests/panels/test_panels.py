@@ -156,8 +156,33 @@ def test_the_result_of_the_last_run_is_shown(package):
     (main,) = (p for p in our_classes(package, bpy.types.Panel) if p.bl_idname == "VIEW3D_PT_omt_uv_result")
     labels = [entry.removeprefix("label ") for entry in draw(main) if entry.startswith("label ")]
     assert "Unwrap Area Preserving" in labels
-    for name in ("Area error", "Shear", "Folded faces", "Texel density", "Time"):
+    for name in ("Area error", "Shear", "Folded faces", "Texel density"):
         assert labels[labels.index(name) + 1][0].isdigit()
+    assert labels[labels.index("Unwrap Area Preserving") + 1].endswith(" s") and "Bump" in labels
+
+
+def test_the_result_is_as_high_whatever_it_says(package):
+    """Nothing below it moves: as many lines before the first run, after one, with warnings, after a refusal."""
+    (main,) = (p for p in our_classes(package, bpy.types.Panel) if p.bl_idname == "VIEW3D_PT_omt_uv_result")
+    state, last_run = package("session.last_run").state, package("session.last_run")
+
+    def lines():
+        return sum(entry.startswith("label ") for entry in draw(main)) + ("uv.omt_remedy" in draw(main))
+
+    last_run.forget()
+    high = lines()
+    scenes.bump()
+    bpy.ops.uv.omt_unwrap()
+    assert lines() == high
+    notices = tuple(last_run.Notice("far too long to fit into a line " * k, "MERGE") for k in (2, 9))
+    last_run.keep(last_run.Summary("Unwrap", (("Area error", "3 %"),), notices, ("Bump",)))
+    for state.shown in (0, 1):
+        assert lines() == high and "uv.omt_remedy" in draw(main)
+    scenes.select([])
+    scenes.error_of(bpy.ops.uv.omt_unwrap)
+    assert state.summary.refused and lines() == high
+    state.outdated = "the mesh has changed"
+    assert lines() == high and "uv.omt_measure" in draw(main)
 
 
 def test_a_run_shows_its_progress(package):
@@ -176,7 +201,7 @@ def test_a_run_shows_its_progress(package):
 def test_every_operator_is_in_a_menu(package):
     record = []
     package("panels.menus").draw_unwrap(types.SimpleNamespace(layout=Layout(record)), bpy.context)
-    hidden = {"uv.omt_preset", "wm.omt_copy_report"}
+    hidden = {"uv.omt_preset", "wm.omt_copy_report", "uv.omt_remedy", "uv.omt_notices"}
     names = {scenes.name_of(cls) for cls in our_classes(package, bpy.types.Operator)}
     package("panels.menus").draw_remesh(types.SimpleNamespace(layout=Layout(record)), bpy.context)
     assert names - hidden == set(record)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bpy
+
 import pytest
 import scenes
 
@@ -14,12 +16,81 @@ def test_seconds(package, value, text):
 def test_figures_do_not_depend_on_the_scale_of_the_uvs_but_the_texel_density_does(package):
     figures, read = package("session.last_run").figures, package("blender.mesh").read
     obj = scenes.bump()
-    assert figures([read(obj)], 1024, 1.0) == ()
+    assert figures([read(obj)], 1024, 1.0).rows == ()
     uv = scenes.seen_from_above(obj, 0.4)
     scenes.set_uv(obj, uv)
-    first = dict(figures([read(obj)], 1024, 1.0))
+    first = dict(figures([read(obj)], 1024, 1.0).rows)
     scenes.set_uv(obj, uv / 2)
-    second = dict(figures([read(obj)], 1024, 1.0))
+    second = dict(figures([read(obj)], 1024, 1.0).rows)
     density = [float(rows.pop("Texel density").split()[0]) for rows in (first, second)]
     assert first == second and first["Folded faces"] == "0" and first["Islands"] == "1"
     assert density[0] == pytest.approx(2 * density[1], rel=1e-3)
+
+
+@pytest.fixture
+def last_run(package):
+    yield package("session.last_run")
+    package("session.last_run").forget()
+
+
+def test_figures_that_hold_no_more_are_marked(last_run):
+    """After undo, another selection, a mesh or UVs that changed; and they hold again when it is as it was."""
+    obj, other = scenes.bump(), scenes.cube()
+    scenes.select([obj])
+    bpy.ops.uv.omt_unwrap()
+    assert last_run.look_again() == ""
+    scenes.select([other])
+    assert last_run.look_again() == "others are selected"
+    scenes.select([obj])
+    assert last_run.look_again() == ""
+    uv = scenes.uv_of(obj)
+    scenes.set_uv(obj, uv + 0.1)
+    assert last_run.look_again() == "the mesh has changed"
+    scenes.set_uv(obj, uv)
+    assert last_run.look_again() == ""
+    obj.data.vertices[0].co.z += 0.1
+    assert last_run.look_again() == "the mesh has changed"
+    bpy.data.objects.remove(obj)
+    assert last_run.look_again() == "an object is gone"
+
+
+def test_undo_marks_them(last_run):
+    scenes.bump()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.uv.omt_unwrap("EXEC_DEFAULT", True)
+    assert last_run.look_again() == ""
+    bpy.ops.ed.undo()
+    assert last_run.look_again()
+
+
+def test_colours_weights_and_modes_do_not(last_run):
+    obj = scenes.bump()
+    bpy.ops.uv.omt_unwrap()
+    bpy.ops.uv.omt_overlay(show="AREA")
+    bpy.ops.object.omt_weights()
+    scenes.edit(obj)
+    assert last_run.look_again() == ""
+    scenes.leave_edit()
+    bpy.ops.uv.omt_overlay(show="NONE")
+
+
+def test_a_file_that_is_loaded_has_no_result(last_run):
+    scenes.bump()
+    bpy.ops.uv.omt_unwrap()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert last_run.state.summary is None
+
+
+def test_a_check_mark_is_for_what_is_within_all_bounds(last_run, package):
+    icon_of = package("panels.result").icon_of
+    scenes.bump(height=0.1)
+    bpy.ops.uv.omt_unwrap()
+    good = last_run.state.summary
+    assert good.is_good and icon_of(good, "") == "CHECKMARK"
+    assert icon_of(good, "the mesh has changed") != "CHECKMARK"
+    bad = scenes.bump(height=4.0)
+    scenes.set_uv(bad, scenes.seen_from_above(bad))
+    scenes.select([bad])
+    bpy.ops.uv.omt_measure()
+    assert last_run.state.summary.beyond >= {"Area error", "Shear"}
+    assert icon_of(last_run.state.summary, "") != "CHECKMARK"

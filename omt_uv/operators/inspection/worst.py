@@ -1,0 +1,58 @@
+"""Select the faces whose UVs are worst: uv.omt_worst."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty
+
+from ..base import Complaint, QuickOperator, check_all_local, read_objects
+
+FIGURES = (
+    ("AREA", "Area", "Faces whose share of the texture is farthest from what is due to them"),
+    ("SHEAR", "Shear", "Faces that pull the texture most"),
+    ("FOLDS", "Folds", "Faces that are folded over, all of them"),
+)
+
+
+class UV_OT_omt_worst(QuickOperator, bpy.types.Operator):
+    """Select the faces whose UVs are worst, in Edit Mode"""
+
+    bl_idname = "uv.omt_worst"
+    bl_label = "Select Worst UV Faces"
+    bl_options = {"REGISTER", "UNDO"}
+
+    figure: EnumProperty(name="Figure", description="What is bad about them", items=FIGURES, default="AREA")
+    share: FloatProperty(
+        name="Share",
+        description="How much of the surface is selected, at most: the worst of it",
+        default=2.0,
+        min=0.01,
+        max=100.0,
+        soft_max=20.0,
+        subtype="PERCENTAGE",
+    )
+
+    def act(self, context: bpy.types.Context) -> None:
+        from ...blender.mesh import select_elements, select_mode
+        from ...pipelines.distortion import worst_faces
+
+        # What was selected before does not narrow the search: the next click finds the same faces.
+        pairs = read_objects(context) if context.mode == "OBJECT" else _whole(context)
+        check_all_local(pairs)
+        found = worst_faces([reading for _, reading in pairs], self.figure, self.share / 100)
+        count = sum(map(len, found))
+        if not count:
+            raise Complaint("No face is folded." if self.figure == "FOLDS" else "No face stands out.")
+        if context.mode == "OBJECT":
+            bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="DESELECT")
+        context.tool_settings.mesh_select_mode = select_mode("face")
+        for (obj, _), faces in zip(pairs, found, strict=True):
+            select_elements(obj, "face", faces)
+        self.report({"INFO"}, f"Selected {count} face{'' if count == 1 else 's'}")
+
+
+def _whole(context: bpy.types.Context) -> list:
+    """Objects in Edit Mode and their readings, with every face that is not hidden."""
+    bpy.ops.mesh.select_all(action="SELECT")
+    return read_objects(context)

@@ -1,0 +1,94 @@
+"""What a warning or a refusal advises is done by one click, on the objects it is about, and can be undone."""
+
+from __future__ import annotations
+
+import bpy
+
+import numpy as np
+import pytest
+import scenes
+
+
+def doubled():
+    """A patch in two halves whose vertices along the middle lie on one another."""
+    obj = scenes.bump(8, 6)
+    points = np.array([v.co for v in obj.data.vertices])
+    faces = np.array([p.vertices for p in obj.data.polygons])
+    right = points[faces].mean(1)[:, 0] > 0.5
+    bpy.data.objects.remove(obj)
+    return scenes.add(np.concatenate([points, points]), np.where(right[:, None], faces + len(points), faces))
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_vertices_that_lie_on_one_another_are_merged(mode):
+    obj = doubled()
+    count = len({v for p in obj.data.polygons for v in p.vertices})
+    if mode == "EDIT":
+        scenes.edit(obj)
+    assert bpy.ops.uv.omt_remedy(action="MERGE") == {"FINISHED"}
+    if mode == "EDIT":
+        scenes.leave_edit()
+    assert len({v for p in obj.data.polygons for v in p.vertices}) < count
+    assert len(obj.data.vertices) == 63 and len(obj.data.polygons) == 48
+
+
+def test_faces_that_look_inside_are_turned_over(package):
+    obj = scenes.cube()
+    faces = [list(p.vertices) for p in obj.data.polygons]
+    points = [v.co[:] for v in obj.data.vertices]
+    bpy.data.objects.remove(obj)
+    obj = scenes.add(points, [faces[0][::-1], *faces[1:]])
+    assert bpy.ops.uv.omt_unwrap() == {"FINISHED"}
+    told = package("session.last_run").state.summary.notices
+    assert "NORMALS" in {notice.action for notice in told}
+    assert bpy.ops.uv.omt_remedy(action="NORMALS") == {"FINISHED"}
+    middle = np.mean(points, axis=0)
+    assert all(p.normal.dot(p.center) > p.normal.dot(middle) for p in obj.data.polygons)
+
+
+def test_a_face_without_area_is_dissolved():
+    obj = scenes.add([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0, 0)], [(0, 4, 1), (0, 1, 2, 3)])
+    assert bpy.ops.uv.omt_remedy(action="DISSOLVE") == {"FINISHED"}
+    assert min(p.area for p in obj.data.polygons) > 0
+
+
+def test_cut_further_unwraps_again_with_more_seams(package):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=16)
+    obj = bpy.context.object
+    ends = np.array([e.vertices for e in obj.data.edges])
+    x = np.array([v.co for v in obj.data.vertices])
+    # A seam from pole to pole, by hand.
+    on = (np.abs(x[:, 1]) < 1e-6) & (x[:, 0] > -1e-6)
+    for k in np.flatnonzero(on[ends].all(1)).tolist():
+        obj.data.edges[k].use_seam = True
+    bpy.ops.uv.omt_unwrap(max_shear=1.2)
+    state = package("session.last_run").state
+    assert [notice.action for notice in state.summary.notices] == ["CUT_FURTHER"]
+    before = float(dict(state.summary.rows)["Shear"])
+    assert bpy.ops.uv.omt_remedy(action="CUT_FURTHER") == {"FINISHED"}
+    assert float(dict(state.summary.rows)["Shear"]) < before
+
+
+def test_it_acts_on_what_the_result_is_about_whatever_is_selected(package):
+    obj = doubled()
+    bpy.ops.uv.omt_unwrap()
+    other = scenes.cube("Other")
+    scenes.select([other])
+    assert bpy.ops.uv.omt_remedy(action="MERGE") == {"FINISHED"}
+    assert len(obj.data.vertices) == 63
+
+
+def test_without_objects_it_says_so(package):
+    package("session.last_run").forget()
+    assert "Select one or more mesh objects" in scenes.error_of(bpy.ops.uv.omt_remedy, action="MERGE")
+
+
+def test_the_notices_are_paged(package):
+    last_run = package("session.last_run")
+    assert not bpy.ops.uv.omt_notices.poll()
+    last_run.keep(last_run.Summary("Unwrap", notices=(last_run.Notice("One"), last_run.Notice("Two"))))
+    for shown in (1, 0):
+        assert bpy.ops.uv.omt_notices(whole=False) == {"FINISHED"}
+        assert last_run.state.shown == shown
+    assert bpy.ops.uv.omt_notices() == {"FINISHED"}
+    last_run.forget()
