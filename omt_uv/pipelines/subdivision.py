@@ -8,17 +8,17 @@ import numpy as np
 
 from ..solver.analysis.density import Target
 from ..solver.maps.distortion import distortion
-from ..solver.maps.energy import Elements
-from ..solver.mesh.charts import Chart
+from ..solver.maps.mirror_symmetry import MirrorSymmetry
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_loops
 from ..solver.parameterization.chart_map import ChartMap
 from ..solver.parameterization.chart_pins import CornerPins, pins_of_chart
+from ..solver.parameterization.mirrored_charts import mirror_partners
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps
-from ..solver.refinement.boundary_barrier import crossings
-from ..solver.subdivision.cage_refinement import refine_cage, subdivided_elements
+from ..solver.subdivision.cage_refinement import CageElements, refine_cage, subdivided_elements
+from ..solver.subdivision.cage_symmetry import CageChart, cage_symmetry
 from ..solver.subdivision.catmull_clark import (
     SHARP,
     Cage,
@@ -35,8 +35,13 @@ MOST_QUADS = 250_000
 # And where the UVs of the cage are refined for them; denser cages get the areas of their subdivided polygons alone,
 # whose UVs are smoothed by little.
 REFINED_QUADS = 40_000
-# The area's weight is no larger: what the cage cannot express would be bought by shear alone.
+# The area's weight at first, and the factors by which it grows while the error is above the goal. It ends where more
+# weight leaves more than this share of the error: what the cage cannot express would be bought by shear alone.
 AREA_WEIGHT = 100.0
+MOST_WEIGHT = 1e4
+GROWTH = 4.0
+GOAL = 0.01
+WORTHWHILE = 0.75
 # Area error on the subdivided surface that is worth a warning.
 INEXACT = 0.05
 COARSE = "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface"
@@ -170,33 +175,44 @@ def refined_on_subdivision(
     fixed = _fixed(found, pins, boundary)
     found = part.resized(found, fixed)
     uv = np.concatenate([m.uv for m in found.maps])
-    weight = min(AREA_WEIGHT, max(m.area_weight for m in found.maps))
-    elements = part.elements(found, uv, fixed)
-    refined = (yield from refine_cage(elements, part.mapping.matrix, uv, fixed, weight)).uv
-    again, stays = part.crossing(found, refined)
-    if again.any():
-        # With their outlines as they were.
-        start = np.where(again[:, None], uv, refined)
-        refined = (yield from refine_cage(elements, part.mapping.matrix, start, stays | fixed, weight)).uv
-    maps, area, fine_uv = [], np.zeros(len(part.chart)), part.mapping.matrix @ refined
+    asked = max(m.area_weight for m in found.maps)
+    refined = yield from _refined_in_stages(part, found, uv, fixed, asked)
+    maps, fine_uv = [], part.mapping.matrix @ refined
     for k, old in enumerate(found.maps):
         mine = part.chart == k
         new = refined[part.first[k] : part.first[k + 1]]
-        corners = fine_uv[part.mapping.quads[mine]]
-        area[mine] = _quad_areas(np.pad(corners, ((0, 0), (0, 0), (0, 1))))
-        maps.append(_with_figures(old, new, part.corners[mine], corners))
-    space = _quad_areas(part.corners)
-    error = float(np.abs(area / area.sum() - space / space.sum()).sum())
-    more = (COARSE.format(100 * error),) if weight == AREA_WEIGHT and error > INEXACT else ()
+        maps.append(_with_figures(old, new, part.corners[mine], fine_uv[part.mapping.quads[mine]]))
+    error = part.area_error(refined)
+    more = (COARSE.format(100 * error),) if asked >= AREA_WEIGHT and error > INEXACT else ()
     return replace(found, maps=maps, warnings=(*found.warnings, *more))
+
+
+def _refined_in_stages(
+    part: _MappedQuads, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray, asked: float
+) -> Steps[np.ndarray]:
+    """UVs (n,2) of all charts refined with growing weights of the area, as far as these are asked for and of use."""
+    elements, weight = part.elements(found, uv, fixed), min(AREA_WEIGHT, asked)
+    uv, symmetry = part.symmetry(found, uv, fixed)
+    outlines = [boundary_loops(c.disk)[0] + k for c, k in zip(found.charts, part.first, strict=False)]
+    refined, error = uv, np.inf
+    while True:
+        steps = refine_cage(elements, part.mapping.matrix, refined, fixed, weight, symmetry, outlines)
+        new = (yield from steps).uv
+        before, error = error, part.area_error(new)
+        if error > WORTHWHILE * before:
+            return refined
+        refined, weight = new, weight * GROWTH
+        if error <= GOAL or weight > min(MOST_WEIGHT, asked) or part.inner_error(new) > WORTHWHILE * error:
+            return refined
 
 
 @dataclass(frozen=True)
 class _MappedQuads:
-    """The quads of a subdivided surface that charts map: corners (q,4,3) in space, the chart (q,) of each, the UVs'
-    subdivision, and the first (k+1,) of each chart's vertices among all."""
+    """The quads of a subdivided surface that charts map: corners (q,4,3) in space, the polygon and the chart (q,) of
+    each, the UVs' subdivision, and the first (k+1,) of each chart's vertices among all."""
 
     corners: np.ndarray
+    polygon: np.ndarray
     chart: np.ndarray
     mapping: Subdivision
     first: np.ndarray
@@ -211,17 +227,41 @@ class _MappedQuads:
             maps.append(replace(old, uv=old.uv * np.sqrt(space[k] / covered)) if free else old)
         return replace(found, maps=maps)
 
-    def crossing(self, found: SurfaceMap, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (n,) bool of the charts whose outlines cross themselves in the UVs (n,2) but not in their maps, and
-        all others with those on such an outline."""
-        again, stays = np.zeros(len(uv), bool), np.ones(len(uv), bool)
-        for chart, old, start, end in zip(found.charts, found.maps, self.first, self.first[1:], strict=False):
-            if _crosses(uv[start:end], chart) and not _crosses(old.uv, chart):
-                again[start:end], stays[start:end] = True, False
-                stays[start + np.concatenate(boundary_loops(chart.disk))] = True
-        return again, stays
+    def area_error(self, uv: np.ndarray) -> float:
+        """Share of the area of the quads that is in the wrong place in UVs (n,2) of the cage."""
+        area, space = self._shares(uv)
+        return float(np.abs(area - space).sum())
 
-    def elements(self, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray) -> Elements:
+    def inner_error(self, uv: np.ndarray) -> float:
+        """What is left of that if every polygon of the cage gets its share."""
+        area, space = self._shares(uv)
+        of_polygon = [np.bincount(self.polygon, x)[self.polygon] for x in (area, space)]
+        return float(np.abs(area * (of_polygon[1] / np.maximum(of_polygon[0], 1e-300)) - space).sum())
+
+    def _shares(self, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shares (q,) that quads have of the area in UVs (n,2) of the cage, and in space."""
+        mapped = (self.mapping.matrix @ uv)[self.mapping.quads]
+        area, space = _quad_areas(np.pad(mapped, ((0, 0), (0, 0), (0, 1)))), _quad_areas(self.corners)
+        return area / area.sum(), space / space.sum()
+
+    def symmetry(
+        self, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray
+    ) -> tuple[np.ndarray, MirrorSymmetry | None]:
+        """UVs (n,2) about the axes of their charts, and their symmetry; as they are, and none, with fixed vertices."""
+        if fixed.any():
+            return uv, None
+        polygon_area = np.bincount(self.polygon, _quad_areas(self.corners), int(self.polygon.max()) + 1)
+        around = []
+        for chart in found.charts:
+            n = len(chart.vertices)
+            pairs = np.unique(np.repeat(chart.faces, 3).astype(np.int64) * n + chart.triangles.ravel())
+            around.append(np.bincount(pairs % n, polygon_area[pairs // n], n))
+        charts = [CageChart(c.vertices, c.triangles, c.faces, a) for c, a in zip(found.charts, around, strict=True)]
+        partners = mirror_partners(found.charts, [None] * len(charts))
+        symmetry, w = cage_symmetry(charts, uv @ [1, 1j], partners)
+        return np.column_stack([w.real, w.imag]), symmetry
+
+    def elements(self, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray) -> CageElements:
         """Those of the quads and of the triangles of the charts; a chart with fixed vertices keeps its area."""
         count = len(found.charts)
         owner = np.repeat(np.arange(count), np.diff(self.first))
@@ -252,7 +292,8 @@ def _mapped_part(
     mapping = subdivided_uv(vertex, start, ids, modifier, fine.levels)
     owner = np.repeat(np.arange(len(found.charts)), np.diff(first))
     chart = owner[vertex[start[:-1]]][mapping.polygon]
-    return _MappedQuads(fine.corners[whole[fine.subdivision.polygon]], chart, mapping, first)
+    mine = whole[fine.subdivision.polygon]
+    return _MappedQuads(fine.corners[mine], fine.subdivision.polygon[mine], chart, mapping, first)
 
 
 def _with_figures(old: ChartMap, uv: np.ndarray, corners: np.ndarray, mapped: np.ndarray) -> ChartMap:
@@ -283,12 +324,6 @@ def _fixed(found: SurfaceMap, pins: CornerPins | None, boundary: str) -> np.ndar
             fixed[boundary_loops(chart.disk)[0]] = True
         every.append(fixed)
     return np.concatenate(every)
-
-
-def _crosses(uv: np.ndarray, chart: Chart) -> bool:
-    """Whether the outline of a map (n,2) of a chart crosses itself."""
-    loops = boundary_loops(chart.disk)
-    return len(loops) > 0 and len(crossings(uv @ [1, 1j], loops[0])) > 0
 
 
 def _creases(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,26 @@ class MirrorSymmetry:
         own = np.where(self.flip, slope.conj() * self.factor, slope * self.factor.conj())
         n = len(slope)
         return np.bincount(self.representative, own.real, n) + 1j * np.bincount(self.representative, own.imag, n)
+
+    def unknowns(self, fixed: np.ndarray) -> csr_matrix:
+        """Both coordinates of every vertex in turn, (2n,k), by what may be chosen freely of a change of the map.
+
+        Representatives change, and what follows them; but not where one of these is fixed (n,) bool.
+        """
+        n = len(fixed)
+        stays = np.zeros(n, bool)
+        stays[self.representative[fixed]] = True
+        free = ~stays & ~self.follows
+        both, along = free & ~self.on_axis, free & self.on_axis & (self.line != 0)
+        columns = np.concatenate([np.flatnonzero(both), np.flatnonzero(both), np.flatnonzero(along)])
+        values = np.concatenate([np.full(both.sum(), 1.0 + 0j), np.full(both.sum(), 1j), self.line[along]])
+        chosen = coo_matrix((values, (columns, np.arange(len(columns)))), shape=(n, len(columns))).tocsr()
+        w = chosen[self.representative].tocoo()
+        w.data = self.factor[w.row] * np.where(self.flip[w.row], w.data.conj(), w.data)
+        rows, values = np.concatenate([2 * w.row, 2 * w.row + 1]), np.concatenate([w.data.real, w.data.imag])
+        found = csr_matrix((values, (rows, np.tile(w.col, 2))), shape=(2 * n, len(columns)))
+        found.eliminate_zeros()
+        return found
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear forms by vertices (k,q), rows of any shape (k,...,q), as forms by representatives."""

@@ -8,14 +8,20 @@ to 0 with the folds (Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov 2021
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import block_diag, csr_matrix, identity, vstack
+from scipy.sparse import csr_matrix, identity, kron, vstack
 from scipy.sparse.linalg import splu
 
 from ..maps.energy import Elements, face_derivatives_of, hat_gradients, squared, sum_at_vertices
+from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
 from ..progress import Progress, Steps
+from ..refinement.boundary_barrier import BoundaryBarrier, crossings, make_barrier
+from ..refinement.continuation import CONTACT_STRENGTH
+from ..refinement.hessian_blocks import Assembly
+from ..refinement.projected_newton import linear_forms
 
 # Corners of the four triangles of a quad, of both its diagonals, so that none prefers a direction.
 BOTH_DIAGONALS = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
@@ -49,57 +55,80 @@ class CageMap:
 
 
 @dataclass(frozen=True)
-class _CageProblem:
-    """Elements of the fine and the cage's triangles, the matrix to their vertices, and what is fixed (n,) bool."""
+class CageElements:
+    """What is asked of the triangles of fine quads (q,4), four of each, and of those of the cage after them."""
 
     faces: Elements
-    matrix: csr_matrix
-    free: np.ndarray
-    area_weight: float
+    quads: np.ndarray
 
-    def without(self, out: np.ndarray) -> _CageProblem:
-        """The problem without some triangles (m,) bool."""
-        f = self.faces
-        faces = Elements(f.triangles[~out], f.area[~out], f.gradient[~out], f.ratio[~out], f.weight[~out])
-        return replace(self, faces=faces)
+
+@dataclass(frozen=True)
+class _CageProblem:
+    """Elements of the fine and the cage's triangles and which of them count (m,) bool, the matrix to their vertices,
+    that from the unknowns to both coordinates (2n,k) of the map of the cage, and barriers of its outlines."""
+
+    elements: CageElements
+    counted: np.ndarray
+    matrix: csr_matrix
+    unknowns: csr_matrix
+    assembly: Assembly
+    area_weight: float
+    barriers: tuple[BoundaryBarrier, ...] = ()
+
+    @property
+    def faces(self) -> Elements:
+        """Those of all triangles; what does not count has no weight."""
+        return self.elements.faces
 
     def dets(self, w: np.ndarray) -> np.ndarray:
-        """Determinants (m,) over those that are asked for, of a map w (n,) complex of the cage."""
+        """Determinants (m',) over those that are asked for of what counts, of a map w (n,) complex of the cage."""
         a, b = self.faces.derivatives(self.matrix @ w)
-        return (squared(a) - squared(b)) / self.faces.ratio
+        return ((squared(a) - squared(b)) / self.faces.ratio)[self.counted]
 
     def energy(self, w: np.ndarray, eps: float) -> float:
         """The energy of a map w (n,) complex of the cage; with eps 0 infinite at a fold."""
         a, b = self.faces.derivatives(self.matrix @ w)
-        outer, inner = squared(a) / self.faces.ratio, squared(b) / self.faces.ratio
+        outer, inner = (squared(x)[self.counted] / self.faces.ratio[self.counted] for x in (a, b))
         det = outer - inner
         if eps == 0 and not (det > 0).all():
             return np.inf
         chi = _chi(det, eps)[0]
         value = (outer + inner) / chi - 1 + self.area_weight * ((det**2 + 1) / (2 * chi) - 1)
-        return float(self.faces.weight @ value)
+        return float(self.faces.weight[self.counted] @ value + sum(part.energy(w) for part in self.barriers))
 
     def newton(self, w: np.ndarray, eps: float) -> tuple[np.ndarray, float]:
         """The step (n,) complex of a map w (n,) of the cage and the decrease that it promises."""
-        n = len(w)
+        quads, n, fine = self.elements.quads, len(w), self.matrix.shape[0]
         d = face_derivatives_of(self.faces, *self.faces.derivatives(self.matrix @ w), *self._by_squares(w, eps))
-        gradient = self.matrix.T @ sum_at_vertices(self.faces, d.gradient, self.matrix.shape[0])
-        rows = _real_rows(d.rows, self.faces.triangles, self.matrix.shape[0])
-        both = block_diag([self.matrix, self.matrix], format="csr")
-        hessian = (both.T @ ((rows.T @ rows) @ both)).tocsc()
-        free = np.flatnonzero(np.tile(self.free, 2))
-        right = np.concatenate([gradient.real, gradient.imag])[free]
-        hessian = hessian[free][:, free]
+        gradient = self.matrix.T @ sum_at_vertices(self.faces, d.gradient, fine)
+        cut = 4 * len(quads)
+        rows = np.zeros((len(quads), 4, 4, 4), complex)
+        for k, corners in enumerate(BOTH_DIAGONALS):
+            rows[:, k, :, corners] = d.rows[k:cut:4].transpose(2, 0, 1)
+        blocks = _squares(d.rows[cut:]), _squares(rows.reshape(len(quads), 16, 4))
+        by_axes = kron(self.matrix, identity(2), "csr") @ self.unknowns
+        hessian = by_axes.T @ (self.assembly.matrix(blocks[0], np.zeros(2 * fine), blocks[1]) @ by_axes)
+        for part in self.barriers:
+            slope, vertices, forms = part.derivatives(w)
+            linear = linear_forms(vertices, forms, n) @ self.unknowns
+            gradient, hessian = gradient + slope, hessian + linear.T @ linear
+        right = self.unknowns.T @ gradient.view(float)
         shift = SHIFT * hessian.diagonal().mean()
-        step = np.zeros(2 * n)
-        system = (hessian + shift * identity(len(free))).tocsc()
+        system = (hessian + shift * identity(len(right))).tocsc()
         factor = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        step[free] = factor.solve(-right)
-        return step[:n] + 1j * step[n:], float(-right @ step[free])
+        solved = factor.solve(-right)
+        return (self.unknowns @ solved).view(complex), float(-right @ solved)
+
+    def bounded(self, w: np.ndarray, step: np.ndarray) -> float:
+        """The share of a step (n,) from a map w (n,) that lets no outline with a barrier touch itself."""
+        share = 1.0
+        for part in self.barriers:
+            share *= min(1.0, part.limit(w, share * step))
+        return share
 
     def _by_squares(self, w: np.ndarray, eps: float):
         """Derivatives of the energy by |a|^2 and |b|^2, those that the Hessian keeps, and its entries."""
-        ratio, weight = self.faces.ratio, self.faces.weight
+        ratio, weight = self.faces.ratio, self.faces.weight * self.counted
         a, b = self.faces.derivatives(self.matrix @ w)
         p, q = squared(a) / ratio, squared(b) / ratio
         d = p - q
@@ -127,18 +156,15 @@ def _chi(det: np.ndarray, eps: float) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return (det + root) / 2, (1 + det / root) / 2, eps**2 / (2 * root**3)
 
 
-def _real_rows(rows: np.ndarray, triangles: np.ndarray, n: int) -> csr_matrix:
-    """Linear forms (m,4,3) complex of n fine vertices as real rows (4m,2n) by u and v."""
-    m = len(triangles)
-    column = np.broadcast_to(triangles[:, None, :], (m, 4, 3)).reshape(-1, 3)
-    column = np.concatenate([column, column + n], axis=1)
-    value = np.concatenate([rows.real, -rows.imag], axis=2)
-    return csr_matrix((value.ravel(), column.ravel(), np.arange(0, 24 * m + 1, 6)), shape=(4 * m, 2 * n))
+def _squares(rows: np.ndarray) -> np.ndarray:
+    """Sums (k,2q,2q) of the squares of linear forms (k,r,q) complex, by both axes of each vertex in turn."""
+    real = np.stack([rows.real, -rows.imag], axis=3).reshape(*rows.shape[:2], -1)
+    return real.transpose(0, 2, 1) @ real
 
 
 def subdivided_elements(
     corners: np.ndarray, quads: np.ndarray, cage_corners: np.ndarray, cage_triangles: np.ndarray, scale: np.ndarray
-) -> Elements:
+) -> CageElements:
     """Elements of fine quads (q,4) with corners (q,4,3) in space, and of the cage's triangles (m,3) with corners
     (m,3,3), whose vertices come after those of the quads. Each shall have scale (q+m,) times its area in the plane.
 
@@ -154,40 +180,71 @@ def subdivided_elements(
     share = area / area[:fine].sum()
     share[fine:] *= CAGE_WEIGHT
     ratio = np.concatenate([np.repeat(scale[: len(quads)], 4), scale[len(quads) :]])
-    return Elements(triangles, share, gradient, ratio, share)
+    return CageElements(Elements(triangles, share, gradient, ratio, share), quads)
 
 
 def refine_cage(
-    faces: Elements, matrix: csr_matrix, uv: np.ndarray, fixed: np.ndarray, area_weight: float
+    elements: CageElements,
+    matrix: csr_matrix,
+    uv: np.ndarray,
+    fixed: np.ndarray,
+    area_weight: float,
+    symmetry: MirrorSymmetry | None = None,
+    outlines: Sequence[np.ndarray] = (),
 ) -> Steps[CageMap]:
     """Refine the UVs (n,2) of a cage for the elements of its subdivided surface (`subdivided_elements`).
 
-    matrix (n',n): from the cage to the fine vertices; fixed (n,) bool: vertices of the cage that stay
+    matrix (n',n): from the cage to the fine vertices; fixed (n,) bool: vertices of the cage that stay; symmetry: that
+    of the map, which is kept; outlines: boundaries (b,) of charts, none of which comes to cross itself
     """
-    problem = _CageProblem(faces, vstack([matrix, identity(len(uv))]).tocsr(), ~fixed, area_weight)
-    w, iterations, history = uv @ [1, 1j], 0, list[float]()
+    faces, w = elements.faces, uv @ [1, 1j]
+    problem = _CageProblem(
+        elements=elements,
+        counted=np.ones(len(faces.triangles), bool),
+        matrix=vstack([matrix, identity(len(uv))]).tocsr(),
+        unknowns=(symmetry or without_symmetry(len(uv))).unknowns(fixed),
+        assembly=Assembly(faces.triangles[4 * len(elements.quads) :], matrix.shape[0] + len(uv), None, elements.quads),
+        area_weight=area_weight,
+    )
+    watched = [loop for loop in outlines if len(crossings(w, loop)) == 0]
+    iterations, history = 0, list[float]()
     # The second of a quad's triangulations, and the cage.
     spare = np.arange(len(faces.triangles)) % 4 > 1
     spare |= faces.triangles.min(axis=1) >= matrix.shape[0]
-    for k in range(STEPS if not fixed.all() else 0):
+    for k in range(STEPS if problem.unknowns.shape[1] else 0):
         yield Progress("Subdivision", k / STEPS)
         if k == PATIENCE:
-            problem = problem.without(spare & (problem.dets(w) <= 0))
+            bad = np.zeros(len(spare), bool)
+            bad[problem.counted] = problem.dets(w) <= 0
+            problem = replace(problem, counted=~(spare & bad))
         least = float(problem.dets(w).min())
         eps = 0.0 if least > 0 else float(np.hypot(LEAST, REGULAR * least))
         before = problem.energy(w, eps)
-        step, decrease = problem.newton(w, eps)
-        size = 1.0
-        for _ in range(HALVINGS):
-            if problem.energy(w + size * step, eps) <= before - ARMIJO * size * decrease:
-                break
-            size /= 2
-        else:
+        new, decrease = _searched(problem, w, eps, before)
+        touching = [loop for loop in watched if new is not None and len(crossings(new, loop))]
+        if touching:
+            watched = [loop for loop in watched if not any(loop is other for other in touching)]
+            strength = CONTACT_STRENGTH / len(elements.quads)
+            barriers = tuple(make_barrier(w, loop, strength) for loop in touching)
+            problem = replace(problem, barriers=(*problem.barriers, *barriers))
+            continue
+        if new is None:
             break
-        w, iterations = w + size * step, k + 1
+        w, iterations = new, k + 1
         history = [*history, before] if eps == 0 else []
         slow = len(history) > LAST and history[-LAST - 1] - before < SLOW * before
         if slow or (eps == 0 and decrease < DONE * max(before, 1e-9)):
             break
     folds = int((problem.dets(w) <= 0).sum())
     return CageMap(np.column_stack([w.real, w.imag]), iterations, folds)
+
+
+def _searched(problem: _CageProblem, w: np.ndarray, eps: float, before: float) -> tuple[np.ndarray | None, float]:
+    """The map (n,) after a step from w (n,) of energy `before`, None without a decrease, and what was promised."""
+    step, decrease = problem.newton(w, eps)
+    size = problem.bounded(w, step)
+    for _ in range(HALVINGS):
+        if problem.energy(w + size * step, eps) <= before - ARMIJO * size * decrease:
+            return w + size * step, decrease
+        size /= 2
+    return None, decrease

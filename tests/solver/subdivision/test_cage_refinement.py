@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.boundary_barrier import crossings
 from omt_uv.solver.subdivision.cage_refinement import refine_cage, subdivided_elements
+from omt_uv.solver.subdivision.cage_symmetry import CageChart, cage_symmetry
 from omt_uv.solver.subdivision.catmull_clark import cage_of, straight_boundary, subdivide
 
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -59,3 +62,65 @@ def test_fixed_vertices_stay():
     found, _, plane = refined(uv, fixed, cage, quads, positions)
     assert (found.uv[fixed] == uv[fixed]).all() and (plane > 0).all()
     assert not np.allclose(found.uv[~fixed], uv[~fixed])
+
+
+def elements_of(cage, quads, positions, mapping):
+    corners = (subdivide(cage, 2).matrix @ positions)[mapping.quads]
+    triangles = quads[:, HALVES].reshape(-1, 3)
+    scale = np.ones(len(corners) + len(triangles))
+    return subdivided_elements(corners, mapping.quads, positions[triangles], triangles, scale)
+
+
+def test_a_symmetric_map_stays_symmetric_in_both_its_mirrors():
+    cage, quads, uv, positions = bump()
+    chart = CageChart(positions, quads[:, HALVES].reshape(-1, 3), np.repeat(np.arange(len(quads)), 2), np.ones(len(uv)))
+    symmetry, w = cage_symmetry([chart], uv @ [1, 1j], {})
+    assert len(np.unique(symmetry.representative)) < 0.4 * len(uv)
+    mapping = subdivide(straight_boundary(cage), 2)
+    start = np.column_stack([w.real, w.imag])
+    none = np.zeros(len(uv), bool)
+    elements = elements_of(cage, quads, positions, mapping)
+    found = drain(refine_cage(elements, mapping.matrix, start, none, 1000.0, symmetry)).uv
+    assert not np.allclose(found, start, atol=1e-3)
+    upside_down = np.arange(49).reshape(7, 7)[::-1].ravel()
+    assert np.abs(found[upside_down] * [1, -1] - found).max() < 1e-12
+
+
+def test_a_chart_that_is_the_image_of_another_follows_it():
+    _, quads, uv, positions = bump()
+    triangles, faces = quads[:, HALVES].reshape(-1, 3), np.repeat(np.arange(len(quads)), 2)
+    rough = positions + 0.02 * np.random.default_rng(0).random(positions.shape)
+    charts = [CageChart(p, triangles, faces, np.ones(len(uv))) for p in (rough, rough * [-1, 1, 1])]
+    w = uv @ [1, 1j]
+    symmetry, centred = cage_symmetry(charts, np.concatenate([w, 5 - w.conj()]), {1: (0, np.arange(len(uv)))})
+    change = symmetry.unknowns(np.zeros(2 * len(uv), bool)) @ np.arange(2.0 * len(uv))
+    assert symmetry.follows.sum() == len(uv)
+    assert np.allclose(centred[len(uv) :], -centred[: len(uv)].conj())
+    moved = change.view(complex)
+    assert np.allclose(moved[len(uv) :], -moved[: len(uv)].conj())
+
+
+def test_an_outline_does_not_come_to_cross_itself():
+    # A slit that opens by nothing: its sides would pass through each other.
+    columns, rows = 8, 4
+    vertex = np.arange((columns + 1) * (rows + 1)).reshape(rows + 1, columns + 1)
+    corner = np.stack([vertex[:-1, :-1], vertex[:-1, 1:], vertex[1:, 1:], vertex[1:, :-1]], axis=2)
+    y, x = np.divmod(np.arange(vertex.size), columns + 1)
+    count = vertex.size + columns // 2
+    copy = vertex.copy()
+    copy[rows // 2, : columns // 2] = np.arange(vertex.size, count)
+    upper = corner[rows // 2 :].copy()
+    upper[0, :, 0], upper[0, :, 1] = copy[rows // 2, :-1], copy[rows // 2, 1:]
+    quads = np.concatenate([corner[: rows // 2], upper]).reshape(-1, 4)
+    uv = np.column_stack([x, y]).astype(float)
+    positions = np.column_stack([uv, 0.6 * np.sin(uv[:, 0]) * np.cos(2 * uv[:, 1])])
+    positions = np.concatenate([positions, positions[vertex[rows // 2, : columns // 2]]])
+    uv = np.concatenate([uv, uv[vertex[rows // 2, : columns // 2]] + [0, 0.02]])
+    cage = cage_of(quads.ravel(), np.arange(0, 4 * len(quads) + 1, 4), count)
+    mapping = subdivide(straight_boundary(cage), 2)
+    loop = boundary_loops(quads[:, HALVES].reshape(-1, 3))[0]
+    elements = elements_of(cage, quads, positions, mapping)
+    none = np.zeros(count, bool)
+    free = drain(refine_cage(elements, mapping.matrix, uv, none, 1000.0)).uv
+    kept = drain(refine_cage(elements, mapping.matrix, uv, none, 1000.0, None, [loop])).uv
+    assert len(crossings(free @ [1, 1j], loop)) and not len(crossings(kept @ [1, 1j], loop))
