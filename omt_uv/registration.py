@@ -10,7 +10,7 @@ from .operators.distortion import UV_OT_omt_histogram, UV_OT_omt_measure, UV_OT_
 from .operators.inspection.checker import UV_OT_omt_checker, UV_OT_omt_checker_remove
 from .operators.inspection.remedy import UV_OT_omt_notices, UV_OT_omt_remedy
 from .operators.inspection.worst import UV_OT_omt_worst
-from .operators.live import UV_OT_omt_live
+from .operators.live import UV_OT_omt_live, UV_OT_omt_live_end
 from .operators.magnify import UV_OT_omt_magnify
 from .operators.preset import UV_OT_omt_preset
 from .operators.refine import UV_OT_omt_refine
@@ -35,6 +35,7 @@ CLASSES = (
     UV_OT_omt_seams,
     UV_OT_omt_sphere,
     UV_OT_omt_live,
+    UV_OT_omt_live_end,
     UV_OT_omt_measure,
     OBJECT_OT_omt_remesh,
     UV_OT_omt_overlay,

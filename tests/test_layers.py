@@ -62,7 +62,8 @@ ARROWS: dict[str, str] = {
     "files.in_place": "errors solver",
     "files": "errors supervision solver blender files.formats files.in_place",
     "display": "solver solver.mesh solver.maps pipelines blender",
-    "session": "errors settings solver solver.editing solver.parameterization pipelines blender",
+    "session": "errors settings solver solver.mesh solver.maps solver.editing solver.parameterization pipelines "
+    "blender",
     "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "

@@ -216,6 +216,17 @@ def corner_uvs(obj: bpy.types.Object, layer: str, corners: np.ndarray, face_star
     return np.array([edit.faces[f].loops[k][uv_layer].uv[:] for f, k in places], float).reshape(-1, 2)
 
 
+def uvs_at(obj: bpy.types.Object, layer: str, corners: np.ndarray, face_start: np.ndarray) -> np.ndarray:
+    """UVs (k,2) of a few corners (k,), in any mode; face_start (f+1,) as in Surface."""
+    return corner_uvs(obj, layer, corners, face_start) if obj.mode == "EDIT" else read_uv(obj.data, layer)[corners]
+
+
+def touched_faces(obj: bpy.types.Object) -> np.ndarray:
+    """Polygons (f,) bool of an object in Edit Mode with a selected vertex, that are not hidden."""
+    edit = bmesh.from_edit_mesh(obj.data)
+    return np.array([not f.hide and any(v.select for v in f.verts) for f in edit.faces], bool)
+
+
 def write_uv(obj: bpy.types.Object, layer: str, corners: np.ndarray, uv: np.ndarray) -> None:
     """Write uv (k,2) to the given corners (k,) of an existing layer; every other corner keeps its bits."""
     if obj.mode == "EDIT":

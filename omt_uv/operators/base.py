@@ -14,7 +14,7 @@ import bpy
 
 from ..display import overlay
 from ..errors import UserError
-from ..session import last_run, run
+from ..session import following, last_run, run
 from ..settings import DEFAULT_MAX_SHEAR, DEFAULT_TEXTURE_SIZE
 
 # What Blender makes of infinity is above, and nothing that is meant.
@@ -230,6 +230,7 @@ class SolverOperator:
     def execute(self, context: bpy.types.Context) -> set[str]:
         from ..solver.progress import drain
 
+        following.keep(context)
         manager, begin = context.window_manager, time.monotonic()
         manager.progress_begin(0, 100)
         try:
@@ -251,6 +252,7 @@ class SolverOperator:
         """Run the first slice, which is all for small meshes, and go on from a timer."""
         if run.current is not None:
             return tell(self, context, Complaint(f"{run.current.label} is still running. Wait, or cancel it by Esc."))
+        following.keep(context)
         try:
             check_numbers(self)
             objects = mesh_objects(context)
@@ -265,7 +267,7 @@ class SolverOperator:
         return state
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
+        if event.type == "ESC" and event.value == "PRESS":
             seconds = run.current.seconds if run.current else 0.0
             self.cancel(context)
             self.report({"INFO"}, f"Cancelled after {seconds:.1f} s; nothing was changed")  # type: ignore[attr-defined]
@@ -360,6 +362,7 @@ class QuickOperator:
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        following.keep(context)
         try:
             check_numbers(self)
             with complaints():

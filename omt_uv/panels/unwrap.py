@@ -5,12 +5,12 @@ from __future__ import annotations
 import bpy
 
 from ..blender.versions import progress_bar
-from ..operators import live
 from ..operators.unwrap import draw_main, draw_more
-from ..session import run
+from ..session import following, run
 from .section import Section, big_button, operator_section, settings_of
 
 UNWRAP = "uv.omt_unwrap"
+LIVE = "uv.omt_live"
 # The bar of a run is as high as the button, so that nothing below moves.
 HEIGHT = 1.5
 
@@ -18,6 +18,8 @@ HEIGHT = 1.5
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if run.current is not None:
         draw_run(layout, run.current)
+    elif following.current is not None:
+        draw_end(layout)
     else:
         big_button(layout, UNWRAP, "UV", "Unwrap", HEIGHT)
     properties = settings_of(context, UNWRAP)
@@ -26,10 +28,20 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def draw_live(layout: bpy.types.UILayout, properties) -> None:
-    """The slider, and the button that makes the UVs follow it."""
+    """The slider, and the button that makes the UVs follow it; red while they do."""
     row = layout.row(align=True)
+    row.alert = following.current is not None
     row.prop(properties, "balance", text="Area - Angle", slider=True)
-    row.operator("uv.omt_live", text="", icon="PLAY", depress=live.current is not None)
+    row.operator(LIVE, text="", icon="PLAY", depress=following.current is not None)
+    row.prop(settings_of(bpy.context, LIVE), "pins", text="", icon_only=True)
+
+
+def draw_end(layout: bpy.types.UILayout) -> None:
+    """What ends a live session, in place of the button."""
+    row = layout.row(align=True)
+    row.scale_y = HEIGHT
+    row.operator("uv.omt_live_end", text="Accept", icon="CHECKMARK").end = "KEEP"
+    row.operator("uv.omt_live_end", text="Cancel", icon="X").end = "BACK"
 
 
 def draw_run(layout: bpy.types.UILayout, current: run.Run) -> None:

@@ -171,18 +171,22 @@ def figures(readings, texture_size: float, metres: float, max_shear: float = DEF
         pixels = texel_density(readings, Texels(texture_size, metres))
     except MeshError:
         return Figures()
+    found_rows = rows_of(found, max_shear)
+    return Figures((*place, *found_rows.rows, ("Texel density", density_text(pixels))), found_rows.beyond)
+
+
+def rows_of(found, max_shear: float = DEFAULT_MAX_SHEAR) -> Figures:
+    """Rows about a Distortion."""
     beyond = {
         "Area error": found.area_l1 > AREA_BOUND,
         "Shear": found.angle_mean > max_shear,
         "Folded faces": found.folds > 0,
     }
     rows = (
-        *place,
         ("Area error", f"{100 * found.area_l1:.2f} %"),
         ("Shear", f"{found.angle_mean:.3f}"),
         ("Folded faces", f"{found.folds}"),
         ("Islands", f"{found.charts}"),
-        ("Texel density", density_text(pixels)),
     )
     return Figures(rows, frozenset(name for name, is_beyond in beyond.items() if is_beyond))
 

@@ -10,39 +10,55 @@ import bpy
 import numpy as np
 
 from ..blender import mesh as blender_mesh
-from ..pipelines.layout import Refusal
+from ..pipelines.layout import Refusal, pack_islands
 from ..pipelines.refine import found_islands
+from ..settings import Settings
 from ..solver.editing.live_map import LiveMap
 from ..solver.errors import MeshError
+from ..solver.mesh.charts import Chart
 from ..solver.parameterization.chart_indices import located
+from ..solver.progress import drain
 from .run import Disturbed
 
 # Seconds of work between two looks at the mouse.
 SLICE = 0.1
+# Corners of an island that are looked at, to see whether somebody else wrote its UVs.
+SAMPLES = 16
+# A UV that is off by more than this share of the extent was moved.
+MOVED = 1e-5
 
 
 @dataclass
 class _LiveIsland:
-    """An island of object number `owner`: corners (k,) to write, their vertices (k,), and corners of its pins (p,)."""
+    """An island of object number `owner`: corners (k,) to write, their vertices (k,), and corners of its pins (p,).
+
+    targets : where soft pins were dragged to, (p,2); written : UVs (k,2) as this session wrote them last
+    """
 
     owner: int
+    chart: Chart
     corners: np.ndarray
     vertices: np.ndarray
     pin_corners: np.ndarray
     live_map: LiveMap
+    targets: np.ndarray | None = None
+    written: np.ndarray | None = None
 
 
 class Session:
     """Islands of the chosen faces, from the moment on when it is made.
+
+    soft : pins give way to the shape of their island, which follows them as a whole
 
     Raises
     ------
     Refusal : with the index of the object and the MeshError that says why an island cannot follow
     """
 
-    def __init__(self, context: bpy.types.Context, pairs: list):
+    def __init__(self, context: bpy.types.Context, pairs: list, soft: bool = False):
         # Until the artist ends it.
         self.is_on = True
+        self.soft = soft
         self._mode = context.mode
         self.objects = [obj for obj, _ in pairs]
         self._names = [obj.name for obj in self.objects]
@@ -52,6 +68,7 @@ class Session:
         self._before = [reading.uv for _, reading in pairs]
         self._lost = False
         self._islands = [self._live(*found) for found in _islands(pairs)]
+        self._whole = all(self._covers(k, reading) for k, (_, reading) in enumerate(pairs))
         self._handlers = [bpy.app.handlers.undo_post, bpy.app.handlers.redo_post, bpy.app.handlers.load_pre]
         for kind in self._handlers:
             kind.append(self._on_exchange)
@@ -66,12 +83,17 @@ class Session:
         if at is not None:
             order = np.argsort(at[0])
             at = (at[0][order], at[1][order])
-        free = ~np.isin(vertices, pinned)
+        free = np.full(len(vertices), True) if self.soft else ~np.isin(vertices, pinned)
         try:
-            live_map = LiveMap(chart.vertices, chart.triangles, island.uv, at, chart.faces)
+            live_map = LiveMap(chart.vertices, chart.triangles, island.uv, at, chart.faces, self.soft)
         except MeshError as error:
             raise Refusal(owner, located(error, chart)) from error
-        return _LiveIsland(owner, corners[free], vertices[free], pin_corners, live_map)
+        return _LiveIsland(owner, chart, corners[free], vertices[free], pin_corners, live_map)
+
+    def _covers(self, owner: int, reading) -> bool:
+        """Whether every face of an object is part of an island that follows."""
+        mine = [np.zeros(0, int), *(i.chart.corners.ravel() for i in self._islands if i.owner == owner)]
+        return len(np.unique(np.concatenate(mine))) == len(np.unique(reading.surface.triangles))
 
     def follow(self, balance: float, seconds: float = SLICE) -> bool:
         """Work for about so long, and write what has moved; whether anything has.
@@ -83,6 +105,7 @@ class Session:
         self._check()
         end, moved = time.monotonic() + seconds, False
         for island in self._islands:
+            self._check_uvs(island)
             places = self._places(island)
             before = island.live_map.uv
             uv = island.live_map.follow(balance, places, max(end - time.monotonic(), 0.0))
@@ -96,15 +119,65 @@ class Session:
         return moved
 
     def _places(self, island: _LiveIsland) -> np.ndarray | None:
-        """Where the pins are by now; only Edit Mode lets them move."""
+        """Where the pins are by now, or are wanted if they are soft; only Edit Mode lets them move."""
         obj = self.objects[island.owner]
         if not len(island.pin_corners) or obj.mode != "EDIT":
             return None
-        return blender_mesh.corner_uvs(obj, self._layers[island.owner], island.pin_corners, self._starts[island.owner])
+        now = blender_mesh.corner_uvs(obj, self._layers[island.owner], island.pin_corners, self._starts[island.owner])
+        if not self.soft:
+            return now
+        place = np.searchsorted(island.corners, island.pin_corners)
+        if island.targets is None or island.written is None:
+            island.targets = now
+        else:
+            # Where a pin is not as it was left, the artist has moved it.
+            moved = np.abs(now - island.written[place]).max(axis=1) > MOVED * np.ptp(island.written)
+            island.targets = np.where(moved[:, None], now, island.targets)
+        return island.targets
 
     def _write(self, island: _LiveIsland, uv: np.ndarray) -> None:
         obj = self.objects[island.owner]
-        blender_mesh.write_uv(obj, self._layers[island.owner], island.corners, uv[island.vertices])
+        island.written = uv[island.vertices].astype(np.float32)
+        blender_mesh.write_uv(obj, self._layers[island.owner], island.corners, island.written)
+
+    def _check_uvs(self, island: _LiveIsland) -> None:
+        """Raise Disturbed where somebody else wrote UVs of the island since; a few corners tell."""
+        if island.written is None or not len(island.corners):
+            return
+        some = np.linspace(0, len(island.corners) - 1, SAMPLES).astype(int)
+        if self.soft:
+            some = some[~np.isin(island.corners[some], island.pin_corners)]
+        obj, layer = self.objects[island.owner], self._layers[island.owner]
+        now = blender_mesh.uvs_at(obj, layer, island.corners[some], self._starts[island.owner])
+        if (np.abs(now - island.written[some]) > MOVED * np.ptp(island.written)).any():
+            raise Disturbed("The UVs were changed")
+
+    def figures(self):
+        """Distortion of the islands as they are, all together."""
+        from ..solver.maps.distortion import distortion
+
+        positions, triangles, uv, polygons = [], [], [], []
+        vertices = faces = 0
+        for island in self._islands:
+            chart = island.chart
+            positions.append(chart.vertices)
+            triangles.append(chart.triangles + vertices)
+            uv.append(island.live_map.uv[chart.triangles])
+            polygons.append(chart.faces + faces)
+            vertices += len(chart.vertices)
+            faces += int(chart.faces.max()) + 1
+        V, F, places, of = map(np.concatenate, (positions, triangles, uv, polygons))
+        return distortion(V, F, places, overlap=False, polygons=of)
+
+    def pack(self, settings: Settings) -> bool:
+        """Pack the islands into the tile again, if they are all that the objects have, and none is pinned."""
+        if not self._whole or any(len(island.pin_corners) for island in self._islands):
+            return False
+        uvs = [island.live_map.uv for island in self._islands]
+        packed = drain(pack_islands(uvs, [island.chart.triangles for island in self._islands], settings))
+        for island, uv in zip(self._islands, packed.islands, strict=True):
+            self._write(island, uv)
+        return True
 
     def restore(self) -> None:
         """Every corner as it was at the beginning, to the bit; nothing if the objects are gone."""

@@ -17,7 +17,7 @@ def slider(package):
     properties = bpy.context.window_manager.operator_properties_last("uv.omt_unwrap")
     yield properties
     properties.property_unset("balance")
-    assert package("operators.live").current is None
+    assert package("session.following").current is None
 
 
 @pytest.fixture(params=["OBJECT", "EDIT"])
@@ -33,8 +33,8 @@ def event(kind, value="NOTHING"):
     return types.SimpleNamespace(type=kind, value=value)
 
 
-def begin():
-    operator = scenes.stand_in("uv.omt_live")
+def begin(**options):
+    operator = scenes.stand_in("uv.omt_live", **{"pack": False, **options})
     assert operator.start(bpy.context) == {"RUNNING_MODAL"}
     return operator
 
@@ -130,3 +130,124 @@ def test_uvs_without_area_are_refused(slider):
     obj.data.uv_layers.new()
     obj.data.uv_layers[0].uv.foreach_set("vector", [0.0] * (2 * len(obj.data.loops)))
     assert "no area" in scenes.error_of(bpy.ops.uv.omt_live)
+
+
+def test_another_operator_ends_it_and_its_uvs_are_kept(patch, slider, package):
+    """Nothing of the other one is written over, and nothing of the session is lost."""
+    operator = begin()
+    slider.balance = 0.6
+    tick(operator, 30)
+    followed = scenes.uv_of(patch)
+    assert bpy.ops.uv.omt_measure() == {"FINISHED"}
+    assert package("session.following").current is None
+    assert (scenes.uv_of(patch) == followed).all()
+    assert operator.modal(bpy.context, event("TIMER")) == {"CANCELLED"}
+    operator = begin()
+    assert bpy.ops.uv.omt_unwrap(boundary="DISK") == {"FINISHED"}
+    unwrapped = scenes.uv_of(patch)
+    slider.balance = 0.1
+    assert operator.modal(bpy.context, event("TIMER")) == {"CANCELLED"}
+    assert (scenes.uv_of(patch) == unwrapped).all()
+
+
+def test_uvs_that_somebody_else_writes_stay(patch, slider):
+    operator = begin()
+    tick(operator, 20)
+    scenes.leave_edit()
+    uv = scenes.seen_from_above(patch)[:, ::-1]
+    if operator.modal(bpy.context, event("TIMER")) == {"FINISHED"}:
+        return  # the mode was changed
+    scenes.set_uv(patch, uv)
+    slider.balance = 0.9
+    assert tick(operator) == {"FINISHED"}
+    assert "UVs were changed" in operator.reports[0][1]
+    assert (scenes.uv_of(patch) == uv).all()
+
+
+def test_figures_follow(patch, slider, package):
+    operator, state, seen = begin(), package("session.last_run").state, []
+    for balance in (0.0, 1.0):
+        slider.balance = balance
+        tick(operator, 30)
+        operator._looked = 0.0
+        operator._show_now(bpy.context, package("session.following").current)
+        seen.append(dict(state.summary.rows))
+    assert seen[0]["Area error"] != seen[1]["Area error"] and state.summary.title == "Live Balance"
+    operator.modal(bpy.context, event("RET", "PRESS"))
+    assert dict(state.summary.rows)["Area error"] == seen[1]["Area error"]
+
+
+def test_it_is_packed_on_accept_and_not_on_cancel(patch, slider):
+    operator = begin(pack=True)
+    slider.balance = 0.3
+    tick(operator, 20)
+    assert operator.modal(bpy.context, event("RET", "PRESS")) == {"FINISHED"}
+    uv = scenes.uv_of(patch)
+    assert 0 <= uv.min() < 0.02 and 0.98 < uv.max() <= 1
+
+
+@pytest.mark.parametrize("end", ["KEEP", "BACK"])
+def test_buttons_end_it(patch, slider, end):
+    before = scenes.uv_of(patch)
+    operator = begin()
+    slider.balance = 0.8
+    tick(operator, 10)
+    moved = scenes.uv_of(patch)
+    assert bpy.ops.uv.omt_live_end(end=end) == {"FINISHED"}
+    assert tick(operator) == ({"FINISHED"} if end == "KEEP" else {"CANCELLED"})
+    after = scenes.uv_of(patch)
+    assert (after == before).all() if end == "BACK" else not (after == before).all()
+    assert not (moved == before).all()
+    assert not bpy.ops.uv.omt_live_end.poll()
+
+
+def pinned_in_edit_mode(vertices):
+    obj = scenes.bump(12, 10)
+    scenes.set_uv(obj, scenes.seen_from_above(obj) * [1.0, 0.6])
+    scenes.pin(obj, vertices)
+    scenes.edit(obj)
+    bpy.ops.mesh.select_all(action="DESELECT")
+    edit = bmesh.from_edit_mesh(obj.data)
+    edit.select_mode = {"VERT"}
+    edit.verts.ensure_lookup_table()
+    for vertex in vertices:
+        edit.verts[vertex].select_set(True)
+    bmesh.update_edit_mesh(obj.data)
+    return obj, edit
+
+
+def drag(edit, vertex, by):
+    layer = edit.loops.layers.uv.active
+    for loop in edit.verts[vertex].link_loops:
+        loop[layer].uv = (loop[layer].uv[0] + by[0], loop[layer].uv[1] + by[1])
+
+
+def test_a_selected_vertex_takes_its_island_and_a_single_pin_moves_it(slider):
+    obj, edit = pinned_in_edit_mode([70])
+    assert not any(face.select for face in edit.faces)
+    operator = begin()
+    tick(operator, 20)
+    before = scenes.uv_of(obj)
+    drag(edit, 70, (0.3, 0.2))
+    tick(operator, 30)
+    operator.modal(bpy.context, event("RET", "PRESS"))
+    np.testing.assert_allclose(scenes.uv_of(obj) - before, [[0.3, 0.2]] * len(before), atol=2e-3)
+
+
+@pytest.mark.parametrize("pins", ["HARD", "SOFT"])
+def test_soft_pins_give_way_and_hard_ones_hold(slider, pins):
+    obj, edit = pinned_in_edit_mode([0, 12])
+    operator = begin(pins=pins)
+    tick(operator, 20)
+    before = scenes.uv_of(obj)
+    drag(edit, 12, (0.4, 0.0))
+    tick(operator, 60)
+    operator.modal(bpy.context, event("RET", "PRESS"))
+    after = scenes.uv_of(obj)
+    scenes.leave_edit()
+    at = {v: next(k for k, loop in enumerate(obj.data.loops) if loop.vertex_index == v) for v in (0, 12)}
+    moved = np.abs(after - before).max(1)
+    if pins == "HARD":
+        assert np.abs(after[at[12]] - before[at[12]] - [0.4, 0]).max() < 1e-6 and moved[at[0]] == 0
+    else:
+        assert moved[at[0]] > 0.01 and moved[at[12]] < 0.39

@@ -20,6 +20,8 @@ from .refine_island import island_elements, island_start, meets_itself
 # Of the springs between pins and where they are dragged to, energy per squared length in units of the map: stiff, as
 # the barrier against folds must only just win.
 STIFFNESS = 1e6
+# Of springs that give: the island follows as a whole, and the pins are where its shape lets them be.
+SOFT_STIFFNESS = 1.0
 # Newton promises less than this share of the energy: nothing is left to see.
 AT_REST = 1e-3
 
@@ -32,6 +34,7 @@ class LiveMap:
     vertices, triangles, uv : (n,3), (m,3), (n,2) a connected surface and its map
     pins : vertices (k,) and their places (k,2)
     polygons : (m,) polygon of every triangle; by default each is its own
+    soft : whether the pins give way to the shape of the island, which follows them as a whole
 
     Attributes
     ----------
@@ -49,6 +52,7 @@ class LiveMap:
         uv: np.ndarray,
         pins: tuple[np.ndarray, np.ndarray] | None = None,
         polygons: np.ndarray | None = None,
+        soft: bool = False,
     ):
         self._mesh = mesh = renumbered(vertices, triangles, uv, pins, polygons)
         self._given = given = mesh.uv @ [1, 1j]
@@ -60,6 +64,7 @@ class LiveMap:
         self._task = MapProblem(faces, assembly_of(faces, len(given)), motion, guard, False)
         self._w, self._pins, self._guarded = start, mesh.pins, False
         self._balance = -1.0
+        self._stiffness = SOFT_STIFFNESS if soft else STIFFNESS
         self.at_rest = False
 
     def follow(self, balance: float, places: np.ndarray | None = None, seconds: float = 0.1) -> np.ndarray:
@@ -97,7 +102,7 @@ class LiveMap:
         if self._pins is not None:
             task = rescaled(task, self._w)
             unit = np.sqrt(np.abs(task.faces.areas(self._w)).sum())
-            extras = (PinEnergy(self._pins, STIFFNESS, unit),)
+            extras = (PinEnergy(self._pins, self._stiffness, unit),)
         if self._guarded:
             extras = (*extras, task.barrier(self._w))
         weight = final_weight(self._balance, QUALITIES["standard"])
