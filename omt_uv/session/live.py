@@ -119,7 +119,7 @@ class Session:
         return moved
 
     def _places(self, island: _LiveIsland) -> np.ndarray | None:
-        """Where the pins are by now, or are wanted if they are soft; only Edit Mode lets them move."""
+        """Where the pins are by now, or are asked for if they are soft; only Edit Mode lets them move."""
         obj = self.objects[island.owner]
         if not len(island.pin_corners) or obj.mode != "EDIT":
             return None
