@@ -10,10 +10,13 @@ from pathlib import Path
 
 from . import __version__, supervision
 from .commands import magnify, measure, refine, remesh, seams, sphere, unwrap, weights
+from .commands.batches import batch, page, summary, table
 from .errors import UserError
 from .supervision import PROGRAM, tell
 
 COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, remesh)
+# Of many files, without Blender in their own process.
+BATCHES = (batch, table, summary, page)
 
 
 def script() -> None:
@@ -24,9 +27,12 @@ def script() -> None:
 def program(arguments: Sequence[str], words: Sequence[str]) -> int:
     """Run a command in a child process, which `words` start; returns the exit status."""
     try:
-        options = parser().parse_args(arguments)
+        options = parsed(arguments)
     except SystemExit as stop:
         return _status(stop)
+    if getattr(options, "alone", False):
+        options.start = list(words)[: len(words) - len(arguments)]
+        return carry_out(options)
     if supervision.is_child():
         supervision.begin_child(options.memory)
         return carry_out(options)
@@ -45,9 +51,20 @@ def program(arguments: Sequence[str], words: Sequence[str]) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command in this process, without its limits; returns the exit status."""
     try:
-        return carry_out(parser().parse_args(arguments))
+        return carry_out(parsed(sys.argv[1:] if arguments is None else arguments))
     except SystemExit as stop:
         return _status(stop)
+
+
+def parsed(arguments: Sequence[str]) -> argparse.Namespace:
+    """The options of a command; `rest` is what a batch hands to the command that it runs, after --."""
+    words, rest = list(arguments), []
+    if words[:1] == [batch.NAME] and "--" in words:
+        cut = words.index("--")
+        words, rest = words[:cut], words[cut + 1 :]
+    options = parser().parse_args(words)
+    options.rest = rest
+    return options
 
 
 def carry_out(options: argparse.Namespace) -> int:
@@ -83,6 +100,6 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog=PROGRAM, description="Area-preserving UV unwrapping.")
     top.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for command in COMMANDS:
+    for command in (*COMMANDS, *BATCHES):
         command.add(commands)
     return top

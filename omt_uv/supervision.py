@@ -14,8 +14,9 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,6 +38,8 @@ MARK = "OMT_UV_CHILD"
 # A file in that folder with the number of the parent: no other folder is ever removed.
 OWNER = "omt_uv_parent"
 FOLDER = "omt_uv_"
+# Where what a watched child prints is kept.
+STREAMS = ("printed.txt", "errors.txt")
 MEMORY_IS_LIMITED = sys.platform.startswith("linux")
 # What a user or a system ends a program with; Windows knows the first two alone.
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -108,28 +111,114 @@ def leave(status: int) -> None:
 
 def supervise(errand: Errand) -> int:
     """Run the child to its end and say what ended it unless it did so itself; returns the exit status."""
-    with tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True) as folder:
+    with begun(errand) as (child, _):
+        with _stopped_by_signals(child) as received:
+            late = False
+            try:
+                child.wait(errand.timeout or None)
+            except subprocess.TimeoutExpired:
+                late = True
+                child.kill()
+                child.wait()
+        if received:
+            status, text = 128 + received[0], f"stopped by {signal.Signals(received[0]).name}"
+        else:
+            status, text = _end(errand, child.returncode, late)
+        if text:
+            _tidy(errand, child)
+            tell(f"{errand.about}: {text}")
+        return status
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a child that was watched has ended.
+
+    status, text : its exit status, and what ended it unless it said so itself; out, err : what it has printed
+    seconds : by the clock; processor : seconds of processors; memory : bytes at most; both None where none can tell
+    """
+
+    status: int
+    text: str
+    out: str
+    err: str
+    seconds: float
+    processor: float | None
+    memory: int | None
+
+
+def watch(errand: Errand, begin: Callable[[subprocess.Popen], None]) -> Outcome:
+    """Run the child to its end without a word, on any thread; `begin` is handed the child, so that it can be ended."""
+    with begun(errand, captured=True) as (child, folder):
+        begin(child)
+        late = threading.Event()
+        timer = threading.Timer(errand.timeout or threading.TIMEOUT_MAX, _end_late, (child, late))
+        timer.daemon = True
+        start = time.monotonic()
+        if errand.timeout:
+            timer.start()
+        try:
+            processor, memory = _wait(child)
+        finally:
+            timer.cancel()
+        seconds = time.monotonic() - start
+        status, text = _end(errand, child.returncode, late.is_set())
+        if text:
+            _tidy(errand, child)
+        out, err = ((folder / name).read_text(errors="replace") for name in STREAMS)
+    return Outcome(status, text, out, err, seconds, processor, memory)
+
+
+@contextmanager
+def begun(errand: Errand, captured: bool = False) -> Iterator[tuple[subprocess.Popen, Path]]:
+    """The child of an errand, and the folder for its temporary files, which goes at the end of the block."""
+    with tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True) as folder, ExitStack() as stack:
         (Path(folder) / OWNER).write_text(str(os.getpid()))
         places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
+        out, err = (stack.enter_context(open(Path(folder) / n, "wb")) if captured else None for n in STREAMS)
         child = subprocess.Popen(
             errand.words,
             env={**os.environ, **places, MARK: folder},
             stdin=subprocess.PIPE,
+            stdout=out,
+            stderr=err,
             # Ctrl-C in a terminal is for the parent alone, which ends the child at once.
             start_new_session=True,
         )
-        with _stopped_by_signals(child) as received:
-            try:
-                child.wait(errand.timeout or None)
-            except subprocess.TimeoutExpired:
-                child.kill()
-                child.wait()
-                return _told(errand, child, TIMEOUT, f"not done within {errand.timeout:g} s")
-        if received:
-            return _told(errand, child, 128 + received[0], f"stopped by {signal.Signals(received[0]).name}")
-        if child.returncode in OWN:
-            return child.returncode
-        return _told(errand, child, *_crash(child.returncode, errand.memory))
+        try:
+            yield child, Path(folder)
+        finally:
+            assert child.stdin is not None
+            child.stdin.close()
+
+
+def _end_late(child: subprocess.Popen, late: threading.Event) -> None:
+    """End a child that takes too long."""
+    late.set()
+    child.kill()
+
+
+def _wait(child: subprocess.Popen) -> tuple[float | None, int | None]:
+    """Wait for a child; seconds of processors and bytes that it alone has used, where the system says so."""
+    if not hasattr(os, "wait4"):
+        child.wait()
+        return None, None
+    try:
+        _, ended, usage = os.wait4(child.pid, 0)
+    except ChildProcessError:
+        # It had ended by itself when somebody was about to end it, who has taken its status.
+        child.wait()
+        return None, None
+    child.returncode = os.waitstatus_to_exitcode(ended)
+    unit = 1 if sys.platform == "darwin" else 1024
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss * unit
+
+
+def _end(errand: Errand, returned: int, late: bool) -> tuple[int, str]:
+    """Exit status, and words for an end that the child has not told itself."""
+    if late:
+        return TIMEOUT, f"not done within {errand.timeout:g} s"
+    return (returned, "") if returned in OWN else _crash(returned, errand.memory)
 
 
 @contextmanager
@@ -158,8 +247,8 @@ def _crash(returned: int, memory: bool) -> tuple[int, str]:
     return CRASH, f"Blender crashed on it ({what}); the file may be damaged{more}"
 
 
-def _told(errand: Errand, child: subprocess.Popen, status: int, text: str) -> int:
-    """The status, said on one line and tidied up after."""
+def _tidy(errand: Errand, child: subprocess.Popen) -> None:
+    """Remove what a child that was ended has left in the folders that it writes to."""
     for folder in errand.folders:
         # By the number of the child: other runs may be writing to the same folder.
         for rest in folder.glob(f".omt_uv_{child.pid}_*"):
@@ -167,8 +256,6 @@ def _told(errand: Errand, child: subprocess.Popen, status: int, text: str) -> in
                 shutil.rmtree(rest, ignore_errors=True)
             else:
                 rest.unlink(missing_ok=True)
-    tell(f"{errand.about}: {text}")
-    return status
 
 
 def tell(text: str) -> None:

@@ -64,8 +64,10 @@ ARROWS: dict[str, str] = {
     "display": "solver solver.mesh solver.maps pipelines blender",
     "session": "errors settings solver solver.mesh solver.maps solver.editing solver.parameterization pipelines "
     "blender",
+    "batch": "errors supervision solver",
     "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display",
+    "commands.batches": "supervision solver batch commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display session",
     "operators.inspection": "remedies solver pipelines blender display session operators",

@@ -105,6 +105,13 @@ def stretch(obj: bpy.types.Object) -> np.ndarray:
     return (axes.T * stretch) @ axes
 
 
+def place_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (3,3) and shift (3,) that take stretched positions to their place in the world."""
+    matrix = np.array(obj.matrix_world, dtype=float)
+    left, _, axes = np.linalg.svd(matrix[:3, :3])
+    return left @ axes, matrix[:3, 3]
+
+
 def up_of(obj: bpy.types.Object) -> tuple[float, float, float]:
     """The direction (3,) of positions that are stretched, and not rotated, which is up in the world."""
     left, _, axes = np.linalg.svd(np.array(obj.matrix_world, dtype=float)[:3, :3])

@@ -13,6 +13,10 @@ from .. import __version__
 from ..errors import UserError
 from ..supervision import PROGRAM
 
+# Formats in which Y is up, by custom, and what turns that to Z.
+Y_IS_UP = (".obj", ".off", ".ply")
+Y_TO_Z = ((1, 0, 0), (0, 0, -1), (0, 1, 0))
+
 
 class CommandError(UserError):
     """Told on one line, with a status that is not zero."""
@@ -73,8 +77,11 @@ def check_paths(options: argparse.Namespace, outputs: Sequence[Path] | None = No
     from ..files.saving import check_target
     from ..files.verified import check_writable, clash
 
+    check_picture(getattr(options, "preview", None))
     meshes = [options.output] if outputs is None and "output" in options else list(outputs or ())
-    more = [(name, getattr(options, name, None)) for name in ("report", "histogram", "image_out", "image_output")]
+    more = [
+        (name, getattr(options, name, None)) for name in ("report", "histogram", "preview", "image_out", "image_output")
+    ]
     written = [(f"--{name.replace('_', '-')}", path) for name, path in more if path is not None]
     read = [("IN", options.input), ("--image", getattr(options, "image", None))]
     mesh_names = [("OUT", path) for path in meshes]
@@ -86,6 +93,50 @@ def check_paths(options: argparse.Namespace, outputs: Sequence[Path] | None = No
         check_target(path)
     for _, path in written:
         check_writable(path)
+
+
+def write_picture(path: Path, picture) -> None:
+    """Write a picture (h,w,3) in [0,1] as a PNG file, whole or not at all.
+
+    Raises
+    ------
+    CommandError : it cannot be written
+    """
+    from ..display.canvas import save
+    from ..files.images import check_whole
+    from ..files.silence import silence
+    from ..files.verified import staged
+
+    try:
+        with staged(path) as made, silence():
+            save(made, picture)
+            check_whole(made)
+    except (OSError, RuntimeError) as error:
+        raise CommandError(f"{path}: {error}") from error
+
+
+def write_preview(options: argparse.Namespace, pairs) -> None:
+    """Draw objects with their Readings into a PNG file, if there is to be one."""
+    if options.preview is None:
+        return
+    import numpy as np
+
+    from ..blender.mesh import place_of
+    from ..display.preview import Placed, preview
+
+    # Their axes are taken as they are.
+    upright = np.array(Y_TO_Z if options.input.suffix.lower() in Y_IS_UP else np.eye(3), float)
+    placed = []
+    for obj, reading in pairs:
+        rotation, shift = place_of(obj)
+        placed.append(Placed(reading, upright @ rotation, upright @ shift))
+    write_picture(options.preview, preview(placed))
+
+
+def check_picture(path: Path | None) -> None:
+    """Raise UsageError if a picture that is asked for is no .png file."""
+    if path is not None and path.suffix.lower() != ".png":
+        raise UsageError(f"{path}: this picture is a .png file. Name one.")
 
 
 def drain_shown(steps):

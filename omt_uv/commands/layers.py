@@ -6,7 +6,7 @@ import argparse
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from .common import CommandError, check_paths, require_blender, warn
+from .common import CommandError, check_paths, require_blender, warn, write_preview
 from .selection import read_file
 
 if TYPE_CHECKING:
@@ -60,4 +60,6 @@ def write_layers(options: argparse.Namespace, pairs, result, apart: bool = False
         told = found.warnings(gate([reading for _, reading in pairs], apart))
     objects = [obj for obj, _ in pairs]
     warnings = [*result.warnings, *((-1, text) for text in told)]
-    return Written(warn(objects, warnings, save_uvs(options.output, objects, options.input)), found)
+    lines = warn(objects, warnings, save_uvs(options.output, objects, options.input))
+    write_preview(options, zip(objects, final, strict=True))
+    return Written(lines, found)

@@ -7,8 +7,8 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from .common import CommandError, check_paths, refusals, require_blender
-from .options import add_input
+from .common import CommandError, check_paths, refusals, require_blender, write_picture, write_preview
+from .options import add_input, add_preview
 from .selection import read_file
 
 
@@ -19,6 +19,7 @@ def add(commands) -> None:
     command.add_argument(
         "--histogram", type=Path, metavar="H.png", help="draw how area error and shear are spread over the surface"
     )
+    add_preview(command)
     command.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
@@ -31,25 +32,14 @@ def run(options: argparse.Namespace) -> None:
         raise CommandError(f"{options.histogram}: a histogram is a picture. Name a .png file.")
     check_paths(options)
     with refusals(name=str(options.input)):
-        readings = [reading for _, reading in read_file(options)]
+        pairs = read_file(options)
+        readings = [reading for _, reading in pairs]
         figures = measure_readings(readings)
         if options.histogram:
-            _draw(options.histogram, [evaluated(reading) for reading in readings])
+            from ..display.histogram import histogram
+
+            write_picture(options.histogram, histogram([evaluated(reading) for reading in readings]))
+        write_preview(options, pairs)
     subdivided = on_subdivision(readings)
     more = {"on_subdivided_surface": True} if subdivided else {}
     print(json.dumps(asdict(figures) | more, indent=1) if options.json else summary(figures, subdivided))
-
-
-def _draw(path: Path, readings: list) -> None:
-    from ..display.canvas import save
-    from ..display.histogram import histogram
-    from ..files.images import check_whole
-    from ..files.silence import silence
-    from ..files.verified import staged
-
-    try:
-        with staged(path) as made, silence():
-            save(made, histogram(readings))
-            check_whole(made)
-    except (OSError, RuntimeError) as error:
-        raise CommandError(f"{path}: {error}") from error

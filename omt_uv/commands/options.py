@@ -54,6 +54,13 @@ def add_area_options(command: argparse.ArgumentParser) -> None:
 
 def add_report(command: argparse.ArgumentParser, of: str) -> None:
     command.add_argument("--report", type=Path, metavar="R.json", help=f"write figures of every {of}")
+    add_preview(command)
+
+
+def add_preview(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--preview", type=Path, metavar="P.png", help="draw the checkered mesh, the layout and the wireframe"
+    )
 
 
 def add_cut_options(command: argparse.ArgumentParser) -> None:

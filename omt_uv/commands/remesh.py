@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
-from .common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn
-from .options import add_files, angle, faces, names, number, positive, vertices
+from .common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn, write_preview
+from .options import add_files, add_preview, angle, faces, names, number, positive, vertices
 from .selection import read_file
 
 KINDS = ("uniform", "curvature", "gaussian", "saliency")
@@ -42,6 +42,7 @@ def add(commands) -> None:
     )
     command.add_argument("--strategy", choices=names(STRATEGIES), default=DEFAULT_STRATEGY.lower(), help="two maps")
     _add_features(command)
+    add_preview(command)
     command.add_argument("--no-attributes", action="store_true", help="carry no UVs, groups, colours, shape keys")
 
 
@@ -77,6 +78,9 @@ def _ratio(text: str) -> float:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
+    import bpy
+
+    from ..blender.mesh import read
     from ..blender.remesh_objects import carried_attributes, carried_gate, lost, new_objects, read_request, source_of
     from ..files.verified import same_file
     from ..pipelines.remesh import remesh_series
@@ -104,6 +108,10 @@ def run(options: argparse.Namespace) -> None:
             raise CommandError(f"{options.input}: {'; '.join(found)}. Nothing was written, as --strict asks.")
         told += [(-1, text) for text in found]
     warn(objects, told, _save(options.output, made, options.input))
+    if options.preview:
+        # Of a series the coarsest: it differs most from what was given.
+        shown = [bpy.data.objects[names[-1]] for names in made]
+        write_preview(options, [(obj, read(obj)) for obj in shown])
 
 
 def _is_split(path: Path, obj) -> bool:

@@ -34,7 +34,7 @@ def test_choices_are_those_of_the_settings_in_lower_case(package):
 def commands(package):
     """Pairs of the name and the parser of every command."""
     (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
-    return every.choices.items()
+    return {name: c for name, c in every.choices.items() if not c.get_default("alone")}.items()
 
 
 def complete(command, beside):

@@ -1,0 +1,158 @@
+"""The results of a batch: figures of reports, table, summary and page."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+import os
+import shutil
+import subprocess
+
+import pytest
+
+CHART = {"object": "a", "chart": 0, "faces": 10, "folds": 1, "area_l1": 0.1, "seconds": {"packing": 1.0}, "status": "x"}
+REPORT = {
+    "quality": "exact",
+    "charts": [CHART, {**CHART, "chart": 1, "faces": 30, "area_l1": 0.5}],
+    "gate": {"overlap": 0.25},
+}
+EVIL = "</script><script>document.title='evil'</script><img src=x onerror=alert(1)>.obj"
+
+
+def row(name, state="done", **more):
+    plain = {"name": name, "path": f"/in/{name}", "state": state, "status": 0, "seconds": 2.0, "processor": 1.5,
+             "memory": 10**9, "size": 1000, "tries": 1, "host": "h", "version": "1", "message": "", "warnings": "[]",
+             "words": json.dumps(["omt", name]), "report": json.dumps(REPORT), "preview": ""}  # fmt: skip
+    return {**plain, **more}
+
+
+def test_parts_of_a_file_are_one_row(package):
+    figures = package("batch.figures").figures_of(json.dumps(REPORT))
+    assert figures == {"gate.overlap": 0.25, "charts": 2, "faces": 40, "folds": 2, "seconds.packing": 2.0,
+                       "area_l1": pytest.approx(0.4), "area_l1.worst": 0.5}  # fmt: skip
+    assert package("batch.figures").figures_of("") == package("batch.figures").figures_of("[1]") == {}
+
+
+def test_a_table_has_a_line_for_every_file_and_no_formulas(package):
+    rows = [row("=cmd|x.obj"), row("b.obj", "failed", status=1, report="", message='has "quotes", and commas')]
+    text = package("batch.tables").csv_text(rows)
+    first, second = csv.DictReader(io.StringIO(text))
+    assert first["name"] == "'=cmd|x.obj" and float(first["area_l1"]) == pytest.approx(0.4)
+    assert second["message"] == 'has "quotes", and commas' and second["area_l1"] == ""
+
+
+def test_parquet_has_the_same_columns_with_types(package, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    rows = [row("a.obj"), row("b.obj", "failed", seconds=None, report="")]
+    package("batch.tables").write_parquet(tmp_path / "t.parquet", rows)
+    table = parquet.read_table(tmp_path / "t.parquet").to_pydict()
+    assert table["area_l1"] == [pytest.approx(0.4), None] and table["size"] == [1000, 1000]
+    assert list(table) == package("batch.tables").table_of(rows)[0]
+
+
+def test_without_pyarrow_the_error_names_it(package, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    with pytest.raises(package("batch.plan").BatchError, match=r"pip install 'omt-uv\[farm\]'"):
+        package("batch.tables").write_parquet(tmp_path / "t.parquet", [row("a.obj")])
+
+
+def test_a_summary_has_percentiles_growth_and_causes(package):
+    rows = [row(f"{k}.obj", size=1000 * 2**k, seconds=0.1 * 2 ** (1.5 * k), report="") for k in range(12)]
+    for k in range(3):
+        rows.append(row(f"x{k}.obj", "failed", status=1, message=f"/in/x{k}.obj: face {k} of {10 * k} is a line."))
+    rows.append(row("y.obj", "failed", status=4, message="not done within 5 s"))
+    summary = package("batch.statistics").summary_of(rows)
+    assert summary.counts == {"done": 12, "failed": 4}
+    assert summary.exponent == pytest.approx(1.5) and summary.sizes == "bytes"
+    assert summary.causes == {"FILE: face N of N is a line.": 3, "not done within N s": 1}
+    assert summary.figures["seconds"][0] == pytest.approx(0.1)
+    assert "seconds grow as bytes ^ 1.50" in summary.text() and "3 x FILE" in summary.text()
+
+
+def test_an_empty_batch_has_a_summary_and_a_page(package, tmp_path):
+    assert package("batch.statistics").summary_of([]).exponent is None
+    assert "<!doctype html>" in package("batch.pages").page_of([], tmp_path, "none")
+
+
+# ---- the page, in a browser ---------------------------------------------------------------------------------
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+in_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+
+
+@pytest.fixture(scope="module")
+def page(package, tmp_path_factory):
+    """A page of 450 files, one of them with a name that would be a script, 30 of them failed."""
+    folder = tmp_path_factory.mktemp("page")
+    rows = [
+        row(f"m{k:03}.obj", seconds=float((7 * k) % 449), preview=str(folder / "p" / "a b.png")) for k in range(419)
+    ]
+    rows += [row(f"f{k}.obj", "failed", status=1, seconds=None, message="bad face", report="") for k in range(30)]
+    rows.append(row(EVIL))
+    path = folder / "out.html"
+    path.write_text(package("batch.pages").page_of(rows, folder, EVIL), encoding="utf-8")
+    return path
+
+
+def shown(page, tmp_path, address="", then=""):
+    """What the page shows at an address, after a script: rows of texts of cells, and the document."""
+    copy = page.with_name("copy.html")
+    # Its own script has drawn by then.
+    end = """
+    <script>THEN
+    const seen = { rows: [...document.querySelectorAll('tbody tr')].map(r => [...r.cells].map(c => c.textContent)),
+      heads: [...document.querySelectorAll('th')].map(c => c.textContent), title: document.title, hash: location.hash,
+      place: document.querySelector('#place').textContent, on: document.querySelector('#on').disabled,
+      pictures: [...document.querySelectorAll('img')].map(i => i.getAttribute('src')) };
+    document.documentElement.innerHTML = '<pre></pre>';
+    const text = btoa(unescape(encodeURIComponent(JSON.stringify(seen))));
+    document.querySelector('pre').textContent = 'SEEN' + text + 'END';
+    </script></body>"""
+    text = page.read_text(encoding="utf-8")
+    copy.write_text(text.replace("</body>", end.replace("THEN", then)), encoding="utf-8")
+    words = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}", "--dump-dom"]
+    done = subprocess.run([*words, f"{copy.as_uri()}{address}"], capture_output=True, text=True, timeout=120)
+    assert "SEEN" in done.stdout, done.stderr
+    return json.loads(base64.b64decode(done.stdout.partition("SEEN")[2].partition("END")[0]))
+
+
+def column(seen, name):
+    at = seen["heads"].index(name)
+    return [cells[at] for cells in seen["rows"]]
+
+
+@in_browser
+def test_a_page_sorts_filters_and_turns_pages_by_clicks(page, tmp_path):
+    first = shown(page, tmp_path)
+    assert len(first["rows"]) == 200 and first["place"] == "450 of 450 files, page 1 of 3" and not first["on"]
+    assert first["pictures"][0] == "p/a%20b.png" and first["title"] == "OMT UV: a batch"
+    click = "document.querySelector('[data-column=seconds]').click();"
+    seconds = [float(x) for x in column(shown(page, tmp_path, then=click), "seconds")]
+    assert seconds == sorted(seconds) and seconds[0] == 0
+    last = shown(page, tmp_path, then=click + click + "for (const k of [1, 2]) document.querySelector('#on').click();")
+    assert last["place"].endswith("page 3 of 3") and last["on"] and len(last["rows"]) == 50
+    # What has no figure stays at the end, whichever way it is sorted.
+    assert column(last, "seconds")[-30:] == [""] * 30 and float(column(last, "seconds")[0]) >= 0
+    assert last["hash"] == "#sort=seconds&down=1&page=3"
+
+
+@in_browser
+def test_an_address_is_a_view(page, tmp_path):
+    seen = shown(page, tmp_path, "#state=failed&filter=BAD&sort=name&down=1")
+    assert column(seen, "name") == [f"f{k}.obj" for k in range(29, -1, -1)]
+    assert set(column(seen, "message")) == {"bad face"}
+    assert shown(page, tmp_path, "#sort=none&page=99")["place"].endswith("page 3 of 3")
+
+
+@in_browser
+def test_no_name_of_a_file_is_run(page, tmp_path):
+    seen = shown(page, tmp_path, "#filter=script")
+    assert column(seen, "name") == [EVIL] and seen["title"] == "OMT UV: a batch"
+
+
+def test_no_name_of_a_file_ends_the_data(page):
+    text = page.read_text(encoding="utf-8")
+    assert text.count("</script>") == 2 and "onerror=alert(1)>" not in text
+    assert os.path.getsize(page) < 450 * 2000
