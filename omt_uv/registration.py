@@ -20,6 +20,8 @@ from .operators.seams import UV_OT_omt_seams
 from .operators.sphere import UV_OT_omt_sphere
 from .operators.texel_density import UV_OT_omt_density_get, UV_OT_omt_density_set
 from .operators.unwrap import UV_OT_omt_unwrap
+from .operators.volumes.flow import OBJECT_OT_omt_flow
+from .operators.volumes.uv_flow import UV_OT_omt_flow
 from .operators.weights import OBJECT_OT_omt_weights
 from .panels.menus import draw_remesh, draw_unwrap, draw_weights, menus, remesh_menus, weights_menus
 from .panels.preferences import OMTUVPreferences, apply_soon
@@ -38,6 +40,8 @@ CLASSES = (
     UV_OT_omt_live_end,
     UV_OT_omt_measure,
     OBJECT_OT_omt_remesh,
+    OBJECT_OT_omt_flow,
+    UV_OT_omt_flow,
     UV_OT_omt_overlay,
     UV_OT_omt_histogram,
     UV_OT_omt_density_get,

@@ -27,6 +27,7 @@ ARROWS: dict[str, str] = {
     "solver.linalg": "solver solver.mesh",
     "solver.transfer": "solver solver.mesh",
     "solver.analysis": "solver solver.mesh solver.linalg",
+    "solver.flows": "solver solver.mesh",
     "solver.maps": "solver solver.mesh solver.linalg",
     "solver.packing": "solver solver.mesh",
     "solver.transport": "solver solver.mesh solver.linalg",
@@ -57,7 +58,9 @@ ARROWS: dict[str, str] = {
     "solver.refinement "
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas_charts",
+    "pipelines.volumes": "errors solver solver.mesh solver.flows",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
+    "blender.volumes": "errors solver solver.flows pipelines.volumes blender",
     "files.formats": "solver",
     "files.in_place": "errors solver",
     "files": "errors supervision solver blender files.formats files.in_place",
@@ -66,11 +69,12 @@ ARROWS: dict[str, str] = {
     "blender",
     "batch": "errors supervision solver",
     "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
-    "pipelines blender files display",
+    "pipelines pipelines.volumes blender blender.volumes files display solver.flows",
     "commands.batches": "supervision solver batch commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display session",
     "operators.inspection": "remedies solver pipelines blender display session operators",
+    "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
     "panels": "errors remedies settings solver blender display session operators operators.inspection",
 }
 SOLVER_LIBRARIES = {"numpy", "scipy"}

@@ -168,7 +168,7 @@ def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, 
 
 def _is_finite(value) -> bool:
     """Whether a property, a number or several, is finite; Blender makes the largest float of infinity."""
-    return all(abs(x) < LARGEST for x in (value if hasattr(value, "__iter__") else (value,)))
+    return all(abs(x) < LARGEST for x in (value if hasattr(value, "__len__") else (value,)))
 
 
 def check_numbers(operator: bpy.types.Operator) -> None:

@@ -15,6 +15,7 @@ ENTRIES = (
         "uv.omt_seams",
         "uv.omt_measure",
     ),
+    *("object.omt_flow", "uv.omt_flow"),
     *("uv.omt_checker", "uv.omt_checker_remove", "uv.omt_worst"),
     *("uv.omt_live", "uv.omt_overlay", "uv.omt_histogram", "uv.omt_density_get", "uv.omt_density_set"),
 )

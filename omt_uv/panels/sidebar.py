@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import inspect, result, tools, unwrap
+from . import inspect, result, tools, unwrap, volumes
 from .section import Section, class_of
 
 TAB = "OMT"
@@ -28,6 +28,7 @@ SECTIONS = (
     tools.WEIGHTS,
     tools.REMESH,
     tools.SPHERE,
+    volumes.FLOW,
 )
 
 

@@ -220,6 +220,30 @@ class CountError(MeshError):
     remedy = "Ask for more, or keep fewer features"
 
 
+class HandleError(MeshError):
+    """Handles of a flow contradict each other, or there is none that moves."""
+
+    remedy = "Move them apart, let them go the same way, or choose a smaller radius"
+
+
+class LibraryError(MeshError):
+    """A library that a solver needs is not installed."""
+
+    remedy = "Install it"
+
+
+class SelfIntersectionError(MeshError):
+    """A surface passes through itself, so that it has no inside."""
+
+    remedy = "Move these faces apart, or remesh the surface"
+
+
+class TetrahedraError(MeshError):
+    """No tetrahedra fill a surface, or none of them has a map without inversions."""
+
+    remedy = "Remesh the surface evenly first"
+
+
 # What warnings advise, in the solver's words: front ends replace these by where their users find it.
 MERGE = "merge vertices that coincide"
 MERGING = "merging vertices that coincide"

@@ -23,8 +23,9 @@ def test_every_float_refuses_nan_and_what_blender_makes_of_infinity(package):
         operator = getattr(getattr(bpy.ops, module), name)
         for prop in (p for p in operator.get_rna_type().properties if p.type == "FLOAT"):
             for value in (math.nan, math.inf) if prop.hard_max > 3e38 else (math.nan,):
+                given = (value,) * prop.array_length if prop.is_array else value
                 with pytest.raises(RuntimeError, match=f"{prop.name} is not a finite number"):
-                    operator(**{prop.identifier: value})
+                    operator(**{prop.identifier: given})
                 assert not obj.data.uv_layers and list(bpy.data.objects) == [obj]
                 tried += 1
     assert tried >= 12

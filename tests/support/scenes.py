@@ -223,7 +223,7 @@ def stand_in(name, **settings):
     body["rna_type"] = bpy.context.window_manager.operator_properties_last(name).bl_rna
     for prop in body["rna_type"].properties:
         if not prop.is_readonly and prop.identifier != "rna_type":
-            body[prop.identifier] = prop.default
+            body[prop.identifier] = tuple(prop.default_array) if getattr(prop, "is_array", False) else prop.default
     body |= settings
     body["report"] = lambda self, kind, text: self.reports.append((set(kind), text))
     return type("StandIn", (), body)()

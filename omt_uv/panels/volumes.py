@@ -1,0 +1,22 @@
+"""The sections of bodies: moved without a change of volume, and mapped with their insides."""
+
+from __future__ import annotations
+
+import bpy
+
+from .section import Section, big_button, class_of, draw_settings, settings_of
+
+OBJECT_FLOW = "object.omt_flow"
+UV_FLOW = "uv.omt_flow"
+
+
+def _draw_flow(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    draw_settings(layout.column(), OBJECT_FLOW, settings_of(context, OBJECT_FLOW))
+    big_button(layout, OBJECT_FLOW, "MOD_FLUIDSIM")
+    if class_of(UV_FLOW) is not None:
+        layout.separator()
+        draw_settings(layout.column(), UV_FLOW, settings_of(context, UV_FLOW))
+        big_button(layout, UV_FLOW, "UV_DATA")
+
+
+FLOW = Section("flow", "Move Incompressibly", _draw_flow, (OBJECT_FLOW, UV_FLOW))

@@ -1,0 +1,126 @@
+"""Move bodies along one flow, and UVs along another: the one path of object.omt_flow, uv.omt_flow and the command
+flow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...solver.flows.domain import FlowDomain
+from ...solver.flows.flow_map import flow
+from ...solver.flows.handles import FlowHandle
+from ...solver.flows.options import FlowOptions
+from ...solver.progress import Steps
+
+
+@dataclass(frozen=True)
+class FlowBody:
+    """A body in space: positions (n,3), triangles (m,3) of them, and vertices that stay, (n,) bool or None."""
+
+    name: str
+    positions: np.ndarray
+    triangles: np.ndarray
+    stays: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class FlowJob:
+    """Bodies that flow together, pairs of the body's number and a handle on its vertices (-1: on none), and walls."""
+
+    bodies: tuple[FlowBody, ...]
+    handles: tuple[tuple[int, FlowHandle], ...]
+    options: FlowOptions = field(default_factory=FlowOptions)
+    domain: FlowDomain | None = None
+    frames: int = 1
+
+
+@dataclass(frozen=True)
+class FlowResult:
+    """Positions (n,3) of every body at every frame, `frames[k][body]`, and figures.
+
+    volume: greatest relative change of an enclosed volume, 0 where nothing is closed; drift: the same by the flow
+    alone;
+    missed: greatest distance of a handle's point from its end, over the diagonal, before it was set there
+    """
+
+    frames: tuple[tuple[np.ndarray, ...], ...]
+    volume: float
+    drift: float
+    missed: float
+    intersecting: int
+    steps: int
+    warnings: tuple[str, ...]
+
+    def report(self) -> dict[str, float]:
+        """Figures for a report."""
+        return {
+            "volume_change": self.volume,
+            "drift": self.drift,
+            "missed": self.missed,
+            "new_intersections": self.intersecting,
+            "steps": self.steps,
+        }
+
+
+def flow_bodies(job: FlowJob) -> Steps[FlowResult]:
+    """Move all bodies of a job in one field.
+
+    Raises
+    ------
+    MeshError : those of `solver.flows.flow`; elements are vertices of all bodies in their order
+    """
+    sizes = np.array([len(body.positions) for body in job.bodies])
+    first = np.concatenate([[0], np.cumsum(sizes)])
+    points = np.concatenate([body.positions for body in job.bodies])
+    triangles = np.concatenate([body.triangles + first[k] for k, body in enumerate(job.bodies)])
+    handles = [_placed(handle, first[owner] if owner >= 0 else -1) for owner, handle in job.handles]
+    for k, body in enumerate(job.bodies):
+        rows = np.zeros(0, np.int64) if body.stays is None else np.flatnonzero(body.stays)
+        if len(rows):
+            handles.append(FlowHandle(body.positions[rows], body.positions[rows], first[k] + rows, "what stays"))
+    steps = flow(points, tuple(handles), job.options, triangles, job.domain, job.frames)
+    found = yield from steps
+    return FlowResult(
+        frames=tuple(tuple(np.split(at, first[1:-1])) for at in found.frames),
+        volume=float(np.abs(found.volumes).max(initial=0.0)),
+        drift=float(np.abs(found.drift).max(initial=0.0)),
+        missed=found.missed,
+        intersecting=len(found.intersecting),
+        steps=found.steps,
+        warnings=found.warnings,
+    )
+
+
+def _placed(handle: FlowHandle, first: int) -> FlowHandle:
+    """A handle with its vertices counted among those of all bodies; of none where `first` is negative."""
+    vertices = None if first < 0 or handle.vertices is None else handle.vertices + first
+    return FlowHandle(handle.start, handle.end, vertices, handle.name)
+
+
+@dataclass(frozen=True)
+class UVFlow:
+    """UVs (c,2) after a flow, and its warnings."""
+
+    uv: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def flow_uvs(
+    uv: np.ndarray, pinned: np.ndarray, start: np.ndarray, end: np.ndarray, options: FlowOptions
+) -> Steps[UVFlow]:
+    """Move UVs (c,2) so that the places `start` (k,2) go to `end` (k,2) and `pinned` (c,) bool stay; areas stay, too.
+
+    Raises
+    ------
+    MeshError : those of `solver.flows.flow`
+    """
+    # Corners at one place stay together.
+    places, inverse = np.unique(uv, axis=0, return_inverse=True)
+    inverse = inverse.ravel()
+    handles = [FlowHandle(np.asarray(start, float), np.asarray(end, float))]
+    rows = np.unique(inverse[pinned])
+    if len(rows):
+        handles.append(FlowHandle(places[rows], places[rows], rows, "pins"))
+    found = yield from flow(places, tuple(handles), options)
+    return UVFlow(found.positions[inverse], found.warnings)

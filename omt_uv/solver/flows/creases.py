@@ -1,0 +1,124 @@
+"""Keep faces of a mesh that flowed from passing through one another where it is creased more finely than it is divided.
+
+A flow takes no two points to one, but flat faces between vertices may meet where the surface nearly touches itself
+within an edge. There, the flow is replaced by its best affine map, which takes faces apart to faces apart, and blended
+with the flow over a few rings of vertices.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..mesh.topology import graph_components, halfedges
+from .self_intersections import intersecting_pairs
+
+# Rings of vertices around faces that intersect, in the rounds of mending; beyond them the blend takes as many again.
+RINGS = (1, 2, 3, 4, 6, 8)
+# Mending moves nothing farther than this share of the diagonal, and is for creases, not for more than this share of all
+# faces.
+FARTHEST = 0.02
+MOST_FACES = 0.02
+
+
+def new_intersections(
+    before: np.ndarray, after: np.ndarray, triangles: np.ndarray, concerned: np.ndarray | None = None
+) -> np.ndarray:
+    """Pairs (k,2) of triangles (m,3) that intersect at positions `after` (n,3) and did not at `before` (n,3)."""
+    pairs = intersecting_pairs(after, triangles, concerned)
+    if not len(pairs):
+        return pairs
+    mine = np.zeros(len(triangles), bool)
+    mine[pairs] = True
+    old = intersecting_pairs(before, triangles, mine)
+    count = len(triangles)
+    return pairs[~np.isin(pairs @ [count, 1], old @ [count, 1])]
+
+
+def without_new_intersections(
+    before: np.ndarray, after: np.ndarray, triangles: np.ndarray, free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n,3) close to `after` (n,3), and the pairs (k,2) of triangles (m,3) that still intersect and did not
+    at `before` (n,3). Only vertices `free` (n,) bool move."""
+    pairs = new_intersections(before, after, triangles, (before != after).any(axis=1)[triangles].any(axis=1))
+    best, fewest, position = after, pairs, after
+    farthest = FARTHEST * np.linalg.norm(np.ptp(before, axis=0))
+    n = len(before)
+    tail, head = halfedges(triangles)
+    graph = sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
+    graph = graph + sp.identity(n, format="csr")
+    for rings in RINGS:
+        if not len(pairs) or len(np.unique(pairs)) > MOST_FACES * len(triangles):
+            break
+        position = _blended(before, after, position, graph, triangles[pairs].reshape(len(pairs), -1), free, rings)
+        if np.abs(position - after).max() > farthest:
+            break
+        near = (position != best).any(axis=1)[triangles].any(axis=1)
+        near[fewest] = True
+        pairs = new_intersections(before, position, triangles, near)
+        if len(pairs) < len(fewest):
+            best, fewest = position, pairs
+    return best, fewest
+
+
+def _blended(before, after, position, graph, seeds: np.ndarray, free, rings: int) -> np.ndarray:
+    """Positions (n,3) with every cluster of vertices `seeds` (k,6) and of rings around them moved by an affine map."""
+    n = len(before)
+    weight = np.zeros(n)
+    weight[seeds] = 1.0
+    for _ in range(rings):
+        weight = np.minimum(graph @ weight, 1.0)
+    core = weight > 0
+    tail, head = seeds[:, :1].repeat(5, 1).ravel(), seeds[:, 1:].ravel()
+    inner = sp.csr_matrix(graph[core][:, core])
+    place = np.cumsum(core) - 1
+    rows, columns = inner.nonzero()
+    _, label = graph_components(np.r_[rows, place[tail]], np.r_[columns, place[head]], int(core.sum()))
+    fade = core.astype(float)
+    reach = core.copy()
+    owner = np.full(n, -1)
+    owner[core] = label
+    for k in range(rings):
+        ring = (graph @ reach > 0) & ~reach
+        near = sp.csr_matrix(graph[ring].multiply(reach.astype(float)))
+        near.eliminate_zeros()
+        owner[ring] = owner[near.indices[near.indptr[:-1]]]
+        fade[ring] = 1 - (k + 1) / (rings + 1)
+        reach |= ring
+    moved = position.copy()
+    used = np.flatnonzero(reach)
+    target = _affine_images(before[used], after[used], owner[used], fade[used])
+    share = (fade[used] * free[used])[:, None]
+    moved[used] = (1 - share) * after[used] + share * target
+    return moved
+
+
+def _affine_images(before: np.ndarray, after: np.ndarray, owner: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Images (k,3) of points (k,3) by the affine map of their cluster `owner` (k,) nearest to points `after` (k,3)."""
+    count = int(owner.max()) + 1
+    total = np.bincount(owner, weight, count)
+
+    def means(x):
+        return np.stack([np.bincount(owner, weight * x[:, k], count) for k in range(3)], axis=1) / total[:, None]
+
+    low, high = means(before), means(after)
+    x, y = before - low[owner], after - high[owner]
+    scale = np.sqrt(np.bincount(owner, weight * np.square(x).sum(axis=1), count) / total)
+    products = [np.einsum("ki,kj->kij", weight[:, None] * z, x) for z in (x, y)]
+    square, cross = (
+        np.stack([np.bincount(owner, p[:, i, j], count) for i in range(3) for j in range(3)], axis=1).reshape(-1, 3, 3)
+        for p in products
+    )
+    # Towards the identity across flat patches, whose normal no point says anything about.
+    soft = (1e-3 * scale**2 * total)[:, None, None] * np.eye(3)
+    rotation = _rotations(cross)
+    matrix = (cross + soft @ rotation) @ np.linalg.inv(square + soft)
+    return high[owner] + np.einsum("kij,kj->ki", matrix[owner], x)
+
+
+def _rotations(cross: np.ndarray) -> np.ndarray:
+    """The rotations (c,3,3) nearest to matrices (c,3,3)."""
+    u, _, v = np.linalg.svd(cross)
+    sign = np.ones((len(u), 3))
+    sign[:, 2] = np.sign(np.linalg.det(u @ v))
+    return (u * sign[:, None, :]) @ v

@@ -1,0 +1,296 @@
+"""Carry points along a flow without divergence that takes handles where they shall go (Hu, Zou, Hua 2014, section 5).
+
+The paper fits one steady field to samples of all paths at all times, which cannot be where two paths cross. Here every
+moment has a field of its own, of as many unknowns as there are handles then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import EmptyMeshError, HandleError, NonFiniteError
+from ..progress import Progress, Steps
+from .creases import new_intersections, without_new_intersections
+from .domain import FlowDomain
+from .enclosed_volume import closed_parts, component_volumes, restore_volumes
+from .handles import SPACING, FlowHandle, check_handles, farthest_points, joined, sampled_handles
+from .integration import BLOCK, FlowStep, carried, planned_steps
+from .kernel import FlowField, conditions, interpolated_field
+from .options import STRAIGHT, FlowOptions
+from .paths import handle_paths
+
+# Points on which steps are planned, besides those next to the handles.
+PROBES = 300
+# Samples of walls are this share of the radius apart: closer, and they make the equations ill-conditioned.
+WALL_SPACING = 0.35
+# Handle points that are missed by more than this share of the diagonal before they are set are worth a warning,
+MISSED = 1e-3
+# and volumes that change by more.
+CHANGED = 1e-3
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Where the points are.
+
+    positions (n,d); frames: positions (n,d) at even steps of time, the last one these; steps: of Runge and Kutta's;
+    missed: greatest distance of a handle's point from its end, over the diagonal, before such points were set there;
+    drift: relative changes (c,) of the volumes of closed parts by the flow alone; volumes: what is left of them (c,)
+    intersecting: pairs (k,2) of triangles that pass through one another, and did not before
+    """
+
+    positions: np.ndarray
+    frames: tuple[np.ndarray, ...]
+    steps: int
+    missed: float
+    drift: np.ndarray
+    volumes: np.ndarray
+    intersecting: np.ndarray
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Places (k + 1, p, d) of handle samples at even steps of time, walls, and lambda: what fields are made of."""
+
+    path: np.ndarray
+    domain: FlowDomain | None
+    sharpness: float
+
+    def field(self, stretch: int, time: float) -> FlowField:
+        """The field at a time within a stretch."""
+        count = len(self.path) - 1
+        here, there = self.path[stretch], self.path[stretch + 1]
+        at = here + (time * count - stretch) * (there - here)
+        d = at.shape[1]
+        walls = np.zeros((0, d)) if self.domain is None else self.domain.points
+        normals = np.zeros((0, d)) if self.domain is None else self.domain.normals
+        values = np.concatenate([((there - here) * count).ravel(), np.zeros(len(walls))])
+        return interpolated_field(conditions(at, walls, normals), values, self.sharpness)
+
+
+def flow(
+    points: np.ndarray,
+    handles: tuple[FlowHandle, ...],
+    options: FlowOptions | None = None,
+    triangles: np.ndarray | None = None,
+    domain: FlowDomain | None = None,
+    frames: int = 1,
+) -> Steps[Flow]:
+    """Carry points (n,d), d = 2 or 3, along a flow without divergence that takes handles to their ends.
+
+    Parameters
+    ----------
+    handles : what goes where in a unit of time, and what stays; FlowHandle
+    triangles : (m,3), in space: closed parts get back what flat faces lose of their volume, and faces that newly meet
+    in
+        a crease are taken apart
+    domain : walls that nothing crosses
+    frames : at how many even steps of time positions are asked for
+
+    Raises
+    ------
+    HandleError : nothing moves, handles contradict each other, or lie too close together for the radius
+    EmptyMeshError, NonFiniteError : there are no points, or some are not finite
+    ValueError : an unknown path, or a radius or tolerance that is not positive
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> from omt_uv.solver.progress import drain
+    >>> grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 9)] * 2), axis=-1).reshape(-1, 2)
+    >>> handle = FlowHandle(np.array([[0.5, 0.5]]), np.array([[0.7, 0.5]]))
+    >>> found = drain(flow(grid, (handle,)))
+    >>> bool(np.abs(found.positions[40] - [0.7, 0.5]).max() < 1e-9)
+    True
+
+    References
+    ----------
+    Hu, Zou, Hua 2014, section 5; Narcowich, Ward 1994
+    """
+    options = options or FlowOptions()
+    points = np.asarray(points, float)
+    size = _checked(points, handles, options)
+    check_handles(handles, points.shape[1])
+    way = _way(points / size, handles, options, domain, size)
+    yield Progress("Paths", 0.0)
+    everything = np.concatenate([points, *(h.start for h in handles)]) / size
+    plan = _plan(way, everything, options, len(points), frames)
+    merged = yield from _carry_all(everything, plan, way.domain)
+    ends = np.concatenate([h.end for h in handles]) / size
+    missed = float(np.abs(merged[-1][len(points) :] - ends).max(initial=0.0))
+    positions = [at[: len(points)] * size for at in merged]
+    _set_handles(positions[-1], points, handles)
+    shape = _Shape(points, triangles if points.shape[1] == 3 else None, _free(len(points), handles))
+    return (yield from _sound(positions, shape, options.mend, sum(map(len, plan)), missed))
+
+
+def _sound(positions: list[np.ndarray], shape: _Shape, mend: bool, steps: int, missed: float) -> Steps[Flow]:
+    """The result, of positions (n,3) at every frame that get their volumes back."""
+    drift = shape.changes(positions[-1])
+    for k, at in enumerate(list(positions)):
+        yield Progress("Volumes", k / len(positions))
+        positions[k], intersecting = shape.sound(at, mend)
+    volumes = shape.changes(positions[-1])
+    return Flow(
+        positions=positions[-1],
+        frames=tuple(positions),
+        steps=steps,
+        missed=missed,
+        drift=drift,
+        volumes=volumes,
+        intersecting=intersecting,
+        warnings=_warnings(missed, volumes, len(intersecting)),
+    )
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Points (n,3) before the flow, triangles (m,3) if there are any, and which points (n,) bool may be put right."""
+
+    points: np.ndarray
+    triangles: np.ndarray | None
+    free: np.ndarray
+
+    def changes(self, after: np.ndarray) -> np.ndarray:
+        """Relative changes (c,) of the volumes of closed parts."""
+        if self.triangles is None or not len(self.triangles):
+            return np.zeros(0)
+        old, part = component_volumes(self.points, self.triangles)
+        new, _ = component_volumes(after, self.triangles)
+        closed = closed_parts(self.triangles, part) & (old != 0)
+        return (new[closed] - old[closed]) / np.abs(old[closed])
+
+    def sound(self, after: np.ndarray, mend: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Positions with the volumes of before and, with `mend`, no faces that newly intersect; pairs that still do."""
+        none = np.zeros((0, 2), np.int64)
+        if self.triangles is None or not len(self.triangles):
+            return after, none
+        restored, _ = restore_volumes(self.points, after, self.triangles, self.free)
+        if not mend:
+            return restored, none
+        mended, pairs = without_new_intersections(self.points, restored, self.triangles, self.free)
+        if mended is restored:
+            return restored, pairs
+        result, _ = restore_volumes(self.points, mended, self.triangles, self.free)
+        touched = (mended != restored).any(axis=1)[self.triangles].any(axis=1)
+        return result, new_intersections(self.points, result, self.triangles, touched)
+
+
+def _checked(points: np.ndarray, handles: tuple[FlowHandle, ...], options: FlowOptions) -> float:
+    """The diagonal of the box around points (n,d), if everything is as it should be."""
+    if not (options.radius > 0 and np.isfinite(options.radius) and options.tolerance > 0):
+        raise ValueError("radius and tolerance must be positive")
+    if not len(points):
+        raise EmptyMeshError("There are no vertices to move")
+    wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(wrong):
+        raise NonFiniteError("Coordinates are not finite numbers", kind="vertex", elements=wrong)
+    if not handles:
+        raise HandleError("There is no handle", "Choose what shall move, and where to")
+    size = options.diagonal or float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
+    if not (size > 0 and np.isfinite(size)):
+        raise EmptyMeshError("All vertices are at one place")
+    return size
+
+
+def _way(points, handles, options: FlowOptions, domain: FlowDomain | None, size: float) -> _Way:
+    """Samples of handles on their way, in units of the diagonal."""
+    scaled = tuple(FlowHandle(h.start / size, h.end / size, h.vertices, h.name) for h in handles)
+    sampled = sampled_handles(scaled, SPACING * options.radius)
+    start, end, owner = joined(sampled, options.radius)
+    if domain is not None:
+        rows = farthest_points(domain.points / size, WALL_SPACING * options.radius, len(domain.points))
+        domain = replace(
+            domain,
+            points=domain.points[rows] / size,
+            normals=domain.normals[rows],
+            middle=domain.middle / size,
+            reach=domain.reach / size,
+        )
+        middle, reach = domain.middle, domain.reach
+    else:
+        middle, reach = (points.max(axis=0) + points.min(axis=0)) / 2, 0.5
+    count = 1 if options.path == STRAIGHT else max(options.samples, 1)
+    path = handle_paths(start, end, owner, options.path, count, middle, reach)
+    straight = start + np.linspace(0, 1, len(path))[:, None, None] * (end - start)
+    if np.abs(path - straight).max() < 1e-12:
+        # Nothing turns: one chord does.
+        path = path[[0, -1]]
+    return _Way(path, domain, 1 / options.radius**2)
+
+
+def _plan(way: _Way, everything: np.ndarray, options: FlowOptions, n: int, frames: int) -> list[list[FlowStep]]:
+    """Steps of every frame."""
+    stride = max(n // PROBES, 1)
+    probes = np.concatenate([everything[:n:stride], _nearest(everything[:n], way.path[0])])
+    stretches = len(way.path) - 1
+    knots = np.unique(np.concatenate([np.arange(stretches + 1) / stretches, np.arange(frames + 1) / frames]).round(12))
+
+    def field_at(j: int, time: float) -> FlowField:
+        stretch = min(int((knots[j] + knots[j + 1]) / 2 * stretches), stretches - 1)
+        return way.field(stretch, time)
+
+    plan = planned_steps(field_at, knots, probes, options.tolerance)
+    frame = np.minimum(((knots[:-1] + knots[1:]) / 2 * frames).astype(int), frames - 1)
+    return [[step for k in np.flatnonzero(frame == f) for step in plan[k]] for f in range(frames)]
+
+
+def _nearest(points: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Of points (n,d) those nearest to each of places (p,d)."""
+    from scipy.spatial import cKDTree
+
+    return points[np.unique(cKDTree(points).query(places, k=min(3, len(points)))[1].ravel())]
+
+
+def _carry_all(everything: np.ndarray, plan: list[list[FlowStep]], domain: FlowDomain | None) -> Steps[list]:
+    """Positions (n,d) of all points after every frame."""
+    results = [np.empty_like(everything) for _ in plan]
+    for start in range(0, len(everything), BLOCK):
+        block = everything[start : start + BLOCK]
+        for steps, result in zip(plan, results, strict=True):
+            block = carried(block, steps)
+            if domain is not None:
+                block = domain.held(block)
+            result[start : start + BLOCK] = block
+        yield Progress("Flow", min((start + BLOCK) / len(everything), 1.0))
+    return results
+
+
+def _set_handles(positions: np.ndarray, points: np.ndarray, handles: tuple[FlowHandle, ...]) -> None:
+    """Set vertices of handles where they belong, to the last bit, and those that stay last."""
+    for handle in sorted(handles, key=lambda h: h.stays):
+        if handle.vertices is None:
+            continue
+        known = handle.vertices >= 0
+        rows = handle.vertices[known]
+        positions[rows] = points[rows] if handle.stays else handle.end[known]
+
+
+def _free(n: int, handles: tuple[FlowHandle, ...]) -> np.ndarray:
+    """Which of n points (n,) bool belong to no handle."""
+    free = np.ones(n, bool)
+    for handle in handles:
+        if handle.vertices is not None:
+            free[handle.vertices[handle.vertices >= 0]] = False
+    return free
+
+
+def _warnings(missed: float, volumes: np.ndarray, intersecting: int) -> tuple[str, ...]:
+    told = []
+    if missed > MISSED:
+        told.append(
+            f"Vertices of a handle that the flow took elsewhere, by up to {100 * missed:.2g} % of the diagonal, "
+            "were set to their ends; a handle that only turns and shifts is followed"
+        )
+    worst = float(np.abs(volumes).max(initial=0.0))
+    if worst > CHANGED:
+        told.append(f"An enclosed volume changes by {100 * worst:.2g} %; a finer mesh near the handles helps")
+    if intersecting:
+        told.append(
+            f"{intersecting} pairs of faces pass through one another that did not before; a finer mesh, "
+            "a greater radius or a shorter way helps"
+        )
+    return tuple(told)

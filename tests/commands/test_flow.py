@@ -1,0 +1,60 @@
+"""The command flow: positions, shape keys, report, and what is refused."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+
+import numpy as np
+import pytest
+import scenes
+from bodies import icosphere
+
+
+@pytest.fixture
+def ball(tmp_path):
+    V, F = icosphere(2)
+    obj = scenes.add(V, F, "Ball")
+    obj.vertex_groups.new(name="tip").add([int(V[:, 2].argmax())], 1.0, "REPLACE")
+    obj.vertex_groups.new(name="feet").add(np.flatnonzero(V[:, 2] < -0.8).tolist(), 1.0, "REPLACE")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    (tmp_path / "h.json").write_text(json.dumps({"handles": [{"group": "tip", "move": [0, 0, 0.4]}]}))
+    return tmp_path
+
+
+def test_a_blend_gets_a_shape_key_and_a_report(run, ball):
+    words = ["flow", ball / "in.blend", "-o", ball / "out.blend", "--handles", ball / "h.json", "--keep", "feet"]
+    status, _, err = run(*words, "--shape-key", "--report", ball / "r.json", "--path", "radius", "--lambda", "25")
+    assert status == 0, err
+    report = json.loads((ball / "r.json").read_text())
+    assert report["volume_change"] < 1e-6 and report["new_intersections"] == 0 and report["missed"] < 1e-6
+    bpy.ops.wm.open_mainfile(filepath=str(ball / "out.blend"))
+    keys = bpy.data.objects["Ball"].data.shape_keys.key_blocks
+    assert list(keys.keys()) == ["Basis", "Flow"]
+    assert max(p.co.z for p in keys["Flow"].data) == pytest.approx(1.4, abs=1e-5)
+
+
+def test_other_files_get_the_positions(run, package, ball):
+    (ball / "h.json").write_text('[{"group": "tip", "move": [0.2, 0, 0]}]')
+    words = ["flow", ball / "in.blend", "-o", ball / "out.obj", "--handles", ball / "h.json"]
+    status, _, err = run(*words, "--inside", "ball")
+    assert status == 0, err
+    (obj,) = package("files.meshes").load(ball / "out.obj")
+    assert 0.19 < max(obj.data.vertices, key=lambda v: v.co.z).co.x < 0.5
+
+
+def test_what_makes_no_sense_is_refused(run, ball):
+    words = ["flow", ball / "in.blend", "-o", ball / "out.obj", "--handles", ball / "h.json"]
+    for more, code, text in [
+        (["--frames", "3"], 2, "no shape keys"),
+        (["--keep", "none"], 1, "no vertex group 'none'"),
+        (["--inside", "Nothing"], 1, "no object 'Nothing'"),
+        (["--inside", "Ball"], 1, "nothing that could flow"),
+    ]:
+        status, _, err = run(*words, *more)
+        assert status == code and text in err, err
+        assert not (ball / "out.obj").exists()
+    (ball / "h.json").write_text("[]")
+    status, _, err = run(*words)
+    assert status == 1 and "no list of handles" in err

@@ -1,0 +1,112 @@
+"""Bodies in one field, and UVs that are pushed; handles from files."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from bodies import icosphere
+
+from omt_uv.pipelines.volumes.flow import FlowBody, FlowJob, flow_bodies, flow_uvs
+from omt_uv.pipelines.volumes.handle_file import HandleFileError, euler_matrix, handles_of, read_handle_file
+from omt_uv.solver.flows.handles import FlowHandle
+from omt_uv.solver.flows.options import FlowOptions
+from omt_uv.solver.progress import drain
+
+
+def two_bodies():
+    """A ball in a larger one, as an eye in a head."""
+    V, F = icosphere(3)
+    return FlowBody("head", V, F), FlowBody("eye", 0.3 * V + [0.5, 0, 0], F, np.zeros(len(V), bool))
+
+
+def test_what_is_inside_flows_along():
+    head, eye = two_bodies()
+    near = np.flatnonzero(head.positions[:, 0] > 0.95)
+    handle = FlowHandle(head.positions[near], head.positions[near] + [0.2, 0.1, 0], near)
+    found = drain(flow_bodies(FlowJob((head, eye), ((0, handle),))))
+    (shapes,) = found.frames
+    assert found.volume < 1e-9 and found.missed < 1e-3 and found.intersecting == 0
+    np.testing.assert_allclose(shapes[0][near], handle.end)
+    shift = shapes[1].mean(axis=0) - eye.positions.mean(axis=0)
+    assert shift[0] > 0.03 and found.report().keys() >= {"volume_change", "steps"}
+    assert (np.linalg.norm(shapes[1] - shapes[0].mean(axis=0), axis=1) < 1.2).all()
+
+
+def test_a_region_stays():
+    head, eye = two_bodies()
+    low = FlowBody("low", head.positions, head.triangles, head.positions[:, 2] < -0.5)
+    top = np.flatnonzero(head.positions[:, 2] > 0.95)
+    handle = FlowHandle(head.positions[top], head.positions[top] + [0.3, 0, 0], top)
+    found = drain(flow_bodies(FlowJob((low,), ((0, handle),), frames=2)))
+    for (shape,) in found.frames:
+        assert np.abs(shape[low.stays] - low.positions[low.stays]).max() < 5e-3
+    np.testing.assert_array_equal(found.frames[-1][0][low.stays], low.positions[low.stays])
+
+
+def test_uvs_keep_their_areas_and_pins():
+    x = np.linspace(0, 1, 41)
+    uv = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
+    corners = np.concatenate([uv, uv])
+    pinned = np.zeros(len(corners), bool)
+    pinned[0] = True
+    moved = drain(
+        flow_uvs(corners, pinned, np.array([[0.5, 0.5]]), np.array([[0.6, 0.5]]), FlowOptions(0.2, diagonal=1.0))
+    )
+    np.testing.assert_array_equal(moved.uv[: len(uv)], moved.uv[len(uv) :])
+    np.testing.assert_array_equal(moved.uv[0], uv[0])
+    grid = moved.uv[: len(uv)].reshape(41, 41, 2)
+    a, b = grid[1:, 1:] - grid[:-1, :-1], grid[:-1, 1:] - grid[1:, :-1]
+    area = 0.5 * (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]) * 40**2
+    assert np.abs(area - 1).max() < 0.02 and np.abs(grid - uv.reshape(41, 41, 2)).max() > 0.08
+
+
+def test_handle_files_say_what_goes_where(tmp_path):
+    V, F = icosphere(1)
+    bodies = (FlowBody("A", V, F), FlowBody("B", V + 5, F))
+    path = tmp_path / "h.json"
+    path.write_text(
+        json.dumps(
+            {
+                "handles": [
+                    {"group": "tip", "move": [0, 0, 1], "rotate": [0, 0, 90]},
+                    {"vertices": [3, 1], "object": "B", "move": [1, 0, 0]},
+                    {"from": [0, 0, 0], "to": [1, 1, 1]},
+                ],
+                "keep": "feet",
+            }
+        )
+    )
+    file = read_handle_file(path)
+    found = handles_of(file, bodies, lambda k, name: np.array([0, 5]) if (k, name) == (0, "tip") else None)
+    assert [owner for owner, _ in found] == [0, 1, -1] and file.keep == ("feet",)
+    tip, pair, free = (handle for _, handle in found)
+    np.testing.assert_allclose(tip.end.mean(axis=0), tip.start.mean(axis=0) + [0, 0, 1])
+    np.testing.assert_array_equal(pair.vertices, [1, 3])
+    np.testing.assert_allclose(free.end, [[1, 1, 1]])
+    np.testing.assert_allclose(euler_matrix(np.radians([0, 0, 90])) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("nonsense", "is no JSON"),
+        ("{}", "no list of handles"),
+        ('{"handles": []}', "no list of handles"),
+        ('[{"grup": "a"}]', "'grup'"),
+        ('[{"group": "none"}]', "has no vertices"),
+        ('[{"vertices": [99]}]', "vertices 0 to 41"),
+        ('[{"vertices": ["a"]}]', "no list of numbers"),
+        ('[{"vertices": [0], "move": [0, 1]}]', "no list of points"),
+        ('[{"from": "x", "to": [0, 0, 0]}]', "no list of points"),
+    ],
+)
+def test_handle_files_that_say_nothing_are_refused(tmp_path, text, words):
+    path = tmp_path / "h.json"
+    path.write_text(text)
+    V, F = icosphere(1)
+    with pytest.raises(HandleFileError, match=words):
+        handles_of(read_handle_file(path), (FlowBody("A", V, F),), lambda k, name: None)
+    with pytest.raises(HandleFileError, match="cannot be read"):
+        read_handle_file(tmp_path / "none.json")

@@ -1,0 +1,50 @@
+"""Pairs of triangles that pass through one another: all of them, and no others."""
+
+from __future__ import annotations
+
+import numpy as np
+from bodies import icosphere
+
+from omt_uv.solver.flows.self_intersections import intersecting_pairs
+
+
+def by_sampling(V, F):
+    """Pairs by brute force: every edge against every triangle without a common vertex."""
+    found = set()
+    for i, one in enumerate(F):
+        for j, other in enumerate(F):
+            for a, b in (one[[0, 1]], one[[1, 2]], one[[2, 0]]):
+                if {a, b} & set(other.tolist()):
+                    continue
+                p, q, (u, v, w) = V[a], V[b], V[other]
+                matrix = np.stack([q - p, u - v, u - w], axis=1)
+                if abs(np.linalg.det(matrix)) < 1e-12:
+                    continue
+                t, s, r = np.linalg.solve(matrix, u - p)
+                if 0 < t < 1 and s > 0 and r > 0 and s + r < 1:
+                    found.add((min(i, j), max(i, j)))
+    return sorted(found)
+
+
+def test_random_triangles_agree_with_brute_force():
+    rng = np.random.default_rng(0)
+    V = rng.uniform(size=(30, 3))
+    F = np.array([rng.choice(30, 3, replace=False) for _ in range(40)])
+    F = F[np.unique(np.sort(F, axis=1), axis=0, return_index=True)[1]]
+    # Triangles with an edge in common pass by the rule, and here none of them would be told anyway.
+    assert [tuple(p) for p in intersecting_pairs(V, F)] == by_sampling(V, F)
+
+
+def test_two_balls_and_one():
+    V, F = icosphere(2)
+    assert not len(intersecting_pairs(V, F))
+    two, faces = np.concatenate([V, 0.9 * V + [1.2, 0.1, 0]]), np.concatenate([F, F + len(V)])
+    pairs = intersecting_pairs(two, faces)
+    assert len(pairs) > 10 and (pairs[:, 0] < len(F)).all() and (pairs[:, 1] >= len(F)).all()
+    mine = np.zeros(len(faces), bool)
+    mine[pairs[0, 0]] = True
+    some = intersecting_pairs(two, faces, mine)
+    np.testing.assert_array_equal(some, pairs[(pairs == pairs[0, 0]).any(axis=1)])
+    large = np.concatenate([two, [[0, 0, 0.01], [90, 0, 0.01], [0, 90, 0.02]]])
+    many = intersecting_pairs(large, np.concatenate([faces, [[len(two), len(two) + 1, len(two) + 2]]]))
+    assert (many == len(faces)).any()

@@ -1,0 +1,42 @@
+"""Closed bodies in space: a ball of triangles, and one with limbs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def icosphere(levels: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n,3) of the unit sphere and triangles (m,3), an icosahedron divided `levels` times."""
+    g = (1 + 5**0.5) / 2
+    points = np.array([(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0)], float)
+    points = np.concatenate([points, points[:, [2, 0, 1]], points[:, [1, 2, 0]]])
+    points /= np.linalg.norm(points[0])
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    near = np.isclose(distance, np.sort(np.unique(distance.round(9)))[1])
+    i, j, k = np.nonzero(near[:, :, None] & near[:, None, :] & near[None, :, :])
+    faces = np.stack([i, j, k], axis=1)
+    faces = faces[(faces[:, 0] < faces[:, 1]) & (faces[:, 1] < faces[:, 2])]
+    corner = points[faces]
+    inwards = np.einsum("mi,mi->m", np.cross(corner[:, 0], corner[:, 1]), corner[:, 2]) < 0
+    faces[inwards] = faces[inwards][:, ::-1]
+    for _ in range(levels):
+        points, faces = divided(points, faces)
+        points = points / np.linalg.norm(points, axis=1)[:, None]
+    return points, faces
+
+
+def divided(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every triangle (m,3) of points (n,3) in four."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    ends, inverse = np.unique(edges, axis=0, return_inverse=True)
+    ab, bc, ca = len(points) + inverse.ravel().reshape(3, -1)
+    parts = [[faces[:, 0], ab, ca], [faces[:, 1], bc, ab], [faces[:, 2], ca, bc], [ab, bc, ca]]
+    return np.concatenate([points, points[ends].mean(axis=1)]), np.concatenate([np.stack(p, axis=1) for p in parts])
+
+
+def limbed(levels: int = 4) -> tuple[np.ndarray, np.ndarray]:
+    """A closed body with six blunt limbs, without a plane of symmetry."""
+    points, faces = icosphere(levels)
+    x, y, z = points.T
+    radius = 1 + 0.5 * (x**4 + y**4 + z**4 - 0.6) + 0.1 * x * y + 0.07 * z
+    return points * radius[:, None], faces
