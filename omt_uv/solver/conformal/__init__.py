@@ -8,6 +8,7 @@ from ..lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
+    boundary_first="FlatDisk",
     disk_map="ConformalMap conformal_disk conformal_rectangle",
     intrinsic_triangulation="IntrinsicTriangulation make_delaunay",
     moebius="centre_on_sphere to_plane to_sphere",

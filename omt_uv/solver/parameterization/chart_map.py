@@ -23,7 +23,18 @@ from ..refinement.initial_maps import unroll
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..transport.convex_domain import Disk
 from .chart_pins import ChartPins, mirrored_to_pins, moved_to_pins, refuse_pins_on_outline
-from .initial_map import COARSE_ABOVE, DiskMesh, InitialChartMap, coarse_initial_map, initial_map, mean_value_sites
+from .initial_map import (
+    COARSE_ABOVE,
+    DRAFT_ABOVE,
+    DRAFT_SPREAD,
+    DiskMesh,
+    InitialChartMap,
+    coarse_initial_map,
+    direct_initial_map,
+    flat_initial_map,
+    good_enough,
+    mean_value_sites,
+)
 from .options import MapOptions
 from .polygon_disk import of_polygon_disk, polygon_disk
 
@@ -102,7 +113,8 @@ def map_chart(
     density = None if target is None else target.density
     vertices, unit = in_unit_box(chart.vertices)
     disk = _disk_mesh(vertices, chart, options.boundary, target, log)
-    initial = yield from part_of(_initial_map(disk, options.balance, log), *INITIAL)
+    draft = options.quality == "draft" and options.balance == 0 and target is None and pins is None
+    initial = yield from part_of(_initial_map(disk, options.balance, log, draft), *INITIAL)
     with log.timed("refinement"):
         start, places = mirrored_to_pins(initial.uv, pins)
         refinement_options = RefinementOptions(
@@ -114,7 +126,9 @@ def map_chart(
         )
         given = {"target": None if target is None else disk.target, "region": disk.region, "pins": places}
         given["polygons"] = disk.polygons
-        refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
+        refined = good_enough(disk, start) if draft else None
+        if refined is None:
+            refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
         # Centres of polygons were there for the map alone.
         refined = replace(refined, uv=refined.uv[: len(vertices)])
     with log.timed("measure"):
@@ -186,20 +200,25 @@ def _disk_mesh(vertices: np.ndarray, chart: Chart, boundary: str, target: Target
     )
 
 
-def _initial_map(disk: DiskMesh, balance: float, log: RunLog) -> Steps[InitialChartMap]:
-    """The initial map: flat charts with a free boundary are unrolled, large ones come by way of a coarser mesh."""
+def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool) -> Steps[InitialChartMap]:
+    """The initial map: charts with a free boundary are unrolled or flattened where that changes their areas little;
+    large ones come by way of a coarser mesh."""
     if disk.boundary == "free":
         flat = unroll(disk.vertices, disk.triangles, disk.loop)
         if flat is not None:
             return InitialChartMap(flat)
-    if len(disk.vertices) > COARSE_ABOVE:
+        if draft and len(disk.vertices) <= COARSE_ABOVE:
+            even = flat_initial_map(disk, log, DRAFT_SPREAD)
+            if even is not None:
+                return even
+    if len(disk.vertices) > (DRAFT_ABOVE if draft else COARSE_ABOVE):
         try:
-            found = yield from coarse_initial_map(disk, balance, log)
+            found = yield from coarse_initial_map(disk, balance, log, draft=draft)
             if found is not None:
                 return found
         except MeshError as error:
             log.warnings.append(f"{error.cause}; refined without a coarser mesh")
-    return (yield from initial_map(disk, log))
+    return (yield from direct_initial_map(disk, log))
 
 
 def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: dict, log: RunLog) -> Steps[Refinement]:

@@ -11,15 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.density import graded_density
+from ..conformal.boundary_first import boundary_first
 from ..conformal.disk_map import ConformalMap, conformal_disk, conformal_rectangle
 from ..conformal.rectangle_to_disk import centre_in_disk
 from ..errors import PrecisionError, TransportError
-from ..maps.energy import elements
+from ..maps.energy import area_error, elements, energy
+from ..maps.polygon_elements import polygon_elements
 from ..maps.tutte import arc_length_parameters, tutte
-from ..maps.untangle import map_energy
+from ..maps.untangle import count_folds, map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
+from ..refinement.boundary_barrier import covers_itself
+from ..refinement.continuation_rules import QUALITIES
 from ..refinement.initial_maps import is_far
 from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
@@ -50,6 +54,14 @@ COARSE_ENOUGH = 0.25
 COARSER_FAR = 5
 COARSE_ENOUGH_FAR = 0.4
 DIRECT_FAR = 20000
+# A disk whose log scale spreads less than this over the surface, flattened with the boundary as it comes, is as near to
+# the map looked for as the transport would bring it.
+LITTLE_SPREAD = 0.5
+# Drafts of charts with more vertices than this come by way of a coarser mesh, unless their log scale spreads less.
+DRAFT_ABOVE = 600
+DRAFT_COARSE_ABOVE = 2000
+DRAFT_SPREAD = 0.03
+DRAFT_SWEEPS = 6
 # Their edges grow by at most the root of this over the number of vertices for a length: as they do around a disk that
 # gets most of the map, and meets its ring with as many edges as the ring has around it.
 AROUND = 4.0
@@ -111,12 +123,24 @@ class InitialChartMap:
     multiplier: float = 0.0
 
 
+def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD) -> InitialChartMap | None:
+    """A disk flattened with the boundary as it comes; None where it would fold, cover itself, or scale unevenly."""
+    with log.timed("flattening"):
+        mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
+        try:
+            flat = boundary_first(disk.vertices, disk.triangles, disk.loop)
+        except PrecisionError:
+            return None
+        usable = flat.spread(mass) < spread and count_folds(flat.uv, disk.triangles) == 0
+        return InitialChartMap(flat.uv) if usable and not covers_itself(flat.uv @ [1, 1j], disk.loop) else None
+
+
 def coarse_initial_map(
-    disk: DiskMesh, balance: float, log: RunLog, flat: np.ndarray | None = None
+    disk: DiskMesh, balance: float, log: RunLog, flat: np.ndarray | None = None, draft: bool = False
 ) -> Steps[InitialChartMap | None]:
     """Map a disk by way of a coarser mesh; None where it cannot be coarsened, or where that does not pay.
 
-    flat (n,2) : an embedding, a mean value map by default
+    flat (n,2) : an embedding, a mean value map by default; draft : the map had better have its areas at once
     """
     vertices, triangles = disk.vertices, disk.triangles
     far = is_far(disk.target, face_areas(vertices, triangles))
@@ -136,39 +160,44 @@ def coarse_initial_map(
     points = vertices[coarse.kept]
     coarse_disk = DiskMesh(points, coarse.triangles, coarse.mass, loop, disk.boundary, corners, coarse.region)
     found = None
-    if len(points) > (DIRECT_FAR if far else COARSE_ABOVE):
-        found = yield from part_of(coarse_initial_map(coarse_disk, balance, log, flat[coarse.kept]), *COARSE_MAP)
+    if len(points) > (DIRECT_FAR if far else DRAFT_COARSE_ABOVE if draft else COARSE_ABOVE):
+        coarser = coarse_initial_map(coarse_disk, balance, log, flat[coarse.kept])
+        found = yield from part_of(coarser, *COARSE_MAP)
     if found is None:
-        found = yield from part_of(initial_map(coarse_disk, log), *COARSE_MAP)
+        found = yield from part_of(direct_initial_map(coarse_disk, log), *COARSE_MAP)
     with log.timed("coarse refinement"):
-        refined = yield from part_of(_coarse_refined(coarse_disk, found, balance, far), *COARSE_REFINEMENT)
+        refined = yield from part_of(
+            _coarse_refined(coarse_disk, found, balance, "sketch" if draft else "rough" if far else "relaxed"),
+            *COARSE_REFINEMENT,
+        )
     log.warnings += refined.warnings
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
-        uv = yield from part_of(_smoothed(disk, uv, far), *SMOOTHING)
+        weight, sweeps = SMOOTH_WEIGHT_FAR if far or draft else SMOOTH_WEIGHT, DRAFT_SWEEPS if draft else SWEEPS
+        uv = yield from part_of(_smoothed(disk, uv, weight, sweeps), *SMOOTHING)
         # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
-        if not far and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
+        if not (far or draft) and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(flat)
     return InitialChartMap(uv, found.conformal, found.cells, far, refined.multiplier)
 
 
-def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, far: bool) -> Steps[Refinement]:
+def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, quality: str) -> Steps[Refinement]:
     """The refined map of a coarse mesh."""
     options = RefinementOptions(
         boundary=disk.boundary,
         balance=balance,
-        quality="rough" if far else "relaxed",
+        quality=quality,
         warm_start=initial.warm,
         multiplier=initial.multiplier,
     )
     return refine(disk.vertices, disk.triangles, initial.uv, options, target=disk.target, region=disk.region)
 
 
-def _smoothed(disk: DiskMesh, uv: np.ndarray, far: bool) -> Steps[np.ndarray]:
+def _smoothed(disk: DiskMesh, uv: np.ndarray, area_weight: float, sweeps: int) -> Steps[np.ndarray]:
     """A map uv (n,2) that came from a coarser mesh, its vertices moved within their stars."""
     faces, w = elements(disk.vertices, disk.triangles, disk.target), uv @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
-    w = yield from smoothed(faces, w, SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT, SWEEPS)
+    w = yield from smoothed(faces, w, area_weight, sweeps)
     return np.column_stack([w.real, w.imag])
 
 
@@ -180,6 +209,33 @@ def _density(vertices, triangles, target, goal: int) -> np.ndarray:
     density = area * graded_density(stretch, vertices, triangles, np.sqrt(AROUND / goal), goal)
     has, all_of_it = (np.bincount(triangles.ravel(), np.repeat(x, 3), len(vertices)) for x in (density, area))
     return has / all_of_it
+
+
+def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
+    """Map a disk by itself: flattened where its boundary is free and it may be, by conformal map and transport else."""
+    flat = flat_initial_map(disk, log) if disk.boundary == "free" else None
+    return (yield from initial_map(disk, log)) if flat is None else flat
+
+
+def good_enough(disk: DiskMesh, uv: np.ndarray) -> Refinement | None:
+    """An initial map uv (n,2) as the result, if its areas are a draft's, no face folds and nothing covers itself."""
+    faces = polygon_elements(disk.vertices, disk.triangles, disk.target, disk.polygons, disk.region)
+    w = uv @ [1, 1j]
+    w = w * np.sqrt((faces.area @ faces.ratio) / np.abs(faces.areas(w).sum()))
+    value, error = energy(faces, w, SMOOTH_WEIGHT_FAR), area_error(faces, w)
+    if not np.isfinite(value) or error > QUALITIES["draft"].area_error or covers_itself(w, disk.loop):
+        return None
+    return Refinement(
+        uv=np.column_stack([w.real, w.imag]),
+        iterations=0,
+        residual=0.0,
+        area_error=error,
+        area_weight=SMOOTH_WEIGHT_FAR,
+        energy=value,
+        status="converged",
+        overlap=False,
+        warnings=(),
+    )
 
 
 def initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:

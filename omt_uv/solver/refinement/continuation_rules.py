@@ -102,7 +102,18 @@ QUALITIES = {
         area_error=0.1, area_weights=(30.0,), greatest_weight=1e4, max_steps=80, tolerance=3e-2, loose_tolerance=1e-2
     ),
     "rough": Quality(area_error=0.03, area_weights=(30.0, 500.0), greatest_weight=1e4, max_steps=80, tolerance=1e-2),
-    "draft": Quality(area_error=0.05, area_weights=(10.0, 100.0), greatest_weight=1e3, max_steps=40, tolerance=1e-2),
+    "sketch": Quality(
+        area_error=0.01,
+        area_weights=(30.0, 500.0),
+        greatest_weight=4e3,
+        max_steps=30,
+        tolerance=0.1,
+        loose_tolerance=0.1,
+    ),
+    # Areas about right, whatever is left of the shear.
+    "draft": Quality(
+        area_error=0.05, area_weights=(100.0,), greatest_weight=1e3, max_steps=40, tolerance=0.1, loose_tolerance=0.5
+    ),
     "standard": Quality(
         area_error=0.008, area_weights=(30.0, 500.0), greatest_weight=1e6, max_steps=150, tolerance=3e-2
     ),

@@ -12,6 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..linalg.additive_schwarz import AdditiveSchwarz
+from ..linalg.nested_dissection import LARGE, vertex_graph
+from ..linalg.sparse import minimum_degree
 from ..maps.energy import Elements, area_forms, face_derivatives, sum_at_vertices
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..mesh.polygon_areas import BOTH
@@ -23,8 +25,11 @@ CHUNK = 20_000
 class Assembly:
     """Scatters dense blocks of triangles, and of quads, into one sparse matrix whose pattern never changes.
 
-    Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: of a mesh that is solved in parts, or None.
+    Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: of a mesh that is solved in parts, or None; order: in which
+    unknowns are eliminated, see `sparse.Factor`.
     """
+
+    order: str | np.ndarray = "natural"
 
     def __init__(
         self, triangles: np.ndarray, n: int, parts: AdditiveSchwarz | None = None, quads: np.ndarray | None = None
@@ -70,7 +75,12 @@ def assembly_of(
     """The assembly of the elements of a mesh of n vertices, of which some may follow others."""
     first = lone_triangles(faces)
     place = np.arange(n) if symmetry is None else symmetry.representative
-    return Assembly(place[faces.triangles[:first]], n, parts, place[corners_of_quads(faces)])
+    assembly = Assembly(place[faces.triangles[:first]], n, parts, place[corners_of_quads(faces)])
+    if symmetry is not None and n < LARGE:
+        # The order of the mesh is no order of its half: folded, its separators are neighbours of both sides.
+        vertices = minimum_degree(vertex_graph(place[faces.triangles], n))
+        assembly.order = (2 * vertices[:, None] + np.arange(2)).ravel()
+    return assembly
 
 
 def lone_triangles(faces: Elements) -> int:

@@ -188,7 +188,8 @@ def newton_direction(
     frame, free = problem.motion.frame(w), problem.motion.free.astype(float)
     matrix, slopes, scale = _equations(problem, w, pressure, frame, free)
     parts = problem.assembly.parts if np.max(problem.area_weight) <= STIFF else None
-    step = -_solution(matrix, slopes, scale, parts, w, frame[:, None] * [1, 1j] * free)
+    axes = frame[:, None] * [1, 1j] * free
+    step = -_solution(matrix, slopes, scale, parts, w, axes, problem.assembly.order)
     return step.view(complex), float(step @ slopes)
 
 
@@ -214,12 +215,12 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
     return matrix + extra if problem.terms else matrix, axes.ravel(), found.scale
 
 
-def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | None, w, axes) -> np.ndarray:
+def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | None, w, axes, order) -> np.ndarray:
     """Solution x (n,) of matrix x = b, shifted where rounding makes it singular: the step is shorter, and goes down."""
     shift = SHIFT
     while True:
         try:
-            return Factor(matrix, "natural").solve(b) if parts is None else parts.solve(matrix, b, w, axes)
+            return Factor(matrix, order).solve(b) if parts is None else parts.solve(matrix, b, w, axes)
         except PrecisionError:
             if shift > 1:
                 raise

@@ -206,7 +206,7 @@ def _refined(
     several_pins = pins is not None and len(pins.vertices) > 1
     if pins is not None and several_pins:
         problem, w = yield from move_pins(problem, w, pins)
-    elif boundary == "free":
+    elif boundary == "free" and options.quality != "draft":
         w = yield from part_of(
             _smoothed_if_tense(problem, by_triangle, w, planned_weights(balance, quality)[0]), *SMOOTHING
         )

@@ -7,6 +7,8 @@ such errors: the one face that folds first stops the step of all. Boundaries may
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from ..maps.energy import Elements, energies, squared
@@ -149,41 +151,112 @@ def relax(
 
     row (s,): which of the vertices is the first corner of a face of the stars; fixed: vertices (k,) bool that stay.
     """
-    k = len(vertex)
-    value = np.bincount(row, energies(faces, w, area_weight), k)
+    k, before = len(vertex), w[vertex]
+    around = _around(faces, w)
+    first = value = np.bincount(row, around.energies(area_weight), k)
     for _ in range(steps):
-        step = _directions(row, faces, w, area_weight, k)
-        moving = np.ones(k, bool) & ~np.asarray(fixed)
-        for _ in range(HALVINGS):
-            trial = w.copy()
-            trial[vertex[moving]] += step[moving]
-            new = np.bincount(row, energies(faces, trial, area_weight), k)
-            better = moving & (new < value)
-            w[vertex[better]] += step[better]
-            value = np.where(better, new, value)
-            moving &= ~better
-            if not moving.any():
-                break
-            step *= 0.5
+        step = _directions(row, around, area_weight, k)
+        step[np.asarray(fixed) & np.ones(k, bool)] = 0
+        moved, value = _searched(row, around, step, area_weight, value)
+        w[vertex] += moved
+        around = around.moved(moved[row]) if steps > 1 else around
+    # What was followed from step to step has its own rounding: on slivers it may have lost a fold.
+    after = np.bincount(row, energies(faces, w, area_weight), k)
+    worse = ~(after <= first)
+    w[vertex[worse]] = before[worse]
 
 
-def _directions(row, faces: Elements, w, area_weight: float, k: int) -> np.ndarray:
+@dataclass(frozen=True)
+class _Around:
+    """Faces (s,) of stars as the places of their first corners change, in which their areas are linear.
+
+    weight, ratio : of the faces; gradient : of the first corner's hat function, complex; inner : derivative dw/dconj(z)
+    det : determinants; by_area : their slopes by that corner, complex
+    """
+
+    weight: np.ndarray
+    ratio: np.ndarray
+    gradient: np.ndarray
+    inner: np.ndarray
+    det: np.ndarray
+    by_area: np.ndarray
+
+    def of(self, some: np.ndarray) -> _Around:
+        """Some of the faces, (s,) bool or numbers."""
+        return _Around(**{name: values[some] for name, values in vars(self).items()})
+
+    def moved(self, step: np.ndarray) -> _Around:
+        """The faces after a step (s,) complex of their first corners."""
+        det = self.det + (self.by_area.real * step.real + self.by_area.imag * step.imag)
+        return replace(self, inner=self.inner + 0.5 * self.gradient * step, det=det)
+
+    def energies(self, area_weight: float) -> np.ndarray:
+        """The energy of every face, (s,), infinite at a fold, as `energy.energies` has it."""
+        safe = np.where(self.det > 0, self.det, 1)
+        r = safe / self.ratio
+        value = self.weight * (2 * squared(self.inner) / safe + area_weight * ((r + 1 / r) / 2 - 1))
+        return np.where(self.det > 0, value, np.inf)
+
+
+def _around(faces: Elements, w: np.ndarray) -> _Around:
+    a, b = faces.derivatives(w)
+    g = faces.gradient[:, 0]
+    return _Around(
+        weight=faces.weight,
+        ratio=faces.ratio,
+        gradient=g,
+        inner=b,
+        det=squared(a) - squared(b),
+        by_area=a * g - b * g.conj(),
+    )
+
+
+def _searched(row, around: _Around, step: np.ndarray, area_weight: float, value: np.ndarray):
+    """How far the vertices go along their steps (k,), halved until their energies (k,) fall, and the energies then."""
+    k = len(step)
+    moved, value, left, size = np.zeros(k, complex), value.copy(), np.flatnonzero(step != 0), 1.0
+    rows, here = row, around
+    if len(left) < k:
+        here, rows = _star_of(left, row, around, k)
+    for _ in range(HALVINGS):
+        trial = size * step[left]
+        new = np.bincount(rows, here.moved(trial[rows]).energies(area_weight), len(left))
+        better = new < value[left]
+        moved[left[better]], value[left[better]] = trial[better], new[better]
+        if better.all():
+            break
+        here, rows = _star_of(np.flatnonzero(~better), rows, here, len(left))
+        left, size = left[~better], 0.5 * size
+    return moved, value
+
+
+def _star_of(some: np.ndarray, row: np.ndarray, around: _Around, k: int) -> tuple[_Around, np.ndarray]:
+    """The faces around some (j,) of k vertices, and whose each is, among these."""
+    place = np.full(k, -1)
+    place[some] = np.arange(len(some))
+    kept = place[row] >= 0
+    return around.of(kept), place[row[kept]]
+
+
+def _directions(row, around: _Around, area_weight: float, k: int) -> np.ndarray:
     """Newton steps (k,) of single vertices, with their whole Hessian.
 
     By the place of its first corner a face's area changes linearly, so that there is no need of eigensystems.
     """
-    a, b = faces.derivatives(w)
-    g, inner = faces.gradient[:, 0], squared(b)
-    det = squared(a) - inner
-    by_area, by_shear = a * g - b * g.conj(), b * g.conj()
-    slope = faces.weight * (area_weight / 2 * (1 / faces.ratio - faces.ratio / det**2) - 2 * inner / det**2)
-    bend = faces.weight * (4 * inner + area_weight * faces.ratio) / det**3
-    mixed, even = -2 * faces.weight / det**2, faces.weight * squared(g) / det
-    down = slope * by_area + 2 * faces.weight / det * by_shear
-    xx = bend * by_area.real**2 + 2 * mixed * by_area.real * by_shear.real + even
-    yy = bend * by_area.imag**2 + 2 * mixed * by_area.imag * by_shear.imag + even
-    xy = bend * by_area.real * by_area.imag + mixed * (by_area * by_shear).imag
-    xx, yy, xy, gx, gy = (np.bincount(row, x, k) for x in (xx, yy, xy, down.real, down.imag))
+    g, b, det, by_area = around.gradient, around.inner, around.det, around.by_area
+    inner, by_shear, over = squared(b), b * g.conj(), 1 / det
+    weighted = around.weight * over
+    bent = weighted * over
+    slope = around.weight * (area_weight / 2) / around.ratio - bent * (area_weight / 2 * around.ratio + 2 * inner)
+    bend = bent * over * (4 * inner + area_weight * around.ratio)
+    even = weighted * squared(g)
+    ax, ay, sx, sy = by_area.real, by_area.imag, by_shear.real, by_shear.imag
+    px, py = bend * ax - 2 * bent * sx, bend * ay - 2 * bent * sy
+    xx = px * ax - 2 * bent * ax * sx + even
+    yy = py * ay - 2 * bent * ay * sy + even
+    xy = px * ay - 2 * bent * ax * sy
+    gx, gy = slope * ax + 2 * weighted * sx, slope * ay + 2 * weighted * sy
+    xx, yy, xy, gx, gy = (np.bincount(row, x, k) for x in (xx, yy, xy, gx, gy))
     # Bent downwards, or hardly at all, it is made a little convex.
     mean, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     lift = np.maximum(0, CONVEX * (np.abs(mean) + half) - (mean - half))

@@ -99,5 +99,5 @@ def test_a_step_is_newtons(chart):
     assert convex.mean() > 0.8
     gradient = np.stack([slope(1e-5), slope(1e-5j)], 1)
     expected = -np.linalg.solve(hessian, gradient[..., None])[..., 0] @ [1, 1j]
-    found = smoothing._directions(row, star, w, WEIGHT, len(vertex))
+    found = smoothing._directions(row, smoothing._around(star, w), WEIGHT, len(vertex))
     np.testing.assert_allclose(found[convex], expected[convex], atol=1e-3 * np.abs(expected).max())
