@@ -41,6 +41,9 @@ ARROWS: dict[str, str] = {
     "solver.editing": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement",
     "solver.sphere": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal solver.refinement",
     "solver.globe": "solver solver.mesh solver.linalg solver.sphere",
+    "solver.strain": "solver solver.mesh solver.analysis",
+    "solver.registration": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement "
+    "solver.parameterization solver.sphere",
     "solver.remeshing.components": "solver solver.mesh",
     "solver.remeshing.edits": "solver solver.mesh solver.remeshing.components",
     "solver.remeshing.relaxation": "solver solver.mesh solver.linalg solver.remeshing.edits",

@@ -244,6 +244,24 @@ class TetrahedraError(MeshError):
     remedy = "Remesh the surface evenly first"
 
 
+class TopologyMismatchError(MeshError):
+    """Two surfaces that are to be matched have different topology, or one that no common domain has."""
+
+    remedy = "Close holes and remove handles until both are alike"
+
+
+class LandmarkError(MeshError):
+    """Landmarks of two surfaces contradict each other, or cannot be met."""
+
+    remedy = "Give every landmark one place on either surface"
+
+
+class HandednessError(LandmarkError):
+    """Landmarks of one surface are a mirror image of those of the other."""
+
+    remedy = "Exchange left and right on one side, or match mirrored"
+
+
 # What warnings advise, in the solver's words: front ends replace these by where their users find it.
 MERGE = "merge vertices that coincide"
 MERGING = "merging vertices that coincide"

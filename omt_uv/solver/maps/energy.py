@@ -128,15 +128,15 @@ def energy(faces: Elements, w: np.ndarray, area_weight: float) -> float:
 
 def energy_of(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float) -> float:
     """The energy of the derivatives a, b (m,) complex; infinity where a face is folded."""
-    return float(_energies(faces, a, b, area_weight).sum())
+    return float(energies_of(faces, a, b, area_weight).sum())
 
 
 def energies(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
     """The energy of every polygon (p,) of a map w (n,) complex, infinite at a fold; area_weight: one, or (p,)."""
-    return _energies(faces, *faces.derivatives(w), area_weight)
+    return energies_of(faces, *faces.derivatives(w), area_weight)
 
 
-def _energies(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
+def energies_of(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
     """The energy of every face (m,) from the derivatives a, b (m,) complex."""
     outer, inner = squared(a), squared(b)
     det = outer - inner

@@ -1,0 +1,136 @@
+"""Map two surfaces to a common domain with areas kept: the unit sphere, or the unit disk.
+
+Holes that do not count are closed by fans, for the map only. What the two surfaces must have in common is checked
+first: one part each, no handles, and the same kind of boundary.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import (
+    EmptyMeshError,
+    NonManifoldEdgeError,
+    OrientationError,
+    PinchedVertexError,
+    SeveralComponentsError,
+    TopologyMismatchError,
+)
+from ..mesh.surface import check_finite, triangle_surface
+from ..mesh.topology import boundary_edges, boundary_loops, graph_components, halfedges, pair_keys
+from ..parameterization.options import UnwrapOptions
+from ..parameterization.unwrap import unwrap
+from ..progress import Steps
+from ..sphere.sphere_map import sphere_map
+
+SPHERE = "sphere"
+DISK = "disk"
+AUTO = "auto"
+DOMAINS = (AUTO, SPHERE, DISK)
+
+
+@dataclass(frozen=True)
+class FilledSurface:
+    """A surface whose holes are closed: vertices (n,3), triangles (m,3), of which the first `count` are its own, and
+    the first `own` of the vertices; loop (k,): its one boundary, in order, where it is to be a disk."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    own: int
+    count: int
+    holes: int
+    loop: np.ndarray
+
+
+def kind_of(source: np.ndarray, target: np.ndarray, domain: str) -> str:
+    """The domain for triangles (m,3) of a source and a target: a sphere where one of them is closed."""
+    if domain != AUTO:
+        return domain
+    return DISK if len(boundary_edges(source)) and len(boundary_edges(target)) else SPHERE
+
+
+def checked(vertices: np.ndarray, triangles: np.ndarray, name: str) -> None:
+    """Raise unless a surface (n,3), (m,3) is one manifold part without handles, all of whose vertices are used.
+
+    name : "source" or "target", for the message
+    """
+    if not len(triangles):
+        raise EmptyMeshError(f"The {name} has no faces")
+    check_finite(vertices, triangles)
+    tail, head = halfedges(triangles)
+    key, count = np.unique(pair_keys(tail, head), return_counts=True)
+    ends = np.stack([key >> 32, key & 0xFFFFFFFF], axis=1)
+    if (count > 2).any():
+        raise NonManifoldEdgeError(f"More than two faces of the {name} meet at an edge", "", "edge", ends[count > 2])
+    directed = tail * len(vertices) + head
+    _, first, repeated = np.unique(directed, return_index=True, return_counts=True)
+    if (repeated > 1).any():
+        wrong = first[repeated > 1]
+        pairs = np.stack([tail[wrong], head[wrong]], axis=1)
+        raise OrientationError(f"Neighbouring faces of the {name} have opposite orientation", "", "edge", pairs)
+    part = graph_components(tail, head, len(vertices))[1][triangles[:, 0]]
+    _, of, size = np.unique(part, return_inverse=True, return_counts=True)
+    if len(size) > 1:
+        rest = np.flatnonzero(of.ravel() != size.argmax())
+        raise SeveralComponentsError(f"The {name} has {len(size)} parts", "Match its parts one by one", "face", rest)
+    edges = boundary_edges(triangles)
+    pinched = np.flatnonzero(np.bincount(edges[:, 0], minlength=len(vertices)) > 1)
+    if len(pinched):
+        raise PinchedVertexError(f"Boundaries of the {name} touch in a vertex", "", "vertex", pinched)
+    euler = len(vertices) - len(key) + len(triangles) + len(boundary_loops(triangles))
+    if euler != 2:
+        handles = (2 - euler) // 2
+        raise TopologyMismatchError(
+            f"The {name} has {'a handle' if handles == 1 else f'{handles} handles'}",
+            "Match surfaces without handles; close them, or cut both alike by seams",
+        )
+
+
+def filled(surface: tuple[np.ndarray, np.ndarray], domain: str, name: str) -> FilledSurface:
+    """A surface, vertices (n,3) and triangles (m,3), with a fan in every hole; a disk keeps the longest boundary.
+
+    Raises
+    ------
+    TopologyMismatchError : a closed surface, and the domain is a disk
+    """
+    vertices, triangles = surface
+    loops = boundary_loops(triangles)
+    lengths = [np.linalg.norm(vertices[loop] - vertices[np.roll(loop, -1)], axis=1).sum() for loop in loops]
+    outer = np.zeros(0, np.int64)
+    if domain == DISK:
+        if not loops:
+            raise TopologyMismatchError(
+                f"The {name} is closed, and the other surface is not",
+                "Open both or close both, or take the sphere as domain, which closes holes",
+            )
+        outer = loops.pop(int(np.argmax(lengths)))
+    added, centres = [], []
+    for k, loop in enumerate(loops):
+        centres.append(vertices[loop].mean(axis=0))
+        centre = np.full(len(loop), len(vertices) + k)
+        added.append(np.column_stack([np.roll(loop, -1), loop, centre]))
+    return FilledSurface(
+        vertices=np.concatenate([vertices, np.reshape(centres, (-1, 3))]),
+        triangles=np.concatenate([triangles, *added]),
+        own=len(vertices),
+        count=len(triangles),
+        holes=len(loops),
+        loop=outer,
+    )
+
+
+def domain_map(surface: FilledSurface, domain: str, balance: float) -> Steps[np.ndarray]:
+    """Places of the vertices in the domain: unit vectors (n,3), or points of the unit disk (n,2).
+
+    Areas are kept at balance 0, angles at 1. Raises MeshError: see `sphere.sphere_map`, `parameterization.unwrap`.
+    """
+    if domain == SPHERE:
+        return (yield from sphere_map(surface.vertices, surface.triangles, balance=balance)).positions
+    options = UnwrapOptions(boundary="disk", balance=balance, seams="existing")
+    found = yield from unwrap(triangle_surface(surface.vertices, surface.triangles), options=options)
+    corners, uv = found.corner_uv()
+    places = np.zeros((len(surface.vertices), 2))
+    places[surface.triangles.ravel()[corners]] = uv
+    return places / np.linalg.norm(places[surface.loop], axis=1).mean()

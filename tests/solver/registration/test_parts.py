@@ -1,0 +1,174 @@
+"""The parts of a registration, each by the property that it is for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from meshes import bumpy, icosphere
+from sphere_shapes import blob, random_rotation
+
+from omt_uv.solver.errors import LandmarkError
+from omt_uv.solver.maps.energy import elements
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.hessian_blocks import Assembly
+from omt_uv.solver.registration import alignment
+from omt_uv.solver.registration.carriers import DiskCarrier, SphereCarrier, TargetCarrier
+from omt_uv.solver.registration.coarse_polish import far_vertices
+from omt_uv.solver.registration.descriptors import descriptors
+from omt_uv.solver.registration.domains import checked, filled, kind_of
+from omt_uv.solver.registration.landmark_flow import draw_landmarks
+from omt_uv.solver.registration.landmarks import split_at, vertex_landmarks
+from omt_uv.solver.registration.straight_walks import StraightWalks
+from omt_uv.solver.registration.suggestions import suggest_landmarks
+from omt_uv.solver.registration.surface_newton import Deformation, frames, minimise_on
+
+
+def test_the_rotation_of_pairs_is_found_mirrored_too():
+    points = icosphere(1)[0]
+    R = random_rotation(3)
+    assert np.allclose(alignment.rotation_of_pairs(points, points @ R.T).rotation, R)
+    M = R @ np.diag([1.0, 1, -1])
+    found = alignment.rotation_of_pairs(points[[0, 1, 2, 5]], points[[0, 1, 2, 5]] @ M.T, mirrored=True)
+    assert np.allclose(found.rotation, M) and found.error < 1e-20
+
+
+def test_the_search_finds_a_rotation_of_functions():
+    P, _ = icosphere(3)
+    R = random_rotation(5)
+    values = np.column_stack([P[:, 0] ** 3 + P[:, 1], P[:, 2] * P[:, 0], np.sin(3 * P[:, 1])])
+    found = alignment.rotation_by_search((P, values), (P @ R.T, values))
+    assert np.trace(found.rotation @ R.T) > 1 + 2 * np.cos(np.radians(4))
+    turned = alignment.turn_by_search((P[:, :2], values), (P[:, :2] @ [[0, 1], [-1, 0]], values))
+    assert abs(turned.turn - 1j) < 0.05
+
+
+def test_rotations_of_the_grid_are_proper():
+    grid = alignment.rotation_grid()
+    assert np.allclose(np.einsum("rab,rcb->rac", grid, grid), np.eye(3)) and np.allclose(np.linalg.det(grid), 1)
+
+
+def test_a_moebius_map_takes_three_pairs_where_they_belong():
+    given = alignment.MoebiusMap(0.3 - 0.2j, np.exp(0.7j))
+    z = np.array([0.1 + 0.2j, -0.5j, 0.6 + 0.1j])
+    assert np.abs(alignment.moebius_of_pairs(z, given(z))(z) - given(z)).max() < 1e-2
+
+
+def test_straight_walks_on_a_sphere_are_great_circles():
+    V, F = icosphere(4)
+    walks = StraightWalks(V, F)
+    rng = np.random.default_rng(0)
+    faces, weights = rng.integers(len(F), size=50), rng.dirichlet(np.ones(3), 50)
+    start = np.einsum("kc,kcd->kd", weights, V[F[faces]])
+    side = np.cross(start, rng.normal(size=(50, 3)))
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    ends = walks(faces, weights, 1.0 * side)
+    end = np.einsum("kc,kcd->kd", ends[1], V[F[ends[0]]])
+    expected = np.cos(1.0) * start / np.linalg.norm(start, axis=1, keepdims=True) + np.sin(1.0) * side
+    assert np.abs(end - expected).max() < 0.02
+    assert (ends[1] >= 0).all() and np.allclose(ends[1].sum(axis=1), 1)
+
+
+def test_straight_walks_cross_a_crease_as_if_it_were_flat():
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]])
+    F = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]])
+    folded = V.copy()
+    folded[4:] = [[1, 0, 1], [1, 1, 1]]
+    start, weights, step = np.array([0]), np.array([[0.2, 0.5, 0.3]]), np.array([[0.8, 0.1, 0.0]])
+    flat, bent = StraightWalks(V, F)(start, weights, step), StraightWalks(folded, F)(start, weights, step)
+    assert flat[0] == bent[0] and np.allclose(flat[1], bent[1])
+    stops = StraightWalks(V, F)(start, weights, 9 * step)
+    assert np.abs(stops[1]).min() < 1e-9
+
+
+def test_landmarks_split_triangles_and_keep_the_surface():
+    V, F = bumpy(4, 4)
+    inside = np.array([[0.2, 0.3, 0.5], [0.6, 0.2, 0.2], [1, 0, 0]])
+    split = split_at(V, F, np.array([3, 3, 7]), inside)
+    assert face_areas(split.vertices, split.triangles).sum() == pytest.approx(face_areas(V, F).sum())
+    corners = np.einsum("mkc,mcd->mkd", split.corners, V[F[split.parent]])
+    assert np.allclose(corners, split.vertices[split.triangles])
+    assert split.landmarks[0] == len(V) and split.landmarks[1] == F[3, 0] and split.landmarks[2] == F[7, 0]
+    with pytest.raises(LandmarkError, match="without faces"):
+        vertex_landmarks((np.array([99]), F), (np.array([0]), F))
+
+
+def test_holes_are_filled_but_for_the_boundary_of_a_disk():
+    V, F = bumpy(6, 6)
+    gone = np.delete(F, np.flatnonzero((F == 24).any(axis=1)), axis=0)
+    used = np.unique(gone)
+    name = np.full(len(V), -1)
+    name[used] = np.arange(len(used))
+    W, G = V[used], name[gone]
+    checked(W, G, "source")
+    disk, sphere = filled((W, G), "disk", "source"), filled((W, G), "sphere", "source")
+    assert (disk.holes, sphere.holes) == (1, 2) and len(disk.loop) == 24
+    assert kind_of(G, F, "auto") == "disk" and kind_of(G, icosphere(0)[1], "auto") == "sphere"
+
+
+def test_descriptors_do_not_change_with_place_and_size():
+    V, F = blob(2)
+    assert np.allclose(descriptors(V, F), descriptors(5 * V @ random_rotation().T + 2, F), atol=1e-6)
+
+
+def test_suggestions_of_a_body_and_itself_are_its_own_peaks():
+    V, F = blob(3, seed=2)
+    found = suggest_landmarks((V, F), (V, F))
+    assert len(found.source) >= 3 and (found.source == found.target).all()
+
+
+def test_far_vertices_start_with_those_that_are_given():
+    V, _ = icosphere(3)
+    chosen = far_vertices(V, np.array([7, 9]), np.zeros(0, np.int64), 40)
+    assert chosen[:2].tolist() == [7, 9] and len(np.unique(chosen)) == 40
+
+
+def problem_on(carrier, positions, triangles):
+    faces = elements(positions, triangles, face_areas(positions, triangles))
+    return Deformation(faces, Assembly(triangles, len(positions)), carrier, np.zeros(len(positions), bool), 1.0)
+
+
+def test_landmarks_flow_to_their_places_on_the_sphere():
+    P, F = icosphere(3)
+    carrier = SphereCarrier()
+    start = carrier.place(P)
+    vertices = np.array([0, 50, 200, 400])
+    moved = P[vertices] + 0.4 * np.cross(P[vertices], [0.3, 0.5, 1.0])
+    targets = carrier.place(moved / np.linalg.norm(moved, axis=1, keepdims=True))
+    found = drain(draw_landmarks(problem_on(carrier, P, F), start, vertices, targets))
+    assert found.met.all() and not carrier.folded(found.placed, F).any()
+    assert np.abs(found.placed.positions[vertices] - targets.positions).max() < 1e-12
+
+
+def test_newton_on_a_surface_undoes_a_disturbance():
+    V, F = icosphere(2)
+    carrier = TargetCarrier(V, F, V)
+    rng = np.random.default_rng(1)
+    disturbed = V + 0.05 * rng.normal(size=V.shape)
+    start = carrier.place(disturbed / np.linalg.norm(disturbed, axis=1, keepdims=True))
+    problem = problem_on(carrier, V, F)
+    before = problem.energy(start)
+    placed, _ = drain(minimise_on(problem, start, 30, 1e-5, "Test"))
+    assert problem.energy(placed) < 0.05 * before and not carrier.folded(placed, F).any()
+
+
+def test_vertices_of_the_boundary_stay_on_it():
+    V, F = bumpy(6, 6)
+    uv = V[:, :2] * 1.0
+    loop = np.flatnonzero((V[:, 0] == V[:, 0].min()) | (V[:, 0] == V[:, 0].max()))
+    carrier = TargetCarrier(V, F, uv, loop)
+    placed = carrier.place(uv)
+    moved = carrier.move(placed, np.full(V.shape, 0.03))
+    assert (moved.barycentric[loop].min(axis=1) < 1e-12).all()
+    assert np.allclose(np.linalg.norm(carrier.axes(moved)[loop, 0], axis=1), 1)
+
+
+def test_a_disk_keeps_its_boundary_on_the_circle():
+    uv = np.array([[1.0, 0], [0, 1], [-1, 0], [0, -1], [0.1, 0]])
+    F = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    carrier = DiskCarrier(np.arange(4))
+    placed = carrier.place(uv)
+    step = np.einsum("na,nad->nd", np.full((5, 2), 0.1), carrier.axes(placed))
+    moved = carrier.move(placed, step)
+    assert np.allclose(np.linalg.norm(moved.domain[:4], axis=1), 1) and not carrier.folded(moved, F).any()
+    assert frames(moved.positions, F)[1].shape == (4, 3)

@@ -1,0 +1,76 @@
+"""The Beltrami coefficient of known maps, regions, histograms of a match, and the mean of shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from meshes import bumpy, icosphere
+from sphere_shapes import random_rotation
+
+from omt_uv.solver.strain.beltrami import beltrami, corner_beltrami, vertex_means
+from omt_uv.solver.strain.collection import mean_shape
+from omt_uv.solver.strain.figures import match_figures
+from omt_uv.solver.strain.regions import compare_regions, region_strain
+
+
+def test_the_coefficient_of_a_linear_map_is_known():
+    rng = np.random.default_rng(0)
+    z = rng.normal(size=(20, 3)) + 1j * rng.normal(size=(20, 3))
+    z *= np.where((np.conj(z[:, 1] - z[:, 0]) * (z[:, 2] - z[:, 0])).imag > 0, 1, 1j * 0 + 1)[:, None]
+    turned = (np.conj(z[:, 1] - z[:, 0]) * (z[:, 2] - z[:, 0])).imag < 0
+    z[turned] = z[turned][:, [0, 2, 1]]
+    w = 2 * np.exp(1j) * (z + 0.4 * np.exp(0.3j) * z.conj())
+    corners = np.stack([z.real, z.imag, 0 * z.real], axis=2)
+    found = corner_beltrami(corners, np.stack([w.real, w.imag], axis=2))
+    assert np.allclose(found.size, 0.4)
+    expected = np.array([np.cos(0.15), np.sin(0.15), 0])
+    assert np.allclose(np.abs(found.direction @ expected), 1)
+    # The size is that of the singular values, and does not change when the image is turned in space.
+    again = corner_beltrami(corners, np.stack([w.real, w.imag, 0 * w.real], axis=2) @ random_rotation().T)
+    assert np.allclose(again.size, found.size) and np.allclose(again.direction, found.direction)
+
+
+def test_a_fold_is_beyond_one_and_an_isometry_nothing():
+    V, F = bumpy(6, 6)
+    assert beltrami(V, F, V @ random_rotation().T).size.max() < 1e-9
+    assert (beltrami(V, F, V[:, :2] * [-1, 1]).size > 1).all()
+    flat = beltrami(V, F, np.zeros((len(V), 3)))
+    assert flat.mean <= 1 and flat.histogram().sum() == pytest.approx(1)
+
+
+def test_regions_are_told_apart():
+    V, F = bumpy(10, 10)
+    side = V[F].mean(axis=1)[:, 0] > np.median(V[:, 0])
+    image = V * np.where(V[:, [0]] > np.median(V[:, 0]), [[1, 3, 1]], [[1, 1, 1]])
+    still, moved = (region_strain(beltrami(V, F, x), {"left": ~side * 1.0, "none": 0 * side}) for x in (V, image))
+    assert [row.name for row in still] == ["all", "left"]
+    apart = compare_regions(still, moved)
+    assert apart["left"] < 0.2 < apart["all"]
+    means = vertex_means(np.ones(len(F)), F, np.ones(len(F)), len(V) + 1)
+    assert means[:-1] == pytest.approx(1) and means[-1] == 0
+
+
+def test_figures_of_the_identity_are_one():
+    V, F = icosphere(3)
+    V = V * [1, 1.5, 0.7]
+    corner = np.array([np.argwhere(v == F)[0] for v in range(len(V))])
+    found = match_figures((V, F), (V, F), (corner[:, 0], np.eye(3)[corner[:, 1]]), V)
+    assert found.mean_curvature == pytest.approx(1) and found.mean_area == pytest.approx(1)
+    assert found.area[0] == pytest.approx(1) and found.curvature.sum() == pytest.approx(1)
+
+
+def test_the_mean_of_turned_copies_is_the_shape_and_what_is_off_stands_out():
+    V, _ = icosphere(2)
+    V = V * [1, 1.4, 0.6]
+    shapes = np.array([V @ random_rotation(k).T + k for k in range(5)])
+    found = mean_shape(shapes, np.ones(len(V)))
+    assert found.deviation.max() < 1e-9
+    rng = np.random.default_rng(0)
+    shapes = shapes + 0.01 * rng.normal(size=shapes.shape)
+    shapes[3, 7] *= 1.5
+    found = mean_shape(shapes, np.ones(len(V)))
+    assert found.score.argmax() == 3 * len(V) + 7 and found.score.max() > 5
+    sizes = np.arange(1, 5)[:, None, None]
+    assert mean_shape(sizes * np.delete(shapes, 3, axis=0), np.ones(len(V)), True).deviation.max() < 0.2
+    with pytest.raises(ValueError, match="two shapes"):
+        mean_shape(shapes[:1], np.ones(len(V)))
