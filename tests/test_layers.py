@@ -28,6 +28,7 @@ ARROWS: dict[str, str] = {
     "solver.transfer": "solver solver.mesh",
     "solver.analysis": "solver solver.mesh solver.linalg",
     "solver.flows": "solver solver.mesh",
+    "solver.comparison": "solver solver.mesh solver.analysis",
     "solver.maps": "solver solver.mesh solver.linalg",
     "solver.packing": "solver solver.mesh",
     "solver.transport": "solver solver.mesh solver.linalg",
@@ -71,8 +72,8 @@ ARROWS: dict[str, str] = {
     "session": "errors settings solver solver.mesh solver.maps solver.editing solver.parameterization pipelines "
     "blender",
     "batch": "errors supervision solver",
-    "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
-    "pipelines pipelines.volumes blender blender.volumes files display solver.flows",
+    "commands": "errors supervision remedies settings solver solver.comparison solver.cutting solver.globe "
+    "solver.parameterization pipelines pipelines.volumes blender blender.volumes files display solver.flows",
     "commands.batches": "supervision solver batch commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display session",

@@ -43,6 +43,9 @@ def add(commands) -> None:
     command.add_argument("--strategy", choices=names(STRATEGIES), default=DEFAULT_STRATEGY.lower(), help="two maps")
     _add_features(command)
     add_preview(command)
+    command.add_argument(
+        "--report", type=Path, metavar="R.json", help="write figures of every new mesh beside the old one"
+    )
     command.add_argument("--no-attributes", action="store_true", help="carry no UVs, groups, colours, shape keys")
 
 
@@ -98,6 +101,7 @@ def run(options: argparse.Namespace) -> None:
             request = read_request(obj, settings, weld=_is_split(options.input, obj))
             series = drain_shown(remesh_series(request.job, settings))
         results.append((obj, request, series, carried_attributes(request, series)))
+    rows = _compared(objects, results) if options.report else []
     told, made = [], []
     by_hand = options.input.suffix.lower() == ".blend"
     for k, (obj, request, series, carried) in enumerate(results):
@@ -107,11 +111,45 @@ def run(options: argparse.Namespace) -> None:
         if found and options.strict:
             raise CommandError(f"{options.input}: {'; '.join(found)}. Nothing was written, as --strict asks.")
         told += [(-1, text) for text in found]
-    warn(objects, told, _save(options.output, made, options.input))
+    lines = warn(objects, told, _save(options.output, made, options.input))
+    if options.report:
+        _write_report(options, rows, lines)
     if options.preview:
         # Of a series the coarsest: it differs most from what was given.
         shown = [bpy.data.objects[names[-1]] for names in made]
         write_preview(options, [(obj, read(obj)) for obj in shown])
+
+
+def _compared(objects: list, results: list) -> list[dict]:
+    """A row of figures for every level of every object, which is compared with what it was made of."""
+    from ..solver.comparison.comparison_figures import compare
+
+    rows = []
+    for obj, (_, request, series, _) in zip(objects, results, strict=True):
+        surface = request.job.surface
+        old = (surface.positions, surface.corner_vertex[surface.triangles])
+        for k, level in enumerate(series.levels):
+            with refusals(name=obj.name):
+                found = drain_shown(compare(old, (level.positions, level.triangles)))
+            rows.append({"object": obj.name, "level": k, **vars(found)})
+    return rows
+
+
+def _write_report(options: argparse.Namespace, rows: list[dict], told: list[str]) -> None:
+    """Figures of every level, as JSON."""
+    import json
+
+    from .. import __version__
+    from ..files.verified import write_text
+
+    report = {
+        "version": __version__,
+        "input": str(options.input),
+        "output": str(options.output),
+        "levels": rows,
+        "warnings": [*options.told, *told],
+    }
+    write_text(options.report, json.dumps(report, indent=1) + "\n")
 
 
 def _is_split(path: Path, obj) -> bool:

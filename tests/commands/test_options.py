@@ -41,7 +41,8 @@ def complete(command, beside):
     """Arguments that make a command complete beside an action."""
     exclusive = [group._group_actions for group in command._mutually_exclusive_groups]
     needed = [a for a in command._actions if a.required and a.option_strings and a is not beside]
-    words = ["in.obj", *(word for a in needed for word in (a.option_strings[-1], "x"))]
+    more = ["b.obj"] if any(a.dest == "others" for a in command._actions) else []
+    words = ["in.obj", *more, *(word for a in needed for word in (a.option_strings[-1], "x"))]
     free = [actions[0].option_strings[0] for actions in exclusive if beside not in actions]
     return [*words, *(word for name in free for word in (name, "9"))]
 

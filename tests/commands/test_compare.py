@@ -1,0 +1,46 @@
+"""The command compare, and the report of remesh, which has the same figures."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import meshes
+import pytest
+
+
+@pytest.fixture
+def bump(package, tmp_path, monkeypatch):
+    # A hundred thousand points take most of the time of so small a mesh.
+    monkeypatch.setattr(package("solver.comparison.comparison_figures"), "POINTS", 4000)
+    V, F = meshes.bumpy(12, 12)
+    lines = [f"v {x} {y} {z}" for x, y, z in V.tolist()] + [f"f {a} {b} {c}" for a, b, c in (F + 1).tolist()]
+    (tmp_path / "in.obj").write_text("\n".join(lines) + "\n")
+    return tmp_path
+
+
+def test_levels_of_detail_have_rows_and_a_plot(run, bump):
+    words = ["remesh", bump / "in.obj", "-o", bump / "out.obj", "--vertices", "120", "--levels", "2"]
+    status, _, err = run(*words, "--report", bump / "r.json", "--preview", bump / "p.png")
+    assert status == 0, err
+    levels = json.loads((bump / "r.json").read_text())["levels"]
+    assert [(row["level"], row["vertices"]) for row in levels] == [(0, 120), (1, 60)]
+    assert levels[0]["hausdorff"] < levels[1]["hausdorff"] < 0.1 and levels[0]["topology_kept"]
+    others = [bump / "out_LOD0.obj", bump / "out_LOD1.obj"]
+    status, out, err = run("compare", bump / "in.obj", *others, "--csv", "--plot", bump / "plot.png")
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert (status, err) == (0, "")
+    # What was written has single precision.
+    for row, level in zip(rows, levels, strict=True):
+        assert float(row["rms"]) == pytest.approx(level["rms"], rel=1e-3)
+    for name in ("p.png", "plot.png"):
+        assert (bump / name).read_bytes().startswith(b"\x89PNG")
+    status, out, _ = run("compare", bump / "in.obj", bump / "in.obj")
+    assert status == 0 and "Hausdorff 0.00000" in out and "topology kept" in out
+
+
+def test_what_cannot_be_compared_or_drawn_is_one_line(run, bump):
+    for words in (["none.obj"], ["in.obj", "--plot", bump / "p.jpg"], ["in.obj", "--plot", bump / "none" / "p.png"]):
+        status, out, err = run("compare", bump / "in.obj", bump / words[0], *words[1:])
+        assert (status, out) == (1, "") and len(err.splitlines()) == 1
