@@ -23,6 +23,8 @@ LARGE = 50_000
 PART_SIZE = 1000
 # Rings of vertices that parts overlap by.
 OVERLAP = 2
+# Neighbours of a vertex beyond which it is no part of any overlap.
+MOST_NEIGHBOURS = 100
 # Iterations in which the quadratic model must fall
 WINDOW = 3
 # by more than this share of its fall so far, or they end: a step that is not the last needs no more.
@@ -44,9 +46,13 @@ class AdditiveSchwarz:
         self._part = kd_parts(points, max(0, round(np.log2(n / size))))
         self._count = int(self._part.max()) + 1
         graph = vertex_graph(triangles, n).tocsr()
+        # A vertex with thousands of neighbours would bring all of them into every part.
+        quiet = sp.diags((np.diff(graph.indptr) <= MOST_NEIGHBOURS).astype(float))
+        spreading = (quiet @ graph @ quiet + sp.identity(n)).tocsr()
+        spreading.eliminate_zeros()
         member = sp.csr_matrix((np.ones(n), self._part, np.arange(n + 1)), shape=(n, self._count))
         for _ in range(OVERLAP):
-            member = graph @ member
+            member = spreading @ member
         member = member.tocsc()
         place = np.full(n, -1, np.int64)
         self._unknowns = []

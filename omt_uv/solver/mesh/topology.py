@@ -10,6 +10,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+# Nodes of graphs whose components are found without a sparse matrix.
+FEW_NODES = 2000
+
 
 def halfedges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tail and head vertex of every halfedge, (3m,) each, of triangles (m,3)."""
@@ -76,7 +79,27 @@ def expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def graph_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndarray]:
     """Number of components of a graph of n nodes with the edges a, b (e,), and the component (n,) of every node."""
+    if n <= FEW_NODES:
+        return _few_components(np.asarray(a), np.asarray(b), n)
     return connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n)), directed=False)
+
+
+def _few_components(a: np.ndarray, b: np.ndarray, n: int) -> tuple[int, np.ndarray]:
+    """The same by pointer doubling: to make a sparse matrix of a small graph takes longer than to walk through it."""
+    root = np.arange(n)
+    while True:
+        one, other = root[a], root[b]
+        apart = one != other
+        if not apart.any():
+            break
+        np.minimum.at(root, np.maximum(one, other)[apart], np.minimum(one, other)[apart])
+        while True:
+            further = root[root]
+            if (further == root).all():
+                break
+            root = further
+    first, label = np.unique(root, return_inverse=True)
+    return len(first), label.ravel()
 
 
 def on_boundary(triangles: np.ndarray, n: int) -> np.ndarray:
@@ -94,9 +117,18 @@ def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
 
     The mesh must be an oriented manifold with one fan per vertex (`charts.strict_charts` guarantees it).
     """
+    vertices, size = vertices_along_boundary(triangles)
+    return sorted(np.split(vertices, np.cumsum(size)[:-1]), key=len, reverse=True) if len(size) else []
+
+
+def vertices_along_boundary(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (b,) of all boundary loops, one after the other by their first vertices, and the sizes (l,) of these.
+
+    See `boundary_loops`.
+    """
     edges = boundary_edges(triangles)
     if len(edges) == 0:
-        return []
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
     edges = edges[np.argsort(edges[:, 0], kind="stable")]
     vertices = edges[:, 0]
     following = np.minimum(np.searchsorted(vertices, edges[:, 1]), len(vertices) - 1)
@@ -105,8 +137,7 @@ def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
     start = np.unique(label, return_index=True)[1]
     ahead = _steps_to(following, start, int(size.max()))
     order = np.lexsort((size[label] - ahead, ahead > 0, label))
-    loops = np.split(vertices[order], np.cumsum(size)[:-1])
-    return sorted(loops, key=len, reverse=True)
+    return vertices[order], size
 
 
 def _steps_to(following: np.ndarray, goals: np.ndarray, most: int) -> np.ndarray:

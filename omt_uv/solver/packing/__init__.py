@@ -8,7 +8,7 @@ from ..lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
-    outline_raster="IslandOutline outline_of grown_cells",
+    outline_raster="IslandOutline outlines_of grown_cells",
     pack_square="MarginError Packing covered_area pack stack",
     placement="Item Turned place turned_masks",
     raster_grid="RasterGrid runs_of",

@@ -6,6 +6,7 @@ that are nearer lies a point that is within half of the margin of both, and its 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,10 +34,23 @@ class IslandOutline:
         return IslandOutline(self.tail * scale - origin, self.head * scale - origin)
 
 
-def outline_of(points: np.ndarray, triangles: np.ndarray) -> IslandOutline:
-    """The outline of an island of points (n,2) and triangles (m,3)."""
-    edges = boundary_edges(triangles)
-    return IslandOutline(points[edges[:, 0]], points[edges[:, 1]])
+def side_by_side(points: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n,2) and triangles (m,3) of all islands (n_i,2), (m_i,3) as one mesh."""
+    first = np.cumsum([0, *map(len, points)])[:-1]
+    shifted = np.concatenate(triangles) + np.repeat(first, list(map(len, triangles)))[:, None]
+    return np.concatenate(points), shifted
+
+
+def outlines_of(points: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> list[IslandOutline]:
+    """The outlines of islands of points (n_i,2) and triangles (m_i,3), of all at once."""
+    if not len(points):
+        return []
+    every, shifted = side_by_side(points, triangles)
+    edges, first = boundary_edges(shifted), np.cumsum([0, *map(len, points)])
+    tail, head = every[edges[:, 0]], every[edges[:, 1]]
+    # Edges come in the order of their triangles, and these island by island.
+    ends = np.searchsorted(np.searchsorted(first, edges[:, 0], side="right"), np.arange(2, len(points) + 1))
+    return list(map(IslandOutline, np.split(tail, ends), np.split(head, ends)))
 
 
 def grown_cells(outline: IslandOutline, growth: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import MarginError
 from ..mesh.geometry import signed_areas
 from ..progress import Progress, Steps, part_of
-from .outline_raster import IslandOutline, grown_cells, outline_of
+from .outline_raster import IslandOutline, grown_cells, outlines_of, side_by_side
 from .placement import Item, Place, place, turned_masks
 from .raster_grid import RasterGrid
 from .shelves import Block, blocks_of
@@ -163,11 +163,14 @@ def stack(islands: Sequence[np.ndarray]) -> Packing:
 
 def covered_area(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> float:
     """Share of the unit square that islands (n_i,2) without overlap cover."""
-    return float(sum(_area(uv, index) for uv, index in zip(islands, triangles, strict=True)))
+    return float(_areas(islands, triangles).sum())
 
 
-def _area(points: np.ndarray, triangles: np.ndarray) -> float:
-    return float(np.abs(signed_areas(points, triangles)).sum())
+def _areas(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> np.ndarray:
+    """Area (k,) of every island."""
+    points, index = side_by_side(islands, triangles)
+    owner = np.repeat(np.arange(len(islands)), list(map(len, triangles)))
+    return np.bincount(owner, np.abs(signed_areas(points, index)), len(islands))
 
 
 def _spread(points: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
@@ -190,10 +193,11 @@ def _task(points, faces, margin: float, texture_size: int, around) -> _PackTask:
     low = np.array([p.min(axis=0) for p in points])
     pixels = texture_size / (texture_size - margin)
     # The square is the raster, and half of the margin around it belongs to the growth of the islands.
-    staying = [outline_of((p * texture_size - 0.5 * margin) * (COARSE / texture_size) * pixels, t) for p, t in around]
+    there = [(p * texture_size - 0.5 * margin) * (COARSE / texture_size) * pixels for p, _ in around]
+    staying = outlines_of(there, [t for _, t in around])
     return _PackTask(
-        outlines=[outline_of(p, t) for p, t in zip(points, faces, strict=True)],
-        areas=np.array([_area(p, t) for p, t in zip(points, faces, strict=True)]),
+        outlines=outlines_of(points, faces),
+        areas=_areas(points, faces),
         low=low,
         sizes=np.array([p.max(axis=0) for p in points]) - low,
         margin=margin,

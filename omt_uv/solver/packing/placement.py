@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation
 
 from .raster_grid import RasterGrid, runs_of
 
@@ -54,13 +53,30 @@ class Place:
 
 def turned_masks(mask: np.ndarray, quarters: Sequence[int]) -> Item:
     """A mask (h,w) bool in the turns it may have, the first of which is preferred."""
-    turns = []
+    turns, beside = [], _beside(mask)
     for number in quarters:
+        turned, cells, (height, width) = mask, beside, mask.shape
+        for _ in range(number):
+            cells = np.column_stack([height - 1 - cells[:, 1], cells[:, 0]])
+            height, width = width, height
         turned = np.ascontiguousarray(np.rot90(mask, -number))
-        padded = np.pad(turned, BESIDE)
-        beside = np.argwhere(binary_dilation(padded, iterations=BESIDE) & ~padded)[:, ::-1] - BESIDE
-        turns.append(Turned(turned, number, runs_of(turned), beside))
+        turns.append(Turned(turned, number, runs_of(turned), cells))
     return Item(tuple(turns))
+
+
+def _beside(mask: np.ndarray) -> np.ndarray:
+    """Cells (k,2) x, y outside a mask (h,w) bool that at most `BESIDE` steps from cell to cell lead to."""
+    inside = np.zeros((mask.shape[0] + 2 * BESIDE, mask.shape[1] + 2 * BESIDE), dtype=bool)
+    inside[BESIDE:-BESIDE, BESIDE:-BESIDE] = mask
+    near = inside
+    for _ in range(BESIDE):
+        grown = near.copy()
+        grown[1:] |= near[:-1]
+        grown[:-1] |= near[1:]
+        grown[:, 1:] |= near[:, :-1]
+        grown[:, :-1] |= near[:, 1:]
+        near = grown
+    return np.argwhere(near & ~inside)[:, ::-1] - BESIDE
 
 
 def place(items: Sequence[Item], order: Sequence[int], grid: RasterGrid) -> tuple[list[Place], int]:
@@ -108,7 +124,6 @@ def _extremes(free: np.ndarray) -> set[tuple[int, int]]:
 
 def _touch(turned: Turned, x: int, y: int, grid: RasterGrid) -> float:
     """Share of the cells beside a mask that are taken, or outside, where it is placed at (x, y)."""
-    column, row = (turned.beside + [x, y]).T
-    outside = (column < 0) | (row < 0) | (column >= grid.side) | (row >= grid.side)
-    taken = grid.taken[np.clip(row, 0, grid.side - 1), np.clip(column, 0, grid.side - 1)]
-    return float((outside | taken).mean())
+    # Cells of negative numbers are the last ones, beyond the raster: they are taken, too.
+    taken = grid.taken_around[turned.beside[:, 1] + y, turned.beside[:, 0] + x]
+    return np.count_nonzero(taken) / len(taken)

@@ -12,12 +12,16 @@ import numpy as np
 
 def runs_of(mask: np.ndarray) -> list[list[int]]:
     """Runs [k, row, column], from `column` over 2^k cells of `row`, that together are the mask (h,w) bool."""
-    change = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    height, width = mask.shape
+    padded = np.zeros((height, width + 2), np.int8)
+    padded[:, 1:-1] = mask
+    change = padded[:, 1:] - padded[:, :-1]
     row, begin = np.nonzero(change == 1)
     end = np.nonzero(change == -1)[1]
     power = np.floor(np.log2(end - begin)).astype(np.int64)
-    runs = np.concatenate([np.stack([power, row, x], axis=1) for x in (begin, end - 2**power)])
-    return np.unique(runs, axis=0).tolist()
+    keys = np.unique([(power * height + row) * (width + 1) + x for x in (begin, end - 2**power)])
+    rest, column = np.divmod(keys, width + 1)
+    return np.column_stack([*np.divmod(rest, height), column]).tolist()
 
 
 class RasterGrid:
@@ -40,6 +44,11 @@ class RasterGrid:
     def taken(self) -> np.ndarray:
         """Cells (side,side) bool that are taken."""
         return self._widened[0][: self.side, : self.side]
+
+    @property
+    def taken_around(self) -> np.ndarray:
+        """Cells that are taken, and after the last ones of rows and columns some of those beyond: all are taken."""
+        return self._widened[0]
 
     def take(self, mask: np.ndarray, x: int, y: int) -> None:
         """Take the cells of a mask (h,w) bool whose lower left is at column x and row y."""

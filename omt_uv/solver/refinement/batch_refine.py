@@ -19,14 +19,14 @@ from ..maps.development import developed
 from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, energies, gradient
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
 from ..maps.polygon_elements import polygon_elements, restricted, with_convex_quads
-from ..maps.tutte import arc_length_parameters, tutte
+from ..maps.tutte import tutte
 from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths, signed_areas
-from ..mesh.topology import boundary_loops
+from ..mesh.topology import vertices_along_boundary
 from ..progress import Progress, Steps
 from .batch_continuation import AreaErrors, BatchContinuation
 from .boundary_barrier import crossings
 from .hessian_blocks import assembly_of
-from .initial_maps import EXACT, NEARLY_FLAT, farthest_from_first, unroll
+from .initial_maps import EXACT, NEARLY_FLAT, farthest_from_first, least_squares_conformal
 from .mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from .projected_newton import ARMIJO, FOLD_SHARE, FreeMotion, Motion, NewtonProblem, fold_shares, newton_direction
 
@@ -124,7 +124,7 @@ def refine_batch(
     area = 0.5 * np.linalg.norm(_normals(union), axis=1)
     target = area if density is None else area * density
     target = target * (union.sums(area) / union.sums(target))[union.of_face]
-    w = _initial_maps(union, meshes, area)
+    w = _initial_maps(union, area)
     faces = polygon_elements(union.positions, union.triangles, target, union.polygon, region)
     faces = with_convex_quads(faces, w)
     symmetry, w = _symmetric(union, faces, w)
@@ -176,8 +176,11 @@ def _union(meshes, polygons) -> MeshUnion:
     first = np.cumsum(sizes) - sizes
     triangles = np.concatenate([t + k for (_, t), k in zip(meshes, first, strict=True)])
     of_vertex = np.repeat(np.arange(len(meshes)), sizes)
-    loops = sorted(boundary_loops(triangles), key=lambda loop: of_vertex[loop[0]])
-    boundary = np.concatenate([np.column_stack([loop, np.roll(loop, -1)]) for loop in loops])
+    # Disks have one loop each, and its first vertex is among theirs.
+    along, size = vertices_along_boundary(triangles)
+    following = np.arange(1, len(along) + 1)
+    following[np.cumsum(size) - 1] -= size
+    boundary = np.column_stack([along, along[following]])
     positions = np.concatenate([v for v, _ in meshes])
     return MeshUnion(
         positions=positions,
@@ -191,12 +194,14 @@ def _union(meshes, polygons) -> MeshUnion:
     )
 
 
-def _initial_maps(union: MeshUnion, meshes, area: np.ndarray) -> np.ndarray:
+def _initial_maps(union: MeshUnion, area: np.ndarray) -> np.ndarray:
     """Every chart with its area, (n,) complex: its mean value map with a circle as the boundary, or unrolled."""
     loop = union.boundary[:, 0]
     ends = np.flatnonzero(union.of_boundary[1:] != union.of_boundary[:-1]) + 1
-    loops = np.split(loop, ends)
-    turn = 2 * np.pi * np.concatenate([arc_length_parameters(union.positions, part) for part in loops])
+    step = np.linalg.norm(union.positions[union.boundary[:, 1]] - union.positions[loop], axis=1)
+    whole, before = np.bincount(union.of_boundary, step, union.count), np.cumsum(step) - step
+    began = before[np.r_[0, ends]]
+    turn = 2 * np.pi * (before - began[union.of_boundary]) / whole[union.of_boundary]
     uv = tutte(union.positions, union.triangles, loop, np.column_stack([np.cos(turn), np.sin(turn)]))
     angle = angles_from_lengths(halfedge_lengths(union.positions, union.triangles).reshape(-1, 3))
     defect = np.abs(angle_defects(union.triangles, angle, loop, len(uv)))
@@ -205,12 +210,9 @@ def _initial_maps(union: MeshUnion, meshes, area: np.ndarray) -> np.ndarray:
     w = uv @ [1, 1j]
     exact, places = _developed(union, flat)
     w[exact[union.of_vertex]] = places[exact[union.of_vertex]]
-    for k in np.flatnonzero(flat & ~exact):
-        vertices, triangles = meshes[k]
-        begin = int(np.searchsorted(union.of_vertex, k))
-        unrolled = unroll(vertices, triangles, loops[k] - begin)
-        if unrolled is not None:
-            w[begin : begin + len(vertices)] = unrolled @ [1, 1j]
+    if (flat & ~exact).any():
+        conformal, places = _conformal(union, flat & ~exact)
+        w[conformal[union.of_vertex]] = places[conformal[union.of_vertex]]
     signed = signed_areas(np.column_stack([w.real, w.imag]), union.triangles)
     return np.sqrt(union.sums(area) / np.abs(union.sums(signed)))[union.of_vertex] * w
 
@@ -226,11 +228,35 @@ def _developed(union: MeshUnion, flat: np.ndarray) -> tuple[np.ndarray, np.ndarr
     start, end = farthest_from_first(union.positions, union.boundary, union.of_boundary)
     along = w[end] - w[start]
     w = (w - w[start][union.of_vertex]) * (along.conj() / np.maximum(np.abs(along), 1e-300))[union.of_vertex]
-    exact &= turns(w, union.boundary[:, 0], union.boundary[:, 1], union.of_boundary) <= 1
-    mine = exact[union.of_boundary]
+    return _one_to_one(union, exact, w), w
+
+
+def _conformal(union: MeshUnion, nearly: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of the nearly flat charts (c,) bool have a conformal map that is one to one, and their places (n,) complex.
+
+    As `unroll` maps one of them.
+    """
+    vertices = np.flatnonzero(nearly[union.of_vertex])
+    place = np.full(len(union.positions), -1)
+    place[vertices] = np.arange(len(vertices))
+    mine = nearly[union.of_boundary]
+    start, end = farthest_from_first(union.positions, union.boundary[mine], union.of_boundary[mine])
+    triangles = union.triangles[nearly[union.of_face]]
+    w = np.zeros(len(union.positions), complex)
+    w[vertices] = least_squares_conformal(union.positions[vertices], place[triangles], place[start], place[end])
+    signed = signed_areas(np.column_stack([w.real, w.imag]), triangles)
+    unfolded = nearly.copy()
+    unfolded[union.of_vertex[triangles[:, 0]][~(signed > 0)]] = False
+    return _one_to_one(union, unfolded, w), w
+
+
+def _one_to_one(union: MeshUnion, chosen: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Which of the chosen charts (c,) bool, whose maps w (n,) have no folds, do not cover themselves."""
+    chosen = chosen & (turns(w, union.boundary[:, 0], union.boundary[:, 1], union.of_boundary) <= 1)
+    mine = chosen[union.of_boundary]
     if mine.any():
-        exact[union.of_boundary[mine][crossings(_side_by_side(union, w), union.boundary[mine])]] = False
-    return exact, w
+        chosen[union.of_boundary[mine][crossings(_side_by_side(union, w), union.boundary[mine])]] = False
+    return chosen
 
 
 class _ActiveCharts:
@@ -352,9 +378,13 @@ class _ActiveCharts:
 
 def _numbered(of_disks: list[np.ndarray]) -> np.ndarray:
     """Polygons of several disks, any numbers, as different numbers."""
-    own = [np.unique(p, return_inverse=True)[1].ravel() for p in of_disks]
-    first = np.cumsum([0, *(p.max() + 1 for p in own[:-1])])
-    return np.concatenate([p + k for p, k in zip(own, first, strict=True)])
+    every = np.concatenate(of_disks).astype(np.int64)
+    disk = np.repeat(np.arange(len(of_disks)), list(map(len, of_disks)))
+    order = np.lexsort((every, disk))
+    new = (np.diff(every[order]) != 0) | (np.diff(disk[order]) != 0)
+    label = np.empty(len(every), np.int64)
+    label[order] = np.cumsum(np.r_[0, new])
+    return label
 
 
 def _symmetric(union: MeshUnion, faces: Elements, w: np.ndarray) -> tuple[MirrorSymmetry | None, np.ndarray]:
@@ -382,7 +412,7 @@ def _side_by_side(union: MeshUnion, w: np.ndarray) -> np.ndarray:
     """The maps (n,) moved and scaled until none of them touches another."""
     first = np.searchsorted(union.of_vertex, np.arange(union.count))
     low, high = ([f.reduceat(x, first) for x in (w.real, w.imag)] for f in (np.minimum, np.maximum))
-    extent = np.maximum(high[0] - low[0], high[1] - low[1])
+    extent = np.maximum(np.maximum(high[0] - low[0], high[1] - low[1]), 1e-300)
     columns = int(np.ceil(np.sqrt(union.count)))
     place = 2.0 * (np.arange(union.count) % columns + 1j * (np.arange(union.count) // columns))
     corner = low[0] + 1j * low[1]

@@ -196,7 +196,7 @@ def unroll(vertices, triangles, loop) -> np.ndarray | None:
     if gap.max() <= EXACT * np.abs(w).max():
         w = (w - w[first]) * np.abs(w[second] - w[first]) / (w[second] - w[first])
     else:
-        w = _least_squares_conformal(vertices, triangles, int(first[0]), int(second[0]))
+        w = least_squares_conformal(vertices, triangles, first, second)
     uv = np.column_stack([w.real, w.imag])
     signed = signed_areas(uv, triangles)
     if not (signed > 0).all() or covers_itself(w, loop):
@@ -218,16 +218,19 @@ def farthest_from_first(vertices: np.ndarray, boundary: np.ndarray, owner: np.nd
     return tail[begin], tail[good[np.unique(chart[good], return_index=True)[1]]]
 
 
-def _least_squares_conformal(vertices, triangles, first: int, second: int) -> np.ndarray:
-    """The least squares conformal map (n,) complex that keeps the distance of two vertices, the first one at 0."""
+def least_squares_conformal(vertices, triangles, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """The least squares conformal map (n,) complex of disks side by side (n,3), (m,3) (Levy et al. 2002).
+
+    It keeps the distance of two vertices of each, first and second (c,), the first one at 0. Raises PrecisionError.
+    """
     n = len(vertices)
     area = face_areas(vertices, triangles)
     faces = elements(vertices, triangles, area)
     rows = np.sqrt(area)[:, None] * faces.gradient
     linear = linear_forms(np.vstack([triangles, triangles]), np.vstack([rows, -1j * rows]), n).tocsc()
-    fixed = np.array([2 * first, 2 * first + 1, 2 * second, 2 * second + 1])
+    fixed = np.concatenate([2 * first, 2 * first + 1, 2 * second, 2 * second + 1])
     x = np.zeros(2 * n)
-    x[fixed[2]] = np.linalg.norm(vertices[second] - vertices[first])
+    x[2 * second] = np.linalg.norm(vertices[second] - vertices[first], axis=1)
     others = np.setdiff1d(np.arange(2 * n), fixed)
     free = linear[:, others]
     factor = Factor(free.T @ free)

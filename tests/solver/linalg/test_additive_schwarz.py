@@ -102,3 +102,15 @@ def test_nonzeros_grow_with_the_mesh():
             newton_direction(problem, w)
         counts.append(tally.nonzeros / len(w))
     assert counts[1] <= 1.15 * counts[0]
+
+
+def test_a_hub_brings_its_neighbours_into_no_other_part():
+    count = 4000
+    angle = 2 * np.pi * np.arange(count) / count
+    V = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    V = np.concatenate([V, [[0, 0, 0.5]]])
+    F = np.column_stack([np.arange(count), (np.arange(count) + 1) % count, np.full(count, count)])
+    parts = AdditiveSchwarz(V, F, 200)
+    sizes = [len(unknowns) // 2 for unknowns in parts._unknowns]
+    assert len(sizes) >= 8 and max(sizes) <= 2 * count / len(sizes)
+    assert np.unique(np.concatenate(parts._unknowns)).size == 2 * len(V)

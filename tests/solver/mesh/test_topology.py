@@ -3,6 +3,8 @@
 import meshes
 import numpy as np
 import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from omt_uv.solver.mesh.topology import (
     boundary_edges,
@@ -78,6 +80,13 @@ def test_rows_of_counts():
 
 
 def test_components_of_a_graph():
+    rng = np.random.default_rng(0)
+    for n in (1, 2, 30, 300):
+        a, b = rng.integers(0, n, (2, n // 2))
+        graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
+        count, label = connected_components(graph, directed=False)
+        found = graph_components(a, b, n)
+        assert found[0] == count and np.array_equal(found[1], label)
     count, label = graph_components(np.array([0, 1, 4]), np.array([1, 2, 5]), 7)
     assert count == 4 and len(np.unique(label)) == 4
     assert label[0] == label[1] == label[2] and label[4] == label[5] != label[3]

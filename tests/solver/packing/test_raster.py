@@ -4,8 +4,9 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.packing.outline_raster import grown_cells, outline_of
-from omt_uv.solver.packing.placement import place, turned_masks
+from omt_uv.solver.packing.outline_raster import grown_cells, outlines_of
+from omt_uv.solver.mesh.topology import boundary_edges
+from omt_uv.solver.packing.placement import BESIDE, place, turned_masks
 from omt_uv.solver.packing.raster_grid import RasterGrid, runs_of
 from omt_uv.solver.packing.shelves import blocks_of
 
@@ -20,12 +21,12 @@ def blob(rng, height, width):
 def test_cells_are_those_that_the_grown_island_touches(growth):
     V, F = meshes.random_disk(count=120)
     points = V[:, :2] * 17.3 + [3.3, -8.1]
-    cells, low = grown_cells(outline_of(points, F), growth)
+    cells, low = grown_cells(outlines_of([points], [F])[0], growth)
     rng = np.random.default_rng(0)
     # Samples of the island, and of a circle of that radius around its outline, all lie in the cells.
     weights = rng.dirichlet(np.ones(3), (len(F), 40))
     inside = np.einsum("mkj,mjd->mkd", weights, points[F]).reshape(-1, 2)
-    outline = outline_of(points, F)
+    outline = outlines_of([points], [F])[0]
     t = rng.random((len(outline.tail), 60, 1))
     on_it = (outline.tail[:, None] * (1 - t) + outline.head[:, None] * t).reshape(-1, 2)
     angle = rng.uniform(0, 2 * np.pi, len(on_it))
@@ -39,6 +40,27 @@ def test_cells_are_those_that_the_grown_island_touches(growth):
     samples = np.concatenate([inside, on_it])
     nearest = np.array([np.hypot(*(samples - c).T).min() for c in centres])
     assert nearest.max() < growth + 2 * np.sqrt(2) + 0.5
+
+
+def test_outlines_of_several_islands_are_their_own():
+    several = [meshes.random_disk(count=30), meshes.grid(3, 2), meshes.random_disk(count=20)]
+    points, triangles = [V[:, :2] for V, _ in several], [F for _, F in several]
+    for outline, mine, index in zip(outlines_of(points, triangles), points, triangles, strict=True):
+        edges = boundary_edges(index)
+        assert np.array_equal(outline.tail, mine[edges[:, 0]]) and np.array_equal(outline.head, mine[edges[:, 1]])
+    assert outlines_of([], []) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_cells_beside_a_mask_are_those_a_few_steps_away_in_every_turn(seed):
+    rng = np.random.default_rng(seed)
+    for turned in turned_masks(blob(rng, *rng.integers(1, 9, 2)), (0, 1, 2, 3)).turns:
+        row, column = np.nonzero(turned.mask)
+        y, x = np.mgrid[-BESIDE : turned.mask.shape[0] + BESIDE, -BESIDE : turned.mask.shape[1] + BESIDE]
+        steps = (np.abs(y[..., None] - row) + np.abs(x[..., None] - column)).min(axis=2)
+        expected = (steps > 0) & (steps <= BESIDE)
+        assert {*map(tuple, turned.beside)} == {*zip(x[expected].tolist(), y[expected].tolist(), strict=True)}
+        assert len(turned.beside) == expected.sum()
 
 
 @pytest.mark.parametrize("seed", range(5))

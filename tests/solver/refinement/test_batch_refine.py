@@ -6,9 +6,12 @@ import pytest
 
 from omt_uv.solver.maps.untangle import count_folds
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
+from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement import batch_refine
 from omt_uv.solver.refinement.batch_refine import refine_batch
 from omt_uv.solver.refinement.continuation_rules import QUALITIES
+from omt_uv.solver.refinement.initial_maps import unroll
 
 
 def in_unit_box(charts):
@@ -71,3 +74,24 @@ def test_a_region_gets_its_share():
         here = slice(begin, begin := begin + len(F))
         has, target = signed_areas(uv, F), face_areas(V, F) * density[here]
         assert middle[here] @ has / has.sum() == pytest.approx(middle[here] @ target / target.sum(), rel=0.004)
+
+
+def test_nearly_flat_charts_start_where_each_alone_is_unrolled():
+    rng = np.random.default_rng(3)
+    charts = []
+    for size in ((4, 3), (5, 5), (3, 6)):
+        V, F = meshes.grid(*size)
+        charts.append((V + rng.normal(size=V.shape) * [0, 0, 1e-3], F))
+    charts = in_unit_box([*charts, meshes.hemisphere(6, 14)])
+    union = batch_refine._union(charts, None)
+    nearly = np.array([True, True, True, False])
+    found, w = batch_refine._conformal(union, nearly)
+    np.testing.assert_array_equal(found, nearly)
+    for k, (V, F) in enumerate(charts[:3]):
+        alone = unroll(V, F, boundary_loops(F)[0]) @ [1, 1j]
+        mine = w[union.of_vertex == k]
+        for edge in (alone, mine):
+            edge -= edge.mean()
+            edge /= np.abs(edge).max()
+        turn = (alone.conj() * mine).sum()
+        np.testing.assert_allclose(mine, alone * turn / np.abs(turn), atol=1e-8)
