@@ -183,18 +183,21 @@ def closed_components(surface: Surface, faces: np.ndarray | None = None) -> list
 def _globe(component: ClosedComponent, job: GlobeJob, settings: GlobeSettings) -> Steps[Globe]:
     """Map a component to the sphere, turn it, and lay it out."""
     density = None if job.density is None else job.density[component.members]
-    found = yield from part_of(
-        sphere_map(
-            component.vertices, component.triangles, density, settings.balance, settings.quality, settings.method
-        ),
-        0.0,
-        MAPPING,
+    mapping = sphere_map(
+        component.vertices,
+        component.triangles,
+        density,
+        balance=settings.balance,
+        quality=settings.quality,
+        method=settings.method,
+        polygons=component.faces,
     )
+    found = yield from part_of(mapping, 0.0, MAPPING)
     points = found.positions @ _rotation(component, found.positions, job.markers).T
     polygons, corners = gather_polygons(component.corners, component.triangles, component.faces)
     on_sphere = spherical_areas(points, component.triangles) / (4 * np.pi)
     # Where areas shall be exact, what is left of their error on the sphere need not be kept.
-    shares = _shares(component, density) if settings.balance == 0 else on_sphere
+    shares = _as_on_sphere(component, _shares(component, density), on_sphere) if settings.balance == 0 else on_sphere
     laying = _laid_out(points, polygons, shares, settings)
     uv, points, missed = yield from part_of(laying, MAPPING, 1 - MAPPING)
     areas = signed_areas(uv, polygons.triangles)
@@ -232,6 +235,13 @@ def _shares(component: ClosedComponent, density: np.ndarray | None) -> np.ndarra
     area = polygon_areas(component.vertices, component.triangles, component.faces)
     mass = area if density is None else area * density
     return mass / mass.sum()
+
+
+def _as_on_sphere(component: ClosedComponent, shares: np.ndarray, on_sphere: np.ndarray) -> np.ndarray:
+    """Shares (m,) of the polygons, split among their triangles as on the sphere (m,)."""
+    of = np.unique(component.faces, return_inverse=True)[1].ravel()
+    whole, there = np.bincount(of, shares), np.bincount(of, on_sphere)
+    return on_sphere * (whole / np.maximum(there, np.finfo(float).tiny))[of]
 
 
 def _rotation(component: ClosedComponent, positions: np.ndarray, markers: Markers | None) -> np.ndarray:

@@ -128,6 +128,7 @@ def sphere_map(vertices: np.ndarray, faces: Faces, **options) -> Steps[SphereMap
     if density is not None:
         density = np.asarray(density, float)[surface.triangle_face]
     triangles = surface.corner_vertex[surface.triangles]
+    options["polygons"] = surface.triangle_face
     return (yield from spheres.sphere_map(surface.positions, triangles, density, **options))
 
 

@@ -248,7 +248,11 @@ def area_forms(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) 
     The row is the slope of the polygon's area times the root of the area term's second derivative by it. 0 for polygons
     of one triangle, whose term is among the rows of `face_derivatives`.
     """
-    a, b = faces.derivatives(w)
+    return area_forms_of(faces, *faces.derivatives(w), area_weight)
+
+
+def area_forms_of(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
+    """As `area_forms`, from the derivatives a, b (m,) complex of the map."""
     whole = faces.sums(squared(a) - squared(b))
     size = np.sqrt(faces.weight * area_weight * faces.ratio / whole**3)
     g = faces.gradient

@@ -137,11 +137,17 @@ def with_convex_quads(faces: Elements, w: np.ndarray) -> Elements:
 
     The areas of polygons and their targets do not change by that.
     """
+    if faces.quads is None:
+        return faces
+    a, b, c = w[faces.triangles[len(faces.triangles) - 4 * len(faces.quads.convex) :]].T
+    return with_convex_quads_of(faces, ((b - a).conj() * (c - a)).imag.reshape(-1, 4))
+
+
+def with_convex_quads_of(faces: Elements, area: np.ndarray) -> Elements:
+    """As `with_convex_quads`, from the areas (q,4) of the four triangles of every quad in the map, in any unit."""
     if faces.quads is None or faces.part is None or not len(faces.quads.convex):
         return faces
     first = len(faces.triangles) - 4 * len(faces.quads.convex)
-    a, b, c = w[faces.triangles[first:]].T
-    area = ((b - a).conj() * (c - a)).imag.reshape(-1, 4)
     both = faces.quads.convex & (area > CONVEX * area[:, :2].sum(axis=1)[:, None]).all(axis=1)
     part = faces.part.copy()
     part[first:] = (faces.quads.size * np.where(both[:, None], 0.5, [1, 1, 0, 0])).ravel()

@@ -138,13 +138,13 @@ def hessian_blocks(
     return Blocks(
         gradient=gradient,
         triangles=blocks,
-        quads=_quad_blocks(rows[first:].reshape(-1, 4, 4, 6), area[first:].reshape(-1, 4, 6)),
-        rest=_long_forms(faces, vertex, area[:first], n),
+        quads=quad_blocks(rows[first:].reshape(-1, 4, 4, 6), area[first:].reshape(-1, 4, 6)),
+        rest=long_forms(faces, vertex, area[:first], n),
         scale=scale,
     )
 
 
-def _quad_blocks(rows: np.ndarray, area: np.ndarray) -> np.ndarray:
+def quad_blocks(rows: np.ndarray, area: np.ndarray) -> np.ndarray:
     """Blocks (q,8,8) from the rows (q,4,4,6) of four triangles each, and their parts (q,4,6) of the area's row."""
     columns = (2 * BOTH[:, :, None] + [0, 1]).reshape(4, 6)
     blocks = np.empty((len(rows), 8, 8))
@@ -158,7 +158,7 @@ def _quad_blocks(rows: np.ndarray, area: np.ndarray) -> np.ndarray:
     return blocks
 
 
-def _long_forms(faces: Elements, vertex: np.ndarray, area: np.ndarray, n: int) -> sp.spmatrix | None:
+def long_forms(faces: Elements, vertex: np.ndarray, area: np.ndarray, n: int) -> sp.spmatrix | None:
     """The squares of the rows of polygons of several triangles that are no quads, from their triangles' (t,6)."""
     if faces.polygon is None or faces.alone is None:
         return None

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..linalg.sparse import Factor
-from ..maps.energy import Elements, FaceDerivatives, derivatives_of, energy_of, squared
+from ..maps.energy import Elements, FaceDerivatives, area_forms_of, derivatives_of, energy_of, squared
 from ..mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
-from ..refinement.hessian_blocks import Assembly
-from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, NewtonStep, fold_share
+from ..refinement.hessian_blocks import Assembly, lone_triangles, long_forms, quad_blocks
+from ..refinement.projected_newton import ARMIJO, FOLD_SHARE, MAX_HALVINGS, SHIFT, NewtonStep, fold_shares
+from .symmetry import SphereSymmetry
 
 
 @dataclass(frozen=True)
@@ -79,9 +80,10 @@ def retract(positions: np.ndarray, axes: np.ndarray, step: np.ndarray) -> np.nda
 
 @dataclass(frozen=True)
 class SphereProblem:
-    """What Newton minimises: faces whose ratio is that of their projections, and the area weight.
+    """What Newton minimises: polygons whose ratio is that of their projections, and the area weight.
 
-    target (m,): spherical areas, summing to 4 pi; ratio (m,): theirs over those of the surface.
+    target (p,): spherical areas, summing to 4 pi; ratio (p,): theirs over those of the surface; symmetry: that of the
+    maps, which every step keeps
     """
 
     faces: Elements
@@ -89,10 +91,25 @@ class SphereProblem:
     ratio: np.ndarray
     assembly: Assembly
     area_weight: float
+    symmetry: SphereSymmetry | None = None
+
+    def spherical_areas(self, positions: np.ndarray) -> np.ndarray:
+        """Areas (p,) of the polygons on the sphere, by the triangulation given."""
+        area = spherical_areas(positions, self.faces.triangles)
+        if self.faces.polygon is None:
+            return area
+        first = lone_triangles(self.faces)
+        given = np.concatenate([area[:first], (area[first:].reshape(-1, 4) * [1, 1, 0, 0]).ravel()])
+        return np.bincount(self.faces.polygon, given, len(self.target))
+
+    def projected_areas(self, positions: np.ndarray) -> np.ndarray:
+        """Areas (p,) of the polygons' projections over those of the surface."""
+        a, b = derivatives(self.faces, project_faces(positions, self.faces.triangles).corner)
+        return self.faces.sums(squared(a) - squared(b))
 
     def energy(self, positions: np.ndarray) -> float:
         """The energy of unit vectors (n,3); infinity where a face is folded."""
-        if not signed_volumes(positions, self.faces.triangles).min() > 0:
+        if self.faces.folded(signed_volumes(positions, self.faces.triangles)).any():
             return np.inf
         corner = project_faces(positions, self.faces.triangles).corner
         return energy_of(self.faces, *derivatives(self.faces, corner), self.area_weight)
@@ -100,13 +117,12 @@ class SphereProblem:
     def area_error(self, positions: np.ndarray) -> float:
         """The larger of the share of the area in the wrong place and the deviation of the areas' ratios."""
         share = self.target / self.target.sum()
-        ratio = spherical_areas(positions, self.faces.triangles) / self.target
+        ratio = self.spherical_areas(positions) / self.target
         return float(max(share @ np.abs(ratio - 1), np.sqrt(share @ (ratio - 1) ** 2)))
 
     def projected_area_error(self, positions: np.ndarray) -> float:
         """Share of the area in the wrong place, of projected faces against their own targets."""
-        a, b = derivatives(self.faces, project_faces(positions, self.faces.triangles).corner)
-        error = np.abs((squared(a) - squared(b)) / self.faces.ratio - 1)
+        error = np.abs(self.projected_areas(positions) / self.faces.ratio - 1)
         return float(self.target @ error / self.target.sum())
 
     def step(self, positions: np.ndarray, value: float, pressure: float) -> NewtonStep:
@@ -114,10 +130,16 @@ class SphereProblem:
         face = project_faces(positions, self.faces.triangles)
         a, b = derivatives(self.faces, face.corner)
         local = derivatives_of(self.faces, a, b, self.area_weight, pressure)
+        whole = None if self.faces.polygon is None else area_forms_of(self.faces, a, b, self.area_weight)
         axes = tangents(positions)
-        direction, slope = newton_direction(self.faces, self.assembly, positions, axes, face, local)
-        change = np.einsum("na,nad->nd", direction, axes)[self.faces.triangles]
-        share = min(1.0, FOLD_SHARE * fold_share(a, b, *derivatives(self.faces, face.change(change))))
+        direction, slope = newton_direction(self.faces, self.assembly, positions, axes, face, local, area=whole)
+        moved = np.einsum("na,nad->nd", direction, axes)
+        if self.symmetry is not None:
+            moved = self.symmetry.averaged(moved)
+            direction = np.einsum("nd,nad->na", moved, axes)
+        far = fold_shares(a, b, *derivatives(self.faces, face.change(moved[self.faces.triangles])))
+        counted = far if self.faces.part is None else far[self.faces.part > 0]
+        share = min(1.0, FOLD_SHARE * float(counted.min(initial=np.inf)))
         for _ in range(MAX_HALVINGS):
             trial = retract(positions, axes, share * direction)
             trial_value = self.energy(trial)
@@ -135,14 +157,16 @@ def newton_direction(
     face: ProjectedFaces,
     local: FaceDerivatives,
     fixed: np.ndarray | None = None,
+    area: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
-    """Step (n,2) along the tangents (n,2,3), 0 for fixed vertices (n,) bool, and the energy's slope along it."""
+    """Step (n,2) along the tangents (n,2,3), 0 for fixed vertices (n,) bool, and the energy's slope along it.
+
+    area (m,3) complex: the parts that triangles have in the rows of their polygons' areas, see `energy.area_forms`
+    """
     n, triangles = len(positions), faces.triangles
     # How the tangents of the corners lie in the frames of the faces: (m, corner, frame axis, tangent).
     turn = np.einsum("mfd,mkad->mkfa", face.axes, axes[triangles])
-    forms = np.matmul(local.rows, face.mixing)
-    rows = forms.real[..., None] * turn[:, None, :, 0] - forms.imag[..., None] * turn[:, None, :, 1]
-    rows = np.ascontiguousarray(rows.reshape(len(triangles), 4, 6))
+    rows = _tangential(local.rows, face, turn)
     corner = np.einsum("mk,mkl->ml", local.gradient, face.mixing)
     corner = np.stack([corner.real, corner.imag], axis=2)
     pull = np.einsum("mkf,mfd->mkd", corner, face.axes).reshape(-1, 3)
@@ -153,7 +177,24 @@ def newton_direction(
     if fixed is not None:
         rows *= ~np.repeat(fixed[triangles], 2, axis=1)[:, None, :]
         gradient[fixed], bend[fixed] = 0, 1
-    matrix = assembly.matrix(np.matmul(rows.transpose(0, 2, 1), rows), np.repeat(bend, 2) + SHIFT * scale)
+    first = lone_triangles(faces)
+    blocks = np.matmul(rows[:first].transpose(0, 2, 1), rows[:first])
+    diagonal = np.repeat(bend, 2) + SHIFT * scale
+    if area is None:
+        matrix = assembly.matrix(blocks, diagonal)
+    else:
+        whole = _tangential(area[:, None, :], face, turn)[:, 0]
+        fours = quad_blocks(rows[first:].reshape(-1, 4, 4, 6), whole[first:].reshape(-1, 4, 6))
+        rest = long_forms(faces, triangles, whole[:first], n)
+        matrix = assembly.matrix(blocks, diagonal, fours)
+        matrix = matrix if rest is None else matrix + rest
     slope = np.einsum("nd,nad->na", gradient, axes).ravel()
     step = -Factor(matrix, "natural").solve(slope)
     return step.reshape(n, 2), float(step @ slope)
+
+
+def _tangential(forms: np.ndarray, face: ProjectedFaces, turn: np.ndarray) -> np.ndarray:
+    """Linear forms (m,r,3) complex of the faces' corners as rows (m,r,6) by the tangents of these, see `turn`."""
+    mixed = np.matmul(forms, face.mixing)
+    rows = mixed.real[..., None] * turn[:, None, :, 0] - mixed.imag[..., None] * turn[:, None, :, 1]
+    return np.ascontiguousarray(rows.reshape(*forms.shape[:2], 6))

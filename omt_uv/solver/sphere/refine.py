@@ -12,9 +12,11 @@ import numpy as np
 
 from ..errors import FoldedUVError
 from ..linalg.nested_dissection import mesh_order
-from ..maps.energy import Elements, elements, squared
-from ..mesh.spherical_geometry import signed_volumes, spherical_areas
-from ..progress import Progress, Steps
+from ..maps.energy import Elements, elements
+from ..maps.polygon_elements import polygon_elements, with_convex_quads_of
+from ..mesh.polygon_areas import polygon_areas
+from ..mesh.spherical_geometry import normalized, signed_volumes
+from ..progress import Progress, Steps, part_of
 from ..refinement.continuation import StageLimits, minimise
 from ..refinement.continuation_rules import (
     LOOSE,
@@ -27,8 +29,10 @@ from ..refinement.continuation_rules import (
     is_squeezed,
     planned_weights,
 )
-from ..refinement.hessian_blocks import Assembly
-from .newton import SphereProblem, derivatives, project_faces
+from ..refinement.hessian_blocks import Assembly, assembly_of, lone_triangles
+from ..refinement.mirrored_motion import find_symmetry
+from .newton import SphereProblem
+from .symmetry import symmetric_map
 from .untangle import untangle_on_sphere
 
 # Predicted decrease over energy at which an area weight is left for a greater one, where the area error is not reached.
@@ -38,6 +42,10 @@ LEAST_GROWTH = 2.0
 MOST_GROWTH = 10.0
 # Share of its value below which the area error has to fall for the same area weight to be used again.
 ENOUGH_PROGRESS = 0.9
+# Area error, over that of a free map, that a symmetric one may have where neither reaches what was asked for.
+MUCH_LESS = 1.25
+# Where a symmetric map is through, of the time of a refinement.
+SYMMETRIC = 0.7
 # Steps on the way from coarse to fine: the finer levels do the rest.
 RELAXING = Quality(0.1, (1.0, 10.0), 10.0, 30, LOOSE)
 
@@ -69,8 +77,9 @@ def sphere_refine(
     *,
     balance: float = 0.0,
     quality: str = "standard",
+    polygons: np.ndarray | None = None,
 ) -> Steps[SphereRefinement]:
-    """Refine a map (n,3) of a closed surface (n,3), (m,3) to the sphere until every face has its area.
+    """Refine a map (n,3) of a closed surface (n,3), (m,3) to the sphere until every polygon has its area.
 
     Minimises sum a_f (symmetric MIPS + area weight (r + 1 / r) / 2), r the ratio of a face's area to its target, with
     growing area weight, by projected Newton steps.
@@ -80,6 +89,8 @@ def sphere_refine(
     target : (m,) area that every spherical triangle shall have relative to the others
     balance : 0 for exact areas to 1 for the least shear
     quality : "draft", "standard" or "exact"
+    polygons : (m,) polygon of every triangle; by default each is its own. A mesh that is its own mirror image gets a
+        symmetric map
 
     Raises
     ------
@@ -97,7 +108,18 @@ def sphere_refine(
     folded = np.flatnonzero(~(signed_volumes(start, problem.faces.triangles) > 0))
     if len(folded):
         raise FoldedUVError("Folds of the transport map could not be straightened", kind="face", elements=folded)
-    found = yield from _stages(problem, start, balance, QUALITIES[quality])
+    by_triangle, problem = problem, _of_polygons(problem, vertices[order], polygons)
+    symmetry = find_symmetry(vertices[order], by_triangle.faces.triangles, polygons, problem.faces)
+    found, settings = None, QUALITIES[quality]
+    if symmetry is not None:
+        refining = _symmetric(problem, by_triangle, symmetry.images, start, balance, settings)
+        found, more = yield from part_of(refining, 0.0, SYMMETRIC)
+        steps += more
+    if found is None or (balance == 0 and found.area_error > settings.area_error):
+        begin = 0.0 if found is None else SYMMETRIC
+        free = yield from part_of(_stages(problem, start, balance, settings), begin, 1 - begin)
+        # Around a thin limb the symmetric map may be the one with less room.
+        found = found if found is not None and found.area_error <= MUCH_LESS * free.area_error else free
     yield Progress("Refinement", 1.0)
     return replace(found, positions=_in_order(found.positions, order), untangling=steps)
 
@@ -137,6 +159,38 @@ def _renumbered(vertices, triangles, target) -> tuple[SphereProblem, np.ndarray]
     return SphereProblem(faces=faces, target=target, ratio=faces.ratio, assembly=assembly, area_weight=1.0), order
 
 
+def _of_polygons(problem: SphereProblem, vertices: np.ndarray, polygons: np.ndarray | None) -> SphereProblem:
+    """The problem with the areas of polygons (m,), any numbers, and shear without a diagonal; itself without any."""
+    faces = polygon_elements(vertices, problem.faces.triangles, problem.target, polygons)
+    if faces.polygon is None:
+        return problem
+    area = faces.area * polygon_areas(vertices, problem.faces.triangles, polygons).sum()
+    ratio = faces.ratio * (4 * np.pi / (area @ faces.ratio))
+    faces = replace(faces, ratio=ratio)
+    return replace(problem, faces=faces, target=area * ratio, ratio=ratio, assembly=assembly_of(faces, len(vertices)))
+
+
+def _symmetric(
+    problem: SphereProblem,
+    by_triangle: SphereProblem,
+    images: np.ndarray,
+    start: np.ndarray,
+    balance: float,
+    settings: Quality,
+) -> Steps[tuple[SphereRefinement | None, int]]:
+    """The symmetric map next to unit vectors (n,3) without folds, refined, None where there is none; and the steps that
+    straightened its start."""
+    near = symmetric_map(images, start)
+    if near is None:
+        return None, 0
+    symmetry, averaged = near
+    averaged, steps = yield from untangle_on_sphere(by_triangle.faces, by_triangle.assembly, averaged)
+    averaged = normalized(symmetry.averaged(averaged))
+    if not signed_volumes(averaged, by_triangle.faces.triangles).min() > 0:
+        return None, steps
+    return (yield from _stages(replace(problem, symmetry=symmetry), averaged, balance, settings)), steps
+
+
 def _in_order(positions: np.ndarray, order: np.ndarray) -> np.ndarray:
     """Positions (n,3) of vertices order (n,) back in the order of the mesh."""
     result = np.empty_like(positions)
@@ -151,7 +205,7 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
         weights = [SQUEEZED_WEIGHT, *weights]
     steps, k, error = 0, 0, np.inf
     while True:
-        current = with_projected_targets(problem, p, weights[k])
+        current = with_projected_targets(with_both_diagonals(problem, p), p, weights[k])
         goal = settings.area_error if k >= len(weights) - 1 else np.inf
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
@@ -181,9 +235,15 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
             weights.append(weights[-1] * growth)
 
 
+def with_both_diagonals(problem: SphereProblem, p: np.ndarray) -> SphereProblem:
+    """The problem with both triangulations of the quads that are convex in the map p (n,3)."""
+    if problem.faces.quads is None:
+        return problem
+    area = signed_volumes(p, problem.faces.triangles[lone_triangles(problem.faces) :]).reshape(-1, 4)
+    return replace(problem, faces=with_convex_quads_of(problem.faces, area))
+
+
 def with_projected_targets(problem: SphereProblem, p: np.ndarray, area_weight: float) -> SphereProblem:
     """The problem with its targets as much below the spherical ones as the projected faces of the map p (n,3) are."""
-    triangles = problem.faces.triangles
-    a, b = derivatives(problem.faces, project_faces(p, triangles).corner)
-    shrink = (squared(a) - squared(b)) * problem.target / problem.ratio / spherical_areas(p, triangles)
+    shrink = problem.projected_areas(p) * problem.target / problem.ratio / problem.spherical_areas(p)
     return replace(problem, faces=replace(problem.faces, ratio=problem.ratio * shrink), area_weight=area_weight)

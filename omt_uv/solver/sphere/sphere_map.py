@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FoldedUVError, PrecisionError, TransportError, positive_density
 from ..mesh.closed_surface import ClosedSurface, closed_surface
 from ..mesh.geometry import face_areas, vertex_areas
-from ..mesh.spherical_geometry import spherical_areas
+from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..mesh.topology import twins
 from ..progress import Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
@@ -23,6 +23,7 @@ from .conformal import ConformalSphere, conformal_sphere
 from .dominitz_tannenbaum import flow_map
 from .multilevel import multilevel_start
 from .refine import SphereRefinement, sphere_refine
+from .symmetry import with_mirrored_quads
 
 # Optimal transport, by Newton's method.
 NEWTON = "newton"
@@ -33,6 +34,8 @@ METHODS = (NEWTON, FLOW)
 CONFORMAL = (0.0, 0.15)
 TRANSPORT = (0.15, 0.25)
 REFINEMENT = (0.4, 0.6)
+# Area error, over that of symmetric quads, that a map of these may have in the triangles that they came as.
+AREA_KEPT = 1.5
 # From coarse to fine, where the transport failed.
 MULTILEVEL = (0.4, 0.3)
 
@@ -62,8 +65,9 @@ def sphere_map(
     balance: float = 0.0,
     quality: str = "standard",
     method: str = "newton",
+    polygons: np.ndarray | None = None,
 ) -> Steps[SphereMap]:
-    """Map a closed surface (n,3), (m,3) of genus 0 to the unit sphere, every face with its share of 4 pi.
+    """Map a closed surface (n,3), (m,3) of genus 0 to the unit sphere, every polygon with its share of 4 pi.
 
     Parameters
     ----------
@@ -71,6 +75,7 @@ def sphere_map(
     balance : from 0, exact areas, to 1, least shear
     quality : "draft", "standard" or "exact", how small the area error of single faces becomes
     method : "newton", optimal transport, or "flow", that of Dominitz and Tannenbaum; both are refined
+    polygons : (m,) polygon of every triangle; by default each is its own
 
     Raises
     ------
@@ -89,20 +94,21 @@ def sphere_map(
     surface = closed_surface(vertices, triangles)
     target = _target(surface, density)
     warnings = list(surface.warnings)
-    options = {"balance": balance, "quality": quality}
+    joined = with_mirrored_quads(surface.vertices, surface.triangles, polygons)
+    options = {"balance": balance, "quality": quality, "polygons": joined}
     found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
     refined = None
     if found is not None:
-        if method == NEWTON:
-            begin = _transport_start(found, vertex_areas(surface.vertices, surface.triangles, density))
-        else:
-            begin = _flow_start(found, surface.triangles, target)
+        mass = vertex_areas(surface.vertices, surface.triangles, density)
+        begin = _flow_start(found, surface.triangles, target) if method == FLOW else _transport_start(found, mass)
         refined = yield from _refined_start(surface, begin, target, warnings, options)
     if refined is None:
         start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *MULTILEVEL)
         refined = yield from _refined(surface, start, target, options)
+    if joined is not polygons and not _as_given(refined.positions, surface, target, refined.area_error):
+        refined = yield from _refined(surface, refined.positions, target, options | {"polygons": polygons})
     if balance == 0 and refined.area_error > QUALITIES[quality].area_error:
-        warnings.append(_area_warning(refined.positions, surface.triangles, target))
+        warnings.append(_area_warning(refined.positions, surface.triangles, target, polygons))
     conformal = found.positions if found else (yield from _least_shear(surface, refined))
     return SphereMap(
         positions=refined.positions,
@@ -122,10 +128,18 @@ def _target(surface: ClosedSurface, density: np.ndarray | None) -> np.ndarray:
     return area * positive_density(density)
 
 
-def _area_warning(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray) -> str:
-    """Say how far areas on the sphere are from the target (m,)."""
+def _as_given(positions: np.ndarray, surface: ClosedSurface, target: np.ndarray, error: float) -> bool:
+    """Whether triangles as they were given, with their targets (m,), have areas not much farther off than quads."""
     share = target / target.sum()
-    off = np.abs(spherical_areas(positions, triangles) / (4 * np.pi * share) - 1)
+    off = np.abs(spherical_areas(positions, surface.triangles) / (4 * np.pi) - share).sum()
+    return bool(off <= AREA_KEPT * error and signed_volumes(positions, surface.triangles).min() > 0)
+
+
+def _area_warning(positions: np.ndarray, triangles: np.ndarray, target: np.ndarray, polygons: np.ndarray | None) -> str:
+    """Say how far areas of polygons (m,) on the sphere are from the target (m,)."""
+    owner = np.arange(len(triangles)) if polygons is None else np.unique(polygons, return_inverse=True)[1].ravel()
+    share = np.bincount(owner, target / target.sum())
+    off = np.abs(np.bincount(owner, spherical_areas(positions, triangles)) / (4 * np.pi * share) - 1)
     mean, deviation = 100 * (share @ off), 100 * np.sqrt(share @ off**2)
     return (
         f"On the sphere, the area of a face is off by {mean:.1f} % on average, standard deviation {deviation:.1f} %; "

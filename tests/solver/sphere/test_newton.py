@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from sphere_shapes import blob, lopsided, random_rotation, random_sphere
+from sphere_shapes import blob, creature, lopsided, random_rotation, random_sphere
 
-from omt_uv.solver.maps.energy import derivatives_of, elements
+from omt_uv.solver.maps.energy import area_forms_of, derivatives_of, elements
+from omt_uv.solver.maps.polygon_elements import polygon_elements, with_convex_quads_of
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
-from omt_uv.solver.refinement.hessian_blocks import Assembly
+from omt_uv.solver.refinement.hessian_blocks import Assembly, assembly_of
 from omt_uv.solver.sphere.newton import SphereProblem, derivatives, newton_direction, project_faces, retract, tangents
 
 
@@ -24,6 +25,25 @@ def test_the_slope_is_the_derivative():
     direction, slope = newton_direction(faces, problem.assembly, p, axes, face, local)
     before, after = (problem.energy(retract(p, axes, s * direction)) for s in (-1e-6, 1e-6))
     np.testing.assert_allclose((after - before) / 2e-6, slope, rtol=1e-5)
+
+
+def test_the_slope_of_quads_and_longer_polygons_is_the_derivative():
+    V, F = creature(3, 0, 1, 0)
+    V = V - V.mean(axis=0)
+    owner = np.tile(np.arange(len(F) // 2), 2)
+    owner[owner == 1] = 0
+    faces = polygon_elements(V, F, face_areas(V, F), owner)
+    assert len(faces.quads.convex) == len(F) // 2 - 2 and not faces.alone[:4].any()
+    faces = with_convex_quads_of(faces, np.ones((len(faces.quads.convex), 4)))
+    problem = SphereProblem(faces, faces.area * faces.ratio, faces.ratio, assembly_of(faces, len(V)), 3.0)
+    p = normalized(V)
+    axes, face = tangents(p), project_faces(p, faces.triangles)
+    a, b = derivatives(faces, face.corner)
+    local, area = derivatives_of(faces, a, b, 3.0, 1.0), area_forms_of(faces, a, b, 3.0)
+    direction, slope = newton_direction(faces, problem.assembly, p, axes, face, local, area=area)
+    before, after = (problem.energy(retract(p, axes, s * direction)) for s in (-1e-6, 1e-6))
+    np.testing.assert_allclose((after - before) / 2e-6, slope, rtol=1e-5)
+    assert slope < 0 and problem.step(p, problem.energy(p), 1.0).share == 1.0
 
 
 def test_projected_faces_have_the_area_of_their_determinant():

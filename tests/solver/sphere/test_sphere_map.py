@@ -5,11 +5,13 @@ from __future__ import annotations
 import meshes
 import numpy as np
 import pytest
-from sphere_shapes import SHAPES, blob, star
+from scipy.spatial import cKDTree
+from sphere_shapes import SHAPES, blob, creature, star
 
 from omt_uv.solver import errors
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.geometry import face_areas, vertex_areas
+from omt_uv.solver.mesh.polygon_areas import polygon_areas
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.progress import drain
@@ -103,6 +105,46 @@ def test_the_same_twice():
     np.testing.assert_array_equal(*(drain(sphere_map(V, F)).positions for _ in range(2)))
 
 
+def quads_of(V, F):
+    """The polygon of every triangle of a body of squares, and its triangles with other diagonals."""
+    first, second = np.split(F, 2)
+    quads = np.column_stack([first, second[:, 2]])
+    turned = np.where((np.random.default_rng(0).random(len(quads)) < 0.5)[:, None], np.roll(quads, 1, axis=1), quads)
+    return np.tile(np.arange(len(quads)), 2), np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
+
+
+def test_polygons_have_their_areas_whichever_way_they_are_cut():
+    V, F = creature(4, 3, 2, 3)
+    V = V + 0.1 * np.sin(V @ np.random.default_rng(1).normal(size=(3, 3)))
+    owner, other = quads_of(V, F)
+    one, two = (drain(sphere_map(V, x, polygons=owner, quality="exact")).positions for x in (F, other))
+    for p in (one, two):
+        for triangles in (F, other):
+            assert (signed_volumes(p, triangles) > 0).all()
+        area, target = (np.bincount(owner, x) for x in (spherical_areas(p, F), polygon_areas(V, F, owner)))
+        assert np.abs(area / area.sum() - target / target.sum()).sum() < 1e-3
+    u, _, v = np.linalg.svd(two.T @ one)
+    assert np.abs(two @ u @ v - one).max() < 0.02
+
+
+def symmetric_bodies():
+    """A box of squares with any diagonals, and a sphere of triangles, both with a bump at z = 0."""
+    V, squares = creature(8, 0, 1, 0)
+    owner, other = quads_of(V, squares)
+    for points, triangles, polygons in ((V, other, owner), (*meshes.icosphere(2), None)):
+        p = (points - points.mean(axis=0)) / np.ptp(points, axis=0) * [1, 1.2, 1]
+        yield p * (1 + 0.5 * np.exp(-10 * ((p - [0.4, 0.3, 0]) ** 2).sum(axis=1))[:, None]), triangles, polygons
+
+
+def test_a_symmetric_body_has_a_symmetric_map():
+    for V, F, polygons in symmetric_bodies():
+        p = drain(sphere_map(V, F, polygons=polygons)).positions
+        image = cKDTree(V).query(V * [1, 1, -1])[1]
+        u, _, v = np.linalg.svd(p.T @ p[image])
+        assert np.linalg.det(u @ v) < 0
+        assert np.abs(p[image] @ (u @ v).T - p).max() < 1e-9
+
+
 MODELS = ["spot", "bunny_small", "max_planck"]
 
 
@@ -111,7 +153,8 @@ def test_models(name):
     if not meshes.model_path(name):
         pytest.skip(f"no {name} in {meshes.models_folder()}: set OMT_UV_MODELS")
     V, F = meshes.load_model(name)
-    check(V, F, drain(sphere_map(V, F)))
+    # The quads of spot's two sides are cut along other diagonals: they have their areas, their halves nearly so.
+    check(V, F, drain(sphere_map(V, F)), most=0.04 if name == "spot" else 0.01)
     found = drain(conformal_sphere(V, F))
     mass = vertex_areas(V, F)
     carried = drain(sphere_transport(found.sites, mass, hull=Hull(found.triangles, twins(found.triangles))))
