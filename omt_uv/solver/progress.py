@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeAlias, TypeVar
 
+from .blas_threads import one_blas_thread
+
 T = TypeVar("T")
 
 
@@ -33,13 +35,14 @@ Steps: TypeAlias = Generator[Progress, None, T]
 
 def drain(steps: Steps[T], callback: Callable[[Progress], None] | None = None) -> T:
     """Run a solver to its end and return its result; `callback` sees every Progress."""
-    while True:
-        try:
-            progress = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        if callback is not None:
-            callback(progress)
+    with one_blas_thread():
+        while True:
+            try:
+                progress = next(steps)
+            except StopIteration as stop:
+                return stop.value
+            if callback is not None:
+                callback(progress)
 
 
 def part_of(steps: Steps[T], start: float, width: float) -> Steps[T]:
@@ -65,9 +68,10 @@ def on_thread(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
 
     def work() -> None:
         try:
-            while not closed.is_set():
-                latest[0] = next(steps)
-            steps.close()
+            with one_blas_thread():
+                while not closed.is_set():
+                    latest[0] = next(steps)
+                steps.close()
         except StopIteration as stop:
             results.append(stop.value)
         except BaseException as error:  # noqa: BLE001, it is raised again below
