@@ -6,8 +6,10 @@ import bpy
 
 from .blender.versions import register_command, unregister_command
 from .display import colour_bar, overlay
+from .links import manual
 from .operators.distortion import UV_OT_omt_histogram, UV_OT_omt_measure, UV_OT_omt_overlay
 from .operators.inspection.checker import UV_OT_omt_checker, UV_OT_omt_checker_remove
+from .operators.inspection.compare import OBJECT_OT_omt_compare
 from .operators.inspection.remedy import UV_OT_omt_notices, UV_OT_omt_remedy
 from .operators.inspection.worst import UV_OT_omt_worst
 from .operators.live import UV_OT_omt_live, UV_OT_omt_live_end
@@ -23,7 +25,8 @@ from .operators.unwrap import UV_OT_omt_unwrap
 from .operators.volumes.flow import OBJECT_OT_omt_flow
 from .operators.volumes.uv_flow import UV_OT_omt_flow
 from .operators.weights import OBJECT_OT_omt_weights
-from .panels.menus import draw_remesh, draw_unwrap, draw_weights, menus, remesh_menus, weights_menus
+from .panels import keymap
+from .panels.menus import UV_MT_omt, draw_menu, draw_remesh, menus, remesh_menus
 from .panels.preferences import OMTUVPreferences, apply_soon
 from .panels.sidebar import PANELS
 from .session import last_run
@@ -40,6 +43,7 @@ CLASSES = (
     UV_OT_omt_live_end,
     UV_OT_omt_measure,
     OBJECT_OT_omt_remesh,
+    OBJECT_OT_omt_compare,
     OBJECT_OT_omt_flow,
     UV_OT_omt_flow,
     UV_OT_omt_overlay,
@@ -54,6 +58,7 @@ CLASSES = (
     UV_OT_omt_preset,
     WM_OT_omt_copy_report,
     OMTUVPreferences,
+    UV_MT_omt,
     *PANELS,
 )
 COMMAND = "omt_uv"
@@ -67,14 +72,17 @@ def register() -> None:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append((bpy.utils.unregister_class, cls))
-        entries = ((draw_unwrap, menus()), (draw_remesh, remesh_menus()), (draw_weights, weights_menus()))
+        entries = ((draw_menu, menus()), (draw_remesh, remesh_menus()))
         for draw, places in entries:
             for menu in places:
                 menu.append(draw)
                 _undo.append((menu.remove, draw))
         _undo.append((unregister_command, register_command(COMMAND, _command)))
-        register_folder()
+        bpy.utils.register_manual_map(manual)
+        _undo.append((bpy.utils.unregister_manual_map, manual))
         _undo.append((_clear, None))
+        keymap.register()
+        register_folder()
         apply_soon()
     except Exception:
         unregister()
@@ -89,6 +97,7 @@ def unregister() -> None:
 
 def _clear(_) -> None:
     """What lives outside of classes and menus."""
+    keymap.unregister()
     overlay.forget()
     colour_bar.forget()
     last_run.forget()

@@ -58,10 +58,19 @@ DENSITIES = (
     ("ATTRIBUTE", "Attribute", "Vertices per area in proportion to an attribute of floats, on vertices or faces"),
 )
 STRATEGIES = (
-    ("APP-CFP", "APP, CFP", "Sample on the area-preserving map, triangulate on the conformal map"),
-    ("APP-APP", "APP, APP", "For comparison: sample and triangulate on the area-preserving map"),
-    ("CFP-CFP", "CFP, CFP", "For comparison: sample and triangulate on the conformal map"),
-    ("CFP-APP", "CFP, APP", "For comparison: sample on the conformal map, triangulate on the area-preserving one"),
+    (
+        "APP-CFP",
+        "Even and Well Shaped",
+        "Vertices where areas ask for them, joined where angles are right (APP, CFP): "
+        "sample on the area-preserving map, triangulate on the conformal map",
+    ),
+    ("APP-APP", "Areas Alone", "For comparison (APP, APP): sample and triangulate on the area-preserving map"),
+    ("CFP-CFP", "Angles Alone", "For comparison (CFP, CFP): sample and triangulate on the conformal map"),
+    (
+        "CFP-APP",
+        "Angles, Then Areas",
+        "For comparison (CFP, APP): sample on the conformal map, triangulate on the area-preserving one",
+    ),
 )
 DEFAULT_STRATEGY = "APP-CFP"
 
@@ -162,11 +171,13 @@ class RemeshSettings:
     strategy: str = DEFAULT_STRATEGY.lower()
 
 
+# Of the operator alone: what it does depends on what it finds.
+AUTO_SOURCE = ("AUTO", "Auto", "Inside the UV islands where every object has UVs, unwrapped anew otherwise")
 SOURCES = (
-    ("MESH", "Mesh", "Unwrap anew: every part of the surface gets its share, and the region what was asked"),
+    ("MESH", "New UVs", "Unwrap anew: every part of the surface gets its share, and the region what was asked"),
     (
         "UV",
-        "UVs",
+        "Existing UVs",
         "Magnify inside the UV islands that are there, in their own outline, as under a glass",
     ),
 )
@@ -205,12 +216,14 @@ class GlobeSettings:
 
     projection, quality, method : an identifier of the lists above in lower case
     balance : from 0, exact areas, to 1, least shear
+    inside : scale the layout into the tile where faces across its edge reach beyond it
     """
 
     projection: str = DEFAULT_PROJECTION.lower()
     quality: str = DEFAULT_QUALITY.lower()
     balance: float = DEFAULT_BALANCE
     method: str = DEFAULT_SPHERE_METHOD.lower()
+    inside: bool = False
 
 
 WEIGHT_KINDS = (

@@ -20,6 +20,7 @@ MOST_MODULES, MOST_LINES, MOST_FUNCTION_LINES, MOST_PARAMETERS = 14, 450, 60, 8
 ARROWS: dict[str, str] = {
     "settings": "",
     "errors": "",
+    "links": "",
     "supervision": "",
     # The names of the front door are looked up in solver.api when they are used.
     "solver": "",
@@ -79,7 +80,7 @@ ARROWS: dict[str, str] = {
     "pipelines blender files display session",
     "operators.inspection": "remedies solver pipelines blender display session operators",
     "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
-    "panels": "errors remedies settings solver blender display session operators operators.inspection",
+    "panels": "links errors remedies settings solver blender display session operators operators.inspection",
 }
 SOLVER_LIBRARIES = {"numpy", "scipy"}
 # Blender's modules stay in these.

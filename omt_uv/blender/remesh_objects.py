@@ -172,6 +172,38 @@ def new_objects(
     return names
 
 
+# Property of a new object: the one that it was made of, to be shown in its place.
+SOURCE = "omt_uv_source"
+
+
+def mark_source(group: list[bpy.types.Object], names: list[str]) -> None:
+    """Let new objects, levels in turn and each for every object of the group, know what they were made of.
+
+    Several levels stand in a collection of their own, below the first one of the object.
+    """
+    levels = len(names) // len(group)
+    for k, name in enumerate(names):
+        bpy.data.objects[name][SOURCE] = group[k % len(group)]
+    if levels < 2:
+        return
+    home = next((c for c in group[0].users_collection if c.library is None), bpy.context.scene.collection)
+    collection = bpy.data.collections.new(f"{group[0].name} LODs")
+    home.children.link(collection)
+    for name in names:
+        obj = bpy.data.objects[name]
+        for other in list(obj.users_collection):
+            other.objects.unlink(obj)
+        collection.objects.link(obj)
+    bpy.context.view_layer.update()
+
+
+def family(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The object that it was made of, and all that were made of that, the finest first; empty if there is none."""
+    source = obj.get(SOURCE) or obj
+    made = [other for other in bpy.data.objects if other.get(SOURCE) == source and other.type == "MESH"]
+    return [source, *sorted(made, key=lambda other: -len(other.data.vertices))] if made else []
+
+
 def carried_attributes(request: Request, series: Series) -> list[Attributes]:
     """What the meshes of a series carry."""
     surface = request.job.surface

@@ -45,3 +45,4 @@ def progress_bar(layout: bpy.types.UILayout, fraction: float, text: str) -> None
 
 
 SMOOTH_COLOUR_SHADER = "SMOOTH_COLOR" if bpy.app.version >= (4, 0, 0) else "2D_SMOOTH_COLOR"
+UNIFORM_COLOUR_SHADER = "UNIFORM_COLOR" if bpy.app.version >= (4, 0, 0) else "2D_UNIFORM_COLOR"

@@ -8,6 +8,7 @@ import bpy
 
 # In the UV editor, so that the outlines of the faces are seen through the colours.
 OPACITY = 0.65
+OUTLINE = (0.0, 0.0, 0.0, 0.35)
 
 
 @dataclass
@@ -18,6 +19,8 @@ class _Shown:
     places: list = field(default_factory=list)
     colours: list = field(default_factory=list)
     batch: object = None
+    edges: list = field(default_factory=list)
+    outlines: object = None
     shading: dict = field(default_factory=dict)
     handle: object = None
 
@@ -40,7 +43,7 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
     import numpy as np
 
     from ..blender import colour_attributes
-    from ..pipelines.distortion import triangles_of
+    from ..pipelines.distortion import polygon_outlines, triangles_of
     from ..solver.maps.distortion import face_distortion
     from .colormaps import area_colours, shear_colours
 
@@ -56,7 +59,8 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
         start += len(corners)
     rgba = np.concatenate([np.repeat(rgb, 3, axis=0), np.full((3 * len(rgb), 1), OPACITY)], axis=1)
     _shown.kind, _shown.places, _shown.colours = figure, found.uv.reshape(-1, 2).tolist(), rgba.tolist()
-    _shown.batch = None
+    _shown.edges = polygon_outlines([reading for _, reading in pairs]).reshape(-1, 2).tolist()
+    _shown.batch = _shown.outlines = None
     if _shown.handle is None and not bpy.app.background:
         _shown.handle = bpy.types.SpaceImageEditor.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
     for kind, function in _handlers():
@@ -138,19 +142,32 @@ def _redraw(context: bpy.types.Context) -> None:
                 area.tag_redraw()
 
 
+def _shows_uvs(context: bpy.types.Context) -> bool:
+    """Whether an editor is one of UVs: in Object Mode, too, where Blender itself shows none."""
+    space, area = context.space_data, context.area
+    return bool(getattr(space, "show_uvedit", False) or getattr(area, "ui_type", "") == "UV")
+
+
 def _draw() -> None:
     """Fill the faces in the UV editor; Blender draws their outlines over them."""
     import gpu
     from gpu_extras.batch import batch_for_shader
 
-    from ..blender.versions import SMOOTH_COLOUR_SHADER
+    from ..blender.versions import SMOOTH_COLOUR_SHADER, UNIFORM_COLOUR_SHADER
 
-    space = bpy.context.space_data
-    if space is None or not getattr(space, "show_uvedit", True):
+    if not _shows_uvs(bpy.context):
         return
     shader = gpu.shader.from_builtin(SMOOTH_COLOUR_SHADER)
     if _shown.batch is None:
         _shown.batch = batch_for_shader(shader, "TRIS", {"pos": _shown.places, "color": _shown.colours})
     gpu.state.blend_set("ALPHA")
     _shown.batch.draw(shader)  # type: ignore[attr-defined]
+    if bpy.context.mode == "OBJECT":
+        # Blender draws no outlines there.
+        lines = gpu.shader.from_builtin(UNIFORM_COLOUR_SHADER)
+        if _shown.outlines is None:
+            _shown.outlines = batch_for_shader(lines, "LINES", {"pos": _shown.edges})
+        lines.bind()
+        lines.uniform_float("color", OUTLINE)
+        _shown.outlines.draw(lines)  # type: ignore[attr-defined]
     gpu.state.blend_set("NONE")

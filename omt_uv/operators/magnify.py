@@ -9,11 +9,12 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..session import run
 from ..settings import (
+    AUTO_SOURCE,
     BOUNDARIES,
+    DEFAULT_BALANCE,
     DEFAULT_FACTOR,
     DEFAULT_QUALITY,
     DEFAULT_REGION,
-    DEFAULT_SOURCE,
     OWN_BOUNDARY,
     QUALITIES,
     REGIONS,
@@ -40,7 +41,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         soft_min=0.1,
         soft_max=16.0,
     )
-    source: EnumProperty(name="Source", description="What is magnified", items=SOURCES, default=DEFAULT_SOURCE)
+    source: EnumProperty(name="Source", description="What is magnified", items=(AUTO_SOURCE, *SOURCES), default="AUTO")
     region: EnumProperty(name="Region", description="What marks the region", items=REGIONS, default=DEFAULT_REGION)
     weight_group: StringProperty(
         name="Group",
@@ -75,6 +76,20 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
     quality: EnumProperty(
         name="Quality", description="How exact the areas become", items=QUALITIES, default=DEFAULT_QUALITY
     )
+    balance: FloatProperty(
+        name="Balance",
+        description="From 0, exact areas, to 1, least shear, where UVs are made anew. The share of the region is exact "
+        "at 0 alone",
+        default=DEFAULT_BALANCE,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    use_image: BoolProperty(
+        name="Show Warped Image",
+        description="Let the materials of the objects show the warped image in place of the old one",
+        default=True,
+    )
     image: StringProperty(
         name="Warp Image",
         description="Image that follows the UVs: a copy is made that looks on the mesh as the old one did. "
@@ -84,7 +99,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
     def draw(self, _context: bpy.types.Context) -> None:
         draw_settings(self.layout, self)
 
-    def settings(self) -> MagnifySettings:
+    def settings(self, source: str) -> MagnifySettings:
         return MagnifySettings(
             boundary=self.boundary.lower(),
             quality=self.quality.lower(),
@@ -93,7 +108,8 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             tile=self.tile,
             factor=self.factor,
             exact=self.exact,
-            source=self.source.lower(),
+            source=source,
+            balance=self.balance if source == "mesh" else 0.0,
             cascade=self.cascade,
         )
 
@@ -103,13 +119,16 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
 
         objects, readings = read_writable(context)
         with complaints(objects=objects):
-            picture = images.pixels_of(images.named(self.image)) if self.image and self.source == "UV" else None
+            source = self.source.lower()
+            if source == "auto":
+                source = "uv" if all(reading.uv is not None for reading in readings) else "mesh"
+            picture = images.pixels_of(images.named(self.image)) if self.image and source == "uv" else None
             weights, warnings = self._weights(context, list(zip(objects, readings, strict=True)))
             regions = [
                 Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up)
                 for r, w in zip(readings, weights, strict=True)
             ]
-            result = yield from run.aside(magnify(regions, self.settings()))
+            result = yield from run.aside(magnify(regions, self.settings(source)))
         if picture is not None:
             straight = images.has_straight_alpha(images.named(self.image))
             picture = warped_picture(picture, regions, result, self.margin, straight)
@@ -136,12 +155,36 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             ("Region now", f"{100 * shares.after:.3f} %"),
             ("Area error", f"{100 * worst:.2f} %"),
         )
-        warn(self, objects, magnified.warnings)
+        warn(self, objects, [*magnified.warnings, *_beyond(objects, magnified)])
         text = shares.text()
         if picture is not None:
-            warped = images.packed_image(f"{self.image} warped", picture, images.named(self.image))
+            old = images.named(self.image)
+            warped = images.packed_image(f"{self.image} warped", picture, old)
             text += f"; the warped image is {warped.name!r}"
+            if self.use_image:
+                _show_image(objects, old, warped)
         self.report({"INFO"}, text)
+
+
+def _beyond(objects: list, magnified) -> list[tuple[int, str]]:
+    """A warning for each object whose UVs have left the tile that they were in."""
+    from ..pipelines.texel_density import beyond_tile
+
+    found = []
+    for k, (corners, uv) in enumerate(zip(magnified.corners, magnified.uv, strict=True)):
+        far = beyond_tile(uv) if len(corners) else 0.0
+        if far > 0:
+            found.append((k, f"UVs reach {far:.3f} beyond their tile; use Pack Islands, or a smaller factor"))
+    return found
+
+
+def _show_image(objects: list, old: bpy.types.Image, new: bpy.types.Image) -> None:
+    """Let texture nodes of the objects' materials that show one image show another."""
+    materials = {slot.material for obj in objects for slot in obj.material_slots if slot.material is not None}
+    for material in materials:
+        for node in material.node_tree.nodes if material.node_tree is not None else ():
+            if node.type == "TEX_IMAGE" and node.image == old:
+                node.image = new
 
 
 def _active_group(context: bpy.types.Context) -> str:
@@ -162,9 +205,15 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
         choose_group(layout, properties, "weight_group")
     layout.prop(properties, "exact")
     layout.prop(properties, "source")
+    column = layout.column()
+    column.active = properties.source != "UV"
+    column.prop(properties, "balance", text="Area - Angle", slider=True)
     layout.prop(properties, "boundary")
     layout.prop(properties, "cascade")
     layout.prop(properties, "quality")
-    if properties.source == "UV":
+    if properties.source != "MESH":
         layout.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
+        column = layout.column()
+        column.active = bool(properties.image)
+        column.prop(properties, "use_image")
     draw_margin(layout, properties)

@@ -88,5 +88,9 @@ def _choose(layout: bpy.types.UILayout, properties, name: str, collection: str, 
         layout.prop(properties, name)
         return
     owner = obj if hasattr(obj, collection) else obj.data
-    # A name that does not exist yet may be typed in as well: the field shows it in red, and it is used.
+    chosen = getattr(properties, name)
+    if chosen and chosen not in getattr(owner, collection):
+        # A name about to be made, or of other objects: a search field would show it in red, as if it were wrong.
+        layout.prop(properties, name, icon=icon)
+        return
     layout.prop_search(properties, name, owner, collection, icon=icon)

@@ -109,6 +109,11 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         max=0.99,
         subtype="FACTOR",
     )
+    hide_original: BoolProperty(
+        name="Hide Original",
+        description="Hide the object that the new one was made of, which lies in the same place. Alt H shows it",
+        default=True,
+    )
     strategy: EnumProperty(
         name="Strategy",
         description="On which map vertices are placed, and on which they are joined",
@@ -168,7 +173,7 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
         return [(group, request, *result) for group, request, result in zip(groups, requests, results, strict=True)]
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender.remesh_objects import carried_gate, lost, new_objects
+        from ..blender.remesh_objects import carried_gate, lost, mark_source, new_objects
 
         names, warnings = [], []
         for k, (group, request, series, carried) in enumerate(result):
@@ -178,8 +183,12 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
             told = carried_gate(group[0], new_names[:: len(group)])
             warnings += [(-1, text) for texts in told for text in texts]
             names += new_names
+            mark_source(group, new_names)
         for obj in context.selected_objects:
             obj.select_set(False)
+        if self.hide_original:
+            for obj in (obj for group, *_ in result for obj in group):
+                obj.hide_set(True)
         # Those in a collection that the view layer leaves out cannot be selected.
         made = [new for new in map(context.view_layer.objects.get, names) if new is not None]
         for new in made:
@@ -238,6 +247,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "levels")
     if properties.levels > 1:
         layout.prop(properties, "ratio")
+    layout.prop(properties, "hide_original")
     layout.prop(properties, "strategy")
 
 

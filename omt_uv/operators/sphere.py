@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..session import run
 from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
@@ -50,6 +50,12 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
     pole_group: StringProperty(name="Pole", description="Vertex group of the north pole")
     meridian_group: StringProperty(name="Meridian", description="Vertex group of the middle of the map. Empty: none")
     east_group: StringProperty(name="East", description="Vertex group on the eastern side of the map. Empty: none")
+    inside: BoolProperty(
+        name="Inside the Tile",
+        description="Scale the layout into the tile where faces across its edge reach beyond it. "
+        "Without, it fits globe textures as they are, which repeat",
+        default=True,
+    )
     image: StringProperty(
         name="Redraw Image",
         description="Equirectangular image to redraw for the layout, as a new image beside it. Empty: none",
@@ -70,6 +76,7 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
             quality=self.quality.lower(),
             balance=self.balance,
             method=self.method.lower(),
+            inside=self.inside,
         )
 
     def steps(self, context: bpy.types.Context):
@@ -126,6 +133,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "projection")
     layout.prop(properties, "quality")
     layout.prop(properties, "method")
+    layout.prop(properties, "inside")
     choose_group(layout, properties, "weight_group")
     if properties.weight_group:
         layout.prop(properties, "weight_factor")

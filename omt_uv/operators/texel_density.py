@@ -1,4 +1,4 @@
-"""Measure and set pixels of the texture for every metre of the surface: uv.omt_density_get, uv.omt_density_set."""
+"""Measure and set pixels of the texture for a length of the surface: uv.omt_density_get, uv.omt_density_set."""
 
 from __future__ import annotations
 
@@ -18,9 +18,19 @@ SCOPES = (
 )
 
 
+# Pixels per metre are so many times those per unit.
+UNITS = (
+    ("CM", "px/cm", "Pixels for every centimetre of the surface, as games count"),
+    ("M", "px/m", "Pixels for every metre of the surface"),
+    ("IN", "px/in", "Pixels for every inch of the surface"),
+)
+UNITS_PER_METRE = {"CM": 100.0, "M": 1.0, "IN": 1 / 0.0254}
+
+
 class TextureSize:
     """How wide the texture is that densities refer to."""
 
+    unit: EnumProperty(name="Unit", description="Length that densities are counted for", items=UNITS, default="CM")
     texture_size: IntProperty(
         name="Texture Size",
         description="Width of the texture, in pixels",
@@ -49,8 +59,10 @@ class UV_OT_omt_density_get(TextureSize, QuickOperator, bpy.types.Operator):
 
         found = texel_density([reading for _, reading in read_objects(context)], self.texels(context))
         target = context.window_manager.operator_properties_last(UV_OT_omt_density_set.bl_idname)
-        target.density, target.texture_size = found, self.texture_size
-        self.report({"INFO"}, f"{found:.4g} pixels per metre of a texture {self.texture_size} pixels wide")
+        found /= UNITS_PER_METRE[self.unit]
+        target.density, target.texture_size, target.unit = found, self.texture_size, self.unit
+        unit = next(label for name, label, _ in UNITS if name == self.unit)
+        self.report({"INFO"}, f"{found:.4g} {unit} of a texture {self.texture_size} pixels wide")
 
 
 class UV_OT_omt_density_set(TextureSize, QuickOperator, bpy.types.Operator):
@@ -62,12 +74,12 @@ class UV_OT_omt_density_set(TextureSize, QuickOperator, bpy.types.Operator):
 
     density: FloatProperty(
         name="Density",
-        description="Pixels of the texture for every metre of the surface",
-        default=512.0,
+        description="Pixels of the texture for every unit of length of the surface",
+        default=5.12,
         min=1e-6,
-        soft_min=1.0,
+        soft_min=0.01,
         soft_max=16384.0,
-        precision=1,
+        precision=2,
     )
     scope: EnumProperty(
         name="Scope", description="What is scaled by a factor of its own", items=SCOPES, default="ISLANDS"
@@ -78,6 +90,7 @@ class UV_OT_omt_density_set(TextureSize, QuickOperator, bpy.types.Operator):
         from ..pipelines.texel_density import with_texel_density
 
         objects, readings = read_writable(context)
-        scaled = with_texel_density(readings, self.density, self.texels(context), self.scope == "ISLANDS")
+        target = self.density * UNITS_PER_METRE[self.unit]
+        scaled = with_texel_density(readings, target, self.texels(context), self.scope == "ISLANDS")
         for obj, (corners, uv) in zip(objects, scaled, strict=True):
             write_uv(obj, obj.data.uv_layers.active.name, corners, uv)

@@ -42,6 +42,12 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
     )
     invert: BoolProperty(name="Invert", description="Weight 1 where it would be 0, and 0 for 1", default=False)
 
+    show: BoolProperty(
+        name="Show",
+        description="Show the weights in Weight Paint, to be repainted, or as an overlay in Edit Mode",
+        default=True,
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return ready(cls, context, ("OBJECT", "EDIT_MESH", "PAINT_WEIGHT"))
@@ -70,7 +76,22 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
 
         for obj, weights in result:
             write_group(obj, self.weight_group, weights)
+            obj.vertex_groups.active_index = obj.vertex_groups[self.weight_group].index
+        if self.show:
+            _show(context)
         self.report({"INFO"}, f"Weights are in the vertex group {self.weight_group!r}")
+
+
+def _show(context: bpy.types.Context) -> None:
+    """Weight Paint of the active object where there is a window; in Edit Mode, the overlay of the views."""
+    if bpy.app.background or context.window is None:
+        return
+    if context.mode == "OBJECT" and context.object is not None and context.object.type == "MESH":
+        bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    elif context.mode == "EDIT_MESH":
+        for area in (area for window in context.window_manager.windows for area in window.screen.areas):
+            if area.type == "VIEW_3D":
+                area.spaces.active.overlay.show_weight = True
 
 
 def _weigh_all(jobs: list, kind: str, options: dict):
@@ -100,3 +121,4 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     column.prop(properties, "low", slider=True)
     column.prop(properties, "high", slider=True)
     layout.prop(properties, "invert")
+    layout.prop(properties, "show")

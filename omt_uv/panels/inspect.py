@@ -24,8 +24,9 @@ def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     row = layout.row(align=True)
     row.operator("uv.omt_measure", text="Measure", icon="DRIVER_DISTANCE")
     row.operator("uv.omt_histogram", text="Histogram", icon="RNDCURVE")
-    row = layout.row(align=True)
-    row.label(text="Worst Faces")
+    column = layout.column(align=True)
+    column.label(text="Select Worst Faces")
+    row = column.row(align=True)
     for name, title, _ in FIGURES:
         row.operator("uv.omt_worst", text=title).figure = name
     image = bpy.data.images.get(HISTOGRAM)
@@ -55,10 +56,12 @@ def draw_density(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     properties = settings_of(context, SET_DENSITY)
     split(layout)
     layout.prop(properties, "density")
+    layout.prop(properties, "unit")
     layout.prop(properties, "texture_size")
     layout.prop(properties, "scope")
     row = layout.row(align=True)
-    row.operator("uv.omt_density_get", text="Get", icon="EYEDROPPER").texture_size = properties.texture_size
+    get = row.operator("uv.omt_density_get", text="Get", icon="EYEDROPPER")
+    get.texture_size, get.unit = properties.texture_size, properties.unit
     row.operator(SET_DENSITY, text="Set", icon="CHECKMARK")
 
 

@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from .. import links
 from ..session import run
-from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, QUALITIES
+from ..settings import (
+    BOUNDARIES,
+    DEFAULT_BALANCE,
+    DEFAULT_BOUNDARY,
+    DEFAULT_MARGIN,
+    DEFAULT_MAX_SHEAR,
+    DEFAULT_QUALITY,
+    DEFAULT_TEXTURE_SIZE,
+    QUALITIES,
+)
+from . import keymap
 
 # The package that Blender knows as the add-on contains this one.
 PACKAGE = __package__.rpartition(".")[0]
 ADDON = PACKAGE.rpartition(".")[0] or PACKAGE
-DEFAULTS = ("boundary", "quality", "keep_free", "texture_size")
-OPERATORS = ("UV_OT_omt_unwrap", "UV_OT_omt_refine", "UV_OT_omt_magnify", "UV_OT_omt_seams", "UV_OT_omt_density_set")
+DEFAULTS = ("boundary", "quality", "balance", "max_shear", "margin", "texture_size", "keep_free")
+OPERATORS = (
+    *("UV_OT_omt_unwrap", "UV_OT_omt_refine", "UV_OT_omt_magnify", "UV_OT_omt_sphere", "UV_OT_omt_seams"),
+    "UV_OT_omt_density_set",
+)
 
 
 def _changed(self, context: bpy.types.Context) -> None:
@@ -38,6 +52,33 @@ class OMTUVPreferences(bpy.types.AddonPreferences):
         default=DEFAULT_QUALITY,
         update=_changed,
     )
+    balance: FloatProperty(
+        name="Area - Angle",
+        description="Balance that operators start with, from 0, exact areas, to 1, least shear",
+        default=DEFAULT_BALANCE,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_changed,
+    )
+    max_shear: FloatProperty(
+        name="Max Shear",
+        description="Mean shear above which unwrapping adds seams. 0: none but those that are needed",
+        default=DEFAULT_MAX_SHEAR,
+        min=0.0,
+        soft_max=3.0,
+        update=_changed,
+    )
+    margin: IntProperty(
+        name="Margin",
+        description="Least distance between islands that operators start with, in pixels of the texture",
+        default=DEFAULT_MARGIN,
+        min=0,
+        max=1024,
+        soft_max=64,
+        subtype="PIXEL",
+        update=_changed,
+    )
     keep_free: StringProperty(
         name="Keep Free", description="Vertex group that new cuts avoid, where a mesh has it", update=_changed
     )
@@ -57,7 +98,7 @@ class OMTUVPreferences(bpy.types.AddonPreferences):
         update=_changed,
     )
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.label(text="New sessions start with")
@@ -65,7 +106,14 @@ class OMTUVPreferences(bpy.types.AddonPreferences):
             layout.prop(self, name)
         layout.separator()
         layout.prop(self, "own_thread")
-        layout.operator("wm.omt_copy_report", icon="COPYDOWN")
+        row = layout.row()
+        row.operator("wm.url_open", text="Documentation", icon="HELP").url = links.WEBSITE
+        row.operator("wm.url_open", text="Report a Bug", icon="URL").url = links.BUGS
+        row.operator("wm.omt_copy_report", icon="COPYDOWN")
+        layout.separator()
+        layout.use_property_split = False
+        layout.label(text="Keys: off until you turn them on")
+        keymap.draw(layout.column(), context)
 
 
 def get(context: bpy.types.Context) -> OMTUVPreferences | None:

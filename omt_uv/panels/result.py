@@ -36,7 +36,7 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 def draw_title(column: bpy.types.UILayout, summary: last_run.Summary, outdated: str) -> None:
     """Which operator, on what, and whether that still holds."""
-    row = column.row()
+    row = column.split(factor=0.78)
     row.alert = summary.refused
     row.label(text=summary.title, icon=icon_of(summary, outdated))
     row.label(text=dict(summary.rows).get("Time", ""), translate=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bpy
 
+from .. import links
 from . import inspect, result, tools, unwrap, volumes
 from .section import Section, class_of
 
@@ -47,13 +48,22 @@ class TabPanel:
     def draw(self, context: bpy.types.Context) -> None:
         self.section.draw(self.layout, context)
 
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        self.layout.emboss = "NONE"
+        operators = self.section.operators or ("uv.omt_measure",)
+        self.layout.operator(
+            "wm.url_open", text="", icon="HELP"
+        ).url = f"{links.page(operators[0])}#{self.section.name}"
+
 
 class MainPanel(TabPanel):
     """The first section, with presets in its header."""
 
-    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
         self.layout.emboss = "NONE"
-        self.layout.menu("UV_MT_omt_presets", text="", icon="PRESET")
+        row = self.layout.row()
+        row.menu("UV_MT_omt_presets", text="", icon="PRESET")
+        TabPanel.draw_header_preset(self, context)
 
 
 class UV_MT_omt_presets(bpy.types.Menu):

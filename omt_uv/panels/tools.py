@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
-from .section import operator_section
+import bpy
+
+from .section import Section, big_button, draw_settings, operator_section, settings_of
+
+REMESH_NAME = "object.omt_remesh"
+
+
+def draw_remesh(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    draw_settings(layout.column(), REMESH_NAME, settings_of(context, REMESH_NAME))
+    big_button(layout, REMESH_NAME, "MOD_REMESH")
+    layout.operator("object.omt_compare", text="Compare", icon="UV_SYNC_SELECT")
+
 
 MAGNIFY = operator_section("magnify", "Magnify", "uv.omt_magnify", "VIEWZOOM")
 WEIGHTS = operator_section("weights", "Weights", "object.omt_weights", "MOD_VERTEX_WEIGHT", parent="magnify")
-REMESH = operator_section("remesh", "Remesh", "object.omt_remesh", "MOD_REMESH")
+REMESH = Section("remesh", "Remesh", draw_remesh, (REMESH_NAME, "object.omt_compare"))
 SPHERE = operator_section("sphere", "Sphere", "uv.omt_sphere", "WORLD")

@@ -60,6 +60,20 @@ def triangles_of(readings: Sequence[Reading]) -> ChosenTriangles:
     )
 
 
+def polygon_outlines(readings: Sequence[Reading]) -> np.ndarray:
+    """UVs (k,2,2) of both ends of the sides of all chosen polygons that have UVs."""
+    sides = [np.zeros((0, 2, 2))]
+    for reading in readings:
+        if reading.uv is None:
+            continue
+        starts = np.asarray(reading.surface.face_start)
+        following = np.arange(1, starts[-1] + 1)
+        following[starts[1:] - 1] = starts[:-1]
+        chosen = np.repeat(reading.faces, np.diff(starts))
+        sides.append(np.stack([reading.uv, reading.uv[following]], axis=1)[chosen])
+    return np.concatenate(sides)
+
+
 def measure_readings(readings: Sequence[Reading], overlap: bool = True) -> Distortion:
     """Distortion of the active UVs over the chosen polygons of all readings; `overlap` costs most of the time.
 

@@ -128,9 +128,17 @@ def project(jobs: Sequence[GlobeJob], settings: GlobeSettings) -> Steps[Globes]:
     corners = [np.concatenate([g.corners for g in mine]) for mine in globes]
     uv = [np.concatenate([g.uv for g in mine]) for mine in globes]
     warnings = [(k, text) for k, mine in enumerate(globes) for g in mine for text in g.warnings]
+    if settings.inside:
+        uv = [inside_tile(mine) for mine in uv]
     if sum(map(len, globes)) > 1:
         warnings.append((-1, f"{sum(map(len, globes))} closed parts; every one has the whole texture to itself"))
     return Globes(corners=corners, uv=uv, globes=globes, warnings=warnings)
+
+
+def inside_tile(uv: np.ndarray) -> np.ndarray:
+    """UVs (c,2) scaled along each axis as far as it takes to lie in the unit square."""
+    low, high = np.minimum(uv.min(axis=0), 0.0), np.maximum(uv.max(axis=0), 1.0)
+    return (uv - low) / (high - low)
 
 
 def _globes(job: GlobeJob, settings: GlobeSettings) -> Steps[list[Globe]]:

@@ -13,6 +13,9 @@ from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.polygon_areas import polygon_areas
 from .reading import Reading
 
+# UVs are stored with single precision.
+ROUNDING = 1e-5
+
 
 @dataclass(frozen=True)
 class Texels:
@@ -32,6 +35,13 @@ class _MeasuredFaces:
     vertices: np.ndarray
     space: np.ndarray
     uv_area: np.ndarray
+
+
+def beyond_tile(uv: np.ndarray) -> float:
+    """How far UVs (k,2) reach beyond the UDIM tile that holds their middle; 0 where they do not, up to rounding."""
+    tile = np.floor((uv.min(axis=0) + uv.max(axis=0)) / 2)
+    far = float(np.maximum(tile - uv.min(axis=0), uv.max(axis=0) - tile - 1).max())
+    return far if far > ROUNDING else 0.0
 
 
 def texel_density(readings: Sequence[Reading], texels: Texels) -> float:

@@ -6,10 +6,12 @@ usage: blender --factory-startup --python drive.py -- STORY OUT      (see run.py
 from __future__ import annotations
 
 import faulthandler
+import importlib
 import importlib.util
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -18,8 +20,13 @@ from pathlib import Path
 
 import bpy
 
+sys.path.append(str(Path(__file__).resolve().parent))
+from widgets import Finder
+
 bpy.context.preferences.view.show_splash = False
-PATIENCE = 60.0
+PATIENCE = 240.0
+# The package as Blender knows it: an extension that was installed, or an add-on of a folder of scripts.
+ADDON = os.environ.get("OMT_UV_ADDON", "omt_uv")
 
 
 class Story:
@@ -44,6 +51,10 @@ class Story:
                 raise TimeoutError(f"waited {patience} s in vain")
             yield
         return time.monotonic() - begin
+
+    def log(self, *words):
+        """A line for whoever looks for what went wrong."""
+        print("STORY", *words, flush=True)
 
     def x(self, *words):
         """xdotool, without waiting in a way that would stop the window it talks to."""
@@ -84,37 +95,66 @@ class Story:
     def shoot(self, name):
         """A screenshot of the whole window, mouse pointer aside."""
         yield from self.pause(0.4)
+        if shutil.which("import"):
+            # What the screen shows, whatever Blender thinks of it: 5.2 draws nothing into screenshots of its own here.
+            process = subprocess.Popen(["import", "-window", "root", str(self.out / f"{name}.png")])
+            while process.poll() is None:
+                yield
+            return
         window = bpy.context.window_manager.windows[0]
         with bpy.context.temp_override(window=window, screen=window.screen, area=window.screen.areas[0]):
             bpy.ops.screen.screenshot(filepath=str(self.out / f"{name}.png"))
         yield from self.pause(0.1)
 
+    def package(self, name):
+        """A module of the package, such as "session.run"."""
+        return importlib.import_module(f"{ADDON}.omt_uv.{name}")
+
     def running(self):
         """The run in the window, or None."""
-        from omt_uv.omt_uv.session import run
+        return self.package("session.run").current
 
-        return run.current
+    def following(self):
+        """The live session in the window, or None."""
+        return self.package("session.following").current
 
     def said(self):
         """What the panel says about the last run: title and rows, None before the first."""
-        from omt_uv.omt_uv.session import last_run
-
-        summary = last_run.state.summary
+        summary = self.package("session.last_run").state.summary
         return None if summary is None else [summary.title, *summary.rows]
 
     def forget(self):
         """Let the panel say nothing."""
-        from omt_uv.omt_uv.session import last_run
-
-        last_run.forget()
+        self.package("session.last_run").forget()
 
     def figures(self, obj):
         """Area error, shear and folds of the active UVs, by the add-on's own measure."""
-        from omt_uv.omt_uv.blender import mesh as blender_mesh
-        from omt_uv.omt_uv.pipelines import distortion as measuring
-
-        found = measuring.measure_readings([blender_mesh.read(obj)])
+        reading = self.package("blender.mesh").read(obj)
+        found = self.package("pipelines.distortion").measure_readings([reading])
         return {name: getattr(found, name) for name in ("area_l1", "angle_mean", "folds", "overlap")}
+
+    def tab(self, kind):
+        """The add-on's tab in the sidebar of an editor, opened; finds and clicks its buttons."""
+        area, finder = self.area(kind), Finder(self, kind)
+        area.spaces.active.show_region_ui = True
+        yield from self.pause(0.5)
+        region = finder.region
+        if hasattr(region, "active_panel_category") and bpy.app.version >= (5, 0, 0):
+            region.active_panel_category = "OMT"
+            area.tag_redraw()
+            yield from self.pause(0.5)
+            return finder
+        # Tabs stand at the right edge, one below the other: the one that brings our button is ours.
+        window = bpy.context.window_manager.windows[0]
+        for y in range(region.height - 20, region.height // 4, -24):
+            yield from self.x("mousemove", region.x + region.width - 8, window.height - (region.y + y))
+            yield from self.x("click", 1)
+            yield from self.pause(0.25)
+            for row in (40, 58):
+                call = yield from finder.under(region.width // 2, region.height - row)
+                if "omt_unwrap" in call:
+                    return finder
+        raise LookupError(f"no tab of {kind} is ours")
 
     def area(self, kind):
         """The first area of a kind, such as "VIEW_3D"."""
@@ -136,15 +176,6 @@ class Story:
             bpy.ops.view3d.view_axis(type="RIGHT")
             bpy.ops.view3d.view_selected()
             bpy.ops.view3d.view_orbit(type="ORBITUP")
-
-    def open_tab(self, place):
-        """The add-on's tab beside the object that was made, by a click at a place in the 3D View."""
-        yield from self.pause(1)
-        view = self.area("VIEW_3D")
-        view.spaces.active.show_region_ui = True
-        self.look_at_it(view)
-        yield from self.pause(1)
-        yield from self.click(*self.place("VIEW_3D", *place))
 
     def head(self, count):
         """A bust of quads instead of the cube, open at the neck, selected."""
@@ -180,14 +211,25 @@ def _head(count):
     return points, faces
 
 
+def light_theme():
+    """Blender's own light theme, to look at the panels in it."""
+    for folder in bpy.utils.preset_paths("interface_theme"):
+        for path in Path(folder).glob("*[Ll]ight*.xml"):
+            bpy.ops.script.execute_preset(filepath=str(path), menu_idname="USERPREF_MT_interface_theme_presets")
+            return
+
+
 def main():
     """Play the story, step by step from a timer, and write what it found."""
     story_path, out = map(Path, sys.argv[sys.argv.index("--") + 1 :])
     out.mkdir(parents=True, exist_ok=True)
     # Blender's own handler has no Python of other threads; the file stays open as long as Blender lives.
     faulthandler.enable((out / "stacks.log").open("w"))
-    sys.path.append(os.environ["OMT_UV_SITE"])
-    bpy.ops.preferences.addon_enable(module="omt_uv")
+    if "OMT_UV_SITE" in os.environ:
+        sys.path.append(os.environ["OMT_UV_SITE"])
+        bpy.ops.preferences.addon_enable(module=ADDON)
+    if os.environ.get("OMT_UV_THEME"):
+        light_theme()
     spec = importlib.util.spec_from_file_location("story", story_path)
     story_module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(story_module)
@@ -197,7 +239,7 @@ def main():
     def go_on():
         try:
             next(told)
-            return 0.05
+            return 0.02
         except StopIteration:
             story.facts["finished"] = True
         except Exception:  # noqa: BLE001, it is told

@@ -1,14 +1,15 @@
 """Drive a real Blender window without a screen, as an artist would.
 
 Needs Debian's packages blender, xvfb and xdotool. Debian's Blender has no numpy: that comes from the project's own
-environment, if its Python is the same.
+environment, if its Python is the same. Later ages of Blender are driven in roots of their own (see ages.py).
 
-usage: run.py [STORY ...] [--out FOLDER]       stories are the files of this folder's `stories`, all by default
+usage: run.py [STORY ...] [--age NAME] [--out FOLDER]      stories are the files of this folder's `stories`
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import os
 import shutil
@@ -18,18 +19,23 @@ import tempfile
 import time
 from pathlib import Path
 
+sys.path.append(str(Path(__file__).resolve().parent))
+from ages import AGES, Age, enter, install
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 PROGRAMS = ("blender", "Xvfb", "xdotool")
 SIZE = (1600, 900)
-TIME_LIMIT = 500
+TIME_LIMIT = 900
 
 
-def missing() -> str:
-    """Why no window can be driven here, empty if it can."""
-    absent = [name for name in PROGRAMS if shutil.which(name) is None]
+def missing(age: Age = AGES[0]) -> str:
+    """Why no window of an age can be driven here, empty if it can."""
+    absent = [name for name in PROGRAMS[1 if age.suite else 0 :] if shutil.which(name) is None]
     if absent:
         return f"{', '.join(absent)} not installed (Debian: apt-get install blender xvfb xdotool libgl1-mesa-dri)"
+    if age.suite:
+        return "" if age.is_there() else f"no root at {age.root}; scripts/gui/ages.py makes one"
     answer = subprocess.run(
         ["blender", "-b", "--factory-startup", "--python-expr", "import sys; print('PY', *sys.version_info[:2])"],
         capture_output=True,
@@ -48,27 +54,14 @@ def stories() -> list[Path]:
     return sorted((HERE / "stories").glob("*.py"))
 
 
-def play(story: Path, out: Path) -> dict:
+def play(story: Path, out: Path, age: Age = AGES[0], theme: str = "") -> dict:
     """Play one story in a window of its own; what it found, also in OUT/facts.json."""
-    import numpy
-
     out.mkdir(parents=True, exist_ok=True)
     (out / "facts.json").unlink(missing_ok=True)
-    with tempfile.TemporaryDirectory(prefix="omt_uv_gui_") as folder, open(out / "blender.log", "w") as log:
-        (Path(folder) / "addons").mkdir()
-        (Path(folder) / "addons" / "omt_uv").symlink_to(ROOT)
+    with open(out / "blender.log", "w") as log:
         server, display = _display(log)
-        variables = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {
-            "DISPLAY": display,
-            "LIBGL_ALWAYS_SOFTWARE": "1",
-            "BLENDER_USER_SCRIPTS": folder,
-            "OMT_UV_SITE": str(Path(numpy.__file__).resolve().parents[1]),
-            "PYTHONDONTWRITEBYTECODE": "1",
-        }
-        command = ["blender", "--factory-startup", "--window-geometry", "0", "0", *map(str, SIZE)]
-        command += ["--python", str(HERE / "drive.py"), "--", str(story), str(out)]
         try:
-            subprocess.run(command, env=variables, stdout=log, stderr=log, timeout=TIME_LIMIT)
+            (_in_root if age.suite else _here)(story, out, age, {"DISPLAY": display, "OMT_UV_THEME": theme}, log)
         except subprocess.TimeoutExpired:
             return {"error": f"the story took longer than {TIME_LIMIT} s"}
         finally:
@@ -79,6 +72,61 @@ def play(story: Path, out: Path) -> dict:
         return json.loads(found.read_text())
     logs = [out / name for name in ("blender.log", "stacks.log")]
     return {"error": "\n".join(log.read_text()[-4000:] for log in logs if log.exists())}
+
+
+def _command(drive: Path, story: Path, out: Path) -> list[str]:
+    window = ["--window-geometry", "0", "0", *map(str, SIZE)]
+    return ["blender", *window, "--python", str(drive), "--", str(story), str(out)]
+
+
+def _here(story: Path, out: Path, _age: Age, variables: dict, log) -> None:
+    """With this machine's Blender, and the sources as an add-on of it."""
+    import numpy
+
+    with tempfile.TemporaryDirectory(prefix="omt_uv_gui_") as folder:
+        (Path(folder) / "addons").mkdir()
+        (Path(folder) / "addons" / "omt_uv").symlink_to(ROOT)
+        variables = (
+            {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+            | {
+                "LIBGL_ALWAYS_SOFTWARE": "1",
+                "BLENDER_USER_SCRIPTS": folder,
+                "OMT_UV_SITE": str(Path(numpy.__file__).resolve().parents[1]),
+                "PYTHONDONTWRITEBYTECODE": "1",
+            }
+            | variables
+        )
+        command = _command(HERE / "drive.py", story, out)
+        command.insert(1, "--factory-startup")
+        subprocess.run(command, env=variables, stdout=log, stderr=log, timeout=TIME_LIMIT)
+
+
+@functools.cache
+def _user(age: Age) -> Path:
+    """A user of a root with the extension, installed once for all stories."""
+    sys.path.append(str(ROOT / "scripts" / "release"))
+    from build_extension import build, this_platform
+
+    (archive,) = build([this_platform()])
+    return install(age, archive)
+
+
+def _in_root(story: Path, out: Path, age: Age, variables: dict, log) -> None:
+    """With the Blender of a root, and the extension as it was installed from the zip."""
+    user = _user(age)
+    inside = age.root / user.relative_to("/")
+    for path in (*HERE.glob("*.py"), story):
+        shutil.copy2(path, inside / path.name)
+    target = user / "out"
+    shutil.rmtree(inside / "out", ignore_errors=True)
+    command = _command(user / "drive.py", user / story.name, target)
+    words = {"HOME": str(user), "LIBGL_ALWAYS_SOFTWARE": "1", "BLENDER_USER_RESOURCES": str(user)} | variables
+    words["OMT_UV_ADDON"] = "bl_ext.user_default.omt_uv"
+    shell = " ".join([*(f"{k}={v}" for k, v in words.items()), "timeout", str(TIME_LIMIT), *command])
+    done = enter(age, shell)
+    log.write(done.stdout + done.stderr)
+    for path in (inside / "out").glob("*"):
+        shutil.copy2(path, out / path.name)
 
 
 def _display(log):
@@ -99,14 +147,17 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("stories", nargs="*", metavar="STORY", help=" ".join(s.stem for s in stories()))
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "gui")
+    parser.add_argument("--age", choices=[age.name for age in AGES], default="here")
+    parser.add_argument("--light", action="store_true", help="in Blender's light theme")
     args = parser.parse_args()
-    if reason := missing():
+    age = next(age for age in AGES if age.name == args.age)
+    if reason := missing(age):
         print(f"skipped: {reason}")
         return 0
     failed = False
     for story in stories():
         if not args.stories or story.stem in args.stories:
-            facts = play(story, args.out.resolve() / story.stem)
+            facts = play(story, args.out.resolve() / age.name / story.stem, age, "light" if args.light else "")
             failed |= "error" in facts
             print(json.dumps({story.stem: facts}, indent=1))
     return int(failed)

@@ -144,7 +144,7 @@ def test_every_island_gets_the_density_about_its_middle(mode):
     before = scenes.uv_of(obj)
     if mode == "EDIT":
         scenes.edit(obj)
-    assert bpy.ops.uv.omt_density_set(density=77.0, texture_size=1024) == {"FINISHED"}
+    assert bpy.ops.uv.omt_density_set(density=77.0, unit="M", texture_size=1024) == {"FINISHED"}
     if mode == "EDIT":
         scenes.leave_edit()
     np.testing.assert_allclose(densities(obj), 77.0, rtol=1e-5)
@@ -156,9 +156,9 @@ def test_every_island_gets_the_density_about_its_middle(mode):
 def test_all_together_keeps_the_differences():
     obj = two_islands()
     ratio = densities(obj)
-    assert bpy.ops.uv.omt_density_set(density=200.0, texture_size=1024, scope="ALL") == {"FINISHED"}
+    assert bpy.ops.uv.omt_density_set(density=200.0, unit="M", texture_size=1024, scope="ALL") == {"FINISHED"}
     np.testing.assert_allclose(densities(obj) / ratio, (densities(obj) / ratio)[0], rtol=1e-5)
-    assert bpy.ops.uv.omt_density_get(texture_size=1024) == {"FINISHED"}
+    assert bpy.ops.uv.omt_density_get(texture_size=1024, unit="M") == {"FINISHED"}
     target = bpy.context.window_manager.operator_properties_last("uv.omt_density_set")
     assert target.density == pytest.approx(200.0, rel=1e-5)
 
@@ -168,7 +168,7 @@ def test_density_is_per_metre_whatever_the_units():
     obj.scale = (2, 2, 2)
     bpy.context.scene.unit_settings.scale_length = 0.01
     bpy.context.view_layer.update()
-    bpy.ops.uv.omt_density_set(density=5000.0, texture_size=2048)
+    bpy.ops.uv.omt_density_set(density=5000.0, unit="M", texture_size=2048)
     np.testing.assert_allclose(densities(obj, 2048), 50.0, rtol=1e-5)
 
 
@@ -176,7 +176,7 @@ def test_density_leaves_other_faces_alone():
     obj = two_islands()
     before = scenes.uv_of(obj)
     scenes.edit(obj, faces=[1])
-    bpy.ops.uv.omt_density_set(density=10.0)
+    bpy.ops.uv.omt_density_set(density=10.0, unit="M")
     scenes.leave_edit()
     after = scenes.uv_of(obj)
     assert (after[:4] == before[:4]).all()
@@ -206,3 +206,13 @@ def test_the_command_writes_the_histogram_and_packs_into_a_tile(package, tmp_pat
     capfd.readouterr()
     assert main(["measure", str(out), "--histogram", str(tmp_path / "h.gif")]) != 0
     assert ".png" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("CM", 0.01), ("M", 1.0), ("IN", 0.0254)])
+def test_densities_are_counted_for_the_unit_that_was_chosen(unit, metres):
+    obj = scenes.bump()
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    bpy.ops.uv.omt_density_set(density=8.0, unit=unit, texture_size=1024)
+    bpy.ops.uv.omt_density_get(texture_size=1024, unit="M")
+    target = bpy.context.window_manager.operator_properties_last("uv.omt_density_set")
+    assert target.density == pytest.approx(8.0 / metres, rel=1e-4) and target.unit == "M"

@@ -33,7 +33,14 @@ def test_every_float_refuses_nan_and_what_blender_makes_of_infinity(package):
 
 # What reads meshes, or looks at none.
 READ_ONLY = {"uv.omt_measure", "uv.omt_histogram", "uv.omt_density_get", "object.omt_remesh"}
-OTHERS = {"uv.omt_preset", "wm.omt_copy_report", "uv.omt_notices", "uv.omt_checker_remove", "uv.omt_live_end"}
+OTHERS = {
+    "uv.omt_preset",
+    "wm.omt_copy_report",
+    "uv.omt_notices",
+    "uv.omt_checker_remove",
+    "uv.omt_live_end",
+    "object.omt_compare",
+}
 
 
 @pytest.mark.parametrize("override", [False, True], ids=["linked", "override"])
@@ -57,6 +64,7 @@ def test_linked_meshes_are_refused_by_name_by_every_operator_that_writes(package
     for name in sorted(names - OTHERS):
         module, operator = name.split(".")
         run = getattr(getattr(bpy.ops, module), operator)
+        obj.hide_set(False)
         for other in bpy.context.view_layer.objects:
             other.select_set(other == obj)
         bpy.context.view_layer.objects.active = obj

@@ -221,3 +221,16 @@ def test_the_flow_gives_the_same_areas():
     space, uv = scenes.areas(obj)
     assert (uv > 0).all()
     assert np.abs(uv / uv.sum() - space / space.sum()).sum() < 0.08
+
+
+def test_inside_the_tile_nothing_reaches_beyond_it():
+    obj = ball()
+    project(projection="EQUIRECT")
+    beyond = scenes.uv_of(obj)
+    project(projection="EQUIRECT", inside=True)
+    inside = scenes.uv_of(obj)
+    assert beyond[:, 0].max() > 1
+    assert inside.min() > -1e-6 and inside.max() < 1 + 1e-6
+    # Scaled, and nothing else.
+    low, high = np.minimum(beyond.min(0), 0), np.maximum(beyond.max(0), 1)
+    np.testing.assert_allclose(inside, (beyond - low) / (high - low), atol=1e-5)

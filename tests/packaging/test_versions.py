@@ -41,7 +41,8 @@ def test_the_server_runs_every_python_that_blender_is_pinned_for():
 def test_the_wheel_depends_on_what_the_extension_brings():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wheels = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["wheels"]
-    brought = {tuple(Path(w).name.split("-")[:2]) for w in wheels}
+    # Linux distributions alone have a later Python, which no wheel of the pinned scipy is for.
+    brought = {tuple(Path(w).name.split("-")[:2]) for w in wheels if "-cp314-" not in w}
     assert brought == {(name, pinned(name)[0]) for name in ("scipy", "xatlas")}
     assert {f"bpy=={v}" for v in pinned("bpy")} == {
         line.split(";")[0] for line in project["optional-dependencies"]["blender"]

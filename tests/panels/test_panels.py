@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import types
+from pathlib import Path
 
 import bpy
 
@@ -46,8 +47,12 @@ class Layout:
         assert hasattr(bpy.types, name), name
         self.record.append(name)
 
+    emboss = operator_context = ""
+
     def operator(self, name, **_):
         group, verb = name.split(".")
+        if name == "wm.url_open":
+            return types.SimpleNamespace()
         assert verb in dir(getattr(bpy.ops, group)), name
         self.record.append(name)
         return types.SimpleNamespace()
@@ -198,13 +203,51 @@ def test_a_run_shows_its_progress(package):
         operator.cancel(bpy.context)
 
 
-def test_every_operator_is_in_a_menu(package):
+def test_every_operator_is_in_the_one_submenu(package):
     record = []
-    package("panels.menus").draw_unwrap(types.SimpleNamespace(layout=Layout(record)), bpy.context)
+    menus = package("panels.menus")
+    stand_in = types.SimpleNamespace(layout=Layout(record))
+    menus.UV_MT_omt.draw(stand_in, bpy.context)
     hidden = {"uv.omt_preset", "wm.omt_copy_report", "uv.omt_remedy", "uv.omt_notices", "uv.omt_live_end"}
     names = {scenes.name_of(cls) for cls in our_classes(package, bpy.types.Operator)}
-    package("panels.menus").draw_remesh(types.SimpleNamespace(layout=Layout(record)), bpy.context)
-    assert names - hidden == set(record)
+    assert names - hidden == set(record) and len(record) == len(set(record))
+    for menu in menus.menus():
+        entry = []
+        menus.draw_menu(types.SimpleNamespace(layout=Layout(entry)), bpy.context)
+        assert entry == ["UV_MT_omt"] and menus.draw_menu in menu.draw._draw_funcs
+
+
+def test_in_weight_paint_the_submenu_has_the_weights_alone(package):
+    obj = scenes.bump()
+    obj.vertex_groups.new(name="Region")
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    record = []
+    package("panels.menus").UV_MT_omt.draw(types.SimpleNamespace(layout=Layout(record)), bpy.context)
+    assert record == ["object.omt_weights"]
+
+
+def test_names_say_what_operators_do():
+    """So that the search finds them by it, as it finds them by the submenu's name."""
+    for name, word in (("uv.omt_unwrap", "Unwrap Area Preserving"), ("object.omt_remesh", "Remesh Area Preserving")):
+        assert scenes.class_of(name).bl_label == word
+
+
+def test_every_operator_has_its_page(package):
+    links = package("links")
+    root, places = links.manual()
+    assert root == links.WEBSITE
+    folder = Path(__file__).resolve().parents[2] / "docs" / "operators"
+    for cls in our_classes(package, bpy.types.Operator):
+        name = scenes.name_of(cls)
+        if name.startswith("wm.") or name == "uv.omt_preset":
+            continue
+        assert (folder / f"{links.PAGES[name]}.md").exists(), name
+        assert (f"bpy.ops.{name}*", f"operators/{links.PAGES[name]}/") in places
+
+
+def test_keys_are_of_operators_and_menus_that_there_are(package):
+    for key in package("panels.keymap").KEYS:
+        assert hasattr(bpy.types, key.menu) if key.menu else scenes.class_of(key.operator)
 
 
 def test_everything_has_a_tooltip(package):

@@ -9,6 +9,7 @@ from ...solver.lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     checker="UV_OT_omt_checker UV_OT_omt_checker_remove",
+    compare="OBJECT_OT_omt_compare",
     remedy="UV_OT_omt_remedy",
     worst="UV_OT_omt_worst",
 )

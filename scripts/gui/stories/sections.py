@@ -6,13 +6,6 @@ import bpy
 
 import bmesh
 
-# Places in an editor, pixels from its upper right corner: the tab, headers of sections while all are closed, and the
-# button of each while it alone is open.
-TAB = (10, 213)
-MAGNIFY = (173, 359), (127, 651)
-SPHERE = (173, 411), (127, 612)
-REMESH = (173, 437), (127, 725)
-
 
 def tell(story):
     """Open every section once and click its button."""
@@ -22,17 +15,19 @@ def tell(story):
     space = story.area("VIEW_3D").spaces.active
     space.shading.color_type = "TEXTURE"
     space.overlay.show_stats = True
-    yield from story.open_tab(TAB)
-    story.facts["magnified"] = yield from run(story, "magnify", *MAGNIFY)
-    story.facts["sphere"] = yield from run(story, "sphere", *SPHERE)
-    story.facts["remeshed"] = yield from run(story, "remesh", *REMESH)
+    story.look_at_it(story.area("VIEW_3D"))
+    tab = yield from story.tab("VIEW_3D")
+    story.facts["magnified"] = yield from run(story, tab, "magnify", "omt_magnify(")
+    story.facts["sphere"] = yield from run(story, tab, "sphere", "omt_sphere(")
+    story.facts["remeshed"] = yield from run(story, tab, "remesh", "omt_remesh(")
     story.facts["objects"] = sorted(bpy.data.objects.keys())
+    story.facts["original is hidden"] = bpy.data.objects["Head"].hide_get()
 
 
-def run(story, name, header, button):
+def run(story, tab, name, button):
     """Open a section, click its button, look, and leave the tab as it was."""
-    yield from story.click(*story.place("VIEW_3D", *header))
-    yield from story.click(*story.place("VIEW_3D", *button))
+    yield from tab.open(name)
+    yield from tab.click(button)
     yield from story.until(lambda: not story.running() and story.said())
     if name == "remesh":
         show_alone(story, bpy.context.view_layer.objects.active)
@@ -40,7 +35,7 @@ def run(story, name, header, button):
     said = story.said()
     story.forget()
     yield from story.pause(0.5)
-    yield from story.click(*story.place("VIEW_3D", *header))
+    yield from tab.open(name)
     return said
 
 
@@ -48,7 +43,6 @@ def show_alone(story, obj):
     """With its wires, not among those of the object that it was made from."""
     story.area("VIEW_3D").spaces.active.shading.color_type = "MATERIAL"
     obj.show_wire = obj.show_all_edges = True
-    bpy.data.objects["Head"].hide_set(True)
     obj.select_set(False)
 
 

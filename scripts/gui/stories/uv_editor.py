@@ -4,16 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-# Places in the editor, pixels from its upper right corner, before and after the box with the figures of a live session.
-TAB = (14, 168)
-UNWRAP = (127, 105)
-LIVE = (50, 136)
-SLIDER_START = (200, 136)
-SLIDER_END = (110, 136)
-AREA = (127, 415)
-SHEAR = (68, 415)
-OFF = (185, 415)
-
 
 def tell(story):
     """Unwrap in the UV Editor, drag the slider, look at both colourings."""
@@ -27,32 +17,59 @@ def tell(story):
             bpy.ops.mesh.select_all(action="SELECT")
     story.look_at_it(story.area("VIEW_3D"))
     editor = story.area("IMAGE_EDITOR")
-    editor.spaces.active.show_region_ui = True
-    yield from story.pause(1)
-    yield from story.click(*story.place("IMAGE_EDITOR", *TAB))
-    yield from story.click(*story.place("IMAGE_EDITOR", *UNWRAP))
+    tab = yield from story.tab("IMAGE_EDITOR")
+    yield from tab.click("omt_unwrap(")
     yield from story.until(lambda: not story.running() and obj.data.uv_layers)
     with bpy.context.temp_override(window=window, area=editor, region=story.window_region(editor)):
         bpy.ops.image.view_all(fit_view=True)
     yield from story.shoot("uv_unwrapped")
     story.facts["unwrapped in the UV editor"] = story.figures(obj)
-    yield from live(story, obj)
-    for name, place in (("uv_area", AREA), ("uv_shear", SHEAR)):
-        yield from story.click(*story.place("IMAGE_EDITOR", *place))
+    yield from live(story, tab, obj)
+    for name in ("uv_area", "uv_shear"):
+        yield from tab.click("omt_overlay", f"'{name.removeprefix('uv_').upper()}'")
         yield from story.shoot(name)
         story.facts[name] = [a.name for a in obj.data.color_attributes]
-    yield from story.click(*story.place("IMAGE_EDITOR", *OFF))
+    yield from discarded(story, tab, obj)
+    yield from object_mode(story, tab, obj, window)
 
 
-def live(story, obj):
-    """Drag the slider; the UVs follow before the button is let go."""
+def live(story, tab, obj):
+    """Drag the slider; the UVs follow before the button is let go. Then accept."""
     seen = []
-    yield from story.click(*story.place("IMAGE_EDITOR", *LIVE))
-    start, end = (story.place("IMAGE_EDITOR", *place) for place in (SLIDER_START, SLIDER_END))
+    place = yield from tab.click("omt_live(")
+    yield from story.until(story.following)
+    # The slider is to the left of its button.
+    start, end = (place[0] - 40, place[1]), (place[0] - 130, place[1])
     yield from story.drag(start, end, steps=6, keep=lambda: seen.append(story.figures(obj)))
     yield from story.pause(2)
     yield from story.shoot("live")
     story.facts["while dragging"] = [round(figures["area_l1"], 4) for figures in seen]
     story.facts["after dragging"] = story.figures(obj)
-    yield from story.move(*story.place("IMAGE_EDITOR", 400, 400))
-    yield from story.key("Return")
+    story.facts["figures while it runs"] = story.said()
+    yield from tab.click("omt_live_end", "'KEEP'")
+    yield from story.until(lambda: not story.following())
+    story.facts["accepted"] = story.figures(obj)
+
+
+def discarded(story, tab, obj):
+    """A session that is on when another unwrap is started: the new UVs stay, whatever the slider does."""
+    yield from tab.click("omt_live(")
+    yield from story.until(story.following)
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=story.area("IMAGE_EDITOR")):
+        bpy.ops.uv.omt_unwrap("EXEC_DEFAULT", boundary="DISK", balance=0.0)
+    yield from story.pause(1)
+    before = story.figures(obj)
+    bpy.context.window_manager.operator_properties_last("uv.omt_unwrap").balance = 0.9
+    yield from story.pause(2)
+    story.facts["session after another unwrap"] = story.following() is not None
+    story.facts["the other unwrap stays"] = before == story.figures(obj)
+    bpy.context.window_manager.operator_properties_last("uv.omt_unwrap").balance = 0.0
+
+
+def object_mode(story, tab, obj, window):
+    """Colours in the UV editor are there in Object Mode, too."""
+    with bpy.context.temp_override(window=window, area=story.area("VIEW_3D")):
+        bpy.ops.object.mode_set(mode="OBJECT")
+    yield from tab.click("omt_overlay", "'AREA'")
+    yield from story.shoot("uv_object_mode")
+    yield from tab.click("omt_overlay", "'NONE'")

@@ -6,3 +6,4 @@ op.projection = "LAMBERT"
 op.balance = 0.0
 op.quality = "STANDARD"
 op.orientation = "AXES"
+op.inside = False

@@ -1,0 +1,48 @@
+"""What was remeshed hides what it was made of; one click shows the other in the same place."""
+
+from __future__ import annotations
+
+import bpy
+
+import scenes
+
+
+def shown():
+    return [obj.name for obj in bpy.context.view_layer.objects if not obj.hide_get()]
+
+
+def test_the_original_is_hidden_and_comes_back_by_undo():
+    scenes.bump()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.object.omt_remesh("EXEC_DEFAULT", True, target_vertices=60)
+    assert shown() == ["Bump_remesh"]
+    bpy.ops.ed.undo()
+    assert shown() == ["Bump"]
+
+
+def test_it_stays_where_that_is_asked_for():
+    scenes.bump()
+    bpy.ops.object.omt_remesh(target_vertices=60, hide_original=False)
+    assert set(shown()) == {"Bump", "Bump_remesh"}
+
+
+def test_levels_stand_in_a_collection_and_are_shown_in_turn():
+    scenes.bump()
+    bpy.ops.object.omt_remesh(target_vertices=80, levels=3)
+    collection = bpy.data.collections["Bump LODs"]
+    assert sorted(obj.name for obj in collection.objects) == ["Bump_LOD0", "Bump_LOD1", "Bump_LOD2"]
+    assert bpy.context.view_layer.objects.active.name == "Bump_LOD0"
+    counts = [len(bpy.data.objects[f"Bump_LOD{k}"].data.vertices) for k in range(3)]
+    assert counts == sorted(counts, reverse=True)
+    seen = []
+    for _ in range(4):
+        assert bpy.ops.object.omt_compare() == {"FINISHED"}
+        (name,) = shown()
+        seen.append(name)
+        assert bpy.context.view_layer.objects.active.name == name
+    assert seen == ["Bump_LOD1", "Bump_LOD2", "Bump", "Bump_LOD0"]
+
+
+def test_nothing_to_compare_with_is_said():
+    scenes.bump()
+    assert "Remesh it first" in scenes.error_of(bpy.ops.object.omt_compare)
