@@ -48,10 +48,10 @@ class Finder:
                 bpy.ops.ui.copy_python_command_button()
         return manager.clipboard
 
-    def seek(self, wanted, places=PLACES):
+    def seek(self, words, places=PLACES):
         """Coordinates in the region of a button whose call holds all the words, scrolled into sight; None if none."""
         for call, place in list(self.known.items()):
-            if all(word in call for word in wanted):
+            if all(word in call for word in words):
                 x, y = self.region.view2d.view_to_region(*place, clip=False)
                 if 0 < y < self.region.height and (yield from self.under(x, y)) == call:
                     return x, y
@@ -64,7 +64,7 @@ class Finder:
                     call = yield from self.under(x, y)
                     if call:
                         self.known[call] = region.view2d.region_to_view(x, y)
-                    if call and all(word in call for word in wanted):
+                    if call and all(word in call for word in words):
                         return x, y
             if not (yield from self.scroll(5)):
                 return None
@@ -85,11 +85,11 @@ class Finder:
         while (yield from self.scroll(4)):
             pass
 
-    def click(self, *wanted, places=PLACES):
+    def click(self, *words, places=PLACES):
         """Find a button and click it; the place on the screen."""
-        found = yield from self.seek(wanted, places)
+        found = yield from self.seek(words, places)
         if found is None:
-            raise LookupError(f"no button of {self.kind} is {' '.join(wanted)}")
+            raise LookupError(f"no button of {self.kind} is {' '.join(words)}")
         return (yield from self.click_at(*found))
 
     def click_at(self, x, y):

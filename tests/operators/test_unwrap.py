@@ -356,10 +356,10 @@ def test_other_modifiers_do_not_matter():
 def test_menus_show_the_operators_once():
     for name in ("IMAGE_MT_uvs_unwrap", "VIEW3D_MT_object"):
         functions = getattr(bpy.types, name).draw._draw_funcs
-        assert sum(f.__name__ == "draw_unwrap" for f in functions) == 1
+        assert sum(f.__name__ == "draw_menu" for f in functions) == 1
     uv_map = getattr(bpy.types.VIEW3D_MT_uv_map.draw, "_draw_funcs", [])
     # Since 4.5 this menu contains the one of the UV editor.
-    assert sum(f.__name__ == "draw_unwrap" for f in uv_map) == (bpy.app.version < (4, 5, 0))
+    assert sum(f.__name__ == "draw_menu" for f in uv_map) == (bpy.app.version < (4, 5, 0))
 
 
 def test_poll_names_the_modes():

@@ -4,8 +4,8 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.packing.outline_raster import grown_cells, outlines_of
 from omt_uv.solver.mesh.topology import boundary_edges
+from omt_uv.solver.packing.outline_raster import grown_cells, outlines_of
 from omt_uv.solver.packing.placement import BESIDE, place, turned_masks
 from omt_uv.solver.packing.raster_grid import RasterGrid, runs_of
 from omt_uv.solver.packing.shelves import blocks_of
