@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.polygon_elements import with_convex_quads
 from ..mesh.topology import boundary_edges
 from ..refinement.continuation import MapProblem, rescaled
@@ -61,7 +62,9 @@ class LiveMap:
         start, self.warnings = island_start(mesh.vertices, mesh.triangles, given, boundary, mesh.pins is not None)
         guard = None if meets_itself(start, boundary) else boundary
         motion = FreeMotion(np.zeros(len(given), bool))
-        self._task = MapProblem(faces, assembly_of(faces, len(given)), motion, guard, False)
+        # Large islands by parts: a step that is nearly right, and there sooner, is what a slider wants.
+        assembly = assembly_of(faces, len(given), schwarz_solver(mesh.vertices, mesh.triangles))
+        self._task = MapProblem(faces, assembly, motion, guard, False)
         self._w, self._pins, self._guarded = start, mesh.pins, False
         self._balance = -1.0
         self._stiffness = SOFT_STIFFNESS if soft else STIFFNESS

@@ -124,15 +124,21 @@ class InitialChartMap:
 
 
 def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD) -> InitialChartMap | None:
-    """A disk flattened with the boundary as it comes; None where it would fold, cover itself, or scale unevenly."""
+    """A disk flattened with the boundary as it comes, or a mean value map where that would fold or cover itself.
+
+    None where it would scale unevenly: areas are farther from a mean value map than from the transport's, then.
+    """
     with log.timed("flattening"):
         mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
         try:
             flat = boundary_first(disk.vertices, disk.triangles, disk.loop)
         except PrecisionError:
             return None
-        usable = flat.spread(mass) < spread and count_folds(flat.uv, disk.triangles) == 0
-        return InitialChartMap(flat.uv) if usable and not covers_itself(flat.uv @ [1, 1j], disk.loop) else None
+        if not flat.spread(mass) < spread:
+            return None
+        if count_folds(flat.uv, disk.triangles) == 0 and not covers_itself(flat.uv @ [1, 1j], disk.loop):
+            return InitialChartMap(flat.uv)
+        return InitialChartMap(mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk()))
 
 
 def coarse_initial_map(
