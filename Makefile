@@ -5,7 +5,7 @@ STAMP := $(VENV)/.installed
 export PYTHONPATH := $(CURDIR)
 export OMT_UV_MODELS ?= $(CURDIR)/../shared/models
 
-.PHONY: demo test check bench extension matrix gui venv clean
+.PHONY: demo test check bench papers extension matrix gui venv clean
 
 test: $(STAMP)
 	$(PY) -m pytest
@@ -17,6 +17,9 @@ check: $(STAMP)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
+
+papers: $(STAMP)
+	$(PY) scripts/papers/gu_2018.py
 
 bench: $(STAMP)
 	$(PY) benchmarks/run.py

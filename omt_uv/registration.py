@@ -10,6 +10,7 @@ from .links import manual
 from .operators.distortion import UV_OT_omt_histogram, UV_OT_omt_measure, UV_OT_omt_overlay
 from .operators.inspection.checker import UV_OT_omt_checker, UV_OT_omt_checker_remove
 from .operators.inspection.compare import OBJECT_OT_omt_compare
+from .operators.inspection.regions import UV_OT_omt_attributes, UV_OT_omt_regions
 from .operators.inspection.remedy import UV_OT_omt_notices, UV_OT_omt_remedy
 from .operators.inspection.worst import UV_OT_omt_worst
 from .operators.live import UV_OT_omt_live, UV_OT_omt_live_end
@@ -53,6 +54,8 @@ CLASSES = (
     UV_OT_omt_checker,
     UV_OT_omt_checker_remove,
     UV_OT_omt_worst,
+    UV_OT_omt_regions,
+    UV_OT_omt_attributes,
     UV_OT_omt_remedy,
     UV_OT_omt_notices,
     UV_OT_omt_preset,

@@ -64,7 +64,9 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas_charts",
     "pipelines.volumes": "errors solver solver.mesh solver.flows",
-    "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
+    "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
+    "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines "
+    "pipelines.measuring",
     "blender.volumes": "errors solver solver.flows pipelines.volumes blender",
     "files.formats": "solver",
     "files.in_place": "errors solver",
@@ -74,11 +76,12 @@ ARROWS: dict[str, str] = {
     "blender",
     "batch": "errors supervision solver",
     "commands": "errors supervision remedies settings solver solver.comparison solver.cutting solver.globe "
-    "solver.parameterization pipelines pipelines.volumes blender blender.volumes files display solver.flows",
+    "solver.parameterization pipelines pipelines.measuring pipelines.volumes blender blender.volumes "
+    "files display solver.flows",
     "commands.batches": "supervision solver batch commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display session",
-    "operators.inspection": "remedies solver pipelines blender display session operators",
+    "operators.inspection": "settings remedies solver pipelines pipelines.measuring blender display session operators",
     "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
     "panels": "links errors remedies settings solver blender display session operators operators.inspection",
 }

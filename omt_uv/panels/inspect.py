@@ -29,6 +29,10 @@ def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     row = column.row(align=True)
     for name, title, _ in FIGURES:
         row.operator("uv.omt_worst", text=title).figure = name
+    row = layout.row(align=True)
+    row.label(text="Regions")
+    row.operator_menu_enum("uv.omt_regions", "kind", text="Copy Table", icon="COPYDOWN")
+    row.operator("uv.omt_attributes", text="", icon="SPREADSHEET")
     image = bpy.data.images.get(HISTOGRAM)
     if image is not None and image.preview is not None:
         layout.template_icon(icon_value=image.preview.icon_id, scale=7.0)
@@ -69,7 +73,15 @@ SECTION = Section(
     "inspect",
     "Inspect",
     draw,
-    (SHOW, "uv.omt_measure", "uv.omt_histogram", "uv.omt_checker", "uv.omt_worst"),
+    (
+        SHOW,
+        "uv.omt_measure",
+        "uv.omt_histogram",
+        "uv.omt_checker",
+        "uv.omt_worst",
+        "uv.omt_regions",
+        "uv.omt_attributes",
+    ),
     is_open=True,
 )
 DENSITY = Section("density", "Texel Density", draw_density, (SET_DENSITY,), parent="inspect")

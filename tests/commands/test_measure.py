@@ -33,3 +33,46 @@ def test_a_histogram_is_a_picture_and_nothing_else(run, tmp_path):
     assert (tmp_path / "h.png").read_bytes().startswith(b"\x89PNG")
     status, out, err = run("measure", tmp_path / "in.blend", "--histogram", tmp_path / "h.txt")
     assert status == 1 and out == "" and "Name a .png file" in err
+
+
+def test_regions_are_rows_and_attributes_are_written(run, tmp_path):
+    obj = scenes.bump()
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    group = obj.vertex_groups.new(name="half")
+    group.add([v.index for v in obj.data.vertices if v.co.x < 1.1], 1.0, "REPLACE")
+    for name in ("red", "blue"):
+        obj.data.materials.append(bpy.data.materials.new(name))
+    for polygon in obj.data.polygons:
+        polygon.material_index = polygon.index % 2
+    part = obj.data.attributes.new("part", "INT", "FACE")
+    part.data.foreach_set("value", [k % 3 for k in range(len(obj.data.polygons))])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    for kind, names in [("groups", ["half"]), ("materials", ["blue", "red"]), ("part", ["part 0", "part 1", "part 2"])]:
+        status, out, _ = run("measure", tmp_path / "in.blend", "--regions", kind, "--csv")
+        rows = [line.split(",") for line in out.splitlines()]
+        assert status == 0 and [row[0] for row in rows] == ["name", "all", *names]
+    status, out, _ = run("measure", tmp_path / "in.blend", "--regions", "materials", "--json")
+    shares = [row["surface_share"] for row in json.loads(out)["regions"]]
+    assert shares[0] == 1 and sum(shares[1:]) == pytest.approx(1)
+    words = ["measure", tmp_path / "in.blend", "--attributes", tmp_path / "out.blend", "--preview", tmp_path / "p.png"]
+    assert run(*words)[0] == 0 and (tmp_path / "p.png").is_file()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    attributes = bpy.data.objects[0].data.attributes
+    assert [attributes[f"OMT UV {name}"].domain for name in ("Area", "Shear", "Stretch")] == ["FACE"] * 3
+
+
+@pytest.mark.parametrize(
+    "words, status, said",
+    [
+        (["--regions", "none"], 1, "no attribute 'none'"),
+        (["--regions", "groups"], 1, "no vertex group"),
+        (["--csv"], 2, "--regions"),
+        (["--attributes", "x.obj"], 1, "only .blend"),
+        (["--preview", "x.jpg"], 2, ".png"),
+    ],
+)
+def test_regions_that_are_not_there_and_files_of_other_kinds_are_one_line(run, tmp_path, words, status, said):
+    scenes.set_uv(obj := scenes.bump(), scenes.seen_from_above(obj))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    found, out, err = run("measure", tmp_path / "in.blend", *words)
+    assert (found, out) == (status, "") and said in err.splitlines()[-1]

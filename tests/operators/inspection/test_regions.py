@@ -1,0 +1,44 @@
+"""uv.omt_regions and uv.omt_attributes: a table in the clipboard, and values that nodes can read."""
+
+from __future__ import annotations
+
+import bpy
+
+import numpy as np
+import pytest
+import scenes
+
+
+@pytest.fixture
+def bump():
+    obj = scenes.bump()
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    obj.vertex_groups.new(name="half").add([v.index for v in obj.data.vertices if v.co.x < 1.1], 1.0, "REPLACE")
+    return obj
+
+
+def test_regions_are_measured_and_nothing_changes(bump):
+    before = len(bump.data.attributes)
+    assert bpy.ops.uv.omt_regions(kind="GROUPS") == {"FINISHED"}
+    assert len(bump.data.attributes) == before
+    assert "no material" in scenes.error_of(bpy.ops.uv.omt_regions, kind="MATERIALS")
+    assert "No attribute is named" in scenes.error_of(bpy.ops.uv.omt_regions, kind="ATTRIBUTE")
+    assert "no attribute 'x'" in scenes.error_of(bpy.ops.uv.omt_regions, kind="ATTRIBUTE", attribute="x")
+
+
+def test_values_agree_with_the_figures_and_a_second_run_fills_them_again(package, bump):
+    for _ in range(2):
+        assert bpy.ops.uv.omt_attributes() == {"FINISHED"}
+    values = np.zeros(len(bump.data.polygons), np.float32)
+    bump.data.attributes["OMT UV Shear"].data.foreach_get("value", values)
+    found = package("pipelines.measuring.per_face").face_values(package("blender.mesh").read(bump))
+    assert values == pytest.approx(found.shear, rel=1e-5) and values.max() > 1.01
+    assert len([a for a in bump.data.attributes if a.name.startswith("OMT UV")]) == 3
+
+
+def test_another_attribute_of_that_name_is_refused_and_nothing_changes(bump):
+    bump.data.attributes.new("OMT UV Stretch", "INT", "POINT")
+    assert "another attribute 'OMT UV Stretch'" in scenes.error_of(bpy.ops.uv.omt_attributes)
+    assert "OMT UV Area" not in bump.data.attributes
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert "Object Mode" in scenes.error_of(bpy.ops.uv.omt_attributes)
