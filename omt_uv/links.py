@@ -22,6 +22,8 @@ PAGES = {
     "uv.omt_overlay": "distortion",
     "uv.omt_histogram": "distortion",
     "uv.omt_measure": "distortion",
+    "uv.omt_regions": "distortion",
+    "uv.omt_attributes": "distortion",
     "uv.omt_density_get": "texel_density",
     "uv.omt_density_set": "texel_density",
     "uv.omt_checker": "result",

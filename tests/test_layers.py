@@ -65,8 +65,8 @@ ARROWS: dict[str, str] = {
     "xatlas_charts",
     "pipelines.volumes": "errors solver solver.mesh solver.flows",
     "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
-    "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines "
-    "pipelines.measuring",
+    "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
+    "blender.measuring": "errors solver pipelines pipelines.measuring blender",
     "blender.volumes": "errors solver solver.flows pipelines.volumes blender",
     "files.formats": "solver",
     "files.in_place": "errors solver",
@@ -77,11 +77,13 @@ ARROWS: dict[str, str] = {
     "batch": "errors supervision solver",
     "commands": "errors supervision remedies settings solver solver.comparison solver.cutting solver.globe "
     "solver.parameterization pipelines pipelines.measuring pipelines.volumes blender blender.volumes "
+    "blender.measuring "
     "files display solver.flows",
     "commands.batches": "supervision solver batch commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display session",
-    "operators.inspection": "settings remedies solver pipelines pipelines.measuring blender display session operators",
+    "operators.inspection": "settings remedies solver pipelines pipelines.measuring blender blender.measuring display "
+    "session operators",
     "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
     "panels": "links errors remedies settings solver blender display session operators operators.inspection",
 }

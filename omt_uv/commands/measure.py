@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _regions(options: argparse.Namespace, pairs: list) -> list:
     """Figures of the regions, a row for each, and for all first."""
-    from ..blender.region_labels import regions_of
+    from ..blender.measuring.region_labels import regions_of
     from ..pipelines.measuring.region_figures import figures_by_region
 
     regions = regions_of(pairs, options.regions)
@@ -95,7 +95,7 @@ def _line(row) -> str:
 
 def _write_attributes(options: argparse.Namespace, pairs: list) -> None:
     """Put values of faces into attributes of the objects, and write the file."""
-    from ..blender.face_attributes import write_face_values
+    from ..blender.measuring.face_attributes import write_face_values
     from ..files.saving import save
     from ..pipelines.measuring.per_face import face_values
 

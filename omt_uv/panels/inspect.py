@@ -31,7 +31,7 @@ def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
         row.operator("uv.omt_worst", text=title).figure = name
     row = layout.row(align=True)
     row.label(text="Regions")
-    row.operator_menu_enum("uv.omt_regions", "kind", text="Copy Table", icon="COPYDOWN")
+    row.operator("uv.omt_regions", text="Copy Table", icon="COPYDOWN")
     row.operator("uv.omt_attributes", text="", icon="SPREADSHEET")
     image = bpy.data.images.get(HISTOGRAM)
     if image is not None and image.preview is not None:

@@ -11,7 +11,7 @@ ENTRIES: list[list[str]] = [
     ["uv.omt_unwrap", "uv.omt_refine", "uv.omt_live", "uv.omt_seams"],
     ["uv.omt_magnify", "object.omt_weights", "object.omt_remesh", "object.omt_compare", "uv.omt_sphere"],
     ["uv.omt_checker", "uv.omt_checker_remove", "uv.omt_overlay", "uv.omt_histogram", "uv.omt_measure", "uv.omt_worst"],
-    ["uv.omt_density_get", "uv.omt_density_set"],
+    ["uv.omt_regions", "uv.omt_attributes", "uv.omt_density_get", "uv.omt_density_set"],
     ["object.omt_flow", "uv.omt_flow"],
 ]
 # Those that work in Weight Paint.

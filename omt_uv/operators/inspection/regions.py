@@ -34,7 +34,7 @@ class UV_OT_omt_regions(QuickOperator, bpy.types.Operator):
     )
 
     def act(self, context: bpy.types.Context) -> None:
-        from ...blender.region_labels import regions_of
+        from ...blender.measuring.region_labels import regions_of
         from ...pipelines.measuring.region_figures import figures_by_region, table_text
 
         if self.kind == "ATTRIBUTE" and not self.attribute:
@@ -55,8 +55,8 @@ class UV_OT_omt_attributes(QuickOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def act(self, context: bpy.types.Context) -> None:
-        from ...blender.face_attributes import KINDS as NAMES
-        from ...blender.face_attributes import write_face_values
+        from ...blender.measuring.face_attributes import KINDS as NAMES
+        from ...blender.measuring.face_attributes import write_face_values
         from ...pipelines.measuring.per_face import face_values
 
         if context.mode != "OBJECT":

@@ -8,9 +8,9 @@ import bpy
 
 import numpy as np
 
-from ..errors import UserError
-from ..pipelines.reading import Reading
-from .vertex_groups import group_weights
+from ...errors import UserError
+from ...pipelines.reading import Reading
+from ..vertex_groups import group_weights
 
 GROUPS = "groups"
 MATERIALS = "materials"

@@ -6,9 +6,9 @@ import bpy
 
 import numpy as np
 
-from ..errors import UserError
-from ..pipelines.measuring.per_face import FaceValues
-from .mesh import linked
+from ...errors import UserError
+from ...pipelines.measuring.per_face import FaceValues
+from ..mesh import linked
 
 # Names of the attributes: log2 of the area ratio, shear, and direction of stretch.
 AREA = "OMT UV Area"

@@ -1,0 +1,9 @@
+"""Regions that objects name, and figures written into attributes of faces.
+
+Imports blender, pipelines and what these import.
+Main names: regions_of, write_face_values.
+"""
+
+from ...solver.lazy import lazy
+
+__getattr__, __all__ = lazy(__name__, face_attributes="write_face_values", region_labels="regions_of")
