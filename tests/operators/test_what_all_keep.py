@@ -1,0 +1,197 @@
+"""What holds for every operator that works on meshes: several objects, what else they hold, where they stand, undo."""
+
+from __future__ import annotations
+
+import bpy
+
+import numpy as np
+import pytest
+import scenes
+
+# Arguments of each operator, and the parts of `scenes.state` that it may change; "UV": the active layer.
+RUNS: dict[str, tuple[dict, set[str]]] = {
+    "uv.omt_unwrap": ({"quality": "DRAFT", "balance": 0.6}, {"UV"}),
+    "uv.omt_refine": ({"quality": "DRAFT"}, {"UV"}),
+    "uv.omt_magnify": ({"quality": "DRAFT", "weight_group": "painted here", "factor": 2.0}, {"UV"}),
+    "uv.omt_sphere": ({"quality": "DRAFT"}, {"UV"}),
+    "uv.omt_density_set": ({"density": 40.0}, {"UV"}),
+    "uv.omt_seams": ({}, {"seams", "uv_seam", ".uv_seam"}),
+    "uv.omt_overlay": ({}, {"OMT UV Distortion"}),
+    "object.omt_weights": ({"kind": "GAUSSIAN"}, {"groups"}),
+    "uv.omt_measure": ({}, set()),
+    "uv.omt_histogram": ({}, set()),
+    "uv.omt_density_get": ({}, set()),
+    "object.omt_remesh": ({"target_vertices": 40}, set()),
+}
+# What ends something, is a setting, or has meshes of its own kind, looked at by tests beside it.
+OTHERS = {"uv.omt_preset", "wm.omt_copy_report", "uv.omt_notices", "uv.omt_checker", "uv.omt_checker_remove",
+          "uv.omt_live", "uv.omt_live_end", "uv.omt_remedy", "uv.omt_worst"}  # fmt: skip
+LAYER = "UV map of mine"
+
+
+def run(name):
+    module, operator = name.split(".")
+    return getattr(getattr(bpy.ops, module), operator)
+
+
+def body(name, segments, rings, at=0.0, squeeze=1.0):
+    """A closed body that is nowhere like anywhere else, with two UV layers, a group, seams, creases and colours."""
+    # Blender's own sphere has its faces in another order every time.
+    turn, polar = np.arange(segments) * 2 * np.pi / segments, np.arange(1, rings) * np.pi / rings
+    around = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    points = np.concatenate([p * around + [0, 0, q] for p, q in zip(np.sin(polar), np.cos(polar), strict=True)])
+    k, last = np.arange(segments), segments * (rings - 2)
+    top, bottom, following = len(points), len(points) + 1, (k + 1) % segments
+    quads = [(a + i, a + segments + i, a + segments + j, a + j)
+             for a in range(0, last, segments) for i, j in zip(k, following, strict=True)]  # fmt: skip
+    tips = [(top, i, j) for i, j in zip(k, following, strict=True)]
+    tips += [(bottom, last + j, last + i) for i, j in zip(k, following, strict=True)]
+    obj = scenes.add([*points, (0, 0, 1), (0, 0, -1)], [*quads, *tips], name)
+    obj.location.x = at
+    obj.data.uv_layers.new(name="first")
+    rough = np.random.default_rng(5).normal(1, 0.06, (len(obj.data.vertices), 3))
+    for vertex, factor in zip(obj.data.vertices, rough, strict=True):
+        x, y, z = factor * vertex.co
+        vertex.co = (x * (1 + 0.2 * z), y * (1 + 0.15 * x), squeeze * z * (1 + 0.3 * x + 0.1 * y))
+    weights = obj.vertex_groups.new(name="painted here")
+    weights.add(list(range(0, segments)), 0.7, "REPLACE")
+    obj.data.uv_layers.active = obj.data.uv_layers.new(name=LAYER)
+    for k, edge in enumerate(obj.data.edges):
+        edge.use_edge_sharp = k % 7 == 0
+    crease = obj.data.attributes.new("crease_edge", "FLOAT", "EDGE")
+    crease.data.foreach_set("value", np.linspace(0, 1, len(obj.data.edges)))
+    mine = obj.data.attributes.new("of mine", "FLOAT", "FACE")
+    mine.data.foreach_set("value", np.arange(len(obj.data.polygons), dtype=float))
+    colour = obj.data.color_attributes.new("Colour", "BYTE_COLOR", "CORNER")
+    colour.data.foreach_set("color", np.random.default_rng(0).random(4 * len(obj.data.loops)))
+    return obj
+
+
+def bodies():
+    """Two different bodies, selected, with UVs."""
+    found = [body("One of two", 7, 5), body("The other", 6, 6, 4.0, 1.6)]
+    scenes.select(found)
+    assert bpy.ops.uv.omt_unwrap(quality="DRAFT", max_shear=0.0) == {"FINISHED"}
+    for obj in found:
+        assert obj.data.uv_layers.active.name == LAYER
+    return found
+
+
+def state(obj):
+    """`scenes.state` with the active layer under a name of its own, and what belongs to the object."""
+    found = scenes.state(obj)
+    found["UV"] = found.pop(obj.data.uv_layers.active.name)
+    found["active"] = obj.data.uv_layers.active.name
+    found["names"] = [group.name for group in obj.vertex_groups]
+    found["sharp"] = [edge.use_edge_sharp for edge in obj.data.edges]
+    found["matrix"] = [tuple(row) for row in obj.matrix_world]
+    return found
+
+
+def changed(before, after):
+    return {key for key in before.keys() | after.keys() if before.get(key) != after.get(key)}
+
+
+def test_every_operator_is_looked_at(package):
+    classes = [c for c in package("registration").CLASSES if issubclass(c, bpy.types.Operator)]
+    # Operators of a room of their own are looked at there.
+    here = {c.bl_idname for c in classes if c.__module__.split(".operators.")[1].count(".") == 0}
+    assert here == (set(RUNS) | OTHERS) & here and set(RUNS) <= here
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_several_objects_change_where_they_shall_and_nowhere_else_and_undo_is_exact(name):
+    found = bodies()
+    arguments, may = RUNS[name]
+    before = {obj.name: state(obj) for obj in found}
+    everything = len(bpy.data.objects)
+    bpy.ops.ed.undo_push()
+    assert run(name)("EXEC_DEFAULT", True, **arguments) == {"FINISHED"}
+    for obj in found:
+        more = {"names"} if "groups" in may else set()
+        # A colour attribute that is new becomes a layer of its own name.
+        new = changed(before[obj.name], state(obj)) - more
+        new = {key for key in new if not ("OMT UV Distortion" in may and key.startswith("OMT"))} | (
+            {"OMT UV Distortion"} if any(key.startswith("OMT") for key in new) else set()
+        )
+        assert new <= may and bool(new) == bool(may), (name, obj.name, new)
+    if name == "object.omt_remesh":
+        assert len(bpy.data.objects) == everything + 2
+    if not may and "remesh" not in name:
+        return  # there is nothing to undo
+    bpy.ops.ed.undo()
+    assert len(bpy.data.objects) == everything
+    for key, old in before.items():
+        assert changed(old, state(bpy.data.objects[key])) == set(), (name, key)
+
+
+# A transform that is scaled by three different numbers, turned, and sheared by its parent.
+def sheared(obj):
+    parent = bpy.data.objects.new("a parent of it", None)
+    bpy.context.collection.objects.link(parent)
+    parent.scale, parent.rotation_euler = (1.0, 1.7, 0.6), (0.3, 0.5, -0.4)
+    obj.parent, obj.scale, obj.rotation_euler = parent, (1.4, 0.8, 1.1), (0.9, -0.2, 0.6)
+    bpy.context.view_layer.update()
+
+
+def apply_transform(obj):
+    matrix = obj.matrix_world.copy()
+    obj.parent = None
+    obj.matrix_world = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+    obj.data.transform(matrix)
+    obj.data.update()
+    bpy.context.view_layer.update()
+
+
+# Globes turn with the axes of the object.
+WRITES = [name for name, (_, may) in RUNS.items() if may and name not in ("uv.omt_overlay", "uv.omt_sphere")]
+
+
+@pytest.mark.parametrize("name", WRITES)
+def test_a_transform_of_the_object_is_as_good_as_one_of_the_mesh(name):
+    results = []
+    for applied in (False, True):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        obj = body("One of two", 7, 5)
+        sheared(obj)
+        if applied:
+            apply_transform(obj)
+        scenes.select([obj])
+        assert bpy.ops.uv.omt_unwrap(quality="DRAFT", max_shear=0.0) == {"FINISHED"}
+        # The same UVs to begin with, for what depends on these.
+        if results:
+            scenes.set_uv(obj, results[0][0], LAYER)
+        begin = scenes.uv_of(obj)
+        assert run(name)(**RUNS[name][0]) == {"FINISHED"}
+        seams = [edge.use_seam for edge in obj.data.edges]
+        weights = [[round(g.weight, 3) for g in v.groups] for v in obj.data.vertices]
+        results.append((begin, scenes.uv_of(obj), seams, weights))
+    (_, uv, seams, weights), (_, other_uv, other_seams, other_weights) = results
+    assert seams == other_seams
+    # Where heights cancel, an axis of the object stands for up, and the map may be turned.
+    w, other = ((x - x.mean(axis=0)) @ [1, 1j] for x in (uv, other_uv))
+    turn = (w.conj() * other).sum()
+    # Islands that lie otherwise than before are packed a little otherwise.
+    atol = 1e-3 if name == "uv.omt_magnify" else 1e-5
+    np.testing.assert_allclose(other, w * turn / np.abs(turn), atol=atol)
+    if name != "uv.omt_magnify":
+        np.testing.assert_allclose(uv, other_uv, atol=1e-5)
+    for mine, others in zip(weights, other_weights, strict=True):
+        np.testing.assert_allclose(mine, others, atol=2e-3)
+
+
+@pytest.mark.parametrize("scale", [(1, 1, 1), (-1.0, 1.5, 0.7), (0.5, 2.0, -1.2)], ids=str)
+def test_areas_are_those_in_the_world_for_all_objects_together(scale):
+    found = bodies()
+    found[1].scale = scale
+    bpy.context.view_layer.update()
+    for name in ("uv.omt_unwrap", "uv.omt_refine"):
+        arguments = {"max_shear": 0.0} if name == "uv.omt_unwrap" else {}
+        assert run(name)(quality="STANDARD", **arguments) == {"FINISHED"}
+        space, uv = (np.concatenate(x) for x in zip(*map(scenes.polygon_areas, found), strict=True))
+        if name == "uv.omt_unwrap":
+            error = np.abs(np.abs(uv) / np.abs(uv).sum() - space / space.sum()).sum()
+            assert error < 0.02, scale
+        for obj in found:
+            space, uv = scenes.polygon_areas(obj)
+            assert np.abs(np.abs(uv) / np.abs(uv).sum() - space / space.sum()).sum() < 0.02, (name, obj.name)
