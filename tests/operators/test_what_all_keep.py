@@ -54,7 +54,7 @@ def body(name, segments, rings, at=0.0, squeeze=1.0):
         x, y, z = factor * vertex.co
         vertex.co = (x * (1 + 0.2 * z), y * (1 + 0.15 * x), squeeze * z * (1 + 0.3 * x + 0.1 * y))
     weights = obj.vertex_groups.new(name="painted here")
-    weights.add(list(range(0, segments)), 0.7, "REPLACE")
+    weights.add(list(range(segments)), 0.7, "REPLACE")
     obj.data.uv_layers.active = obj.data.uv_layers.new(name=LAYER)
     for k, edge in enumerate(obj.data.edges):
         edge.use_edge_sharp = k % 7 == 0
