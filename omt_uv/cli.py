@@ -11,10 +11,12 @@ from pathlib import Path
 from . import __version__, supervision
 from .commands import compare, flow, magnify, measure, refine, remesh, seams, sphere, unwrap, weights
 from .commands.batches import batch, page, summary, table
+from .commands.shapes import average, match
 from .errors import UserError
 from .supervision import PROGRAM, tell
 
 COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, compare, remesh, flow)
+COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, remesh, flow, match, average)
 # Of many files, without Blender in their own process.
 BATCHES = (batch, table, summary, page)
 

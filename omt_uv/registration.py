@@ -20,6 +20,13 @@ from .operators.refine import UV_OT_omt_refine
 from .operators.remesh import OBJECT_OT_omt_remesh
 from .operators.report import WM_OT_omt_copy_report
 from .operators.seams import UV_OT_omt_seams
+from .operators.shapes.landmarks import (
+    OBJECT_OT_omt_landmarks,
+    OBJECT_OT_omt_landmarks_clear,
+    OBJECT_OT_omt_landmarks_suggest,
+)
+from .operators.shapes.match import OBJECT_OT_omt_match
+from .operators.shapes.strain import OBJECT_OT_omt_strain
 from .operators.sphere import UV_OT_omt_sphere
 from .operators.texel_density import UV_OT_omt_density_get, UV_OT_omt_density_set
 from .operators.unwrap import UV_OT_omt_unwrap
@@ -45,6 +52,11 @@ CLASSES = (
     UV_OT_omt_measure,
     OBJECT_OT_omt_remesh,
     OBJECT_OT_omt_compare,
+    OBJECT_OT_omt_match,
+    OBJECT_OT_omt_landmarks,
+    OBJECT_OT_omt_landmarks_suggest,
+    OBJECT_OT_omt_landmarks_clear,
+    OBJECT_OT_omt_strain,
     OBJECT_OT_omt_flow,
     UV_OT_omt_flow,
     UV_OT_omt_overlay,

@@ -63,10 +63,13 @@ ARROWS: dict[str, str] = {
     "solver.refinement "
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas_charts",
+    "pipelines.shapes": "errors solver solver.mesh solver.transfer solver.registration solver.strain pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows",
     "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
     "blender.measuring": "errors solver pipelines pipelines.measuring blender",
+    "blender.shapes": "errors solver solver.mesh solver.analysis solver.registration pipelines "
+    "pipelines.shapes blender",
     "blender.volumes": "errors solver solver.flows pipelines.volumes blender",
     "files.formats": "solver",
     "files.in_place": "errors solver",
@@ -84,6 +87,16 @@ ARROWS: dict[str, str] = {
     "pipelines blender files display session",
     "operators.inspection": "settings remedies solver pipelines pipelines.measuring blender blender.measuring display "
     "session operators",
+    "solver.parameterization pipelines pipelines.volumes blender blender.volumes files display solver.flows",
+    "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
+    "pipelines pipelines.shapes pipelines.volumes blender blender.shapes blender.volumes files display solver.flows",
+    "commands.shapes": "solver solver.mesh solver.registration solver.strain pipelines.shapes blender "
+    "blender.shapes files commands",
+    "commands.batches": "supervision solver batch commands",
+    "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
+    "pipelines blender files display session",
+    "operators.inspection": "remedies solver pipelines blender display session operators",
+    "operators.shapes": "solver solver.registration pipelines.shapes blender blender.shapes session operators",
     "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
     "panels": "links errors remedies settings solver blender display session operators operators.inspection",
 }

@@ -20,7 +20,7 @@ def write_attributes(obj: bpy.types.Object, attributes: Attributes) -> None:
     mesh.polygons.foreach_set("use_smooth", attributes.smooth)
     _write_marks(mesh, attributes.marks)
     for layer in attributes.layers:
-        _write_layer(mesh, layer)
+        write_layer(mesh, layer)
     _write_flags(mesh, attributes)
     for k, name in enumerate(attributes.groups):
         group = obj.vertex_groups.new(name=name)
@@ -50,10 +50,10 @@ def _write_marks(mesh: bpy.types.Mesh, marks: Marks) -> None:
     for layer in marks.layers:
         values = np.zeros((e, *layer.values.shape[1:]), layer.values.dtype)
         values[at] = layer.values
-        _write_layer(mesh, replace(layer, values=values))
+        write_layer(mesh, replace(layer, values=values))
 
 
-def _write_layer(mesh: bpy.types.Mesh, layer: Layer) -> None:
+def write_layer(mesh: bpy.types.Mesh, layer: Layer) -> None:
     key, _, dtype, _ = TYPES[layer.data_type]
     if is_uv(layer):
         mesh.uv_layers.new(name=layer.name, do_init=False)

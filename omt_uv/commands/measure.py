@@ -35,6 +35,11 @@ def add(commands) -> None:
         metavar="OUT.blend",
         help="write area ratio, shear and stretch as attributes of faces",
     )
+        "--beltrami",
+        action="store_true",
+        help="strain of UV maps, or of a shape key, by vertex groups and materials",
+    )
+    command.add_argument("--shape-key", default="", metavar="NAME", help="with --beltrami: measure this shape key")
     command.add_argument("--json", action="store_true", help="print the figures as JSON")
 
 
@@ -53,6 +58,9 @@ def run(options: argparse.Namespace) -> None:
     check_paths(options, [options.attributes] if options.attributes else [])
     with refusals(name=str(options.input)):
         pairs = read_file(options)
+        if options.beltrami:
+            print(_strain(pairs, options))
+            return
         readings = [reading for _, reading in pairs]
         figures = measure_readings(readings)
         if options.histogram:
@@ -103,3 +111,43 @@ def _write_attributes(options: argparse.Namespace, pairs: list) -> None:
     for (obj, _), found in zip(pairs, values, strict=True):
         write_face_values(obj, found)
     warn([], [], save(options.attributes, [obj for obj, _ in pairs], options.input))
+    more = {"on_subdivided_surface": True} if subdivided else {}
+    print(json.dumps(asdict(figures) | more, indent=1) if options.json else summary(figures, subdivided))
+
+
+def _strain(pairs: list, options: argparse.Namespace) -> str:
+    """|mu| of the active UV maps, or of a shape key, over all and by region, as a table or JSON."""
+    from ..blender.read_attributes import read_attributes
+    from ..pipelines.shapes.strain import regions_of, strain_of, strain_report
+
+    found = {}
+    for obj, reading in pairs:
+        groups = read_attributes(obj.data, tuple(g.name for g in obj.vertex_groups))
+        weights = {name: groups.weights[:, k] for k, name in enumerate(groups.groups)}
+        materials = [slot.name or str(k) for k, slot in enumerate(obj.material_slots)]
+        regions = regions_of(reading.surface, weights, groups.material_index, materials)
+        strain = strain_of(reading.surface, **_measured(obj, reading, options.shape_key))
+        found[obj.name] = strain_report(strain, regions)
+    if options.json:
+        return json.dumps(found, indent=1)
+    rows = [(name, row) for name, table in found.items() for row in table]
+    return "\n".join(
+        f"{name}, {row['name']}: mean strain {row['mean']:.4f}, greatest {row['greatest']:.4f}, "
+        f"{100 * row['share']:.1f} % of the surface"
+        for name, row in rows
+    )
+
+
+def _measured(obj, reading, key: str) -> dict:
+    """What `strain_of` takes: UVs, or the positions of a shape key."""
+    from ..blender.mesh import stretch
+    from ..blender.shapes.strain import key_shape
+
+    if key:
+        shape = key_shape(obj.data, key)
+        if shape is None:
+            raise CommandError(f"{obj.name}: There is no shape key {key!r}. Name one that it has.")
+        return {"shape": shape @ stretch(obj)}
+    if reading.uv is None:
+        raise CommandError(f"{obj.name}: There is no UV map. Unwrap it first, or name a shape key.")
+    return {"uv": reading.uv}

@@ -10,6 +10,7 @@ import bpy
 
 from .. import links
 from . import inspect, result, tools, unwrap, volumes
+from . import inspect, match, result, tools, unwrap, volumes
 from .section import Section, class_of
 
 TAB = "OMT"
@@ -29,6 +30,7 @@ SECTIONS = (
     tools.WEIGHTS,
     tools.REMESH,
     tools.SPHERE,
+    match.SECTION,
     volumes.FLOW,
 )
 

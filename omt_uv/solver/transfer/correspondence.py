@@ -48,6 +48,7 @@ def correspond(
     new_triangles: np.ndarray,
     faces: np.ndarray,
     barycentric: np.ndarray,
+    owner: np.ndarray | None = None,
 ) -> Correspondence:
     """Find where a new mesh (k,3), (t,3) lies on the old one (n,3), (m,3), by closest points and walks between seams.
 
@@ -55,6 +56,7 @@ def correspond(
     ----------
     seams : (s,2) pairs of old vertices, edges that corner and face values may jump across
     faces, barycentric : (k,), (k,3) old triangle and coordinates of the new vertices
+    owner : (t,) polygon of each new triangle, where some have several: all of a polygon is on one side of every seam
     """
     spacing = _median_edge(new_positions, new_triangles)
     closest = ClosestPoint(positions, triangles, spacing)(
@@ -67,12 +69,16 @@ def correspond(
     mesh = cut_open(positions, triangles, np.concatenate([np.reshape(seams, (-1, 2)), boundary_edges(triangles)]))
     near = _near_seams(mesh, lifted[new_triangles], spacing)
     extended = 0
+    if owner is not None:
+        near = np.flatnonzero(np.isin(owner, owner[near]))
     if len(near):
         free = ~on_seam(mesh, faces, barycentric)
         start = faces[reference_vertices(mesh, new_triangles, free, lifted, spacing)]
         face_triangle[near] = locate_faces(
             mesh, new_triangles[near], free, start, closest.points[near], face_triangle[near]
         )
+        if owner is not None:
+            face_triangle[near] = face_triangle[near][_leading(owner[near], new_positions[new_triangles[near]])]
         corners = locate_corners(mesh, new_triangles[near], face_triangle[near], free, lifted, faces, barycentric)
         corner_triangle[near], corner_weights[near], side[near], extended = corners
         one_sided = _away_from(mesh, seams, lifted, spacing)
@@ -90,6 +96,14 @@ def correspond(
         seam_origin=origin,
         extended=extended,
     )
+
+
+def _leading(owner: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """For every triangle (t,3,3) the largest of its polygon's, (t,)."""
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    order = np.lexsort((-area, owner))
+    first = order[np.unique(owner[order], return_index=True)[1]]
+    return first[np.unique(owner, return_inverse=True)[1].ravel()]
 
 
 def _away_from(mesh: CutMesh, seams: np.ndarray, points: np.ndarray, distance: float) -> np.ndarray:

@@ -1,0 +1,59 @@
+"""The strain of UV maps, of shape keys and between poses, as figures and as what is written to a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+
+from ...solver.mesh.surface import Surface
+from ...solver.strain.beltrami import Beltrami, corner_beltrami
+from ...solver.strain.regions import RegionStrain, region_strain
+
+
+def strain_of(surface: Surface, uv: np.ndarray | None = None, shape: np.ndarray | None = None) -> Beltrami:
+    """Beltrami coefficients of the triangles of a surface, of its map to UVs (c,2) of the corners or to a shape (n,3).
+
+    Raises
+    ------
+    ValueError : neither or both are given
+    """
+    if (uv is None) == (shape is None):
+        raise ValueError("strain is that of UVs or of a shape")
+    corners = surface.positions[surface.corner_vertex[surface.triangles]]
+    if uv is not None:
+        return corner_beltrami(corners, np.asarray(uv, float)[surface.triangles])
+    return corner_beltrami(corners, np.asarray(shape, float)[surface.corner_vertex[surface.triangles]])
+
+
+def of_polygons(found: Beltrami, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """|mu| (f,), at most 1, of the polygons, the mean over their triangles, and the vector (f,3) of stretch as long."""
+    count = len(surface.face_start) - 1
+    area = np.maximum(found.area, 1e-300)
+    total = np.maximum(np.bincount(surface.triangle_face, area, count), 1e-300)
+    # A direction and its opposite are one: squares are averaged.
+    moment = np.einsum("m,ma,mb->mab", area * np.minimum(found.size, 1), found.direction, found.direction)
+    square = np.zeros((count, 3, 3))
+    np.add.at(square, surface.triangle_face, moment)
+    size = np.bincount(surface.triangle_face, area * np.minimum(found.size, 1), count) / total
+    _, axes = np.linalg.eigh(square)
+    return size, size[:, None] * axes[:, :, 2]
+
+
+def regions_of(surface: Surface, weights: dict[str, np.ndarray], materials: np.ndarray, names: list[str]) -> dict:
+    """Regions as weights (m,) of the triangles: vertex groups by weights (n,), materials by slots (f,)."""
+    triangles = surface.corner_vertex[surface.triangles]
+    regions = {name: np.asarray(w, float)[triangles].mean(axis=1) for name, w in weights.items()}
+    slots = materials[surface.triangle_face]
+    if len(names) > 1:
+        regions |= {f"material {name}": (slots == k).astype(float) for k, name in enumerate(names)}
+    return regions
+
+
+def strain_report(found: Beltrami, regions: dict[str, np.ndarray]) -> list[dict]:
+    """Figures of the whole and of every region, for a JSON file."""
+    return [_row(row) for row in region_strain(found, regions)]
+
+
+def _row(row: RegionStrain) -> dict:
+    return {**asdict(row), "histogram": row.histogram.round(6).tolist()}
