@@ -15,8 +15,7 @@ from .commands.shapes import average, match
 from .errors import UserError
 from .supervision import PROGRAM, tell
 
-COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, compare, remesh, flow)
-COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, remesh, flow, match, average)
+COMMANDS = (unwrap, refine, magnify, weights, seams, sphere, measure, compare, remesh, flow, match, average)
 # Of many files, without Blender in their own process.
 BATCHES = (batch, table, summary, page)
 

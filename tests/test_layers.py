@@ -90,6 +90,8 @@ ARROWS: dict[str, str] = {
     "solver.parameterization pipelines pipelines.volumes blender blender.volumes files display solver.flows",
     "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
     "pipelines pipelines.shapes pipelines.volumes blender blender.shapes blender.volumes files display solver.flows",
+    "solver.parameterization pipelines pipelines.shapes pipelines.volumes blender blender.shapes blender.volumes files "
+    "display solver.flows",
     "commands.shapes": "solver solver.mesh solver.registration solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
     "commands.batches": "supervision solver batch commands",

@@ -9,7 +9,6 @@ from __future__ import annotations
 import bpy
 
 from .. import links
-from . import inspect, result, tools, unwrap, volumes
 from . import inspect, match, result, tools, unwrap, volumes
 from .section import Section, class_of
 

@@ -15,12 +15,15 @@ MORE = {"magnify": ["--weights", "region", "--factor", "2"], "remesh": ["--verti
         "weights": ["--kind", "gaussian"]}  # fmt: skip
 # Commands on bodies, whose reports have no charts: tests of their own look at these.
 BODIES = ("flow",)
+# Commands on two files or a folder: tests/commands/shapes has theirs.
+SHAPES = ("match", "average")
 
 
 def names(package):
     (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
     # A batch works on folders, and has the tests of its own room.
-    return [name for name, command in every.choices.items() if not command.get_default("alone")]
+    alone = [name for name, command in every.choices.items() if command.get_default("alone")]
+    return [name for name in every.choices if name not in (*alone, *SHAPES)]
 
 
 def arguments(name, folder, target="out.blend"):
@@ -95,7 +98,7 @@ def test_every_report_has_all_of_its_keys(package, run, tmp_path):
     (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
     reporting = [n for n, c in every.choices.items() if any("--report" in a.option_strings for a in c._actions)]
     # That of remesh has levels instead of charts.
-    reporting = [n for n in reporting if n not in (*BODIES, "remesh")]
+    reporting = [n for n in reporting if n not in (*BODIES, *SHAPES, "remesh")]
     assert set(reporting) == own.keys()
     for name in reporting:
         words = [*arguments(name, tmp_path), *(["--source", "uv"] if name == "magnify" else [])]

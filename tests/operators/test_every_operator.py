@@ -48,7 +48,6 @@ PAIRS = {
     "object.omt_landmarks_suggest",
     "object.omt_landmarks_clear",
 }
-OTHERS = {"uv.omt_preset", "wm.omt_copy_report", "uv.omt_notices", "uv.omt_checker_remove", "uv.omt_live_end"}
 
 
 @pytest.mark.parametrize("override", [False, True], ids=["linked", "override"])

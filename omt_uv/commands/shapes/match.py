@@ -61,6 +61,7 @@ def _weight(text: str) -> float:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
+    from ...blender.mesh import check_local
     from ...files.saving import save
     from ...files.verified import same_file
 
@@ -76,6 +77,7 @@ def run(options: argparse.Namespace) -> None:
     source, target = (second, first) if options.wrap else (first, second)
     result, attributes, told = _match(options, source, target)
     if options.wrap:
+        check_local(second[0])
         _shaped(second[0], result, options.output)
     else:
         from ...blender.shapes.match_objects import check_room, write_onto
