@@ -80,24 +80,15 @@ ARROWS: dict[str, str] = {
     "batch": "errors supervision solver",
     "commands": "errors supervision remedies settings solver solver.comparison solver.cutting solver.globe "
     "solver.parameterization pipelines pipelines.measuring pipelines.volumes blender blender.volumes "
-    "blender.measuring "
+    "blender.measuring pipelines.shapes blender.shapes "
     "files display solver.flows",
-    "commands.batches": "supervision solver batch commands",
-    "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
-    "pipelines blender files display session",
-    "operators.inspection": "settings remedies solver pipelines pipelines.measuring blender blender.measuring display "
-    "session operators",
-    "solver.parameterization pipelines pipelines.volumes blender blender.volumes files display solver.flows",
-    "commands": "errors supervision remedies settings solver solver.cutting solver.globe solver.parameterization "
-    "pipelines pipelines.shapes pipelines.volumes blender blender.shapes blender.volumes files display solver.flows",
-    "solver.parameterization pipelines pipelines.shapes pipelines.volumes blender blender.shapes blender.volumes files "
-    "display solver.flows",
     "commands.shapes": "solver solver.mesh solver.registration solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
     "commands.batches": "supervision solver batch commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display session",
-    "operators.inspection": "remedies solver pipelines blender display session operators",
+    "operators.inspection": "settings remedies solver pipelines pipelines.measuring blender blender.measuring display "
+    "session operators",
     "operators.shapes": "solver solver.registration pipelines.shapes blender blender.shapes session operators",
     "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
     "panels": "links errors remedies settings solver blender display session operators operators.inspection",

@@ -35,6 +35,7 @@ def add(commands) -> None:
         metavar="OUT.blend",
         help="write area ratio, shear and stretch as attributes of faces",
     )
+    command.add_argument(
         "--beltrami",
         action="store_true",
         help="strain of UV maps, or of a shape key, by vertex groups and materials",
@@ -111,8 +112,6 @@ def _write_attributes(options: argparse.Namespace, pairs: list) -> None:
     for (obj, _), found in zip(pairs, values, strict=True):
         write_face_values(obj, found)
     warn([], [], save(options.attributes, [obj for obj, _ in pairs], options.input))
-    more = {"on_subdivided_surface": True} if subdivided else {}
-    print(json.dumps(asdict(figures) | more, indent=1) if options.json else summary(figures, subdivided))
 
 
 def _strain(pairs: list, options: argparse.Namespace) -> str:
