@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from heads import write_heads
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "build" / "papers" / "gu_2018"
+MODELS = ("max_planck.obj", "lion.off", "bunny.obj")
 # Faces that B. Gu remeshed.
 ALL = 70_000
 ERRORS = {
@@ -26,16 +28,36 @@ ERRORS = {
 }
 
 
-def batch(options) -> Path:
-    """Remesh the heads in a batch, which goes on where it was; the path of its manifest."""
-    heads, out = FOLDER / "heads", FOLDER / "out"
-    write_heads(heads, options.count)
-    words = ["batch", "remesh", str(heads), "-o", str(out), "--jobs", str(options.jobs), "--"]
+def batch(source: Path, name: str, options) -> list[dict]:
+    """Remesh a folder or a list of meshes in a batch, which goes on where it was; rows of its manifest."""
+    from omt_uv.batch.manifest import rows_of
+
+    out = FOLDER / name
+    words = ["batch", "remesh", str(source), "-o", str(out), "--jobs", str(options.jobs), "--"]
     words += ["--vertices", str(options.vertices), "--levels", str(options.levels)]
     status = subprocess.run([sys.executable, "-m", "omt_uv", *words], cwd=ROOT).returncode
     if status not in (0, 7):
         sys.exit(status)
-    return out.with_name("out.manifest.sqlite")
+    return rows_of([out.with_name(f"{name}.manifest.sqlite")])
+
+
+def models(options) -> None:
+    """Remesh public models, as far as they are there, and draw the errors of each."""
+    from omt_uv.display.canvas import save
+    from omt_uv.display.plots import plot, slope
+
+    folder = Path(os.environ.get("OMT_UV_MODELS", ROOT.parent / "shared" / "models"))
+    paths = [path for path in (folder / name for name in MODELS) if path.is_file()]
+    if not paths:
+        print(f"{folder}: none of {', '.join(MODELS)} is there; heads alone")
+        return
+    (FOLDER / "models.txt").write_text("\n".join(map(str, paths)) + "\n")
+    rows = batch(FOLDER / "models.txt", "models", options)
+    levels = {row["name"]: levels_of([row]) for row in rows if row["report"]}
+    for key, title in ERRORS.items():
+        curves = {name: [(level["faces"], level[key]) for level in found] for name, found in levels.items()}
+        save(FOLDER / f"models_{key}.png", plot(curves, title))
+        print(f"{title:20}" + "   ".join(f"{name} {slope(curve):+.2f}" for name, curve in curves.items()))
 
 
 def levels_of(rows: list[dict]) -> list[dict]:
@@ -80,16 +102,17 @@ def main():
     parser.add_argument("--levels", type=int, default=4)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    from omt_uv.batch.manifest import rows_of
     from omt_uv.display.canvas import save
     from omt_uv.display.plots import plot
 
-    rows = rows_of([batch(options)])
+    write_heads(FOLDER / "heads", options.count)
+    rows = batch(FOLDER / "heads", "out", options)
     levels = levels_of(rows)
     save(FOLDER / "errors.png", plot(medians(levels), f"{options.count} heads, medians"))
     clouds = {name: [(level["faces"], level[key]) for level in levels] for key, name in ERRORS.items()}
     save(FOLDER / "cloud.png", plot(clouds, f"{options.count} heads", cloud=True))
     tell(rows, levels, options.jobs)
+    models(options)
     print(f"plots: {FOLDER / 'errors.png'}, {FOLDER / 'cloud.png'}")
 
 

@@ -42,7 +42,8 @@ def head(seed: int) -> tuple[np.ndarray, np.ndarray]:
     waves = rng.normal(size=(5, 3)) * 3
     radius += 0.008 * np.sin(way @ waves.T + rng.random(5) * 6).sum(1)
     V = way * radius[:, None] * rng.uniform(0.9, 1.1, 3) * [0.8, 0.95, 1.15]
-    return V, _triangles()
+    # In files Y is up, and what looks at us is in front.
+    return V[:, [0, 2, 1]] * [-1, 1, 1], _triangles()
 
 
 def _triangles() -> np.ndarray:
@@ -52,7 +53,8 @@ def _triangles() -> np.ndarray:
     i = np.arange(ROWS - 2)[:, None] * COLUMNS + 1
     a, b = (i + j).ravel(), (i + (j + 1) % COLUMNS).ravel()
     rows = [np.stack([a, a + COLUMNS, b + COLUMNS], 1), np.stack([a, b + COLUMNS, b], 1)]
-    return np.concatenate([fan, *rows])
+    # As directions are listed, these look inwards.
+    return np.concatenate([fan, *rows])[:, ::-1]
 
 
 def write_heads(folder: Path, count: int) -> None:

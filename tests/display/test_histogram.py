@@ -7,7 +7,7 @@ from readings import reading
 
 from omt_uv.display import canvas
 from omt_uv.display.colormaps import AREA_OCTAVES, SHEAR_TOP, area_colours, shear_colours
-from omt_uv.display.histogram import HEIGHT, WIDTH, histogram, thumbnail
+from omt_uv.display.histogram import HEIGHT, WIDTH, area_axis, histogram, shear_axis, thumbnail
 from omt_uv.solver.errors import EmptyMeshError
 
 
@@ -49,3 +49,18 @@ def test_a_thumbnail_is_transparent_but_for_its_bars():
 def test_nothing_to_draw_is_an_error():
     with pytest.raises(EmptyMeshError):
         histogram([reading(*meshes.grid(2, 2))])
+
+
+def test_axes_reach_over_the_surface_and_no_farther():
+    share = np.full(200, 0.5)
+    octaves = np.linspace(-1, 1, 200)
+    axis = area_axis(octaves, share)
+    assert (axis.low, axis.high) == (-2, 2) and [text for _, text in axis.ticks] == ["1/4", "1/2", "as due", "2x", "4x"]
+    axis = area_axis(5 * octaves, share)
+    assert (axis.low, axis.high) == (-5, 5) and [k for k, _ in axis.ticks] == [-3, 0, 3]
+    assert area_axis(np.append(octaves, 30), np.append(share, 0.5)).high == 2
+    assert area_axis(100 * octaves, share).high == 10
+    axis = shear_axis(2.0 ** (3 * np.abs(octaves)), share)
+    assert (axis.low, axis.high) == (0, 3) and [text for _, text in axis.ticks] == ["1", "2", "4", "8"]
+    assert axis.places(np.array([0.0, 3.0])) == pytest.approx([0, 1])
+    assert np.array_equal(axis.scale(np.array([1.0])), shear_colours(np.array([8.0])))
