@@ -5,7 +5,7 @@ STAMP := $(VENV)/.installed
 export PYTHONPATH := $(CURDIR)
 export OMT_UV_MODELS ?= $(CURDIR)/../shared/models
 
-.PHONY: demo test check bench papers extension matrix gui venv clean
+.PHONY: demo test check bench papers extension matrix gui repository site venv clean
 
 test: $(STAMP)
 	$(PY) -m pytest
@@ -17,6 +17,7 @@ check: $(STAMP)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
+	$(PY) scripts/release/site.py
 
 papers: $(STAMP)
 	$(PY) scripts/papers/gu_2018.py
@@ -30,8 +31,16 @@ extension: $(STAMP)
 matrix: $(STAMP)
 	$(PY) scripts/release/matrix.py
 
+# Makes roots of later Debians where it may, and plays in whatever is there; OMT_UV_GUI_AGES=here plays in this one's.
 gui: $(STAMP)
-	OMT_UV_GUI=1 $(PY) -m pytest tests/gui
+	@[ "$${OMT_UV_GUI_AGES:-all}" = here ] || $(PY) scripts/gui/ages.py || true
+	OMT_UV_GUI=1 $(PY) -m pytest -rs tests/gui
+
+repository: $(STAMP)
+	$(PY) scripts/release/repository.py
+
+site: $(STAMP)
+	$(PY) scripts/release/site.py
 
 venv: $(STAMP)
 

@@ -7,6 +7,8 @@ import bpy
 from .blender.versions import register_command, unregister_command
 from .display import colour_bar, overlay
 from .links import manual
+from .operators.arranging.islands import UV_OT_omt_rectify, UV_OT_omt_stack, UV_OT_omt_symmetrize
+from .operators.arranging.queue import UV_OT_omt_queue, UV_OT_omt_queue_stop
 from .operators.distortion import UV_OT_omt_histogram, UV_OT_omt_measure, UV_OT_omt_overlay
 from .operators.inspection.checker import UV_OT_omt_checker, UV_OT_omt_checker_remove
 from .operators.inspection.compare import OBJECT_OT_omt_compare
@@ -63,6 +65,11 @@ CLASSES = (
     UV_OT_omt_histogram,
     UV_OT_omt_density_get,
     UV_OT_omt_density_set,
+    UV_OT_omt_stack,
+    UV_OT_omt_symmetrize,
+    UV_OT_omt_rectify,
+    UV_OT_omt_queue,
+    UV_OT_omt_queue_stop,
     UV_OT_omt_checker,
     UV_OT_omt_checker_remove,
     UV_OT_omt_worst,

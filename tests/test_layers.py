@@ -41,6 +41,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.transport "
     "solver.cutting solver.seams solver.conformal solver.refinement",
     "solver.editing": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement",
+    "solver.arranging": "solver solver.mesh",
     "solver.sphere": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal solver.refinement",
     "solver.globe": "solver solver.mesh solver.linalg solver.sphere",
     "solver.strain": "solver solver.mesh solver.analysis",
@@ -66,6 +67,7 @@ ARROWS: dict[str, str] = {
     "pipelines.shapes": "errors solver solver.mesh solver.transfer solver.registration solver.strain pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows",
     "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
+    "pipelines.arranging": "settings solver solver.mesh solver.editing solver.arranging pipelines",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
     "blender.measuring": "errors solver pipelines pipelines.measuring blender",
     "blender.shapes": "errors solver solver.mesh solver.analysis solver.registration pipelines "
@@ -91,7 +93,9 @@ ARROWS: dict[str, str] = {
     "session operators",
     "operators.shapes": "solver solver.registration pipelines.shapes blender blender.shapes session operators",
     "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
-    "panels": "links errors remedies settings solver blender display session operators operators.inspection",
+    "operators.arranging": "solver pipelines pipelines.arranging blender session operators",
+    "panels": "links errors remedies settings solver blender display session operators operators.inspection "
+    "operators.arranging",
 }
 SOLVER_LIBRARIES = {"numpy", "scipy"}
 # Blender's modules stay in these.

@@ -8,7 +8,8 @@ from .section import class_of
 
 # In the order of the menu, a list for every group; those that do not exist are left out.
 ENTRIES: list[list[str]] = [
-    ["uv.omt_unwrap", "uv.omt_refine", "uv.omt_live", "uv.omt_seams"],
+    ["uv.omt_unwrap", "uv.omt_refine", "uv.omt_live", "uv.omt_seams", "uv.omt_queue"],
+    ["uv.omt_stack", "uv.omt_symmetrize", "uv.omt_rectify"],
     ["uv.omt_magnify", "object.omt_weights", "object.omt_remesh", "object.omt_compare", "uv.omt_sphere"],
     ["uv.omt_checker", "uv.omt_checker_remove", "uv.omt_overlay", "uv.omt_histogram", "uv.omt_measure", "uv.omt_worst"],
     ["uv.omt_regions", "uv.omt_attributes", "uv.omt_density_get", "uv.omt_density_set"],

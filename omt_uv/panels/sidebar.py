@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 
 from .. import links
-from . import inspect, match, result, tools, unwrap, volumes
+from . import arrange, inspect, match, result, tools, unwrap, volumes
 from .section import Section, class_of
 
 TAB = "OMT"
@@ -22,9 +22,11 @@ SECTIONS = (
     unwrap.OPTIONS,
     unwrap.REFINE,
     unwrap.SEAMS,
+    arrange.QUEUE_SECTION,
     result.SECTION,
     inspect.SECTION,
     inspect.DENSITY,
+    arrange.SECTION,
     tools.MAGNIFY,
     tools.WEIGHTS,
     tools.REMESH,

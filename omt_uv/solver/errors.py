@@ -214,6 +214,12 @@ class FoldedUVError(MeshError):
     remedy = "Unwrap these faces anew first"
 
 
+class GridError(MeshError):
+    """An island that should become a rectangle is no grid of quads."""
+
+    remedy = "Choose islands of quads in rows and columns, such as strips and bands"
+
+
 class CountError(MeshError):
     """A remesh was asked for fewer vertices or faces than its topology and features take."""
 

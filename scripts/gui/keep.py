@@ -1,6 +1,6 @@
 """Keep the screenshots of the last `make gui` for the documentation, in 256 colours.
 
-usage: keep.py [--from build/gui] [--to docs/pictures/ui]
+usage: keep.py [--from build/gui/sid] [--to docs/pictures/ui]
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = {
-    "tour": ("tab", "unwrapped", "area", "shear", "histogram", "redo"),
+    "tour": ("tab", "unwrapped", "area", "shear", "histogram", "checker", "outdated", "redo"),
     "escape": ("progress",),
     "sections": ("magnify", "sphere", "remesh"),
-    "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear"),
+    "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear", "uv_object_mode"),
 }
 
 
 def main() -> None:
     """Copy the pictures that the documentation shows."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--from", dest="source", type=Path, default=ROOT / "build" / "gui")
+    parser.add_argument("--from", dest="source", type=Path, default=ROOT / "build" / "gui" / "sid")
     parser.add_argument("--to", dest="target", type=Path, default=ROOT / "docs" / "pictures" / "ui")
     args = parser.parse_args()
     args.target.mkdir(parents=True, exist_ok=True)

@@ -9,10 +9,10 @@ import bpy
 
 # Pixels between two looks, down and across; a button is higher and wider.
 DOWN = 12
-PLACES = (0.5, 0.2, 0.8, 0.94)
-TURNS_TO_SEE = 3
+PLACES = (0.5, 0.2, 0.77, 0.835)
+TURNS_TO_SEE = 2
 # Where headers have their buttons.
-HEADER = (0.83, 0.87, 0.78)
+HEADER = (0.83, 0.78)
 # Turns of the wheel that move a panel by about half of what is seen.
 TURNS = 4
 
@@ -57,18 +57,35 @@ class Finder:
                     return x, y
         yield from self.scroll_to_top()
         for _ in range(12):
-            region = self.region
-            for y in range(region.height - DOWN, DOWN, -DOWN):
-                for share in places:
-                    x = int(region.width * share)
-                    call = yield from self.under(x, y)
-                    if call:
-                        self.known[call] = region.view2d.region_to_view(x, y)
-                    if call and all(word in call for word in words):
-                        return x, y
-            if not (yield from self.scroll(5)):
-                return None
+            found = yield from self.look(words, places)
+            if found is not None or not (yield from self.scroll(5)):
+                return found
         return None
+
+    def look(self, words, places):
+        """Coordinates of such a button in what is in sight: in the middle first, then beside buttons seen there."""
+        region, rows = self.region, []
+        every = range(region.height - DOWN, DOWN, -DOWN)
+        for y in every:
+            call = yield from self.seen(int(region.width * places[0]), y)
+            if all(word in call for word in words):
+                return int(region.width * places[0]), y
+            if call:
+                rows.append(y)
+        # Rows of several buttons have one in the middle as a rule.
+        for y in [*rows, *(y for y in every if y not in rows)]:
+            for x in (int(region.width * share) for share in places[1:]):
+                call = yield from self.seen(x, y)
+                if call and all(word in call for word in words):
+                    return x, y
+        return None
+
+    def seen(self, x, y):
+        """As `under`, and remembered."""
+        call = yield from self.under(x, y)
+        if call:
+            self.known[call] = self.region.view2d.region_to_view(x, y)
+        return call
 
     def scroll(self, button):
         """Turn the wheel over the sidebar; whether it moved. 4 is up, 5 down."""

@@ -1,0 +1,167 @@
+"""Unwrap many objects one after the other: what is done stays, whatever happens to the others: uv.omt_queue."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+from bpy.props import FloatProperty
+
+from ...session import following, last_run, queue
+from ..base import Complaint, check_all_local, mesh_objects, ready, tell
+
+UNWRAP = "uv.omt_unwrap"
+# Seconds of work between two looks at the keyboard.
+SLICE = 0.05
+
+
+class UV_OT_omt_queue(bpy.types.Operator):
+    """Unwrap the selected objects one by one, each with a texture to itself, with the settings of Unwrap.
+    Stop or Esc keeps what is done. What takes too long or fails is named, and selected at the end"""
+
+    bl_idname = "uv.omt_queue"
+    bl_label = "Unwrap in a Queue"
+    bl_options = {"REGISTER", "UNDO"}
+
+    limit: FloatProperty(
+        name="Time Limit",
+        description="Seconds after which an object is given up, and the next one taken. 0: none",
+        default=120.0,
+        min=0.0,
+        soft_max=3600.0,
+        subtype="TIME_ABSOLUTE",
+    )
+
+    _timer: bpy.types.Timer | None = None
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return ready(cls, context, ("OBJECT",))
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        state = self.start(context)
+        if "RUNNING_MODAL" in state:
+            self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
+            context.window_manager.modal_handler_add(self)
+        return state
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """For scripts and the redo panel: all at once."""
+        state = self.start(context)
+        while "RUNNING_MODAL" in state:
+            state = self._advance(context)
+        return state
+
+    def start(self, context: bpy.types.Context) -> set[str]:
+        following.keep(context)
+        try:
+            objects = mesh_objects(context)
+            check_all_local([(obj, None) for obj in objects])
+        except Complaint as complaint:
+            return tell(self, context, complaint)
+        queue.state = queue.Queue([queue.Job(obj.name) for obj in objects])
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "ESC" and event.value == "PRESS":
+            queue.stop()
+        return self._advance(context) if event.type == "TIMER" else {"PASS_THROUGH"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        queue.stop()
+        self._end(context)
+
+    def _advance(self, context: bpy.types.Context) -> set[str]:
+        """Work on the job that is on for a moment, or begin the next one."""
+        jobs = queue.state
+        job = jobs.current if jobs is not None else None
+        if jobs is None or job is None or jobs.is_stopped:
+            return self._end(context)
+        obj = bpy.data.objects.get(job.name)
+        if obj is None or obj.name not in context.view_layer.objects:
+            job.end("FAILED", "it is gone")
+            return {"RUNNING_MODAL"}
+        try:
+            steps = job.steps or job.begin(self._steps(context, obj))
+            end = time.monotonic() + SLICE
+            while time.monotonic() < end:
+                job.progress = next(steps).fraction
+                if self.limit and job.seconds > self.limit:
+                    job.end("FAILED", f"it took more than {self.limit:.0f} s")
+                    return {"RUNNING_MODAL"}
+        except StopIteration as stop:
+            _write(obj, stop.value)
+            job.end("DONE")
+        except Complaint as complaint:
+            job.end("FAILED", str(complaint))
+        last_run.redraw(context)
+        return {"RUNNING_MODAL"}
+
+    def _steps(self, context: bpy.types.Context, obj: bpy.types.Object):
+        """The steps of unwrapping one object, with the settings of the operator."""
+        from ...blender.mesh import check_target, read
+        from ...pipelines.layout import UnwrapJob
+        from ...pipelines.unwrap import lay_out
+        from ..base import complaints
+        from ..unwrap import UV_OT_omt_unwrap
+
+        chosen = context.window_manager.operator_properties_last(UNWRAP)
+        with complaints(obj):
+            check_target(obj, chosen.uv_layer)
+            reading = read(obj)
+        subdivision = reading.subdivision if chosen.use_subdivision else None
+        job = UnwrapJob(
+            reading.surface, reading.faces, reading.pins, None, subdivision=subdivision, up=reading.up, uv=reading.uv
+        )
+        with complaints(objects=[obj]):
+            return (yield from lay_out([job], UV_OT_omt_unwrap.settings(chosen)))
+
+    def _end(self, context: bpy.types.Context) -> set[str]:
+        jobs = queue.state
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        if jobs is None:
+            return {"CANCELLED"}
+        for job in jobs.jobs:
+            job.close()
+        failed = [job for job in jobs.jobs if job.state == "FAILED"]
+        done = [job for job in jobs.jobs if job.state == "DONE"]
+        for obj in context.view_layer.objects:
+            if failed:
+                obj.select_set(obj.name in {job.name for job in failed})
+        notices = tuple(last_run.Notice(f"{job.name}: {job.reason}") for job in failed)
+        rows = (("Done", f"{len(done)} of {len(jobs.jobs)}"), ("Failed, selected", f"{len(failed)}"))
+        names = tuple(obj.name for obj in last_run.chosen_objects(context))
+        last_run.keep(last_run.Summary(self.bl_label, rows, notices, names))
+        for notice in notices:
+            self.report({"WARNING"}, notice.text)
+        jobs.is_over = True
+        last_run.redraw(context)
+        self.report({"INFO"}, f"Unwrapped {len(done)} of {len(jobs.jobs)} objects")
+        return {"FINISHED"} if done else {"CANCELLED"}
+
+
+def _write(obj: bpy.types.Object, layout) -> None:
+    from ..base import write_layers
+
+    layer = bpy.context.window_manager.operator_properties_last(UNWRAP).uv_layer
+    write_layers([obj], layer, layout)
+
+
+class UV_OT_omt_queue_stop(bpy.types.Operator):
+    """Stop the queue; what is done is kept"""
+
+    bl_idname = "uv.omt_queue_stop"
+    bl_label = "Stop the Queue"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return queue.state is not None and not queue.state.is_over
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        queue.stop()
+        return {"FINISHED"}

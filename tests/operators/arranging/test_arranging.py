@@ -1,0 +1,71 @@
+"""Equal islands share their texture, halves are the same, strips are rectangles; other corners keep their bits."""
+
+from __future__ import annotations
+
+import bpy
+
+import numpy as np
+import pytest
+import scenes
+
+
+def two_patches(mirror=False):
+    """Two equal patches in one mesh, the second turned and elsewhere, or seen in the plane x = 0."""
+    obj = scenes.bump(5, 4)
+    points = np.array([v.co for v in obj.data.vertices]) + [0.3, 0, 0]
+    faces = np.array([p.vertices for p in obj.data.polygons])
+    bpy.data.objects.remove(obj)
+    second = points * [-1, 1, 1] if mirror else points[:, [1, 2, 0]] + [4, 0, 0]
+    obj = scenes.add(np.concatenate([points, second]), np.concatenate([faces, faces + len(points)]))
+    uv = scenes.seen_from_above(obj)
+    scenes.set_uv(obj, uv * 0.1 + np.repeat([[0, 0], [0.5, 0.5]], len(uv) // 2, axis=0))
+    return obj
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+@pytest.mark.parametrize("mirror", [False, True])
+def test_equal_islands_are_stacked(mirror, mode):
+    obj = two_patches(mirror)
+    if mode == "EDIT":
+        scenes.edit(obj)
+    assert bpy.ops.uv.omt_stack() == {"FINISHED"}
+    # A patch that is its own image has two motions that fit: the same places, whichever vertex is where.
+    first, second = (np.unique(uv.round(4), axis=0) for uv in scenes.uv_of(obj).reshape(2, -1, 2))
+    assert np.allclose(first, second, atol=2e-4)
+
+
+@pytest.mark.parametrize("halves", ["APART", "STACKED"])
+def test_halves_are_the_same(halves):
+    obj = two_patches(True)
+    assert bpy.ops.uv.omt_symmetrize(halves=halves) == {"FINISHED"}
+    first, second = scenes.uv_of(obj).reshape(2, -1, 2)
+    if halves == "STACKED":
+        assert np.allclose(first, second, atol=1e-5)
+    else:
+        assert np.allclose(np.diff(first, axis=0), np.diff(second, axis=0) * [-1, 1], atol=1e-5)
+
+
+def test_a_strip_has_its_areas_to_the_last_quad(package):
+    obj = scenes.bump(9, 1)
+    scenes.set_uv(obj, scenes.seen_from_above(obj) * 0.5)
+    assert bpy.ops.uv.omt_rectify() == {"FINISHED"}
+    found = package("pipelines.distortion").measure_readings([package("blender.mesh").read(obj)])
+    assert found.area_l1 < 1e-5 and found.folds == 0
+    assert len(np.unique(scenes.uv_of(obj)[:, 1].round(5))) == 2
+
+
+def test_what_cannot_be_arranged_is_said_and_changes_nothing():
+    obj = scenes.cube()
+    scenes.set_uv(obj, np.random.default_rng(0).uniform(size=(len(obj.data.loops), 2)))
+    bpy.context.view_layer.update()
+    obj2 = scenes.add([(0, 0, 0), (1, 0, 0), (0, 1, 0.3)], [(0, 1, 2)], "Triangle")
+    scenes.set_uv(obj2, scenes.seen_from_above(obj2))
+    scenes.select([obj2])
+    before = scenes.uv_of(obj2)
+    assert "no quads" in scenes.error_of(bpy.ops.uv.omt_rectify)
+    assert "image" in scenes.error_of(bpy.ops.uv.omt_symmetrize, axis="Z")
+    assert (scenes.uv_of(obj2) == before).all()
+    bare = scenes.bump()
+    scenes.select([bare])
+    for operator in (bpy.ops.uv.omt_stack, bpy.ops.uv.omt_symmetrize, bpy.ops.uv.omt_rectify):
+        assert "Unwrap the mesh first" in scenes.error_of(operator)
