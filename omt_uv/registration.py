@@ -39,6 +39,7 @@ from .panels import keymap
 from .panels.menus import UV_MT_omt, draw_menu, draw_remesh, menus, remesh_menus
 from .panels.preferences import OMTUVPreferences, apply_soon
 from .panels.sidebar import PANELS
+from .panels.translations.registered import tables_of
 from .session import last_run
 from .session.presets import register_folder, unregister_folder
 
@@ -100,6 +101,8 @@ def register() -> None:
                 menu.append(draw)
                 _undo.append((menu.remove, draw))
         _undo.append((unregister_command, register_command(COMMAND, _command)))
+        bpy.app.translations.register(__package__, tables_of())
+        _undo.append((bpy.app.translations.unregister, __package__))
         bpy.utils.register_manual_map(manual)
         _undo.append((bpy.utils.unregister_manual_map, manual))
         _undo.append((_clear, None))

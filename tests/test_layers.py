@@ -94,8 +94,9 @@ ARROWS: dict[str, str] = {
     "operators.shapes": "solver solver.registration pipelines.shapes blender blender.shapes session operators",
     "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
     "operators.arranging": "solver pipelines pipelines.arranging blender session operators",
+    "panels.translations": "solver",
     "panels": "links errors remedies settings solver blender display session operators operators.inspection "
-    "operators.arranging",
+    "operators.arranging panels.translations",
 }
 SOLVER_LIBRARIES = {"numpy", "scipy"}
 # Blender's modules stay in these.

@@ -7,7 +7,7 @@ import bpy
 from ..operators.inspection.remedy import UV_OT_omt_notices
 from ..remedies import ACTIONS
 from ..session import last_run
-from .section import Section
+from .section import Section, words
 
 # Lines of figures, and of a warning; what does not fit is left out, and in the report.
 ROWS = 7
@@ -41,7 +41,7 @@ def draw_title(column: bpy.types.UILayout, summary: last_run.Summary, outdated: 
     row.label(text=summary.title, icon=icon_of(summary, outdated))
     row.label(text=dict(summary.rows).get("Time", ""), translate=False)
     row = column.row()
-    row.label(text=f"{about(summary)}" if not outdated else f"Outdated: {outdated}", translate=bool(outdated))
+    row.label(text=words("Outdated: {}", words(outdated)) if outdated else about(summary), translate=False)
     if outdated:
         row.operator("uv.omt_measure", text="", icon="FILE_REFRESH")
 
@@ -64,7 +64,7 @@ def draw_notice(column: bpy.types.UILayout, summary: last_run.Summary, width: in
     else:
         row.label(text="")
     if len(notices) > 1:
-        count = f"{last_run.state.shown % len(notices) + 1} of {len(notices)}"
+        count = words("{} of {}", last_run.state.shown % len(notices) + 1, len(notices))
         row.operator(UV_OT_omt_notices.bl_idname, text=count, icon="TRIA_RIGHT").whole = False
     if notices:
         row.operator(UV_OT_omt_notices.bl_idname, text="", icon="FULLSCREEN_ENTER").whole = True
@@ -92,7 +92,7 @@ def about(summary: last_run.Summary) -> str:
     """The object, or how many."""
     if len(summary.objects) == 1:
         return summary.objects[0]
-    return f"{len(summary.objects)} objects" if summary.objects else ""
+    return words("{} objects", len(summary.objects)) if summary.objects else ""
 
 
 def characters(context: bpy.types.Context) -> int:
