@@ -114,3 +114,16 @@ def test_a_hub_brings_its_neighbours_into_no_other_part():
     sizes = [len(unknowns) // 2 for unknowns in parts._unknowns]
     assert len(sizes) >= 8 and max(sizes) <= 2 * count / len(sizes)
     assert np.unique(np.concatenate(parts._unknowns)).size == 2 * len(V)
+
+
+def test_parts_overlap_by_the_rings_around_them():
+    V, F = meshes.hemisphere(16, 40)
+    parts = AdditiveSchwarz(V, F, 100)
+    near = np.zeros((len(V), len(V)), bool)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        near[F[:, a], F[:, b]] = near[F[:, b], F[:, a]] = True
+    for k, unknowns in enumerate(parts._unknowns):
+        mine = parts._part == k
+        for _ in range(schwarz.OVERLAP):
+            mine = mine | near[mine].any(axis=0)
+        assert np.array_equal(np.unique(unknowns // 2), np.flatnonzero(mine))

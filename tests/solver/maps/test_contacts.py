@@ -5,7 +5,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.maps.contacts import turns
+from omt_uv.solver.maps.contacts import covering_contacts, turns
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.options import UnwrapOptions
@@ -51,6 +51,16 @@ def test_more_than_a_full_turn_around_a_vertex_is_two_turns_of_the_outline():
     assert turns(w, *loop_edges(boundary_loops(F)[0])) == 2
     _, w, F = path_of_squares([0, 1, 2])
     assert turns(w, *loop_edges(boundary_loops(F)[0])) == 1
+
+
+@pytest.mark.parametrize("angle, covers", [(0.4, True), (0.01, True), (1e-4, False), (-0.4, False)])
+def test_corners_at_one_place_cover_each_other_where_their_sectors_do(angle, covers):
+    """Two triangles with a corner at 0; the second begins so much before the end of the first."""
+    first, second = np.exp(1j * np.array([0, 1.0])), np.exp(1j * (np.array([1.0, 2.0]) - angle))
+    w = np.array([0, *first, 0, *second])
+    tail, head = np.arange(6), np.array([1, 2, 0, 4, 5, 3])
+    found = covering_contacts(w, tail, head, np.array([0, 3]), np.array([3, 0]), 1e-9)
+    assert (found == covers).all()
 
 
 @pytest.mark.parametrize("turn", [1, np.exp(0.7j)])

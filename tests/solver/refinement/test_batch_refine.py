@@ -95,3 +95,14 @@ def test_nearly_flat_charts_start_where_each_alone_is_unrolled():
             edge /= np.abs(edge).max()
         turn = (alone.conj() * mine).sum()
         np.testing.assert_allclose(mine, alone * turn / np.abs(turn), atol=1e-8)
+
+
+def test_a_chart_whose_map_would_cover_itself_is_given_back():
+    """A ramp that goes around by more than a full turn, nearly without curvature, beside one that does not."""
+    ramps = []
+    for turn in (1.25, 0.6):
+        V, F = meshes.grid(60, 2)
+        angle, radius = 2 * np.pi * turn * V[:, 0] / V[:, 0].max(), 1 + 0.4 * V[:, 1] / V[:, 1].max()
+        ramps.append((np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.1 * angle], axis=1), F))
+    found = drain(refine_batch(in_unit_box(ramps), "standard", 0.0))
+    assert found.solved.tolist() == [False, True]

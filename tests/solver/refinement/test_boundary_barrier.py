@@ -5,7 +5,7 @@ import pytest
 
 from omt_uv.solver.maps import boxes
 from omt_uv.solver.maps.boxes import box_pairs
-from omt_uv.solver.refinement.boundary_barrier import crossings, loop_edges, make_barrier
+from omt_uv.solver.refinement.boundary_barrier import BoundaryBarrier, crossings, loop_edges, make_barrier
 
 
 def test_crossings_of_a_bow_tie_and_of_a_polygon():
@@ -101,3 +101,13 @@ def test_the_barrier_does_not_feel_where_the_map_lies():
     assert barrier.energy(ring * (0.6 + 0.8j) + 3) == pytest.approx(barrier.energy(ring))
     assert abs(gradient.sum()) < 1e-9 * np.abs(gradient).sum()
     assert abs((gradient.conj() * 1j * ring).real.sum()) < 1e-9 * np.abs(gradient).sum()
+
+
+@pytest.mark.parametrize("vertex_reach, edge_reach", [(0.5, 0.1), (0.1, 0.5), (0.5, 0.4), (0.1, 0.1)])
+def test_of_a_vertex_and_an_edge_the_smaller_reach_counts(vertex_reach, edge_reach):
+    """Two triangles, 0.3 apart."""
+    w = np.array([0, 1, 0.5 - 1j, 0.5 + 0.3j, 1.5 + 1.3j, -0.5 + 1.3j])
+    tail, head = np.arange(6), np.array([1, 2, 0, 4, 5, 3])
+    barrier = BoundaryBarrier(tail, head, np.full(6, vertex_reach), np.full(6, edge_reach), 1.0)
+    reach = min(vertex_reach, edge_reach)
+    assert barrier.energy(w) == pytest.approx(max(reach / 0.3 - 1, 0) ** 2)
