@@ -25,11 +25,11 @@ from .options import ShearBound
 
 # Maps that are made at most, with more seams each.
 MOST_ROUNDS = 3
-# A map shears by about exp(k |u|) where the predicted log scale is u: the mean square of u that goes with a mean shear
-# s is this times the square of log(s). Measured on heads, animals and figures, where it lies between 0.2 and 0.9.
-SPREAD_OF_SHEAR = 0.3
-# What a further search aims below the bound, so that it need not be the last but one.
-MARGIN = 0.7
+# The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
+# between 0.2 and 0.35, of limbs with fingers less.
+SPREAD_OF_SHEAR = 0.21
+# What a search that is made again aims below the bound, so that it need not be the last but one.
+MARGIN = 0.65
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
 
@@ -68,18 +68,22 @@ class ShearSearch:
     target: Target | None
     cutting: dict
 
-    def first(self) -> SeamSearch:
-        """The search to begin with."""
-        spread = np.full(self._count, SPREAD_OF_SHEAR * np.log(self.shear.bound) ** 2)
+    def first_spread(self) -> np.ndarray:
+        """The spread (f,) to begin with, see `SeamSearch`."""
+        return np.full(self._count, SPREAD_OF_SHEAR * np.log(self.shear.bound) ** 2)
+
+    def search(self, spread: np.ndarray) -> SeamSearch:
+        """The search for a spread (f,)."""
         return SeamSearch(spread, self.surface, self.costs, density=self._density, further=self.shear.further)
 
-    def again(self, cuts: np.ndarray, charts: list[Chart], missed: list[int], mean: np.ndarray) -> Steps[DiskCharts]:
-        """The charts with the edges cut (k,2), and further those that missed the bound with this mean shear."""
-        share = np.full(self._count, np.inf)
-        for k in missed:
-            share[charts[k].faces] = MARGIN * (np.log(self.shear.bound) / np.log(mean[k])) ** 2
-        search = SeamSearch(share, self.surface, self.costs, relative=True, density=self._density, further=True)
-        surface = replace(self.surface, seams=np.concatenate([self.surface.seams, cuts]))
+    def again(self, cuts: np.ndarray, charts: list[Chart], missed: list[int], spread: np.ndarray) -> Steps[DiskCharts]:
+        """Charts that missed the bound cut anew for a spread (f,); the edges that others were cut along (k,2) stay."""
+        outlines = [_outline(charts[k]) for k in missed]
+        kept = cuts[~np.isin(pair_keys(*cuts.T), np.concatenate(outlines))]
+        others = np.ones(self._count, dtype=bool)
+        others[np.concatenate([charts[k].faces for k in missed])] = False
+        search = replace(self.search(np.where(others, np.inf, spread)), further=True)
+        surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
         return disk_charts(surface, self.faces, search=search, **self.cutting)
 
     def costs(self) -> SeamCosts:
@@ -111,8 +115,7 @@ def bound_shear(
     Errors are those of `disk_charts.disk_charts` and of `map_charts`.
     """
     prepared, bound = first, search.shear.bound
-    first_cuts = _cuts(first)
-    cuts, length = first_cuts.edges, first_cuts.length
+    cuts, spread = _cuts(first), search.first_spread()
     rounds = 0
     while True:
         charts = prepared.charts
@@ -122,17 +125,21 @@ def bound_shear(
         searched = [k for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
         if rounds == MOST_ROUNDS or not searched:
             break
+        for k in searched:
+            spread[charts[k].faces] *= MARGIN * (np.log(bound) / np.log(mean[k])) ** 2
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        again = search.again(cuts, charts, searched, mean)
-        prepared = yield from part_of(again, begin, width * SEARCHING)
-        more = _cuts(prepared)
-        if len(more.edges) == 0:
+        again = yield from part_of(search.again(cuts.edges, charts, searched, spread), begin, width * SEARCHING)
+        more = _cuts(again)
+        outlines = np.concatenate([_outline(charts[k]) for k in searched])
+        stays = ~np.isin(pair_keys(*cuts.edges.T), outlines)
+        edges = np.concatenate([cuts.edges[stays], more.edges])
+        if len(edges) == len(cuts.edges) and np.isin(pair_keys(*edges.T), pair_keys(*cuts.edges.T)).all():
             break
-        cuts, length = np.concatenate([cuts, more.edges]), length + more.length
+        prepared, cuts = again, replace(cuts, edges=edges, length=_length(search.surface, edges))
         mapping = _mapped(prepared.charts, charts, maps, map_charts)
         maps = yield from part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
-    prepared = DiskCharts(charts, replace(first_cuts, edges=cuts, length=length), first.warnings)
+    prepared = DiskCharts(charts, cuts, first.warnings)
     by_hand = np.array([k not in searched for k in missed], dtype=bool)
     warnings = tuple(_warnings(mean[missed], by_hand, bound))
     return BoundedShear(prepared, maps, warnings)
@@ -154,9 +161,19 @@ def _warnings(mean: np.ndarray, by_hand: np.ndarray, bound: float) -> Iterator[s
             yield f"{who} {mean[chosen].max():.3g} in the mean, above {bound:.3g}: {what}"
 
 
+def _outline(chart: Chart) -> np.ndarray:
+    """Keys (e,) of the edges around a chart."""
+    return pair_keys(*chart.vertex_ids[boundary_edges(chart.triangles)].T)
+
+
+def _length(surface: Surface, edges: np.ndarray) -> float:
+    """Length of edges (k,2)."""
+    return float(np.linalg.norm(surface.positions[edges[:, 0]] - surface.positions[edges[:, 1]], axis=1).sum())
+
+
 def _is_marked(surface: Surface, chart: Chart) -> bool:
     """Whether seams of the surface bound a chart."""
-    return bool(is_seam(surface, pair_keys(*chart.vertex_ids[boundary_edges(chart.triangles)].T)).any())
+    return bool(is_seam(surface, _outline(chart)).any())
 
 
 def _polygon_density(surface: Surface, target: Target | None) -> np.ndarray | None:

@@ -137,7 +137,7 @@ def cut_charts(
     bound = options.shear_bound()
     given: dict[str, Any] = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}
     search = None if bound is None else ShearSearch(surface, faces, bound, target, given)
-    finder = None if search is None else search.first()
+    finder = None if search is None else search.search(search.first_spread())
     prepared = yield from disk_charts(surface, faces, seams=options.seams, search=finder, **given)
     return replace(_to_be_mapped(surface, prepared, pins, target), search=search)
 

@@ -237,9 +237,11 @@ def _smoothed_if_tense(
     faces = problem.faces
     tense = len(faces.triangles) > FEW and problem.newton_problem(w, area_weight, False).energy(w) > TENSE
     if tense and not problem.boundary_crosses(w):
-        w = yield from smoothed(by_triangle, w, area_weight, SWEEPS, problem.loop)
-        if problem.symmetry is not None:
-            w = problem.symmetry.averaged(w)
+        free = yield from smoothed(by_triangle, w, area_weight, SWEEPS, problem.loop)
+        # Sweeps are not symmetric: halves may have gone ways whose mean folds.
+        found = free if problem.symmetry is None else problem.symmetry.averaged(free)
+        if by_triangle.areas(found).min() > 0 and not problem.boundary_crosses(found):
+            return found
     return w
 
 

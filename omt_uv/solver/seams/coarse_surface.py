@@ -19,6 +19,8 @@ QUANTILE = 0.6
 TURNED = 0.2
 # cost so many times as much.
 TURNED_COST = 4.0
+# A collapse that turns a face costs more by this times (1 - cosine): limbs keep more vertices for their area.
+BENT_COST = 15.0
 # Least shape that the cost of a vertex is divided by; 1 is equilateral.
 LEAST_SHAPE = 1e-4
 # Sum of two degrees beyond which every edge more adds the length of the collapsed edge once more to its price.
@@ -131,7 +133,7 @@ class _ShrinkingMesh:
         tail, head = halfedges(self.faces)
         parent, price = self._parents(tail, head)
         fans = self._fans(parent)
-        cost = price / np.sqrt(fans.shape) * np.where(fans.turned, TURNED_COST, 1.0)
+        cost = price / np.sqrt(fans.shape) * np.where(fans.turned, TURNED_COST, 1.0) * (1 + BENT_COST * fans.bend)
         # A new edge must not be there already: the surface would be pinched (Dey et al. 1999).
         old = np.sort(_keys(tail, head, size))
         there = old[np.minimum(np.searchsorted(old, fans.key), len(old) - 1)] == fans.key
@@ -190,18 +192,23 @@ class _ShrinkingMesh:
         squares = ((q - s) ** 2).sum(axis=1) + ((r - q) ** 2).sum(axis=1) + ((s - r) ** 2).sum(axis=1)
         shape = np.ones(size)
         np.minimum.at(shape, i[real], 2 * np.sqrt(3) * area / np.maximum(squares, 1e-300))
+        cosine = (old * new).sum(axis=1) / np.maximum(np.linalg.norm(old, axis=1) * area, 1e-300)
         turned = np.zeros(size, dtype=bool)
-        turned[i[real][(old * new).sum(axis=1) < TURNED * np.linalg.norm(old, axis=1) * area]] = True
-        return _Fans(np.maximum(shape, LEAST_SHAPE), turned, i[inner], key)
+        turned[i[real][cosine < TURNED]] = True
+        bend = np.zeros(size)
+        np.maximum.at(bend, i[real], 1 - cosine)
+        return _Fans(np.maximum(shape, LEAST_SHAPE), turned, bend, i[inner], key)
 
 
 @dataclass(frozen=True)
 class _Fans:
     """The fans that fill the stars of vertices, from the neighbours they go to: least shape (n,) of a face, whether
-    one turns over (n,), and owner (e,) and key (e,) of their inner edges."""
+    one turns over (n,), 1 - cosine (n,) of the angle that one turns by at most, and owner (e,) and key (e,) of their
+    inner edges."""
 
     shape: np.ndarray
     turned: np.ndarray
+    bend: np.ndarray
     owner: np.ndarray
     key: np.ndarray
 

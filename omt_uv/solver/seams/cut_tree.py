@@ -29,11 +29,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Cut:
-    """Steps (k,) of a cut, its vertices (c,) off the boundary, the log scale (n,), its spread, and what it costs."""
+    """Steps (k,) of a cut, its vertices (c,) off the boundary, its spread, and what it costs."""
 
     steps: np.ndarray
     vertices: np.ndarray
-    scale: np.ndarray
     spread: float
     cost: float
 
@@ -46,9 +45,8 @@ def cut_along(task: Task, steps: np.ndarray) -> Cut:
     """The cut along steps (k,)."""
     steps = np.unique(steps)
     vertices = task.graph.vertices_of(steps)
-    scale = task.model.scale_cut(vertices)
     cost = float(task.graph.cost[steps].sum())
-    return Cut(steps=steps, vertices=vertices, scale=scale, spread=task.model.spread(scale), cost=cost)
+    return Cut(steps=steps, vertices=vertices, spread=task.model.spread_cut(vertices), cost=cost)
 
 
 def stretches(graph: PathGraph, steps: np.ndarray) -> list[np.ndarray]:

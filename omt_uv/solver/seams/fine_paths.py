@@ -43,6 +43,8 @@ def carried(
     start (n,) bool: vertices that are on a boundary or cut already, from which paths set out.
     """
     fine = _FineGraph.of(component)
+    # Diagonals need not be mirrored; paths run along edges that are, where there is such a way.
+    half = fine if mirror is None else _FineGraph.of(component, mirror.image)
     used = start.copy()
     spacing = coarse.size * float(np.median(graph.cost)) if len(graph.cost) else 0.0
     paths = []
@@ -53,7 +55,9 @@ def carried(
         if mirror is not None:
             # Off the plane nothing comes back to it: that would, with its mirror image, close a loop.
             allowed = mirror.plane | used if in_plane else (mirror.side & ~mirror.plane) | used
-        path = fine.path(used, int(coarse.kept[end]), along, spacing, allowed)
+        path = half.path(used, int(coarse.kept[end]), along, spacing, allowed)
+        if mirror is not None and len(path) == 0:
+            path = fine.path(used, int(coarse.kept[end]), along, spacing, allowed)
         used[path] = True
         paths.append(path)
         if mirror is not None and not in_plane and len(path):
@@ -109,9 +113,15 @@ class _FineGraph:
     length: csr_matrix
 
     @staticmethod
-    def of(component: CutComponent) -> _FineGraph:
-        """The graph of a component; diagonals of polygons are no edges."""
+    def of(component: CutComponent, image: np.ndarray | None = None) -> _FineGraph:
+        """The graph of a component; diagonals of polygons are no edges.
+
+        image (n,): mirror image of every vertex; edges whose image is no edge stay away.
+        """
         inner = np.isfinite(component.cost)
+        if image is not None:
+            keys = pair_keys(*component.ends[inner].T)
+            inner[inner] = np.isin(pair_keys(*image[component.ends[inner]].T), keys)
         tail, head = halfedges(component.triangles)
         boundary = component.boundary
         ends = np.concatenate([component.ends[inner], np.column_stack([tail[boundary], head[boundary]])])

@@ -57,7 +57,7 @@ def _best_arc(task: Task, cut: Cut, model: ScaleModel) -> _Arc | None:
             new = np.union1d(part[:-1], graph.image[part[:-1]])
             if len(new) == 0:
                 continue
-            fall = cut.spread - model.spread(model.scale_cut(new))
+            fall = cut.spread - model.spread_cut(new)
             worth = task.tip_factor[part[0]] * fall / cost[part[0]]
             if worth > 0 and (best is None or worth > best.worth):
                 best = _Arc(part, worth)

@@ -95,11 +95,14 @@ def path_graph(
     ends = np.column_stack([tail[once], head[once]])
     length = np.linalg.norm(surface.positions[ends[:, 0]] - surface.positions[ends[:, 1]], axis=1)
     across, straight = _across(surface.positions, tail, head, twin)
+    along_edges = len(ends)
     ends, length = np.concatenate([ends, across]), np.concatenate([length, straight])
     image = np.arange(n)
     if mirrored is not None:
         image = mirrored.image
+        # In the plane only edges can be carried: where it crosses faces, there is nothing to cut along.
         keep = mirrored.side[ends].all(axis=1)
+        keep[along_edges:] &= ~(image[across] == across).all(axis=1)
         ends, length = ends[keep], length[keep]
         length = np.where((image[ends] == ends).all(axis=1), length, 2 * length)
     ends = np.sort(ends, axis=1)

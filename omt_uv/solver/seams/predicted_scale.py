@@ -1,9 +1,13 @@
-"""Predict how a flat map scales a surface that is cut along any vertices, by Green's functions.
+"""Predict how much a flat map of a surface has to shear that is cut along any vertices, by Green's functions.
 
 With the logarithm u of its length scale held at 0 on boundary and seam, which a free boundary of least area distortion
 does (Springborn, Schroeder, Pinkall 2008, section 4), a flat conformal metric solves Laplacian(u) = curvature
-(Ben-Chen, Gotsman, Bunin 2008, equation 5). To make areas exact, a map then has to shear: by exp(2 |u|) and less. A cut
-is no more than further vertices where u = 0, so that trials cost a small dense system each (Woodbury), and no map.
+(Ben-Chen, Gotsman, Bunin 2008, equation 5). To make areas exact, a map then has to move points within the plane, and
+what moves are conformal costs no shear: the part of u that is harmonic goes for nothing. What is left, in the mean
+square, is the energy of a clamped plate under the curvature as its load, K . stress / 2 with bilaplacian(stress) = K:
+the equation of Foeppl and von Karman for sheets that do not bend (Landau, Lifshitz, Theory of Elasticity, section 14).
+A cut is no more than further vertices without stress, so that trials cost a small dense system each (Woodbury), and no
+map. Along a cut the plate is held but not clamped, which is the same where both sides are alike.
 """
 
 from __future__ import annotations
@@ -23,17 +27,33 @@ from .coarse_surface import CoarseSurface
 LEAST_STIFFNESS = 1e-3
 # A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
 GROUND = 1e-6
-# Added to the diagonal of Green's functions, over their largest, against rounding.
-ROUNDING = 1e-12
+# The plate of a closed surface is held a little everywhere: its Green's function has digits left for the first pin.
+PLATE_GROUND = 1e-2
+# Areas below this share of the mean would make a plate stiff without end.
+LEAST_AREA = 1e-3
+# Added to the diagonal of Green's functions, over itself and over its largest, against rounding.
+ROUNDING = 1e-8
+LEAST_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
 class ScaleModel:
-    """Green's function (n,n) of a surface with u = 0 on its boundary, u (n,) there, and the area (n,), of sum 1."""
+    """A surface under its curvature, held at its boundary.
+
+    Attributes
+    ----------
+    green (n,n) : Green's function of the Laplacian
+    scale (n,) : the log scale u, 0 on the boundary
+    plate (n,n) : Green's function of the bilaplacian
+    stress (n,) : under the load, 0 on the boundary
+    load (n,) : the curvature, 0 on the boundary
+    """
 
     green: np.ndarray
     scale: np.ndarray
-    area: np.ndarray
+    plate: np.ndarray
+    stress: np.ndarray
+    load: np.ndarray
 
     @staticmethod
     def of(surface: CoarseSurface, log_density: np.ndarray | None = None) -> ScaleModel:
@@ -47,41 +67,62 @@ class ScaleModel:
             curvature = curvature + laplacian @ log_density
             area = area * np.exp(2 * log_density)
             area = area / area.sum()
+        load = np.where(surface.boundary, 0.0, curvature)
         free = np.flatnonzero(~surface.boundary)
-        inner = laplacian[free][:, free]
+        columns = laplacian[:, free]
+        ground, held = 0.0, 0.0
         if len(free) == n:
-            inner = inner + GROUND * sp.diags(surface.area)
-        inverse = Factor(inner.tocsc()).solve(np.eye(len(free)))
-        green = np.zeros((n, n))
-        green[np.ix_(free, free)] = (inverse + inverse.T) / 2
-        return ScaleModel(green, green @ np.where(surface.boundary, 0.0, curvature), area)
+            ground, held = GROUND, PLATE_GROUND
+        inner = columns[free] + ground * sp.diags(surface.area[free])
+        columns = columns + held * sp.diags(surface.area).tocsc()[:, free]
+        bend = columns.T @ sp.diags(1 / np.maximum(area, LEAST_AREA * area.mean())) @ columns
+        green, plate = _inverse(inner, free, n), _inverse(bend, free, n)
+        return ScaleModel(green, green @ load, plate, plate @ load, load)
 
-    def spread(self, scale: np.ndarray) -> float:
-        """Mean square over the surface of a log scale (n,)."""
-        return float(self.area @ scale**2)
+    @property
+    def spread(self) -> float:
+        """Mean square of what maps shear by, up to a factor: the energy of the plate."""
+        return float(self.load @ self.stress)
 
-    def scale_cut(self, vertices: np.ndarray) -> np.ndarray:
-        """The log scale (n,) where it is 0 at the vertices (k,) of a cut, too."""
+    def spread_cut(self, vertices: np.ndarray) -> float:
+        """The spread that is left where the stress is 0 at the vertices (k,) of a cut, too."""
         if len(vertices) == 0:
-            return self.scale
-        return self.scale - self.green[:, vertices] @ np.linalg.solve(self._between(vertices), self.scale[vertices])
+            return self.spread
+        stress = self.stress[vertices]
+        return self.spread - float(stress @ np.linalg.solve(_between(self.plate, vertices), stress))
 
     def cut(self, vertices: np.ndarray) -> ScaleModel:
         """The model of the surface cut at the vertices (k,)."""
         if len(vertices) == 0:
             return self
-        root = np.linalg.cholesky(self._between(vertices))
-        share = solve_triangular(root, self.green[vertices], lower=True)
-        scale = self.scale - share.T @ solve_triangular(root, self.scale[vertices], lower=True)
-        return ScaleModel(self.green - share.T @ share, scale, self.area)
+        green, scale = _cut(self.green, self.scale, vertices)
+        plate, stress = _cut(self.plate, self.stress, vertices)
+        return ScaleModel(green, scale, plate, stress, self.load)
 
     def gain(self, vertices: np.ndarray) -> np.ndarray:
         """Fall of the spread (k,) by a cut at each of the vertices (k,) alone."""
-        columns = self.green[vertices]
-        own = np.maximum(columns[np.arange(len(vertices)), vertices], 1e-300)
-        part = self.scale[vertices] / own
-        return 2 * part * (columns @ (self.area * self.scale)) - part**2 * (columns**2 @ self.area)
+        own = np.maximum(self.plate[vertices, vertices], 1e-300)
+        return self.stress[vertices] ** 2 / own
 
-    def _between(self, vertices: np.ndarray) -> np.ndarray:
-        block = self.green[np.ix_(vertices, vertices)]
-        return block + ROUNDING * block.diagonal().max() * np.eye(len(vertices))
+
+def _inverse(matrix, free: np.ndarray, n: int) -> np.ndarray:
+    """The inverse (n,n) of a symmetric matrix on the vertices `free` (k,), 0 elsewhere."""
+    inverse = Factor(sp.csc_matrix(matrix)).solve(np.eye(len(free)))
+    whole = np.zeros((n, n))
+    whole[np.ix_(free, free)] = (inverse + inverse.T) / 2
+    return whole
+
+
+def _cut(green: np.ndarray, value: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Green's function (n,n) and the value (n,) under a load where both are 0 at the vertices (k,), too."""
+    root = np.linalg.cholesky(_between(green, vertices))
+    share = solve_triangular(root, green[vertices], lower=True)
+    value = value - share.T @ solve_triangular(root, value[vertices], lower=True)
+    return green - share.T @ share, value
+
+
+def _between(green: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """Green's function (k,k) between the vertices (k,) of a cut."""
+    block = green[np.ix_(vertices, vertices)]
+    own = block.diagonal()
+    return block + np.diag(ROUNDING * own + LEAST_ROUNDING * own.max())

@@ -44,8 +44,7 @@ class SeamSearch:
 
     Attributes
     ----------
-    spread (f,) : mean square of the log scale to be reached, of every polygon, infinite where nothing is searched; if
-        relative, a share of that of the component
+    spread (f,) : to be reached, of every polygon, see `predicted_scale.ScaleModel`; infinite where nothing is searched
     surface : whose components they are
     costs : gives what cutting its edges costs, when that is known to be needed
     density (f,) : area that polygons ask for, over their own; None for 1
@@ -56,7 +55,6 @@ class SeamSearch:
     spread: np.ndarray
     surface: Surface
     costs: Callable[[], SeamCosts]
-    relative: bool = False
     density: np.ndarray | None = None
     further: bool = False
     options: SearchOptions = field(default_factory=SearchOptions)
@@ -72,9 +70,7 @@ class SeamSearch:
         coarse = coarse_surface(component.positions, component.triangles, self.options.vertices)
         model = ScaleModel.of(coarse, self._log_density(component, coarse))
         bound = float(self.spread[component.polygons[component.polygons >= 0]].min())
-        if self.relative:
-            bound *= model.spread(model.scale)
-        elif coarse.boundary.any() and model.spread(model.scale) <= bound:
+        if coarse.boundary.any() and model.spread <= bound:
             return np.zeros(len(component.pair), dtype=bool)
         component = self._with_costs(component)
         mirror = None if base.any() else self._mirror(component)

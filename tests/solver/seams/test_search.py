@@ -31,13 +31,14 @@ def task_of(coarse, bound):
 def test_a_cut_by_green_functions_is_that_of_a_new_solve(cap):
     model, vertices = ScaleModel.of(cap), np.flatnonzero(~cap.boundary)[:12]
     cut = model.cut(vertices)
-    assert np.allclose(cut.scale, model.scale_cut(vertices), atol=1e-8)
+    assert np.isclose(cut.spread, model.spread_cut(vertices), rtol=1e-6) and cut.spread < model.spread
     assert np.abs(cut.scale[vertices]).max() < 1e-6
+    assert np.abs(cut.stress[vertices]).max() < 1e-6 * np.abs(model.stress).max()
     # Cut one after another, it is the same.
     twice = model.cut(vertices[:5]).cut(vertices[5:])
     assert np.allclose(twice.scale, cut.scale, atol=1e-6)
     one = vertices[:1]
-    assert np.isclose(model.gain(one)[0], model.spread(model.scale) - model.spread(model.scale_cut(one)), rtol=1e-6)
+    assert np.isclose(model.gain(one)[0], model.spread - model.spread_cut(one), rtol=1e-6)
 
 
 def test_a_flat_surface_has_no_scale():
@@ -79,12 +80,12 @@ def test_what_is_cut_is_one_disk(name):
 
 
 def test_seams_of_a_symmetric_body_are_symmetric():
-    V, F = meshes.icosphere(3)
+    V, F = meshes.cap(16, 32, 0.9)
     V = V * [1.0, 1.3, 1.7] + 0.3 * np.stack([0 * V[:, 0], V[:, 2] ** 2, V[:, 1] * V[:, 2]], axis=1)
-    edges = np.sort(found(V, F, 0.03).cuts.edges, axis=1)
+    edges = np.sort(found(V, F, 0.005).cuts.edges, axis=1)
     image = np.array([np.argmin(np.linalg.norm(V - p * [-1, 1, 1], axis=1)) for p in V])
     keys = set(map(tuple, edges.tolist()))
-    assert keys == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
+    assert len(keys) > 8 and keys == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
 
 
 def test_scale_does_not_matter():
