@@ -5,7 +5,7 @@ does (Springborn, Schroeder, Pinkall 2008, section 4), a flat conformal metric s
 (Ben-Chen, Gotsman, Bunin 2008, equation 5). To make areas exact, a map then has to move points within the plane, and
 what moves are conformal costs no shear: the part of u that is harmonic goes for nothing. What is left, in the mean
 square, is the energy of a clamped plate under the curvature as its load, K . stress / 2 with bilaplacian(stress) = K:
-the equation of Foeppl and von Karman for sheets that do not bend (Landau, Lifshitz, Theory of Elasticity, section 14).
+the equation of Foeppl and von Karman without bending (Landau, Lifshitz, Theory of Elasticity, section 14).
 A cut is no more than further vertices without stress, so that trials cost a small dense system each (Woodbury), and no
 map. Along a cut the plate is held but not clamped, which is the same where both sides are alike.
 """
