@@ -122,7 +122,9 @@ def write_preview(options: argparse.Namespace, pairs) -> None:
     import numpy as np
 
     from ..blender.mesh import place_of
+    from ..display.png import png_bytes
     from ..display.preview import Placed, preview
+    from ..files.verified import write_bytes
 
     # Their axes are taken as they are.
     upright = np.array(Y_TO_Z if options.input.suffix.lower() in Y_IS_UP else np.eye(3), float)
@@ -130,7 +132,7 @@ def write_preview(options: argparse.Namespace, pairs) -> None:
     for obj, reading in pairs:
         rotation, shift = place_of(obj)
         placed.append(Placed(reading, upright @ rotation, upright @ shift))
-    write_picture(options.preview, preview(placed))
+    write_bytes(options.preview, png_bytes(preview(placed)))
 
 
 def check_picture(path: Path | None) -> None:

@@ -12,8 +12,8 @@ from ..solver.maps.distortion import face_distortion
 from .colormaps import area_colours
 from .raster import Covered, cover, edge_distances
 
-# Pixels of a tile, and how many samples a pixel has along either axis.
-TILE = 320
+# Pixels of a tile, twice those of a page of many, and how many samples a pixel has along either axis.
+TILE = 240
 SAMPLES = 2
 # Cells of the checker along the texture.
 CELLS = 16

@@ -89,3 +89,14 @@ def test_a_folded_face_is_in_a_colour_of_its_own(square, package):
     folded = package("display.preview").FOLDED
     assert (np.abs(layout - folded).max(2) < 0.02).any()
     assert not (np.abs(np.split(square(), 3, axis=1)[1] - folded).max(2) < 0.02).any()
+
+
+def test_a_picture_is_read_back_from_its_bytes(package, tmp_path):
+    import bpy
+
+    picture = np.random.default_rng(0).random((7, 11, 3))
+    (tmp_path / "p.png").write_bytes(package("display.png").png_bytes(picture))
+    image = bpy.data.images.load(str(tmp_path / "p.png"))
+    image.colorspace_settings.name = "Non-Color"
+    read = np.array(image.pixels[:]).reshape(7, 11, 4)[::-1, :, :3]
+    assert np.abs(read - picture).max() <= 0.51 / 255
