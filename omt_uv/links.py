@@ -32,6 +32,7 @@ PAGES = {
     "uv.omt_overlay": "distortion",
     "uv.omt_histogram": "distortion",
     "uv.omt_measure": "distortion",
+    "object.omt_distance": "distortion",
     "uv.omt_regions": "distortion",
     "uv.omt_attributes": "distortion",
     "uv.omt_density_get": "texel_density",

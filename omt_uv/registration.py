@@ -12,6 +12,7 @@ from .operators.arranging.queue import UV_OT_omt_queue, UV_OT_omt_queue_stop
 from .operators.distortion import UV_OT_omt_histogram, UV_OT_omt_measure, UV_OT_omt_overlay
 from .operators.inspection.checker import UV_OT_omt_checker, UV_OT_omt_checker_remove
 from .operators.inspection.compare import OBJECT_OT_omt_compare
+from .operators.inspection.distance import OBJECT_OT_omt_distance
 from .operators.inspection.regions import UV_OT_omt_attributes, UV_OT_omt_regions
 from .operators.inspection.remedy import UV_OT_omt_notices, UV_OT_omt_remedy
 from .operators.inspection.worst import UV_OT_omt_worst
@@ -74,6 +75,7 @@ CLASSES = (
     UV_OT_omt_checker,
     UV_OT_omt_checker_remove,
     UV_OT_omt_worst,
+    OBJECT_OT_omt_distance,
     UV_OT_omt_regions,
     UV_OT_omt_attributes,
     UV_OT_omt_remedy,

@@ -89,8 +89,8 @@ ARROWS: dict[str, str] = {
     "commands.batches": "supervision solver batch commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display session",
-    "operators.inspection": "settings remedies solver pipelines pipelines.measuring blender blender.measuring display "
-    "session operators",
+    "operators.inspection": "settings remedies solver solver.comparison pipelines pipelines.measuring blender "
+    "blender.measuring display session operators",
     "operators.shapes": "solver solver.registration pipelines.shapes blender blender.shapes session operators",
     "operators.volumes": "solver solver.flows pipelines.volumes blender blender.volumes session operators",
     "operators.arranging": "solver pipelines pipelines.arranging blender session operators",

@@ -30,7 +30,7 @@ def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     for name, title, _ in FIGURES:
         row.operator("uv.omt_worst", text=title).figure = name
     row = layout.row(align=True)
-    row.label(text="Regions")
+    row.operator("object.omt_distance", text="Compare", icon="MOD_MESHDEFORM")
     row.operator("uv.omt_regions", text="Copy Table", icon="COPYDOWN")
     row.operator("uv.omt_attributes", text="", icon="SPREADSHEET")
     image = bpy.data.images.get(HISTOGRAM)
@@ -79,6 +79,7 @@ SECTION = Section(
         "uv.omt_histogram",
         "uv.omt_checker",
         "uv.omt_worst",
+        "object.omt_distance",
         "uv.omt_regions",
         "uv.omt_attributes",
     ),

@@ -12,7 +12,7 @@ ENTRIES: list[list[str]] = [
     ["uv.omt_stack", "uv.omt_symmetrize", "uv.omt_rectify"],
     ["uv.omt_magnify", "object.omt_weights", "object.omt_remesh", "object.omt_compare", "uv.omt_sphere"],
     ["uv.omt_checker", "uv.omt_checker_remove", "uv.omt_overlay", "uv.omt_histogram", "uv.omt_measure", "uv.omt_worst"],
-    ["uv.omt_regions", "uv.omt_attributes", "uv.omt_density_get", "uv.omt_density_set"],
+    ["object.omt_distance", "uv.omt_regions", "uv.omt_attributes", "uv.omt_density_get", "uv.omt_density_set"],
     [
         "object.omt_match",
         "object.omt_landmarks",

@@ -10,6 +10,7 @@ __getattr__, __all__ = lazy(
     __name__,
     checker="UV_OT_omt_checker UV_OT_omt_checker_remove",
     compare="OBJECT_OT_omt_compare",
+    distance="OBJECT_OT_omt_distance",
     regions="UV_OT_omt_attributes UV_OT_omt_regions",
     remedy="UV_OT_omt_remedy",
     worst="UV_OT_omt_worst",
