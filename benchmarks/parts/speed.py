@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
 import numpy as np
 from meshes import bumpy, subdivide
 from work import counted_work
 
 from benchmarks import rivals
 from benchmarks.cases import Case, available, load_case, our_uv
-from benchmarks.part import BOUNDARY, MODELS, Option, Part
+from benchmarks.part import BOUNDARY, MODELS, RUNS, Option, Part
 from benchmarks.tables import Table, missed
-from benchmarks.timing import peak_mib, timed
+from benchmarks.timing import median_of, peak_mib, timed
 from omt_uv.solver.maps.distortion import distortion
 
 FACES = Option("faces", 300_000, "the most that a surface is subdivided to", {"type": int})
@@ -20,6 +26,11 @@ ISLANDS = 1000
 ISLANDS_GOAL = 2.0  # times the time of Minimum Stretch 10
 ISLANDS_A_ROW = 40
 ISLANDS_APART = 3.0  # of squares of side 1
+DRAFT_GOAL = 0.4  # times the time of Standard
+DRAFT_AREAS = 0.05
+DRAFTED = ("lion", "face", "max_planck", "bunny")
+STARTUP_GOAL = 1.5  # times the time of importing Blender
+STARTUP_SIDE = 22  # squares along a side: 968 triangles
 
 
 def counts_table(args) -> Table:
@@ -106,10 +117,69 @@ def islands_table(args) -> Table:
     return table
 
 
+def draft_table(args) -> Table:
+    """Draft beside Standard: its areas, its folds, and its share of the time."""
+    table = Table(
+        "Draft beside Standard; ratio = time / time of Standard",
+        {"model": 15, "faces": 8, "boundary": 8, "preset": 9, "area_l1": 9, "angle_mean": 10, "folds": 5, "time": 8}
+        | {"ratio": 7, "missed goals": 20},
+    )
+    for case in map(load_case, args.models or available(DRAFTED)):
+        for boundary in args.boundaries:
+            unit = None
+            for preset in ("standard", "draft"):
+                (uv, _), seconds = median_of(args.runs, lambda c=case, b=boundary, p=preset: our_uv(c, b, p))
+                figures, unit = _figures(case, uv), unit or seconds
+                goals = {} if preset == "standard" else _draft_goals(figures, seconds / unit)
+                head = {"model": case.name, "faces": len(case.F), "boundary": boundary, "preset": preset}
+                table.add(**head, **figures, time=seconds, ratio=seconds / unit, **missed(**goals))
+    return table
+
+
+def _draft_goals(figures, ratio):
+    """The goals of a draft by name, each with whether it is missed."""
+    return {
+        "time": ratio > DRAFT_GOAL,
+        "areas": figures["area_l1"] > DRAFT_AREAS,
+        "folds": figures["folds"] > 0,
+    }
+
+
+def startup_table(args) -> Table:
+    """The command line on a small file, parent and child, beside importing Blender alone."""
+    table = Table(
+        "Processor seconds of whole processes; ratio = time / time of importing Blender",
+        {"command": 30, "time": 8, "ratio": 7, "missed goals": 20},
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        source, out = Path(folder) / "in.obj", Path(folder) / "out.obj"
+        V, F = bumpy(STARTUP_SIDE, STARTUP_SIDE, height=0.3)
+        lines = ["v {} {} {}".format(*v) for v in V] + ["f {} {} {}".format(*(f + 1)) for f in F]
+        source.write_text("\n".join(lines) + "\n")
+        words = ["-m", "omt_uv", "unwrap", str(source), "-o", str(out)]
+        commands = {"import bpy": ["-c", "import bpy"], "unwrap --max-shear 0": [*words, "--max-shear", "0"]}
+        unit = None
+        for name, command in (commands | {"unwrap": words}).items():
+            seconds = sorted(_child_seconds([sys.executable, *command]) for _ in range(args.runs))[args.runs // 2]
+            unit = unit or seconds
+            table.add(command=name, time=seconds, ratio=seconds / unit, **missed(time=seconds > STARTUP_GOAL * unit))
+    return table
+
+
+def _child_seconds(command: list[str]) -> float:
+    """Processor seconds of a command and its children."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=True, capture_output=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 PARTS = (
     Part("counts", "Newton steps, factorisations and nonzeros of an unwrap: the same on every machine", counts_table,
          (MODELS, BOUNDARY)),
     Part("growth", "time of the same surface, subdivided again and again, and the exponent", growth_table,
          (MODELS, FACES)),
+    Part("draft", "Draft beside Standard: areas, folds, and share of the time", draft_table, (MODELS, BOUNDARY, RUNS)),
+    Part("startup", "the command line on a small file beside importing Blender", startup_table, (RUNS,)),
     Part("islands", "a thousand small islands against Minimum Stretch", islands_table),
 )  # fmt: skip

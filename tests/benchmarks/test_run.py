@@ -42,7 +42,7 @@ def test_what_no_part_can_use_is_refused(words, complaint, capsys):
 
 
 def test_counts_are_those_of_the_report_and_the_same_again(capsys):
-    args, (part,) = run.parse(["counts", "--models", "cone", "--boundaries", "free"])
+    args, (part,) = run.parse(["counts", "--models", "cone", "--boundaries", "disk"])
     first, again = part.table(args), part.table(args)
     assert first.rows == again.rows
     (row,) = first.rows

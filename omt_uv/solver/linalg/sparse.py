@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, cg, splu
+from scipy.sparse.linalg import splu
 
 from ..errors import PrecisionError
 
@@ -111,8 +111,22 @@ def conjugate_gradients(
 ) -> np.ndarray:
     """Solve A x = b (n,) by conjugate gradients, A symmetric positive definite, given by `times`, x to A x, and close
     to the matrix with this `inverse`."""
-    A = LinearOperator(shape=inverse.shape, matvec=times, dtype=float)
-    x, _ = cg(A, b, rtol=tolerance, maxiter=most, M=inverse)
+    # scipy's own takes as long again for its checks of every product of small systems.
+    x, residual = np.zeros(len(b)), np.array(b, float)
+    goal = tolerance * np.linalg.norm(residual)
+    if goal == 0:
+        return x
+    direction, power = np.zeros(len(b)), np.inf
+    for _ in range(most):
+        z = inverse @ residual
+        power, before = residual @ z, power
+        direction = z + (power / before) * direction
+        image = times(direction)
+        step = power / (direction @ image)
+        x += step * direction
+        residual -= step * image
+        if np.linalg.norm(residual) <= goal:
+            break
     return x
 
 

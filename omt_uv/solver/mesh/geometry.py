@@ -45,8 +45,8 @@ def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray
 
 def face_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unsigned area of every triangle, (m,), of positions (n,3)."""
-    p = positions[triangles]
-    return 0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    x, y, z = _double_areas(positions, triangles)
+    return 0.5 * np.sqrt(x * x + y * y + z * z)
 
 
 def unit(v: np.ndarray) -> np.ndarray:

@@ -113,7 +113,8 @@ def map_chart(
     density = None if target is None else target.density
     vertices, unit = in_unit_box(chart.vertices)
     disk = _disk_mesh(vertices, chart, options.boundary, target, log)
-    draft = options.quality == "draft" and options.balance == 0 and target is None and pins is None
+    plain = target is None and pins is None
+    draft = options.quality == "draft" and options.balance == 0 and plain
     initial = yield from part_of(_initial_map(disk, options.balance, log, draft), *INITIAL)
     with log.timed("refinement"):
         start, places = mirrored_to_pins(initial.uv, pins)
@@ -126,7 +127,7 @@ def map_chart(
         )
         given = {"target": None if target is None else disk.target, "region": disk.region, "pins": places}
         given["polygons"] = disk.polygons
-        refined = good_enough(disk, start) if draft else None
+        refined = good_enough(disk, start, draft) if plain else None
         if refined is None:
             refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
         # Centres of polygons were there for the map alone.

@@ -57,6 +57,8 @@ DIRECT_FAR = 20000
 # A disk whose log scale spreads less than this over the surface, flattened with the boundary as it comes, is as near to
 # the map looked for as the transport would bring it.
 LITTLE_SPREAD = 0.5
+# Energy below which a map is an isometry, but for rounding, and nothing is left to refine.
+ISOMETRY = 1e-8
 # Drafts of charts with more vertices than this come by way of a coarser mesh, unless their log scale spreads less.
 DRAFT_ABOVE = 600
 DRAFT_COARSE_ABOVE = 2000
@@ -223,12 +225,15 @@ def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
     return (yield from initial_map(disk, log)) if flat is None else flat
 
 
-def good_enough(disk: DiskMesh, uv: np.ndarray) -> Refinement | None:
-    """An initial map uv (n,2) as the result, if its areas are a draft's, no face folds and nothing covers itself."""
+def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool) -> Refinement | None:
+    """An initial map uv (n,2) as the result, if no face folds and nothing covers itself, and it is an isometry; for a
+    draft it only needs to have a draft's areas."""
     faces = polygon_elements(disk.vertices, disk.triangles, disk.target, disk.polygons, disk.region)
     w = uv @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / np.abs(faces.areas(w).sum()))
     value, error = energy(faces, w, SMOOTH_WEIGHT_FAR), area_error(faces, w)
+    if not draft and (disk.boundary != "free" or not value < ISOMETRY):
+        return None
     if not np.isfinite(value) or error > QUALITIES["draft"].area_error or covers_itself(w, disk.loop):
         return None
     return Refinement(

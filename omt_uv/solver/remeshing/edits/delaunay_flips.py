@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...mesh.edge_flips import flip_in_place, flip_until_none
-from ...mesh.geometry import unit
+from ...mesh.geometry import face_normals
 from ...mesh.topology import halfedges, pair_keys, previous_halfedge, twins
 
 # Cosine by which the new faces of a flip may lean against the old ones at most.
@@ -110,9 +110,10 @@ def _cotangents(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def _unfolded(points, i, j, k, far) -> np.ndarray:
     """Whether the faces i, far, k and j, k, far look the same way as i, j, k and j, i, far, (e,) bool."""
-    a, b, c, d = points[i], points[j], points[k], points[far]
-    old = unit(np.cross(b - a, c - a)) + unit(np.cross(a - b, d - b))
-    first, second = unit(np.cross(d - a, c - a)), unit(np.cross(c - b, d - b))
+    given, other, first, second = (
+        face_normals(points, np.column_stack(corners)) for corners in ((i, j, k), (j, i, far), (i, far, k), (j, k, far))
+    )
+    old = given + other
     reach = MIN_COSINE * np.sqrt(np.einsum("ij,ij->i", old, old))
     ahead = (np.einsum("ij,ij->i", old, first) > reach) & (np.einsum("ij,ij->i", old, second) > reach)
     return ahead & (np.einsum("ij,ij->i", first, second) > MIN_COSINE_BETWEEN)
