@@ -82,3 +82,12 @@ def test_warnings_count_and_tell_what_was_there_before():
     one, two = Gate(9, 1, 0.0).warnings(), Gate(9, 3, 0.25).warnings(Gate(9, 3, 0.1))
     assert one == ("1 face is folded in the UVs",)
     assert two == ("3 faces are folded in the UVs, as before", "25 % of the UV area is under several faces")
+
+
+@pytest.mark.parametrize("folds, old_folds", [(1, 0), (3, 2), (2, 2), (2, 5)])
+@pytest.mark.parametrize("overlap, old_overlap", [(0.3, 0.1), (0.3, 0.3), (0.1, 0.3)])
+def test_only_what_has_not_grown_is_as_before(folds, old_folds, overlap, old_overlap):
+    told = Gate(9, folds, overlap).warnings(Gate(9, old_folds, old_overlap))
+    assert [text.endswith(", as before") for text in told] == [folds <= old_folds, overlap <= old_overlap]
+    assert told[0].startswith("1 face is" if folds == 1 else f"{folds} faces are")
+    assert not any("before" in text for text in Gate(9, folds, overlap).warnings())

@@ -55,6 +55,9 @@ def test_islands_that_grew_into_each_other_are_told():
     assert grown_together(apart) == "" and grown_together(apart[:1]) == ""
     moved = [apart[0], PlacedIsland(owner=0, chart=apart[1].chart, uv=apart[1].uv - (1.5, 0), before=apart[1].uv)]
     assert "Islands grew into each other, by 50." in grown_together(moved)
+    # What lay on one another before has not grown.
+    there = [PlacedIsland(owner=0, chart=i.chart, uv=i.uv, before=i.uv) for i in moved]
+    assert grown_together(there) == ""
 
 
 def test_a_refusal_is_what_a_user_can_mend_and_names_the_surface():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from readings import reading, together
 
-from omt_uv.pipelines.texel_density import Texels, texel_density, with_texel_density
+from omt_uv.pipelines.texel_density import Texels, beyond_tile, texel_density, with_texel_density
 from omt_uv.solver.errors import EmptyMeshError, ZeroAreaFaceError
 
 TEXELS = Texels(1024)
@@ -16,6 +16,16 @@ def two_squares():
     V, F = together(meshes.grid(2, 2), meshes.grid(2, 2))
     uv = V[:, :2] * np.repeat([0.25, 0.5], 9)[:, None] + np.repeat([0.0, 0.5], 9)[:, None]
     return V, F, uv
+
+
+@pytest.mark.parametrize("tile", [(0, 0), (3, 1), (-1, 2)])
+@pytest.mark.parametrize(
+    "side, far", [((0.3, 0), 0.3), ((-0.3, 0), 0.3), ((0, 0.2), 0.2), ((0, -0.2), 0.2), ((0, 0), 0)]
+)
+def test_what_reaches_beyond_its_tile_is_told_on_every_side(tile, side, far):
+    uv = np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.5]])
+    uv = np.concatenate([uv, [[0.5, 0.5] + 1.0 * np.array(side) + 0.5 * np.sign(side)]]) + tile
+    assert beyond_tile(uv) == pytest.approx(far)
 
 
 def test_a_unit_square_has_the_pixels_of_the_texture_in_every_unit():
