@@ -35,6 +35,7 @@ from .operators.texel_density import UV_OT_omt_density_get, UV_OT_omt_density_se
 from .operators.unwrap import UV_OT_omt_unwrap
 from .operators.volumes.flow import OBJECT_OT_omt_flow
 from .operators.volumes.uv_flow import UV_OT_omt_flow
+from .operators.volumes.volume import OBJECT_OT_omt_volume
 from .operators.weights import OBJECT_OT_omt_weights
 from .panels import keymap
 from .panels.menus import UV_MT_omt, draw_menu, draw_remesh, menus, remesh_menus
@@ -63,6 +64,7 @@ CLASSES = (
     OBJECT_OT_omt_strain,
     OBJECT_OT_omt_flow,
     UV_OT_omt_flow,
+    OBJECT_OT_omt_volume,
     UV_OT_omt_overlay,
     UV_OT_omt_histogram,
     UV_OT_omt_density_get,

@@ -33,6 +33,7 @@ SECTIONS = (
     tools.SPHERE,
     match.SECTION,
     volumes.FLOW,
+    volumes.VOLUME,
 )
 
 

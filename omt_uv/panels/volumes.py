@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import bpy
 
+from ..operators.volumes.volume import is_available
 from .section import Section, big_button, class_of, draw_settings, settings_of
 
 OBJECT_FLOW = "object.omt_flow"
 UV_FLOW = "uv.omt_flow"
+MAP_VOLUME = "object.omt_volume"
 
 
 def _draw_flow(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -20,3 +22,13 @@ def _draw_flow(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 FLOW = Section("flow", "Move Incompressibly", _draw_flow, (OBJECT_FLOW, UV_FLOW))
+
+
+def _draw_volume(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    if not is_available():
+        layout.label(text="Needs TetGen: python -m pip install tetgen", icon="INFO")
+    draw_settings(layout.column(), MAP_VOLUME, settings_of(context, MAP_VOLUME))
+    big_button(layout, MAP_VOLUME, "MESH_ICOSPHERE")
+
+
+VOLUME = Section("volume", "Volume", _draw_volume, (MAP_VOLUME,))

@@ -14,7 +14,7 @@ READ_ONLY = ("measure", "compare", "remesh")
 MORE = {"magnify": ["--weights", "region", "--factor", "2"], "remesh": ["--vertices", "40"],
         "weights": ["--kind", "gaussian"]}  # fmt: skip
 # Commands on bodies, whose reports have no charts: tests of their own look at these.
-BODIES = ("flow",)
+BODIES = ("flow", "volume")
 # Commands on two files or a folder: tests/commands/shapes has theirs.
 SHAPES = ("match", "average")
 
@@ -31,6 +31,8 @@ def arguments(name, folder, target="out.blend"):
     nothing: dict = {"measure": [], "compare": [folder / "in.blend"]}
     output = nothing.get(name, ["-o", folder / target])
     output += ["--quality", "draft"] if name in ("unwrap", "refine", "magnify", "sphere") else []
+    if name == "volume":
+        output += ["--tets", "200"]
     if name == "flow":
         (folder / "h.json").write_text('[{"vertices": [0], "move": [0, 0, 0.1]}]')
         output += ["--handles", folder / "h.json"]

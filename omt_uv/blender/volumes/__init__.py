@@ -1,6 +1,6 @@
 """Bodies in the world, handles of flows, and tetrahedra in and out of Blender.
 
-Imports blender, pipelines.volumes, solver and errors.
+Imports blender, pipelines.volumes, solver.flows, solver.volumes and errors.
 Main names: read_body, write_frames, scene_handles, wall_of.
 """
 
@@ -10,4 +10,5 @@ __getattr__, __all__ = lazy(
     __name__,
     bodies="read_body write_frames write_positions",
     flow_handles="grip scene_handles wall_of",
+    tet_objects="point_object read_volume_body shell_objects slice_object tet_object",
 )

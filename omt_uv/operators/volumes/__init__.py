@@ -10,5 +10,6 @@ __getattr__, __all__ = lazy(
     __name__,
     drag="FlowDrag UVDrag",
     flow="OBJECT_OT_omt_flow",
+    volume="OBJECT_OT_omt_volume",
     uv_flow="UV_OT_omt_flow",
 )

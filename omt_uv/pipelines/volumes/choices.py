@@ -27,3 +27,25 @@ DEFAULT_RADIUS = 0.2
 DEFAULT_PATH = "RIGID"
 # How many chords a curved path has.
 DEFAULT_SAMPLES = 32
+VOLUME_DOMAINS = (
+    ("BALL", "Ball", "The unit ball: every part gets its share of the volume"),
+    ("CUBE", "Cube", "The cube from -1 to 1"),
+    ("BODY", "Body", "The inside of another closed mesh, by way of the ball"),
+)
+VOLUME_METHODS = (
+    ("NEWTON", "Newton", "Volumes exact around every vertex, nothing inverted"),
+    ("FLOW", "Flow", "The flow of Hu, Zou and Hua, for comparison: it inverts some tetrahedra"),
+)
+VOLUME_RESULTS = (
+    ("TETS", "Tetrahedra", "A new object of all tetrahedra, with places in the domain as an attribute"),
+    ("SHELLS", "Shells", "New objects that divide the body into parts of equal volume, like the skins of an onion"),
+    ("POINTS", "Points", "A new object of points inside, evenly dense"),
+    ("SLICE", "Slice", "A new object that cuts the body, coloured by how much the map dilates"),
+    ("ATTRIBUTE", "Attribute", "Places in the domain as an attribute of the mesh itself"),
+)
+AXES = (
+    ("X", "X", "Across the X axis"),
+    ("Y", "Y", "Across the Y axis"),
+    ("Z", "Z", "Across the Z axis"),
+)
+DEFAULT_TETS = 40_000

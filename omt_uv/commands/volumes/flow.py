@@ -6,11 +6,11 @@ import argparse
 import json
 from pathlib import Path
 
-from .. import __version__
-from ..pipelines.volumes.choices import DEFAULT_PATH, DEFAULT_RADIUS, DEFAULT_SAMPLES, FLOW_PATHS
-from .common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn
-from .options import add_files, names, positive
-from .selection import read_file
+from ... import __version__
+from ...pipelines.volumes.choices import DEFAULT_PATH, DEFAULT_RADIUS, DEFAULT_SAMPLES, FLOW_PATHS
+from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn
+from ..options import add_files, names, positive
+from ..selection import read_file
 
 # The ball around everything is so much larger, or nothing on it could move.
 ROOM = 1.1
@@ -18,7 +18,7 @@ ROOM = 1.1
 
 def add(commands) -> None:
     command = commands.add_parser("flow", help="move parts of bodies; the rest flows along, and volumes stay")
-    command.set_defaults(run=run)
+    command.set_defaults(run=run_flow)
     add_files(command)
     command.add_argument("--handles", type=Path, metavar="H.json", required=True, help="what moves, and where to")
     reach = command.add_mutually_exclusive_group()
@@ -46,11 +46,12 @@ def _count(text: str) -> int:
     return value
 
 
-def run(options: argparse.Namespace) -> None:
+def run_flow(options: argparse.Namespace) -> None:
+    """Carry out the command flow."""
     require_blender()
-    from ..blender.volumes.bodies import write_frames, write_positions
-    from ..files.saving import save
-    from ..pipelines.volumes.handle_file import read_handle_file
+    from ...blender.volumes.bodies import write_frames, write_positions
+    from ...files.saving import save
+    from ...pipelines.volumes.handle_file import read_handle_file
 
     keyed = options.shape_key or options.frames > 1
     if keyed and options.output.suffix.lower() not in (".blend", ".glb", ".fbx"):
@@ -75,10 +76,10 @@ def run(options: argparse.Namespace) -> None:
 
 def _flow(options: argparse.Namespace, file, objects: list):
     """The FlowResult of objects with the handles of a file."""
-    from ..blender.volumes.bodies import check_keep, members, read_body
-    from ..pipelines.volumes.flow import FlowJob, flow_bodies
-    from ..pipelines.volumes.handle_file import handles_of
-    from ..solver.flows.options import FlowOptions
+    from ...blender.volumes.bodies import check_keep, members, read_body
+    from ...pipelines.volumes.flow import FlowJob, flow_bodies
+    from ...pipelines.volumes.handle_file import handles_of
+    from ...solver.flows.options import FlowOptions
 
     keep = options.keep or (file.keep[0] if file.keep else "")
     bodies = tuple(read_body(obj, keep) for obj in objects)
@@ -90,7 +91,7 @@ def _flow(options: argparse.Namespace, file, objects: list):
 
 
 def _report(options: argparse.Namespace, objects: list, found, told: list[str]) -> None:
-    from ..files.verified import write_text
+    from ...files.verified import write_text
 
     report = {
         "version": __version__,
@@ -112,12 +113,12 @@ def _domain(options: argparse.Namespace, bodies):
     if not options.inside:
         return None
     if options.inside != "ball":
-        from ..blender.volumes.flow_handles import wall_of
+        from ...blender.volumes.flow_handles import wall_of
 
         return wall_of("mesh", options.inside)
     import numpy as np
 
-    from ..solver.flows.domain import ball_domain
+    from ...solver.flows.domain import ball_domain
 
     points = np.concatenate([body.positions for body in bodies])
     middle = (points.max(axis=0) + points.min(axis=0)) / 2

@@ -1,0 +1,86 @@
+"""Map insides of bodies, and make of them what artists use: the one path of object.omt_volume and the command
+volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...solver.errors import HandleError
+from ...solver.progress import Steps, part_of
+from ...solver.volumes.body_map import VolumeMap, into_body, volume_map
+from ...solver.volumes.registration import registered
+from ...solver.volumes.slices import dilation
+
+BODY = "body"
+
+
+@dataclass(frozen=True)
+class VolumeBody:
+    """Positions (n,3) and triangles (m,3) of a closed body, and vertices (k,) of its landmarks by their names."""
+
+    name: str
+    positions: np.ndarray
+    triangles: np.ndarray
+    landmarks: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class VolumeSettings:
+    """domain: "ball", "cube" or "body"; method: "newton" or "flow"; count: tetrahedra, about."""
+
+    domain: str = "ball"
+    method: str = "newton"
+    count: int = 40_000
+
+
+@dataclass(frozen=True)
+class MappedVolume:
+    """A map of the inside; ball: positions (n,3) in the ball, where the domain is another body, or the map itself."""
+
+    map: VolumeMap
+    ball: np.ndarray
+
+    def report(self) -> dict[str, float | int | str]:
+        """Figures for a report."""
+        logs = dilation(self.map.points, self.map.positions, self.map.tets)
+        histogram, _ = np.histogram(logs, np.linspace(-2, 2, 41))
+        return {
+            "domain": self.map.domain,
+            "points": len(self.map.points),
+            "tetrahedra": len(self.map.tets),
+            "inverted": self.map.inverted,
+            "share_error": self.map.shares,
+            "vertex_share_error": self.map.around_vertices,
+            "steps": self.map.steps,
+            "log2_dilation_histogram": histogram.tolist(),
+        }
+
+
+def mapped_volume(body: VolumeBody, settings: VolumeSettings, other: VolumeBody | None = None) -> Steps[MappedVolume]:
+    """Map the inside of a body; to the other one where the domain is "body", landmarks of one name onto one another.
+
+    Raises
+    ------
+    MeshError : those of `solver.volumes.volume_map`; elements are vertices, edges and triangles of the body
+    HandleError : the domain is "body", and there is none, or landmarks contradict each other
+    """
+    domain = "ball" if settings.domain == BODY else settings.domain
+    width = 0.4 if settings.domain == BODY else 1.0
+    steps = volume_map(body.positions, body.triangles, domain, settings.method, settings.count)
+    first = yield from part_of(steps, 0.0, width)
+    if settings.domain != BODY:
+        return MappedVolume(first, first.positions)
+    if other is None:
+        raise HandleError("There is no other body to map to", "Choose one")
+    steps = volume_map(other.positions, other.triangles, "ball", settings.method, settings.count)
+    second = yield from part_of(steps, width, width)
+    placed = None
+    names = sorted(body.landmarks.keys() & other.landmarks.keys())
+    if len(names) >= 3:
+        mine = np.stack([first.positions[body.landmarks[name]].mean(axis=0) for name in names])
+        theirs = np.stack([second.positions[other.landmarks[name]].mean(axis=0) for name in names])
+        found = yield from part_of(registered(first.positions, mine, theirs), 2 * width, 1 - 2 * width)
+        placed = found.positions
+    return MappedVolume(into_body(first, second, placed), first.positions if placed is None else placed)

@@ -1,0 +1,175 @@
+"""Map the inside of a body to a ball or a cube, volume by volume (Hu, Zou, Hua 2014, sections 3 and 4).
+
+The boundary goes by the area-preserving map of the sphere, the inside follows harmonically; what is inverted is
+untangled, and the volumes are made exact by Newton's method (`tet_newton`). The paper's flow is a method of its own
+(`paper_flow`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import TetrahedraError
+from ..flows.paths import rotation_between
+from ..linalg.sparse import Factor
+from ..mesh.closed_surface import closed_surface
+from ..progress import Progress, Steps, part_of
+from ..sphere.sphere_map import sphere_map
+from .domains import BALL, CUBE, DOMAINS, BallDomain, CubeDomain, cube_points
+from .meshing import TetMesh, tetrahedra
+from .paper_flow import paper_flow
+from .tet_mesh import graph_laplacian, share_error, stiffness, tet_volumes, vertex_share_error
+from .tet_newton import inverted, refined, tet_problem, untangled
+from .transfer import TetLocation
+
+NEWTON = "newton"
+FLOW = "flow"
+METHODS = (NEWTON, FLOW)
+# Least weight of an edge, relative to the mean of their sizes: where cotangents are negative.
+POSITIVE = 1e-3
+# What volumes around vertices may be off, summed up.
+TOLERANCE = 5e-3
+
+
+@dataclass(frozen=True)
+class VolumeMap:
+    """Points (n,3) of tetrahedra (m,4) of a body, and their positions (n,3) in the domain.
+
+    The first points are the vertices of the surface. shares: sum of abs(share of the volume there - here) over
+    tetrahedra,
+    around_vertices: over what lies around vertices, a quarter of each tetrahedron there; inverted: tetrahedra
+    """
+
+    points: np.ndarray
+    tets: np.ndarray
+    positions: np.ndarray
+    domain: str
+    shares: float
+    around_vertices: float
+    inverted: int
+    steps: int
+    warnings: tuple[str, ...]
+
+
+def volume_map(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    domain: str = BALL,
+    method: str = NEWTON,
+    count: int = 40_000,
+    mesh: TetMesh | None = None,
+) -> Steps[VolumeMap]:
+    """Map the inside of a closed surface (n,3), (m,3) without handles to the unit ball, or the cube from -1 to 1.
+
+    Parameters
+    ----------
+    domain : "ball" or "cube"; method : "newton", or "flow", the paper's
+    count : tetrahedra, about; mesh : those to take instead
+
+    Raises
+    ------
+    MeshError : see `closed_surface.closed_surface`; LibraryError, SelfIntersectionError, TetrahedraError
+    ValueError : an unknown domain or method
+
+    References
+    ----------
+    Hu, Zou, Hua 2014; Garanzha et al. 2021; Smith, de Goes, Kim 2019; Bonet, Burton 1998
+    """
+    if domain not in DOMAINS or method not in METHODS:
+        raise ValueError(f"domain must be one of {', '.join(DOMAINS)}, method one of {', '.join(METHODS)}")
+    vertices, triangles = np.asarray(vertices, float), np.asarray(triangles, np.int64)
+    surface = closed_surface(vertices, triangles)
+    outwards = _outwards(surface.vertices, triangles)
+    yield Progress("Tetrahedra", 0.0)
+    if mesh is None:
+        mesh = tetrahedra(surface.vertices, outwards, count)
+    sphere = yield from part_of(sphere_map(surface.vertices, outwards), 0.05, 0.15)
+    aligned = _aligned(sphere.positions, surface.vertices)
+    positions, steps = yield from _mapped(mesh, aligned, domain, method)
+    target = tet_volumes(mesh.points, mesh.tets)
+    count_inverted = inverted(positions, mesh.tets)
+    points = mesh.points * surface.extent + _middle(vertices)
+    points[: len(vertices)] = vertices
+    warnings = [*surface.warnings, *sphere.warnings]
+    if count_inverted:
+        warnings.append(f"{count_inverted} tetrahedra are inverted in the map; the method newton has none")
+    return VolumeMap(
+        points=points,
+        tets=mesh.tets,
+        positions=positions,
+        domain=domain,
+        shares=share_error(positions, mesh.tets, target),
+        around_vertices=vertex_share_error(positions, mesh.tets, target),
+        inverted=count_inverted,
+        steps=steps,
+        warnings=tuple(warnings),
+    )
+
+
+def _middle(vertices: np.ndarray) -> np.ndarray:
+    """The middle (3,) of the box around vertices (n,3)."""
+    return vertices.min(axis=0) / 2 + vertices.max(axis=0) / 2
+
+
+def _outwards(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Triangles (m,3) that look outwards."""
+    corner = vertices[triangles]
+    inside = np.einsum("mi,mi->m", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum() < 0
+    return triangles[:, ::-1] if inside else triangles
+
+
+def _aligned(sphere: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """Unit vectors (n,3) turned so that they lie on the sides where vertices (n,3) do."""
+    return sphere @ rotation_between(sphere, vertices).T
+
+
+def harmonic(mesh: TetMesh, boundary: np.ndarray) -> np.ndarray:
+    """Positions (n,3) with the first (b,3) given and the others the means of their neighbours, with positive
+    weights."""
+    weights = stiffness(mesh.points, mesh.tets)
+    weights = np.maximum(weights, POSITIVE * np.abs(weights).mean())
+    matrix = sp.csr_matrix(graph_laplacian(mesh.tets, weights, len(mesh.points)))
+    b = len(boundary)
+    inner = Factor(matrix[b:][:, b:]).solve(-(matrix[b:][:, :b] @ boundary))
+    return np.concatenate([boundary, inner])
+
+
+def _mapped(mesh: TetMesh, sphere: np.ndarray, domain: str, method: str) -> Steps[tuple[np.ndarray, int]]:
+    """Positions (n,3) of a mesh whose boundary goes to unit vectors (b,3), and steps."""
+    b = np.arange(len(sphere))
+    if domain == CUBE:
+        start = harmonic(mesh, cube_points(sphere))
+        kind: BallDomain | CubeDomain = CubeDomain(b, np.abs(sphere).argmax(axis=1))
+    else:
+        start, kind = harmonic(mesh, sphere), BallDomain(b)
+    yield Progress("Harmonic map", 0.2)
+    if method == FLOW:
+        found = yield from part_of(paper_flow(mesh.points, mesh.tets, start, kind), 0.2, 0.8)
+        return found.positions, len(found.errors) - 1
+    problem = tet_problem(mesh.points, mesh.tets, kind)
+    free = yield from part_of(untangled(problem, start), 0.2, 0.3)
+    if inverted(free, mesh.tets):
+        raise TetrahedraError("Tetrahedra stay inverted in the map")
+    return (yield from part_of(refined(problem, free, TOLERANCE), 0.5, 0.5))
+
+
+def into_body(first: VolumeMap, other: VolumeMap, placed: np.ndarray | None = None) -> VolumeMap:
+    """The inside of the first body in the other one: through the ball, where both are; `placed` (n,3) instead of the
+    first one's positions there, as after a registration."""
+    at = first.positions if placed is None else placed
+    positions = TetLocation(other.positions, other.tets).values(at, other.points)
+    target = tet_volumes(first.points, first.tets)
+    count = inverted(positions, first.tets)
+    told = (f"{count} of {len(first.tets)} tetrahedra are inverted where they lie between those of the other body",)
+    return replace(
+        first,
+        positions=positions,
+        domain="body",
+        shares=share_error(positions, first.tets, target),
+        around_vertices=vertex_share_error(positions, first.tets, target),
+        inverted=count,
+        warnings=(*first.warnings, *other.warnings, *(told if count else ())),
+    )

@@ -1,0 +1,82 @@
+"""object.omt_volume: tetrahedra, shells, points, slices and attributes; undo and bad input."""
+
+from __future__ import annotations
+
+import sys
+
+import bpy
+
+import numpy as np
+import pytest
+import scenes
+from bodies import icosphere, limbed
+
+from omt_uv.solver.flows.enclosed_volume import component_volumes
+
+
+def body(name="Body"):
+    obj = scenes.add(*limbed(2), name)
+    obj.scale = (2, 2, 2)
+    bpy.context.view_layer.update()
+    return obj
+
+
+def arrays(obj):
+    mesh = obj.data
+    points = np.zeros(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", points)
+    return points.reshape(-1, 3).astype(float), np.array([p.vertices[:] for p in mesh.polygons])
+
+
+def test_every_result_is_made(package):
+    obj = body()
+    V, F = limbed(2)
+    whole = 8 * component_volumes(V, F)[0][0]
+    few = {"tets": 1200}
+    before = scenes.state(obj) if hasattr(scenes, "state") else None
+    assert bpy.ops.object.omt_volume(result="SHELLS", shells=1, **few) == {"FINISHED"}
+    shell = bpy.data.objects["Body Shell 1"]
+    assert component_volumes(*arrays(shell))[0].sum() == pytest.approx(whole / 2, rel=1e-3)
+    assert bpy.context.view_layer.objects.active == shell
+    scenes.select([obj])
+    assert bpy.ops.object.omt_volume(result="POINTS", points=500, **few) == {"FINISHED"}
+    assert len(bpy.data.objects["Body Points"].data.vertices) == 500
+    scenes.select([obj])
+    assert bpy.ops.object.omt_volume(result="SLICE", axis="Z", **few) == {"FINISHED"}
+    cut = bpy.data.objects["Body Slice"].data
+    assert "OMT Dilation" in cut.attributes and cut.color_attributes
+    scenes.select([obj])
+    assert bpy.ops.object.omt_volume(result="TETS", **few) == {"FINISHED"}
+    tets = bpy.data.objects["Body Tetrahedra"].data
+    places = np.zeros(3 * len(tets.vertices), np.float32)
+    tets.attributes["OMT Ball"].data.foreach_get("vector", places)
+    radius = np.linalg.norm(places.reshape(-1, 3), axis=1)
+    np.testing.assert_allclose(radius[: len(V)], 1, atol=1e-6)
+    assert radius.max() < 1 + 1e-6 and len(tets.polygons) > 2000
+    assert "OMT Ball" not in obj.data.attributes and before == (scenes.state(obj) if before else None)
+
+
+def test_the_attribute_is_undone_in_one_step():
+    obj = body()
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.object.omt_volume(result="ATTRIBUTE", tets=1000, domain="CUBE") == {"FINISHED"}
+    assert "OMT Ball" in obj.data.attributes
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    assert "OMT Ball" not in bpy.data.objects["Body"].data.attributes
+
+
+def test_bad_bodies_are_named_and_nothing_is_made(monkeypatch):
+    V, F = icosphere(2)
+    scenes.add(V, F[1:], "Open")
+    count = len(bpy.data.objects)
+    assert "Open: The surface is not closed" in scenes.error_of(bpy.ops.object.omt_volume, tets=500)
+    pushed = V.copy()
+    pushed[V[:, 2].argmax()] = [0.1, 0.2, -1.5]
+    scenes.select([scenes.add(pushed, F, "Pushed")])
+    assert "pass through one another" in scenes.error_of(bpy.ops.object.omt_volume, tets=500)
+    assert "no mesh ''" in scenes.error_of(bpy.ops.object.omt_volume, domain="BODY")
+    monkeypatch.setitem(sys.modules, "tetgen", None)
+    scenes.select([scenes.add(V, F, "Ball")])
+    assert "pip install tetgen" in scenes.error_of(bpy.ops.object.omt_volume, tets=500)
+    assert len(bpy.data.objects) == count + 2

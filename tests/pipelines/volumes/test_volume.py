@@ -1,0 +1,42 @@
+"""Insides of bodies, by way of the ball into one another; and files of tetrahedra."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from bodies import icosphere, limbed
+
+from omt_uv.pipelines.volumes.volume import VolumeBody, VolumeSettings, mapped_volume
+from omt_uv.pipelines.volumes.vtu import vtu_text
+from omt_uv.solver.errors import HandleError
+from omt_uv.solver.progress import drain
+
+
+def test_a_body_goes_into_another_with_its_landmarks():
+    V, F = icosphere(2)
+    W, G = limbed(2)
+    rows = {f"LM_{k}": np.array([r]) for k, r in enumerate((0, 30, 60, 90))}
+    one, other = VolumeBody("one", V, F, rows), VolumeBody("other", W, G, rows)
+    settings = VolumeSettings("body", count=1200)
+    found = drain(mapped_volume(one, settings, other))
+    assert found.map.domain == "body" and len(found.map.positions) == len(found.map.points)
+    for (row,) in rows.values():
+        assert np.linalg.norm(found.map.positions[row] - W[row]) < 0.25
+    assert (np.linalg.norm(found.map.positions, axis=1) <= np.linalg.norm(W, axis=1).max() + 1e-6).all()
+    report = found.report()
+    assert report["tetrahedra"] == len(found.map.tets) and sum(report["log2_dilation_histogram"]) > 0
+    with pytest.raises(HandleError, match="no other body"):
+        drain(mapped_volume(one, settings))
+
+
+def test_a_vtu_file_holds_what_it_is_given():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1 / 3]])
+    text = vtu_text(points, np.array([[0, 1, 2, 3]]), {"OMT Ball": 2 * points}, {"OMT Dilation": np.array([0.5])})
+    piece = ET.fromstring(text).find("UnstructuredGrid/Piece")
+    assert piece.attrib == {"NumberOfPoints": "4", "NumberOfCells": "1"}
+    arrays = {a.get("Name"): a.text.split() for a in piece.iter("DataArray")}
+    np.testing.assert_array_equal(np.array(arrays["Points"], float).reshape(-1, 3), points)
+    np.testing.assert_array_equal(np.array(arrays["OMT Ball"], float).reshape(-1, 3), 2 * points)
+    assert arrays["connectivity"] == ["0", "1", "2", "3"] and arrays["offsets"] == ["4"] and arrays["types"] == ["10"]
