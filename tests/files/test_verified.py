@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -124,3 +125,24 @@ def test_missing_rights_are_told_beforehand(tmp_path):
     with pytest.raises(FileError, match="nothing can be written"):
         verified.check_writable(tmp_path / "b")
     tmp_path.chmod(0o700)
+
+
+@pytest.mark.parametrize("length, fits", [(255, True), (256, False)])
+def test_names_that_no_folder_takes_are_refused(tmp_path, length, fits):
+    path = tmp_path / ("é" * (length // 2) + "e" * (length % 2))
+    if fits:
+        verified.check_length(path)
+    else:
+        with pytest.raises(FileError, match="longer than 255 bytes"):
+            verified.check_length(path)
+
+
+@pytest.mark.parametrize("age, goes", [(10, False), (50, False), (90, True), (3600, True)])
+@pytest.mark.skipif(verified.fcntl is None, reason="no locks of files")
+def test_what_nothing_locks_is_left_over_after_a_minute(tmp_path, age, goes):
+    path = tmp_path / f"{verified.PREFIX}12345678.obj"
+    path.write_text("half")
+    then = time.time() - age
+    os.utime(path, (then, then))
+    verified.sweep(tmp_path)
+    assert path.exists() != goes
