@@ -25,6 +25,7 @@ PAGES = {
     "uv.omt_rectify": "arrange",
     "uv.omt_queue": "queue",
     "uv.omt_queue_stop": "queue",
+    "mesh.omt_partition": "partition",
     "object.omt_flow": "flow",
     "uv.omt_flow": "flow",
     "uv.omt_live": "live",

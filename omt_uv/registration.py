@@ -29,6 +29,7 @@ from .operators.shapes.landmarks import (
     OBJECT_OT_omt_landmarks_suggest,
 )
 from .operators.shapes.match import OBJECT_OT_omt_match
+from .operators.shapes.partition import MESH_OT_omt_partition
 from .operators.shapes.strain import OBJECT_OT_omt_strain
 from .operators.sphere import UV_OT_omt_sphere
 from .operators.texel_density import UV_OT_omt_density_get, UV_OT_omt_density_set
@@ -65,6 +66,7 @@ CLASSES = (
     OBJECT_OT_omt_flow,
     UV_OT_omt_flow,
     OBJECT_OT_omt_volume,
+    MESH_OT_omt_partition,
     UV_OT_omt_overlay,
     UV_OT_omt_histogram,
     UV_OT_omt_density_get,

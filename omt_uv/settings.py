@@ -242,3 +242,33 @@ DEFAULT_GROUP = "omt_weights"
 # Shares of the surface area with weight 0, and up to weight 1.
 DEFAULT_LOW = 0.5
 DEFAULT_HIGH = 0.95
+
+# What a partition becomes.
+CELL_WRITES = (
+    ("FACE_SETS", "Face Sets", "A face set of Sculpt Mode for each cell; cells follow faces"),
+    ("MATERIALS", "Materials", "A material slot for each cell; cells follow faces"),
+    ("SEAMS", "Seams", "Seams between cells, which follow faces: tiles of equal texels"),
+    ("ATTRIBUTE", "Attribute", "The number of the cell, from 0, as an integer on faces; cells follow faces"),
+    ("MESH", "Cut Mesh", "A new object, cut along the cells, so that their areas are exact"),
+    ("POINTS", "Points", "A new object of one vertex for each cell, with normals and radii, for Geometry Nodes"),
+)
+DEFAULT_CELL_WRITE = "FACE_SETS"
+DEFAULT_CELLS = 50
+DEFAULT_RELAX = 5
+CELL_ATTRIBUTE = "OMT Cell"
+# Every one is a slot of the object.
+MOST_MATERIALS = 1000
+
+
+@dataclass(frozen=True)
+class PartitionSettings:
+    """Into what to divide a surface.
+
+    cells : how many; relax : how often their sites move to the means; write : an identifier of CELL_WRITES in lower
+    case; seed : of the first sites
+    """
+
+    cells: int = DEFAULT_CELLS
+    relax: int = DEFAULT_RELAX
+    write: str = DEFAULT_CELL_WRITE.lower()
+    seed: int = 0

@@ -56,6 +56,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.sphere solver.remeshing.components solver.remeshing.edits",
     "solver.remeshing": "solver solver.mesh solver.analysis solver.remeshing.components solver.remeshing.edits "
     "solver.remeshing.relaxation solver.remeshing.fitting solver.remeshing.initial",
+    "solver.partition": "solver solver.mesh solver.linalg solver.transport",
     "solver.api": "solver solver.mesh solver.analysis solver.maps solver.parameterization solver.editing solver.sphere "
     "solver.remeshing",
     "remedies": "solver",
@@ -65,13 +66,14 @@ ARROWS: dict[str, str] = {
     "solver.refinement "
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas_charts",
-    "pipelines.shapes": "errors solver solver.mesh solver.transfer solver.registration solver.strain pipelines",
+    "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
+    "solver.strain solver.partition pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
     "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
     "pipelines.arranging": "settings solver solver.mesh solver.editing solver.arranging pipelines",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
     "blender.measuring": "errors solver pipelines pipelines.measuring blender",
-    "blender.shapes": "errors solver solver.mesh solver.analysis solver.registration pipelines "
+    "blender.shapes": "settings errors solver solver.mesh solver.analysis solver.registration pipelines "
     "pipelines.shapes blender",
     "blender.volumes": "errors solver solver.flows solver.volumes pipelines.volumes blender",
     "files.formats": "solver",
@@ -85,7 +87,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization pipelines pipelines.measuring pipelines.volumes blender blender.volumes "
     "blender.measuring pipelines.shapes blender.shapes "
     "files display solver.flows solver.volumes",
-    "commands.shapes": "solver solver.mesh solver.registration solver.strain pipelines.shapes blender "
+    "commands.shapes": "settings solver solver.mesh solver.registration solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
     "commands.volumes": "solver solver.flows solver.volumes pipelines.volumes blender.volumes files commands",
     "commands.batches": "supervision solver batch commands",
@@ -93,7 +95,8 @@ ARROWS: dict[str, str] = {
     "pipelines blender files display session",
     "operators.inspection": "settings remedies solver solver.comparison pipelines pipelines.measuring blender "
     "blender.measuring display session operators",
-    "operators.shapes": "solver solver.registration pipelines.shapes blender blender.shapes session operators",
+    "operators.shapes": "settings solver solver.registration pipelines pipelines.shapes blender "
+    "blender.shapes session operators",
     "operators.volumes": "solver solver.flows pipelines pipelines.volumes blender blender.volumes session operators",
     "operators.arranging": "solver pipelines pipelines.arranging blender session operators",
     "panels.translations": "solver",

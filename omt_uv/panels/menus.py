@@ -20,7 +20,7 @@ ENTRIES: list[list[str]] = [
         "object.omt_landmarks_clear",
         "object.omt_strain",
     ],
-    ["object.omt_flow", "uv.omt_flow", "object.omt_volume"],
+    ["mesh.omt_partition", "object.omt_flow", "uv.omt_flow", "object.omt_volume"],
 ]
 # Those that work in Weight Paint.
 WEIGHTS = ["object.omt_weights"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 
 from .. import links
-from . import arrange, inspect, match, result, tools, unwrap, volumes
+from . import arrange, inspect, match, partition, result, tools, unwrap, volumes
 from .section import Section, class_of
 
 TAB = "OMT"
@@ -30,6 +30,7 @@ SECTIONS = (
     tools.MAGNIFY,
     tools.WEIGHTS,
     tools.REMESH,
+    partition.SECTION,
     tools.SPHERE,
     match.SECTION,
     volumes.FLOW,

@@ -12,9 +12,9 @@ import scenes
 
 READ_ONLY = ("measure", "compare", "remesh")
 MORE = {"magnify": ["--weights", "region", "--factor", "2"], "remesh": ["--vertices", "40"],
-        "weights": ["--kind", "gaussian"]}  # fmt: skip
+        "weights": ["--kind", "gaussian"], "partition": ["--cells", "4", "--relax", "0"]}  # fmt: skip
 # Commands on bodies, whose reports have no charts: tests of their own look at these.
-BODIES = ("flow", "volume")
+BODIES = ("flow", "volume", "partition")
 # Commands on two files or a folder: tests/commands/shapes has theirs.
 SHAPES = ("match", "average")
 

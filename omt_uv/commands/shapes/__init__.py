@@ -1,7 +1,7 @@
-"""Commands on shapes: one file's mesh matched with another's, and the mean of many.
+"""Commands on shapes: one file's mesh matched with another's, the mean of many, cells of equal area.
 
-Imports commands, pipelines.shapes, blender.shapes, files and, when they run, of the solver what they need.
-Main names: match.run, average.run.
+Imports commands, settings, pipelines, blender and their rooms for shapes, files and, when they run, the solver.
+Main names: match.run, average.run, partition.run.
 """
 
 from ...solver.lazy import lazy
@@ -10,4 +10,5 @@ __getattr__, __all__ = lazy(
     __name__,
     average="Registered",
     match="kinds_of",
+    partition="of_cells",
 )

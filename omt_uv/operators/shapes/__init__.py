@@ -1,7 +1,7 @@
-"""Operators on shapes: one object matched with another, and its landmarks.
+"""Operators on shapes: one object matched with another, its landmarks, cells of equal area.
 
-Imports operators, blender.shapes, pipelines.shapes, session and solver.
-Main names: OBJECT_OT_omt_match, OBJECT_OT_omt_landmarks, OBJECT_OT_omt_landmarks_suggest, OBJECT_OT_omt_strain.
+Imports settings, solver, pipelines, blender, their rooms for shapes, session and operators.
+Main names: OBJECT_OT_omt_match, OBJECT_OT_omt_strain, MESH_OT_omt_partition, and those of landmarks.
 """
 
 from ...solver.lazy import lazy
@@ -11,4 +11,5 @@ __getattr__, __all__ = lazy(
     landmarks="OBJECT_OT_omt_landmarks OBJECT_OT_omt_landmarks_clear OBJECT_OT_omt_landmarks_suggest",
     match="OBJECT_OT_omt_match",
     strain="OBJECT_OT_omt_strain",
+    partition="MESH_OT_omt_partition",
 )

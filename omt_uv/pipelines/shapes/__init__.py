@@ -1,7 +1,7 @@
-"""Shapes compared and matched: what the operators and commands of shapes share, from arrays to arrays.
+"""Shapes compared, matched and divided: what operators and commands of shapes share, from arrays to arrays.
 
-Imports pipelines, settings, errors, solver, solver.registration, solver.strain and solver.transfer.
-Main names: MatchJob, MatchResult, match_surfaces, transferred, Pairs, pairs_of, strain_of.
+Imports pipelines, settings, errors, solver and its rooms of registration, strain, partition and transfer.
+Main names: MatchJob, MatchResult, match_surfaces, transferred, pairs_of, strain_of, partition_surface, carry_to_cells.
 """
 
 from ...solver.lazy import lazy
@@ -12,4 +12,6 @@ __getattr__, __all__ = lazy(
     match="MatchJob MatchResult match_surfaces",
     onto="transferred",
     strain="strain_of",
+    cell_attributes="carry_to_cells",
+    partition="Partition partition_surface",
 )

@@ -1,0 +1,115 @@
+"""Draw docs/pictures/partition.png: a head in panels, the same head stippled by its shading, an armadillo with scales.
+
+python scripts/pictures/partition_plate.py [OUT.png]
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests/support")]
+
+import meshes
+from PIL import Image
+from renders import VIEWS, render_colours
+
+from omt_uv.solver.mesh.geometry import face_normals, vertex_normals
+from omt_uv.solver.partition.cut_mesh import CellMesh, cut_along_cells
+from omt_uv.solver.partition.division import Division, DivisionOptions, divide
+from omt_uv.solver.progress import drain
+
+PIXELS = 620
+LIGHT = np.array([0.62, 0.45, 0.64])
+PANELS = 200
+DOTS = 6000
+SCALES = 1500
+TONES = np.array([[0.93, 0.89, 0.80], [0.80, 0.62, 0.42], [0.56, 0.67, 0.70], [0.86, 0.78, 0.62], [0.70, 0.76, 0.68]])
+
+
+def fans(mesh: CellMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (t,3) of the polygons of a cut mesh, as corners, and the cell (t,) of each."""
+    size = np.diff(mesh.face_start) - 2
+    first = np.repeat(mesh.face_start[:-1], size)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(size) - size, size)
+    return np.stack([first, first + step + 1, first + step + 2], axis=1), np.repeat(mesh.cell, size)
+
+
+def shrunk(V, F, division: Division, factor: float, lift=lambda along: 0 * along):
+    """The cells apart, (n,3), (t,3): about their sites times `factor`, lifted along the normal by `lift` of the place
+    in the cell downwards, in radii; and the cell (t,) of every triangle."""
+    mesh = cut_along_cells(V, F, division)
+    triangles, cell = fans(mesh)
+    at = division.sites.positions(V, F)[np.repeat(mesh.cell, np.diff(mesh.face_start))]
+    smooth = vertex_normals(V, F)
+    normal = np.einsum("cd,cdk->ck", mesh.barycentric, smooth[F[np.repeat(mesh.triangle, np.diff(mesh.face_start))]])
+    radius = np.sqrt(division.asked.mean() / np.pi)
+    step = mesh.positions[mesh.corner_vertex] - at
+    down = np.array([0.0, -1, 0]) - normal * -normal[:, [1]]
+    along = (step * down).sum(axis=1) / radius
+    return at + factor * step + radius * lift(along)[:, None] * normal, triangles, cell
+
+
+def panels(path):
+    """Equal panels with grooves."""
+    V, F = meshes.load_model("max_planck")
+    division = drain(divide(V, F, PANELS, options=DivisionOptions(relax=10)))
+    P, T, cell = shrunk(V, F, division, 0.95, lambda along: 0.02 + 0 * along)
+    inside = vertex_normals(V, F)
+    body = V - 0.004 * np.ptp(V, axis=0).max() * inside
+    colours = np.concatenate([TONES[(cell * 7) % len(TONES)], np.full((len(F), 3), 0.12)])
+    render_colours(
+        np.concatenate([P, body]), np.concatenate([T, F + len(P)]), colours, VIEWS["max_planck"], path, PIXELS
+    )
+
+
+def stipples(path):
+    """Dots by darkness."""
+    V, F = meshes.load_model("max_planck")
+    lit = np.clip(face_normals(V, F) @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
+    division = drain(divide(V, F, DOTS, 0.03 + (1 - lit) ** 2, DivisionOptions(relax=6)))
+    at, normal = division.sites.positions(V, F), face_normals(V, F)[division.sites.triangle]
+    size = 0.0032 * np.ptp(V, axis=0).max()
+    side = np.cross(normal, [0.3, 0.5, 0.8])
+    side /= np.linalg.norm(side, axis=1)[:, None]
+    angle = 2 * np.pi * np.arange(8) / 8
+    ring = np.cos(angle)[:, None, None] * side + np.sin(angle)[:, None, None] * np.cross(normal, side)
+    corners = (at + 0.5 * size * normal + size * ring).transpose(1, 0, 2).reshape(-1, 3)
+    fan = np.array([[0, k, k + 1] for k in range(1, 7)])
+    dots = (8 * np.arange(len(at))[:, None, None] + fan).reshape(-1, 3)
+    colours = np.concatenate([np.full((len(F), 3), 0.96), np.full((len(dots), 3), 0.02)])
+    both = np.concatenate([V, corners]), np.concatenate([F, dots + len(V)])
+    render_colours(*both, colours, VIEWS["max_planck"], path, PIXELS)
+
+
+def scales(path):
+    """Cells that overlap downwards."""
+    V, F = meshes.load_model("armadillo")
+    division = drain(divide(V, F, SCALES, options=DivisionOptions(relax=5)))
+    P, T, cell = shrunk(V, F, division, 1.08, lambda along: 0.12 + 0.22 * along)
+    tone = 0.75 + 0.25 * np.random.default_rng(0).random(SCALES)
+    colours = np.array([0.55, 0.66, 0.40]) * tone[cell, None]
+    body = np.concatenate([colours, np.full((len(F), 3), [0.16, 0.19, 0.13])])
+    render_colours(np.concatenate([P, V]), np.concatenate([T, F + len(P)]), body, VIEWS["armadillo"], path, PIXELS)
+
+
+def main(out: Path) -> None:
+    """Render the three and put them side by side."""
+    with tempfile.TemporaryDirectory() as folder:
+        images = []
+        for k, draw in enumerate((panels, stipples, scales)):
+            draw(Path(folder) / f"{k}.png")
+            image = Image.open(Path(folder) / f"{k}.png").convert("RGBA")
+            images.append(Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB"))
+        whole = Image.new("RGB", (sum(i.width for i in images), images[0].height), "white")
+        for k, image in enumerate(images):
+            whole.paste(image, (sum(i.width for i in images[:k]), 0))
+        whole.quantize(128).save(out, optimize=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/pictures/partition.png")

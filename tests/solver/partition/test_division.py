@@ -1,0 +1,142 @@
+"""Cells have their masses on any surface in few steps, sites keep apart, and cutting along cells loses nothing."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver import errors
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.partition.cut_mesh import cut_along_cells
+from omt_uv.solver.partition.division import DivisionOptions, divide
+from omt_uv.solver.partition.face_labels import follow_faces
+from omt_uv.solver.partition.polar_coordinates import WindowMesh
+from omt_uv.solver.partition.relaxation import sights
+from omt_uv.solver.partition.sites import allot, parts
+from omt_uv.solver.partition.spacing import site_distances
+from omt_uv.solver.progress import drain
+
+
+def two_parts():
+    V, F = meshes.icosphere(2)
+    W, G = meshes.grid(6, 6)
+    return np.concatenate([V, W + [3, 0, 0]]), np.concatenate([F, G + len(V)])
+
+
+def thin():
+    """A rod much thinner than its cells."""
+    V, F = meshes.icosphere(2)
+    return V * [2.0, 0.2, 0.2], F
+
+
+SURFACES = {
+    "square of two triangles": (meshes.quad_patch, 40),
+    "plane": (lambda: meshes.grid(20, 20), 30),
+    "sphere": (lambda: meshes.icosphere(4), 60),
+    "torus": (meshes.torus, 50),
+    "two parts": (two_parts, 20),
+    "rod": (thin, 12),
+    "one cell": (lambda: meshes.icosphere(2), 1),
+}
+
+
+def found(name, **options):
+    make, count = SURFACES[name]
+    V, F = make()
+    return V, F, drain(divide(V, F, count, options=DivisionOptions(**options)))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_every_cell_has_its_area_and_the_cut_mesh_is_the_surface(name):
+    V, F, division = found(name, relax=3)
+    area = face_areas(V, F)
+    assert np.abs(division.cells.area / division.asked - 1).max() < 1e-4 and division.iterations <= 20
+    assert np.isclose(division.cells.area.sum(), area.sum())
+    mesh = cut_along_cells(V, F, division)
+    assert not len(mesh.torn())
+    a, b = mesh.corner_vertex, np.roll(mesh.corner_vertex, -1)
+    b[mesh.face_start[1:] - 1] = mesh.corner_vertex[mesh.face_start[:-1]]
+    edges, uses = np.unique(np.sort(np.stack([a, b], axis=1), axis=1), axis=0, return_counts=True)
+    # The same surface: no edge of three faces, and Euler's number and boundary as before.
+    own, own_uses = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    assert uses.max() == 2 and (uses == 1).any() == (own_uses == 1).any()
+    assert len(mesh.positions) - len(edges) + len(mesh.cell) == len(np.unique(F)) - len(own) + len(F)
+    assert np.isclose(lengths(mesh.positions, edges[uses == 1]), lengths(V, own[own_uses == 1]))
+    size = np.diff(mesh.face_start)
+    first = np.repeat(mesh.face_start[:-1], size - 2)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(size - 2) - (size - 2), size - 2)
+    fans = mesh.corner_vertex[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+    of_cell = np.bincount(np.repeat(mesh.cell, size - 2), face_areas(mesh.positions, fans))
+    assert np.allclose(of_cell, division.asked, rtol=2e-4)
+
+
+def lengths(positions, edges):
+    return np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1).sum()
+
+
+@pytest.mark.parametrize("name", ["plane", "sphere", "torus", "rod"])
+def test_relaxed_sites_keep_apart(name):
+    V, F, division = found(name, relax=6)
+    distance = site_distances(WindowMesh(V, F), division)
+    assert distance.min() > 0.75 * distance.mean()
+
+
+def test_sites_see_one_another_as_far_as_they_are():
+    V, F, division = found("sphere", relax=1)
+    i, j, _, distance = sights(WindowMesh(V, F), division.sites, division.pairs)
+    x = division.sites.positions(V, F)
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    assert np.allclose(distance, np.arccos((x[i] * x[j]).sum(axis=1)), rtol=0.05)
+
+
+def test_density_gives_more_cells_where_it_is_greater():
+    V, F = meshes.grid(30, 30)
+    right = V[F][:, :, 0].mean(axis=1) > 0.5
+    density = np.where(right, 9.0, 1.0)
+    division = drain(divide(V, F, 100, density))
+    share = (division.sites.positions(V, F)[:, 0] > 0.5).mean()
+    assert abs(share - 0.9) < 0.03 and division.residual < 1e-4
+    assert np.isclose(division.asked.sum(), 5.0)
+
+
+def test_parts_get_whole_cells():
+    V, F, division = found("two parts", relax=2)
+    part = parts(F, len(V))
+    area = np.bincount(part, face_areas(V, F))
+    count = np.bincount(part[division.sites.triangle])
+    assert count.sum() == 20 and count.min() >= 1
+    expected = area / area.max() * count.max()
+    assert np.abs(count - expected).max() < 1.5 and 0 < division.unequal < 0.5
+    assert allot(np.array([1.0, 1e-9, 1e-9]), 5).tolist() == [3, 1, 1]
+
+
+def test_whole_faces_hang_together():
+    V, F, division = found("sphere", relax=2)
+    followed = follow_faces(division, np.arange(len(F)), F.ravel(), 3 * np.arange(len(F) + 1))
+    assert set(followed.cell.tolist()) == set(range(60))
+    assert not len(followed.torn) and not len(followed.empty)
+    assert np.allclose(followed.mass, np.bincount(followed.cell, face_areas(V, F)))
+    assert np.abs(followed.mass / division.asked - 1).max() < 0.1
+
+
+def test_size_and_place_play_no_part():
+    V, F = meshes.icosphere(3)
+    one, other = (drain(divide(p, F, 25)) for p in (V, 1e6 * V + 1e7))
+    assert (one.sites.triangle == other.sites.triangle).mean() > 0.9
+    assert np.allclose(one.asked * 1e12, other.asked, rtol=1e-6)
+
+
+def test_what_cannot_be_divided_is_named():
+    V, F = two_parts()
+    with pytest.raises(errors.CountError, match="fewer than the 2 separate parts"):
+        drain(divide(V, F, 1))
+    with pytest.raises(errors.CountError, match="none"):
+        drain(divide(V, F, 0))
+    with pytest.raises(errors.EmptyMeshError):
+        drain(divide(V, F[:0], 3))
+    with pytest.raises(errors.EmptyMeshError, match="no area"):
+        drain(divide(V * [1, 0, 0], F, 3))
+    with pytest.raises(errors.DensityError):
+        drain(divide(V, F, 3, np.zeros(len(F))))
+    V[3] = np.nan
+    with pytest.raises(errors.NonFiniteError, match="1 vertex: 3"):
+        drain(divide(V, F, 3))
