@@ -28,6 +28,9 @@ def main() -> None:
     args.target.mkdir(parents=True, exist_ok=True)
     for story, names in KEPT.items():
         for name in names:
+            if not (args.source / story / f"{name}.png").exists():
+                print(f"{story}/{name}.png is missing: the picture of before stays")
+                continue
             path = args.target / f"{name}.png"
             Image.open(args.source / story / f"{name}.png").convert("RGB").quantize(
                 256, method=Image.Quantize.MAXCOVERAGE, kmeans=2
