@@ -28,6 +28,7 @@ PAGES = {
     "mesh.omt_partition": "partition",
     "object.omt_flow": "flow",
     "uv.omt_flow": "flow",
+    "object.omt_volume": "volume",
     "uv.omt_live": "live",
     "uv.omt_live_end": "live",
     "uv.omt_overlay": "distortion",
