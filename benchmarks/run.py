@@ -21,6 +21,7 @@ from benchmarks.parts import (
     hard,
     latency,
     magnify,
+    match,
     memory,
     profile,
     remesh,
@@ -31,7 +32,22 @@ from benchmarks.parts import (
     unwrap,
 )
 
-MODULES = (transport, unwrap, profile, memory, speed, magnify, cascade, saliency, latency, sphere, remesh, cuts, hard)
+MODULES = (
+    transport,
+    unwrap,
+    profile,
+    memory,
+    speed,
+    magnify,
+    cascade,
+    saliency,
+    latency,
+    sphere,
+    remesh,
+    cuts,
+    hard,
+    match,
+)
 PARTS: dict[str, Part] = {part.name: part for module in MODULES for part in module.PARTS}
 OPTIONS: dict[str, Option] = {option.name: option for part in PARTS.values() for option in part.options}
 

@@ -73,7 +73,7 @@ ARROWS: dict[str, str] = {
     "pipelines.arranging": "settings solver solver.mesh solver.editing solver.arranging pipelines",
     "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
     "blender.measuring": "errors solver pipelines pipelines.measuring blender",
-    "blender.shapes": "settings errors solver solver.mesh solver.analysis solver.registration pipelines "
+    "blender.shapes": "settings errors solver solver.mesh solver.analysis solver.registration solver.strain pipelines "
     "pipelines.shapes blender",
     "blender.volumes": "errors solver solver.flows solver.volumes pipelines.volumes blender",
     "files.formats": "solver",
@@ -86,7 +86,7 @@ ARROWS: dict[str, str] = {
     "commands": "errors supervision remedies settings solver solver.comparison solver.cutting solver.globe "
     "solver.parameterization pipelines pipelines.measuring pipelines.volumes blender blender.volumes "
     "blender.measuring pipelines.shapes blender.shapes "
-    "files display solver.flows solver.volumes",
+    "files display solver.flows solver.volumes solver.strain",
     "commands.shapes": "settings solver solver.mesh solver.registration solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
     "commands.volumes": "solver solver.flows solver.volumes pipelines.volumes blender.volumes files commands",

@@ -28,6 +28,10 @@ def add(commands) -> None:
     command.add_argument("others", type=Path, nargs="+", metavar="B", help="meshes that are compared with IN")
     command.add_argument("--json", action="store_true", help="print the figures as JSON")
     command.add_argument("--csv", action="store_true", help="print the figures as CSV, a line for each B")
+    command.add_argument(
+        "--beltrami", action="store_true", help="how far apart the strain of the UV maps is instead, region by region"
+    )
+    command.add_argument("--shape-key", default="", metavar="NAME", help="with --beltrami: of this shape key")
     command.add_argument("--plot", type=Path, metavar="P.png", help="draw errors over the number of faces")
 
 
@@ -39,6 +43,9 @@ def run(options: argparse.Namespace) -> None:
         if options.plot.suffix.lower() != ".png":
             raise CommandError(f"{options.plot}: a plot is a picture. Name a .png file.")
         check_writable(options.plot)
+    if options.beltrami:
+        print(_strain(options))
+        return
     rows = compared(options)
     if options.plot is not None:
         write_picture(options.plot, plotted(rows))
@@ -60,6 +67,29 @@ def compared(options: argparse.Namespace) -> list[dict]:
         with refusals(name=str(path)):
             rows.append({"file": str(path), **vars(drain_shown(compare(first, second)))})
     return rows
+
+
+def _strain(options: argparse.Namespace) -> str:
+    """Distances of the histograms of |mu| between IN and each other mesh, as lines or JSON."""
+    from ..solver.strain.regions import compare_regions
+
+    first, found = _strain_of_file(options, options.input), {}
+    for path in options.others:
+        found[str(path)] = compare_regions(first, _strain_of_file(options, path))
+    if options.json:
+        return json.dumps(found, indent=1)
+    return "\n".join(f"{path}, {name}: {value:.4f}" for path, row in found.items() for name, value in row.items())
+
+
+def _strain_of_file(options: argparse.Namespace, path: Path) -> list:
+    """The strain by region of the one mesh of a file."""
+    from ..blender.shapes.strain import strain_rows
+
+    pairs = read_file(argparse.Namespace(**{**vars(options), "input": path}))
+    if len(pairs) > 1:
+        raise CommandError(f"{path}: it has several meshes. Name one by --object.")
+    obj, reading = pairs[0]
+    return strain_rows(obj, reading, options.shape_key)
 
 
 def plotted(rows: list[dict]):

@@ -116,37 +116,15 @@ def _write_attributes(options: argparse.Namespace, pairs: list) -> None:
 
 def _strain(pairs: list, options: argparse.Namespace) -> str:
     """|mu| of the active UV maps, or of a shape key, over all and by region, as a table or JSON."""
-    from ..blender.read_attributes import read_attributes
-    from ..pipelines.shapes.strain import regions_of, strain_of, strain_report
+    from ..blender.shapes.strain import strain_rows
+    from ..pipelines.shapes.strain import strain_report
 
-    found = {}
-    for obj, reading in pairs:
-        groups = read_attributes(obj.data, tuple(g.name for g in obj.vertex_groups))
-        weights = {name: groups.weights[:, k] for k, name in enumerate(groups.groups)}
-        materials = [slot.name or str(k) for k, slot in enumerate(obj.material_slots)]
-        regions = regions_of(reading.surface, weights, groups.material_index, materials)
-        strain = strain_of(reading.surface, **_measured(obj, reading, options.shape_key))
-        found[obj.name] = strain_report(strain, regions)
+    found = {obj.name: strain_report(strain_rows(obj, reading, options.shape_key)) for obj, reading in pairs}
     if options.json:
         return json.dumps(found, indent=1)
-    rows = [(name, row) for name, table in found.items() for row in table]
     return "\n".join(
         f"{name}, {row['name']}: mean strain {row['mean']:.4f}, greatest {row['greatest']:.4f}, "
         f"{100 * row['share']:.1f} % of the surface"
-        for name, row in rows
+        for name, table in found.items()
+        for row in table
     )
-
-
-def _measured(obj, reading, key: str) -> dict:
-    """What `strain_of` takes: UVs, or the positions of a shape key."""
-    from ..blender.mesh import stretch
-    from ..blender.shapes.strain import key_shape
-
-    if key:
-        shape = key_shape(obj.data, key)
-        if shape is None:
-            raise CommandError(f"{obj.name}: There is no shape key {key!r}. Name one that it has.")
-        return {"shape": shape @ stretch(obj)}
-    if reading.uv is None:
-        raise CommandError(f"{obj.name}: There is no UV map. Unwrap it first, or name a shape key.")
-    return {"uv": reading.uv}

@@ -6,6 +6,13 @@ import bpy
 
 import numpy as np
 
+from ...errors import UserError
+from ...pipelines.reading import Reading
+from ...pipelines.shapes.strain import regions_of, strain_of
+from ...solver.strain.regions import RegionStrain, region_strain
+from ..mesh import stretch
+from ..read_attributes import read_attributes
+
 SIZE_NAME = "OMT Strain"
 VECTOR_NAME = "OMT Stretch"
 
@@ -33,3 +40,29 @@ def key_shape(mesh: bpy.types.Mesh, name: str) -> np.ndarray | None:
     values = np.zeros(3 * len(mesh.vertices), np.float32)
     block.data.foreach_get("co", values)
     return values.reshape(-1, 3).astype(float)
+
+
+class StrainError(UserError):
+    """An object without the UV map or shape key whose strain is asked for."""
+
+
+def strain_rows(obj: bpy.types.Object, reading: Reading, key: str = "") -> list[RegionStrain]:
+    """Strain of the UV map of a Reading, or of a shape key, over all, by vertex groups and by materials.
+
+    Raises
+    ------
+    StrainError : there is no such map
+    """
+    if key:
+        shape = key_shape(obj.data, key)
+        if shape is None:
+            raise StrainError(f"{obj.name}: There is no shape key {key!r}. Name one that it has.")
+        found = strain_of(reading.surface, shape=shape @ stretch(obj))
+    elif reading.uv is None:
+        raise StrainError(f"{obj.name}: There is no UV map. Unwrap it first, or name a shape key.")
+    else:
+        found = strain_of(reading.surface, uv=reading.uv)
+    carried = read_attributes(obj.data, tuple(group.name for group in obj.vertex_groups))
+    weights = {name: carried.weights[:, k] for k, name in enumerate(carried.groups)}
+    materials = [slot.name or str(k) for k, slot in enumerate(obj.material_slots)]
+    return region_strain(found, regions_of(reading.surface, weights, carried.material_index, materials))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...solver.mesh.surface import Surface
 from ...solver.strain.beltrami import Beltrami, corner_beltrami
-from ...solver.strain.regions import RegionStrain, region_strain
+from ...solver.strain.regions import RegionStrain
 
 
 def strain_of(surface: Surface, uv: np.ndarray | None = None, shape: np.ndarray | None = None) -> Beltrami:
@@ -50,9 +50,9 @@ def regions_of(surface: Surface, weights: dict[str, np.ndarray], materials: np.n
     return regions
 
 
-def strain_report(found: Beltrami, regions: dict[str, np.ndarray]) -> list[dict]:
+def strain_report(rows: list[RegionStrain]) -> list[dict]:
     """Figures of the whole and of every region, for a JSON file."""
-    return [_row(row) for row in region_strain(found, regions)]
+    return [_row(row) for row in rows]
 
 
 def _row(row: RegionStrain) -> dict:

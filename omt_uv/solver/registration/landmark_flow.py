@@ -64,7 +64,7 @@ def draw_landmarks(problem: Deformation, placed: InPlace, vertices: np.ndarray, 
         placed = without_folds(problem, placed, moved)
         placed, more = yield from minimise_on(held, placed, RELAXING_STEPS, LOOSE, "Landmarks")
         steps += more
-    placed, met = _put(problem, placed, vertices, targets)
+    placed, met = put_landmarks(problem, placed, vertices, targets)
     final = replace(held, held=problem.held.copy())
     final.held[vertices] = True
     placed, more = yield from minimise_on(final, placed, LAST_STEPS, LOOSE, "Landmarks")
@@ -83,7 +83,9 @@ def _field(positions: np.ndarray, vertices: np.ndarray, move: np.ndarray) -> np.
     return np.exp(-((positions[:, None] - at) ** 2).sum(axis=2) / width**2) @ factor
 
 
-def _put(problem: Deformation, placed: InPlace, vertices: np.ndarray, targets: InPlace) -> tuple[InPlace, np.ndarray]:
+def put_landmarks(
+    problem: Deformation, placed: InPlace, vertices: np.ndarray, targets: InPlace
+) -> tuple[InPlace, np.ndarray]:
     """The landmarks put into their places one by one, where that folds nothing, and which (k,) bool that are."""
     landmarks = vertices.tolist()
     met = np.zeros(len(landmarks), bool)

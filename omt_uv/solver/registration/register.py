@@ -25,7 +25,7 @@ from .carriers import DiskCarrier, InPlace, SphereCarrier, TargetCarrier
 from .coarse_polish import coarse_polish
 from .descriptors import descriptors
 from .domains import AUTO, DOMAINS, SPHERE, FilledSurface, checked, domain_map, filled, kind_of
-from .landmark_flow import Drawn, draw_landmarks
+from .landmark_flow import Drawn, draw_landmarks, put_landmarks
 from .landmarks import Landmarks, SplitSurface, check_handedness, check_landmarks, no_landmarks, split_at
 from .surface_newton import STRICT, Deformation, Features, in_space, minimise_on
 
@@ -35,6 +35,8 @@ AREA_WEIGHT = 1.0
 FEATURE_WEIGHT = 0.05
 # Newton steps of the polish at most.
 POLISHING_STEPS = 60
+# And after landmarks that had no room were put into their places.
+AGAIN_STEPS = 10
 # Distance over the extent below which a landmark is met.
 MET = 1e-6
 # Where the time goes, roughly, as start and width.
@@ -289,6 +291,12 @@ def _polished(
     placed, few = yield from part_of(coarse_polish(problem, pair.vertices, placed, pair.loop), 0.0, 0.3)
     polishing = minimise_on(problem, placed, POLISHING_STEPS, STRICT, "Polishing")
     placed, steps = yield from part_of(polishing, 0.3, 0.7)
+    if not drawn.met.all():
+        # What had no room in the domain may have it now.
+        placed, _ = put_landmarks(problem, placed, pair.landmarks, targets)
+        problem.held[pair.landmarks] = True
+        placed, more = yield from minimise_on(problem, placed, AGAIN_STEPS, STRICT, "Polishing")
+        steps += more
     return placed, few + steps
 
 

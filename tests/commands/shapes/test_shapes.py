@@ -109,3 +109,6 @@ def test_strain_by_region(run, files):
     assert status == 0 and "all: mean strain 0.0000" in text
     status, _, err = run("measure", folder / "target.blend", "--beltrami")
     assert status == 1 and "no UV map" in err
+    status, text, err = run("compare", folder / "source.blend", folder / "source.blend", "--beltrami", "--json")
+    assert status == 0, err
+    assert set(json.loads(text)[str(folder / "source.blend")].values()) == {0.0}
