@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import HandleError, NonFiniteError
 
 # Samples of one handle are at least this share of the radius apart, so that the system is well conditioned,
-SPACING = 0.25
+SPACING = 0.18
 # and at most so many.
 MOST_SAMPLES = 96
 # Handles that start closer together than this share of the radius must go the same way.
