@@ -11,14 +11,14 @@ from pathlib import Path
 from . import __version__, supervision
 from .commands import compare, magnify, measure, refine, remesh, seams, sphere, unwrap, weights
 from .commands.batches import batch, page, summary, table
-from .commands.shapes import average, match, partition
+from .commands.shapes import average, distance, library, match, partition
 from .commands.volumes import flow, volume
 from .errors import UserError
 from .supervision import PROGRAM, tell
 
 COMMANDS = (
     *(unwrap, refine, magnify, weights, seams, sphere, measure, compare, remesh),
-    *(flow, volume, match, average, partition),
+    *(flow, volume, match, average, partition, distance, library),
 )
 # Of many files, without Blender in their own process.
 BATCHES = (batch, table, summary, page)

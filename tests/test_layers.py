@@ -56,6 +56,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.sphere solver.remeshing.components solver.remeshing.edits",
     "solver.remeshing": "solver solver.mesh solver.analysis solver.remeshing.components solver.remeshing.edits "
     "solver.remeshing.relaxation solver.remeshing.fitting solver.remeshing.initial",
+    "solver.signatures": "solver solver.mesh solver.analysis solver.conformal solver.sphere solver.registration",
     "solver.partition": "solver solver.mesh solver.linalg solver.transport",
     "solver.api": "solver solver.mesh solver.analysis solver.maps solver.parameterization solver.editing solver.sphere "
     "solver.remeshing",
@@ -67,7 +68,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas_charts",
     "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
-    "solver.strain solver.partition pipelines",
+    "solver.strain solver.partition solver.signatures pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
     "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
     "pipelines.arranging": "settings solver solver.mesh solver.editing solver.arranging pipelines",
@@ -87,7 +88,8 @@ ARROWS: dict[str, str] = {
     "solver.parameterization pipelines pipelines.measuring pipelines.volumes blender blender.volumes "
     "blender.measuring pipelines.shapes blender.shapes "
     "files display solver.flows solver.volumes solver.strain",
-    "commands.shapes": "settings solver solver.mesh solver.registration solver.strain pipelines.shapes blender "
+    "commands.shapes": "settings solver solver.signatures solver.mesh solver.registration "
+    "solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
     "commands.volumes": "solver solver.flows solver.volumes pipelines.volumes blender.volumes files commands",
     "commands.batches": "supervision solver batch commands",
