@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..analysis.curvature import gaussian_curvature, mean_curvature
 from ..errors import EmptyMeshError, NonFiniteError
-from ..mesh.closest_point import ClosestPoint, SurfacePoints
+from ..mesh.closest_point import ClosestPoint, SurfacePoints, subdivision_centroids
 from ..mesh.geometry import face_areas, face_normals
 from ..mesh.topology import boundary_edges
 from ..progress import Progress, Steps, part_of
@@ -23,6 +23,9 @@ Mesh: TypeAlias = tuple[np.ndarray, np.ndarray]
 POINTS = 100_000
 # Points that are looked for at once, for memory.
 CHUNK = 100_000
+# Triangles with the farthest points that are looked at again, each at the square of so many points.
+PEAKS = 100
+PEAK_LEVEL = 16
 # Points along the boundary for each diagonal.
 BOUNDARY_POINTS = 2000
 
@@ -71,11 +74,12 @@ class Comparison:
 @dataclass(frozen=True)
 class _OneWay:
     """From a surface to another: the triangles (k,) of points that stand for the same area each; then, of these and of
-    all vertices, the closest points and distances."""
+    all vertices, the closest points, distances, and the greatest of them."""
 
     owner: np.ndarray
     found: SurfacePoints
     distance: np.ndarray
+    most: float
 
 
 def compare(A: Mesh, B: Mesh, points: int = 0) -> Steps[Comparison]:
@@ -95,7 +99,7 @@ def compare(A: Mesh, B: Mesh, points: int = 0) -> Steps[Comparison]:
     there = yield from part_of(_way(A, B, points), 0.4, 0.3)
     back = yield from part_of(_way(B, A, points), 0.7, 0.3)
     rms_a, rms_b = (float(np.sqrt(np.mean(_spread(w) ** 2))) / diagonal for w in (there, back))
-    most_a, most_b = (float(way.distance.max()) / diagonal for way in (there, back))
+    most_a, most_b = (way.most / diagonal for way in (there, back))
     # A point of a triangle and its closest point are about where the surfaces are the same.
     n = len(there.owner)
     cosine = (face_normals(*A)[there.owner] * face_normals(*B)[there.found.faces[:n]]).sum(axis=1)
@@ -176,7 +180,18 @@ def _way(source: Mesh, target: Mesh, count: int) -> Steps[_OneWay]:
         yield Progress("distances", k / len(chunks))
         parts.append(_search(index, part))
     found = SurfacePoints(*(np.concatenate(x) for x in zip(*(vars(p).values() for p in parts), strict=True)))
-    return _OneWay(owner, found, np.linalg.norm(found.points - every, axis=1))
+    distance = np.linalg.norm(found.points - every, axis=1)
+    most = max(float(distance.max()), _greatest_around(source, owner[np.argsort(distance[:count])[::-1]], index))
+    return _OneWay(owner, found, distance, most)
+
+
+def _greatest_around(source: Mesh, owner: np.ndarray, index: ClosestPoint) -> float:
+    """The greatest distance within the first few different triangles (k,) of `owner`, by many points of each."""
+    _, first = np.unique(owner, return_index=True)
+    V, F = source
+    pattern = subdivision_centroids(PEAK_LEVEL)
+    points = np.einsum("sc,fcj->fsj", pattern, V[F[owner[np.sort(first)[:PEAKS]]]]).reshape(-1, 3)
+    return float(np.linalg.norm(_closest(index, points) - points, axis=1).max())
 
 
 def _scattered(V: np.ndarray, F: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
