@@ -9,7 +9,7 @@ import bpy
 
 # Pixels between two looks, down and across; a button is higher and wider.
 DOWN = 12
-PLACES = (0.5, 0.2, 0.77, 0.835)
+PLACES = (0.5, 0.63, 0.72, 0.2, 0.77, 0.835)
 TURNS_TO_SEE = 2
 # Where headers have their buttons.
 HEADER = (0.83, 0.78)
