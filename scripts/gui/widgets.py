@@ -11,6 +11,7 @@ import bpy
 DOWN = 12
 PLACES = (0.5, 0.63, 0.72, 0.2, 0.77, 0.835)
 TURNS_TO_SEE = 2
+BESIDE = (0.2, 0.8, 0.5, 0.35, 0.65)
 # Where headers have their buttons.
 HEADER = (0.83, 0.78)
 # Turns of the wheel that move a panel by about half of what is seen.
@@ -55,6 +56,15 @@ class Finder:
                 x, y = self.region.view2d.view_to_region(*place, clip=False)
                 if 0 < y < self.region.height and (yield from self.under(x, y)) == call:
                     return x, y
+        for call, (_, height) in list(self.known.items()):
+            # Buttons of one operator stand beside one another as a rule.
+            if words[0] in call:
+                y = self.region.view2d.view_to_region(0, height, clip=False)[1]
+                for share in BESIDE if 0 < y < self.region.height else ():
+                    x = int(self.region.width * share)
+                    found = yield from self.seen(x, y)
+                    if all(word in found for word in words):
+                        return x, y
         yield from self.scroll_to_top()
         for _ in range(12):
             found = yield from self.look(words, places)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+# Where the button is beside the slider, as shares of the width: first in narrow panels, then in wide ones.
+LIVE = (0.63, 0.72)
+
 
 def tell(story):
     """Unwrap in the UV Editor, drag the slider, look at both colourings."""
@@ -36,7 +39,7 @@ def tell(story):
 def live(story, tab, obj):
     """Drag the slider; the UVs follow before the button is let go. Then accept."""
     seen = []
-    place = yield from tab.click("omt_live(")
+    place = yield from tab.click("omt_live(", places=LIVE)
     yield from story.until(story.following)
     # The slider is to the left of its button.
     start, end = (place[0] - 40, place[1]), (place[0] - 130, place[1])
@@ -46,14 +49,14 @@ def live(story, tab, obj):
     story.facts["while dragging"] = [round(figures["area_l1"], 4) for figures in seen]
     story.facts["after dragging"] = story.figures(obj)
     story.facts["figures while it runs"] = story.said()
-    yield from tab.click("omt_live_end", "'KEEP'")
+    yield from tab.click("omt_live_end", "'KEEP'", places=(0.25, 0.5))
     yield from story.until(lambda: not story.following())
     story.facts["accepted"] = story.figures(obj)
 
 
 def discarded(story, tab, obj):
     """A session that is on when another unwrap is started: the new UVs stay, whatever the slider does."""
-    yield from tab.click("omt_live(")
+    yield from tab.click("omt_live(", places=LIVE)
     yield from story.until(story.following)
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=story.area("IMAGE_EDITOR")):
         bpy.ops.uv.omt_unwrap("EXEC_DEFAULT", boundary="DISK", balance=0.0)
