@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import MeshError, positive_density
 from ..linalg.additive_schwarz import schwarz_solver
-from ..maps.energy import Elements, area_error, elements
+from ..maps.energy import Elements, area_error, elements, has_folds
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import polygon_elements
 from ..mesh.geometry import face_areas
@@ -197,7 +197,8 @@ def _refined(
     initial = INITIAL_MAPS[boundary](*given, **({"relaxed": np.inf} if far else {}))
     w = initial.uv @ [1, 1j]
     symmetric = None if symmetry is None else symmetric_start(symmetry, w, by_triangle, boundary, loop)
-    symmetry, w = (None, w) if symmetric is None else symmetric
+    # What a mean with its image leaves next to nothing may be a fold by rounding.
+    symmetry, w = (None, w) if symmetric is None or has_folds(faces, symmetric[1]) else symmetric
     assembly = assembly_of(faces, n, schwarz_solver(mesh.vertices, mesh.triangles), symmetry)
     # Sweeps know of triangles alone, of no pins, and of no balance.
     swept = faces.polygon is None and faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
