@@ -88,7 +88,9 @@ def look_again() -> str:
     """Whether the figures still hold: an empty text, or why they do not."""
     from ..blender.fingerprint import uv_mark
 
-    if state.summary is None:
+    if state.summary is None or not state.marks:
+        # A live session brings its figures up to date itself.
+        state.outdated = ""
         return ""
     objects = {name: bpy.data.objects.get(name) for name in state.marks}
     if any(obj is None or obj.type != "MESH" for obj in objects.values()):

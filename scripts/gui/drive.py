@@ -78,6 +78,8 @@ class Story:
         """Press at the start, move to the end, look with `keep` at every place, and let go."""
         yield from self.move(*start)
         yield from self.x("mousedown", 1)
+        # On a busy machine, a press and a move that come together are a click, which edits the number as text.
+        yield from self.pause(0.5)
         for k in range(1, steps + 1):
             place = [round(a + (b - a) * k / steps) for a, b in zip(start, end, strict=True)]
             yield from self.x("mousemove", *place)
