@@ -19,10 +19,11 @@ from .domains import BallDomain, CubeDomain
 from .tet_energy import RestShape, TetAssembly, rest_shape, tet_energy
 from .tet_mesh import tet_volumes, vertex_share_error, volume_gradients
 
-# Steps that untangle, eps of the first, its factor from step to step, and its least value.
-UNTANGLING = 40
+# Steps that untangle; eps of the first, its factor from step to step, that after a step that failed, and its least.
+UNTANGLING = 80
 FIRST_EPS = 0.3
-EPS_FACTOR = 0.6
+EPS_FACTOR = 0.75
+EPS_BACK = 12.0
 LEAST_EPS = 2e-3
 # Volumes of slivers are taken for this share of the mean while untangling, and then.
 COARSE = 0.1
@@ -101,8 +102,9 @@ def untangled(problem: TetProblem, points: np.ndarray) -> Steps[np.ndarray]:
             return points
         yield Progress("Untangling", k / UNTANGLING)
         size = float(tet_volumes(points, problem.tets).sum())
-        points, _ = _step(problem, shape, points, _Terms(size, 1.0, eps))
-        eps = max(eps * EPS_FACTOR, LEAST_EPS)
+        points, fall = _step(problem, shape, points, _Terms(size, 1.0, eps))
+        # Where no step helps, a softer energy may.
+        eps = max(eps * EPS_FACTOR, LEAST_EPS) if fall > 0 else min(eps * EPS_BACK, FIRST_EPS)
     count = inverted(points, problem.tets)
     if count:
         raise TetrahedraError(f"{count} of {len(problem.tets)} tetrahedra stay inverted in the map")
