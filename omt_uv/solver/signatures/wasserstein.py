@@ -25,7 +25,8 @@ FEW = 120
 ROUNDS = 6
 # Weight of the squared difference of curvature next to squared angles.
 CURVATURE = 0.15
-# Distances of two samplings of one surface times the root of the number of points, measured on heads and animals.
+# Distance of two independent samplings of one surface times the root of the number of points: 0.083 at 400, 0.041 at
+# 1,600.
 FLOOR = 1.6
 
 
