@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -142,7 +141,7 @@ def test_names_that_no_folder_takes_are_refused(tmp_path, length, fits):
 def test_what_nothing_locks_is_left_over_after_a_minute(tmp_path, age, goes):
     path = tmp_path / f"{verified.PREFIX}12345678.obj"
     path.write_text("half")
-    then = time.time() - age
+    then = path.stat().st_mtime - age
     os.utime(path, (then, then))
     verified.sweep(tmp_path)
     assert path.exists() != goes
