@@ -7,8 +7,9 @@ export OMT_UV_MODELS ?= $(CURDIR)/../shared/models
 
 .PHONY: demo test check bench papers extension matrix gui repository site venv clean
 
+# Two processes at once, each file in one of them, and no threads of BLAS that would spin beside the other's.
 test: $(STAMP)
-	$(PY) -m pytest
+	OMP_NUM_THREADS=$${OMP_NUM_THREADS:-1} $(PY) -m pytest -n 2 --dist loadfile
 
 demo: $(STAMP)
 	$(PY) scripts/pictures/demo.py

@@ -39,6 +39,7 @@ OTHERS = {
     "uv.omt_notices",
     "uv.omt_checker_remove",
     "uv.omt_live_end",
+    "uv.omt_queue_stop",
     "object.omt_compare",
 }
 # What works on two objects; tests/operators/shapes links one of them.

@@ -8,7 +8,7 @@ import bpy
 from bpy.props import FloatProperty
 
 from ...session import following, last_run, queue
-from ..base import Complaint, check_all_local, mesh_objects, ready, tell
+from ..base import Complaint, check_all_local, check_numbers, mesh_objects, ready, tell
 
 UNWRAP = "uv.omt_unwrap"
 # Seconds of work between two looks at the keyboard.
@@ -57,6 +57,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
     def start(self, context: bpy.types.Context) -> set[str]:
         following.keep(context)
         try:
+            check_numbers(self)
             objects = mesh_objects(context)
             check_all_local([(obj, None) for obj in objects])
         except Complaint as complaint:

@@ -29,7 +29,7 @@ MOST_ROUNDS = 3
 # between 0.2 and 0.35, of limbs with fingers less.
 SPREAD_OF_SHEAR = 0.21
 # What a search that is made again aims below the bound, so that it need not be the last but one.
-MARGIN = 0.65
+MARGIN = 0.75
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
 

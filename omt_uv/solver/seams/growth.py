@@ -12,7 +12,7 @@ from .predicted_scale import ScaleModel
 # Extremities that paths are tried to.
 MOST_TIPS = 12
 # An arc that costs as much as a side of a square of the same area is to lower the spread by this share, at least.
-LEAST_WORTH = 0.04
+LEAST_WORTH = 0.015
 # Cuts end when they cost so many sides.
 MOST_COST = 14.0
 # Shares of the way to an extremity at which a path may end.

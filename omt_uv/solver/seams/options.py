@@ -7,7 +7,7 @@ from dataclasses import dataclass
 # Vertices of the coarse surface that seams are searched on.
 COARSE_VERTICES = 1200
 # Arcs that one component gets at most.
-MOST_ARCS = 64
+MOST_ARCS = 160
 
 
 @dataclass(frozen=True)

@@ -125,4 +125,7 @@ def _between(green: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Green's function (k,k) between the vertices (k,) of a cut."""
     block = green[np.ix_(vertices, vertices)]
     own = block.diagonal()
+    if len(vertices) == 1:
+        # The first pin of a closed surface takes all of its load: what gave way there would be a spread that stays.
+        return block
     return block + np.diag(ROUNDING * own + LEAST_ROUNDING * own.max())

@@ -207,7 +207,8 @@ class _Setting:
             start[root] = True
         more = np.flatnonzero(start & ~self.coarse.boundary)
         graph = path_graph(self.coarse, self.factor, start, self.mirrored)
-        return Task(graph, self.model.cut(more), bound, self.tip_factor)
+        # One alone first: before it, a closed surface is held nowhere.
+        return Task(graph, self.model.cut(more[:1]).cut(more[1:]), bound, self.tip_factor)
 
 
 def _hub(graph: PathGraph, steps: np.ndarray) -> int:
