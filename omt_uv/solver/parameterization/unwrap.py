@@ -108,7 +108,8 @@ def unwrap(
         cut = yield from part_of(cutting, 0.0, begin)
     prepared, width = cut.prepared, (1 - begin) * (1 if cut.search is None else MAPPING)
     maps = yield from part_of(task.map_symmetric(cut), begin, width)
-    if cut.search is not None:
+    # A draft leaves shear that Standard takes away: it shows the seams that are predicted, and no others.
+    if cut.search is not None and task.options.quality != "draft":
         further = bound_shear(cut.search, prepared, maps, task.map_charts)
         found = yield from part_of(further, begin + width, 1 - begin - width)
         prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps

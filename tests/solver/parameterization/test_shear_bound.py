@@ -15,7 +15,7 @@ from omt_uv.solver.progress import drain
 
 
 def unwrapped(surface, bound, **options):
-    return drain(unwrap(surface, options=UnwrapOptions(quality="draft", max_shear=bound, **options)))
+    return drain(unwrap(surface, options=UnwrapOptions(max_shear=bound, **options)))
 
 
 def mean_shear(result):
@@ -40,6 +40,14 @@ def test_a_lower_bound_takes_longer_seams():
         for seams in (unwrapped(triangle_surface(V, F), bound).seams for bound in (1.6, 1.3))
     ]
     assert 0 < length[0] < length[1]
+
+
+def test_a_draft_has_the_seams_that_are_predicted(monkeypatch):
+    """Its shear says nothing of the one that Standard leaves."""
+    monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
+    surface = triangle_surface(*meshes.cap(rings=12, sectors=24, opening=0.9))
+    found = [unwrapped(surface, 1.3, quality=quality).seams for quality in ("draft", "standard")]
+    assert len(found[0]) and np.array_equal(*found)
 
 
 def test_a_chart_within_the_bound_is_left_alone():
