@@ -6,14 +6,17 @@ import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ... import __version__
-from ...batch.engine import BatchResult, carry_out
-from ...batch.manifest import ASIDE, DONE, FAILED, Manifest, only_one
-from ...batch.plan import FAILURES, MANIFEST, BatchPlan, beside, tasks_of
 from ...supervision import INTERRUPTED, PROGRAM
 from ..common import CommandError, UsageError, warn_of
 from ..options import gigabytes, positive
+
+if TYPE_CHECKING:
+    # Every run of every command reads this module: the database and the engine wait until there is a batch.
+    from ...batch.engine import BatchResult
+    from ...batch.plan import BatchPlan
 
 NAME = "batch"
 # Exit status where some files could be done, and some not.
@@ -103,6 +106,10 @@ def run_batch(options: argparse.Namespace) -> None:
     BatchError : there is nothing to do, or another batch is at work
     SomeFailed : some files, or all, could not be done
     """
+    from ...batch.engine import carry_out
+    from ...batch.manifest import Manifest, only_one
+    from ...batch.plan import MANIFEST, beside, tasks_of
+
     plan = _plan(options)
     tasks = tasks_of(plan, options.input, options.part)
     name = MANIFEST if options.part[1] == 1 else f".part{options.part[0]}of{options.part[1]}{MANIFEST}"
@@ -121,19 +128,22 @@ def run_batch(options: argparse.Namespace) -> None:
 
 def _plan(options: argparse.Namespace) -> BatchPlan:
     """What is asked, after the command's own parser has looked at its options."""
+    from ...batch.plan import BatchPlan
+
     given = _given(options)
     rest = tuple(options.rest)
     suffix = options.format.lower()
     suffix = suffix if not suffix or suffix.startswith(".") else f".{suffix}"
-    words = ["in.obj", *(["-o", f"out{suffix or '.obj'}"] if given.writes else []), *rest]
+    out = f"out{suffix or '.obj'}"
+    words = ["in.obj", *(["-o", out] if given.writes else []), *rest]
     values = vars(given.parser.parse_args(words))
     plain = vars(given.parser.parse_args(_complete(given, words, rest)))
     for name, value in values.items():
         if isinstance(value, Path) and name not in (*READ, "input", "output"):
             raise UsageError(f"--{name.replace('_', '-')} names one file for all of the batch. Leave it out.")
-        if name in OWN and name not in ("output",) and value != plain[name]:
+        if name in OWN and name != "output" and value != plain[name]:
             raise UsageError(f"--{name} belongs before the --: the batch gives it to every run.")
-    if str(values.get("output", f"out{suffix or '.obj'}")) != f"out{suffix or '.obj'}":
+    if str(values.get("output", out)) != out:
         raise UsageError("-o belongs before the --: every file gets a place in that folder.")
     return BatchPlan(
         command=options.command,
@@ -201,6 +211,9 @@ def _tell(result: BatchResult, plan: BatchPlan, allowed: bool) -> None:
     ------
     SomeFailed : not all of them
     """
+    from ...batch.manifest import ASIDE, DONE, FAILED
+    from ...batch.plan import FAILURES
+
     counts = result.counts
     done = counts.get(DONE, 0)
     failed = counts.get(FAILED, 0) + counts.get(ASIDE, 0)
