@@ -112,7 +112,7 @@ def leave(status: int) -> None:
 def supervise(errand: Errand) -> int:
     """Run the child to its end and say what ended it unless it did so itself; returns the exit status."""
     with begun(errand) as (child, _):
-        with _stopped_by_signals(child) as received:
+        with ended_by_signals(child.kill) as received:
             late = False
             try:
                 child.wait(errand.timeout or None)
@@ -222,13 +222,16 @@ def _end(errand: Errand, returned: int, late: bool) -> tuple[int, str]:
 
 
 @contextmanager
-def _stopped_by_signals(child: subprocess.Popen) -> Iterator[list[int]]:
-    """Signals that are received end the child; the value lists them."""
+def ended_by_signals(end: Callable[[], None]) -> Iterator[list[int]]:
+    """Signals that are received call `end`; the value lists them. Threads other than the first get none."""
     received: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield received
+        return
 
     def stop(number: int, _frame) -> None:
         received.append(number)
-        child.kill()
+        end()
 
     before = {number: signal.signal(number, stop) for number in SIGNALS}
     try:

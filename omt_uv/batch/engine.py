@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..supervision import SIGNALS
+from ..supervision import ended_by_signals
 from .bar import shown, work_of
 from .child import Record
 from .manifest import Manifest
@@ -35,7 +32,7 @@ def carry_out(
     manifest.describe(plan)
     due = manifest.due(plan, tasks, retry)
     ran = 0
-    with _ended_by_signals(runner) as received, shown(len(due), sum(work_of(t.size) for t in due)) as step:
+    with ended_by_signals(runner.stop) as received, shown(len(due), sum(work_of(t.size) for t in due)) as step:
         for task, record in runner.run(due):
             if record is None:
                 manifest.begin(task)
@@ -58,23 +55,3 @@ def keep_failure(plan: BatchPlan, task: FileTask, record: Record) -> None:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(f"{shell_text(record.words)}\n\nstatus {record.status}\n{record.message}\n", errors="replace")
-
-
-@contextmanager
-def _ended_by_signals(runner: Runner) -> Iterator[list[int]]:
-    """Signals that are received end the runner; the value lists them. Threads other than the first get none."""
-    received: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield received
-        return
-
-    def stop(number: int, _frame) -> None:
-        received.append(number)
-        runner.stop()
-
-    before = {number: signal.signal(number, stop) for number in SIGNALS}
-    try:
-        yield received
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -7,6 +7,7 @@ import queue
 import subprocess
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -43,7 +44,7 @@ class LocalPool:
         self.room = room * GIGABYTE if room else SHARE * free_memory()
         if not plan.memory and MEMORY_IS_LIMITED:
             # What would drive the machine out of memory ends by itself, and no other run with it.
-            self.plan = _with_memory(plan, self.room / GIGABYTE)
+            self.plan = replace(plan, memory=round(self.room / GIGABYTE, 3))
         self._children: set[subprocess.Popen] = set()
         self._lock = threading.Lock()
         self._ended: queue.SimpleQueue = queue.SimpleQueue()
@@ -103,12 +104,6 @@ class LocalPool:
             self._children = {c for c in self._children if c.returncode is None} | {child}
         if self._stopped:
             child.kill()
-
-
-def _with_memory(plan: BatchPlan, gigabytes: float) -> BatchPlan:
-    from dataclasses import replace
-
-    return replace(plan, memory=round(gigabytes, 3))
 
 
 def cores() -> int:
