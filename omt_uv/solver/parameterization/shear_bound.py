@@ -23,7 +23,7 @@ from ..seams.search import SeamSearch
 from .chart_map import ChartMap
 from .options import ShearBound
 
-# Maps that are made at most, with more seams each.
+# Maps that are made at most.
 MOST_ROUNDS = 3
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
@@ -76,13 +76,12 @@ class ShearSearch:
         """The search for a spread (f,)."""
         return SeamSearch(spread, self.surface, self.costs, density=self._density, further=self.shear.further)
 
-    def again(self, cuts: np.ndarray, charts: list[Chart], missed: list[int], spread: np.ndarray) -> Steps[DiskCharts]:
+    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray) -> Steps[DiskCharts]:
         """Charts that missed the bound cut anew for a spread (f,); the edges that others were cut along (k,2) stay."""
-        outlines = [_outline(charts[k]) for k in missed]
-        kept = cuts[~np.isin(pair_keys(*cuts.T), np.concatenate(outlines))]
-        others = np.ones(self._count, dtype=bool)
-        others[np.concatenate([charts[k].faces for k in missed])] = False
-        search = replace(self.search(np.where(others, np.inf, spread)), further=True)
+        wanted = np.full(self._count, np.inf)
+        for chart in missed:
+            wanted[chart.faces] = spread[chart.faces]
+        search = replace(self.search(wanted), further=True)
         surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
         return disk_charts(surface, self.faces, search=search, **self.cutting)
 
@@ -109,7 +108,7 @@ def bound_shear(
     maps: list[ChartMap],
     map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
 ) -> Steps[BoundedShear]:
-    """Cut charts further whose maps shear more than a bound, and map them again, until all keep it or it is too much.
+    """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or it is too much.
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts.
     Errors are those of `disk_charts.disk_charts` and of `map_charts`.
@@ -129,11 +128,11 @@ def bound_shear(
             spread[charts[k].faces] *= MARGIN * (np.log(bound) / np.log(mean[k])) ** 2
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        again = yield from part_of(search.again(cuts.edges, charts, searched, spread), begin, width * SEARCHING)
-        more = _cuts(again)
-        outlines = np.concatenate([_outline(charts[k]) for k in searched])
-        stays = ~np.isin(pair_keys(*cuts.edges.T), outlines)
-        edges = np.concatenate([cuts.edges[stays], more.edges])
+        worst = [charts[k] for k in searched]
+        outlines = np.concatenate([_outline(chart) for chart in worst])
+        kept = cuts.edges[~np.isin(pair_keys(*cuts.edges.T), outlines)]
+        again = yield from part_of(search.again(kept, worst, spread), begin, width * SEARCHING)
+        edges = np.concatenate([kept, _cuts(again).edges])
         if len(edges) == len(cuts.edges) and np.isin(pair_keys(*edges.T), pair_keys(*cuts.edges.T)).all():
             break
         prepared, cuts = again, replace(cuts, edges=edges, length=_length(search.surface, edges))

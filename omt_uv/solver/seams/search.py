@@ -67,16 +67,16 @@ class SeamSearch:
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
         """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut."""
         yield Progress("Seams", 0.0)
-        coarse = coarse_surface(component.positions, component.triangles, self.options.vertices)
-        model = ScaleModel.of(coarse, self._log_density(component, coarse))
         bound = float(self.spread[component.polygons[component.polygons >= 0]].min())
-        if coarse.boundary.any() and model.spread <= bound:
-            return np.zeros(len(component.pair), dtype=bool)
+        bounded = bool(component.on_boundary().any())
+        if bounded:
+            coarse, model = self._modelled(component)
+            if model.spread <= bound:
+                return np.zeros(len(component.pair), dtype=bool)
         component = self._with_costs(component)
         mirror = None if base.any() else self._mirror(component)
-        if mirror is not None:
-            coarse = coarse_surface(component.positions, component.triangles, self.options.vertices, mirror.plane)
-            model = ScaleModel.of(coarse, self._log_density(component, coarse))
+        if mirror is not None or not bounded:
+            coarse, model = self._modelled(component, mirror)
         setting = _Setting.of(component, coarse, base, mirror, model, self._tip_factor(component))
         task = setting.task(bound, setting.extremity())
         if mirror is not None and not task.graph.is_whole():
@@ -109,6 +109,12 @@ class SeamSearch:
             done = np.log(begin / cut.spread) / max(np.log(begin / task.bound), 1e-9)
             yield Progress(f"Seams, cut {count + 1}", GROWN * min(max(done, 0.0), 1.0))
         return cut
+
+    def _modelled(self, component: CutComponent, mirror: FineMirror | None = None) -> tuple[CoarseSurface, ScaleModel]:
+        """The coarse surface of a component, whose mirror plane stays a line, and its model."""
+        line = None if mirror is None else mirror.plane
+        coarse = coarse_surface(component.positions, component.triangles, self.options.vertices, line)
+        return coarse, ScaleModel.of(coarse, self._log_density(component, coarse))
 
     def _with_costs(self, component: CutComponent) -> CutComponent:
         """The component with the costs of where an artist would cut; what fills holes costs as before."""
