@@ -48,10 +48,9 @@ def test_together_is_as_good_as_one_by_one(monkeypatch, quality, balance):
     options = UnwrapOptions(quality=quality, balance=balance)
     together = drain(unwrap(surface, options=options))
     alone = one_by_one(monkeypatch, surface, options=options)
-    assert sum(m.newton_transport is None for m in together.maps) >= len(SHAPES)
-    steps = sorted(m.newton_refinement for m in together.maps if m.newton_transport is None)
-    # A shape of 480 triangles starts far from its map since conformal starts are found for all charts at once.
-    assert steps[-2] <= 25
+    # What went alone has stages of its own.
+    batched = [m for m in together.maps if set(m.seconds) == {"refinement"}]
+    assert len(batched) >= len(SHAPES) and max(m.newton_refinement for m in batched) <= 25
     for chart, a, b in zip(together.charts, together.maps, alone.maps, strict=True):
         assert a.folds == 0 and (signed_areas(a.uv, chart.triangles) > 0).all()
         figures = distortion(chart.vertices, chart.triangles, a.uv[chart.triangles])
