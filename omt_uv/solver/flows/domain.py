@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import HandleError, NonFiniteError
 from ..mesh.closest_point import spread_points
+from ..mesh.spherical_geometry import fibonacci_sphere
 from .handles import farthest_points
 
 # Samples of a wall.
@@ -56,15 +57,6 @@ def ball_domain(middle: np.ndarray, reach: float, samples: int = SAMPLES) -> Flo
     else:
         normals = fibonacci_sphere(samples)
     return FlowDomain(middle + reach * normals, normals, middle, float(reach), ball=True)
-
-
-def fibonacci_sphere(count: int) -> np.ndarray:
-    """Unit vectors (count,3) spread evenly over the sphere."""
-    k = np.arange(count) + 0.5
-    z = 1 - 2 * k / count
-    angle = np.pi * (1 + 5**0.5) * k
-    ring = np.sqrt(np.maximum(1 - z**2, 0.0))
-    return np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1)
 
 
 def mesh_domain(vertices: np.ndarray, triangles: np.ndarray, samples: int = SAMPLES) -> FlowDomain:

@@ -1,4 +1,4 @@
-"""Measure triangles on the unit sphere: orientation and area (van Oosterom, Strackee 1983)."""
+"""Measure triangles on the unit sphere: orientation and area (van Oosterom, Strackee 1983); and spread points there."""
 
 from __future__ import annotations
 
@@ -9,6 +9,14 @@ def normalized(vectors: np.ndarray) -> np.ndarray:
     """Unit vectors (n,3) in the direction of vectors (n,3); zero stays zero."""
     size = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(size > 0, size, 1)
+
+
+def fibonacci_sphere(count: int) -> np.ndarray:
+    """Unit vectors (count,3) spread evenly over the sphere, from the north pole to the south (Gonzalez 2010)."""
+    k = np.arange(count) + 0.5
+    z, angle = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
+    ring = np.sqrt(1 - z * z)
+    return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])
 
 
 def triple_products(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.spherical_geometry import normalized
+from ..mesh.spherical_geometry import fibonacci_sphere, normalized
 
 # Directions of the first axis, and turns about it, of the grid of rotations.
 DIRECTIONS = 192
@@ -90,15 +90,6 @@ def _scores(source: _Sampled, target: _Sampled, rotations: np.ndarray) -> np.nda
     turned = np.einsum("rab,kb->rka", rotations, source.points)
     index = target.tree.query(turned.reshape(-1, 3))[1].reshape(len(rotations), -1)
     return ((target.values[index] - source.values) ** 2).sum(axis=2).mean(axis=1)
-
-
-def fibonacci_sphere(count: int) -> np.ndarray:
-    """Unit vectors (count,3) spread evenly."""
-    k = np.arange(count) + 0.5
-    z = 1 - 2 * k / count
-    turn = np.pi * (1 + np.sqrt(5)) * k
-    across = np.sqrt(1 - z * z)
-    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
 
 
 def rotation_grid() -> np.ndarray:

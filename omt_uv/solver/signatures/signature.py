@@ -15,10 +15,9 @@ from ..conformal.moebius import centre_on_sphere
 from ..errors import EmptyMeshError, NotASphereError
 from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.point_location import locate
-from ..mesh.spherical_geometry import normalized
+from ..mesh.spherical_geometry import fibonacci_sphere, normalized
 from ..mesh.topology import boundary_loops, graph_components, halfedges
 from ..progress import Steps
-from ..registration.alignment import fibonacci_sphere
 from ..sphere.sphere_map import sphere_map
 
 POINTS = 400

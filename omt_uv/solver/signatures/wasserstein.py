@@ -13,7 +13,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from ..registration.alignment import fibonacci_sphere, rotation_grid, rotation_of_pairs
+from ..mesh.spherical_geometry import fibonacci_sphere
+from ..registration.alignment import rotation_grid, rotation_of_pairs
 from .signature import Signature
 
 # Points at which densities are compared, and the width of the kernel that smooths them, in radians.

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ..linalg.sparse import solve_spd
-from ..mesh.spherical_geometry import normalized
+from ..mesh.spherical_geometry import fibonacci_sphere, normalized
 
 # Radius of a bump, in distances between neighbouring centres.
 RADIUS = 2.5
@@ -38,11 +38,7 @@ class BumpBasis:
 
 def bump_basis(count: int) -> BumpBasis:
     """A basis of `count` bumps, centred on a spherical Fibonacci lattice (Gonzalez 2010)."""
-    k = np.arange(count) + 0.5
-    z, angle = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
-    r = np.sqrt(1 - z**2)
-    centres = np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
-    return BumpBasis(centres=centres, radius=RADIUS * np.sqrt(4 * np.pi / count))
+    return BumpBasis(centres=fibonacci_sphere(count), radius=RADIUS * np.sqrt(4 * np.pi / count))
 
 
 @dataclass(frozen=True)
