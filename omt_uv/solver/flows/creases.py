@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from ..mesh.geometry import nearest_rotations
 from ..mesh.topology import graph_components, halfedges
 from .self_intersections import intersecting_pairs
 
@@ -111,14 +112,6 @@ def _affine_images(before: np.ndarray, after: np.ndarray, owner: np.ndarray, wei
     )
     # Towards the identity across flat patches, whose normal no point says anything about.
     soft = (1e-3 * scale**2 * total)[:, None, None] * np.eye(3)
-    rotation = _rotations(cross)
+    rotation = nearest_rotations(cross)
     matrix = (cross + soft @ rotation) @ np.linalg.inv(square + soft)
     return high[owner] + np.einsum("kij,kj->ki", matrix[owner], x)
-
-
-def _rotations(cross: np.ndarray) -> np.ndarray:
-    """The rotations (c,3,3) nearest to matrices (c,3,3)."""
-    u, _, v = np.linalg.svd(cross)
-    sign = np.ones((len(u), 3))
-    sign[:, 2] = np.sign(np.linalg.det(u @ v))
-    return (u * sign[:, None, :]) @ v

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..mesh.geometry import nearest_rotations
 from .options import BLEND, RADIUS, RIGID, STRAIGHT
 
 # Radians below pi that directions may be apart; opposite ones have no shortest way.
@@ -73,10 +74,7 @@ def _turned(start: np.ndarray, end: np.ndarray, times: np.ndarray) -> np.ndarray
 
 def rotation_between(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """The rotation R (d,d) that takes points (k,d) about their mean nearest to others (k,d) (Kabsch 1976)."""
-    u, _, v = np.linalg.svd((end - end.mean(axis=0)).T @ (start - start.mean(axis=0)))
-    sign = np.ones(len(u))
-    sign[-1] = np.sign(np.linalg.det(u @ v)) or 1.0
-    return (u * sign) @ v
+    return nearest_rotations((end - end.mean(axis=0)).T @ (start - start.mean(axis=0)))
 
 
 def _rigid(start: np.ndarray, end: np.ndarray, times: np.ndarray) -> np.ndarray:

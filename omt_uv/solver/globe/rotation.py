@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import face_areas, vertex_areas
+from ..mesh.geometry import face_areas, nearest_rotations, vertex_areas
 from ..mesh.spherical_geometry import signed_volumes
 
 NORTH = np.array([0.0, 0, 1])
@@ -39,8 +39,7 @@ def along_axes(points: np.ndarray, vertices: np.ndarray, triangles: np.ndarray) 
 
 def nearest_rotation(points: np.ndarray, directions: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Rotation R (3,3) with the largest sum of weight (n,) * <R points, directions>, (n,3) both (Kabsch 1976)."""
-    u, _, vt = np.linalg.svd((directions * weight[:, None]).T @ points)
-    return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return nearest_rotations((directions * weight[:, None]).T @ points)
 
 
 def by_markers(pole: np.ndarray, meridian: np.ndarray | None = None, side: np.ndarray | None = None) -> np.ndarray:

@@ -55,6 +55,17 @@ def unit(v: np.ndarray) -> np.ndarray:
     return v / np.where(length > 0, length, 1)
 
 
+def nearest_rotations(matrices: np.ndarray, mirrored: bool = False) -> np.ndarray:
+    """The rotations (..., d, d) nearest to matrices (..., d, d), or the nearest of determinant -1 (Kabsch 1976).
+
+    The one nearest to a sum of q p^T takes points p nearest to places q in the squares.
+    """
+    left, _, right = np.linalg.svd(matrices)
+    sign = np.ones(left.shape[:-1])
+    sign[..., -1] = np.sign(np.linalg.det(left @ right)) * (-1 if mirrored else 1)
+    return (left * sign[..., None, :]) @ right
+
+
 def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unit normals (m,3) of triangles (m,3) of positions (n,3), 0 for a triangle without area."""
     return unit(np.stack(_double_areas(positions, triangles), axis=1))

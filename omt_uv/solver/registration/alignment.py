@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..mesh.geometry import nearest_rotations
 from ..mesh.spherical_geometry import fibonacci_sphere, normalized
 
 # Directions of the first axis, and turns about it, of the grid of rotations.
@@ -40,9 +41,7 @@ class Alignment:
 
 def rotation_of_pairs(points: np.ndarray, places: np.ndarray, mirrored: bool = False) -> Alignment:
     """The rotation that takes points (k,3) nearest to places (k,3) in the mean square (Kabsch 1976)."""
-    left, _, right = np.linalg.svd(places.T @ points)
-    sign = np.sign(np.linalg.det(left) * np.linalg.det(right)) or 1.0
-    rotation = (left * [1, 1, -sign if mirrored else sign]) @ right
+    rotation = nearest_rotations(places.T @ points, mirrored)
     return Alignment(rotation, float(((points @ rotation.T - places) ** 2).sum(axis=1).mean()))
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..mesh.geometry import nearest_rotations
+
 # Rounds of aligning to the mean, and the change of the mean, over its size, below which they end.
 ROUNDS = 20
 SETTLED = 1e-9
@@ -48,11 +50,7 @@ def mean_shape(shapes: np.ndarray, weight: np.ndarray, scaled: bool = False) -> 
     mean = centred[0]
     for _ in range(ROUNDS):
         moment = np.einsum("n,nd,kne->kde", share, mean, centred)
-        left, _, right = np.linalg.svd(moment)
-        sign = np.ones((len(shapes), 3))
-        sign[:, 2] = np.sign(np.linalg.det(left) * np.linalg.det(right))
-        rotation = np.einsum("kab,kb,kbc->kac", left, sign, right)
-        aligned = np.einsum("kde,kne->knd", rotation, centred)
+        aligned = np.einsum("kde,kne->knd", nearest_rotations(moment), centred)
         following = aligned.mean(axis=0)
         change = float(np.sqrt(share @ ((following - mean) ** 2).sum(axis=1)))
         mean = following

@@ -15,6 +15,7 @@ from ..flows.domain import ball_domain
 from ..flows.flow_map import flow
 from ..flows.handles import FlowHandle
 from ..flows.options import BLEND, FlowOptions
+from ..mesh.geometry import nearest_rotations
 from ..progress import Steps
 
 # Landmarks farther out than this are pulled in: at the wall a flow only goes along it.
@@ -45,9 +46,7 @@ def registered(
     """
     if len(landmarks) < 3 or len(landmarks) != len(goals):
         raise HandleError("A registration needs three landmarks or more, in pairs", "Give more landmarks")
-    u, _, v = np.linalg.svd(goals.T @ landmarks)
-    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ v)) or 1.0])
-    rotation = (u * sign) @ v
+    rotation = nearest_rotations(goals.T @ landmarks)
     turned, start, end = positions @ rotation.T, _inner(landmarks @ rotation.T), _inner(goals)
     before = float(np.linalg.norm(start - end, axis=1).mean())
     options = options or FlowOptions(radius=0.25, path=BLEND)
