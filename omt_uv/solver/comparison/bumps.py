@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix, vstack
 from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.geometry import face_areas
@@ -54,8 +54,6 @@ def bumps_of(V: np.ndarray, F: np.ndarray, count: int = BUMPS) -> Steps[Bumps]:
         yield Progress("bumps", 1.0)
         distance = dijkstra(edges, indices=part, limit=radius)
         rows.append(csr_matrix(np.where(np.isfinite(distance), np.maximum(1 - distance / radius, 0), 0)))
-    from scipy.sparse import vstack
-
     return Bumps(vstack(rows).tocsr(), np.array(centres), radius)
 
 

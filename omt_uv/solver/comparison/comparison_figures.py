@@ -12,7 +12,7 @@ from ..analysis.curvature import gaussian_curvature, mean_curvature
 from ..errors import EmptyMeshError, NonFiniteError
 from ..mesh.closest_point import ClosestPoint, SurfacePoints, subdivision_centroids
 from ..mesh.geometry import face_areas, face_normals
-from ..mesh.topology import boundary_edges
+from ..mesh.topology import boundary_edges, expand
 from ..progress import Progress, Steps, part_of
 from .bumps import Bumps, bumps_of, curvature_error
 from .triangle_shapes import compare_shapes, topology_of
@@ -236,6 +236,6 @@ def _along(mesh: Mesh, step: float) -> np.ndarray:
     edges = boundary_edges(F)
     a, b = V[edges[:, 0]], V[edges[:, 1]]
     count = np.maximum(1, np.ceil(np.linalg.norm(b - a, axis=1) / step).astype(int))
-    edge = np.repeat(np.arange(len(edges)), count)
-    t = ((np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)) / np.repeat(count, count))[:, None]
+    edge, step_number = expand(count)
+    t = (step_number / count[edge])[:, None]
     return a[edge] * (1 - t) + b[edge] * t

@@ -49,10 +49,8 @@ def check_handles(handles: tuple[FlowHandle, ...], dimension: int) -> None:
 def sampled_handles(
     handles: tuple[FlowHandle, ...], spacing: float, most: int = MOST_SAMPLES
 ) -> tuple[FlowHandle, ...]:
-    """Every handle with points that are at least `spacing` apart, at most `most`, chosen farthest first.
-
-    Points (k,d) of handles that came before are kept away from as well where they go the same way.
-    """
+    """Every handle with those of its points (k,d) that are at least `spacing` apart, at most `most`, chosen farthest
+    first."""
     chosen: list[FlowHandle] = []
     for handle in handles:
         rows = farthest_points(handle.start, spacing, most)

@@ -61,7 +61,7 @@ def geodesic_cells(pairs: PolarCoordinates, site_weights: np.ndarray, mass: np.n
     pair = row[kept]
     share, _ = polygons.moments()
     part = 2 * np.maximum(share, 0) * mass[pairs.face[pair]]
-    side, conductance = _sides(polygons, value[kept], pairs.site[pair], mass[pairs.face[pair]])
+    side, conductance = _sides(polygons, mass[pairs.face[pair]])
     i, j, length = _against(pairs, site_weights, side, conductance, pair)
     area = np.bincount(pairs.site[pair], part, n)
     return GeodesicCells(area, pair, polygons, part, np.stack([i, j], axis=1), length)
@@ -105,9 +105,7 @@ def _stacked(many: list[CellPieces]) -> CellPieces:
     return CellPieces(points, np.concatenate([p.count for p in many]), label)
 
 
-def _sides(
-    polygons: CellPieces, value: np.ndarray, site: np.ndarray, mass: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _sides(polygons: CellPieces, mass: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rows (e,2) of a piece and a slot whose side is shared with another site, and twice its length times mass (e,)."""
     rows, slots = np.nonzero((polygons.label >= 0) & polygons.used())
     step = polygons.following()[rows, slots] - polygons.points[rows, slots]

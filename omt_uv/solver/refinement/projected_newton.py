@@ -254,13 +254,9 @@ def first_fold(faces: Elements, w: np.ndarray, step: np.ndarray) -> float:
     return float((far if faces.part is None else far[faces.part > 0]).min(initial=np.inf))
 
 
-def fold_share(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> float:
-    """The smallest t > 0 at which a face with the derivatives a + t da, b + t db (m,) complex has no area."""
-    return float(fold_shares(a, b, da, db).min(initial=np.inf))
-
-
 def fold_shares(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) -> np.ndarray:
-    """The same for every face (m,); infinity where there is none."""
+    """The smallest t > 0 at which each face (m,) with the derivatives a + t da, b + t db (m,) complex has no area;
+    infinity where there is none."""
     c = squared(a) - squared(b)
     h = (a.conj() * da).real - (b.conj() * db).real
     q = squared(da) - squared(db)

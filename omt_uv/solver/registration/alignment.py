@@ -76,11 +76,10 @@ class _Sampled:
     def __init__(self, positions: np.ndarray, values: np.ndarray, count: int, flip: np.ndarray | None = None):
         positions = positions if flip is None else positions @ flip.T
         self.points = fibonacci_sphere(count)
-        weight, near = np.ones(count), cKDTree(positions).query(self.points, k=min(4, len(positions)))
+        near = cKDTree(positions).query(self.points, k=min(4, len(positions)))
         distance, index = (part.reshape(count, -1) for part in near)
         share = 1 / np.maximum(distance, 1e-9)
         self.values = np.einsum("kc,kcf->kf", share / share.sum(axis=1, keepdims=True), values[index])
-        self.weight = weight
         self.tree = cKDTree(self.points)
 
 

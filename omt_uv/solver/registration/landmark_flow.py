@@ -65,9 +65,7 @@ def draw_landmarks(problem: Deformation, placed: InPlace, vertices: np.ndarray, 
         placed, more = yield from minimise_on(held, placed, RELAXING_STEPS, LOOSE, "Landmarks")
         steps += more
     placed, met = put_landmarks(problem, placed, vertices, targets)
-    final = replace(held, held=problem.held.copy())
-    final.held[vertices] = True
-    placed, more = yield from minimise_on(final, placed, LAST_STEPS, LOOSE, "Landmarks")
+    placed, more = yield from minimise_on(held, placed, LAST_STEPS, LOOSE, "Landmarks")
     return Drawn(placed, met, steps + more)
 
 

@@ -18,7 +18,7 @@ from ..linalg.sparse import Factor
 from ..mesh.closed_surface import closed_surface
 from ..progress import Progress, Steps, part_of
 from ..sphere.sphere_map import sphere_map
-from .domains import BALL, CUBE, DOMAINS, BallDomain, CubeDomain, cube_points
+from .domains import BALL, CUBE, DOMAINS, BallDomain, CubeDomain
 from .meshing import TetMesh, tetrahedra
 from .paper_flow import paper_flow
 from .tet_mesh import graph_laplacian, share_error, stiffness, tet_volumes, vertex_share_error
@@ -140,11 +140,9 @@ def harmonic(mesh: TetMesh, boundary: np.ndarray) -> np.ndarray:
 def _mapped(mesh: TetMesh, sphere: np.ndarray, domain: str, method: str) -> Steps[tuple[np.ndarray, int]]:
     """Positions (n,3) of a mesh whose boundary goes to unit vectors (b,3), and steps."""
     b = np.arange(len(sphere))
-    if domain == CUBE:
-        start = harmonic(mesh, cube_points(sphere))
-        kind: BallDomain | CubeDomain = CubeDomain(b, np.abs(sphere).argmax(axis=1))
-    else:
-        start, kind = harmonic(mesh, sphere), BallDomain(b)
+    side = np.abs(sphere).argmax(axis=1)
+    kind: BallDomain | CubeDomain = CubeDomain(b, side) if domain == CUBE else BallDomain(b)
+    start = harmonic(mesh, kind.start(sphere))
     yield Progress("Harmonic map", 0.2)
     if method == FLOW:
         found = yield from part_of(paper_flow(mesh.points, mesh.tets, start, kind), 0.2, 0.8)
