@@ -6,8 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..linalg.sparse import Factor
-from ..mesh.geometry import cotangents_from_lengths, halfedge_lengths, laplacian_from_weights, vertex_areas
-from ..mesh.topology import halfedges
+from ..mesh.geometry import halfedge_lengths, laplacian_from_lengths, vertex_areas
 
 # Dimension of the Krylov space, enough for 1e-4 over a range of times of 1 : 36.
 DIMENSION = 24
@@ -25,8 +24,7 @@ class HeatMeans:
         mass = np.maximum(self.area, 1e-12 * self.area.max())
         length = halfedge_lengths(positions, triangles).reshape(-1, 3)
         # Negative stiffness would let heat flow from cold to hot across obtuse triangles.
-        stiffness = np.maximum(0.5 * cotangents_from_lengths(length).ravel(), 0)
-        laplacian = laplacian_from_weights(*halfedges(triangles), stiffness, n)
+        laplacian = laplacian_from_lengths(length, triangles, n, least=0)
         self._root = np.sqrt(mass)
         self._step = sigma**2 / 2
         self._factor = Factor(sp.diags(mass) + self._step * laplacian)

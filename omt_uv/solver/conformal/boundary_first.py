@@ -13,17 +13,13 @@ import numpy as np
 
 from ..linalg.sparse import Factor
 from ..mesh.geometry import (
+    LEAST_STIFFNESS,
     angle_defects,
     angles_from_lengths,
-    cotangents_from_lengths,
     halfedge_lengths,
-    laplacian_from_weights,
+    laplacian_from_lengths,
     vertex_areas,
 )
-from ..mesh.topology import halfedges
-
-# Least stiffness of an edge: those across obtuse corners would repel.
-LEAST_STIFFNESS = 1e-3
 
 
 @dataclass(frozen=True)
@@ -60,8 +56,7 @@ def boundary_first(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarray
     """
     n = len(vertices)
     length = halfedge_lengths(vertices, triangles).reshape(-1, 3)
-    stiffness = np.maximum(0.5 * cotangents_from_lengths(length), LEAST_STIFFNESS).ravel()
-    laplacian = laplacian_from_weights(*halfedges(triangles), stiffness, n).tocsr()
+    laplacian = laplacian_from_lengths(length, triangles, n, LEAST_STIFFNESS)
     curvature = angle_defects(triangles, angles_from_lengths(length), loop, n)
     inside = np.ones(n, bool)
     inside[loop] = False

@@ -11,11 +11,11 @@ import numpy as np
 
 from ..linalg.sparse import solve_spd
 from ..mesh.geometry import (
+    LEAST_STIFFNESS,
     angle_defects,
     angles_from_lengths,
-    cotangents_from_lengths,
     halfedge_lengths,
-    laplacian_from_weights,
+    laplacian_from_lengths,
     vertex_areas,
 )
 from ..mesh.topology import halfedges
@@ -36,8 +36,7 @@ def log_scale(component: CutComponent, cut: np.ndarray) -> np.ndarray:
     fixed[tail[boundary]] = fixed[head[boundary]] = True
     length = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
     curvature = angle_defects(classes, angles_from_lengths(length), np.flatnonzero(fixed), n)
-    weight = np.maximum(0.5 * cotangents_from_lengths(length), 1e-3).ravel()
-    matrix = laplacian_from_weights(tail, head, weight, n)
+    matrix = laplacian_from_lengths(length, classes, n, LEAST_STIFFNESS)
     if not fixed.any():
         curvature = curvature - curvature.mean()
         fixed[int(np.argmin(curvature))] = True

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.sparse import csr_matrix
 
+# Least share of a triangle in the stiffness of an edge, for estimates: across obtuse corners edges would repel.
+LEAST_STIFFNESS = 1e-3
 # Rows of arrays that are worked on at a time, so few that what is computed from them stays in the cache.
 CHUNK = 1 << 14
 
@@ -140,10 +142,16 @@ def laplacian_from_weights(tail: np.ndarray, head: np.ndarray, stiffness: np.nda
 
 def cotangent_laplacian(positions: np.ndarray, triangles: np.ndarray) -> csr_matrix:
     """Positive semidefinite cotangent Laplacian (n,n), entries -(cot + cot) / 2 (Pinkall, Polthier 1993)."""
-    length = halfedge_lengths(positions, triangles).reshape(-1, 3)
+    return laplacian_from_lengths(halfedge_lengths(positions, triangles).reshape(-1, 3), triangles, len(positions))
+
+
+def laplacian_from_lengths(
+    length: np.ndarray, triangles: np.ndarray, n: int, least: float = -np.inf, most: float = np.inf
+) -> csr_matrix:
+    """The same (n,n) of side lengths (m,3) of triangles (m,3), what each adds to a stiffness kept in bounds."""
     # The angle opposite to halfedge k is the one at vertex k + 2.
-    stiffness = 0.5 * cotangents_from_lengths(length)
-    return laplacian_from_weights(triangles.ravel(), triangles[:, [1, 2, 0]].ravel(), stiffness.ravel(), len(positions))
+    stiffness = np.clip(0.5 * cotangents_from_lengths(length), least, most)
+    return laplacian_from_weights(triangles.ravel(), triangles[:, [1, 2, 0]].ravel(), stiffness.ravel(), n)
 
 
 def angle_defects(triangles: np.ndarray, angles: np.ndarray, boundary: np.ndarray, n: int) -> np.ndarray:

@@ -18,10 +18,12 @@ from ..errors import PrecisionError
 from ..linalg.sparse import solve_spd
 from ..mesh.closed_surface import closed_surface
 from ..mesh.geometry import (
+    LEAST_STIFFNESS,
     angle_defects,
     angles_from_lengths,
     cotangents_from_lengths,
     halfedge_lengths,
+    laplacian_from_lengths,
     laplacian_from_weights,
     vertex_areas,
 )
@@ -34,9 +36,8 @@ from .untangle import untangle_locally
 CANDIDATE_SHARE = 0.02
 # Vertices that are tried at infinity.
 MOST_CANDIDATES = 4
-# Cotangent weights that the estimate of the magnification is bounded to.
-LEAST_COTANGENT = 1e-3
-GREATEST_COTANGENT = 1e3
+# Stiffness that edges have at most in the estimate of the magnification.
+GREATEST_STIFFNESS = 1e3
 
 
 @dataclass(frozen=True)
@@ -128,12 +129,11 @@ def magnified_vertices(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarra
     small, which the plane can hold; a limb at infinity would squeeze all else.
     """
     n = len(vertices)
-    angle = angles_from_lengths(halfedge_lengths(vertices, triangles).reshape(-1, 3))
+    length = halfedge_lengths(vertices, triangles).reshape(-1, 3)
+    angle = angles_from_lengths(length)
     curvature = angle_defects(triangles, angle, np.zeros(0, np.int64), n)
     mass = vertex_areas(vertices, triangles)
-    tail, head = halfedges(triangles)
-    cotangent = cotangents_from_lengths(halfedge_lengths(vertices, triangles).reshape(-1, 3)).ravel()
-    matrix = laplacian_from_weights(tail, head, np.clip(0.5 * cotangent, LEAST_COTANGENT, GREATEST_COTANGENT), n)
+    matrix = laplacian_from_lengths(length, triangles, n, LEAST_STIFFNESS, GREATEST_STIFFNESS)
     u = np.zeros(n)
     u[1:] = solve_spd(matrix[1:][:, 1:].tocsc(), (4 * np.pi * mass / mass.sum() - curvature)[1:])
     likely = np.argsort(-u, kind="stable")[: max(MOST_CANDIDATES, int(CANDIDATE_SHARE * n))]
