@@ -25,7 +25,12 @@ def boundary_triangles(tets: np.ndarray) -> np.ndarray:
 
 def vertex_volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """A quarter of the volume (n,) of the tetrahedra (m,4) around every one of points (n,3)."""
-    return np.bincount(tets.ravel(), np.repeat(tet_volumes(points, tets) / 4, 4), len(points))
+    return around_vertices(tet_volumes(points, tets), tets, len(points))
+
+
+def around_vertices(volume: np.ndarray, tets: np.ndarray, n: int) -> np.ndarray:
+    """A quarter of volumes (m,) of the tetrahedra (m,4) around every one of n vertices, (n,)."""
+    return np.bincount(tets.ravel(), np.repeat(volume / 4, 4), n)
 
 
 def gradients(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
@@ -52,7 +57,7 @@ def share_error(points: np.ndarray, tets: np.ndarray, target: np.ndarray) -> flo
 def vertex_share_error(points: np.ndarray, tets: np.ndarray, target: np.ndarray) -> float:
     """The same of what lies around vertices: a quarter of the tetrahedra (m,4) at each of points (n,3)."""
     mine = vertex_volumes(points, tets)
-    asked = np.bincount(tets.ravel(), np.repeat(target / 4, 4), len(points))
+    asked = around_vertices(target, tets, len(points))
     return float(np.abs(mine / mine.sum() - asked / asked.sum()).sum())
 
 

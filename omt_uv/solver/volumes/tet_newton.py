@@ -8,6 +8,7 @@ vertices, as the nodal pressures of Bonet and Burton (1998).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +18,7 @@ from ..errors import TetrahedraError
 from ..progress import Progress, Steps
 from .domains import BallDomain, CubeDomain
 from .tet_energy import RestShape, TetAssembly, rest_shape, tet_energy
-from .tet_mesh import tet_volumes, vertex_share_error, volume_gradients
+from .tet_mesh import around_vertices, tet_volumes, vertex_share_error, volume_gradients
 
 # Steps that untangle; eps of the first, its factor from step to step, that after a step that failed, and its least.
 UNTANGLING = 80
@@ -55,10 +56,10 @@ class TetProblem:
     fine: RestShape
     count: int
 
-    @property
+    @cached_property
     def vertex_share(self) -> np.ndarray:
         """Share (n,) of the volume around every vertex."""
-        return np.bincount(self.tets.ravel(), np.repeat(self.share / 4, 4), self.count)
+        return around_vertices(self.share, self.tets, self.count)
 
 
 def tet_problem(points: np.ndarray, tets: np.ndarray, domain: BallDomain | CubeDomain) -> TetProblem:
@@ -156,7 +157,7 @@ class _Terms:
 def _volumes_off(problem: TetProblem, points: np.ndarray, size: float = 0.0) -> np.ndarray:
     """Volume (n,) around every vertex as a share of `size`, or of the whole, less what it should be."""
     volume = tet_volumes(points, problem.tets)
-    mine = np.bincount(problem.tets.ravel(), np.repeat(volume / 4, 4), problem.count)
+    mine = around_vertices(volume, problem.tets, problem.count)
     return mine / (size or volume.sum()) - problem.vertex_share
 
 
