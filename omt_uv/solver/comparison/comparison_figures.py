@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..analysis.curvature import gaussian_curvature, mean_curvature
 from ..errors import EmptyMeshError, NonFiniteError
-from ..mesh.closest_point import ClosestPoint, SurfacePoints, subdivision_centroids
+from ..mesh.closest_point import ClosestPoint, SurfacePoints, random_points, subdivision_centroids
 from ..mesh.geometry import face_areas, face_normals
 from ..mesh.topology import boundary_edges, expand
 from ..progress import Progress, Steps, part_of
@@ -196,13 +196,8 @@ def _greatest_around(source: Mesh, owner: np.ndarray, index: ClosestPoint) -> fl
 
 def _scattered(V: np.ndarray, F: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (k,) and places (k,3) of random points, one in each of as many equal parts of the area."""
-    rng = np.random.default_rng(0)
-    area = np.cumsum(face_areas(V, F))
-    owner = np.searchsorted(area, (np.arange(count) + rng.random(count)) / count * area[-1])
-    owner = np.minimum(owner, len(F) - 1)
-    root, share = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
-    a, b, c = (V[F[owner, k]] for k in range(3))
-    return owner, (1 - root) * a + root * (1 - share) * b + root * share * c
+    owner, weights = random_points(face_areas(V, F), count, np.random.default_rng(0))
+    return owner, sum(weights[:, k, None] * V[F[owner, k]] for k in range(3))
 
 
 def _spread(way: _OneWay) -> np.ndarray:

@@ -255,6 +255,16 @@ def spread_points(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -
     return np.concatenate(owners), np.concatenate(points)
 
 
+def random_points(mass: np.ndarray, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (count,) and barycentric coordinates (count,3) of random points, spread by the mass (m,)."""
+    total = np.cumsum(mass)
+    # One in each of as many equal stretches: as random, but more even.
+    at = (np.arange(count) + rng.random(count)) / count * total[-1]
+    face = np.minimum(np.searchsorted(total, at, side="right"), len(mass) - 1)
+    root, along = np.sqrt(rng.random(count)), rng.random(count)
+    return face, np.stack([1 - root, root * (1 - along), root * along], axis=1)
+
+
 def subdivision_centroids(k: int) -> np.ndarray:
     """Barycentric coordinates (k^2,3) of the centroids of a triangle cut into k^2 similar ones."""
     i, j = (x.ravel() for x in np.meshgrid(np.arange(k), np.arange(k), indexing="ij"))

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import CountError
+from ..mesh.closest_point import random_points
 from ..mesh.geometry import face_areas, face_normals
 from ..mesh.topology import graph_components, halfedges
 
@@ -77,7 +78,7 @@ def spread(
     ends = np.cumsum(np.bincount(part, minlength=len(counts)))
     found = []
     for members, count, size in zip(np.split(order, ends[:-1]), counts, np.sqrt(area / counts), strict=True):
-        face, barycentric = _samples(mass[members], int(count) * SAMPLES, rng)
+        face, barycentric = random_points(mass[members], int(count) * SAMPLES, rng)
         face = members[face]
         places = np.einsum("kc,kcd->kd", barycentric, positions[triangles[face]])
         features = np.concatenate([places, NORMALS * size * normals[face]], axis=1)
@@ -85,16 +86,6 @@ def spread(
         found.append((face[chosen], barycentric[chosen]))
     triangle, barycentric = (np.concatenate(k) for k in zip(*found, strict=True))
     return Sites(triangle, inner(barycentric))
-
-
-def _samples(mass: np.ndarray, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (k,) and barycentric coordinates (k,3) of points that are spread by the mass (m,)."""
-    total = np.cumsum(mass)
-    # One in each of as many equal stretches: as random, but more even.
-    at = (np.arange(count) + rng.random(count)) / count * total[-1]
-    face = np.minimum(np.searchsorted(total, at, side="right"), len(mass) - 1)
-    root, along = np.sqrt(rng.random(count)), rng.random(count)
-    return face, np.stack([1 - root, root * (1 - along), root * along], axis=1)
 
 
 def _k_means(features: np.ndarray, count: int) -> np.ndarray:
