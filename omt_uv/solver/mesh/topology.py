@@ -121,6 +121,18 @@ def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
     return sorted(np.split(vertices, np.cumsum(size)[:-1]), key=len, reverse=True) if len(size) else []
 
 
+def with_fans(vertices: np.ndarray, triangles: np.ndarray, loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n,3) and triangles (m,3) with these boundary loops (k,) closed, each by a fan around its mean."""
+    if not loops:
+        return vertices, triangles
+    centres = [vertices[loop].mean(axis=0) for loop in loops]
+    fans = [
+        np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), len(vertices) + k)])
+        for k, loop in enumerate(loops)
+    ]
+    return np.concatenate([vertices, centres]), np.concatenate([triangles, *fans])
+
+
 def vertices_along_boundary(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (b,) of all boundary loops, one after the other by their first vertices, and the sizes (l,) of these.
 

@@ -19,7 +19,7 @@ from ..errors import (
     TopologyMismatchError,
 )
 from ..mesh.surface import check_finite, triangle_surface
-from ..mesh.topology import boundary_edges, boundary_loops, graph_components, halfedges, pair_keys
+from ..mesh.topology import boundary_edges, boundary_loops, graph_components, halfedges, pair_keys, with_fans
 from ..parameterization.options import UnwrapOptions
 from ..parameterization.unwrap import unwrap
 from ..progress import Steps
@@ -106,14 +106,10 @@ def filled(surface: tuple[np.ndarray, np.ndarray], domain: str, name: str) -> Fi
                 "Open both or close both, or take the sphere as domain, which closes holes",
             )
         outer = loops.pop(int(np.argmax(lengths)))
-    added, centres = [], []
-    for k, loop in enumerate(loops):
-        centres.append(vertices[loop].mean(axis=0))
-        centre = np.full(len(loop), len(vertices) + k)
-        added.append(np.column_stack([np.roll(loop, -1), loop, centre]))
+    closed, faces = with_fans(vertices, triangles, loops)
     return FilledSurface(
-        vertices=np.concatenate([vertices, np.reshape(centres, (-1, 3))]),
-        triangles=np.concatenate([triangles, *added]),
+        vertices=closed,
+        triangles=faces,
         own=len(vertices),
         count=len(triangles),
         holes=len(loops),

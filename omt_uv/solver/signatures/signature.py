@@ -16,7 +16,7 @@ from ..errors import EmptyMeshError, NotASphereError
 from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.point_location import locate
 from ..mesh.spherical_geometry import fibonacci_sphere, normalized
-from ..mesh.topology import boundary_loops, graph_components, halfedges
+from ..mesh.topology import boundary_loops, graph_components, halfedges, with_fans
 from ..progress import Steps
 from ..sphere.sphere_map import sphere_map
 
@@ -79,10 +79,4 @@ def closed_part(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarra
         loops = boundary_loops(faces)
     except (ValueError, IndexError) as error:
         raise NotASphereError("The boundary is no set of loops", "Merge vertices that coincide") from error
-    middles, fans = [], []
-    for k, loop in enumerate(loops):
-        middles.append(vertices[loop].mean(axis=0))
-        fans.append(np.stack([np.roll(loop, -1), loop, np.full(len(loop), len(vertices) + k)], axis=1))
-    if loops:
-        vertices, faces = np.concatenate([vertices, middles]), np.concatenate([faces, *fans])
-    return vertices, faces
+    return with_fans(vertices, faces, loops)
