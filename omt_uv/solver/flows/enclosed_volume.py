@@ -8,26 +8,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.topology import graph_components, halfedges
+from ..mesh.topology import graph_components, halfedges, pair_keys
 
 # Newton steps on the offset; the volume is a polynomial of degree 3 in it.
 ROUNDS = 6
+
+
+def corner_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Six times the signed volume (m,) between every triangle (m,3) of vertices (n,3) and the origin: over
+    closed triangles that look outwards they sum to six times what these enclose."""
+    corner = vertices[triangles]
+    return np.einsum("mi,mi->m", corner[:, 0], np.cross(corner[:, 1], corner[:, 2]))
 
 
 def component_volumes(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Signed volume (c,) enclosed by every connected part of triangles (m,3) of vertices (n,3), and the part (n,) of
     each vertex. Loose vertices are parts of no volume; that of open parts depends on the origin and means nothing."""
     count, part = graph_components(*halfedges(triangles), len(vertices))
-    corner = (vertices - vertices.mean(axis=0))[triangles]
-    volume = np.einsum("mi,mi->m", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6
+    volume = corner_volumes(vertices - vertices.mean(axis=0), triangles) / 6
     return np.bincount(part[triangles[:, 0]], volume, count), part
 
 
 def closed_parts(triangles: np.ndarray, part: np.ndarray) -> np.ndarray:
     """Which parts (c,) bool have two faces at every edge that look the same way round; part (n,) of each vertex."""
     tail, head = halfedges(triangles)
-    keys = np.minimum(tail, head) * len(part) + np.maximum(tail, head)
-    _, inverse, count = np.unique(keys, return_inverse=True, return_counts=True)
+    _, inverse, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
     turns = np.bincount(inverse.ravel(), np.where(tail < head, 1.0, -1.0), len(count))
     wrong = (count != 2) | (turns != 0)
     closed = np.zeros(int(part.max(initial=-1)) + 1, bool)

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import TetrahedraError
+from ..flows.enclosed_volume import corner_volumes
 from ..flows.paths import rotation_between
 from ..linalg.sparse import Factor
 from ..mesh.closed_surface import closed_surface
@@ -116,9 +117,7 @@ def _middle(vertices: np.ndarray) -> np.ndarray:
 
 def _outwards(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Triangles (m,3) that look outwards."""
-    corner = vertices[triangles]
-    inside = np.einsum("mi,mi->m", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum() < 0
-    return triangles[:, ::-1] if inside else triangles
+    return triangles[:, ::-1] if corner_volumes(vertices, triangles).sum() < 0 else triangles
 
 
 def _aligned(sphere: np.ndarray, vertices: np.ndarray) -> np.ndarray:

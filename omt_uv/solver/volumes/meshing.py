@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import LibraryError, SelfIntersectionError, TetrahedraError
+from ..flows.enclosed_volume import corner_volumes
 from ..flows.self_intersections import intersecting_pairs
 from ..mesh.topology import halfedges
 from .tet_mesh import EDGES, tet_volumes
@@ -52,8 +53,7 @@ def tetrahedra(vertices: np.ndarray, triangles: np.ndarray, count: int = 40_000)
         )
     size = float(np.ptp(vertices, axis=0).max())
     scaled = (vertices - vertices.min(axis=0)) / size
-    corner = scaled[triangles]
-    volume = abs(float(np.einsum("mi,mi->m", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum())) / 6
+    volume = abs(float(corner_volumes(scaled, triangles).sum())) / 6
     most = GROWTH * 4 * volume / max(count, 1)
     for _ in range(TRIES):
         points, tets = _tetgen(scaled, triangles, most)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..flows.enclosed_volume import corner_volumes
 from .tet_mesh import EDGES, tet_volumes
 
 # Halvings of the radius of a shell.
@@ -53,8 +54,7 @@ def _enclosing(points: np.ndarray, tets: np.ndarray, radius: np.ndarray, volume:
 
 def _enclosed(shell: Shell) -> float:
     """The volume that a closed surface encloses."""
-    corner = shell.vertices[shell.triangles]
-    return float(np.einsum("mi,mi->m", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])).sum() / 6)
+    return float(corner_volumes(shell.vertices, shell.triangles).sum() / 6)
 
 
 def level_surface(points: np.ndarray, tets: np.ndarray, function: np.ndarray, value: float) -> Shell:
