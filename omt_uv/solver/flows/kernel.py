@@ -66,11 +66,6 @@ class FlowField:
         ones = np.full((1, len(x)), -lam)
         return np.concatenate([2 * lam * x.T, ones, -lam * np.square(x).sum(axis=1)[None]])
 
-    def divergence(self, points: np.ndarray, step: float) -> np.ndarray:
-        """Divergence (k,) at points (k,d) by central differences over `step`: for tests, it is nothing but error."""
-        axes = np.eye(points.shape[1])
-        return sum((self(points + step * a) - self(points - step * a)) @ a for a in axes) / (2 * step)
-
 
 def conditions(handles: np.ndarray, walls: np.ndarray, normals: np.ndarray) -> Conditions:
     """All components at handles (h,d), then those along normals (w,d) at walls (w,d)."""

@@ -16,13 +16,6 @@ def tet_volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     return np.einsum("mi,mi->m", np.cross(a, b), c) / 6
 
 
-def boundary_triangles(tets: np.ndarray) -> np.ndarray:
-    """Triangles (k,3) that belong to one of tetrahedra (m,4) alone, looking outwards."""
-    every = tets[:, FACES].reshape(-1, 3)
-    _, inverse, count = np.unique(np.sort(every, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return every[count[inverse.ravel()] == 1]
-
-
 def vertex_volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """A quarter of the volume (n,) of the tetrahedra (m,4) around every one of points (n,3)."""
     return around_vertices(tet_volumes(points, tets), tets, len(points))

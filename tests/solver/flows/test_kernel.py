@@ -23,11 +23,17 @@ def test_every_condition_is_met(dimension):
     np.testing.assert_allclose(found, values, atol=1e-8)
 
 
+def divergence(field, points, step):
+    """By central differences: it is nothing but error."""
+    axes = np.eye(points.shape[1])
+    return sum((field(points + step * a) - field(points - step * a)) @ a for a in axes) / (2 * step)
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_nothing_diverges_anywhere(dimension):
     *_, field = random_field(dimension)
     points = np.random.default_rng(1).uniform(-2, 2, (500, dimension))
-    assert np.abs(field.divergence(points, 1e-4)).max() < 1e-5 * np.abs(field(points)).max() / 1e-1
+    assert np.abs(divergence(field, points, 1e-4)).max() < 1e-5 * np.abs(field(points)).max() / 1e-1
 
 
 def test_the_fast_sum_is_the_kernel():

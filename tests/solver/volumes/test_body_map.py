@@ -16,7 +16,7 @@ from omt_uv.solver.volumes.meshing import tetrahedra, without_chords
 from omt_uv.solver.volumes.paper_flow import paper_flow
 from omt_uv.solver.volumes.tet_energy import REGULAR, TetAssembly, rest_shape, signed_svd, tet_energy
 from omt_uv.solver.volumes.tet_mesh import (
-    boundary_triangles,
+    FACES,
     gradients,
     graph_laplacian,
     share_error,
@@ -81,6 +81,13 @@ def test_measures_of_tetrahedra_fit_together():
     U, s, V = signed_svd(np.diag([1.0, 2, -3])[None])
     np.testing.assert_allclose(U @ (s[:, :, None] * V.swapaxes(1, 2)), np.diag([1.0, 2, -3])[None], atol=1e-12)
     assert s[0, 2] < 0 and np.linalg.det(U) > 0
+
+
+def boundary_triangles(tets):
+    """Triangles (k,3) that belong to one of tetrahedra (m,4) alone."""
+    every = tets[:, FACES].reshape(-1, 3)
+    _, inverse, count = np.unique(np.sort(every, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return every[count[inverse.ravel()] == 1]
 
 
 def test_the_surface_is_kept_and_no_edge_leads_through_the_inside():
