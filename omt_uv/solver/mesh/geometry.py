@@ -57,6 +57,13 @@ def unit(v: np.ndarray) -> np.ndarray:
     return v / np.where(length > 0, length, 1)
 
 
+def plane_axes(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors (m,3) in the planes of triangles of corners (m,3,3): along the first side, and across it."""
+    side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    first = unit(side)
+    return first, unit(other - np.einsum("md,md->m", other, first)[:, None] * first)
+
+
 def nearest_rotations(matrices: np.ndarray, mirrored: bool = False) -> np.ndarray:
     """The rotations (..., d, d) nearest to matrices (..., d, d), or the nearest of determinant -1 (Kabsch 1976).
 

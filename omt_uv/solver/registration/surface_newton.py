@@ -14,7 +14,7 @@ import numpy as np
 
 from ..linalg.sparse import Factor
 from ..maps.energy import Elements, derivatives_of, energies_of, energy_of
-from ..mesh.geometry import unit
+from ..mesh.geometry import plane_axes
 from ..progress import Progress, Steps
 from ..refinement.hessian_blocks import Assembly
 from ..refinement.projected_newton import FOLD_SHARE, SHIFT, fold_shares
@@ -103,10 +103,7 @@ class Deformation:
 def frames(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Axes (m,2,3) in the planes of triangles (m,3) in space (n,3), and their corners (m,3) complex there."""
     p = positions[triangles]
-    along, other = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    first = unit(along)
-    second = unit(other - np.einsum("md,md->m", other, first)[:, None] * first)
-    axes = np.stack([first, second], axis=1)
+    axes = np.stack(plane_axes(p), axis=1)
     part = np.einsum("mad,mkd->mka", axes, p - p[:, :1])
     return axes, part[..., 0] + 1j * part[..., 1]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.geometry import unit
+from ..mesh.geometry import plane_axes
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,14 @@ def beltrami(positions: np.ndarray, triangles: np.ndarray, image: np.ndarray) ->
 
 def corner_beltrami(corners: np.ndarray, image: np.ndarray) -> Beltrami:
     """As `beltrami`, of triangles given by their corners (m,3,3) and those of the image (m,3,3) or (m,3,2)."""
-    first, second = _frames(corners)
+    first, second = plane_axes(corners)
     side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     z1, z2 = _in(side, first, second), _in(other, first, second)
     if image.shape[2] == 2:
         w = image @ np.array([1, 1j])
         w1, w2 = w[:, 1] - w[:, 0], w[:, 2] - w[:, 0]
     else:
-        axes = _frames(image)
+        axes = plane_axes(image)
         w1, w2 = _in(image[:, 1] - image[:, 0], *axes), _in(image[:, 2] - image[:, 0], *axes)
     # alpha z + beta conj(z) = w at both sides; the determinant is that of z, up to a factor.
     alpha = w1 * z2.conj() - w2 * z1.conj()
@@ -78,13 +78,6 @@ def vertex_means(values: np.ndarray, triangles: np.ndarray, area: np.ndarray, n:
     total = np.bincount(triangles.ravel(), weight, n)
     mean = np.bincount(triangles.ravel(), weight * np.repeat(values, 3), n)
     return mean / np.where(total > 0, total, 1)
-
-
-def _frames(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two axes (m,3) in the planes of triangles (m,3,3), along the first side and across."""
-    side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    first = unit(side)
-    return first, unit(other - np.einsum("md,md->m", other, first)[:, None] * first)
 
 
 def _in(vectors: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
