@@ -217,20 +217,11 @@ def _figures(levels: list) -> tuple[tuple[str, str], ...]:
 def _remesh_all(requests: list, settings: RemeshSettings):
     """The series of every request and what its meshes carry; Refusal says which one has none."""
     from ..blender.remesh_objects import carried_attributes
-    from ..pipelines.layout import Refusal
+    from ..pipelines.layout import in_turn
     from ..pipelines.remesh import remesh_series
-    from ..solver.errors import MeshError
-    from ..solver.progress import part_of
 
-    results = []
-    for k, request in enumerate(requests):
-        steps = remesh_series(request.job, settings)
-        try:
-            series = yield from part_of(steps, k / len(requests), 1 / len(requests))
-        except MeshError as error:
-            raise Refusal(k, error) from error
-        results.append((series, carried_attributes(request, series)))
-    return results
+    found = yield from in_turn([remesh_series(request.job, settings) for request in requests])
+    return [(series, carried_attributes(request, series)) for request, series in zip(requests, found, strict=True)]
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:

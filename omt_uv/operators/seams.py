@@ -39,13 +39,15 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context):
         from ..blender.vertex_groups import avoided
+        from ..pipelines.layout import in_turn
 
         pairs = check_all_local(read_objects(context))
         objects = [obj for obj, _ in pairs]
         options = {"fill": self.fill_holes, "extremities": self.extremities}
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
-            cuts = yield from run.aside(_cut_all([reading for _, reading in pairs], free, options))
+            cutting = [_cut(reading, avoid, options) for (_, reading), avoid in zip(pairs, free, strict=True)]
+            cuts = yield from run.aside(in_turn(cutting))
         return list(zip(objects, cuts, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
@@ -60,23 +62,15 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
             self.report({"INFO"}, "Every part is an island already; no seam is needed")
 
 
-def _cut_all(readings: list, free: list, options: dict):
-    """The cuts of every surface; Refusal says which one has none."""
-    from ..pipelines.layout import Refusal
+def _cut(reading, avoid, options: dict):
+    """The cuts of a surface."""
     from ..solver.cutting.cuts import cut
-    from ..solver.errors import MeshError
     from ..solver.parameterization.chart_pins import clear_of_pins
     from ..solver.progress import Progress
 
-    found = []
-    for k, (reading, avoid) in enumerate(zip(readings, free, strict=True)):
-        yield Progress("Seams", k / len(readings))
-        try:
-            clear = clear_of_pins(reading.surface, reading.pins, avoid)
-            found.append(cut(reading.surface, reading.faces, avoid=clear, **options))
-        except MeshError as error:
-            raise Refusal(k, error) from error
-    return found
+    yield Progress("Seams", 0.0)
+    clear = clear_of_pins(reading.surface, reading.pins, avoid)
+    return cut(reading.surface, reading.faces, avoid=clear, **options)
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:

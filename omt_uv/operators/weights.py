@@ -58,6 +58,7 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
     def steps(self, context: bpy.types.Context):
         from ..blender.mesh import read
         from ..blender.vertex_groups import check_group_target, selected_vertices
+        from ..pipelines.layout import in_turn
 
         objects = [context.object] if context.mode == "PAINT_WEIGHT" else mesh_objects(context)
         jobs = []
@@ -68,7 +69,8 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
                 jobs.append((read(obj), selected))
         options = {"low": self.low, "high": self.high, "invert": self.invert}
         with complaints(objects=objects):
-            weights = yield from run.aside(_weigh_all(jobs, self.kind.lower(), options))
+            weighing = [_weigh(reading, selected, self.kind.lower(), options) for reading, selected in jobs]
+            weights = yield from run.aside(in_turn(weighing))
         return list(zip(objects, weights, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
@@ -94,21 +96,13 @@ def _show(context: bpy.types.Context) -> None:
                 area.spaces.active.overlay.show_weight = True
 
 
-def _weigh_all(jobs: list, kind: str, options: dict):
-    """Weights (n,) for every reading and selection; Refusal says which one has none."""
+def _weigh(reading, selected, kind: str, options: dict):
+    """Weights (n,) for a reading and a selection."""
     from ..blender.weights import computed_weights
-    from ..pipelines.layout import Refusal
-    from ..solver.errors import MeshError
     from ..solver.progress import Progress
 
-    found = []
-    for k, (reading, selected) in enumerate(jobs):
-        yield Progress("Weights", k / len(jobs))
-        try:
-            found.append(computed_weights(reading, kind, selected=selected, **options))
-        except MeshError as error:
-            raise Refusal(k, error) from error
-    return found
+    yield Progress("Weights", 0.0)
+    return computed_weights(reading, kind, selected=selected, **options)
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:

@@ -21,7 +21,7 @@ from ..solver.mesh.surface import Surface, chosen_triangles
 from ..solver.mesh.topology import graph_components
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.sphere.sphere_map import SphereMap, sphere_map
-from .layout import Refusal
+from .layout import in_turn
 
 # Share of the work on one component that its map to the sphere takes.
 MAPPING = 0.9
@@ -119,12 +119,7 @@ def project(jobs: Sequence[GlobeJob], settings: GlobeSettings) -> Steps[Globes]:
     Refusal : with the index of the surface and the MeshError that says why
     MarkerError : markers give no direction, or are on no component
     """
-    globes: list[list[Globe]] = []
-    for index, job in enumerate(jobs):
-        try:
-            globes.append((yield from part_of(_globes(job, settings), index / len(jobs), 1 / len(jobs))))
-        except MeshError as error:
-            raise Refusal(index, error) from error
+    globes = yield from in_turn([_globes(job, settings) for job in jobs])
     corners = [np.concatenate([g.corners for g in mine]) for mine in globes]
     uv = [np.concatenate([g.uv for g in mine]) for mine in globes]
     warnings = [(k, text) for k, mine in enumerate(globes) for g in mine for text in g.warnings]

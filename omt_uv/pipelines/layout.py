@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,8 +22,10 @@ from ..solver.mesh.surface import Surface
 from ..solver.packing.pack_square import Packing, pack, stack
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.unwrap import SurfaceMap
-from ..solver.progress import Steps
+from ..solver.progress import Steps, part_of
 from .reading import SubdivisionModifier
+
+T = TypeVar("T")
 
 # More new overlap than this, as a share of the UV area, is said: less is rounding.
 OVERLAP = 1e-4
@@ -38,6 +41,22 @@ class Refusal(UserError):
     def __init__(self, index: int, error: MeshError):
         super().__init__(str(error))
         self.index, self.error = index, error
+
+
+def in_turn(runs: Sequence[Steps[T]]) -> Steps[list[T]]:
+    """The results of solvers, one for each surface, that run one after the other.
+
+    Raises
+    ------
+    Refusal : with the index of the surface and the MeshError that says why it has none
+    """
+    found = []
+    for index, steps in enumerate(runs):
+        try:
+            found.append((yield from part_of(steps, index / len(runs), 1 / len(runs))))
+        except MeshError as error:
+            raise Refusal(index, error) from error
+    return found
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,8 @@ class MESH_OT_omt_partition(SolverOperator, bpy.types.Operator):
         from ...blender.shapes.cell_faces import check_cells
         from ...blender.shapes.cell_objects import check_stretch, read_carried
         from ...blender.vertex_groups import avoided
+        from ...pipelines.layout import in_turn
+        from ...pipelines.shapes.partition import partition_surface
 
         pairs = read_objects(context)
         if self.write not in NEW_OBJECTS:
@@ -71,8 +73,11 @@ class MESH_OT_omt_partition(SolverOperator, bpy.types.Operator):
                 carried.append(read_carried(obj) if self.write == "MESH" else None)
         with complaints(objects=objects):
             weights = avoided(objects, self.capacity_group)
-            jobs = [(reading, mine) for (_, reading), mine in zip(pairs, weights, strict=True)]
-            found = yield from run.aside(_divide_all(jobs, self.settings()))
+            dividing = [
+                partition_surface(reading.surface, reading.faces, mine, self.settings())
+                for (_, reading), mine in zip(pairs, weights, strict=True)
+            ]
+            found = yield from run.aside(in_turn(dividing))
         return list(zip(pairs, carried, found, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
@@ -106,23 +111,6 @@ def _figures(figures: list[dict], write: str) -> tuple[tuple[str, str], ...]:
         rows.append(("Of whole faces", f"{100 * max(f['error_of_faces'] for f in figures):.2g} %"))
     rows.append(("Least distance", f"{min(f['least_distance'] for f in figures):.2f} of the mean"))
     return tuple(rows)
-
-
-def _divide_all(jobs: list, settings: PartitionSettings):
-    """The partition of every reading; Refusal says which one has none."""
-    from ...pipelines.layout import Refusal
-    from ...pipelines.shapes.partition import partition_surface
-    from ...solver.errors import MeshError
-    from ...solver.progress import part_of
-
-    found = []
-    for k, (reading, weights) in enumerate(jobs):
-        steps = partition_surface(reading.surface, reading.faces, weights, settings)
-        try:
-            found.append((yield from part_of(steps, k / len(jobs), 1 / len(jobs))))
-        except MeshError as error:
-            raise Refusal(k, error) from error
-    return found
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:

@@ -58,7 +58,8 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context):
         from ...blender.volumes.tet_objects import read_volume_body
-        from ...pipelines.volumes.volume import VolumeSettings
+        from ...pipelines.layout import in_turn
+        from ...pipelines.volumes.volume import VolumeSettings, mapped_volume
 
         objects = [obj for obj in mesh_objects(context) if self.domain != "BODY" or obj.name != self.body]
         other = None
@@ -74,7 +75,7 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
                 other = read_volume_body(goal)
         settings = VolumeSettings(self.domain.lower(), self.method.lower(), self.tets)
         with complaints(objects=objects):
-            found = yield from run.aside(_map_all(bodies, settings, other))
+            found = yield from run.aside(in_turn([mapped_volume(body, settings, other) for body in bodies]))
         return list(zip(objects, found, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
@@ -110,22 +111,6 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
             return [tet_objects.tet_object(obj, found)]
         tet_objects.write_places(obj, found)
         return []
-
-
-def _map_all(bodies: list, settings, other):
-    """A MappedVolume of every body; Refusal says which one has none."""
-    from ...pipelines.layout import Refusal
-    from ...pipelines.volumes.volume import mapped_volume
-    from ...solver.errors import MeshError
-    from ...solver.progress import part_of
-
-    found = []
-    for k, body in enumerate(bodies):
-        try:
-            found.append((yield from part_of(mapped_volume(body, settings, other), k / len(bodies), 1 / len(bodies))))
-        except MeshError as error:
-            raise Refusal(k, error) from error
-    return found
 
 
 def is_available() -> bool:
