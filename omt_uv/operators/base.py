@@ -47,6 +47,17 @@ def mesh_objects(context: bpy.types.Context, shared: bool = False) -> list[bpy.t
     return unique
 
 
+def select_alone(context: bpy.types.Context, objects: Sequence[bpy.types.Object]) -> None:
+    """Select these objects and no others, the first one active; those outside of the view layer are left out."""
+    for obj in context.selected_objects:
+        obj.select_set(False)
+    there = [obj for obj in objects if obj.name in context.view_layer.objects]
+    for obj in there:
+        obj.select_set(True)
+    if there:
+        context.view_layer.objects.active = there[0]
+
+
 def read_objects(context: bpy.types.Context, layer: str = "") -> list:
     """Pairs of object and Reading of a UV layer (the active one by default), of objects with a face to work on.
 

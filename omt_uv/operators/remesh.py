@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..session import run
 from ..settings import COUNTS, DEFAULT_STRATEGY, DENSITIES, STRATEGIES, RemeshSettings
-from .base import Complaint, SolverOperator, complaints, mesh_objects, ready, warn
+from .base import Complaint, SolverOperator, complaints, mesh_objects, ready, select_alone, warn
 from .properties import choose_attribute, choose_group
 
 
@@ -184,17 +184,10 @@ class OBJECT_OT_omt_remesh(SolverOperator, bpy.types.Operator):
             warnings += [(-1, text) for texts in told for text in texts]
             names += new_names
             mark_source(group, new_names)
-        for obj in context.selected_objects:
-            obj.select_set(False)
+        select_alone(context, [bpy.data.objects[name] for name in names])
         if self.hide_original:
             for obj in (obj for group, *_ in result for obj in group):
                 obj.hide_set(True)
-        # Those in a collection that the view layer leaves out cannot be selected.
-        made = [new for new in map(context.view_layer.objects.get, names) if new is not None]
-        for new in made:
-            new.select_set(True)
-        if made:
-            context.view_layer.objects.active = made[0]
         self.said = _figures([series.levels[0] for _, _, series, _ in result])
         warn(self, [group[0] for group, *_ in result], warnings)
         self.report({"INFO"}, f"Made {', '.join(names)}")

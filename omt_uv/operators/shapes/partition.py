@@ -7,9 +7,8 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ...session import run
 from ...settings import CELL_WRITES, DEFAULT_CELL_WRITE, DEFAULT_CELLS, DEFAULT_RELAX, PartitionSettings
-from ..base import SolverOperator, check_all_local, complaints, read_objects, warn
+from ..base import SolverOperator, check_all_local, complaints, read_objects, select_alone, warn
 from ..properties import choose_group
-from .selection import select_alone
 
 NEW_OBJECTS = ("MESH", "POINTS")
 

@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...pipelines.volumes.choices import AXES, DEFAULT_TETS, VOLUME_DOMAINS, VOLUME_METHODS, VOLUME_RESULTS
 from ...session import run
-from ..base import Complaint, SolverOperator, complaints, mesh_objects, ready, warn
+from ..base import Complaint, SolverOperator, complaints, mesh_objects, ready, select_alone, warn
 
 LIBRARY = "tetgen"
 
@@ -88,13 +88,7 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
             ("Volume error", f"{100 * max(f.map.around_vertices for f in found):.2g} %"),
         )
         if made:
-            for obj in context.selected_objects:
-                obj.select_set(False)
-            here = [new for new in made if new.name in context.view_layer.objects]
-            for new in here:
-                new.select_set(True)
-            if here:
-                context.view_layer.objects.active = here[0]
+            select_alone(context, made)
         self.report({"INFO"}, f"Mapped {', '.join(obj.name for obj, _ in result)}")
 
     def _make(self, obj: bpy.types.Object, found) -> list:
