@@ -104,16 +104,15 @@ def _mesh(options: argparse.Namespace, path: Path):
     """Positions (n,3) in the world and triangles (m,3) of all objects of a file."""
     import numpy as np
 
-    from ..blender.mesh import place_of
+    from ..blender.measuring.distances import placed_mesh
 
     values = {**vars(options), "input": path}
     positions, triangles, count = [], [], 0
     for obj, reading in read_file(argparse.Namespace(**values)):
-        rotation, shift = place_of(obj)
-        surface = reading.surface
-        positions.append(surface.positions @ rotation.T + shift)
-        triangles.append(surface.corner_vertex[surface.triangles] + count)
-        count += len(surface.positions)
+        mine, faces = placed_mesh(obj, reading)
+        positions.append(mine)
+        triangles.append(faces + count)
+        count += len(mine)
     return np.concatenate(positions), np.concatenate(triangles)
 
 
