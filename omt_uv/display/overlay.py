@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import bpy
 
+from .shading import view_spaces
+
 # In the UV editor, so that the outlines of the faces are seen through the colours.
 OPACITY = 0.65
 OUTLINE = (0.0, 0.0, 0.0, 0.35)
@@ -66,7 +68,7 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
     for kind, function in _handlers():
         if function not in kind:
             kind.append(function)
-    _redraw(context)
+    redraw(context)
 
 
 def hide(context: bpy.types.Context) -> None:
@@ -76,12 +78,12 @@ def hide(context: bpy.types.Context) -> None:
     for obj in bpy.data.objects:
         if obj.type == "MESH" and obj.data.library is None and colour_attributes.has_colours(obj.data):
             colour_attributes.remove_colours(obj)
-    for space in _view_spaces(context):
+    for space in view_spaces(context):
         kept = _shown.shading.get(space.as_pointer())
         if kept is not None and space.shading.type == "SOLID" and space.shading.color_type == "VERTEX":
             space.shading.type, space.shading.color_type = kept
     forget()
-    _redraw(context)
+    redraw(context)
 
 
 def forget() -> None:
@@ -121,20 +123,14 @@ def _before_load(*_) -> None:
 
 def _paint_views(context: bpy.types.Context) -> None:
     """Let every 3D View show the attribute, and keep how it was shaded."""
-    for space in _view_spaces(context):
+    for space in view_spaces(context):
         key = space.as_pointer()
         if key not in _shown.shading:
             _shown.shading[key] = (space.shading.type, space.shading.color_type)
         space.shading.type, space.shading.color_type = "SOLID", "VERTEX"
 
 
-def _view_spaces(context: bpy.types.Context) -> list:
-    """The 3D Views of all windows."""
-    areas = [area for window in context.window_manager.windows for area in window.screen.areas]
-    return [area.spaces.active for area in areas if area.type == "VIEW_3D"]
-
-
-def _redraw(context: bpy.types.Context) -> None:
+def redraw(context: bpy.types.Context) -> None:
     """Draw the 3D Views and image editors of all windows anew."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:

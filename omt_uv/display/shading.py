@@ -21,7 +21,11 @@ def hide_textures(context: bpy.types.Context) -> None:
     _before.clear()
 
 
-def _solid_views(context: bpy.types.Context) -> list:
+def view_spaces(context: bpy.types.Context) -> list:
+    """The 3D Views of all windows."""
     areas = [area for window in context.window_manager.windows for area in window.screen.areas]
-    spaces = [area.spaces.active for area in areas if area.type == "VIEW_3D"]
-    return [space for space in spaces if space.shading.type == "SOLID"]
+    return [area.spaces.active for area in areas if area.type == "VIEW_3D"]
+
+
+def _solid_views(context: bpy.types.Context) -> list:
+    return [space for space in view_spaces(context) if space.shading.type == "SOLID"]

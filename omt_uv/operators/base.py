@@ -399,9 +399,4 @@ def show_progress(context: bpy.types.Context, text: str | None) -> None:
     if context.workspace is None:
         return
     context.workspace.status_text_set(f"{text}      Esc: Cancel" if text else None)
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "IMAGE_EDITOR"}:
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
+    last_run.redraw(context)

@@ -152,9 +152,7 @@ class UV_OT_omt_live(bpy.types.Operator):
                 # Other hints take its place after a drag.
                 context.workspace.status_text_set(HINT)
         if moved:
-            for area in (a for w in context.window_manager.windows for a in w.screen.areas):
-                if area.type in {"VIEW_3D", "IMAGE_EDITOR"}:
-                    area.tag_redraw()
+            overlay.redraw(context)
         return moved
 
     def _show_now(self, context: bpy.types.Context, session: Session) -> None:

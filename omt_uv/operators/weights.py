@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
+from ..display.shading import view_spaces
 from ..session import run
 from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
 from .base import SolverOperator, complaints, mesh_objects, ready
@@ -91,9 +92,8 @@ def _show(context: bpy.types.Context) -> None:
     if context.mode == "OBJECT" and context.object is not None and context.object.type == "MESH":
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     elif context.mode == "EDIT_MESH":
-        for area in (area for window in context.window_manager.windows for area in window.screen.areas):
-            if area.type == "VIEW_3D":
-                area.spaces.active.overlay.show_weight = True
+        for space in view_spaces(context):
+            space.overlay.show_weight = True
 
 
 def _weigh(reading, selected, kind: str, options: dict):
