@@ -17,14 +17,13 @@ from scipy.sparse.linalg import splu
 
 from ..maps.energy import Elements, face_derivatives_of, hat_gradients, squared, sum_at_vertices
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
+from ..mesh.polygon_areas import BOTH
 from ..progress import Progress, Steps
 from ..refinement.boundary_barrier import BoundaryBarrier, crossings, make_barrier
 from ..refinement.continuation import CONTACT_STRENGTH
 from ..refinement.hessian_blocks import Assembly
 from ..refinement.projected_newton import linear_forms
 
-# Corners of the four triangles of a quad, of both its diagonals, so that none prefers a direction.
-BOTH_DIAGONALS = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
 # Weight of the cage's own triangles beside those of the subdivided surface: they shall not fold.
 CAGE_WEIGHT = 1e-3
 STEPS = 60  # of Newton at most
@@ -103,7 +102,7 @@ class _CageProblem:
         gradient = self.matrix.T @ sum_at_vertices(self.faces, d.gradient, fine)
         cut = 4 * len(quads)
         rows = np.zeros((len(quads), 4, 4, 4), complex)
-        for k, corners in enumerate(BOTH_DIAGONALS):
+        for k, corners in enumerate(BOTH):
             rows[:, k, :, corners] = d.rows[k:cut:4].transpose(2, 0, 1)
         blocks = _squares(d.rows[cut:]), _squares(rows.reshape(len(quads), 16, 4))
         by_axes = kron(self.matrix, identity(2), "csr") @ self.unknowns
@@ -170,10 +169,10 @@ def subdivided_elements(
 
     Triangles of the cage have next to no weight: they only shall not fold.
     """
-    space = np.concatenate([corners[:, BOTH_DIAGONALS].reshape(-1, 3), cage_corners.reshape(-1, 3)])
+    space = np.concatenate([corners[:, BOTH].reshape(-1, 3), cage_corners.reshape(-1, 3)])
     area, gradient = hat_gradients(space, np.arange(len(space)).reshape(-1, 3))
     offset = int(quads.max(initial=-1)) + 1
-    triangles = np.concatenate([quads[:, BOTH_DIAGONALS].reshape(-1, 3), cage_triangles + offset])
+    triangles = np.concatenate([quads[:, BOTH].reshape(-1, 3), cage_triangles + offset])
     fine = 4 * len(quads)
     # A face without area has nothing to ask for.
     area = np.maximum(area, 1e-12 * area.sum() / len(area))
