@@ -42,13 +42,17 @@ class PolarCoordinates:
     farthest: np.ndarray
     last: np.ndarray
 
+    def chosen(self, rows: np.ndarray) -> PolarCoordinates:
+        """Those of some rows, (r,) or (p,) bool."""
+        return PolarCoordinates(**{name: values[rows] for name, values in vars(self).items()})
+
     def joined(self, other: PolarCoordinates, without: np.ndarray) -> PolarCoordinates:
         """These but those of some sites (k,), and another's instead."""
         there = np.zeros(int(max(self.site.max(), other.site.max())) + 1, bool)
         there[without] = True
         keep = ~there[self.site]
-        mine, its = vars(self), vars(other)
-        return _by_face(PolarCoordinates(**{name: np.concatenate([mine[name][keep], its[name]]) for name in mine}))
+        mine, its = vars(self.chosen(keep)), vars(other)
+        return _by_face(PolarCoordinates(**{name: np.concatenate([mine[name], its[name]]) for name in mine}))
 
 
 class WindowMesh:
@@ -108,8 +112,7 @@ def polar_coordinates(mesh: WindowMesh, sites: Sites, radius: np.ndarray, chosen
 
 
 def _by_face(pairs: PolarCoordinates) -> PolarCoordinates:
-    order = np.argsort(pairs.face * (int(pairs.site.max()) + 1) + pairs.site)
-    return PolarCoordinates(**{name: values[order] for name, values in vars(pairs).items()})
+    return pairs.chosen(np.argsort(pairs.face * (int(pairs.site.max()) + 1) + pairs.site))
 
 
 @dataclass(frozen=True)

@@ -39,9 +39,7 @@ def spaced(mesh: WindowMesh, sites: Sites, pairs: PolarCoordinates, size: np.nda
         step = PUSH * short[rows] * (size[i] + size[j[rows]])
         moved = np.unique(i)
         goal = np.stack([np.bincount(i, step * x, len(size)) for x in away.T], axis=1)
-        mine = np.isin(pairs.site, moved)
-        own = PolarCoordinates(**{name: values[mine] for name, values in vars(pairs).items()})
-        sites = _placed(sites, own, goal)
+        sites = _placed(sites, pairs.chosen(np.isin(pairs.site, moved)), goal)
         pairs = pairs.joined(polar_coordinates(mesh, sites, radius[moved], moved), moved)
     return sites, pairs
 

@@ -54,14 +54,14 @@ def shape_distance(a: Signature, b: Signature, curvature: float = CURVATURE) -> 
 
 def _shape_distance(a: Signature, b: Signature, curvature: float) -> ShapeDistance:
     fields_a, fields_b = _fields(a), _fields(b)
-    best: list[tuple[float, np.ndarray]] = []
+    grid, best = rotation_grid(), list[np.ndarray]()
     for flip in (np.eye(3), np.diag([1.0, 1.0, -1.0])):
         turned = fields_a if flip[2, 2] > 0 else _fields(Signature(a.points @ flip, a.curvature))
         score = ((fields_b[_nearest()] - turned) ** 2).sum(axis=(1, 2))
-        best += [(score[k], rotation_grid()[k] @ flip) for k in np.argsort(score, kind="stable")[:BEST]]
+        best += [grid[k] @ flip for k in np.argsort(score, kind="stable")[:BEST]]
     few = np.linspace(0, len(a.points) - 1, min(FEW, len(a.points))).astype(int)
     short_a, short_b = (Signature(s.points[few], s.curvature[few]) for s in (a, b))
-    tried = [_refined(short_a, short_b, rotation, curvature) for _, rotation in best]
+    tried = [_refined(short_a, short_b, rotation, curvature) for rotation in best]
     rotation = min(tried, key=lambda found: found[0])[1]
     square, rotation = _refined(a, b, rotation, curvature)
     floor = FLOOR / np.sqrt(len(a.points))
