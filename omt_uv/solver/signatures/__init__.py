@@ -1,6 +1,6 @@
 """How alike surfaces are: their areas as they lie on the conformal sphere, compared by optimal transport.
 
-Imports solver.mesh, solver.conformal, solver.sphere and solver.registration.
+Imports solver.mesh, solver.analysis, solver.conformal, solver.sphere and solver.registration.
 Main names: signature (in signature), Signature, shape_distance, ShapeDistance, nearest.
 """
 

@@ -1,6 +1,6 @@
 """Subdivision surfaces of polygon meshes, and UVs of the cage that are right on the subdivided surface.
 
-Imports solver.maps and solver.progress.
+Imports solver.mesh, solver.maps and solver.refinement.
 Main names: Cage, Subdivision, cage_of, subdivide, bilinear, subdivided_elements, refine_cage.
 """
 
