@@ -176,12 +176,7 @@ def warn_of(text: str) -> None:
 
 def write_report(options: argparse.Namespace, more: dict, objects: list, charts: list, written) -> None:
     """Settings, `more`, the figures of the charts of every object, and what was written (`layers.Written`), as JSON."""
-    from ..files.verified import write_text
-
-    report = {
-        "version": __version__,
-        "input": str(options.input),
-        "output": str(options.output),
+    figures = {
         "quality": options.quality,
         "balance": options.balance,
         **more,
@@ -191,6 +186,19 @@ def write_report(options: argparse.Namespace, more: dict, objects: list, charts:
             for k, figures in enumerate(mine)
         ],
         "gate": written.gate.report(),
-        "warnings": [*options.told, *written.warnings],
+    }
+    write_figures(options, figures, written.warnings)
+
+
+def write_figures(options: argparse.Namespace, figures: dict, told: list[str]) -> None:
+    """What was read and written, figures, and warnings that were told, as JSON."""
+    from ..files.verified import write_text
+
+    report = {
+        "version": __version__,
+        "input": str(options.input),
+        "output": str(options.output),
+        **figures,
+        "warnings": [*options.told, *told],
     }
     write_text(options.report, json.dumps(report, indent=1) + "\n")

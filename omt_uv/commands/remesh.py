@@ -8,7 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..settings import DEFAULT_STRATEGY, STRATEGIES, RemeshSettings
-from .common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn, write_preview
+from .common import (
+    CommandError,
+    UsageError,
+    check_paths,
+    drain_shown,
+    refusals,
+    require_blender,
+    warn,
+    write_figures,
+    write_preview,
+)
 from .options import add_files, add_preview, angle, faces, names, number, positive, vertices
 from .selection import read_file
 
@@ -113,7 +123,7 @@ def run(options: argparse.Namespace) -> None:
         told += [(-1, text) for text in found]
     lines = warn(objects, told, _save(options.output, made, options.input))
     if options.report:
-        _write_report(options, rows, lines)
+        write_figures(options, {"levels": rows}, lines)
     if options.preview:
         # Of a series the coarsest: it differs most from what was given.
         shown = [bpy.data.objects[names[-1]] for names in made]
@@ -133,23 +143,6 @@ def _compared(objects: list, results: list) -> list[dict]:
                 found = drain_shown(compare(old, (level.positions, level.triangles)))
             rows.append({"object": obj.name, "level": k, **vars(found)})
     return rows
-
-
-def _write_report(options: argparse.Namespace, rows: list[dict], told: list[str]) -> None:
-    """Figures of every level, as JSON."""
-    import json
-
-    from .. import __version__
-    from ..files.verified import write_text
-
-    report = {
-        "version": __version__,
-        "input": str(options.input),
-        "output": str(options.output),
-        "levels": rows,
-        "warnings": [*options.told, *told],
-    }
-    write_text(options.report, json.dumps(report, indent=1) + "\n")
 
 
 def _is_split(path: Path, obj) -> bool:

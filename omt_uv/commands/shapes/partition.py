@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import json
-from pathlib import Path
 
-from ... import __version__
 from ...settings import CELL_WRITES, DEFAULT_CELL_WRITE, DEFAULT_RELAX, PartitionSettings
-from ..common import check_paths, drain_shown, refusals, require_blender, warn
+from ..common import check_paths, drain_shown, refusals, require_blender, warn, write_figures
 from ..options import add_files, add_report, names, vertices
 from ..selection import read_file
 from .formats import check_kept
@@ -105,16 +102,10 @@ def _save(options: argparse.Namespace, made: list) -> list[str]:
 
 
 def _write_report(options: argparse.Namespace, objects: list, found: list, warnings: list[str]) -> None:
-    from ...files.verified import write_text
-
-    report = {
-        "version": __version__,
-        "input": str(options.input),
-        "output": str(options.output),
+    figures = {
         "capacity": options.capacity,
         "relax": options.relax,
         "write": options.write,
         "meshes": [{"object": obj.name, **p.figures} for obj, p in zip(objects, found, strict=True)],
-        "warnings": [*options.told, *warnings],
     }
-    write_text(Path(options.report), json.dumps(report, indent=1) + "\n")
+    write_figures(options, figures, warnings)

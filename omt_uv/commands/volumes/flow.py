@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
-from ... import __version__
 from ...pipelines.volumes.choices import DEFAULT_PATH, DEFAULT_RADIUS, DEFAULT_SAMPLES, FLOW_PATHS
-from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn
+from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn, write_figures
 from ..options import add_files, names, positive
 from ..selection import read_file
 
@@ -71,7 +69,7 @@ def run_flow(options: argparse.Namespace) -> None:
             write_positions(obj, found.frames[-1][k])
     told = warn(objects, [(-1, text) for text in found.warnings], save(options.output, everything, options.input))
     if options.report is not None:
-        _report(options, objects, found, told)
+        write_figures(options, {"objects": [obj.name for obj in objects], **found.report()}, told)
 
 
 def _flow(options: argparse.Namespace, file, objects: list):
@@ -88,20 +86,6 @@ def _flow(options: argparse.Namespace, file, objects: list):
     radius = options.radius if options.sharpness is None else options.sharpness**-0.5
     flowing = FlowOptions(radius=radius, path=options.path, samples=options.samples)
     return drain_shown(flow_bodies(FlowJob(bodies, handles, flowing, _domain(options, bodies), options.frames)))
-
-
-def _report(options: argparse.Namespace, objects: list, found, told: list[str]) -> None:
-    from ...files.verified import write_text
-
-    report = {
-        "version": __version__,
-        "input": str(options.input),
-        "output": str(options.output),
-        "objects": [obj.name for obj in objects],
-        **found.report(),
-        "warnings": [*options.told, *told],
-    }
-    write_text(options.report, json.dumps(report, indent=1) + "\n")
 
 
 def _rows(inside):

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
-from ... import __version__
 from ...pipelines.volumes.choices import DEFAULT_TETS, VOLUME_METHODS
-from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn
+from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn, write_figures
 from ..options import add_input, faces, names
 from ..selection import read_file
 
@@ -34,7 +32,7 @@ def run_volume(options: argparse.Namespace) -> None:
     """Carry out the command volume."""
     require_blender()
     from ...blender.volumes.tet_objects import read_volume_body
-    from ...files.verified import check_writable, write_text
+    from ...files.verified import check_writable
     from ...pipelines.volumes.volume import VolumeSettings, mapped_volume
 
     suffix = options.output.suffix.lower()
@@ -62,15 +60,8 @@ def run_volume(options: argparse.Namespace) -> None:
             found.append(drain_shown(mapped_volume(read_volume_body(obj), settings, other)))
     told = warn(mine, [(k, text) for k, f in enumerate(found) for text in f.map.warnings], _save(options, mine, found))
     if options.report is not None:
-        report = {
-            "version": __version__,
-            "input": str(options.input),
-            "output": str(options.output),
-            "method": options.method,
-            "volumes": [{"object": obj.name, **f.report()} for obj, f in zip(mine, found, strict=True)],
-            "warnings": [*options.told, *told],
-        }
-        write_text(options.report, json.dumps(report, indent=1) + "\n")
+        volumes = [{"object": obj.name, **f.report()} for obj, f in zip(mine, found, strict=True)]
+        write_figures(options, {"method": options.method, "volumes": volumes}, told)
 
 
 def _save(options: argparse.Namespace, objects: list, found: list) -> list[str]:
