@@ -7,12 +7,10 @@ import time
 import bpy
 from bpy.props import FloatProperty
 
-from ...session import following, last_run, queue
-from ..base import Complaint, check_all_local, check_numbers, mesh_objects, ready, tell
+from ...session import following, last_run, queue, run
+from ..base import Complaint, check_all_local, check_numbers, complaints, mesh_objects, ready, tell, write_layers
 
 UNWRAP = "uv.omt_unwrap"
-# Seconds of work between two looks at the keyboard.
-SLICE = 0.05
 
 
 class UV_OT_omt_queue(bpy.types.Operator):
@@ -86,7 +84,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
             return {"RUNNING_MODAL"}
         try:
             steps = job.steps or job.begin(self._steps(context, obj))
-            end = time.monotonic() + SLICE
+            end = time.monotonic() + run.SLICE
             while time.monotonic() < end:
                 job.progress = next(steps).fraction
                 if self.limit and job.seconds > self.limit:
@@ -105,7 +103,6 @@ class UV_OT_omt_queue(bpy.types.Operator):
         from ...blender.mesh import check_target, read
         from ...pipelines.layout import UnwrapJob
         from ...pipelines.unwrap import lay_out
-        from ..base import complaints
         from ..unwrap import UV_OT_omt_unwrap
 
         chosen = context.window_manager.operator_properties_last(UNWRAP)
@@ -146,8 +143,6 @@ class UV_OT_omt_queue(bpy.types.Operator):
 
 
 def _write(obj: bpy.types.Object, layout) -> None:
-    from ..base import write_layers
-
     layer = bpy.context.window_manager.operator_properties_last(UNWRAP).uv_layer
     write_layers([obj], layer, layout)
 
