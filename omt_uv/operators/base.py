@@ -19,6 +19,8 @@ from ..settings import DEFAULT_MAX_SHEAR, DEFAULT_TEXTURE_SIZE
 
 # What Blender makes of infinity is above, and nothing that is meant.
 LARGEST = 3e38
+# Where operators on meshes work, unless they say otherwise.
+MODES = ("OBJECT", "EDIT_MESH")
 
 
 class Complaint(UserError):
@@ -223,6 +225,7 @@ class SolverOperator:
     bl_label: str
     # Whether it changes the active UVs, so that their figures are worth a look.
     makes_uvs = False
+    modes: tuple[str, ...] = MODES
     # Rows of a name and a value on the result that `finish` wants to be shown first, instead of others of that name.
     said: tuple[tuple[str, str], ...] = ()
     _timer: bpy.types.Timer | None = None
@@ -230,7 +233,7 @@ class SolverOperator:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return ready(cls, context)
+        return ready(cls, context, cls.modes)
 
     def steps(self, context: bpy.types.Context):
         raise NotImplementedError
@@ -365,9 +368,11 @@ class QuickOperator:
     `act(context)` may raise Complaint, UserError and MeshError; what they say is reported.
     """
 
+    modes: tuple[str, ...] = MODES
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return ready(cls, context)
+        return ready(cls, context, cls.modes)
 
     def act(self, context: bpy.types.Context) -> None:
         raise NotImplementedError
@@ -383,7 +388,7 @@ class QuickOperator:
         return {"FINISHED"}
 
 
-def ready(cls, context: bpy.types.Context, modes: tuple[str, ...] = ("OBJECT", "EDIT_MESH")) -> bool:
+def ready(cls, context: bpy.types.Context, modes: tuple[str, ...] = MODES) -> bool:
     """Whether an operator on meshes can run; the tooltip of the greyed button says why not."""
     if run.current is not None:
         cls.poll_message_set(f"{run.current.label} is still running. Esc cancels it")

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from ..display.shading import view_spaces
 from ..session import run
 from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
-from .base import SolverOperator, complaints, mesh_objects, ready
+from .base import SolverOperator, complaints, mesh_objects
 from .properties import choose_group
 
 
@@ -18,6 +18,7 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
     bl_idname = "object.omt_weights"
     bl_label = "OMT Weights"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
+    modes = ("OBJECT", "EDIT_MESH", "PAINT_WEIGHT")
 
     kind: EnumProperty(name="Kind", description="What is weighed", items=WEIGHT_KINDS, default=DEFAULT_KIND)
     weight_group: StringProperty(
@@ -48,10 +49,6 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         description="Show the weights in Weight Paint, to be repainted, or as an overlay in Edit Mode",
         default=True,
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return ready(cls, context, ("OBJECT", "EDIT_MESH", "PAINT_WEIGHT"))
 
     def draw(self, _context: bpy.types.Context) -> None:
         draw_settings(self.layout, self)

@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ...pipelines.shapes.choices import DEFAULT_PREFIX
-from ..base import NAVIGATION, Complaint, QuickOperator, complaints, ready, tell
+from ..base import NAVIGATION, Complaint, QuickOperator, complaints, tell
 from .match import source_and_target
 
 # Pixels from a landmark within which a press takes hold of it.
@@ -20,11 +20,11 @@ HELP = (
 
 
 class _OnPair(QuickOperator):
-    """An operator on the two objects of a match, in Object Mode."""
+    """An operator on landmarks of the two objects of a match, in Object Mode."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return ready(cls, context, ("OBJECT",))
+    modes = ("OBJECT",)
+
+    prefix: StringProperty(name="Prefix", description="How the landmarks' names begin", default=DEFAULT_PREFIX)
 
 
 def place(objects: tuple, obj: bpy.types.Object, prefix: str, point, mirrored: bool) -> list[bpy.types.Object]:
@@ -66,7 +66,6 @@ class OBJECT_OT_omt_landmarks(_OnPair, bpy.types.Operator):
     bl_label = "Pick Landmarks"
     bl_options = {"REGISTER", "UNDO"}
 
-    prefix: StringProperty(name="Prefix", description="How the landmarks' names begin", default=DEFAULT_PREFIX)
     mirrored: BoolProperty(
         name="Mirrored Pairs", description="Set the mirror image of every landmark, too", default=False
     )
@@ -164,7 +163,6 @@ class OBJECT_OT_omt_landmarks_suggest(_OnPair, bpy.types.Operator):
     bl_label = "Suggest Landmarks"
     bl_options = {"REGISTER", "UNDO"}
 
-    prefix: StringProperty(name="Prefix", description="How the landmarks' names begin", default=DEFAULT_PREFIX)
     most: IntProperty(name="Most", description="Landmarks to set at most", default=12, min=1, max=64)
 
     def act(self, context: bpy.types.Context) -> None:
@@ -195,8 +193,6 @@ class OBJECT_OT_omt_landmarks_clear(_OnPair, bpy.types.Operator):
     bl_idname = "object.omt_landmarks_clear"
     bl_label = "Clear Landmarks"
     bl_options = {"REGISTER", "UNDO"}
-
-    prefix: StringProperty(name="Prefix", description="How the landmarks' names begin", default=DEFAULT_PREFIX)
 
     def act(self, context: bpy.types.Context) -> None:
         from ...blender.shapes.landmarks import remove_landmarks

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ..base import Complaint, QuickOperator, complaints, mesh_objects, ready
+from ..base import Complaint, QuickOperator, complaints, mesh_objects
 
 OF = (
     ("KEY", "Shape Key", "From the basis to the active shape key"),
@@ -24,13 +24,10 @@ class OBJECT_OT_omt_strain(QuickOperator, bpy.types.Operator):
     bl_idname = "object.omt_strain"
     bl_label = "Strain"
     bl_options = {"REGISTER", "UNDO"}
+    modes = ("OBJECT",)
 
     of: EnumProperty(name="Of", description="Which map is measured", items=OF)
     shape_key: StringProperty(name="Shape Key", description="Shape key to measure; the active one if empty")
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return ready(cls, context, ("OBJECT",))
 
     def act(self, context: bpy.types.Context) -> None:
         from ...blender.mesh import check_local, read

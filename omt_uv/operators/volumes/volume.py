@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...pipelines.volumes.choices import AXES, DEFAULT_TETS, VOLUME_DOMAINS, VOLUME_METHODS, VOLUME_RESULTS
 from ...session import run
-from ..base import Complaint, SolverOperator, complaints, mesh_objects, ready, select_alone, warn
+from ..base import Complaint, SolverOperator, complaints, mesh_objects, select_alone, warn
 
 LIBRARY = "tetgen"
 
@@ -21,6 +21,7 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
     bl_idname = "object.omt_volume"
     bl_label = "Map Volume"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
+    modes = ("OBJECT",)
 
     domain: EnumProperty(name="Domain", description="What the inside is mapped to", items=VOLUME_DOMAINS)
     body: StringProperty(name="Body", description="Closed mesh object to whose inside it is mapped")
@@ -48,10 +49,6 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
     place: FloatProperty(
         name="Place", description="Where it is cut, from one end to the other", default=0.5, min=0.0, max=1.0
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return ready(cls, context, ("OBJECT",))
 
     def draw(self, _context: bpy.types.Context) -> None:
         draw_settings(self.layout, self)
