@@ -105,6 +105,19 @@ def stretch(obj: bpy.types.Object) -> np.ndarray:
     return (axes.T * stretch) @ axes
 
 
+def is_flattened(stretch: np.ndarray) -> bool:
+    """Whether no positions can be had back from those with a stretch (3,3)."""
+    return bool(abs(np.linalg.det(stretch)) <= 1e-12 * np.abs(stretch).max() ** 3)
+
+
+def check_stretch(obj: bpy.types.Object) -> np.ndarray:
+    """The stretch (3,3) of an object; MeshError if it is flattened, so that no new mesh would get its positions."""
+    found = stretch(obj)
+    if is_flattened(found):
+        raise MeshError("The scale of the object is zero along an axis", "Clear or fix its scale")
+    return found
+
+
 def place_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """Rotation (3,3) and shift (3,) that take stretched positions to their place in the world."""
     matrix = np.array(obj.matrix_world, dtype=float)

@@ -18,7 +18,7 @@ from ..pipelines.remesh import LevelOfDetail, RemeshJob, Series, oriented
 from ..settings import RemeshSettings
 from ..solver.analysis.density import from_polygons, from_vertices
 from ..solver.analysis.feature_edges import edge_union, sharp_edges
-from ..solver.errors import EmptyMeshError, MeshError
+from ..solver.errors import EmptyMeshError
 from ..solver.mesh.surface import Surface
 from . import mesh as blender_mesh
 from .read_attributes import read_attributes
@@ -74,9 +74,7 @@ def read_request(
         names = tuple(group.name for group in obj.vertex_groups)
         attributes = read_attributes(mesh, names, settings.preserve_attributes)
         values = _density_values(obj, mesh, surface, settings)
-    stretch = blender_mesh.stretch(obj)
-    if abs(np.linalg.det(stretch)) <= 1e-12 * np.abs(stretch).max() ** 3:
-        raise MeshError("The scale of the object is zero along an axis", "Clear or fix its scale")
+    stretch = blender_mesh.check_stretch(obj)
     jumps = edge_union(uv_seams(attributes, surface), material_borders(attributes, surface))
     features = _features(attributes, surface, settings)
     kept = followed(attributes, edge_union(features, jumps))

@@ -10,7 +10,6 @@ from ...pipelines.attributes import Attributes
 from ...pipelines.shapes.cell_attributes import carry_to_cells
 from ...pipelines.shapes.partition import Partition
 from ...settings import CELL_ATTRIBUTE
-from ...solver.errors import MeshError
 from ...solver.mesh.surface import Surface, chosen_triangles
 from .. import mesh as blender_mesh
 from ..read_attributes import read_attributes
@@ -18,13 +17,6 @@ from ..write_attributes import write_attributes
 
 CELLS_ENDING = "_cells"
 POINTS_ENDING = "_points"
-
-
-def check_stretch(obj: bpy.types.Object) -> None:
-    """Raise MeshError if the object is flattened, so that no new mesh would get its positions back."""
-    stretch = blender_mesh.stretch(obj)
-    if abs(np.linalg.det(stretch)) <= 1e-12 * np.abs(stretch).max() ** 3:
-        raise MeshError("The scale of the object is zero along an axis", "Clear or fix its scale")
 
 
 def read_carried(obj: bpy.types.Object) -> Attributes:

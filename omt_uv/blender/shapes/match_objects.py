@@ -53,7 +53,7 @@ def read_carrier(obj: bpy.types.Object) -> Carried:
         raise EmptyMeshError("The mesh has no faces", "Choose a mesh with faces")
     surface, warnings = oriented(reading.surface)
     stretch = blender_mesh.stretch(obj)
-    if abs(np.linalg.det(stretch)) <= 1e-12 * np.abs(stretch).max() ** 3:
+    if blender_mesh.is_flattened(stretch):
         raise MatchError(f"{obj.name}: The scale of the object is zero along an axis. Clear or fix its scale.")
     names = tuple(group.name for group in obj.vertex_groups)
     attributes = read_attributes(obj.data, names)

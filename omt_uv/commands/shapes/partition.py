@@ -78,8 +78,9 @@ def run(options: argparse.Namespace) -> None:
 
 def _write(options: argparse.Namespace, pairs: list, found: list) -> list:
     """Write the cells into the objects, or make new ones; the objects to save."""
+    from ...blender.mesh import check_stretch
     from ...blender.shapes.cell_faces import write_cells
-    from ...blender.shapes.cell_objects import check_stretch, new_cell_mesh, new_points, read_carried
+    from ...blender.shapes.cell_objects import new_cell_mesh, new_points, read_carried
 
     made = []
     for (obj, reading), partition in zip(pairs, found, strict=True):

@@ -53,8 +53,9 @@ class MESH_OT_omt_partition(SolverOperator, bpy.types.Operator):
         return PartitionSettings(self.cells, self.relax, self.write.lower(), self.seed)
 
     def steps(self, context: bpy.types.Context):
+        from ...blender.mesh import check_stretch
         from ...blender.shapes.cell_faces import check_cells
-        from ...blender.shapes.cell_objects import check_stretch, read_carried
+        from ...blender.shapes.cell_objects import read_carried
         from ...blender.vertex_groups import avoided
         from ...pipelines.layout import in_turn
         from ...pipelines.shapes.partition import partition_surface
