@@ -352,6 +352,13 @@ def new_mesh(name: str, positions, faces, edges=()) -> bpy.types.Mesh:
     return mesh
 
 
+def link_beside(new: bpy.types.Object, obj: bpy.types.Object) -> None:
+    """Put a new object into the collections of another one, as far as they are of this file."""
+    collections = [c for c in obj.users_collection if c.library is None] or [bpy.context.scene.collection]
+    for collection in collections:
+        collection.objects.link(new)
+
+
 def _items(mesh: bpy.types.Mesh, elements: np.ndarray):
     return (mesh.polygons[i] for i in elements.tolist())
 

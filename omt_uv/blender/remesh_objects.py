@@ -223,9 +223,7 @@ def _new_object(obj: bpy.types.Object, name: str, mesh: bpy.types.Mesh, applied:
     for slot, old in zip(new.material_slots, obj.material_slots, strict=False):
         slot.link, slot.material = old.link, old.material
     _drop_modifiers(new, applied)
-    collections = [c for c in obj.users_collection if c.library is None] or [bpy.context.scene.collection]
-    for collection in collections:
-        collection.objects.link(new)
+    blender_mesh.link_beside(new, obj)
     return new
 
 

@@ -78,8 +78,6 @@ def new_points(obj: bpy.types.Object, partition: Partition) -> bpy.types.Object:
 def _new_object(obj: bpy.types.Object, name: str, mesh: bpy.types.Mesh) -> bpy.types.Object:
     new = bpy.data.objects.new(name, mesh)
     new.matrix_world = obj.matrix_world
-    collections = [c for c in obj.users_collection if c.library is None] or [bpy.context.scene.collection]
-    for collection in collections:
-        collection.objects.link(new)
+    blender_mesh.link_beside(new, obj)
     bpy.context.view_layer.update()
     return new
