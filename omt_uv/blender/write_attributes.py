@@ -53,6 +53,15 @@ def _write_marks(mesh: bpy.types.Mesh, marks: Marks) -> None:
         write_layer(mesh, replace(layer, values=values))
 
 
+def fresh_attribute(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str):
+    """The attribute of this name, made if there is none; one of another kind gives way."""
+    there = mesh.attributes.get(name)
+    if there is not None and (there.data_type, there.domain) != (data_type, domain):
+        mesh.attributes.remove(there)
+        there = None
+    return there or mesh.attributes.new(name, data_type, domain)
+
+
 def write_layer(mesh: bpy.types.Mesh, layer: Layer) -> None:
     key, _, dtype, _ = TYPES[layer.data_type]
     if is_uv(layer):

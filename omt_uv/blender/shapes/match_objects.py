@@ -21,7 +21,7 @@ from ...solver.registration.register import RegistrationOptions
 from .. import mesh as blender_mesh
 from ..read_attributes import get, read_attributes
 from ..vertex_groups import write_group
-from ..write_attributes import write_layer
+from ..write_attributes import fresh_attribute, write_layer
 
 # Attribute with the colours that show what corresponds.
 CHECKER = "OMT Match"
@@ -219,11 +219,7 @@ def _write_colour(mesh: bpy.types.Mesh, place: np.ndarray) -> None:
     square = np.floor(SQUARES * place + 1e-6).astype(np.int64).sum(axis=1) % 2
     colour = np.column_stack([np.clip(place, 0, 1), np.ones(len(place))])
     colour[:, :3] = np.where(square[:, None] == 1, colour[:, :3], WHITE_SHARE + (1 - WHITE_SHARE) * colour[:, :3])
-    layer = mesh.attributes.get(CHECKER)
-    if layer is not None and (layer.domain, layer.data_type) != ("POINT", "FLOAT_COLOR"):
-        mesh.attributes.remove(layer)
-        layer = None
-    layer = layer or mesh.attributes.new(CHECKER, "FLOAT_COLOR", "POINT")
+    layer = fresh_attribute(mesh, CHECKER, "FLOAT_COLOR", "POINT")
     layer.data.foreach_set("color", colour.astype(np.float32).ravel())
     mesh.attributes.active_color_name = CHECKER
     mesh.update()

@@ -12,6 +12,7 @@ from ...pipelines.shapes.strain import regions_of, strain_of
 from ...solver.strain.regions import RegionStrain, region_strain
 from ..mesh import stretch
 from ..read_attributes import read_attributes
+from ..write_attributes import fresh_attribute
 
 SIZE_NAME = "OMT Strain"
 VECTOR_NAME = "OMT Stretch"
@@ -23,11 +24,7 @@ def write_strain(mesh: bpy.types.Mesh, size: np.ndarray, vector: np.ndarray) -> 
         (SIZE_NAME, "FLOAT", "value", size),
         (VECTOR_NAME, "FLOAT_VECTOR", "vector", vector),
     ):
-        layer = mesh.attributes.get(name)
-        if layer is not None and (layer.domain, layer.data_type) != ("FACE", kind):
-            mesh.attributes.remove(layer)
-            layer = None
-        layer = layer or mesh.attributes.new(name, kind, "FACE")
+        layer = fresh_attribute(mesh, name, kind, "FACE")
         layer.data.foreach_set(key, np.ascontiguousarray(values, np.float32).ravel())
     mesh.update()
 
