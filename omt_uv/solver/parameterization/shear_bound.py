@@ -78,10 +78,10 @@ class ShearSearch:
 
     def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray) -> Steps[DiskCharts]:
         """Charts that missed the bound cut anew for a spread (f,); the edges that others were cut along (k,2) stay."""
-        wanted = np.full(self._count, np.inf)
+        target = np.full(self._count, np.inf)
         for chart in missed:
-            wanted[chart.faces] = spread[chart.faces]
-        search = replace(self.search(wanted), further=True)
+            target[chart.faces] = spread[chart.faces]
+        search = replace(self.search(target), further=True)
         surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
         return disk_charts(surface, self.faces, search=search, **self.cutting)
 

@@ -19,12 +19,9 @@ import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
 from ..linalg.sparse import Factor
-from ..mesh.geometry import cotangents_from_lengths, halfedge_lengths, laplacian_from_weights
-from ..mesh.topology import halfedges
+from ..mesh.geometry import LEAST_STIFFNESS, halfedge_lengths, laplacian_from_lengths
 from .coarse_surface import CoarseSurface
 
-# Least stiffness of an edge: those across obtuse corners would repel.
-LEAST_STIFFNESS = 1e-3
 # A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
 GROUND = 1e-6
 # The plate of a closed surface is held a little everywhere: its Green's function has digits left for the first pin.
@@ -60,8 +57,7 @@ class ScaleModel:
         """The model of a coarse surface; log_density (n,): half the logarithm of the area asked for, over its own."""
         n = len(surface.positions)
         length = halfedge_lengths(surface.positions, surface.triangles).reshape(-1, 3)
-        stiffness = np.maximum(0.5 * cotangents_from_lengths(length), LEAST_STIFFNESS).ravel()
-        laplacian = laplacian_from_weights(*halfedges(surface.triangles), stiffness, n)
+        laplacian = laplacian_from_lengths(length, surface.triangles, n, LEAST_STIFFNESS)
         curvature, area = surface.curvature, surface.area
         if log_density is not None:
             curvature = curvature + laplacian @ log_density
