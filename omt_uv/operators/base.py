@@ -354,12 +354,15 @@ class SolverOperator:
         return {"FINISHED"}
 
 
-def figures_of(context: bpy.types.Context, readings: list, operator=None) -> last_run.Figures:
-    """Figures of the active UVs of readings, for the texture and within the bound that an operator has."""
+def figures_of(context: bpy.types.Context, readings: list, operator=None, measured=None) -> last_run.Figures:
+    """Figures of the active UVs of readings, for the texture and within the bound that an operator has.
+
+    measured : their Distortion, where it is known
+    """
     scale = context.scene.unit_settings.scale_length
     bound = getattr(operator, "max_shear", 0.0)
     size = getattr(operator, "texture_size", DEFAULT_TEXTURE_SIZE)
-    return last_run.figures(readings, size, scale, bound if bound > 1 else DEFAULT_MAX_SHEAR)
+    return last_run.figures(readings, size, scale, bound if bound > 1 else DEFAULT_MAX_SHEAR, measured)
 
 
 class QuickOperator:

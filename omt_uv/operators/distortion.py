@@ -31,7 +31,7 @@ class UV_OT_omt_measure(QuickOperator, bpy.types.Operator):
         readings = [reading for _, reading in pairs]
         measured = measure_readings(readings)
         self.report({"INFO"}, summary(measured, on_subdivision(readings)))
-        found, overlap = figures_of(context, readings), last_run.overlap_row(measured.overlap or 0.0)
+        found, overlap = figures_of(context, readings, measured=measured), last_run.overlap_row(measured.overlap or 0.0)
         names = tuple(obj.name for obj, _ in pairs)
         last_run.keep(
             last_run.Summary(self.bl_label, found.rows + overlap.rows, (), names, found.beyond | overlap.beyond)

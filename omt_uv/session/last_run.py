@@ -159,8 +159,10 @@ class Figures:
     beyond: frozenset[str] = frozenset()
 
 
-def figures(readings, texture_size: float, metres: float, max_shear: float = DEFAULT_MAX_SHEAR) -> Figures:
-    """Rows about the active UVs of readings; none where there is nothing to measure."""
+def figures(
+    readings, texture_size: float, metres: float, max_shear: float = DEFAULT_MAX_SHEAR, measured=None
+) -> Figures:
+    """Rows about the active UVs of readings, whose Distortion may be known; none where there is nothing to measure."""
     from ..pipelines.distortion import ON_SUBDIVISION, measure_readings, on_subdivision
     from ..pipelines.subdivision import evaluated
     from ..pipelines.texel_density import Texels, texel_density
@@ -169,7 +171,7 @@ def figures(readings, texture_size: float, metres: float, max_shear: float = DEF
     try:
         place = (("Measured", ON_SUBDIVISION),) if on_subdivision(readings) else ()
         readings = [evaluated(reading) for reading in readings]
-        found = measure_readings(readings, overlap=False)
+        found = measured or measure_readings(readings, overlap=False)
         pixels = texel_density(readings, Texels(texture_size, metres))
     except MeshError:
         return Figures()
