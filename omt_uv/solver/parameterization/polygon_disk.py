@@ -36,7 +36,7 @@ class PolygonDisk:
 
 def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     """The chart, with its vertices at (n,3), cut for its map."""
-    faces = np.unique(chart.faces, return_inverse=True)[1].ravel()
+    faces = _numbered(chart.faces)
     cut = polygon_mesh(chart.triangles, faces, most=len(faces))
     quads = _shorter(vertices, cut.quads, chart.disk)
     own = faces[cut.rows[: len(cut.triangles)]]
@@ -53,7 +53,7 @@ def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
 
 def of_polygon_disk(values: np.ndarray, vertices: np.ndarray, chart: Chart, disk: PolygonDisk, patch: float):
     """Values (m,) per area of a chart's triangles as those (t,) of the disk: one a polygon, `patch` over holes."""
-    faces = np.unique(chart.faces, return_inverse=True)[1].ravel()
+    faces = _numbered(chart.faces)
     area = face_areas(vertices, chart.triangles)
     mean = np.bincount(faces, area * values) / np.bincount(faces, area)
     return np.where(disk.polygons >= 0, mean[disk.polygons], patch)
@@ -79,6 +79,12 @@ def cut_as_mapped(chart: Chart, uv: np.ndarray) -> Chart:
     return replace(chart, triangles=triangles, corners=corners)
 
 
+def _numbered(faces: np.ndarray) -> np.ndarray:
+    """Faces (m,) by numbers from 0 in the order in which they come, whatever they are called."""
+    _, first, label = np.unique(faces, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[label.ravel()]
+
+
 def _shorter(vertices: np.ndarray, quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Quads (q,4) turned so that the diagonal from the first to the third corner is the shorter one that may be cut.
 
@@ -100,7 +106,9 @@ def _shorter(vertices: np.ndarray, quads: np.ndarray, triangles: np.ndarray) -> 
     edges = pair_keys(triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
     _, label, count = np.unique(keys, return_inverse=True, return_counts=True)
     single = ~np.isin(keys, edges) & (count[label] == 1)
-    return np.where((convex & turned & single)[:, None], np.roll(quads, -1, axis=1), quads)
+    cut = np.where((convex & turned & single)[:, None], np.roll(quads, -1, axis=1), quads)
+    # From the lower of the ends of the diagonal on, however the quad came.
+    return np.where((cut[:, 2] < cut[:, 0])[:, None], np.roll(cut, 2, axis=1), cut)
 
 
 def _fans(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray):

@@ -16,7 +16,7 @@ from ..mesh.charts import Chart
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
-from .chart_indices import chart_target, located
+from .chart_indices import chart_target, in_order_of_places, located
 from .chart_map import ChartMap, map_chart
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons
@@ -144,7 +144,8 @@ def cut_charts(
 
 
 def _to_be_mapped(surface: Surface, prepared: DiskCharts, pins: CornerPins | None, target: Target | None) -> CutCharts:
-    charts = prepared.charts
+    charts = [in_order_of_places(chart)[0] for chart in prepared.charts]
+    prepared = replace(prepared, charts=charts)
     chart_pins = [pins_of_chart(pins, chart) for chart in charts]
     free = all(p is None for p in chart_pins)
     joined = with_mirrored_quads(surface, charts) if free else charts
@@ -188,7 +189,9 @@ class _Task:
         """Maps of charts by themselves."""
         if not charts:
             return []
-        return (yield from self.map_symmetric(_to_be_mapped(self.surface, _only(charts), self.pins, self.target)))
+        found = yield from self.map_symmetric(_to_be_mapped(self.surface, _only(charts), self.pins, self.target))
+        places = [np.argsort(in_order_of_places(chart)[1]) for chart in charts]
+        return [replace(one, uv=one.uv[place]) for one, place in zip(found, places, strict=True)]
 
     def map_symmetric(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, symmetric ones also where their mirror images are cut along other diagonals."""

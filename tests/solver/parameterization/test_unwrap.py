@@ -44,12 +44,11 @@ def test_areas_are_kept_and_nothing_folds(shape, boundary):
 
 def test_the_boundary_fills_the_domain():
     surface = triangle_surface(*meshes.head(16))
-    (chart,) = strict_charts(surface)
-    (loop,) = boundary_loops(chart.triangles)
-    disk = drain(unwrap(surface, options=UnwrapOptions("disk"))).maps[0].uv[loop]
+    found = [drain(unwrap(surface, options=UnwrapOptions(name))) for name in ("disk", "square")]
+    (loop,) = boundary_loops(found[0].charts[0].triangles)
+    disk, square = (one.maps[0].uv[loop] for one in found)
     radius = np.linalg.norm(disk, axis=1)
     np.testing.assert_allclose(radius, radius[0], rtol=1e-9)
-    square = drain(unwrap(surface, options=UnwrapOptions("square"))).maps[0].uv[loop]
     side = np.abs(square).max()
     np.testing.assert_allclose(np.abs(square).max(axis=1), side, rtol=1e-9)
     assert (np.abs(np.abs(square) - side) < 1e-9 * side).all(axis=1).sum() == 4
@@ -117,6 +116,20 @@ def test_halves_that_hang_by_an_edge_start_from_where_no_face_is_squeezed():
     assert chart_map.area_l1 <= 0.01 and chart_map.folds == 0
 
 
+@pytest.mark.parametrize("boundary", ["free", "disk", "square"])
+def test_the_order_of_vertices_and_faces_does_not_matter(boundary):
+    V, F = meshes.bumpy(9, 7)
+    rng = np.random.default_rng(0)
+    order, rows = rng.permutation(len(V)), rng.permutation(len(F))
+    maps = []
+    for points, triangles in ((V, F), (V[order], np.argsort(order)[F[rows]])):
+        found = drain(unwrap(triangle_surface(points, triangles), options=UnwrapOptions(boundary)))
+        uv = np.empty((len(V), 2))
+        uv[found.charts[0].vertex_ids] = found.maps[0].uv
+        maps.append(uv)
+    np.testing.assert_array_equal(maps[1], maps[0][order])
+
+
 def test_progress_never_runs_backwards():
     seen: list[Progress] = []
     drain(unwrap(two_charts(), options=UnwrapOptions("disk")), seen.append)
@@ -139,8 +152,8 @@ def test_a_density_magnifies_exactly():
 @pytest.mark.parametrize("boundary", ["free", "disk"])
 def test_a_draft_has_its_areas_within_5_percent_and_neither_folds_nor_overlap(boundary):
     V, F = meshes.bumpy(40, 40, height=1.5)
-    (draft,) = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(boundary, "draft"))).maps
-    (chart,) = strict_charts(triangle_surface(V, F))
+    found = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(boundary, "draft")))
+    (draft,), (chart,) = found.maps, found.charts
     figures = distortion(chart.vertices, chart.triangles, draft.uv[chart.triangles])
     assert figures.area_l1 <= 0.05 and figures.folds == 0 and figures.overlap <= 1e-6
 
