@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
 
 from ..analysis.curvature import mean_curvature
 from ..conformal.moebius import centre_on_sphere
@@ -21,17 +23,26 @@ from ..progress import Steps
 from ..sphere.sphere_map import sphere_map
 
 POINTS = 400
-# Mean curvature is squashed, so that single sharp points do not outweigh a body.
+# Every point is the mean of so many places of its cell.
+FINE = 16
+# Mean curvature is smoothed over so many radians of the map with exact areas, and squashed: single sharp points and
+# noise do not outweigh a body.
+SMOOTHING = 0.15
 SQUASH = 3.0
+# Weight of the squared difference of curvature next to squared angles.
+CURVATURE = 0.15
+# Axes of another lattice.
+OTHER = np.linalg.qr(np.array([[3.0, 1, 2], [-1, 4, 1], [2, -3, 5]]))[0]
 
 
 @dataclass(frozen=True)
 class Signature:
     """points (k,3): unit vectors of equal masses; curvature (k,): mean curvature there for a surface of area 4 pi,
-    squashed to [-1, 1]"""
+    squashed to [-1, 1]; floor: how far apart two quantisations of this surface are"""
 
     points: np.ndarray
     curvature: np.ndarray
+    floor: float = 0.0
 
 
 def signature(positions: np.ndarray, triangles: np.ndarray, count: int = POINTS) -> Steps[Signature]:
@@ -53,13 +64,38 @@ def signature(positions: np.ndarray, triangles: np.ndarray, count: int = POINTS)
     found = yield from sphere_map(vertices, faces, quality="draft")
     mass = vertex_areas(vertices, faces)
     conformal = centre_on_sphere(found.conformal, mass)
-    at, barycentric = locate(found.positions, faces, fibonacci_sphere(count))
-    corner = faces[at]
-    points = normalized(np.einsum("kc,kcd->kd", barycentric, conformal[corner]))
     area = np.maximum(mass, 1e-12 * mass.sum())
     bend = mean_curvature(vertices, faces) / area * np.sqrt(mass.sum() / (4 * np.pi))
-    curvature = np.einsum("kc,kc->k", barycentric, np.tanh(bend / SQUASH)[corner])
-    return Signature(points, curvature)
+    fine = fibonacci_sphere(FINE * count)
+    at, barycentric = locate(found.positions, faces, fine)
+    values = np.column_stack([conformal, bend])[faces[at]]
+    values = np.einsum("kc,kcd->kd", barycentric, values)
+    one, other = (_quantised(fine, values, lattice) for lattice in (fibonacci_sphere(count), _other_lattice(count)))
+    cost = pair_costs(one, other)
+    return Signature(one.points, one.curvature, float(np.sqrt(cost[linear_sum_assignment(cost)].mean())))
+
+
+def pair_costs(a: Signature, b: Signature, curvature: float = CURVATURE) -> np.ndarray:
+    """What it costs (k,l) to take each point of one signature to each of another: squared angles and, by a weight,
+    squared differences of curvature."""
+    # By the chord: a cosine near 1 has lost half its digits.
+    square = np.maximum(2 - 2 * (a.points @ b.points.T), 0)
+    angle = 2 * np.arcsin(np.minimum(np.sqrt(square) / 2, 1))
+    return angle**2 + curvature * (a.curvature[:, None] - b.curvature) ** 2
+
+
+def _other_lattice(count: int) -> np.ndarray:
+    return fibonacci_sphere(count) @ OTHER.T
+
+
+def _quantised(fine: np.ndarray, values: np.ndarray, lattice: np.ndarray) -> Signature:
+    """Means over the cells of a lattice (k,3) of what is at fine points (n,3): conformal places and curvature (n,4)."""
+    owner = cKDTree(lattice).query(fine)[1]
+    count = np.maximum(np.bincount(owner, minlength=len(lattice)), 1)
+    mean = np.stack([np.bincount(owner, column, len(lattice)) / count for column in values.T], axis=1)
+    near = np.exp((lattice @ lattice.T - 1) / SMOOTHING**2)
+    smooth = near @ mean[:, 3] / near.sum(axis=1)
+    return Signature(normalized(mean[:, :3]), np.tanh(smooth / SQUASH))
 
 
 def closed_part(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,45 +1,78 @@
 """The Wasserstein distance of signatures, least over rotations and mirroring.
 
-All rotations of an even grid are scored at once by how well smoothed densities agree, before any is refined: refinement
-from random starts ends at wrong rotations. The best are refined by assignments and Kabsch's rotation in turn.
+All rotations of an even grid are scored at once by how well densities and curvatures agree in spherical harmonics,
+before any is refined: refinement from random starts ends at wrong rotations. The best that are far apart are refined
+by assignments and Kabsch's rotation in turn, of few points first.
 """
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from ..mesh.spherical_geometry import fibonacci_sphere
+from ..mesh.spherical_geometry import fibonacci_sphere, normalized
 from ..registration.alignment import rotation_grid, rotation_of_pairs
-from .signature import Signature
+from .harmonics import DEGREES, by_degree, grid_matrices, harmonics, refined_agreement
+from .signature import CURVATURE, Signature, pair_costs
 
-# Points at which densities are compared, and the width of the kernel that smooths them, in radians.
+# Points of the sphere at which densities are smoothed, and the width of the kernel, in radians.
 LATTICE = 500
-WIDTH = 0.3
-# Rotations that are refined, on so many points, in so many rounds; then once more with all points.
-BEST = 5
-FEW = 120
-ROUNDS = 6
-# Weight of the squared difference of curvature next to squared angles.
-CURVATURE = 0.15
-# Distance of two independent samplings of one surface times the root of the number of points: 0.083 at 400, 0.041 at
-# 1,600.
-FLOOR = 1.6
+WIDTH = 0.25
+# So many of the grid's rotations are turned on to the best agreement nearby; the best of them that are apart, by more
+# than this angle in radians, are refined on few points, and the best of these with all points, in so many rounds.
+TRIED = 24
+BEST = 8
+FEW = 250
+ROUNDS = 3
+FINALISTS = 3
+LAST_ROUNDS = 3
+APART = 0.35
+# A search looks at so many candidates, as often as are asked for, by their harmonics.
+CANDIDATES = 4
 
 
 @dataclass(frozen=True)
 class ShapeDistance:
-    """distance: with the floor taken off; raw: without; floor: of two samplings of one surface; rotation (3,3): of the
-    first, determinant -1 where mirrored"""
+    """distance: with the floor taken off; raw: without; floor: of two quantisations of one surface, as measured for
+    these two; rotation (3,3): of the first, determinant -1 where mirrored"""
 
     distance: float
     raw: float
     floor: float
     rotation: np.ndarray
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What a signature is compared by: itself, few points in its place, and its coefficients (s,c) in harmonics of all
+    degrees from 1, of the logarithm of its density and of its curvature."""
+
+    full: Signature
+    few: Signature
+    coefficients: np.ndarray
+
+
+def prepared(s: Signature) -> Prepared:
+    """What a signature is compared by, at hand for many comparisons."""
+    lattice = fibonacci_sphere(LATTICE)
+    kernel = np.exp((lattice @ s.points.T - 1) / WIDTH**2)
+    kernel *= 2 / (WIDTH**2 * len(s.points))
+    values = np.stack([np.log(kernel.sum(axis=1) + 0.05), kernel @ s.curvature], axis=1)
+    parts = harmonics(lattice)[1:]
+    return Prepared(s, _fewer(s), np.concatenate([part.T @ values for part in parts]) * (4 * np.pi / LATTICE))
+
+
+def _fewer(s: Signature) -> Signature:
+    """Few points that stand for about as many others each: neighbours on the lattice that the points come from."""
+    if len(s.points) <= FEW:
+        return s
+    owner = cKDTree(fibonacci_sphere(FEW)).query(fibonacci_sphere(len(s.points)))[1]
+    count = np.bincount(owner, minlength=FEW)
+    mean = [np.bincount(owner, column, FEW) / count for column in (*s.points.T, s.curvature)]
+    return Signature(normalized(np.stack(mean[:3], axis=1)), mean[3], s.floor)
 
 
 def shape_distance(a: Signature, b: Signature, curvature: float = CURVATURE) -> ShapeDistance:
@@ -48,34 +81,83 @@ def shape_distance(a: Signature, b: Signature, curvature: float = CURVATURE) -> 
     The square is the mean of squared angles, and of squared differences of curvature times a weight (Su 2015, equation
     3.31, on the sphere). It is the same whichever comes first.
     """
-    one, other = _shape_distance(a, b, curvature), _shape_distance(b, a, curvature)
-    return one if one.raw <= other.raw else ShapeDistance(other.distance, other.raw, other.floor, other.rotation.T)
+    return distance_of(prepared(a), prepared(b), curvature)
 
 
-def _shape_distance(a: Signature, b: Signature, curvature: float) -> ShapeDistance:
-    fields_a, fields_b = _fields(a), _fields(b)
-    grid, best = rotation_grid(), list[np.ndarray]()
-    for flip in (np.eye(3), np.diag([1.0, 1.0, -1.0])):
-        turned = fields_a if flip[2, 2] > 0 else _fields(Signature(a.points @ flip, a.curvature))
-        score = ((fields_b[_nearest()] - turned) ** 2).sum(axis=(1, 2))
-        best += [grid[k] @ flip for k in np.argsort(score, kind="stable")[:BEST]]
-    few = np.linspace(0, len(a.points) - 1, min(FEW, len(a.points))).astype(int)
-    short_a, short_b = (Signature(s.points[few], s.curvature[few]) for s in (a, b))
-    tried = [_refined(short_a, short_b, rotation, curvature) for rotation in best]
+def distance_of(a: Prepared, b: Prepared, curvature: float = CURVATURE) -> ShapeDistance:
+    """`shape_distance` of signatures that are prepared."""
+    # Always the same way round.
+    swapped = a.full.points.tobytes() > b.full.points.tobytes()
+    one, other = (b, a) if swapped else (a, b)
+    tried = [_refined(one.few, other.few, start, curvature, ROUNDS) for start in starts(one, other, curvature)[:BEST]]
+    tried = sorted(tried, key=lambda found: found[0])[:FINALISTS]
+    tried = [_refined(one.full, other.full, rotation, curvature, 1) for _, rotation in tried]
     rotation = min(tried, key=lambda found: found[0])[1]
-    square, rotation = _refined(a, b, rotation, curvature)
-    floor = FLOOR / np.sqrt(len(a.points))
-    return ShapeDistance(float(np.sqrt(max(square - floor**2, 0))), float(np.sqrt(square)), floor, rotation)
+    square, rotation = _refined(one.full, other.full, rotation, curvature, LAST_ROUNDS)
+    floor = np.sqrt((a.full.floor**2 + b.full.floor**2) / 2)
+    return ShapeDistance(
+        float(np.sqrt(max(square - floor**2, 0))),
+        float(np.sqrt(square)),
+        float(floor),
+        rotation.T if swapped else rotation,
+    )
 
 
-def _refined(a: Signature, b: Signature, rotation: np.ndarray, curvature: float) -> tuple[float, np.ndarray]:
+def starts(a: Prepared, b: Prepared, curvature: float = CURVATURE) -> np.ndarray:
+    """Rotations (r,3,3), mirrored or not, under which two signatures agree best; apart, the best first."""
+    grid = rotation_grid()
+    first, second = a.coefficients, b.coefficients * [1, np.sqrt(curvature / CURVATURE)]
+    found, score = [], []
+    for sign, agreement in zip((1, -1), _agreements(first, second), strict=True):
+        picked = _apart(grid, agreement, TRIED // 2)
+        source = first * (sign ** _degrees())[:, None]
+        rotations, value = refined_agreement(source, second, grid[picked], picked)
+        kept = _apart(rotations, value, len(value))
+        found.append(sign * rotations[kept])
+        score.append(value[kept])
+    return np.concatenate(found)[np.argsort(-np.concatenate(score), kind="stable")]
+
+
+def _apart(rotations: np.ndarray, score: np.ndarray, most: int) -> np.ndarray:
+    """Rows of the rotations (r,3,3) of the best scores (r,), none close to a better one."""
+    left, chosen = np.argsort(-score, kind="stable")[: 40 * most], list[int]()
+    while len(left) and len(chosen) < most:
+        chosen.append(int(left[0]))
+        # The trace of a rotation is 1 + 2 cos of its angle.
+        cosine = (np.einsum("rab,ab->r", rotations[left], rotations[left[0]]) - 1) / 2
+        left = left[cosine <= np.cos(APART)]
+    return np.array(chosen)
+
+
+def _degrees() -> np.ndarray:
+    """The degree of each coefficient."""
+    return np.repeat(np.arange(1, DEGREES + 1), 2 * np.arange(1, DEGREES + 1) + 1)
+
+
+def _agreements(source: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Inner products (r,) of functions of coefficients (s,c) under every rotation of the grid with others; and the same
+    after an inversion, which turns the sign of odd degrees."""
+    even, odd = np.zeros((2, len(rotation_grid())), np.float32)
+    column = 0
+    for first, second in zip(by_degree(source), by_degree(target), strict=True):
+        size = len(first)
+        part = grid_matrices()[:, column : column + size**2] @ (second @ first.T).astype(np.float32).ravel()
+        if size // 2 % 2:
+            odd += part
+        else:
+            even += part
+        column += size**2
+    return even + odd, even - odd
+
+
+def _refined(
+    a: Signature, b: Signature, rotation: np.ndarray, curvature: float, rounds: int
+) -> tuple[float, np.ndarray]:
     """Least mean cost and its rotation (3,3), by assignments and rotations in turn."""
-    bend = curvature * (a.curvature[:, None] - b.curvature[None]) ** 2
-    best = np.inf
-    found = rotation
+    best, found = np.inf, rotation
     mirrored = bool(np.linalg.det(rotation) < 0)
-    for _ in range(ROUNDS):
-        cost = np.arccos(np.clip(a.points @ rotation.T @ b.points.T, -1, 1)) ** 2 + bend
+    for _ in range(rounds):
+        cost = pair_costs(Signature(a.points @ rotation.T, a.curvature), b, curvature)
         rows, columns = linear_sum_assignment(cost)
         mean = float(cost[rows, columns].mean())
         if mean >= best - 1e-9:
@@ -85,42 +167,23 @@ def _refined(a: Signature, b: Signature, rotation: np.ndarray, curvature: float)
     return best, found
 
 
-def _fields(s: Signature) -> np.ndarray:
-    """Density and curvature (l,2) of a signature at the lattice, smoothed."""
-    kernel = np.exp((fibonacci_sphere(LATTICE) @ s.points.T - 1) / WIDTH**2)
-    kernel /= 2 * np.pi * WIDTH**2 / (4 * np.pi) * len(s.points)
-    return np.stack([np.log(kernel.sum(axis=1) + 0.05), kernel @ s.curvature], axis=1)
-
-
-@functools.lru_cache(maxsize=1)
-def _nearest() -> np.ndarray:
-    """The point of the lattice (r,l) to which every rotation of the grid takes each."""
-    lattice = fibonacci_sphere(LATTICE)
-    turned = np.einsum("rab,kb->rka", rotation_grid(), lattice)
-    return cKDTree(lattice).query(turned.reshape(-1, 3))[1].reshape(len(turned), LATTICE)
-
-
-def spectrum(s: Signature, degrees: int = 12) -> np.ndarray:
-    """What no rotation or mirroring changes, (2 * degrees,): the power of density and curvature in each degree of
+def spectrum(s: Prepared) -> np.ndarray:
+    """What no rotation or mirroring changes, (2 * DEGREES,): the power of density and curvature in each degree of
     spherical harmonics."""
-    gram = np.clip(s.points @ s.points.T, -1, 1)
-    before, now = np.ones_like(gram), gram
-    powers = []
-    for degree in range(1, degrees + 1):
-        powers += [now.mean(), (now * np.outer(s.curvature, s.curvature)).mean()]
-        before, now = now, ((2 * degree + 1) * gram * now - degree * before) / (degree + 1)
-    return np.sqrt(np.maximum(powers, 0))
+    first = np.cumsum([0, *(2 * degree + 1 for degree in range(1, DEGREES))])
+    return np.sqrt(np.add.reduceat(s.coefficients**2, first)).ravel()
 
 
 def nearest(
     s: Signature, library: list[Signature], top: int, spectra: np.ndarray | None = None
 ) -> list[tuple[int, ShapeDistance]]:
-    """The `top` nearest of a library, nearest first; spectra (l,24) of it, if at hand.
+    """The `top` nearest of a library, nearest first; spectra (l,2 * DEGREES) of it, if at hand.
 
-    Spectra choose four times as many as asked for; these alone are compared by transport.
+    Spectra choose several times as many as asked for; these alone are compared by transport.
     """
+    mine = prepared(s)
     if spectra is None:
-        spectra = np.stack([spectrum(other) for other in library])
-    order = np.argsort(((spectra - spectrum(s)) ** 2).sum(axis=1), kind="stable")[: max(4 * top, 8)]
-    found = [(int(k), shape_distance(s, library[k])) for k in order]
-    return sorted(found, key=lambda pair: (pair[1].raw, pair[0]))[:top]
+        spectra = np.stack([spectrum(prepared(other)) for other in library])
+    order = np.argsort(((spectra - spectrum(mine)) ** 2).sum(axis=1), kind="stable")[: max(CANDIDATES * top, 8)]
+    found = [(int(k), distance_of(mine, prepared(library[k]))) for k in order]
+    return sorted(found, key=lambda pair: (pair[1].raw ** 2 - pair[1].floor ** 2, pair[0]))[:top]

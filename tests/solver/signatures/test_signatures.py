@@ -8,9 +8,12 @@ import pytest
 import sphere_shapes
 
 from omt_uv.solver import errors
+from omt_uv.solver.mesh.spherical_geometry import fibonacci_sphere
 from omt_uv.solver.progress import drain
-from omt_uv.solver.signatures.signature import closed_part, signature
-from omt_uv.solver.signatures.wasserstein import nearest, shape_distance, spectrum
+from omt_uv.solver.registration.alignment import rotation_grid
+from omt_uv.solver.signatures.harmonics import grid_matrices, harmonics
+from omt_uv.solver.signatures.signature import Signature, closed_part, signature
+from omt_uv.solver.signatures.wasserstein import nearest, prepared, shape_distance, spectrum, starts
 
 COUNT = 200
 
@@ -30,8 +33,8 @@ def of(seed, change=""):
 @pytest.mark.parametrize("change", ["moved", "mirrored", "subdivided"])
 def test_a_body_is_near_itself(change):
     found = shape_distance(of(0), of(0, change))
-    assert found.raw <= 2 * found.floor
-    assert found.raw < 0.7 * shape_distance(of(0), of(3)).raw
+    assert found.raw <= 1.3 * found.floor
+    assert found.distance < 0.5 * shape_distance(of(0), of(3)).distance
 
 
 def test_distances_are_symmetric_and_zero_on_the_diagonal():
@@ -43,8 +46,36 @@ def test_distances_are_symmetric_and_zero_on_the_diagonal():
 def test_the_nearest_of_a_library_is_the_body_itself():
     library = [of(seed) for seed in (1, 2, 0, 3)]
     assert nearest(of(0, "moved"), library, 2)[0][0] == 2
-    turned = np.linalg.norm(spectrum(of(0)) - spectrum(of(0, "moved")))
-    assert turned < 0.5 * np.linalg.norm(spectrum(of(0)) - spectrum(of(1)))
+    mine, moved, other = (spectrum(prepared(s)) for s in (of(0), of(0, "moved"), of(1)))
+    assert np.linalg.norm(mine - moved) < 0.5 * np.linalg.norm(mine - other)
+
+
+def test_harmonics_are_orthonormal_and_turn_by_their_matrices():
+    at = fibonacci_sphere(4000)
+    every = np.concatenate(harmonics(at), axis=1)
+    assert np.allclose(every.T @ every * 4 * np.pi / len(at), np.eye(every.shape[1]), atol=0.01)
+    grid, matrices, column = rotation_grid(), grid_matrices(), 0
+    for before, after in zip(harmonics(at[::50])[1:], harmonics(at[::50] @ grid[1234].T)[1:], strict=True):
+        size = before.shape[1]
+        matrix = matrices[1234, column : column + size**2].reshape(size, size)
+        assert np.allclose(before @ matrix.T, after, atol=1e-4)
+        column += size**2
+
+
+def test_the_best_start_is_the_rotation_that_was_made():
+    found = of(0)
+    rotation = sphere_shapes.random_rotation(7)
+    for sign in (1, -1):
+        turned = Signature(sign * found.points @ rotation.T, found.curvature)
+        best = starts(prepared(found), prepared(turned))[0]
+        assert np.trace(best @ (sign * rotation).T) > 1 + 2 * np.cos(np.radians(3))
+
+
+def test_isometric_bodies_are_told_apart_by_curvature():
+    found = of(0)
+    dented = Signature(found.points, -found.curvature, found.floor)
+    assert shape_distance(found, dented, curvature=0).raw < 1e-6
+    assert shape_distance(found, dented).distance > 0.1
 
 
 def test_holes_are_filled_and_small_parts_left_out():
