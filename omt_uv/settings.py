@@ -9,6 +9,21 @@ BOUNDARIES = (
     ("FREE", "Free", "The outline follows from the surface: the least shear"),
     ("DISK", "Disk", "Every island becomes a disk"),
     ("SQUARE", "Square", "Every island becomes a square"),
+    (
+        "RECTANGLE",
+        "Rectangle",
+        "Every island becomes a rectangle, by itself of the aspect that it would have without shear: trims, straps",
+    ),
+)
+MAPS = (
+    ("AUTHALIC", "Area Preserving", "Exact areas, or a balance between these and the least shear"),
+    ("CONFORMAL", "Conformal", "Angles alone, as papers compare with it: areas vary, and nothing is refined"),
+    (
+        "POLAR",
+        "Polar Factorisation",
+        "Cells of optimal transport from the conformal map, as papers have it: "
+        "balance is between exact areas of cells and the conformal map",
+    ),
 )
 QUALITIES = (
     ("DRAFT", "Draft", "Fast; areas a few percent off where the surface is hard to flatten"),
@@ -36,6 +51,7 @@ SPHERE_METHODS = (
 DEFAULT_PROJECTION = "EQUIRECT"
 DEFAULT_SPHERE_METHOD = "NEWTON"
 DEFAULT_BOUNDARY = "FREE"
+DEFAULT_MAP = "AUTHALIC"
 DEFAULT_SEAMS = "AUTO"
 DEFAULT_QUALITY = "STANDARD"
 DEFAULT_BALANCE = 0.0
@@ -93,6 +109,7 @@ class Settings:
     seams : an identifier of the list above in lower case; fill_holes : take all boundaries of a part but the longest
         for filled; max_shear : cut islands further until their mean shear is below, 0 for no such cuts
     cut_further : those whose seams were marked by hand, too
+    kind : an identifier of MAPS in lower case; aspect : height over width of a rectangle, 0 for its own
     """
 
     boundary: str = DEFAULT_BOUNDARY.lower()
@@ -107,6 +124,8 @@ class Settings:
     fill_holes: bool = False
     max_shear: float = 0.0
     cut_further: bool = False
+    kind: str = DEFAULT_MAP.lower()
+    aspect: float = 0.0
 
     @property
     def tile_origin(self) -> tuple[int, int]:
@@ -125,6 +144,8 @@ class Settings:
             # Charts are cut for their shear already.
             "max_shear": 0.0 if self.seams == "charts" else self.max_shear,
             "cut_further": self.cut_further,
+            "kind": self.kind,
+            "aspect": self.aspect,
         }
 
 

@@ -36,10 +36,11 @@ ARROWS: dict[str, str] = {
     "solver.cutting": "solver solver.mesh solver.linalg solver.analysis",
     "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.cutting",
     "solver.conformal": "solver solver.mesh solver.linalg solver.maps",
+    "solver.canonical": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal",
     "solver.refinement": "solver solver.mesh solver.linalg solver.analysis solver.maps",
     "solver.subdivision": "solver solver.mesh solver.maps solver.refinement",
     "solver.parameterization": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.transport "
-    "solver.cutting solver.seams solver.conformal solver.refinement",
+    "solver.cutting solver.seams solver.conformal solver.canonical solver.refinement",
     "solver.editing": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement",
     "solver.arranging": "solver solver.mesh",
     "solver.sphere": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal solver.refinement",
@@ -62,9 +63,8 @@ ARROWS: dict[str, str] = {
     "solver.remeshing",
     "remedies": "solver",
     "xatlas_charts": "errors solver solver.mesh",
-    "pipelines": "errors settings solver solver.mesh solver.analysis solver.maps solver.packing solver.subdivision "
-    "solver.transfer "
-    "solver.refinement "
+    "pipelines": "errors settings solver solver.mesh solver.canonical solver.analysis solver.maps solver.packing "
+    "solver.subdivision solver.transfer solver.refinement "
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas_charts",
     "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
@@ -72,7 +72,8 @@ ARROWS: dict[str, str] = {
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
     "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
     "pipelines.arranging": "settings solver solver.mesh solver.editing solver.arranging pipelines",
-    "blender": "errors settings solver solver.mesh solver.analysis solver.globe solver.parameterization pipelines",
+    "blender": "errors settings solver solver.mesh solver.canonical solver.analysis solver.globe "
+    "solver.parameterization pipelines",
     "blender.measuring": "errors solver pipelines pipelines.measuring blender",
     "blender.shapes": "settings errors solver solver.mesh solver.analysis solver.registration solver.strain pipelines "
     "pipelines.shapes blender",

@@ -8,6 +8,7 @@ import bmesh
 import numpy as np
 
 from ..errors import UserError
+from ..solver.canonical.markers import MapMarkers
 from .mesh import check_local
 
 
@@ -47,6 +48,24 @@ def avoided(objects: list, name: str) -> list:
         names = ", ".join(obj.name for obj in objects)
         raise GroupError(f"{names}: There is no vertex group {name!r}. Choose one, or leave it empty.")
     return weights
+
+
+def map_markers(objects: list, groups: dict[str, str]) -> list[MapMarkers | None]:
+    """Markers of each object's maps from vertex groups named as centre, start and corners; None where it has none.
+
+    Raises
+    ------
+    GroupError : no object has a group that is named
+    """
+    if not any(groups.values()):
+        return [None] * len(objects)
+    weights = {role: avoided(objects, name) for role, name in groups.items()}
+    found = []
+    for k in range(len(objects)):
+        of_role = {role: np.flatnonzero([] if w[k] is None else w[k] > 0.5) for role, w in weights.items()}
+        markers = MapMarkers(**of_role)
+        found.append(markers if markers.any else None)
+    return found
 
 
 def selected_vertices(obj: bpy.types.Object) -> np.ndarray:

@@ -12,6 +12,8 @@ from ..supervision import MEMORY_IS_LIMITED
 # Levels of subdivision, as many as Blender's slider has.
 MOST_LEVELS = 6
 FORMATS = ".blend .obj .ply .stl .glb .fbx"
+# Height over width, or width over height, of what still is a rectangle.
+MOST_ASPECT = 1e4
 # Gigabytes; with 0.35 Blender hangs while it starts.
 LEAST_MEMORY = 0.5
 # Corners of faces that Blender can count; a closed mesh of triangles has six for every vertex.
@@ -68,6 +70,15 @@ def add_cut_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--keep-free", default="", metavar="GROUP", help="vertex group that new cuts avoid")
 
 
+def add_marker_options(command: argparse.ArgumentParser) -> None:
+    """Vertex groups that fix what a map leaves open."""
+    command.add_argument("--centre", default="", metavar="GROUP", help="vertex that goes to the middle of a disk")
+    command.add_argument("--start", default="", metavar="GROUP", help="vertex of the boundary that goes to the right")
+    command.add_argument(
+        "--corners", default="", metavar="GROUP", help="four vertices: corners; three, on a disk: to 1, i and -1"
+    )
+
+
 def names(items) -> list[str]:
     return [identifier.lower() for identifier, *_ in items]
 
@@ -84,6 +95,13 @@ def positive(text: str) -> float:
     value = number(text)
     if value <= 0:
         raise argparse.ArgumentTypeError(f"{text} is not greater than 0")
+    return value
+
+
+def aspect(text: str) -> float:
+    value = number(text)
+    if not 0 <= value < MOST_ASPECT:
+        raise argparse.ArgumentTypeError(f"{text} is no aspect from 0, its own, to {MOST_ASPECT:g}")
     return value
 
 

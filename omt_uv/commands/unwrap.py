@@ -7,11 +7,13 @@ import argparse
 from ..settings import (
     BOUNDARIES,
     DEFAULT_BOUNDARY,
+    DEFAULT_MAP,
     DEFAULT_MARGIN,
     DEFAULT_MAX_SHEAR,
     DEFAULT_SEAMS,
     DEFAULT_TEXTURE_SIZE,
     FIRST_TILE,
+    MAPS,
     SEAMS,
     Settings,
 )
@@ -21,7 +23,9 @@ from .options import (
     add_area_options,
     add_cut_options,
     add_files,
+    add_marker_options,
     add_report,
+    aspect,
     margin,
     names,
     shear,
@@ -38,6 +42,11 @@ def add(commands) -> None:
     command.add_argument(
         "--boundary", choices=names(BOUNDARIES), default=DEFAULT_BOUNDARY.lower(), help="outline of every island"
     )
+    command.add_argument("--map", choices=names(MAPS), default=DEFAULT_MAP.lower(), help="which map")
+    command.add_argument(
+        "--aspect", type=aspect, default=0.0, metavar="A", help="height over width of a rectangle; 0: its own"
+    )
+    add_marker_options(command)
     add_area_options(command)
     command.add_argument("--seams", choices=names(SEAMS), default=DEFAULT_SEAMS.lower(), help="where islands are cut")
     add_cut_options(command)
@@ -76,7 +85,7 @@ def run(options: argparse.Namespace) -> None:
     objects, readings = read_layers(options)
     from ..blender.seams import mark_seams
     from ..blender.subdivision import subdivision_warnings, with_levels
-    from ..blender.vertex_groups import avoided
+    from ..blender.vertex_groups import avoided, map_markers
     from ..pipelines.layout import UnwrapJob
     from ..pipelines.unwrap import lay_out
 
@@ -93,14 +102,17 @@ def run(options: argparse.Namespace) -> None:
         fill_holes=options.fill_holes,
         max_shear=options.max_shear,
         cut_further=options.cut_further,
+        kind=options.map,
+        aspect=options.aspect,
     )
     with refusals(objects):
         free = avoided(objects, options.keep_free)
+        marked = map_markers(objects, {"centre": options.centre, "start": options.start, "corners": options.corners})
         if options.subdivision != "auto":
             readings = [with_levels(r, options.subdivision) for r in readings]
         jobs = [
-            UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision, up=r.up, uv=r.uv)
-            for r, avoid in zip(readings, free, strict=True)
+            UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision, up=r.up, uv=r.uv, markers=marks)
+            for r, avoid, marks in zip(readings, free, marked, strict=True)
         ]
         layout = drain_shown(lay_out(jobs, settings))
         if options.subdivision != 0:
@@ -114,4 +126,6 @@ def run(options: argparse.Namespace) -> None:
         packing = {"packer": layout.packing.packer, "scale": layout.packing.scale}
         if not options.no_pack:
             packing["coverage"] = layout.packing.coverage
-        write_report(options, {"boundary": options.boundary, "packing": packing}, objects, charts, written)
+        write_report(
+            options, {"boundary": options.boundary, "map": options.map, "packing": packing}, objects, charts, written
+        )

@@ -6,7 +6,16 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..session import run
-from ..settings import BOUNDARIES, DEFAULT_BOUNDARY, DEFAULT_MAX_SHEAR, DEFAULT_SEAMS, SEAMS, Settings
+from ..settings import (
+    BOUNDARIES,
+    DEFAULT_BOUNDARY,
+    DEFAULT_MAP,
+    DEFAULT_MAX_SHEAR,
+    DEFAULT_SEAMS,
+    MAPS,
+    SEAMS,
+    Settings,
+)
 from .base import SolverOperator, complaints, read_writable, warn, write_layers
 from .properties import AreaSettings, MarginSettings, choose_group, choose_layer, draw_balance, draw_margin
 
@@ -21,6 +30,24 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
 
     boundary: EnumProperty(
         name="Boundary", description="Outline of every island", items=BOUNDARIES, default=DEFAULT_BOUNDARY
+    )
+    kind: EnumProperty(name="Map", description="Which map", items=MAPS, default=DEFAULT_MAP)
+    aspect: FloatProperty(
+        name="Aspect",
+        description="Height over width of rectangles. 0: the aspect that the island has without shear",
+        default=0.0,
+        min=0.0,
+        max=1000.0,
+        soft_max=10.0,
+    )
+    centre: StringProperty(name="Centre", description="Vertex group of the vertex that goes to the middle of a disk")
+    start: StringProperty(
+        name="Start", description="Vertex group of the vertex of the boundary that goes to the right of the middle"
+    )
+    corners: StringProperty(
+        name="Corners",
+        description="Vertex group of four vertices that go into the corners of a rectangle; of three, to the right, "
+        "upper and left end of a disk",
     )
     seams: EnumProperty(name="Seams", description="Where islands are cut", items=SEAMS, default=DEFAULT_SEAMS)
     fill_holes: BoolProperty(
@@ -88,10 +115,12 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
             fill_holes=self.fill_holes,
             max_shear=self.max_shear if self.max_shear > 1 else 0.0,
             cut_further=self.cut_further,
+            kind=self.kind.lower(),
+            aspect=self.aspect,
         )
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.vertex_groups import avoided
+        from ..blender.vertex_groups import avoided, map_markers
         from ..pipelines.layout import UnwrapJob
         from ..pipelines.unwrap import lay_out
 
@@ -99,11 +128,19 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
             used = self.use_subdivision
+            marked = map_markers(objects, {"centre": self.centre, "start": self.start, "corners": self.corners})
             jobs = [
                 UnwrapJob(
-                    r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision if used else None, up=r.up, uv=r.uv
+                    r.surface,
+                    r.faces,
+                    r.pins,
+                    avoid,
+                    subdivision=r.subdivision if used else None,
+                    up=r.up,
+                    uv=r.uv,
+                    markers=marks,
                 )
-                for r, avoid in zip(readings, free, strict=True)
+                for r, avoid, marks in zip(readings, free, marked, strict=True)
             ]
             layout = yield from run.aside(lay_out(jobs, self.settings()))
         return objects, layout
@@ -140,6 +177,16 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     """Where islands are cut, and where they go."""
     layout.use_property_split = True
     layout.use_property_decorate = False
+    layout.prop(properties, "kind")
+    column = layout.column()
+    column.active = properties.boundary == "RECTANGLE"
+    column.prop(properties, "aspect")
+    choose_group(layout, properties, "start")
+    column = layout.column()
+    column.active = properties.boundary != "FREE"
+    choose_group(column, properties, "corners")
+    choose_group(column, properties, "centre")
+    layout.separator()
     layout.prop(properties, "seams")
     column = layout.column()
     column.active = properties.seams != "EXISTING"

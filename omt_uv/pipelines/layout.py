@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import UserError
 from ..settings import Settings
 from ..solver.analysis.density import Target
+from ..solver.canonical.markers import MapMarkers
 from ..solver.errors import MeshError
 from ..solver.maps.overlap import overlap_share
 from ..solver.mesh.charts import Chart
@@ -67,6 +68,7 @@ class UnwrapJob:
         to keep free of cuts; target : density and region of its triangles, their own areas by default. Targets of
         several surfaces are relative to each other; subdivision : the modifier on whose surface areas shall be right
     up : the direction (3,) of the surface that is up in the world; uv : UVs (c,2) that its corners have, if any
+    markers : vertices that fix the turn and the corners of its maps
     """
 
     surface: Surface
@@ -77,6 +79,7 @@ class UnwrapJob:
     subdivision: SubdivisionModifier | None = None
     up: tuple[float, float, float] = UP
     uv: np.ndarray | None = None
+    markers: MapMarkers | None = None
 
 
 @dataclass(frozen=True)

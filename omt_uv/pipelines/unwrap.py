@@ -75,13 +75,22 @@ def lay_out(
     elif staying:
         warnings.append((-1, _in_place(len(staying), len(free))))
     triangles = [_connected_triangles(island.chart) for island in free]
-    upright = turn_upright([i.chart for i in free], [i.uv for i in free], [jobs[i.owner].up for i in free])
+    upright = _upright(free, jobs)
     steps = pack_islands(upright, triangles, settings, around)
     packed = yield from part_of(steps, PACKING_FROM, 1 - PACKING_FROM)
     packed_uv = iter(packed.islands)
     placed = [i if stays else replace(i, uv=next(packed_uv)) for i, stays in zip(mapped, pinned, strict=True)]
     corners, uv = corner_uvs(len(maps), placed)
     return Layout(corners=corners, uv=uv, maps=maps, packing=packed, warnings=warnings)
+
+
+def _upright(islands: Sequence[PlacedIsland], jobs: Sequence[UnwrapJob]) -> list[np.ndarray]:
+    """UVs (n,2) of islands turned upright, but for those whose markers say how they lie."""
+    turned = [k for k, island in enumerate(islands) if jobs[island.owner].markers is None]
+    charts, ups = [islands[k].chart for k in turned], [jobs[islands[k].owner].up for k in turned]
+    upright = turn_upright(charts, [islands[k].uv for k in turned], ups)
+    found = dict(zip(turned, upright, strict=True))
+    return [found.get(k, island.uv) for k, island in enumerate(islands)]
 
 
 def _beside(job: UnwrapJob) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -99,6 +108,7 @@ def _beside(job: UnwrapJob) -> list[tuple[np.ndarray, np.ndarray]]:
 def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[dict[int, CutCharts]]:
     """Charts of several small surfaces, by the numbers of these, those mapped that can be solved together."""
     small = [k for k, job in enumerate(jobs) if len(job.surface.triangles) <= SMALL and job.subdivision is None]
+    small = [k for k in small if jobs[k].markers is None]
     if len(small) < 2:
         return {}
     cuts = []
@@ -132,10 +142,11 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
         "pins": job.pins,
         "target": target,
         "avoid": job.avoid,
+        "markers": job.markers,
     }
     steps = unwrap(job.surface, job.faces, cut=cut, **given)
     found = yield from part_of(steps, 0.0, share)
-    if modifier is None:
+    if modifier is None or options.kind != "authalic":
         return found
     rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary)
     return (yield from part_of(rest, share, 1 - share))

@@ -136,6 +136,12 @@ class PinchedVertexError(NotASphereError):
     remedy = "Split the vertex"
 
 
+class BoundaryError(MeshError):
+    """A map that has no such boundary."""
+
+    remedy = "Choose a disk, a square or a rectangle"
+
+
 class PrecisionError(MeshError):
     """A map leaves double precision."""
 

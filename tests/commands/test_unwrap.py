@@ -37,3 +37,21 @@ def test_subdivision(run, tmp_path):
     assert errors["auto"] == errors["1"] < errors["off"] and errors["2"] < errors["off"]
     assert "on the subdivided surface" in run("measure", tmp_path / "auto.blend")[1].lower()
     assert run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "o.blend", "--subdivision", "-1")[0] != 0
+
+
+def test_maps_by_name_rectangles_and_markers(run, tmp_path):
+    obj = scenes.bump(12, 4)
+    for name, vertices in (("start", [12]), ("corners", [0, 12, 64, 52])):
+        obj.vertex_groups.new(name=name).add(vertices, 1.0, "REPLACE")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    shear, report = {}, tmp_path / "r.json"
+    for kind in ("authalic", "conformal", "polar"):
+        options = ("--map", kind, "--boundary", "rectangle", "--corners", "corners", "--start", "start")
+        assert run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "o.blend", *options, "--report", report)[0] == 0
+        written = json.loads(report.read_text())
+        shear[kind] = written["charts"][0]["angle_mean"]
+        assert written["map"] == kind and written["gate"]["folds"] == 0
+    assert shear["conformal"] < shear["polar"]
+    status, _, told = run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "p.blend", "--map", "polar")
+    assert status == 1 and "disk, a square or a rectangle" in told and not (tmp_path / "p.blend").exists()
+    assert run("unwrap", tmp_path / "in.blend", "-o", tmp_path / "p.blend", "--centre", "none")[0] == 1

@@ -392,3 +392,17 @@ def test_what_was_cut_is_marked_only_on_request():
     assert seams_of(obj) == marked
     unwrap(mark_seams=True, max_shear=1.05, cut_further=True)
     assert seams_of(obj) > marked
+
+
+def test_a_conformal_disk_with_its_centre_and_start_where_they_are_marked():
+    obj = scenes.bump(columns=12, rows=12)
+    for name, vertex in (("middle", 84), ("right", 90)):
+        obj.vertex_groups.new(name=name).add([vertex], 1.0, "REPLACE")
+    unwrap(kind="CONFORMAL", boundary="DISK", centre="middle", start="right", margin=0)
+    places = {}
+    for loop, uv in zip(obj.data.loops, scenes.uv_of(obj), strict=True):
+        places[loop.vertex_index] = uv
+    assert places[84] == pytest.approx([0.5, 0.5], abs=0.01) and places[90] == pytest.approx([1, 0.5], abs=0.01)
+    before = scenes.state(obj)
+    text = scenes.error_of(bpy.ops.uv.omt_unwrap, kind="POLAR", boundary="FREE")
+    assert "convex domain" in text and scenes.state(obj) == before

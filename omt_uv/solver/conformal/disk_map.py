@@ -103,19 +103,24 @@ def quarter_points(vertices: np.ndarray, loop: np.ndarray) -> np.ndarray:
     return loop[np.minimum(place, len(loop) - 4 + np.arange(4))] if len(loop) > 3 else loop
 
 
-def sharpest_corners(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Four vertices (4,) where the boundary turns most, an eighth of its length apart, in order of the loop."""
+def boundary_turns(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """By how much the boundary loop (b,) turns at its vertices, (b,) in radians: pi minus the angles inside."""
+    angle = angles_from_lengths(halfedge_lengths(vertices, triangles).reshape(-1, 3))
+    return np.pi - np.bincount(triangles[:, [2, 0, 1]].ravel(), angle.ravel(), len(vertices))[loop]
+
+
+def sharpest_corners(vertices: np.ndarray, triangles: np.ndarray, loop: np.ndarray, apart: float = 1 / 8) -> np.ndarray:
+    """Four vertices (4,) where the boundary turns most, this share of its length apart, in order of the loop."""
     if len(loop) <= 4:
         return loop
-    angle = angles_from_lengths(halfedge_lengths(vertices, triangles).reshape(-1, 3))
-    turn = np.pi - np.bincount(triangles[:, [2, 0, 1]].ravel(), angle.ravel(), len(vertices))[loop]
+    turn, least = boundary_turns(vertices, triangles, loop), apart
     step = np.linalg.norm(vertices[np.roll(loop, -1)] - vertices[loop], axis=1)
     start, total = np.cumsum(step) - step, step.sum()
     chosen: list[int] = []
     far = np.full(len(loop), np.inf)
     for _ in range(4):
         # Where no vertex is far enough from the chosen ones, the farthest comes next.
-        allowed = far >= total / 8
+        allowed = far >= least * total
         place = int(np.argmax(np.where(allowed, turn, -np.inf)) if allowed.any() else np.argmax(far))
         chosen.append(place)
         apart = np.abs(start - start[place])

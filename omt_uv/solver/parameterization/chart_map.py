@@ -10,8 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..analysis.density import Target, area_error_warnings
+from ..canonical.markers import ChartMarkers
+from ..canonical.named_maps import NamedProblem, conformal_map, polar_map
+from ..canonical.rectangles import natural_aspect, rectangle_corners
 from ..conformal.disk_map import sharpest_corners
-from ..errors import FoldedUVError, MeshError, positive_density
+from ..errors import FoldedUVError, MeshError, PinError, positive_density
 from ..maps.distortion import Distortion, distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
@@ -41,6 +44,8 @@ from .polygon_disk import of_polygon_disk, polygon_disk
 # Where the time of a chart goes, roughly, as start and width in [0, 1]: a bar that moves evenly needs no more.
 INITIAL = (0.0, 0.4)
 REFINEMENT = (0.4, 0.6)
+# Boundaries with four corners.
+RECTANGLES = ("square", "rectangle")
 # What is said, after their number, of faces of a map that is returned all the same.
 FOLDED = "faces are folded or without area in the map"
 
@@ -92,6 +97,7 @@ def map_chart(
     options: MapOptions | None = None,
     target: Target | None = None,
     pins: ChartPins | None = None,
+    markers: ChartMarkers | None = None,
 ) -> Steps[ChartMap]:
     """Map one chart so that its areas are kept, by a conformal map, optimal transport and Newton's method.
 
@@ -100,6 +106,7 @@ def map_chart(
     target : density (m,) > 0 multiplies the area that each triangle asks for, 1 by default; the map has the area asked
         for. Of a region (m,) the share of the map is to be exact
     pins : two or more fix place, direction and scale; one fixes the place, and the chart stays as large as it is
+    markers : corners of a rectangle, and which way the map is turned
 
     Raises
     ------
@@ -107,13 +114,13 @@ def map_chart(
     PrecisionError, TransportError, FoldedUVError : where even the fallbacks fail
     DensityError : a density that is not positive and finite
     """
-    options = options or MapOptions()
-    refuse_pins_on_outline(pins, options.boundary)
-    log = RunLog()
-    density = None if target is None else target.density
+    options, markers, log = options or MapOptions(), markers or ChartMarkers(), RunLog()
+    _refuse_pins(pins, options)
+    density, plain = None if target is None else target.density, target is None and pins is None
     vertices, unit = in_unit_box(chart.vertices)
-    disk = _disk_mesh(vertices, chart, options.boundary, target, log)
-    plain = target is None and pins is None
+    disk = _disk_mesh(vertices, chart, options, target, log, markers)
+    if options.kind != "authalic":
+        return (yield from _named_map(chart, disk, unit, options, markers, log))
     draft = options.quality == "draft" and options.balance == 0 and plain
     initial = yield from part_of(_initial_map(disk, options.balance, log, draft), *INITIAL)
     with log.timed("refinement"):
@@ -125,8 +132,8 @@ def map_chart(
             warm_start=initial.warm and places is None,
             multiplier=initial.multiplier,
         )
-        given = {"target": None if target is None else disk.target, "region": disk.region, "pins": places}
-        given["polygons"] = disk.polygons
+        asked = None if target is None else disk.target
+        given = {"target": asked, "region": disk.region, "pins": places, "polygons": disk.polygons}
         refined = good_enough(disk, start, draft) if plain else None
         if refined is None:
             refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
@@ -141,7 +148,14 @@ def map_chart(
     uv = refined.uv
     if places is None:
         uv = placed_chart(uv, vertices, chart, density, unit, pins, disk.boundary == "free")
+        uv = _turned(uv, disk, markers, pins, log)
     return _chart_map(uv, initial, refined, figures, log, pins is not None)
+
+
+def _refuse_pins(pins: ChartPins | None, options: MapOptions) -> None:
+    refuse_pins_on_outline(pins, options.boundary)
+    if pins is not None and options.kind != "authalic":
+        raise PinError("Pins are kept by area preserving maps alone", "Unpin these vertices, or map by areas")
 
 
 def _chart_map(
@@ -174,21 +188,75 @@ def _chart_map(
     )
 
 
-def _disk_mesh(vertices: np.ndarray, chart: Chart, boundary: str, target: Target | None, log: RunLog) -> DiskMesh:
+def _turned(uv: np.ndarray, disk: DiskMesh, markers: ChartMarkers, pins: ChartPins | None, log: RunLog) -> np.ndarray:
+    """A map uv (n,2) turned as its markers say, if it may be."""
+    if markers.centre >= 0 or len(markers.corners) == 3:
+        log.warnings.append("Markers of a centre, and of three places, are kept by conformal and polar maps alone")
+    return markers.turned(uv) if disk.corners is None and pins is None else uv
+
+
+def _named_map(
+    chart: Chart, disk: DiskMesh, unit: float, options: MapOptions, markers: ChartMarkers, log: RunLog
+) -> Steps[ChartMap]:
+    """A map by name: see `canonical.named_maps`."""
+    aspect = 1.0 if disk.boundary == "square" and options.kind == "polar" else options.aspect
+    problem = NamedProblem(disk.vertices, disk.triangles, disk.target, disk.boundary, disk.corners, aspect, markers)
+    if disk.boundary == "square" and options.kind == "conformal":
+        log.warnings.append("A conformal map fills a rectangle of its own aspect, and no square")
+    with log.timed(options.kind):
+        steps = conformal_map(problem) if options.kind == "conformal" else polar_map(problem, options.balance)
+        found = yield from steps
+    vertices = disk.vertices[: len(chart.vertices)]
+    uv = found.uv[: len(vertices)]
+    with log.timed("measure"):
+        figures = measured_chart(vertices, chart, uv, None)
+    if figures.folds:
+        log.warnings.append(f"{figures.folds} {FOLDED}")
+    conformal, cells = found.conformal, found.cells
+    return ChartMap(
+        uv=placed_chart(uv, vertices, chart, None, unit, None, disk.boundary == "free"),
+        newton_conformal=conformal.iterations if conformal else None,
+        residual_conformal=conformal.residual if conformal else None,
+        newton_transport=cells.iterations if cells else None,
+        residual_transport=cells.residual if cells else None,
+        newton_refinement=0,
+        residual_refinement=0.0,
+        status=options.kind,
+        area_l1=figures.area_l1,
+        area_sd=figures.area_sd,
+        angle_mean=figures.angle_mean,
+        folds=figures.folds,
+        warnings=tuple(dict.fromkeys((*log.warnings, *found.warnings))),
+        seconds=log.seconds,
+    )
+
+
+def _disk_mesh(
+    vertices: np.ndarray, chart: Chart, options: MapOptions, target: Target | None, log: RunLog, markers: ChartMarkers
+) -> DiskMesh:
     """The chart, vertices (n,3) in a unit box, as a disk to be mapped, its polygons cut for that.
 
     Patches over holes are mapped with the rest, and forgotten afterwards.
     """
     disk = polygon_disk(vertices, chart)
     area, region, loop = face_areas(disk.vertices, disk.triangles), None, boundary_loops(disk.triangles)[0]
+    boundary = options.boundary
     if target is not None:
         area = area * of_polygon_disk(positive_density(target.density), vertices, chart, disk, 1.0)
         if target.region is not None:
             region = of_polygon_disk(target.region, vertices, chart, disk, 0.0)
-    if boundary == "square" and len(loop) < 4:
-        log.warnings.append("A chart with only three boundary vertices does not fill a square; its boundary is free")
+    if boundary in RECTANGLES and len(loop) < 4:
+        text = f"A chart with only three boundary vertices does not fill a {boundary}; its boundary is free"
+        log.warnings.append(text)
         boundary = "free"
-    corners = sharpest_corners(disk.vertices, disk.triangles, loop) if boundary == "square" else None
+    corners, aspect = None, 1.0
+    if boundary in RECTANGLES:
+        corners = np.array(markers.corners, np.int64)
+        if len(corners) != 4:
+            find = sharpest_corners if boundary == "square" else rectangle_corners
+            corners = find(disk.vertices, disk.triangles, loop)
+    if boundary == "rectangle" and corners is not None:
+        aspect = options.aspect or natural_aspect(disk.vertices, disk.triangles, corners)
     return DiskMesh(
         vertices=disk.vertices,
         triangles=disk.triangles,
@@ -198,6 +266,7 @@ def _disk_mesh(vertices: np.ndarray, chart: Chart, boundary: str, target: Target
         corners=corners,
         region=region,
         polygons=disk.polygons,
+        aspect=aspect,
     )
 
 

@@ -29,6 +29,7 @@ from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed
 from ..transport.convex_domain import Disk, Domain, Rectangle
+from ..transport.inverse_map import centroid_map, corner_parameters
 from ..transport.semidiscrete import Transport, transport
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
@@ -84,8 +85,8 @@ class DiskMesh:
     vertices (n,3), triangles (m,3) : in a unit box, with one boundary loop
     target (m,) : areas of the triangles in the map
     loop (b,) : the boundary
-    boundary : "free", "disk" or "square"
-    corners (4,) : boundary vertices that go into the corners of a square; None in another boundary
+    boundary : "free", "disk", "square" or "rectangle"
+    corners (4,) : boundary vertices that go into the corners of a square or rectangle; None in another boundary
     region (m,) : weights in [0, 1] of a region whose share is to be exact, or None
     polygons (m,) : of every triangle, or None where each is its own
     """
@@ -98,11 +99,13 @@ class DiskMesh:
     corners: np.ndarray | None = None
     region: np.ndarray | None = None
     polygons: np.ndarray | None = None
+    aspect: float = 1.0
 
     @property
     def domain(self) -> Domain:
-        """Where the transport goes: the square if the map is to fill one, the disk otherwise."""
-        return Rectangle() if self.boundary == "square" else Disk()
+        """Where the transport goes: the rectangle if the map is to fill one, the disk otherwise."""
+        root = np.sqrt(self.aspect)
+        return Disk() if self.corners is None else Rectangle(float(1 / root), float(root))
 
 
 @dataclass(frozen=True)
@@ -166,7 +169,9 @@ def coarse_initial_map(
         return None  # what returned to the boundary would lie on a chord
     corners = None if disk.corners is None else np.searchsorted(coarse.kept, disk.corners)
     points = vertices[coarse.kept]
-    coarse_disk = DiskMesh(points, coarse.triangles, coarse.mass, loop, disk.boundary, corners, coarse.region)
+    coarse_disk = DiskMesh(
+        points, coarse.triangles, coarse.mass, loop, disk.boundary, corners, coarse.region, aspect=disk.aspect
+    )
     found = None
     if len(points) > (DIRECT_FAR if far else DRAFT_COARSE_ABOVE if draft else COARSE_ABOVE):
         coarser = coarse_initial_map(coarse_disk, balance, log, flat[coarse.kept])
@@ -256,23 +261,26 @@ def initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
     """
     vertices, triangles, loop, corners, domain = disk.vertices, disk.triangles, disk.loop, disk.corners, disk.domain
     mass = np.bincount(triangles.ravel(), np.repeat(disk.target / 3, 3), len(vertices))
-    conformal, sites, trouble = yield from _conformal_sites(vertices, triangles, corners, log)
+    conformal, sites, trouble = yield from _conformal_sites(disk, log)
     if not trouble:
         sites = _centred(sites, mass, triangles, loop) if corners is None else sites
         cells, trouble = yield from _transport(sites, mass, domain, log)
         if cells is not None:
-            return InitialChartMap(centroid_map(cells, domain, loop, corners, log.warnings), conformal, cells)
+            return InitialChartMap(
+                centroid_map(cells.cells.centroid, domain, loop, corners, log.warnings), conformal, cells
+            )
     log.warnings.append(f"{trouble}; started from a mean value map instead")
     sites = mean_value_sites(vertices, triangles, loop, corners, domain)
     cells, trouble = yield from _transport(sites, mass, domain, log)
     if cells is None:
         log.warnings.append(f"{trouble}; refined the embedding without transport")
         return InitialChartMap(sites, conformal)
-    return InitialChartMap(centroid_map(cells, domain, loop, corners, log.warnings), conformal, cells)
+    return InitialChartMap(centroid_map(cells.cells.centroid, domain, loop, corners, log.warnings), conformal, cells)
 
 
-def _conformal_sites(vertices, triangles, corners, log: RunLog):
+def _conformal_sites(disk: DiskMesh, log: RunLog):
     """Conformal map, its coordinates (n,2) in the domain, and why they cannot be used or an empty text."""
+    vertices, triangles, corners = disk.vertices, disk.triangles, disk.corners
     with log.timed("conformal"):
         try:
             if corners is None:
@@ -280,7 +288,7 @@ def _conformal_sites(vertices, triangles, corners, log: RunLog):
                 sites = conformal.uv
             else:
                 conformal = yield from part_of(conformal_rectangle(vertices, triangles, corners), *CONFORMAL)
-                sites = conformal.uv / [1, conformal.aspect] - 0.5
+                sites = (conformal.uv / [1, conformal.aspect] - 0.5) * np.sqrt([1 / disk.aspect, disk.aspect])
         except PrecisionError as error:
             return None, None, error.cause
         nearest = halfedge_lengths(sites, triangles).min()
@@ -314,45 +322,10 @@ def _transport(sites, mass, domain: Domain, log: RunLog):
 def mean_value_sites(vertices, triangles, loop, corners, domain: Domain) -> np.ndarray:
     """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
     if corners is not None:
-        # Each side of the square takes the boundary between two corners.
+        # Each side of the rectangle takes the boundary between two corners.
         loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
     share = arc_length_parameters(vertices, loop)
     if corners is not None:
         first = np.append(share[np.isin(loop, corners)], 1.0)
-        share = np.interp(share, first, np.arange(5) / 4)
+        share = np.interp(share, first, corner_parameters(domain) / domain.period)
     return tutte(vertices, triangles, loop, domain.map_boundary(share))
-
-
-def centroid_map(cells: Transport, domain: Domain, loop, corners, warnings: list[str]) -> np.ndarray:
-    """The inverse of the transport map, (n,2): every vertex at the centroid of its cell.
-
-    Boundary vertices (b,) move on to the boundary of the domain, in their order, and `corners` (4,), if given,
-    into those of the rectangle.
-    """
-    uv = cells.cells.centroid.copy()
-    s = domain.boundary_parameter(uv[loop])
-    step = (np.roll(s, -1) - s + domain.period / 2) % domain.period - domain.period / 2
-    if not np.isclose(step.sum(), domain.period):
-        warnings.append("The transport tangles the boundary; it was spread evenly instead")
-        step = np.full(len(loop), domain.period / len(loop))
-    # Start behind the largest gap: there nothing can be out of order.
-    first = (int(step.argmax()) + 1) % len(loop)
-    along = s[first] + np.concatenate([[0.0], np.cumsum(np.roll(step, -first)[:-1])])
-    if (np.diff(along) <= 0).any():
-        along = np.maximum.accumulate(along)
-        spread = along[0] + domain.period * np.arange(len(loop)) / len(loop)
-        along = 0.9 * along + 0.1 * spread
-    loop = np.roll(loop, -first)
-    if corners is not None:
-        loop, along = _into_corners(domain, loop, along, corners)
-    uv[loop] = domain.boundary_point(along)
-    return uv
-
-
-def _into_corners(domain: Domain, loop, along, corners) -> tuple[np.ndarray, np.ndarray]:
-    """Warp boundary parameters in order (b,) piecewise linearly so that the corners come to lie in corners."""
-    first = int(np.flatnonzero(loop == corners[0])[0])
-    loop, along = np.roll(loop, -first), np.concatenate([along[first:], along[:first] + domain.period])
-    place = np.flatnonzero(np.isin(loop, corners))
-    ends = np.append(along[place], along[0] + domain.period)
-    return loop, np.interp(along, ends, domain.period * np.arange(5) / 4)

@@ -9,6 +9,9 @@ from ..cutting.disk_charts import SEAMS
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.refine import BOUNDARIES
 
+KINDS = ("authalic", "conformal", "polar")
+MOST_ASPECT = 1e4
+
 
 @dataclass(frozen=True)
 class ShearBound:
@@ -34,24 +37,31 @@ class MapOptions:
 
     Attributes
     ----------
-    boundary : "free" for the least shear; "disk" or "square", which every chart then fills
+    boundary : "free" for the least shear; "disk", "square" or "rectangle", which every chart then fills
     quality : "draft", "standard" or "exact", how small the area error of single faces becomes
     balance : from 0, exact areas, to 1, least shear
+    kind : "authalic", refined to exact areas; "conformal" or "polar", as papers have them: see `canonical.named_maps`
+    aspect : height over width of a rectangle; 0 for that of the conformal map
 
     Raises
     ------
-    ValueError : a boundary or a quality that is none of these, a balance outside of [0, 1]
+    ValueError : a boundary, a quality or a kind that is none of these, a balance outside of [0, 1]
     """
 
     boundary: str = "free"
     quality: str = "standard"
     balance: float = 0.0
+    kind: str = "authalic"
+    aspect: float = 0.0
 
     def __post_init__(self):
         _check("boundary", self.boundary, BOUNDARIES)
         _check("quality", self.quality, QUALITIES)
         if not 0 <= self.balance <= 1:
             raise ValueError(f"balance must lie in [0, 1], not {self.balance}")
+        _check("kind", self.kind, KINDS)
+        if not 0 <= self.aspect < MOST_ASPECT:
+            raise ValueError(f"the aspect of a rectangle must lie in [0, {MOST_ASPECT:g}), not {self.aspect}")
 
 
 @dataclass(frozen=True)
@@ -87,7 +97,7 @@ class UnwrapOptions(MapOptions):
 
     def shear_bound(self) -> ShearBound | None:
         """The bound of the shear that seams are searched for; None where none are."""
-        if not self.max_shear or self.seams != "auto" or self.boundary != "free":
+        if not self.max_shear or self.seams != "auto" or self.boundary != "free" or self.kind != "authalic":
             return None
         return ShearBound(self.max_shear, self.cut_further, self.preferences)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.density import Target
+from ..canonical.markers import MapMarkers, markers_of_chart
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError
@@ -85,6 +86,7 @@ def unwrap(
     target: Target | None = None,
     avoid: np.ndarray | None = None,
     cut: CutCharts | None = None,
+    markers: MapMarkers | None = None,
 ) -> Steps[SurfaceMap]:
     """Map the polygons `faces` (f,) bool of a surface, all by default, so that areas are kept.
 
@@ -94,13 +96,14 @@ def unwrap(
     target : density (m,) of the triangles of the surface, and a region; every triangle its own area by default
     avoid : (n,) in [0,1], vertices to keep free of cuts; cuts avoid pinned vertices, too
     cut : what `cut_charts` made of all this; then it counts
+    markers : vertices that fix what a map leaves open: its turn, its corners
 
     Raises
     ------
     MeshError : see `disk_charts.cut_to_disks` and `chart_map.map_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
-    task = _Task(surface, options or UnwrapOptions(), pins, target)
+    task = _Task(surface, options or UnwrapOptions(), pins, target, markers)
     begin = 0.0
     if cut is None:
         begin = CUTTING
@@ -114,7 +117,8 @@ def unwrap(
         found = yield from part_of(further, begin + width, 1 - begin - width)
         prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps
     charts, chart_pins = prepared.charts, [pins_of_chart(pins, chart) for chart in prepared.charts]
-    maps = with_convex_polygons(surface, charts, maps, chart_pins, task.options, target)
+    if task.options.kind == "authalic":
+        maps = with_convex_polygons(surface, charts, maps, chart_pins, task.options, target)
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
@@ -156,7 +160,8 @@ def _to_be_mapped(surface: Surface, prepared: DiskCharts, pins: CornerPins | Non
 
 def map_small_charts(several: Sequence[CutCharts], options: UnwrapOptions) -> Steps[list[CutCharts]]:
     """Surfaces with their small charts mapped together where boundaries are free, but those that have to go alone."""
-    alike = [cut.alike if options.boundary == "free" else [] for cut in several]
+    together = options.boundary == "free" and options.kind == "authalic"
+    alike = [cut.alike if together else [] for cut in several]
     where = [(i, k) for i, numbers in enumerate(alike) for k in numbers]
     charts, targets = [several[i].joined[k] for i, k in where], [several[i].targets[k] for i, k in where]
     found = yield from map_together(charts, targets, options)
@@ -175,13 +180,16 @@ class _Task:
     options: UnwrapOptions
     pins: CornerPins | None
     target: Target | None
+    markers: MapMarkers | None = None
 
     def map_one(self, chart: Chart) -> Steps[ChartMap]:
         """The map of one chart; errors have the element indices of the surface."""
         pins = pins_of_chart(self.pins, chart)
         target = chart_target(self.target, self.surface, chart)
+        marked = markers_of_chart(self.markers, chart)
         try:
-            return (yield from map_chart(chart, options=self.options, target=target, pins=pins))
+            given: dict[str, Any] = {"options": self.options, "target": target, "pins": pins, "markers": marked}
+            return (yield from map_chart(chart, **given))
         except MeshError as error:
             raise located(error, chart) from error
 
@@ -212,10 +220,12 @@ class _Task:
 
     def map_all(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, small ones without pins together, one for two that are each other's mirror image."""
-        charts, pairs = cut.joined, cut.pairs
+        # Markers tell charts apart that are alike.
+        charts, pairs = cut.joined, cut.pairs if self.markers is None else {}
         total = sum(len(c.triangles) for c in charts)
-        done = sum(len(charts[k].triangles) for k in cut.alike) / total if self.options.boundary == "free" else 0.0
-        if not cut.maps:
+        together = self.options.boundary == "free" and self.options.kind == "authalic" and self.markers is None
+        done = sum(len(charts[k].triangles) for k in cut.alike) / total if together else 0.0
+        if not cut.maps and self.markers is None:
             (cut,) = yield from part_of(map_small_charts([cut], self.options), 0.0, done)
         maps: list[ChartMap] = []
         for k, chart in enumerate(charts):

@@ -136,10 +136,21 @@ def square_initial_map(vertices, triangles, uv, loop) -> InitialMap:
 
     Where that squeezes faces beyond use, the corners are spread by the boundary's length instead.
     """
+    return _rectangle_map(vertices, triangles, uv, loop, np.ones(2))
+
+
+def rectangle_initial_map(vertices, triangles, uv, loop) -> InitialMap:
+    """As `square_initial_map`, on the rectangle about 0 that has the aspect of the given map."""
+    size = np.ptp(uv[loop], axis=0)
+    return _rectangle_map(vertices, triangles, uv, loop, size / np.sqrt(max(size.prod(), np.finfo(float).tiny)))
+
+
+def _rectangle_map(vertices, triangles, uv, loop, shape: np.ndarray) -> InitialMap:
+    """A start on the rectangle whose sides have the ratio of shape (2,), of product 1."""
     low, high = uv[loop].min(0), uv[loop].max(0)
     if not (high > low).all():
         raise FoldedUVError("The UVs to refine have no area")
-    half = np.sqrt(face_areas(vertices, triangles).sum()) / 2
+    half = shape * np.sqrt(face_areas(vertices, triangles).sum()) / 2
     uv = ((uv - low) / (high - low) * 2 - 1) * half
     given = _perimeter(uv[loop] / half)
     turn = (np.roll(given, -1) - given) % 4

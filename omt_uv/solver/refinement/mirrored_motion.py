@@ -82,6 +82,8 @@ def symmetric_start(
     if boundary == "square":
         # Across the middles of sides, or the corners: other axes are none of the square's.
         phase = 1j ** round(2 * np.angle(turn) / np.pi)
+    if boundary == "rectangle":
+        phase = 1.0 if turn.real > 0 else -1.0
     found = mirror_symmetry(symmetry.images, phase)
     start = found.averaged(centred)
     if np.abs(start - centred).max() > FAR * np.abs(centred).max():
@@ -90,8 +92,8 @@ def symmetric_start(
         start[loop] *= np.abs(w[loop]) / np.abs(start[loop])
         start = found.spread(start)
     if (
-        boundary == "square"
-        and np.abs(_from_square(start[loop]) - _from_square(w[loop])).max() > ALONG * np.abs(w).max()
+        boundary in ("square", "rectangle")
+        and np.abs(_from_sides(start[loop], w[loop]) - _from_sides(w[loop], w[loop])).max() > ALONG
     ):
         return None
     start = _straightened(found, start, faces)
@@ -114,6 +116,6 @@ def _straightened(symmetry: MirrorSymmetry, w: np.ndarray, faces: Elements) -> n
     return w
 
 
-def _from_square(w: np.ndarray) -> np.ndarray:
-    """Size (b,) of the square about 0 on which a point lies."""
-    return np.maximum(np.abs(w.real), np.abs(w.imag))
+def _from_sides(w: np.ndarray, outline: np.ndarray) -> np.ndarray:
+    """Sizes (b,) of the rectangles about 0 on which points lie, over that of the outline (b,) complex."""
+    return np.maximum(np.abs(w.real) / np.abs(outline.real).max(), np.abs(w.imag) / np.abs(outline.imag).max())

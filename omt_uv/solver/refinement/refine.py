@@ -22,12 +22,25 @@ from .continuation import ContinuationResult, MapProblem, minimise_in_stages
 from .continuation_rules import QUALITIES, planned_weights
 from .elimination_order import Renumbered, renumbered
 from .hessian_blocks import Assembly, assembly_of
-from .initial_maps import InitialMap, disk_initial_map, free_initial_map, is_far, notched_disk, square_initial_map
+from .initial_maps import (
+    InitialMap,
+    disk_initial_map,
+    free_initial_map,
+    is_far,
+    notched_disk,
+    rectangle_initial_map,
+    square_initial_map,
+)
 from .mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from .pins import move_pins, placed_like
 from .vertex_sweeps import Smoother, smoothed
 
-INITIAL_MAPS = {"free": free_initial_map, "disk": disk_initial_map, "square": square_initial_map}
+INITIAL_MAPS = {
+    "free": free_initial_map,
+    "disk": disk_initial_map,
+    "square": square_initial_map,
+    "rectangle": rectangle_initial_map,
+}
 BOUNDARIES = tuple(INITIAL_MAPS)
 # Below so many vertices Newton's steps take so little time that sweeps between them save none.
 SWEPT_ABOVE = 2000
@@ -50,7 +63,8 @@ class RefinementOptions:
     Attributes
     ----------
     boundary : "free"; "disk", sliding on the circle about 0 of the target's area; "square", sliding on the sides of
-        the square about 0 of the target's area, corners fixed
+        the square about 0 of the target's area, corners fixed; "rectangle", as the square, with the aspect of the
+        initial map
     balance : 0 for exact areas to 1 for the least shear
     quality : "draft", "standard" or "exact"; "relaxed" or "rough" for the initial map of a finer mesh
     warm_start : the initial map is nearly the one that is looked for, and needs no detour through small area weights

@@ -62,7 +62,7 @@ def test_centroids_of_the_cells_have_the_mass_of_the_disk():
     sites = mean_value_sites(V, F, disk.loop, None, Disk())
     mass = np.bincount(F.ravel(), np.repeat(disk.target / 3, 3))
     cells = drain(transport(sites, mass, Disk()))
-    uv = centroid_map(cells, Disk(), disk.loop, None, [])
+    uv = centroid_map(cells.cells.centroid, Disk(), disk.loop, None, [])
     inner = np.setdiff1d(np.arange(len(V)), disk.loop)
     np.testing.assert_array_equal(uv[inner], cells.cells.centroid[inner])
     np.testing.assert_allclose(np.linalg.norm(uv[disk.loop], axis=1), 1, atol=1e-12)

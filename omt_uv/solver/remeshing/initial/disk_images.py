@@ -12,9 +12,10 @@ from ...maps.tutte import arc_length_parameters, tutte
 from ...maps.untangle import untangle
 from ...mesh.geometry import halfedge_lengths, vertex_areas
 from ...mesh.topology import boundary_loops
-from ...parameterization.initial_map import SITE_RESOLUTION, centroid_map
+from ...parameterization.initial_map import SITE_RESOLUTION
 from ...progress import Steps
 from ...transport.convex_domain import Disk
+from ...transport.inverse_map import centroid_map
 from ...transport.semidiscrete import transport
 
 # Samples need no exact maps: angle sums of the flat metric may be off by this, radians,
@@ -58,7 +59,7 @@ def preserving_image(
     try:
         mass = vertex_areas(vertices, triangles, density)
         cells = yield from transport(conformal, mass, circle, tolerance=AREA_TOLERANCE)
-        uv = centroid_map(cells, circle, loop, None, warnings)
+        uv = centroid_map(cells.cells.centroid, circle, loop, None, warnings)
         uv, _ = untangle(uv, vertices, triangles, loop, uv[loop])
     except TransportError as error:
         warnings.append(f"{error.cause}; samples were spread without transport")

@@ -1,0 +1,94 @@
+"""Maps by name: conformal ones have angles, polar factorisations have areas of cells, and lie in between."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.canonical.named_maps import NamedProblem, conformal_map, polar_map
+from omt_uv.solver.conformal.disk_map import sharpest_corners
+from omt_uv.solver.errors import BoundaryError, PinError
+from omt_uv.solver.maps.distortion import distortion
+from omt_uv.solver.maps.untangle import count_folds
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.chart_pins import ChartPins
+from omt_uv.solver.parameterization.options import MapOptions
+from omt_uv.solver.progress import drain
+from omt_uv.solver.transport.convex_domain import Rectangle
+from omt_uv.solver.transport.inverse_map import corner_parameters
+
+
+def problem(boundary, aspect=0.0):
+    V, F = meshes.bumpy(14, 14, 0.2)
+    corners = None if boundary in ("free", "disk") else sharpest_corners(V, F, boundary_loops(F)[0])
+    return NamedProblem(V, F, face_areas(V, F), boundary, corners, aspect)
+
+
+def figures(disk, uv):
+    return distortion(disk.vertices, disk.triangles, uv[disk.triangles])
+
+
+@pytest.mark.parametrize("boundary", ["free", "disk", "rectangle"])
+def test_conformal_maps_have_angles_and_no_areas(boundary):
+    disk = problem(boundary)
+    found = drain(conformal_map(disk))
+    measured = figures(disk, found.uv)
+    assert measured.angle_mean < 1.2 and measured.folds == 0
+    assert boundary == "free" or measured.area_l1 > 0.1
+
+
+def test_polar_factorisations_lie_between_exact_cells_and_the_conformal_map():
+    disk = problem("disk")
+    maps = [drain(polar_map(disk, balance)) for balance in (0.0, 0.5, 1.0)]
+    shear = [figures(disk, m.uv).angle_mean for m in maps]
+    error = [figures(disk, m.uv).area_l1 for m in maps]
+    assert shear[0] > shear[1] > shear[2] and error[0] < error[1] < error[2]
+    assert all(count_folds(m.uv, disk.triangles) == 0 for m in maps)
+    mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3))
+    assert maps[0].cells.cells.area / np.pi == pytest.approx(mass / mass.sum(), rel=1e-5)
+    conformal = drain(conformal_map(disk))
+    inner = np.setdiff1d(np.arange(len(mass)), disk.loop)
+    assert np.linalg.norm(maps[2].uv - conformal.uv, axis=1)[inner].max() < 0.05
+
+
+def test_a_polar_factorisation_fills_a_rectangle_and_needs_a_convex_domain():
+    disk = problem("rectangle", 0.5)
+    found = drain(polar_map(disk))
+    assert np.divide(*np.ptp(found.uv, axis=0)[::-1]) == pytest.approx(0.5, abs=1e-6)
+    with pytest.raises(BoundaryError):
+        drain(polar_map(problem("free")))
+
+
+@pytest.mark.parametrize("aspect", [0.25, 1.7])
+def test_areas_are_kept_in_rectangles_of_a_given_aspect(aspect):
+    (chart,) = strict_charts(triangle_surface(*meshes.bumpy(14, 14)))
+    found = drain(map_chart(chart, options=MapOptions(boundary="rectangle", aspect=aspect)))
+    width, height = np.ptp(found.uv, axis=0)
+    assert height / width == pytest.approx(aspect, rel=1e-6)
+    assert width * height == pytest.approx(face_areas(chart.vertices, chart.triangles).sum(), rel=1e-6)
+    assert found.area_l1 < 0.01 and found.folds == 0
+
+
+@pytest.mark.parametrize("length", [3, 20])
+def test_a_flat_strap_stays_what_it_is(length):
+    (chart,) = strict_charts(triangle_surface(*meshes.grid(4 * length, 4, length, 1.0)))
+    found = drain(map_chart(chart, options=MapOptions(boundary="rectangle")))
+    assert sorted(np.ptp(found.uv, axis=0)) == pytest.approx([1, length], rel=1e-3) and found.angle_mean < 1.001
+
+
+def test_pins_are_kept_by_area_preserving_maps_alone():
+    (chart,) = strict_charts(triangle_surface(*meshes.bumpy(5, 5)))
+    pins = ChartPins(np.array([0]), np.zeros((1, 2)), np.zeros((len(chart.triangles), 3, 2)))
+    with pytest.raises(PinError):
+        drain(map_chart(chart, options=MapOptions(kind="conformal"), pins=pins))
+
+
+def test_corners_of_a_rectangle_lie_along_its_boundary():
+    domain = Rectangle(2.0, 1.0)
+    assert corner_parameters(domain) == pytest.approx([0, 2, 3, 5, 6])
+    assert domain.boundary_point(corner_parameters(domain)[:4]) == pytest.approx(domain.corners)
