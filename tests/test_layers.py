@@ -93,7 +93,7 @@ ARROWS: dict[str, str] = {
     "solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
     "commands.volumes": "solver solver.flows solver.volumes pipelines.volumes blender.volumes files commands",
-    "commands.batches": "supervision solver batch commands",
+    "commands.batches": "supervision solver batch files commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
     "pipelines blender files display session",
     "operators.inspection": "settings remedies solver solver.comparison pipelines pipelines.measuring blender "

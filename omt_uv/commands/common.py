@@ -16,6 +16,13 @@ from ..supervision import PROGRAM
 # Formats in which Y is up, by custom, and what turns that to Z.
 Y_IS_UP = (".obj", ".off", ".ply")
 Y_TO_Z = ((1, 0, 0), (0, 0, -1), (0, 1, 0))
+# Options that hold files which commands write beside OUT, and such as they read, with what they are called.
+WRITTEN = {name: f"--{name.replace('_', '-')}" for name in (
+    "report", "histogram", "preview", "plot", "image_out", "image_output")}  # fmt: skip
+READ = {"input": "IN", "target": "DST", "other": "B", "others": "B", "image": "--image", "handles": "--handles",
+        "index": "--index", "landmarks": "--landmarks"}  # fmt: skip
+# What is read, and what may take its place.
+REPLACED = {("IN", "OUT"), ("DST", "OUT"), ("--image", "--image-out"), ("--image", "--image-output")}
 
 
 class CommandError(UserError):
@@ -67,7 +74,8 @@ def refusals(objects: Sequence = (), name: str = "", others: tuple[type[Exceptio
 def check_paths(options: argparse.Namespace, outputs: Sequence[Path] | None = None) -> None:
     """Refuse what cannot be written before the long work: all files of the options, and whatever names one twice.
 
-    outputs : mesh files that are written, if other than OUT. OUT may be IN, which is replaced; a picture may be, too
+    outputs : mesh files that are written, if other than OUT. OUT may be IN or DST, which is replaced, and a picture
+        that is written the one that is read; whatever else is read is not written over
 
     Raises
     ------
@@ -79,20 +87,30 @@ def check_paths(options: argparse.Namespace, outputs: Sequence[Path] | None = No
 
     check_picture(getattr(options, "preview", None))
     meshes = [options.output] if outputs is None and "output" in options else list(outputs or ())
-    more = [
-        (name, getattr(options, name, None)) for name in ("report", "histogram", "preview", "image_out", "image_output")
-    ]
-    written = [(f"--{name.replace('_', '-')}", path) for name, path in more if path is not None]
-    read = [("IN", options.input), ("--image", getattr(options, "image", None))]
-    mesh_names = [("OUT", path) for path in meshes]
-    found = clash([*mesh_names, *written]) or clash([("IN", options.input), *written])
-    found = found or next(filter(None, (clash([pair, *mesh_names]) for pair in read[1:] if pair[1] is not None)), None)
+    written, read = _named_paths(options, WRITTEN), _named_paths(options, READ)
+    outs = [("OUT", path) for path in meshes] or _named_paths(options, {"output": "OUT"})
+    found = clash([*outs, *written])
+    for told, path in read:
+        others = [pair for pair in [*outs, *written] if (told, pair[0]) not in REPLACED]
+        found = found or next(filter(None, (clash([(told, path), pair]) for pair in others)), None)
     if found:
         raise UsageError(f"{found[0]} and {found[1]} are one file. Give each a name of its own.")
     for path in meshes:
         check_target(path)
     for _, path in written:
         check_writable(path)
+
+
+def _named_paths(options: argparse.Namespace, names: dict[str, str]) -> list[tuple[str, Path]]:
+    """Pairs of a name for the user and a path that an option holds; one that takes a list gives several."""
+    found = []
+    for name, told in names.items():
+        value = getattr(options, name, None)
+        values = value if isinstance(value, list) else [value]
+        # The landmarks of a file, where they may be a prefix as well.
+        values = [Path(v) if isinstance(v, str) and v.endswith(".json") else v for v in values]
+        found += [(told, path) for path in values if isinstance(path, Path)]
+    return found
 
 
 def write_picture(path: Path, picture) -> None:

@@ -8,7 +8,7 @@ import io
 import json
 from pathlib import Path
 
-from .common import CommandError, drain_shown, refusals, require_blender, write_picture
+from .common import CommandError, check_paths, drain_shown, refusals, require_blender, write_picture
 from .options import add_input
 from .selection import read_file
 
@@ -37,12 +37,9 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ..files.verified import check_writable
-
-    if options.plot is not None:
-        if options.plot.suffix.lower() != ".png":
-            raise CommandError(f"{options.plot}: a plot is a picture. Name a .png file.")
-        check_writable(options.plot)
+    if options.plot is not None and options.plot.suffix.lower() != ".png":
+        raise CommandError(f"{options.plot}: a plot is a picture. Name a .png file.")
+    check_paths(options)
     if options.beltrami:
         print(_strain(options))
         return
@@ -64,7 +61,7 @@ def compared(options: argparse.Namespace) -> list[dict]:
     first, rows = _mesh(options, options.input), []
     for path in options.others:
         second = _mesh(options, path)
-        with refusals(name=str(path)):
+        with refusals(name=f"{options.input}, {path}"):
             rows.append({"file": str(path), **vars(drain_shown(compare(first, second)))})
     return rows
 

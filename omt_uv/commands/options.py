@@ -27,12 +27,16 @@ def add_files(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off"
     command.add_argument("-o", "--output", type=Path, metavar="OUT", required=True, help=writes)
 
 
-def add_input(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off") -> None:
-    """What is read, how strictly, and how much time and memory that may take."""
+def add_input(command: argparse.ArgumentParser, accepts: str = f"{FORMATS} .off", metavar: str = "IN") -> None:
+    """What is read, how strictly, and how much time and memory that may take; a folder's files are each read so."""
     command.set_defaults(told=[])
-    command.add_argument("input", type=Path, metavar="IN", help=accepts)
+    command.add_argument("input", type=Path, metavar=metavar, help=accepts)
     command.add_argument(
-        "--object", action="append", default=[], metavar="NAME", help="take this object of IN alone; may be repeated"
+        "--object",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help=f"take this object of {metavar} alone; may be repeated",
     )
     command.add_argument("--scene", default="", metavar="NAME", help="take the objects of this scene of a .blend alone")
     command.add_argument(

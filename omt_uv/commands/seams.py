@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> None:
     objects = [obj for obj, _ in pairs]
     for obj in objects:
         check_local(obj)
-    told = []
+    told, lines = [], []
     free = avoided(objects, options.keep_free)
     for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
         with refusals(name=obj.name):
@@ -40,5 +40,6 @@ def run(options: argparse.Namespace) -> None:
             cuts = cut(reading.surface, reading.faces, avoid=avoid, fill=options.fill_holes)
         told += [(k, text) for text in cuts.warnings]
         mark_seams(obj, cuts.edges)
-        print(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")
+        lines.append(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")
     warn(objects, told, save(options.output, objects, options.input))
+    print("\n".join(lines))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .common import CommandError, refusals, warn_of
@@ -34,6 +35,13 @@ def read_file(options: argparse.Namespace, layer: str = "") -> list:
     if not pairs:
         raise CommandError(f"{path}: The mesh has no faces. Give a file with faces.")
     return pairs
+
+
+def of_file(options: argparse.Namespace, path: Path) -> argparse.Namespace:
+    """Options of a command that reads several files, for one of them: names of objects are those of IN, or of every
+    file of a folder."""
+    chosen = options.object if path == options.input or path.is_relative_to(options.input) else []
+    return argparse.Namespace(**{**vars(options), "input": path, "object": chosen})
 
 
 def _tell(options: argparse.Namespace, loaded: Loaded) -> None:

@@ -109,7 +109,9 @@ def check_blend(path: Path, objects: Sequence[bpy.types.Object]) -> None:
         with bpy.data.libraries.load(str(path), link=True) as (_, there):
             there.meshes = list(names)
     except OSError as error:
-        raise FileError(f"What was written cannot be read again: {error}. Is the disk full?") from error
+        # Blender names the temporary file, which nobody knows.
+        reason = str(error).rpartition(": ")[2].strip(" .")
+        raise FileError(f"What was written cannot be read again: {reason}. Is the disk full?") from error
     libraries = {mesh.library for mesh in there.meshes if mesh is not None}
     try:
         for name, mesh in zip(names, there.meshes, strict=True):

@@ -68,8 +68,6 @@ def test_every_option_of_numbers_refuses_what_is_no_finite_number(package, run):
 
 
 def test_every_command_has_the_options_of_input_and_limits(package):
-    # These take a folder, a file for each mesh, and know no objects.
-    folders = {"average", "library", "similar"}
-    for name, command in ((n, c) for n, c in commands(package) if n not in folders):
+    for name, command in commands(package):
         have = {text for action in command._actions for text in action.option_strings}
         assert have >= {"--object", "--scene", "--skip-linked", "--strict", "--timeout", "--memory"}, name

@@ -19,13 +19,11 @@ def run(options: argparse.Namespace) -> None:
     from ...batch.manifest import found_beside, rows_of
     from ...batch.pages import page_of
     from ...batch.plan import beside
+    from ...files.verified import write_text
 
     path = options.output or beside(options.input, ".html")
     if path.suffix.lower() != ".html":
         raise CommandError(f"{path}: a page is a .html file. Name one.")
     rows = rows_of(found_beside(options.input))
-    try:
-        path.write_text(page_of(rows, path.resolve().parent, options.input.name), encoding="utf-8")
-    except OSError as error:
-        raise CommandError(f"{path}: cannot be written ({error.strerror or error})") from error
+    write_text(path, page_of(rows, path.resolve().parent, options.input.name))
     print(path)

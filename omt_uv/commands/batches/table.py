@@ -20,6 +20,7 @@ def add(commands) -> None:
 def run(options: argparse.Namespace) -> None:
     from ...batch.manifest import found_beside, rows_of
     from ...batch.tables import csv_text, write_parquet
+    from ...files.verified import staged, write_text
 
     rows = rows_of(found_beside(options.input))
     if options.output is None:
@@ -28,10 +29,8 @@ def run(options: argparse.Namespace) -> None:
     suffix = options.output.suffix.lower()
     if suffix not in SUFFIXES:
         raise CommandError(f"{options.output}: a table is {' or '.join(SUFFIXES)}. Name one of these.")
-    try:
-        if suffix == ".csv":
-            options.output.write_text(csv_text(rows))
-        else:
-            write_parquet(options.output, rows)
-    except OSError as error:
-        raise CommandError(f"{options.output}: cannot be written ({error.strerror or error})") from error
+    if suffix == ".csv":
+        write_text(options.output, csv_text(rows))
+        return
+    with staged(options.output) as made:
+        write_parquet(made, rows)

@@ -10,12 +10,14 @@ from typing import Any
 
 from ... import __version__
 from ...pipelines.shapes.choices import DEFAULT_PREFIX
-from ..common import CommandError, UsageError, drain_shown, refusals, require_blender, warn_of
-from ..options import number
+from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn_of
+from ..options import add_input, number
+from ..selection import of_file, read_file
 
 READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx", ".off")
 # A z-score beyond which a vertex is told of as off.
 FAR = 3.0
+MEAN = "Mean"
 DEVIATION = "OMT Deviation"
 SCORE = "OMT Z-Score"
 
@@ -32,8 +34,8 @@ class Registered:
 
 def add(commands) -> None:
     command = commands.add_parser("average", help="the mean of a folder's shapes, and where each of them is off")
-    command.set_defaults(run=run, told=[], timeout=0.0, memory=0.0)
-    command.add_argument("input", type=Path, metavar="DIR", help="folder with a mesh a file")
+    command.set_defaults(run=run)
+    add_input(command, "folder with a mesh a file", metavar="DIR")
     command.add_argument("-o", "--output", type=Path, metavar="MEAN.blend", required=True, help=".blend")
     command.add_argument(
         "--landmarks", default=DEFAULT_PREFIX, metavar="PREFIX", help="landmarks of shapes that have other vertices"
@@ -45,20 +47,42 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ...files.verified import check_writable
-
     if options.output.suffix.lower() != ".blend":
         raise UsageError(f"{options.output}: the mean and its attributes go into a .blend. Name one.")
-    for path in filter(None, (options.output, options.report)):
-        check_writable(path)
+    check_paths(options)
     if not options.input.is_dir():
         raise CommandError(f"{options.input}: there is no such folder")
-    output = options.output.resolve()
-    files = sorted(p for p in options.input.iterdir() if p.suffix.lower() in READABLE and p.resolve() != output)
+    files = _shape_files(options)
     if len(files) < 2:
         raise CommandError(f"{options.input}: a mean needs two shapes or more. Put their files there.")
     shapes, surface, polygons = _registered(options, files)
     _write(options, shapes, surface, polygons)
+
+
+def _shape_files(options: argparse.Namespace) -> list[Path]:
+    """The files of the shapes, without a mean that was written there before.
+
+    Raises
+    ------
+    UsageError : a file that is written is one of the shapes
+    """
+    import bpy
+
+    from ...files.verified import same_file
+
+    files = sorted(path for path in options.input.iterdir() if path.suffix.lower() in READABLE)
+    for path in [path for path in files if same_file(path, options.output)]:
+        try:
+            with bpy.data.libraries.load(str(path)) as (there, _):
+                is_mean = MEAN in there.objects
+        except OSError:
+            is_mean = False
+        if not is_mean:
+            raise UsageError(f"OUT and {path} of DIR are one file. Give the mean a name of its own.")
+        files.remove(path)
+    if options.report is not None and any(same_file(path, options.report) for path in files):
+        raise UsageError(f"--report and a shape of {options.input} are one file. Give each a name of its own.")
+    return files
 
 
 def _registered(options: argparse.Namespace, files: list[Path]):
@@ -69,7 +93,7 @@ def _registered(options: argparse.Namespace, files: list[Path]):
 
     first, shapes, polygons = None, [], []
     for path in files:
-        obj, surface, landmarks = _read(path, options.landmarks)
+        obj, surface, landmarks = _read(options, path)
         if first is None:
             first, first_landmarks = surface, landmarks
             polygons = [list(polygon.vertices) for polygon in obj.data.polygons]
@@ -88,20 +112,16 @@ def _registered(options: argparse.Namespace, files: list[Path]):
     return shapes, first, polygons
 
 
-def _read(path: Path, prefix: str):
+def _read(options: argparse.Namespace, path: Path):
     """The one mesh of a file, its surface and its landmarks."""
-    from ...blender.mesh import read
     from ...blender.shapes.landmarks import read_landmarks
-    from ...files.meshes import load
 
-    objects = load(path)
-    if len(objects) > 1:
-        raise CommandError(f"{path}: it has several meshes. Join them.")
-    with refusals(name=objects[0].name):
-        surface = read(objects[0]).surface
-    if not len(surface.triangles):
-        raise CommandError(f"{path}: The mesh has no faces. Give files with faces.")
-    return objects[0], surface, read_landmarks(objects[0], prefix) if prefix else []
+    pairs = read_file(of_file(options, path))
+    if len(pairs) > 1:
+        every = ", ".join(obj.name for obj, _ in pairs)
+        raise CommandError(f"{path}: it has several meshes: {every}. Join them, or name one by --object.")
+    obj, reading = pairs[0]
+    return obj, reading.surface, read_landmarks(obj, options.landmarks) if options.landmarks else []
 
 
 def _same_faces(first, other) -> bool:
@@ -130,7 +150,7 @@ def _write(options: argparse.Namespace, shapes: list[Registered], surface, polyg
     found = mean_shape(np.array([shape.positions for shape in shapes]), area, options.scaled)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     width = 1.2 * float(np.ptp(found.mean, axis=0)[0])
-    rows = [("Mean", found.mean, {DEVIATION: found.deviation})]
+    rows = [(MEAN, found.mean, {DEVIATION: found.deviation})]
     rows += [
         (shape.path.stem, found.aligned[k], {DEVIATION: found.distance[k], SCORE: found.score[k]})
         for k, shape in enumerate(shapes)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..common import drain_shown, refusals, require_blender
 from ..options import add_input
+from ..selection import of_file, read_file
 
 
 def add(commands) -> None:
@@ -22,7 +23,7 @@ def run(options: argparse.Namespace) -> None:
     require_blender()
     from ...solver.signatures.wasserstein import shape_distance
 
-    found = shape_distance(signature_of_file(options.input), signature_of_file(options.other))
+    found = shape_distance(signature_of_file(options, options.input), signature_of_file(options, options.other))
     if options.json:
         figures = {"distance": found.distance, "raw": found.raw, "floor": found.floor}
         print(json.dumps({"a": str(options.input), "b": str(options.other), **figures}))
@@ -30,12 +31,10 @@ def run(options: argparse.Namespace) -> None:
         print(f"{found.distance:.4f}, {found.raw:.4f} with the floor of {found.floor:.4f} of sampling")
 
 
-def signature_of_file(path: Path):
-    """The signature of the meshes of a file. Raises CommandError."""
-    from ...blender.mesh import read
-    from ...files.meshes import load
+def signature_of_file(options: argparse.Namespace, path: Path):
+    """The signature of the chosen meshes of a file; `--object` is about IN. Raises CommandError."""
     from ...pipelines.shapes.distance import signature_of
 
+    pairs = read_file(of_file(options, path))
     with refusals(name=path.name):
-        surfaces = [reading.surface for reading in map(read, load(path)) if reading.faces.any()]
-        return drain_shown(signature_of(surfaces))
+        return drain_shown(signature_of([reading.surface for _, reading in pairs]))

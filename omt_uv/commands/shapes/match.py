@@ -10,7 +10,7 @@ from ... import __version__
 from ...pipelines.shapes.choices import DEFAULT_PREFIX, DEFAULT_TRANSFERS, MATCH_DOMAINS, TRANSFERS
 from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn
 from ..options import FORMATS, add_input, names, number, share
-from ..selection import read_file
+from ..selection import of_file, read_file
 
 KEY = "OMT Match"
 
@@ -99,8 +99,7 @@ def _read(options: argparse.Namespace, path: Path):
     from ...blender.shapes.landmarks import read_landmarks
     from ...blender.shapes.match_objects import read_carrier, stretched_offsets
 
-    chosen = options.object if path == options.input else []
-    pairs = read_file(argparse.Namespace(**{**vars(options), "input": path, "object": chosen}))
+    pairs = read_file(of_file(options, path))
     if len(pairs) > 1:
         every = ", ".join(obj.name for obj, _ in pairs)
         raise CommandError(f"{path}: it has several meshes: {every}. Join them, or name one of IN by --object.")

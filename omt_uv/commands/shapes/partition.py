@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ...settings import CELL_WRITES, DEFAULT_CELL_WRITE, DEFAULT_RELAX, PartitionSettings
-from ..common import check_paths, drain_shown, refusals, require_blender, warn, write_figures
+from ..common import check_paths, drain_shown, refusals, require_blender, warn, write_figures, write_preview
 from ..options import add_files, add_report, names, vertices
 from ..selection import read_file
 from .formats import check_kept
@@ -69,6 +69,7 @@ def run(options: argparse.Namespace) -> None:
         made = _write(options, pairs, found)
     told = [(k, text) for k, partition in enumerate(found) for text in partition.warnings]
     warnings = warn(objects, told, _save(options, made))
+    _show(options, pairs, made)
     for obj, partition in zip(objects, found, strict=True):
         figures = partition.figures
         print(f"{obj.name}: {figures['cells']} cells, largest error of an area {figures['error']:.1e}")
@@ -94,6 +95,14 @@ def _write(options: argparse.Namespace, pairs: list, found: list) -> list:
             write_cells(obj, partition, options.write)
             made.append(obj)
     return made
+
+
+def _show(options: argparse.Namespace, pairs: list, made: list) -> None:
+    """Draw what was made; of points, which have no faces, the meshes that they lie on."""
+    from ...blender.mesh import read
+
+    faced = [obj for obj in made if obj.data.polygons]
+    write_preview(options, [(obj, read(obj)) for obj in faced] or pairs)
 
 
 def _save(options: argparse.Namespace, made: list) -> list[str]:

@@ -38,8 +38,8 @@ def run_volume(options: argparse.Namespace) -> None:
     suffix = options.output.suffix.lower()
     if suffix not in WRITABLE:
         raise UsageError(f"{options.output}: unknown format {suffix!r}. Use one of {' '.join(WRITABLE)}.")
-    check_writable(options.output)
     check_paths(options, [])
+    check_writable(options.output)
     objects = [obj for obj, _ in read_file(options)]
     known = options.domain in ("ball", "cube")
     goal = None if known else next((obj for obj in objects if obj.name == options.domain), None)

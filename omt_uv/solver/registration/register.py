@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import LandmarkError
+from ..errors import LandmarkError, ZeroAreaFaceError
 from ..linalg.nested_dissection import mesh_order
 from ..maps.energy import elements
 from ..mesh.closest_point import ClosestPoint
@@ -196,6 +196,8 @@ def _prepared(source, target, landmarks: Landmarks, domain: str) -> _Pair:
     domain = kind_of(source[1], target[1], domain)
     first, second = filled(source, domain, "source"), filled(target, domain, "target")
     sizes = [np.sqrt(face_areas(surface.vertices, surface.triangles).sum()) for surface in (first, second)]
+    if not min(sizes) > 0:
+        raise ZeroAreaFaceError("A surface has no area", "Give meshes whose faces are no lines and no points")
     first = replace(first, vertices=(first.vertices - first.vertices.mean(axis=0)) / sizes[0])
     second = replace(second, vertices=(second.vertices - second.vertices.mean(axis=0)) / sizes[1])
     points = [

@@ -14,10 +14,11 @@ from scipy.spatial import cKDTree
 
 from ..analysis.curvature import mean_curvature
 from ..conformal.moebius import centre_on_sphere
-from ..errors import EmptyMeshError, NotASphereError
+from ..errors import EmptyMeshError, NotASphereError, ZeroAreaFaceError
 from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.point_location import locate
 from ..mesh.spherical_geometry import fibonacci_sphere, normalized
+from ..mesh.surface import check_finite
 from ..mesh.topology import boundary_loops, graph_components, halfedges, with_fans
 from ..progress import Steps
 from ..sphere.sphere_map import sphere_map
@@ -103,12 +104,16 @@ def closed_part(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarra
 
     Raises
     ------
-    EmptyMeshError, NotASphereError : nothing, or a boundary that is no loop
+    EmptyMeshError, NonFiniteError, ZeroAreaFaceError : nothing, or coordinates that are no numbers, or no area
+    NotASphereError : a boundary that is no loop
     """
     if not len(triangles):
         raise EmptyMeshError("There are no faces to compare")
+    check_finite(positions, triangles)
     label = graph_components(*halfedges(triangles), len(positions))[1][triangles[:, 0]]
     area = np.bincount(label, face_areas(positions, triangles))
+    if not area.max() > 0:
+        raise ZeroAreaFaceError("The surface has no area", "Give a mesh whose faces are no lines and no points")
     used, local = np.unique(triangles[label == area.argmax()], return_inverse=True)
     faces, vertices = local.reshape(-1, 3).astype(np.int64), positions[used]
     try:
