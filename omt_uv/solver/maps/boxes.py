@@ -1,4 +1,4 @@
-"""Find which of many boxes in the plane meet, by a grid."""
+"""Find which of many boxes in the plane meet: few by a sweep over the plane, many by a grid."""
 
 from __future__ import annotations
 
@@ -9,15 +9,47 @@ from ..mesh.topology import expand
 # The grid in which they are found is made coarser until a box touches so many of its cells at most, on average,
 # and has at most so many along a side.
 CELLS_PER_BOX = 12
+# A sweep compares so many boxes with each on average at most; where more lie one above the other, a grid is faster.
+SWEPT_PER_BOX = 40
 MOST_CELLS = 2**24
 
 
 def box_pairs(
     low1: np.ndarray, high1: np.ndarray, low2: np.ndarray, high2: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs i, j (p,) of boxes that meet, by a uniform grid: their corners are (k,2) each, and (l,2) each."""
+    """Pairs i, j (p,) of boxes that meet, in their order: their corners are (k,2) each, and (l,2) each."""
+    if not len(low1) or not len(low2):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
     low = np.minimum(low1.min(0), low2.min(0))
-    extent = float((np.maximum(high1.max(0), high2.max(0)) - low).max())
+    extents = np.maximum(high1.max(0), high2.max(0)) - low
+    pairs = _swept(low1, high1, low2, high2, int(extents.argmax()))
+    if pairs is None:
+        pairs = _in_grid(low1, high1, low2, high2, low, float(extents.max()))
+    i, j = pairs
+    meet = (low1[i] <= high2[j]).all(1) & (low2[j] <= high1[i]).all(1)
+    key = np.sort(i[meet] * len(low2) + j[meet])
+    key = key[np.append(True, key[1:] != key[:-1])] if len(key) else key
+    return key // len(low2), key % len(low2)
+
+
+def _swept(low1, high1, low2, high2, axis: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Pairs (p,) of boxes that meet along an axis, or None where these are too many; boxes of points as they are."""
+    begin1, end1, begin2, end2 = (x[:, axis] for x in (low1, high1, low2, high2))
+    order1, order2 = np.argsort(begin1), np.argsort(begin2)
+    sorted1, sorted2 = begin1[order1], begin2[order2]
+    # Of two that meet, one begins in the other: the second in the first or at its beginning, or else the first.
+    first2, last2 = np.searchsorted(sorted2, begin1), np.searchsorted(sorted2, end1, side="right")
+    first1, last1 = np.searchsorted(sorted1, begin2, side="right"), np.searchsorted(sorted1, end2, side="right")
+    count1, count2 = np.maximum(last2 - first2, 0), np.maximum(last1 - first1, 0)
+    if count1.sum() + count2.sum() > SWEPT_PER_BOX * (len(low1) + len(low2)):
+        return None
+    one, k = expand(count1)
+    other, m = expand(count2)
+    return np.concatenate([one, order1[first1[other] + m]]), np.concatenate([order2[first2[one] + k], other])
+
+
+def _in_grid(low1, high1, low2, high2, low, extent: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (p,) of boxes that touch the same cell of a uniform grid, some of them several times."""
     span = np.concatenate([high1 - low1, high2 - low2]).max(axis=1)
     # As the boxes are, however little of the plane they fill: those of a strip lie on a line.
     size = max(float(np.median(span)), extent / MOST_CELLS, 1e-300)
@@ -29,10 +61,7 @@ def box_pairs(
     box2, cell2 = box2[order], cell2[order]
     begin, end = np.searchsorted(cell2, cell1), np.searchsorted(cell2, cell1, side="right")
     which, place = expand(end - begin)
-    i, j = box1[which], box2[begin[which] + place]
-    meet = (low1[i] <= high2[j]).all(1) & (low2[j] <= high1[i]).all(1)
-    key = np.unique(i[meet] * len(low2) + j[meet])
-    return key // len(low2), key % len(low2)
+    return box1[which], box2[begin[which] + place]
 
 
 def _rasterise(low, high, size):

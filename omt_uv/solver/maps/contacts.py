@@ -27,6 +27,9 @@ def covering_contacts(
     across = (to * along[j].conj()) / length
     at_tail = np.abs(to) <= depth
     on = at_tail | ((np.abs(across.imag) <= depth) & (across.real > depth) & (across.real < length - depth))
+    found = np.zeros(len(near), bool)
+    if not on.any():
+        return found
     i, j, at_tail = i[on], j[on], at_tail[on]
     before = _before(tail, head)
     begin, other = np.angle(along[i]), np.angle(along[j])
@@ -35,7 +38,6 @@ def covering_contacts(
     # Either sector begins within the other one.
     covers = np.minimum(angle - (other - begin) % (2 * np.pi), angle) > OVERLAPPING
     covers |= np.minimum(opposite - (begin - other) % (2 * np.pi), opposite) > OVERLAPPING
-    found = np.zeros(len(near), bool)
     found[np.flatnonzero(near)[np.flatnonzero(on)[covers]]] = True
     return found
 

@@ -36,15 +36,47 @@ def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
     there: see `contacts.covering_contacts`.
     """
     tail, head = loop_edges(loop)
-    a, b = w[tail], w[head]
-    low, high = _box(np.stack([a, b]))
-    depth = TOUCH * float((high.max(0) - low.min(0)).max())
+    low, high = _box(np.stack([w[tail], w[head]]))
+    depth = _touch(low, high)
     i, j = box_pairs(low - depth, high + depth, low, high)
     apart = (j > i) & (tail[i] != head[j]) & (head[i] != tail[j])
     i, j = i[apart], j[apart]
-    hit = _passes(a[i], b[i], a[j], b[j], depth) & _passes(a[j], b[j], a[i], b[i], depth)
-    hit |= covering_contacts(w, tail, head, i, j, depth) | covering_contacts(w, tail, head, j, i, depth)
+    hit = _cross_at(w, tail, head, i, j, depth)
     return np.column_stack([i[hit], j[hit]])
+
+
+def crossings_on_the_way(w: np.ndarray, step: np.ndarray, loop: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
+    """Pairs (k,2) of edges of a boundary that cross where vertices have gone these shares of a step (n,) complex.
+
+    Of a map w (n,) complex in which none do: pairs of edges that stay are not looked at.
+    """
+    tail, head = loop_edges(loop)
+    moves = np.flatnonzero((step[tail] != 0) | (step[head] != 0))
+    if not len(moves):
+        return np.zeros((0, 2), np.int64)
+    maps = [w + share * step for share in shares]
+    low, high = _box(np.stack([x for moved in maps for x in (moved[tail], moved[head])]))
+    depth = _touch(low, high)
+    i, j = box_pairs(low[moves] - depth, high[moves] + depth, low, high)
+    i = moves[i]
+    apart = (i != j) & (tail[i] != head[j]) & (head[i] != tail[j])
+    i, j = i[apart], j[apart]
+    hit = np.zeros(len(i), bool)
+    for moved in maps:
+        hit |= _cross_at(moved, tail, head, i, j, depth)
+    return np.column_stack([i[hit], j[hit]])
+
+
+def _touch(low: np.ndarray, high: np.ndarray) -> float:
+    """How far edges with boxes (b,2) may reach past each other and only touch."""
+    return TOUCH * float((high.max(0) - low.min(0)).max())
+
+
+def _cross_at(w, tail, head, i, j, depth: float) -> np.ndarray:
+    """Which pairs i, j (k,) of the edges from tail to head cross in a map w (n,)."""
+    a, b = w[tail], w[head]
+    hit = _passes(a[i], b[i], a[j], b[j], depth) & _passes(a[j], b[j], a[i], b[i], depth)
+    return hit | covering_contacts(w, tail, head, i, j, depth) | covering_contacts(w, tail, head, j, i, depth)
 
 
 def covers_itself(w: np.ndarray, loop: np.ndarray) -> bool:

@@ -24,6 +24,7 @@ from .continuation_rules import (
     NEAR,
     SQUEEZED_WEIGHT,
     STAGE_STEPS,
+    UNSQUEEZED,
     Quality,
     is_enough,
     is_futile,
@@ -146,7 +147,7 @@ def minimise_in_stages(
         multipliers (Hestenes 1969), with one for the share.
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
-    weights = _first_weights(problem, w, balance, quality, warm_start)
+    weights, squeezed = _first_weights(problem, w, balance, quality, warm_start)
     overlap, with_barrier = problem.boundary_crosses(w), problem.with_barrier
     steps, k, before, last = 0, 0, np.inf, weights[0]
     while True:
@@ -157,6 +158,8 @@ def minimise_in_stages(
         if problem.smoother is not None:
             w = problem.smoother.smoothed(newton.faces, w, weight, FIRST_SWEEPS)
         limits = _limits(problem, balance, quality, k - len(weights) + 1, quality.max_steps - steps)
+        if k == 0 and squeezed:
+            limits = replace(limits, relaxed=UNSQUEEZED)
         forbidden = None if with_barrier or overlap else problem.boundary_crosses
         stage = yield from minimise(newton, w, limits, k, forbidden)
         w, steps = stage.w, steps + stage.steps
@@ -187,13 +190,16 @@ def minimise_in_stages(
     )
 
 
-def _first_weights(problem: MapProblem, w: np.ndarray, balance: float, quality: Quality, warm_start: bool):
+def _first_weights(
+    problem: MapProblem, w: np.ndarray, balance: float, quality: Quality, warm_start: bool
+) -> tuple[list[float], bool]:
+    """The first area weights, and whether the first of them is there for a squeezed start alone."""
     weights = planned_weights(balance, quality)
     if warm_start and len(weights) > 1:
-        return [NEAR * weight for weight in weights[1:]]
+        return [NEAR * weight for weight in weights[1:]], False
     if is_squeezed(problem.newton_problem(w, weights[0], False).energy(w), weights[0]):
-        return [SQUEEZED_WEIGHT, *weights]
-    return weights
+        return [SQUEEZED_WEIGHT, *weights], True
+    return weights, False
 
 
 def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, steps_left: int) -> StageLimits:
@@ -210,12 +216,14 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
 
 @dataclass(frozen=True)
 class StageLimits:
-    """When a stage ends: area error to reach, Newton steps at most, tolerances as in `continuation_rules.Quality`."""
+    """When a stage ends: area error to reach, Newton steps at most, tolerances as in `continuation_rules.Quality`, an
+    energy that is low enough in any case."""
 
     area_error: float
     max_steps: int
     tolerance: float = LOOSE
     loose_tolerance: float = LOOSE
+    relaxed: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -268,7 +276,9 @@ def minimise(
         residual = float(promised(step.decrement, value))
         # How many stages and steps there will be is not known: every stage covers half of what is left.
         yield Progress("Refinement", 1 - 0.5 ** (stage + 1 - 0.5**steps))
-        met = residual < limits.loose_tolerance and problem.area_error(w) <= limits.area_error
+        met = value < limits.relaxed or (
+            residual < limits.loose_tolerance and problem.area_error(w) <= limits.area_error
+        )
         verdict = judge_step(step.share, used, residual, met, limits.tolerance)
         if verdict.stalled or verdict.converged:
             status = "stalled" if verdict.stalled else "converged"

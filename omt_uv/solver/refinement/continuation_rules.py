@@ -8,10 +8,10 @@ Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entr
     end a stage              `stage_tolerances`, `judge_step`
     end the refinement       `is_enough`, `is_futile`
 
-A batch differs from a chart by itself in four ways. It takes no `early` end of a stage, since its steps are those of
+A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, since its steps are those of
 all charts. It does not tell `is_futile` of regions: a chart with a region that has no exact areas uses up its steps,
 is given back, and says alone what it did not reach. It knows no barrier and no sweeps, and gives a chart back that
-would need them. And it starts cold.
+would need them. It relaxes a squeezed start to the end, not to UNSQUEEZED. And it starts cold.
 """
 
 from __future__ import annotations
@@ -45,6 +45,8 @@ LEAST_WEIGHT = 1e-2
 # that says so.
 SQUEEZED_WEIGHT = 1.0
 SQUEEZED = 50.0
+# The mean energy at which it is squeezed no longer: what is left of the shear does not hold up the areas.
+UNSQUEEZED = 0.3
 # Where the error is not reached, the weight grows by a factor of at least and at most so much.
 LEAST_GROWTH = 1.3
 MOST_GROWTH = 10.0
@@ -64,8 +66,13 @@ STAGE_STEPS = 40
 # dropped.
 FIRST_PRESSURE = 0.3
 LEAST_PRESSURE = 0.01
+# By how much it falls after a full step that has kept its promise, and after one that has gained what it promised.
+PRESSURE_FALLS = 3.0
+PRESSURE_DROPS = 10.0
 # A full step keeps its promise where it gains more than this share of it, and a poor one gains less than that.
 KEPT_PROMISE = 0.7
+# One that gains this share of it to that has a Hessian that is true.
+TRUE_PROMISE = (0.9, 1.2)
 POOR_PROMISE = 0.3
 # Of a step that is poor because a fold is near: the share of it that was taken.
 POOR_SHARE = 0.5
@@ -164,7 +171,8 @@ def next_pressure(pressure: Number, share: Number, gain: Number, decrement: Numb
     full = (share == 1) & (gain > KEPT_PROMISE * decrement)
     poor = (share < POOR_SHARE) | (gain < POOR_PROMISE * decrement)
     more = np.minimum(1.0, np.maximum(3 * pressure, 3 * LEAST_PRESSURE))
-    less = np.where(pressure > LEAST_PRESSURE, pressure / 3, 0.0)
+    true = (gain > TRUE_PROMISE[0] * decrement) & (gain < TRUE_PROMISE[1] * decrement)
+    less = np.where(pressure > LEAST_PRESSURE, pressure / np.where(true, PRESSURE_DROPS, PRESSURE_FALLS), 0.0)
     return np.where(full, less, np.where(share == 0, 1.0, np.where(poor, more, pressure)))
 
 

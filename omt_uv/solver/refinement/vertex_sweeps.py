@@ -14,7 +14,7 @@ import numpy as np
 from ..maps.energy import Elements, energies, squared
 from ..mesh.topology import halfedges, twins
 from ..progress import Progress, Steps
-from .boundary_barrier import crossings, loop_edges
+from .boundary_barrier import crossings_on_the_way, loop_edges
 
 # Least eigenvalue of a vertex's Hessian over the greatest.
 CONVEX = 0.01
@@ -51,10 +51,10 @@ def smoothed(faces: Elements, w: np.ndarray, area_weight: float, sweeps: int, lo
 
 
 def _uncross(w: np.ndarray, before: np.ndarray, loop: np.ndarray) -> None:
-    """Take back, in place, what moved of edges of a boundary that cross, or would soon."""
+    """Take back, in place, what moved of edges of a boundary that cross, or would soon; before, none did."""
     tail, head = loop_edges(loop)
     # What goes right over a narrow part crosses it now, and farther on no longer.
-    while len(pairs := np.concatenate([crossings(before + k * (w - before), loop) for k in (1, ROOM)])):
+    while len(pairs := crossings_on_the_way(before, w - before, loop, (1.0, ROOM))):
         ends = np.concatenate([tail[pairs].ravel(), head[pairs].ravel()])
         if not (w[ends] != before[ends]).any():
             w[tail] = before[tail]

@@ -5,7 +5,13 @@ import pytest
 
 from omt_uv.solver.maps import boxes
 from omt_uv.solver.maps.boxes import box_pairs
-from omt_uv.solver.refinement.boundary_barrier import BoundaryBarrier, crossings, loop_edges, make_barrier
+from omt_uv.solver.refinement.boundary_barrier import (
+    BoundaryBarrier,
+    crossings,
+    crossings_on_the_way,
+    loop_edges,
+    make_barrier,
+)
 
 
 def test_crossings_of_a_bow_tie_and_of_a_polygon():
@@ -111,3 +117,27 @@ def test_of_a_vertex_and_an_edge_the_smaller_reach_counts(vertex_reach, edge_rea
     barrier = BoundaryBarrier(tail, head, np.full(6, vertex_reach), np.full(6, edge_reach), 1.0)
     reach = min(vertex_reach, edge_reach)
     assert barrier.energy(w) == pytest.approx(max(reach / 0.3 - 1, 0) ** 2)
+
+
+@pytest.mark.parametrize("stacked", [False, True], ids=["swept", "in a grid"])
+def test_boxes_meet_as_all_pairs_say(stacked):
+    rng = np.random.default_rng(3)
+    # Long boxes above one another leave a sweep nothing to tell apart.
+    size = np.array([30.0, 0.01]) if stacked else np.array([0.5, 0.5])
+    low1, low2 = 20 * rng.random((400, 2)), 20 * rng.random((300, 2))
+    high1, high2 = low1 + size * rng.random((400, 2)), low2 + size * rng.random((300, 2))
+    low2[:20], high2[:20] = low1[:20], high1[:20]
+    meet = (low1[:, None] <= high2[None]).all(2) & (low2[None] <= high1[:, None]).all(2)
+    i, j = box_pairs(low1, high1, low2, high2)
+    np.testing.assert_array_equal(np.column_stack([i, j]), np.argwhere(meet))
+    assert not len(box_pairs(low1[:0], high1[:0], low2, high2)[0])
+
+
+def test_crossings_of_what_moves_are_crossings_of_all():
+    w = np.exp(2j * np.pi * np.arange(60) / 60)
+    loop, step = np.arange(60), np.zeros(60, complex)
+    step[[10, 31]] = -1.1 * w[[10, 31]]
+    found = crossings_on_the_way(w, step, loop, (0.3, 1.0, 1.9))
+    everywhere = np.concatenate([crossings(w + share * step, loop) for share in (0.3, 1.0, 1.9)])
+    assert len(everywhere) and {tuple(sorted(p)) for p in found.tolist()} == {tuple(p) for p in everywhere.tolist()}
+    assert not len(crossings_on_the_way(w, 0 * step, loop, (1.0,)))
