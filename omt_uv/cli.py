@@ -10,7 +10,7 @@ from pathlib import Path
 
 from . import __version__, supervision
 from .commands import compare, magnify, measure, refine, remesh, seams, sphere, unwrap, weights
-from .commands.batches import batch, page, summary, table
+from .commands.batches import batch, page, serve, summary, table
 from .commands.shapes import average, distance, library, match, partition
 from .commands.volumes import flow, volume
 from .errors import UserError
@@ -31,6 +31,8 @@ def script() -> None:
 
 def program(arguments: Sequence[str], words: Sequence[str]) -> int:
     """Run a command in a child process, which `words` start; returns the exit status."""
+    if supervision.is_child() and arguments[:1] == [serve.NAME]:
+        return serve.serve(float(arguments[1]), main)
     try:
         options = parsed(arguments)
     except SystemExit as stop:

@@ -69,22 +69,26 @@ def is_child() -> bool:
     return MARK in os.environ
 
 
-def begin_child(gigabytes: float) -> None:
-    """Take up the life of a child: no more than so much memory, 0 for all there is, and an end with the parent."""
+def begin_child(gigabytes: float, heard: Callable[[bytes], object] | None = None) -> None:
+    """Take up the life of a child: no more than so much memory, 0 for all there is, and an end with the parent.
+
+    heard : is handed what the parent writes, on a thread of its own; most children are told nothing
+    """
     folder = os.environ.pop(MARK, "")
     if gigabytes and MEMORY_IS_LIMITED:
         import resource
 
         # What is written to: the address space counts libraries and reserves of threads as well.
         resource.setrlimit(resource.RLIMIT_DATA, (int(gigabytes * GIGABYTE),) * 2)
-    threading.Thread(target=_end_with_parent, args=(Path(folder), os.getppid()), daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(Path(folder), os.getppid(), heard), daemon=True).start()
 
 
-def _end_with_parent(folder: Path, parent: int) -> None:
-    """Wait for the end of the standard input, which the parent holds open and never writes to."""
+def _end_with_parent(folder: Path, parent: int, heard: Callable[[bytes], object] | None) -> None:
+    """Wait for the end of the standard input, which the parent holds open."""
     # Not sys.stdin, whose lock would be held while the interpreter shuts down.
-    while os.read(0, 1):
-        pass
+    while data := os.read(0, 1 << 16):
+        if heard is not None:
+            heard(data)
     _remove_own(folder, parent)
     os._exit(CRASH)
 
@@ -123,9 +127,9 @@ def supervise(errand: Errand) -> int:
         if received:
             status, text = 128 + received[0], f"stopped by {signal.Signals(received[0]).name}"
         else:
-            status, text = _end(errand, child.returncode, late)
+            status, text = end_of(errand, child.returncode, late)
         if text:
-            _tidy(errand, child)
+            tidy(errand, child)
             tell(f"{errand.about}: {text}")
         return status
 
@@ -162,16 +166,19 @@ def watch(errand: Errand, begin: Callable[[subprocess.Popen], None]) -> Outcome:
         finally:
             timer.cancel()
         seconds = time.monotonic() - start
-        status, text = _end(errand, child.returncode, late.is_set())
+        status, text = end_of(errand, child.returncode, late.is_set())
         if text:
-            _tidy(errand, child)
+            tidy(errand, child)
         out, err = ((folder / name).read_text(errors="replace") for name in STREAMS)
     return Outcome(status, text, out, err, seconds, processor, memory)
 
 
 @contextmanager
-def begun(errand: Errand, captured: bool = False) -> Iterator[tuple[subprocess.Popen, Path]]:
-    """The child of an errand, and the folder for its temporary files, which goes at the end of the block."""
+def begun(errand: Errand, captured: bool = False, answers: bool = False) -> Iterator[tuple[subprocess.Popen, Path]]:
+    """The child of an errand, and the folder for its temporary files, which goes at the end of the block.
+
+    captured : what it prints goes to files there; answers : what it prints on the standard output is read by us
+    """
     with tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True) as folder, ExitStack() as stack:
         (Path(folder) / OWNER).write_text(str(os.getpid()))
         places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
@@ -180,7 +187,7 @@ def begun(errand: Errand, captured: bool = False) -> Iterator[tuple[subprocess.P
             errand.words,
             env={**os.environ, **places, MARK: folder},
             stdin=subprocess.PIPE,
-            stdout=out,
+            stdout=subprocess.PIPE if answers else out,
             stderr=err,
             # Ctrl-C in a terminal is for the parent alone, which ends the child at once.
             start_new_session=True,
@@ -189,7 +196,9 @@ def begun(errand: Errand, captured: bool = False) -> Iterator[tuple[subprocess.P
             yield child, Path(folder)
         finally:
             assert child.stdin is not None
-            child.stdin.close()
+            # It may have gone, with words to it still unread.
+            with suppress(OSError):
+                child.stdin.close()
 
 
 def _end_late(child: subprocess.Popen, late: threading.Event) -> None:
@@ -214,7 +223,7 @@ def _wait(child: subprocess.Popen) -> tuple[float | None, int | None]:
     return usage.ru_utime + usage.ru_stime, usage.ru_maxrss * unit
 
 
-def _end(errand: Errand, returned: int, late: bool) -> tuple[int, str]:
+def end_of(errand: Errand, returned: int, late: bool) -> tuple[int, str]:
     """Exit status, and words for an end that the child has not told itself."""
     if late:
         return TIMEOUT, f"not done within {errand.timeout:g} s"
@@ -250,7 +259,7 @@ def _crash(returned: int, memory: bool) -> tuple[int, str]:
     return CRASH, f"Blender crashed on it ({what}); the file may be damaged{more}"
 
 
-def _tidy(errand: Errand, child: subprocess.Popen) -> None:
+def tidy(errand: Errand, child: subprocess.Popen) -> None:
     """Remove what a child that was ended has left in the folders that it writes to."""
     for folder in errand.folders:
         # By the number of the child: other runs may be writing to the same folder.

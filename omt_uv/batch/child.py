@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..supervision import PROGRAM, Errand, Outcome, watch
+from ..supervision import PROGRAM, Errand, Outcome
 from .plan import BatchPlan, FileTask, hash_of, words_of
 
 ERROR = f"{PROGRAM}: error: "
@@ -43,10 +42,8 @@ class Record:
     aside: bool = False
 
 
-def run_task(
-    plan: BatchPlan, task: FileTask, start: Sequence[str], begin: Callable[[subprocess.Popen], None]
-) -> Record:
-    """Run the command on one file; `start` are the words of the program, `begin` is handed the child."""
+def run_task(plan: BatchPlan, task: FileTask, start: Sequence[str], watched: Callable[[Errand], Outcome]) -> Record:
+    """Run the command on one file; `start` are the words of the program, `watched` carries the errand out."""
     # Read before the run: a file that changes meanwhile is done again.
     input_hash = hash_of(task.path)
     preview = plan.beside(".previews") / f"{task.name}.png" if plan.previews else None
@@ -62,7 +59,7 @@ def run_task(
         words = [*start, *words_of(plan, task, places)]
         folders = tuple({path.parent for path in (preview, task.output) if path is not None})
         errand = Errand(words, str(task.path), folders, plan.timeout, plan.memory > 0)
-        outcome = watch(errand, begin)
+        outcome = watched(errand)
         report = _text_of(places.get("report")) if plan.reports else outcome.out
     done = outcome.status == 0
     return Record(

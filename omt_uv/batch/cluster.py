@@ -17,6 +17,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..supervision import Errand, Outcome, watch
 from .child import Record, hash_of, run_task
 from .plan import BatchError, BatchPlan, FileTask, words_of
 
@@ -190,7 +191,7 @@ def run_remote(text: str, data: bytes | None) -> tuple[str, dict[str, bytes]]:
     plan, task = _plan_of(given["plan"]), _task_of(given["task"])
     start = started_by()
     if data is None:
-        return json.dumps(asdict(run_task(plan, task, start, _ignore))), {}
+        return json.dumps(asdict(run_task(plan, task, start, _alone))), {}
     with tempfile.TemporaryDirectory(prefix="omt_uv_batch_") as folder:
         here = Path(folder)
         name = Path(task.name).name
@@ -198,7 +199,7 @@ def run_remote(text: str, data: bytes | None) -> tuple[str, dict[str, bytes]]:
         (here / "in" / name).write_bytes(data)
         output = None if task.output is None else here / "out" / task.output.name
         inner = replace(plan, output=here / "out")
-        record = run_task(inner, replace(task, path=here / "in" / name, output=output), start, _ignore)
+        record = run_task(inner, replace(task, path=here / "in" / name, output=output), start, _alone)
         message = record.message.replace(str(here / "in" / name), str(task.path))
         files = {Path(path).name: Path(path).read_bytes() for path in record.outputs}
         if output is not None:
@@ -217,8 +218,9 @@ def started_by() -> tuple[str, ...]:
     return tuple(shlex.split(os.environ.get(PROGRAM_VARIABLE, ""))) or (sys.executable, "-m", "omt_uv")
 
 
-def _ignore(_child) -> None:
-    """A child ends with the worker, as it waits for the end of a pipe."""
+def _alone(errand: Errand) -> Outcome:
+    """A child of its own, which ends with the worker, as it waits for the end of a pipe."""
+    return watch(errand, lambda _child: None)
 
 
 def _plain(thing) -> dict:

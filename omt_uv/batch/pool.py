@@ -11,9 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from ..supervision import GIGABYTE, MEMORY_IS_LIMITED
+from ..supervision import GIGABYTE, MEMORY_IS_LIMITED, Errand, Outcome, watch
 from .child import Record, run_task
 from .plan import BatchError, BatchPlan, FileTask
+from .servant import Servants
 
 # Bytes that a run takes, measured: Blender and the solver by themselves, and more for every byte of the file.
 BASE_MEMORY = 4 * 10**8
@@ -37,8 +38,13 @@ class Runner(Protocol):
 class LocalPool:
     """Child processes of this one."""
 
-    def __init__(self, plan: BatchPlan, start: Sequence[str], width: int = 0, room: float = 0.0) -> None:
-        """A pool of so many children, and of so many gigabytes for all; 0 for what this machine has."""
+    def __init__(
+        self, plan: BatchPlan, start: Sequence[str], width: int = 0, room: float = 0.0, shared: bool = False
+    ) -> None:
+        """A pool of so many children, and of so many gigabytes for all; 0 for what this machine has.
+
+        shared : children serve one file after the other, see `servant`
+        """
         self.plan, self.start = plan, tuple(start)
         self.width = width or cores()
         self.room = room * GIGABYTE if room else SHARE * free_memory()
@@ -46,6 +52,7 @@ class LocalPool:
             # What would drive the machine out of memory ends by itself, and no other run with it.
             self.plan = replace(plan, memory=round(self.room / GIGABYTE, 3))
         self._children: set[subprocess.Popen] = set()
+        self._servants = Servants(self.start, self.plan.memory, self._begin) if shared else None
         self._lock = threading.Lock()
         self._ended: queue.SimpleQueue = queue.SimpleQueue()
         self._stopped = False
@@ -92,12 +99,22 @@ class LocalPool:
 
     def _work(self, task: FileTask) -> None:
         try:
-            record: Record | Exception = run_task(self.plan, task, self.start, self._begin)
+            record: Record | Exception = run_task(self.plan, task, self.start, self._watched)
         except OSError as error:
             record = Record(status=1, seconds=0.0, message=f"{task.path}: {error}")
         except Exception as error:  # noqa: BLE001 - raised again by the thread that waits for it
             record = error
         self._ended.put((task, record))
+
+    def close(self) -> None:
+        """End the children that wait for more."""
+        if self._servants is not None:
+            self._servants.close()
+
+    def _watched(self, errand: Errand) -> Outcome:
+        if self._servants is None:
+            return watch(errand, self._begin)
+        return self._servants.watch(errand)
 
     def _begin(self, child: subprocess.Popen) -> None:
         with self._lock:

@@ -1,6 +1,6 @@
 """Commands over many files, which need no Blender in their own process: `add` declares options, `run` carries it out.
 
-Imports batch and commands. Each file is a run of another command in a process of its own.
+Imports batch, supervision and commands. Each file is a run of another command in a process apart.
 Main names: SomeFailed, run_batch.
 """
 

@@ -75,6 +75,9 @@ def add(commands) -> None:
     command.add_argument(
         "--allow-failures", action="store_true", help="end with status 0 though some files, or all, could not be done"
     )
+    command.add_argument(
+        "--apart", action="store_true", help="start the program anew for every file, which takes a second or two each"
+    )
     command.add_argument("--no-preview", action="store_true", help="make no pictures of the results")
     command.add_argument(
         "--scheduler", default="", metavar="ADDRESS", help="of a cluster of dask.distributed; or local, or local:N"
@@ -195,7 +198,7 @@ def _runner(options: argparse.Namespace, plan: BatchPlan):
     if not options.scheduler:
         from ...batch.pool import LocalPool
 
-        return LocalPool(plan, start, options.jobs, options.total_memory)
+        return LocalPool(plan, start, options.jobs, options.total_memory, not options.apart)
     from ...batch.cluster import Cluster
 
     cluster = Cluster(plan, start, options.scheduler, options.send)
