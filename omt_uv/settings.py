@@ -44,9 +44,14 @@ PROJECTIONS = (
     ("LAMBERT", "Lambert Equal Area", "A cylinder that keeps areas: every part gets its share of the texture"),
     ("OCTAHEDRAL", "Octahedral Equal Area", "A square folded from an octahedron, which keeps areas with less shear"),
 )
+IMAGE_LAYOUTS = (
+    ("EQUIRECT", "Panorama", "Longitude and latitude: the whole sphere as it is seen all around"),
+    ("SINUSOIDAL", "Flat Picture", "Any picture, wrapped around the globe without pinching it at the poles"),
+)
 SPHERE_METHODS = (
     ("NEWTON", "Newton", "Optimal transport on the sphere, refined"),
-    ("FLOW", "Flow", "The flow of Dominitz and Tannenbaum"),
+    ("FLOW", "Flow", "The flow of Dominitz and Tannenbaum, refined"),
+    ("MOSER", "Moser", "Moser's flow alone, with no refinement: areas nearly right, much shear, for comparison"),
 )
 DEFAULT_PROJECTION = "EQUIRECT"
 DEFAULT_SPHERE_METHOD = "NEWTON"
@@ -238,6 +243,7 @@ class GlobeSettings:
     projection, quality, method : an identifier of the lists above in lower case
     balance : from 0, exact areas, to 1, least shear
     inside : scale the layout into the tile where faces across its edge reach beyond it
+    fill_holes : take holes for filled, for the map alone
     """
 
     projection: str = DEFAULT_PROJECTION.lower()
@@ -245,6 +251,7 @@ class GlobeSettings:
     balance: float = DEFAULT_BALANCE
     method: str = DEFAULT_SPHERE_METHOD.lower()
     inside: bool = False
+    fill_holes: bool = False
 
 
 WEIGHT_KINDS = (

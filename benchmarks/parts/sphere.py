@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import meshes
-import numpy as np
 
 from benchmarks.cases import load_case
 from benchmarks.part import MODELS, Part
 from benchmarks.rivals import REFERENCE, median_unwrap
 from benchmarks.tables import Table, missed
 from benchmarks.timing import timed
-from omt_uv.solver.maps.distortion import shear_of
 from omt_uv.solver.mesh.closed_surface import closed_surface
 from omt_uv.solver.mesh.geometry import face_areas, vertex_areas
-from omt_uv.solver.mesh.spherical_geometry import spherical_areas
 from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.progress import drain
 from omt_uv.solver.sphere.conformal import conformal_sphere
 from omt_uv.solver.sphere.dominitz_tannenbaum import flow_map
+from omt_uv.solver.sphere.figures import sphere_figures
 from omt_uv.solver.sphere.sphere_map import sphere_map
 from omt_uv.solver.transport.semidiscrete_sphere import sphere_transport
 from omt_uv.solver.transport.spherical_power_diagram import Hull
@@ -35,23 +33,12 @@ SEED = {"max_planck": (2.007, 2.29), "bunny": (2.66, 2.76)}
 SEED_AREA_GOAL = 0.0005
 
 
-def sphere_figures(V, F, positions) -> dict[str, float]:
-    """`maps.distortion.distortion` for a map to the sphere: areas of spherical triangles, chords' shear."""
-    surface = face_areas(V, F)
-    share = surface / surface.sum()
-    ratio = spherical_areas(positions, F) / (4 * np.pi) / share
-    side, other = positions[F[:, 1]] - positions[F[:, 0]], positions[F[:, 2]] - positions[F[:, 0]]
-    base = np.linalg.norm(side, axis=1)
-    along, up = np.einsum("md,md->m", side, other) / base, np.linalg.norm(np.cross(side, other), axis=1) / base
-    shear = shear_of(V, F, np.column_stack([base, 0 * base]), np.column_stack([along, up]))
-    return {
-        "folds": int((ratio <= 0).sum()),
-        "area_l1": float(share @ np.abs(ratio - 1)),
-        "area_sd": float(np.sqrt(share @ (ratio - 1) ** 2)),
-        "angle_mean": float(share @ shear),
-        "seed_area - 2": float((ratio + 1 / ratio).mean() - 2),
-        "seed_angle": float((shear + 1 / shear).mean()),
-    }
+def figures_of(V, F, positions) -> dict[str, float]:
+    """Figures of a map to the sphere, by the names of columns."""
+    found = sphere_figures(V, F, positions).report()
+    found["seed_area - 2"] = found.pop("symmetric_area") - 2
+    found["seed_angle"] = found.pop("symmetric_angle")
+    return found
 
 
 def sphere_table(args) -> Table:
@@ -69,7 +56,7 @@ def sphere_table(args) -> Table:
             found, seconds = timed(lambda c=case, m=method, b=balance: _mapped(c.V, c.F, m, b))
             row = {"model": name, "faces": len(case.F), "method": method, "balance": balance}
             row |= {"Newton": steps, "residual": residual} if method == "newton" else {}
-            row |= sphere_figures(case.V, case.F, found.positions) | {"time": seconds, "ratio": seconds / reference}
+            row |= figures_of(case.V, case.F, found.positions) | {"time": seconds, "ratio": seconds / reference}
             goals = _goals(name, steps, residual, row) if balance == 0 and method != UNREFINED else {}
             table.add(**row, **missed(**goals))
     return table

@@ -5,7 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
+from ..settings import (
+    DEFAULT_PROJECTION,
+    DEFAULT_SPHERE_METHOD,
+    IMAGE_LAYOUTS,
+    PROJECTIONS,
+    SPHERE_METHODS,
+    GlobeSettings,
+)
 from .common import CommandError, drain_shown, refusals, require_blender, write_report
 from .layers import read_layers, write_layers
 from .options import add_area_options, add_files, add_report, names, positive
@@ -22,6 +29,7 @@ def add(commands) -> None:
     command.add_argument(
         "--method", choices=names(SPHERE_METHODS), default=DEFAULT_SPHERE_METHOD.lower(), help="how areas are moved"
     )
+    command.add_argument("--fill-holes", action="store_true", help="take holes for filled, for the map alone")
     command.add_argument(
         "--weights", default="", metavar="GROUP", help="vertex group that gets more texture, or saliency, curvature"
     )
@@ -35,7 +43,13 @@ def add(commands) -> None:
     command.add_argument("--pole", default="", metavar="GROUP", help="vertex group of the north pole; default: Z is up")
     command.add_argument("--meridian", default="", metavar="GROUP", help="vertex group of the middle of the map")
     command.add_argument("--east", default="", metavar="GROUP", help="vertex group on the eastern side of the map")
-    command.add_argument("--image", type=Path, metavar="IN.png", help="equirectangular image to redraw for the layout")
+    command.add_argument("--image", type=Path, metavar="IN.png", help="image to redraw for the layout")
+    command.add_argument(
+        "--image-layout",
+        choices=names(IMAGE_LAYOUTS),
+        default=IMAGE_LAYOUTS[0][0].lower(),
+        help="a panorama, or sinusoidal: a flat picture, not pinched at the poles",
+    )
     command.add_argument("--image-out", type=Path, metavar="OUT.png", help="where the redrawn image is written")
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
     add_report(command, "globe")
@@ -48,7 +62,13 @@ def run(options: argparse.Namespace) -> None:
     from ..solver.globe.rotation import MarkerError
 
     _check_image(options)
-    settings = GlobeSettings(options.projection, options.quality, options.balance, options.method)
+    settings = GlobeSettings(
+        projection=options.projection,
+        quality=options.quality,
+        balance=options.balance,
+        method=options.method,
+        fill_holes=options.fill_holes,
+    )
     objects, readings = read_layers(options)
     with refusals(objects, others=(MarkerError,)):
         markers = group_markers(objects, options.pole, options.meridian, options.east)
@@ -87,7 +107,7 @@ def _redrawn(options: argparse.Namespace):
     if options.image is None:
         return None
     source = load(options.image)
-    return drain_shown(redraw(pixels_of(source), "equirect", options.projection)), source
+    return drain_shown(redraw(pixels_of(source), options.image_layout, options.projection)), source
 
 
 def _write_image(options: argparse.Namespace, pixels, source) -> None:

@@ -6,7 +6,14 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..session import run
-from ..settings import DEFAULT_PROJECTION, DEFAULT_SPHERE_METHOD, PROJECTIONS, SPHERE_METHODS, GlobeSettings
+from ..settings import (
+    DEFAULT_PROJECTION,
+    DEFAULT_SPHERE_METHOD,
+    IMAGE_LAYOUTS,
+    PROJECTIONS,
+    SPHERE_METHODS,
+    GlobeSettings,
+)
 from .base import SolverOperator, complaints, read_writable, warn, write_layers
 from .properties import AreaSettings, choose_group, choose_layer, draw_balance
 
@@ -34,6 +41,11 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         items=SPHERE_METHODS,
         default=DEFAULT_SPHERE_METHOD,
     )
+    fill_holes: BoolProperty(
+        name="Fill Holes",
+        description="Take holes for filled, for the map alone",
+        default=False,
+    )
     weight_group: StringProperty(
         name="Weights", description="Vertex group of what gets more of the texture. Empty: none"
     )
@@ -58,7 +70,10 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
     )
     image: StringProperty(
         name="Redraw Image",
-        description="Equirectangular image to redraw for the layout, as a new image beside it. Empty: none",
+        description="Image to redraw for the layout, as a new image beside it. Empty: none",
+    )
+    image_layout: EnumProperty(
+        name="Image Is", description="What the image shows", items=IMAGE_LAYOUTS, default=IMAGE_LAYOUTS[0][0]
     )
     uv_layer: StringProperty(
         name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
@@ -77,6 +92,7 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
             balance=self.balance,
             method=self.method.lower(),
             inside=self.inside,
+            fill_holes=self.fill_holes,
         )
 
     def steps(self, context: bpy.types.Context):
@@ -95,7 +111,7 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
             pixels = images.pixels_of(images.named(self.image)) if self.image else None
             globes = yield from run.aside(project(jobs, self.settings()))
         if pixels is not None:
-            pixels = yield from run.aside(redraw(pixels, "equirect", self.projection.lower()))
+            pixels = yield from run.aside(redraw(pixels, self.image_layout.lower(), self.projection.lower()))
         return objects, globes, pixels
 
     def _markers(self, context: bpy.types.Context, objects: list) -> list:
@@ -116,8 +132,12 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
 
         objects, globes, pixels = result
         # A layout of the whole globe cannot keep areas; the map to the sphere does.
-        worst = max(globe.report()["area_l1_sphere"] for mine in globes.globes for globe in mine)
-        self.said = (("Area error", f"{100 * worst:.2f} %"),)
+        reports = [globe.report() for mine in globes.globes for globe in mine]
+        self.said = (
+            ("Area error", f"{100 * max(r['area_l1_sphere'] for r in reports):.2f} %"),
+            ("Shear", f"{max(r['angle_mean_sphere'] for r in reports):.3f}"),
+            ("Folds", str(sum(r["folds_sphere"] for r in reports))),
+        )
         write_layers(objects, self.uv_layer, globes)
         if pixels is not None:
             source = images.named(self.image)
@@ -133,6 +153,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "projection")
     layout.prop(properties, "quality")
     layout.prop(properties, "method")
+    layout.prop(properties, "fill_holes")
     layout.prop(properties, "inside")
     choose_group(layout, properties, "weight_group")
     if properties.weight_group:
@@ -141,6 +162,8 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     if properties.orientation == "GROUPS":
         for name in ("pole_group", "meridian_group", "east_group"):
             choose_group(layout, properties, name)
-    if properties.projection != "EQUIRECT":
-        layout.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
+    layout.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
+    column = layout.column()
+    column.active = bool(properties.image)
+    column.prop(properties, "image_layout")
     choose_layer(layout, properties, "uv_layer")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from ..solver.mesh.gluing import groups
 from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.spherical_geometry import spherical_areas
 from ..solver.mesh.surface import Surface, chosen_triangles
-from ..solver.mesh.topology import graph_components
+from ..solver.mesh.topology import boundary_loops, graph_components, with_fans
 from ..solver.progress import Progress, Steps, part_of
+from ..solver.sphere.figures import sphere_figures
 from ..solver.sphere.sphere_map import SphereMap, sphere_map
 from .layout import in_turn
 
@@ -55,7 +56,7 @@ def globe_jobs(readings: Sequence, densities: Sequence, markers: Sequence) -> li
 @dataclass(frozen=True)
 class ClosedComponent:
     """A closed component: vertices (n,3) and triangles (m,3); of the surface its corners (m,3), faces (m,),
-    vertex_ids (n,) and `members` (m,), the rows of its triangles."""
+    vertex_ids (n,) and `members` (m,), the rows of its triangles; of its holes the centres (h,3) and fans (k,3)."""
 
     vertices: np.ndarray
     triangles: np.ndarray
@@ -63,6 +64,13 @@ class ClosedComponent:
     faces: np.ndarray
     vertex_ids: np.ndarray
     members: np.ndarray
+    centres: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    fans: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+
+    def filled(self) -> ClosedComponent:
+        """The component with fans in its holes, for the map alone."""
+        vertices, triangles = with_fans(self.vertices, self.triangles, boundary_loops(self.triangles))
+        return replace(self, centres=vertices[len(self.vertices) :], fans=triangles[len(self.triangles) :])
 
 
 @dataclass(frozen=True)
@@ -81,7 +89,14 @@ class Globe:
 
     def report(self) -> dict:
         """Figures for a report."""
-        on_sphere = spherical_areas(self.sphere.positions, self.component.triangles)
+        component, flow = self.component, self.sphere.flow
+        n = len(component.vertices)
+        on_sphere = spherical_areas(self.sphere.positions, component.triangles)
+        figures = sphere_figures(component.vertices, component.triangles, self.sphere.positions[:n]).report()
+        more: dict = {f"{name}_sphere": value for name, value in figures.items() if name != "area_l1"}
+        if flow is not None:
+            moser = sphere_figures(component.vertices, component.triangles, flow.moser[:n]).report()
+            more |= {"costs": list(flow.costs), "drift": flow.drift, "moser": moser}
         return {
             "vertices": len(self.component.vertices),
             "faces": len(np.unique(self.component.faces)),
@@ -90,6 +105,8 @@ class Globe:
             "residual": self.sphere.residual,
             "area_l1_sphere": self._area_error(on_sphere),
             "area_l1": self._area_error(self.areas),
+            "holes": len(component.centres),
+            **more,
         }
 
     def _area_error(self, areas: np.ndarray) -> float:
@@ -139,6 +156,8 @@ def inside_tile(uv: np.ndarray) -> np.ndarray:
 def _globes(job: GlobeJob, settings: GlobeSettings) -> Steps[list[Globe]]:
     """Globes of all components of a surface."""
     components = closed_components(job.surface, job.faces)
+    if settings.fill_holes:
+        components = [component.filled() for component in components]
     markers = job.markers
     if markers is not None and not any(markers.pole[p.vertex_ids].any() for p in components):
         raise MarkerError("The marker of the pole is on no part of the mesh. Mark a vertex of the surface.")
@@ -186,16 +205,19 @@ def closed_components(surface: Surface, faces: np.ndarray | None = None) -> list
 def _globe(component: ClosedComponent, job: GlobeJob, settings: GlobeSettings) -> Steps[Globe]:
     """Map a component to the sphere, turn it, and lay it out."""
     density = None if job.density is None else job.density[component.members]
+    fans = component.fans
+    beyond = component.faces.max() + 1 + np.arange(len(fans))
     mapping = sphere_map(
-        component.vertices,
-        component.triangles,
-        density,
+        np.concatenate([component.vertices, component.centres]),
+        np.concatenate([component.triangles, fans]),
+        None if density is None else np.concatenate([density, np.ones(len(fans))]),
         balance=settings.balance,
         quality=settings.quality,
         method=settings.method,
-        polygons=component.faces,
+        polygons=np.concatenate([component.faces, beyond]),
     )
     found = yield from part_of(mapping, 0.0, MAPPING)
+    found = replace(found, positions=found.positions[: len(component.vertices)])
     points = found.positions @ _rotation(component, found.positions, job.markers).T
     polygons, corners = gather_polygons(component.corners, component.triangles, component.faces)
     on_sphere = spherical_areas(points, component.triangles) / (4 * np.pi)
@@ -243,7 +265,8 @@ def _shares(component: ClosedComponent, density: np.ndarray | None) -> np.ndarra
 def _as_on_sphere(component: ClosedComponent, shares: np.ndarray, on_sphere: np.ndarray) -> np.ndarray:
     """Shares (m,) of the polygons, split among their triangles as on the sphere (m,)."""
     of = np.unique(component.faces, return_inverse=True)[1].ravel()
-    whole, there = np.bincount(of, shares), np.bincount(of, on_sphere)
+    # Holes have a part of the sphere, and of the texture.
+    whole, there = np.bincount(of, shares) * on_sphere.sum(), np.bincount(of, on_sphere)
     return on_sphere * (whole / np.maximum(there, np.finfo(float).tiny))[of]
 
 

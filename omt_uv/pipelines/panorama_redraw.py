@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ..solver.editing.image_warp import bilinear
-from ..solver.globe.projections import OCTAHEDRAL, check_projection, is_cylindrical, to_plane, to_sphere
+from ..solver.globe.projections import OCTAHEDRAL, SINUSOIDAL, check_projection, is_cylindrical, to_plane, to_sphere
 from ..solver.progress import Progress, Steps
 
 # Samples along each side of a pixel, enough where a row at a pole covers a dozen rows of the source.
@@ -19,14 +19,16 @@ BLOCK = 1 << 18
 def redraw(image: np.ndarray, source: str, target: str, size: tuple[int, int] | None = None) -> Steps[np.ndarray]:
     """An image (h,w,c) of the sphere in the layout `source`, redrawn for the layout `target`, (rows,columns,c).
 
-    Row 0 is the bottom, v = 0. Every pixel is the mean of bilinear samples spread over it. The size, as rows and
-    columns, is that of the image by default, but square for the octahedral layout.
+    The source "sinusoidal" is a flat picture, of which the whole is drawn about the equator and ever less towards the
+    poles, which would pinch it. Row 0 is the bottom, v = 0. Every pixel is the mean of bilinear samples spread over
+    it. The size, as rows and columns, is that of the image by default, but square for the octahedral layout.
 
     Raises
     ------
     ValueError : an unknown layout, or an image without pixels
     """
-    check_projection(source)
+    if source != SINUSOIDAL:
+        check_projection(source)
     check_projection(target)
     if image.ndim != 3 or min(image.shape) == 0:
         raise ValueError(f"an image needs rows, columns and channels, not the shape {image.shape}")

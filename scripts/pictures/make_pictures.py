@@ -24,7 +24,6 @@ import world_map
 from benchmarks import rivals
 from benchmarks.cases import load_case, meshes, our_uv
 from benchmarks.parts.remesh import quadriflow, shape
-from benchmarks.parts.sphere import sphere_figures
 from omt_uv.pipelines.globe import GlobeJob, project
 from omt_uv.settings import GlobeSettings
 from omt_uv.solver.analysis.density import mean_curvature_density
@@ -34,6 +33,7 @@ from omt_uv.solver.maps.distortion import distortion, face_distortion
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing import STRATEGIES, RemeshOptions, RemeshSource, remesh
+from omt_uv.solver.sphere.figures import sphere_figures
 
 CELLS = {"lilium": 120}  # how many checker cells cover the model
 CIRCLES = {"max_planck": 260}  # likewise, in squares as large as those of the checker
@@ -138,7 +138,7 @@ def globe_maps(V, F):
 def sphere_caption(V, F, points):
     """Area error and shear of a map to the sphere (n,3)."""
     figures = sphere_figures(V, F, points)
-    return f"area error {figures['area_l1']:.3f}   shear {figures['angle_mean']:.2f}"
+    return f"area error {figures.area_l1:.3f}   shear {figures.angle_mean:.2f}"
 
 
 def circle_plate(name, out, scratch, pixels):

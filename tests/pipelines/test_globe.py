@@ -1,5 +1,7 @@
 """Closed components to the plane: one globe each, all areas shared out, and errors by the indices of the surface."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -89,3 +91,24 @@ def test_an_open_surface_is_refused_by_its_index_and_its_own_elements():
     error = caught.value.error
     assert caught.value.index == 1 and isinstance(error, MeshError)
     assert error.kind and (error.elements >= (80 if error.kind == "face" else 42)).all()
+
+
+def test_holes_are_filled_for_the_map_alone():
+    V, F = ellipsoid(3)
+    F = np.delete(F, np.r_[0, 40:44, 300], axis=0)
+    with pytest.raises(Refusal, match="not closed"):
+        drain(project([GlobeJob(triangle_surface(V, F))], LAMBERT))
+    (globe,) = drain(project([GlobeJob(triangle_surface(V, F))], replace(LAMBERT, fill_holes=True))).globes[0]
+    report = globe.report()
+    assert report["holes"] >= 3 and report["folds_sphere"] == 0 and report["area_l1_sphere"] < 0.05
+    assert len(globe.uv) == F.size and len(globe.points) == len(np.unique(F))
+    assert globe.areas.sum() < 1 and report["area_l1"] < 0.08
+
+
+def test_the_flow_reports_its_costs_and_moser_alone():
+    V, F = ellipsoid(2)
+    flow = replace(LAMBERT, method="flow")
+    (globe,) = drain(project([GlobeJob(triangle_surface(V, F))], flow)).globes[0]
+    report = globe.report()
+    assert report["costs"] == sorted(report["costs"], reverse=True)
+    assert report["moser"]["folds"] == 0 and report["drift"] < 0.05

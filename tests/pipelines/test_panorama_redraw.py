@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omt_uv.pipelines.panorama_redraw import redraw
-from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, to_sphere
+from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS, SINUSOIDAL, to_sphere
 from omt_uv.solver.progress import drain
 
 
@@ -52,3 +52,14 @@ def test_one_colour_stays_that_colour_and_the_seam_does_not_show():
 def test_no_pixels_no_picture(shape):
     with pytest.raises(ValueError, match="an image needs"):
         drain(redraw(np.zeros(shape), EQUIRECT, LAMBERT))
+
+
+def test_a_flat_picture_is_nowhere_pinched():
+    """Stripes along its columns are as wide at 60 degrees as at the equator, and its middle stays."""
+    ramp = np.broadcast_to((np.arange(512) + 0.5)[None, :, None] / 512, (256, 512, 1)).copy()
+    result = drain(redraw(ramp, SINUSOIDAL, EQUIRECT, (256, 512)))[..., 0]
+    slope = np.gradient(result, axis=1)[:, 200:300].mean(axis=1) * 512
+    assert slope[128] == pytest.approx(1, abs=0.01) and slope[128 + 256 // 3] == pytest.approx(0.5, abs=0.02)
+    assert result[:, 255:257].mean(axis=1) == pytest.approx(0.5, abs=1e-3)
+    with pytest.raises(ValueError, match="projection"):
+        drain(redraw(ramp, EQUIRECT, SINUSOIDAL))

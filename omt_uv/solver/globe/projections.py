@@ -15,26 +15,36 @@ LAMBERT = "lambert"
 # Octants to triangles: equal-area (Clarberg 2008).
 OCTAHEDRAL = "octahedral"
 PROJECTIONS = (EQUIRECT, LAMBERT, OCTAHEDRAL)
+# Of pictures alone: longitude times cos(latitude), so that a flat picture is nowhere pinched (Dominitz, Tannenbaum
+# 2010, section 5; Snyder 1987).
+SINUSOIDAL = "sinusoidal"
+PICTURES = (*PROJECTIONS, SINUSOIDAL)
 
 
 def check_projection(projection: str) -> None:
     """Raise ValueError unless `projection` is one of PROJECTIONS."""
-    if projection not in PROJECTIONS:
-        raise ValueError(f"projection must be one of {', '.join(PROJECTIONS)}, not {projection!r}")
+    _check(projection, PROJECTIONS)
+
+
+def _check(projection: str, allowed: tuple[str, ...]) -> None:
+    if projection not in allowed:
+        raise ValueError(f"projection must be one of {', '.join(allowed)}, not {projection!r}")
 
 
 def is_cylindrical(projection: str) -> bool:
     """Whether u is the longitude, so that the square's left and right side are one meridian."""
-    return projection in (EQUIRECT, LAMBERT)
+    return projection in (EQUIRECT, LAMBERT, SINUSOIDAL)
 
 
 def to_plane(points: np.ndarray, projection: str) -> np.ndarray:
-    """UV (..., 2) in the unit square of unit vectors (..., 3)."""
-    check_projection(projection)
+    """UV (..., 2) in the unit square of unit vectors (..., 3), in the layout of a picture, too: see PICTURES."""
+    _check(projection, PICTURES)
     if projection == OCTAHEDRAL:
         return 0.5 * (octahedral_to_plane(points) + 1)
     x, y, z = np.moveaxis(points, -1, 0)
     u = 0.5 + np.arctan2(x, -y) / (2 * np.pi)
+    if projection == SINUSOIDAL:
+        u = 0.5 + (u - 0.5) * np.hypot(x, y) / np.sqrt(x * x + y * y + z * z)
     v = 0.5 * (1 + z) if projection == LAMBERT else 0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi
     return np.stack([u, np.clip(v, 0, 1)], axis=-1)
 

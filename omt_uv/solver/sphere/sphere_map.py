@@ -15,12 +15,12 @@ from ..mesh.closed_surface import ClosedSurface, closed_surface
 from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..mesh.topology import twins
-from ..progress import Steps, part_of
+from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
 from ..transport.semidiscrete_sphere import sphere_transport
 from ..transport.spherical_power_diagram import Hull
 from .conformal import ConformalSphere, conformal_sphere
-from .dominitz_tannenbaum import flow_map
+from .dominitz_tannenbaum import SphereFlow, flow_map
 from .multilevel import multilevel_start
 from .refine import SphereRefinement, sphere_refine
 from .symmetry import with_mirrored_quads
@@ -29,7 +29,9 @@ from .symmetry import with_mirrored_quads
 NEWTON = "newton"
 # Moser's flow and gradient flow (`dominitz_tannenbaum`).
 FLOW = "flow"
-METHODS = (NEWTON, FLOW)
+# Moser's flow by itself, with no refinement, as Dominitz and Tannenbaum compare with it.
+MOSER = "moser"
+METHODS = (NEWTON, FLOW, MOSER)
 # Where the time goes, roughly, as start and width of the whole.
 CONFORMAL = (0.0, 0.15)
 TRANSPORT = (0.15, 0.25)
@@ -47,7 +49,8 @@ class SphereMap:
     positions (n,3) unit vectors, faces counter-clockwise seen from outside; conformal (n,3): the Moebius-centred
     conformal map it started from, or the map of least shear where that leaves double precision; status: see
     `refine.SphereRefinement`; iterations: Newton steps of the refinement; residual: last predicted decrease
-    over energy; warnings: what was repaired or replaced, and why.
+    over energy; warnings: what was repaired or replaced, and why; flow: that of Dominitz and Tannenbaum, where it is
+    the method.
     """
 
     positions: np.ndarray
@@ -56,6 +59,7 @@ class SphereMap:
     iterations: int
     residual: float
     warnings: tuple[str, ...]
+    flow: SphereFlow | None = None
 
 
 def sphere_map(
@@ -74,7 +78,8 @@ def sphere_map(
     density : (m,) > 0 multiplies the area that each triangle asks for; 1 by default
     balance : from 0, exact areas, to 1, least shear
     quality : "draft", "standard" or "exact", how small the area error of single faces becomes
-    method : "newton", optimal transport, or "flow", that of Dominitz and Tannenbaum; both are refined
+    method : "newton", optimal transport, or "flow", that of Dominitz and Tannenbaum, both refined; "moser", the first
+        half of that flow as it comes out
     polygons : (m,) polygon of every triangle; by default each is its own
 
     Raises
@@ -97,10 +102,14 @@ def sphere_map(
     joined = with_mirrored_quads(surface.vertices, surface.triangles, polygons)
     options = {"balance": balance, "quality": quality, "polygons": joined}
     found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
-    refined = None
+    refined, flow = None, None
+    if found is not None and method != NEWTON:
+        flow = yield from part_of(flow_map(found.positions, surface.triangles, target), *TRANSPORT)
+        if method == MOSER:
+            return _unrefined(flow, found, warnings)
     if found is not None:
         mass = vertex_areas(surface.vertices, surface.triangles, density)
-        begin = _flow_start(found, surface.triangles, target) if method == FLOW else _transport_start(found, mass)
+        begin = _transport_start(found, mass) if flow is None else _at_once(flow)
         refined = yield from _refined_start(surface, begin, target, warnings, options)
     if refined is None:
         start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *MULTILEVEL)
@@ -117,6 +126,20 @@ def sphere_map(
         iterations=refined.iterations,
         residual=refined.residual,
         warnings=tuple(warnings),
+        flow=flow,
+    )
+
+
+def _unrefined(flow: SphereFlow, found: ConformalSphere, warnings: list[str]) -> SphereMap:
+    """Moser's flow as it comes out."""
+    return SphereMap(
+        positions=flow.moser,
+        conformal=found.positions,
+        status=MOSER,
+        iterations=0,
+        residual=0.0,
+        warnings=tuple(warnings),
+        flow=flow,
     )
 
 
@@ -175,9 +198,10 @@ def _transport_start(found: ConformalSphere, mass: np.ndarray) -> Steps[np.ndarr
     return (yield from sphere_transport(found.sites, mass, hull=hull)).cells.centroids()
 
 
-def _flow_start(found: ConformalSphere, triangles: np.ndarray, target: np.ndarray) -> Steps[np.ndarray]:
-    """Unit vectors (n,3) by the flow of Dominitz and Tannenbaum."""
-    return (yield from flow_map(found.positions, triangles, target)).positions
+def _at_once(flow: SphereFlow) -> Steps[np.ndarray]:
+    """Unit vectors (n,3) of the flow of Dominitz and Tannenbaum."""
+    yield Progress("Flow", 1.0)
+    return flow.positions
 
 
 def _refined(surface: ClosedSurface, start: np.ndarray, target: np.ndarray, options: dict) -> Steps[SphereRefinement]:
