@@ -94,19 +94,16 @@ def sphere_map(
     Springborn, Schroeder, Pinkall 2008 (conformal map); Dominitz, Tannenbaum 2010 ("flow"); Praun, Hoppe 2003 (where
     the conformal map leaves double precision)
     """
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
+    _check_method(method)
     surface = closed_surface(vertices, triangles)
     target = _target(surface, density)
     warnings = list(surface.warnings)
     joined = with_mirrored_quads(surface.vertices, surface.triangles, polygons)
     options = {"balance": balance, "quality": quality, "polygons": joined}
     found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
-    refined, flow = None, None
-    if found is not None and method != NEWTON:
-        flow = yield from part_of(flow_map(found.positions, surface.triangles, target), *TRANSPORT)
-        if method == MOSER:
-            return _unrefined(flow, found, warnings)
+    refined, flow = None, (yield from part_of(_flow(found, surface, target, method), *TRANSPORT))
+    if found is not None and flow is not None and method == MOSER:
+        return _unrefined(flow, found, warnings)
     if found is not None:
         mass = vertex_areas(surface.vertices, surface.triangles, density)
         begin = _transport_start(found, mass) if flow is None else _at_once(flow)
@@ -128,6 +125,20 @@ def sphere_map(
         warnings=tuple(warnings),
         flow=flow,
     )
+
+
+def _check_method(method: str) -> None:
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
+
+
+def _flow(
+    found: ConformalSphere | None, surface: ClosedSurface, target: np.ndarray, method: str
+) -> Steps[SphereFlow | None]:
+    """The flow of Dominitz and Tannenbaum from a conformal map, where it is the method."""
+    if found is None or method == NEWTON:
+        return None
+    return (yield from flow_map(found.positions, surface.triangles, target))
 
 
 def _unrefined(flow: SphereFlow, found: ConformalSphere, warnings: list[str]) -> SphereMap:
