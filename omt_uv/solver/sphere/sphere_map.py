@@ -91,13 +91,11 @@ def sphere_map(
 
     References
     ----------
-    Springborn, Schroeder, Pinkall 2008 (conformal map); Dominitz, Tannenbaum 2010 ("flow"); Praun, Hoppe 2003 (where
-    the conformal map leaves double precision)
+    Springborn, Schroeder, Pinkall 2008 (conformal map); Dominitz, Tannenbaum 2010 (flow); Praun, Hoppe 2003 (otherwise)
     """
     _check_method(method)
     surface = closed_surface(vertices, triangles)
-    target = _target(surface, density)
-    warnings = list(surface.warnings)
+    target, warnings = _target(surface, density), list(surface.warnings)
     joined = with_mirrored_quads(surface.vertices, surface.triangles, polygons)
     options = {"balance": balance, "quality": quality, "polygons": joined}
     found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
@@ -105,8 +103,7 @@ def sphere_map(
     if found is not None and flow is not None and method == MOSER:
         return _unrefined(flow, found, warnings)
     if found is not None:
-        mass = vertex_areas(surface.vertices, surface.triangles, density)
-        begin = _transport_start(found, mass) if flow is None else _at_once(flow)
+        begin = _transport_start(found, surface, density) if flow is None else _at_once(flow)
         refined = yield from _refined_start(surface, begin, target, warnings, options)
     if refined is None:
         start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *MULTILEVEL)
@@ -203,8 +200,9 @@ def _refined_start(
     return None
 
 
-def _transport_start(found: ConformalSphere, mass: np.ndarray) -> Steps[np.ndarray]:
+def _transport_start(found: ConformalSphere, surface: ClosedSurface, density: np.ndarray | None) -> Steps[np.ndarray]:
     """Every vertex in the middle of its cell, (n,3)."""
+    mass = vertex_areas(surface.vertices, surface.triangles, density)
     hull = Hull(found.triangles, twins(found.triangles))
     return (yield from sphere_transport(found.sites, mass, hull=hull)).cells.centroids()
 
