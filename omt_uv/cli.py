@@ -11,14 +11,14 @@ from pathlib import Path
 from . import __version__, supervision
 from .commands import compare, magnify, measure, refine, remesh, seams, sphere, unwrap, weights
 from .commands.batches import batch, page, serve, summary, table
-from .commands.shapes import average, distance, library, match, partition
+from .commands.shapes import average, distance, distances, library, match, partition, signature
 from .commands.volumes import flow, volume
 from .errors import UserError
 from .supervision import PROGRAM, tell
 
 COMMANDS = (
     *(unwrap, refine, magnify, weights, seams, sphere, measure, compare, remesh),
-    *(flow, volume, match, average, partition, distance, library),
+    *(flow, volume, match, average, partition, distance, signature, library, distances),
 )
 # Of many files, without Blender in their own process.
 BATCHES = (batch, table, summary, page)
@@ -37,11 +37,11 @@ def program(arguments: Sequence[str], words: Sequence[str]) -> int:
         options = parsed(arguments)
     except SystemExit as stop:
         return _status(stop)
-    if getattr(options, "alone", False):
-        options.start = list(words)[: len(words) - len(arguments)]
-        return carry_out(options)
+    options.start = list(words)[: len(words) - len(arguments)]
     if supervision.is_child():
-        supervision.begin_child(options.memory)
+        supervision.begin_child(getattr(options, "memory", 0.0))
+        return carry_out(options)
+    if getattr(options, "alone", False):
         return carry_out(options)
     paths = [value for value in vars(options).values() if isinstance(value, Path)]
     return supervision.supervise(

@@ -20,6 +20,7 @@ PAGES = {
     "object.omt_landmarks_suggest": "match",
     "object.omt_landmarks_clear": "match",
     "object.omt_strain": "match",
+    "object.omt_similar": "similar",
     "uv.omt_stack": "arrange",
     "uv.omt_symmetrize": "arrange",
     "uv.omt_rectify": "arrange",

@@ -30,6 +30,7 @@ from .operators.shapes.landmarks import (
 )
 from .operators.shapes.match import OBJECT_OT_omt_match
 from .operators.shapes.partition import MESH_OT_omt_partition
+from .operators.shapes.similar import OBJECT_OT_omt_similar
 from .operators.shapes.strain import OBJECT_OT_omt_strain
 from .operators.sphere import UV_OT_omt_sphere
 from .operators.texel_density import UV_OT_omt_density_get, UV_OT_omt_density_set
@@ -62,6 +63,7 @@ CLASSES = (
     OBJECT_OT_omt_landmarks,
     OBJECT_OT_omt_landmarks_suggest,
     OBJECT_OT_omt_landmarks_clear,
+    OBJECT_OT_omt_similar,
     OBJECT_OT_omt_strain,
     OBJECT_OT_omt_flow,
     UV_OT_omt_flow,

@@ -89,7 +89,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization pipelines pipelines.measuring pipelines.volumes blender blender.volumes "
     "blender.measuring pipelines.shapes blender.shapes "
     "files display solver.flows solver.volumes solver.strain",
-    "commands.shapes": "settings solver solver.signatures solver.mesh solver.registration "
+    "commands.shapes": "settings supervision batch display solver solver.signatures solver.mesh solver.registration "
     "solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
     "commands.volumes": "solver solver.flows solver.volumes pipelines.volumes blender.volumes files commands",

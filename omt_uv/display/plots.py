@@ -57,7 +57,7 @@ def plot(curves: Curves, title: str, cloud: bool = False) -> np.ndarray:
         at = np.array([place(np.array(p)) for p in known]).reshape(-1, 2)
         if not cloud:
             _lines(picture, at, colour)
-        _dots(picture, at, colour, 1.8 if cloud else DOT)
+        dots(picture, at, colour, 1.8 if cloud else DOT)
         exponent = slope(known)
         text = name if np.isnan(exponent) else f"{name}  {exponent:+.2f}"
         write(picture, text, WIDTH - RIGHT + 14, TOP + 16 + 22 * k, 15, colour)
@@ -88,10 +88,10 @@ def _lines(picture: np.ndarray, at: np.ndarray, colour) -> None:
     """Straight lines between points (k,2) one after the other."""
     for a, b in pairwise(at):
         steps = max(int(np.abs(b - a).max()), 1)
-        _dots(picture, a + (b - a) * np.linspace(0, 1, steps + 1)[:, None], colour, THIN)
+        dots(picture, a + (b - a) * np.linspace(0, 1, steps + 1)[:, None], colour, THIN)
 
 
-def _dots(picture: np.ndarray, at: np.ndarray, colour, radius: float) -> None:
+def dots(picture: np.ndarray, at: np.ndarray, colour, radius: float) -> None:
     """Discs around points (k,2), smooth at the edge."""
     reach = int(np.ceil(radius + 1))
     for x, y in at:

@@ -9,6 +9,7 @@ from .section import Section, big_button, class_of, draw_settings, settings_of
 MATCH = "object.omt_match"
 LANDMARKS = ("object.omt_landmarks", "object.omt_landmarks_suggest", "object.omt_landmarks_clear")
 STRAIN = "object.omt_strain"
+SIMILAR = "object.omt_similar"
 
 
 def _draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -20,6 +21,8 @@ def _draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     big_button(layout, MATCH, "MOD_DATA_TRANSFER")
     if class_of(STRAIN) is not None:
         layout.operator(STRAIN, icon="MOD_SIMPLEDEFORM")
+    if class_of(SIMILAR) is not None:
+        layout.operator(SIMILAR, icon="VIEWZOOM")
 
 
 SECTION = Section("match", "Match", _draw, (MATCH,))

@@ -19,6 +19,7 @@ ENTRIES: list[list[str]] = [
         "object.omt_landmarks_suggest",
         "object.omt_landmarks_clear",
         "object.omt_strain",
+        "object.omt_similar",
     ],
     ["mesh.omt_partition", "object.omt_flow", "uv.omt_flow", "object.omt_volume"],
 ]

@@ -16,7 +16,7 @@ MORE = {"magnify": ["--weights", "region", "--factor", "2"], "remesh": ["--verti
 # Commands on bodies, whose reports have no charts: tests of their own look at these.
 BODIES = ("flow", "volume", "partition")
 # Commands on two files or a folder: tests/commands/shapes has theirs.
-SHAPES = ("match", "average", "distance", "library", "similar")
+SHAPES = ("match", "average", "distance", "signature", "library", "similar")
 
 
 def names(package):

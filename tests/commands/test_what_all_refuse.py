@@ -134,7 +134,7 @@ def test_what_cannot_be_written_is_refused_before_anything_is_read(package, run,
         for action in command_runs.paths_of(parser):
             if action.dest not in WRITTEN:
                 continue
-            key = "npz" if command == "library" else action.dest
+            key = "npz" if command in command_runs.ARRAYS else action.dest
             suffix = command_runs.FILES[key].rpartition(".")[2]
             (tmp_path / f"is_folder.{suffix}").mkdir(exist_ok=True)
             given = "" if command in FOLDERS else "not there"
@@ -153,7 +153,7 @@ def test_no_two_files_of_a_command_may_be_one(package, run, folder):
             if a not in WRITTEN or a == b or (a, b) in REPLACED or (command in FOLDERS and b == "input"):
                 continue
             of_b = command_runs.FILES.get(b, "in.blend")
-            key = "npz" if command == "library" else a
+            key = "npz" if command in command_runs.ARRAYS else a
             call = words(command, folder, **{key: of_b})
             assert refused(run, folder, call, ["one file.", "Name.", "Use.", "Write.", of_b])
             tried += 1
@@ -177,7 +177,9 @@ def test_a_full_disk_leaves_whole_what_was_there_and_a_good_one_changes_only_wha
 ):
     files = written_to(tmp_path)
     (parser,) = (p for name, p in command_runs.commands(package).items() if name == command)
-    keys = {"npz" if command == "library" else a.dest for a in command_runs.paths_of(parser) if a.dest in WRITTEN}
+    keys = {
+        "npz" if command in command_runs.ARRAYS else a.dest for a in command_runs.paths_of(parser) if a.dest in WRITTEN
+    }
     targets = {command_runs.FILES[key] for key in keys}
     if command == "remesh":
         files["report"] = str(tmp_path / "report.json")

@@ -48,6 +48,7 @@ PAIRS = {
     "object.omt_landmarks",
     "object.omt_landmarks_suggest",
     "object.omt_landmarks_clear",
+    "object.omt_similar",
 }
 
 

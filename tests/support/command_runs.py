@@ -16,6 +16,8 @@ from sphere_shapes import blob
 READ = {"input", "target", "other", "others", "handles", "index", "image"}
 WRITTEN = {"output", "report", "preview", "histogram", "plot", "attributes", "image_out", "image_output"}
 FOLDERS = ("average", "library")
+# What writes an .npz.
+ARRAYS = ("library", "signature")
 GROUP = "region"
 
 
@@ -92,6 +94,7 @@ CALLS = {
     "average": "-o @output --report @report",
     "partition": "-o @output --cells 4 --relax 0 --report @report --preview @preview",
     "distance": "@other",
+    "signature": "-o @npz",
     "library": "-o @npz",
     "similar": "--index @index",
 }  # fmt: skip

@@ -7,8 +7,11 @@ import json
 from pathlib import Path
 
 from ..common import drain_shown, refusals, require_blender
-from ..options import add_input
+from ..options import add_input, vertices
 from ..selection import of_file, read_file
+
+# Of a signature; solver.signatures has this number, too, and is not read before there is something to do.
+POINTS = 400
 
 
 def add(commands) -> None:
@@ -17,6 +20,17 @@ def add(commands) -> None:
     add_input(command)
     command.add_argument("other", type=Path, metavar="B", help="what IN is compared with")
     command.add_argument("--json", action="store_true", help="print as JSON")
+    add_points(command)
+
+
+def add_points(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--points",
+        type=vertices,
+        default=POINTS,
+        metavar="N",
+        help=f"of a signature: more are slower, default {POINTS}",
+    )
 
 
 def run(options: argparse.Namespace) -> None:
@@ -31,10 +45,10 @@ def run(options: argparse.Namespace) -> None:
         print(f"{found.distance:.4f}, {found.raw:.4f} with the floor of {found.floor:.4f} of sampling")
 
 
-def signature_of_file(options: argparse.Namespace, path: Path):
+def signature_of_file(options: argparse.Namespace, path: Path, points: int = 0):
     """The signature of the chosen meshes of a file; `--object` is about IN. Raises CommandError."""
     from ...pipelines.shapes.distance import signature_of
 
     pairs = read_file(of_file(options, path))
     with refusals(name=path.name):
-        return drain_shown(signature_of([reading.surface for _, reading in pairs]))
+        return drain_shown(signature_of([reading.surface for _, reading in pairs], points or options.points))

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import io
 import json
 from pathlib import Path
-from zipfile import BadZipFile
 
+from ... import __version__
 from ..common import CommandError, check_paths, require_blender, warn_of
 from ..options import add_input, vertices
 from .average import READABLE
-from .distance import signature_of_file
+from .distance import add_points, signature_of_file
+from .many import add_jobs, carried_out
+from .signature import NAME, SUFFIX, read_signature
+
+# Of a folder beside the index, for signatures that a batch has made.
+FOLDER = ".signatures"
 
 
 def add(commands) -> None:
@@ -19,6 +23,8 @@ def add(commands) -> None:
     command.set_defaults(run=run)
     add_input(command, "folder of meshes, and the folders in it", metavar="DIR")
     command.add_argument("-o", "--output", type=Path, metavar="INDEX.npz", required=True, help=".npz; added to")
+    add_points(command)
+    add_jobs(command)
     similar = commands.add_parser("similar", help="the nearest shapes of an index")
     similar.set_defaults(run=run_similar)
     add_input(similar)
@@ -26,73 +32,86 @@ def add(commands) -> None:
     similar.add_argument("--top", type=vertices, default=10, metavar="K", help="how many, default 10")
 
 
-def read_index(path: Path) -> dict:
-    """Packed signatures by the name of their file, and marks of these. Raises CommandError."""
-    import numpy as np
-
-    if not path.is_file():
-        raise CommandError(f"{path}: there is no such index. Make one by the command library.")
-    try:
-        with np.load(path) as data:
-            rows = zip(data["names"].tolist(), data["marks"].tolist(), data["signatures"], strict=True)
-            return {name: (mark, array) for name, mark, array in rows}
-    except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
-        raise CommandError(f"{path}: is no index of signatures. Make one by the command library.") from error
-
-
 def run(options: argparse.Namespace) -> None:
     """Add what is new in a folder to its index; what has no signature is told with the reason."""
-    require_blender()
-    from ...files.verified import check_writable
-    from ...pipelines.shapes.distance import packed
+    from ...files.verified import check_writable, write_bytes
+    from ...pipelines.shapes.signature_index import index_of, read_index
 
     if not options.input.is_dir():
         raise CommandError(f"{options.input}: there is no such folder")
-    if options.output.suffix.lower() != ".npz":
+    if options.output.suffix.lower() != SUFFIX:
         raise CommandError(f"{options.output}: an index is an .npz. Name one.")
     check_paths(options, [])
     check_writable(options.output)
-    index = read_index(options.output) if options.output.exists() else {}
+    old = read_index(options.output) if options.output.exists() else None
     files = sorted(p for p in options.input.rglob("*") if p.suffix.lower() in READABLE)
-    made = 0
-    for path in files:
-        name = path.relative_to(options.input).as_posix()
-        mark = f"{path.stat().st_size} {path.stat().st_mtime_ns}"
-        if name in index and index[name][0] == mark:
-            continue
-        try:
-            index[name] = (mark, packed(signature_of_file(options, path)))
-        except ValueError as error:
-            warn_of(f"{name}: {error}")
-            continue
-        made += 1
-        _write(options.output, index)
-    if not index:
+    known = dict(zip(old.names, old.marks, strict=True)) if old else {}
+    due = {p.relative_to(options.input).as_posix(): p for p in files}
+    marks = {name: _mark(path) for name, path in due.items()}
+    due = {name: path for name, path in due.items() if known.get(name) != marks[name]}
+    if options.jobs or options.scheduler:
+        found = _by_batch(options, set(due))
+        write = bool(found)
+        index = index_of({name: (marks[name], s) for name, s in found.items()}, old) if found else old
+    else:
+        require_blender()
+        index, write = old, False
+        found = {}
+        for name, path in due.items():
+            try:
+                found[name] = signature_of_file(options, path)
+            except ValueError as error:
+                warn_of(f"{name}: {error}")
+                continue
+            # What was done stays when the rest is stopped.
+            index = index_of({name: (marks[name], found[name])}, index)
+            write_bytes(options.output, index.bytes())
+    if index is None:
         raise CommandError(f"{options.input}: none of its {len(files)} mesh files has a signature. Give closed meshes.")
-    print(f"{made} new, {len(index)} in {options.output}")
+    if write:
+        write_bytes(options.output, index.bytes())
+    print(f"{len(found)} new, {len(index)} in {options.output}")
 
 
-def _write(path: Path, index: dict) -> None:
-    """Write an index whole: what was done stays when the rest is stopped."""
-    import numpy as np
+def _mark(path: Path) -> str:
+    return f"{path.stat().st_size} {path.stat().st_mtime_ns}"
 
-    from ...files.verified import write_bytes
 
-    names = sorted(index)
-    arrays = np.stack([index[name][1] for name in names])
-    data = io.BytesIO()
-    np.savez(data, names=np.array(names), marks=np.array([index[name][0] for name in names]), signatures=arrays)
-    write_bytes(path, data.getvalue())
+def _by_batch(options: argparse.Namespace, due: set[str]) -> dict:
+    """Signatures of files by name, made by a batch, which goes on where another was stopped."""
+    from ...batch.plan import BatchPlan, tasks_of
+
+    words = ["--points", str(options.points), *(f"--object={name}" for name in options.object)]
+    words += [f"--scene={options.scene}"] if options.scene else []
+    words += ["--skip-linked"] if options.skip_linked else []
+    words += ["--strict"] if options.strict else []
+    plan = BatchPlan(
+        command=NAME,
+        options=tuple(words),
+        output=options.output.with_suffix(FOLDER),
+        suffix=SUFFIX,
+        version=__version__,
+        reports=False,
+        previews=False,
+    )
+    rows = carried_out(options, plan, tasks_of(plan, options.input))
+    for name, row in rows.items():
+        if row["state"] != "done":
+            warn_of(f"{name}: {row['message']}")
+    return {
+        name: read_signature((plan.output / name).with_suffix(SUFFIX))
+        for name, row in rows.items()
+        if row["state"] == "done" and name in due
+    }
 
 
 def run_similar(options: argparse.Namespace) -> None:
     """Print the nearest shapes as lines of JSON, nearest first."""
     require_blender()
-    from ...pipelines.shapes.distance import unpacked
+    from ...pipelines.shapes.signature_index import read_index
     from ...solver.signatures.wasserstein import nearest
 
     index = read_index(options.index)
-    names = sorted(index)
-    signatures = [unpacked(index[name][1]) for name in names]
-    for k, found in nearest(signature_of_file(options, options.input), signatures, options.top):
-        print(json.dumps({"name": names[k], "distance": found.distance, "raw": found.raw}))
+    mine = signature_of_file(options, options.input, index.packed.shape[1])
+    for k, found in nearest(mine, index, options.top, index.spectra):
+        print(json.dumps({"name": index.names[k], "distance": found.distance, "raw": found.raw}))

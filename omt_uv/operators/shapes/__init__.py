@@ -1,7 +1,7 @@
-"""Operators on shapes: one object matched with another, its landmarks, cells of equal area.
+"""Operators on shapes: one object matched with another, its landmarks, what is like it, cells of equal area.
 
 Imports settings, solver, pipelines, blender, their rooms for shapes, session and operators.
-Main names: OBJECT_OT_omt_match, OBJECT_OT_omt_strain, MESH_OT_omt_partition, and those of landmarks.
+Main names: OBJECT_OT_omt_match, OBJECT_OT_omt_similar, OBJECT_OT_omt_strain, MESH_OT_omt_partition, those of landmarks.
 """
 
 from ...solver.lazy import lazy
@@ -10,6 +10,7 @@ __getattr__, __all__ = lazy(
     __name__,
     landmarks="OBJECT_OT_omt_landmarks OBJECT_OT_omt_landmarks_clear OBJECT_OT_omt_landmarks_suggest",
     match="OBJECT_OT_omt_match",
+    similar="OBJECT_OT_omt_similar",
     strain="OBJECT_OT_omt_strain",
     partition="MESH_OT_omt_partition",
 )

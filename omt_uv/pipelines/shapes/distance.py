@@ -1,4 +1,4 @@
-"""The signature of what a file holds, and many of them as one array."""
+"""The signature of what was read, and what is nearest to it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...solver.errors import MeshError
 from ...solver.mesh.surface import Surface, chosen_triangles
-from ...solver.progress import Steps
+from ...solver.progress import Steps, part_of
 from ...solver.signatures.signature import POINTS, Signature, signature
+from ...solver.signatures.wasserstein import ShapeDistance, distance_of, nearest, prepared
+from .signature_index import SignatureIndex
 
 
 def signature_of(surfaces: Sequence[Surface], count: int = POINTS) -> Steps[Signature]:
@@ -27,12 +30,34 @@ def signature_of(surfaces: Sequence[Surface], count: int = POINTS) -> Steps[Sign
     return (yield from signature(np.concatenate(positions), np.concatenate(triangles), count))
 
 
-def packed(found: Signature) -> np.ndarray:
-    """A signature as one small array (k,4), single precision."""
-    return np.column_stack([found.points, found.curvature]).astype(np.float32)
+def alike(
+    own: Surface, others: Sequence[tuple[str, Surface]], count: int = POINTS
+) -> Steps[tuple[list[tuple[str, ShapeDistance]], list[str]]]:
+    """Distances of surfaces from one, by name, nearest first; and why some have none.
+
+    Raises
+    ------
+    MeshError : the one has no signature
+    """
+    share = 1 / (1 + len(others))
+    mine = prepared((yield from part_of(signature_of([own], count), 0, share)))
+    found, reasons = [], []
+    for k, (name, surface) in enumerate(others):
+        try:
+            its = yield from part_of(signature_of([surface], count), (1 + k) * share, share)
+        except MeshError as error:
+            reasons.append(f"{name}: {error}")
+            continue
+        found.append((name, distance_of(mine, prepared(its))))
+    return sorted(found, key=lambda pair: pair[1].raw ** 2 - pair[1].floor ** 2), reasons
 
 
-def unpacked(array: np.ndarray) -> Signature:
-    """The signature of an array (k,4)."""
-    array = array.astype(float)
-    return Signature(array[:, :3] / np.linalg.norm(array[:, :3], axis=1, keepdims=True), array[:, 3])
+def nearest_of(own: Surface, index: SignatureIndex, top: int) -> Steps[list[tuple[str, ShapeDistance]]]:
+    """The nearest of an index, by name, nearest first.
+
+    Raises
+    ------
+    MeshError : the surface has no signature
+    """
+    mine = yield from signature_of([own], index.packed.shape[1])
+    return [(index.names[k], found) for k, found in nearest(mine, index, top, index.spectra)]

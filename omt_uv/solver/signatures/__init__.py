@@ -8,6 +8,7 @@ from ..lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
+    embedding="classes_of_nearest classical_scaling",
     signature="Signature closed_part",
-    wasserstein="ShapeDistance nearest shape_distance",
+    wasserstein="ShapeDistance distance_of nearest prepared shape_distance",
 )

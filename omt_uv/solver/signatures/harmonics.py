@@ -97,12 +97,14 @@ def refined_agreement(
         turned.append(matrices[:, column : column + size**2].reshape(-1, size, size) @ part)
         column += size**2
     for near, blocks in small_matrices():
-        tried = [np.einsum("nab,rbc->rnac", block, part) for block, part in zip(blocks, turned, strict=True)]
-        score = sum(np.einsum("rnac,ac->rn", part, g) for part, g in zip(tried, goal, strict=True))
-        best = score.argmax(axis=1)
+        score = np.zeros((len(near), len(rotations)))
+        for block, part, g in zip(blocks, turned, goal, strict=True):
+            both = g @ part.transpose(0, 2, 1)
+            score += block.reshape(len(near), -1) @ both.reshape(len(rotations), -1).T
+        best = score.argmax(axis=0)
         rotations = near[best] @ rotations
-        turned = [part[np.arange(len(best)), best] for part in tried]
-    return rotations, score[np.arange(len(best)), best]
+        turned = [block[best] @ part for block, part in zip(blocks, turned, strict=True)]
+    return rotations, score[best, np.arange(len(best))]
 
 
 def _matrices(rotations: np.ndarray, at: np.ndarray, inverse: list[np.ndarray]) -> list[np.ndarray]:

@@ -7,6 +7,7 @@ by assignments and Kabsch's rotation in turn, of few points first.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,14 +25,17 @@ WIDTH = 0.25
 # So many of the grid's rotations are turned on to the best agreement nearby; the best of them that are apart, by more
 # than this angle in radians, are refined on few points, and the best of these with all points, in so many rounds.
 TRIED = 24
-BEST = 8
-FEW = 250
-ROUNDS = 3
+BEST = 6
+FEW = 200
+ROUNDS = 2
 FINALISTS = 3
 LAST_ROUNDS = 3
 APART = 0.35
-# A search looks at so many candidates, as often as are asked for, by their harmonics.
-CANDIDATES = 4
+# A search looks at so many by the best agreement of the grid, and at so many by transport, for each that is asked for,
+# and at no fewer than these.
+BY_SPECTRUM = 10
+BY_AGREEMENT = 1.3
+FEWEST = 8
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ def starts(a: Prepared, b: Prepared, curvature: float = CURVATURE) -> np.ndarray
     grid = rotation_grid()
     first, second = a.coefficients, b.coefficients * [1, np.sqrt(curvature / CURVATURE)]
     found, score = [], []
-    for sign, agreement in zip((1, -1), _agreements(first, second), strict=True):
+    for sign, agreement in zip((1, -1), _agreements(first, second[None])[:, 0], strict=True):
         picked = _apart(grid, agreement, TRIED // 2)
         source = first * (sign ** _degrees())[:, None]
         rotations, value = refined_agreement(source, second, grid[picked], picked)
@@ -134,20 +138,21 @@ def _degrees() -> np.ndarray:
     return np.repeat(np.arange(1, DEGREES + 1), 2 * np.arange(1, DEGREES + 1) + 1)
 
 
-def _agreements(source: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inner products (r,) of functions of coefficients (s,c) under every rotation of the grid with others; and the same
-    after an inversion, which turns the sign of odd degrees."""
-    even, odd = np.zeros((2, len(rotation_grid())), np.float32)
-    column = 0
-    for first, second in zip(by_degree(source), by_degree(target), strict=True):
+def _agreements(source: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Inner products (2,t,r) of functions of coefficients (s,c) under every rotation of the grid with others (t,s,c);
+    and the same after an inversion, which turns the sign of odd degrees."""
+    even, odd = np.zeros((2, len(targets), len(rotation_grid())), np.float32)
+    column = row = 0
+    for first in by_degree(source):
         size = len(first)
-        part = grid_matrices()[:, column : column + size**2] @ (second @ first.T).astype(np.float32).ravel()
+        both = targets[:, row : row + size] @ first.T
+        part = both.reshape(len(targets), -1).astype(np.float32) @ grid_matrices()[:, column : column + size**2].T
         if size // 2 % 2:
             odd += part
         else:
             even += part
-        column += size**2
-    return even + odd, even - odd
+        row, column = row + size, column + size**2
+    return np.stack([even + odd, even - odd])
 
 
 def _refined(
@@ -175,15 +180,22 @@ def spectrum(s: Prepared) -> np.ndarray:
 
 
 def nearest(
-    s: Signature, library: list[Signature], top: int, spectra: np.ndarray | None = None
+    s: Signature, library: Sequence[Signature], top: int, spectra: np.ndarray | None = None
 ) -> list[tuple[int, ShapeDistance]]:
     """The `top` nearest of a library, nearest first; spectra (l,2 * DEGREES) of it, if at hand.
 
-    Spectra choose several times as many as asked for; these alone are compared by transport.
+    Spectra choose several times as many as asked for, and of these those that agree best under a rotation of the grid;
+    these alone are compared by transport.
     """
     mine = prepared(s)
     if spectra is None:
         spectra = np.stack([spectrum(prepared(other)) for other in library])
-    order = np.argsort(((spectra - spectrum(mine)) ** 2).sum(axis=1), kind="stable")[: max(CANDIDATES * top, 8)]
-    found = [(int(k), distance_of(mine, prepared(library[k]))) for k in order]
+    away = ((spectra - spectrum(mine)) ** 2).sum(axis=1)
+    order = np.argsort(away, kind="stable")[: max(BY_SPECTRUM * top, FEWEST)]
+    candidates = [prepared(library[int(k)]) for k in order]
+    targets = np.stack([candidate.coefficients for candidate in candidates])
+    # The least squared difference of the functions, but for what is the same for all.
+    away = (targets**2).sum(axis=(1, 2)) - 2 * _agreements(mine.coefficients, targets).max(axis=(0, 2))
+    chosen = np.argsort(away, kind="stable")[: max(round(BY_AGREEMENT * top), FEWEST)]
+    found = [(int(order[k]), distance_of(mine, candidates[k])) for k in chosen]
     return sorted(found, key=lambda pair: (pair[1].raw ** 2 - pair[1].floor ** 2, pair[0]))[:top]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
 
 import bpy
+
+import numpy as np
 
 
 def body(path, scale):
@@ -33,3 +36,35 @@ def test_a_folder_is_indexed_once_and_searched(run, tmp_path):
     status, out, _ = run("distance", tmp_path / "query.blend", tmp_path / "all" / "long.blend", "--json")
     assert status == 0 and json.loads(out)["raw"] < 0.3
     assert "no such index" in run("similar", tmp_path / "query.blend", "--index", tmp_path / "none.npz")[2]
+
+
+def test_a_folder_goes_into_an_index_and_a_matrix_by_a_batch_as_it_does_without(package, run, tmp_path):
+    """The same signatures, the same distances; done again is only what changed; the class of the nearest is told."""
+    (tmp_path / "all").mkdir()
+    for name, scale in (("round", 1), ("rounder", 1.05), ("long", 3), ("longer", 3.2)):
+        body(tmp_path / "all" / f"{name}.blend", scale)
+    status, out, err = run("distances", tmp_path / "all", "-o", tmp_path / "d.csv", "--points", 100)
+    assert status == 0 and "6 distances" in out, err
+    with open(tmp_path / "d.csv") as file:
+        names, *rows = list(csv.reader(file))
+    assert names[1:] == [row[0] for row in rows] == ["long.blend", "longer.blend", "round.blend", "rounder.blend"]
+    found = np.array([row[1:] for row in rows], float)
+    assert np.array_equal(found, found.T) and not found.diagonal().any() and found[0, 2] > 2 * found[0, 1]
+    words = ["library", tmp_path / "all", "-o", tmp_path / "index.npz", "--points", 100]
+    assert run(*words)[1].startswith("4 new, 4 in ")
+    read = package("pipelines.shapes.signature_index").read_index
+    assert np.allclose(read(tmp_path / "index.npz").packed, read(tmp_path / "d.index.npz").packed, atol=1e-5)
+    assert run(*words, "--jobs", 1)[1].startswith("0 new, 4 in ")
+    (tmp_path / "labels.csv").write_text("".join(f"{name},{name[:4]}\n" for name in names[1:]))
+    more = ["--labels", tmp_path / "labels.csv", "--knn", 1, "--jobs", 1, "--mds", tmp_path / "m.png"]
+    words = ["distances", tmp_path / "index.npz", "-o", tmp_path / "e.csv", "--picture", tmp_path / "e.png", *more]
+    status, out, err = run(*words)
+    assert status == 0 and "100.0 % of the classes are those of 1 neighbours" in out, err
+    again = np.genfromtxt(tmp_path / "e.csv", delimiter=",", skip_header=1)[:, 1:]
+    assert np.allclose(again, found, atol=1e-3)
+    assert (tmp_path / "e.png").stat().st_size > 1000 and (tmp_path / "m.png").stat().st_size > 1000
+    blocks = tmp_path / "e.blocks" / "found" / "0_4_0_4.npy"
+    before = blocks.stat().st_mtime_ns
+    assert run(*words)[0] == 0 and blocks.stat().st_mtime_ns == before
+    (tmp_path / "labels.csv").write_text("long.blend,long\n")
+    assert "no class for 3 shapes" in run(*words)[2]

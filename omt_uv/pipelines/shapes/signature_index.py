@@ -1,0 +1,130 @@
+"""Signatures of many files as a few arrays, and a matrix of distances in blocks."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from ...errors import UserError
+from ...solver.signatures.signature import CURVATURE, Signature
+from ...solver.signatures.wasserstein import distance_of, prepared, spectrum
+
+# Rows and columns of a block of distances.
+BLOCK = 24
+
+
+class IndexFileError(UserError):
+    """A file that holds no signatures."""
+
+
+@dataclass(frozen=True)
+class SignatureIndex(Sequence):
+    """Signatures of files: names and marks, which change with the file, (n,); packed (n,k,4), single precision; floors
+    (n,); spectra (n,s)."""
+
+    names: tuple[str, ...]
+    marks: tuple[str, ...]
+    packed: np.ndarray
+    floors: np.ndarray
+    spectra: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __getitem__(self, k):
+        return unpacked(self.packed[k], self.floors[k])
+
+    def bytes(self) -> bytes:
+        """The index as a file."""
+        data = io.BytesIO()
+        arrays = {"packed": self.packed, "floors": self.floors, "spectra": self.spectra}
+        np.savez(data, names=np.array(self.names), marks=np.array(self.marks), **arrays)
+        return data.getvalue()
+
+
+def packed(found: Signature) -> np.ndarray:
+    """A signature as one small array (k,4), single precision."""
+    return np.column_stack([found.points, found.curvature]).astype(np.float32)
+
+
+def unpacked(array: np.ndarray, floor: float) -> Signature:
+    """The signature of an array (k,4) and its floor."""
+    array = array.astype(float)
+    points = array[:, :3] / np.linalg.norm(array[:, :3], axis=1, keepdims=True)
+    return Signature(points, array[:, 3], float(floor))
+
+
+def index_of(rows: Mapping[str, tuple[str, Signature]], old: SignatureIndex | None = None) -> SignatureIndex:
+    """The index of signatures with their marks, by name, in the order of names; those of an older one stay, but where
+    a row takes their place.
+
+    Raises
+    ------
+    IndexFileError : signatures of other numbers of points, or none
+    """
+    own = {name: (mark, packed(s), s.floor, spectrum(prepared(s))) for name, (mark, s) in rows.items()}
+    if old is not None:
+        for name, *row in zip(old.names, old.marks, old.packed, old.floors, old.spectra, strict=True):
+            own.setdefault(name, tuple(row))
+    counts = {len(row[1]) for row in own.values()}
+    if len(counts) != 1:
+        raise IndexFileError(f"Signatures have {sorted(counts) or 'no'} points. Make all of an index with one number.")
+    names = sorted(own)
+    marks, arrays, floors, spectra = zip(*(own[name] for name in names), strict=True)
+    return SignatureIndex(
+        tuple(names), tuple(map(str, marks)), np.stack(arrays), np.array(floors, float), np.stack(spectra)
+    )
+
+
+def chosen(index: SignatureIndex, names: Sequence[str]) -> SignatureIndex:
+    """Of an index, some names."""
+    rows = [k for k, name in enumerate(index.names) if name in set(names)]
+    return SignatureIndex(
+        tuple(index.names[k] for k in rows),
+        tuple(index.marks[k] for k in rows),
+        index.packed[rows],
+        index.floors[rows],
+        index.spectra[rows],
+    )
+
+
+def read_index(path: Path) -> SignatureIndex:
+    """Read an index. Raises IndexFileError."""
+    if not path.is_file():
+        raise IndexFileError(f"{path}: there is no such index. Make one by the command library.")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            parts = [data[name] for name in ("packed", "floors", "spectra")]
+            found = SignatureIndex(tuple(data["names"].tolist()), tuple(data["marks"].tolist()), *parts)
+    except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
+        raise IndexFileError(f"{path}: is no index of signatures. Make one by the command library.") from error
+    if not len(found) == len(found.marks) == len(found.packed) == len(found.floors) == len(found.spectra):
+        raise IndexFileError(f"{path}: is no whole index of signatures. Make one by the command library.")
+    return found
+
+
+def blocks_of(count: int) -> list[tuple[int, int, int, int]]:
+    """Rows from, to and columns from, to of all blocks on and above the diagonal of a matrix."""
+    first = range(0, count, BLOCK)
+    return [(i, min(i + BLOCK, count), j, min(j + BLOCK, count)) for i in first for j in first if j >= i]
+
+
+def block_distances(
+    index: SignatureIndex, block: tuple[int, int, int, int], curvature: float = CURVATURE
+) -> np.ndarray:
+    """Distances (2,r,c), with the floor taken off and raw, of a block; 0 on and below the diagonal."""
+    first, last, left, right = block
+    rows = [prepared(index[k]) for k in range(first, last)]
+    columns = rows if first == left else [prepared(index[k]) for k in range(left, right)]
+    found = np.zeros((2, last - first, right - left))
+    for i, a in enumerate(rows):
+        for j, b in enumerate(columns):
+            if left + j > first + i:
+                distance = distance_of(a, b, curvature)
+                found[:, i, j] = distance.distance, distance.raw
+    return found

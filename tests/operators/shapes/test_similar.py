@@ -1,0 +1,58 @@
+"""object.omt_similar as users call it: the nearest objects, duplicates, what cannot be compared, a library's files."""
+
+from __future__ import annotations
+
+import bpy
+
+import scenes
+
+
+def body(name, scale, subdivisions=3, turned=0.0):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=subdivisions, rotation=(turned, 1, 0))
+    obj = bpy.context.object
+    obj.name = name
+    for vertex in obj.data.vertices:
+        vertex.co.x *= scale * (1.5 if vertex.co.x > 0 else 1)
+    return obj
+
+
+def selected():
+    return {obj.name for obj in bpy.context.selected_objects}
+
+
+def test_duplicates_of_any_triangles_and_place_are_selected_and_what_has_handles_is_named():
+    others = [body("Long", 3), body("Turned", 2, turned=1), body("Round", 1)]
+    others[1].scale = (3, 3, 3)
+    bpy.ops.mesh.primitive_torus_add(major_segments=8, minor_segments=6)
+    own = body("Own", 2, 4)
+    before = [tuple(v.co) for v in own.data.vertices]
+    assert bpy.ops.object.omt_similar() == {"FINISHED"}
+    assert selected() == {"Own", "Turned"} and bpy.context.view_layer.objects.active == own
+    assert [tuple(v.co) for v in own.data.vertices] == before
+    assert bpy.ops.object.omt_similar(select="NOTHING") == {"FINISHED"} and selected() == {"Own", "Turned"}
+    bpy.data.objects.remove(others[1])
+    assert bpy.ops.object.omt_similar(select="NEAREST") == {"FINISHED"} and selected() in (
+        {"Own", "Long"},
+        {"Own", "Round"},
+    )
+
+
+def test_a_library_is_searched_and_what_is_none_is_refused(package, tmp_path):
+    module = package("pipelines.shapes.signature_index")
+    own = body("Own", 2)
+    from omt_uv.solver.progress import drain
+
+    made = drain(package("pipelines.shapes.distance").signature_of([package("blender.mesh").read(own).surface], 100))
+    (tmp_path / "i.npz").write_bytes(module.index_of({"a/own.obj": ("", made)}).bytes())
+    assert bpy.ops.object.omt_similar(index=str(tmp_path / "i.npz")) == {"FINISHED"}
+    assert selected() == {"Own"}
+    assert package("session.last_run").state.summary.rows[0] == ("a/own.obj", "0.000")
+    (tmp_path / "i.npz").write_bytes(b"no index")
+    assert "is no index" in scenes.error_of(bpy.ops.object.omt_similar, index=str(tmp_path / "i.npz"))
+
+
+def test_one_object_alone_has_nothing_like_it():
+    body("Own", 2)
+    assert "no other mesh" in scenes.error_of(bpy.ops.object.omt_similar)
+    bpy.context.view_layer.objects.active = None
+    assert "No mesh" in scenes.error_of(bpy.ops.object.omt_similar)
