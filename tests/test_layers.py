@@ -71,6 +71,8 @@ ARROWS: dict[str, str] = {
     "solver.strain solver.partition solver.signatures pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
     "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
+    "pipelines.regions": "settings solver solver.mesh solver.analysis solver.maps solver.editing "
+    "solver.parameterization pipelines",
     "pipelines.arranging": "settings solver solver.mesh solver.editing solver.arranging pipelines",
     "blender": "errors settings solver solver.mesh solver.canonical solver.analysis solver.globe "
     "solver.parameterization pipelines",
@@ -86,16 +88,17 @@ ARROWS: dict[str, str] = {
     "blender",
     "batch": "errors supervision solver",
     "commands": "errors supervision remedies settings solver solver.comparison solver.cutting solver.globe "
-    "solver.parameterization pipelines pipelines.measuring pipelines.volumes blender blender.volumes "
+    "solver.parameterization pipelines pipelines.measuring pipelines.regions pipelines.volumes blender blender.volumes "
     "blender.measuring pipelines.shapes blender.shapes "
-    "files display solver.flows solver.volumes solver.strain",
+    "files display solver.flows solver.volumes solver.strain solver.editing",
     "commands.shapes": "settings supervision batch display solver solver.signatures solver.mesh solver.registration "
     "solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
     "commands.volumes": "solver solver.flows solver.volumes pipelines.volumes blender.volumes files commands",
     "commands.batches": "supervision solver batch files commands",
     "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
-    "pipelines blender files display session",
+    "solver.editing "
+    "pipelines pipelines.regions blender files display session",
     "operators.inspection": "settings remedies solver solver.comparison pipelines pipelines.measuring blender "
     "blender.measuring display session operators",
     "operators.shapes": "settings solver solver.registration pipelines pipelines.shapes blender "

@@ -29,9 +29,16 @@ def add(commands) -> None:
     add_files(command, accepts=f"{FORMATS} .off")
     command.add_argument(
         "--weights",
-        required=True,
+        default="",
         metavar="NAME",
         help="vertex group of the region, or an attribute of floats on vertices or faces; or saliency, or curvature",
+    )
+    command.add_argument(
+        "--region",
+        action="append",
+        default=[],
+        metavar="NAME=FACTOR",
+        help="in place of --weights and --factor: a region and its factor; repeated, all shares are exact together",
     )
     command.add_argument(
         "--factor", type=positive, default=DEFAULT_FACTOR, metavar="M", help="times its share (default %(default)s)"
@@ -65,6 +72,16 @@ def add(commands) -> None:
         metavar="FILE",
         help="picture of the new UVs, .png .exr .tif .jpg",
     )
+    command.add_argument(
+        "--detail",
+        action="append",
+        default=[],
+        metavar="FILE:U0,V0,U1,V1",
+        help="picture of higher resolution of a box of the old UVs, laid over --image where it is magnified; repeated",
+    )
+    command.add_argument(
+        "--image-size", type=texture_size, default=0, metavar="PX", help="width of --image-output; default: of --image"
+    )
     add_report(command, "island")
 
 
@@ -77,10 +94,10 @@ def times(text: str) -> int:
 
 def run(options: argparse.Namespace) -> None:
     require_blender()
-    from ..blender.weights import named_weights
-    from ..pipelines.magnify import Region, magnify, warped_picture
+    from ..pipelines.magnify import magnify
+    from ..pipelines.regions.several import magnify_several
 
-    picture = _picture(options)
+    named, picture = _named(options), _picture(options)
     settings = MagnifySettings(
         boundary=options.boundary,
         quality=options.quality,
@@ -93,26 +110,57 @@ def run(options: argparse.Namespace) -> None:
     )
     objects, readings = read_layers(options)
     with refusals(objects):
-        weights, told = named_weights(list(zip(objects, readings, strict=True)), options.weights)
-        regions = [
-            Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up)
-            for r, w in zip(readings, weights, strict=True)
-        ]
-        result = drain_shown(magnify(regions, settings))
+        several, told = _regions(named, list(zip(objects, readings, strict=True)))
+        regions = several[0].parts
+        steps = magnify_several(several, settings) if options.region else magnify(regions, settings)
+        result = drain_shown(steps)
         result = replace(result, warnings=[*told, *result.warnings])
         written = write_layers(options, zip(objects, readings, strict=True), result, existed=options.source == "uv")
     if picture is not None:
-        _write_picture(options, warped_picture(picture[0], regions, result, options.margin, picture[1]))
+        _write_picture(options, _warped(options, picture, regions, result))
     print(result.shares.text())
     if options.report:
         more = {"weights": options.weights, "factor": options.factor, "exact": options.exact, "source": options.source}
+        more |= {"regions": dict(named)} if options.region else {}
         shares = {"share": result.shares.report()}
         write_report(options, {**more, "cascade": options.cascade, **shares}, objects, result.reports, written)
 
 
+def _named(options: argparse.Namespace) -> list[tuple[str, float]]:
+    """Names of regions and their factors."""
+    from ..pipelines.regions.several import region_factors
+
+    if bool(options.weights) == bool(options.region):
+        raise CommandError("Give either --weights NAME and --factor, or --region NAME=FACTOR once or more often.")
+    try:
+        return region_factors(options.region) or [(options.weights, options.factor)]
+    except ValueError as error:
+        raise CommandError(f"--region: {error}.") from error
+
+
+def _regions(named: list[tuple[str, float]], pairs: list) -> tuple[list, list[tuple[int, str]]]:
+    """The regions with what of them is on each object, and warnings."""
+    from ..blender.weights import named_weights
+    from ..pipelines.magnify import Region
+    from ..pipelines.regions.several import NamedRegion
+
+    found, told = [], []
+    for name, factor in named:
+        weights, texts = named_weights(pairs, name)
+        told += texts
+        parts = [
+            Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up)
+            for (_, r), w in zip(pairs, weights, strict=True)
+        ]
+        found.append(NamedRegion(name, factor, tuple(parts)))
+    return found, told
+
+
 def _picture(options: argparse.Namespace):
-    """Pixels (h,w,4) of the picture that shall follow, and whether its alpha is straight; or None."""
+    """Pixels (h,w,4) of the picture that shall follow, whether its alpha is straight, and insets; or None."""
     if options.image is None and options.image_output is None:
+        if options.detail or options.image_size:
+            raise CommandError("--detail and --image-size go with --image and --image-output. Give all of them.")
         return None
     if options.image is None or options.image_output is None:
         raise CommandError("A picture needs both --image and --image-output.")
@@ -123,9 +171,40 @@ def _picture(options: argparse.Namespace):
     try:
         images.check_target(options.image_output)
         image = images.load(options.image)
-        return images.pixels_of(image), images.has_straight_alpha(image)
+        return images.pixels_of(image), images.has_straight_alpha(image), _insets(options)
     except images.ImageError as error:
         raise CommandError(str(error)) from error
+
+
+def _insets(options: argparse.Namespace) -> list:
+    """Pictures that are laid over boxes of the old UVs."""
+    from ..files import images
+    from ..pipelines.regions.detail import parsed_inset
+    from ..solver.editing.inset_images import InsetImage
+
+    found = []
+    for text in options.detail:
+        try:
+            name, low, high = parsed_inset(text)
+        except ValueError as error:
+            raise CommandError(f"--detail: {error}.") from error
+        found.append(InsetImage(images.pixels_of(images.load(Path(name))), low, high))
+    return found
+
+
+def _warped(options: argparse.Namespace, picture, regions, result):
+    """The picture of the new UVs."""
+    from ..pipelines.magnify import warped_picture
+    from ..pipelines.regions.detail import detailed_picture
+
+    pixels, straight, insets = picture
+    if not insets and not options.image_size:
+        return warped_picture(pixels, regions, result, options.margin, straight)
+    height, width = pixels.shape[:2]
+    wide = options.image_size or width
+    return detailed_picture(
+        pixels, regions, result, insets, (max(1, round(height * wide / width)), wide), options.margin
+    )
 
 
 def _write_picture(options: argparse.Namespace, picture) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ..session import run
 from ..settings import (
@@ -52,6 +52,11 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         name="Attribute",
         description="Attribute of floats on vertices or faces that marks the region with 1, or its largest value",
     )
+    further: StringProperty(
+        name="Further Regions",
+        description="Vertex groups that get factors of their own at the same time, such as: eyes=3, mouth=1.5. "
+        "All shares are exact together",
+    )
     exact: BoolProperty(
         name="Exact Share",
         description="The region gets exactly the factor times its share of the whole. "
@@ -90,6 +95,25 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         description="Let the materials of the objects show the warped image in place of the old one",
         default=True,
     )
+    detail: StringProperty(
+        name="Detail Image",
+        description="Image of higher resolution that is laid over what is magnified. Empty: none",
+    )
+    detail_box: FloatVectorProperty(
+        name="Detail Box",
+        description="Lower left and upper right corner of what the detail image shows, in the old UVs. "
+        "Without an area: the box of the region",
+        size=4,
+        default=(0.0, 0.0, 0.0, 0.0),
+    )
+    image_size: IntProperty(
+        name="Image Width",
+        description="Pixels of the warped image along its width. 0: as the old one",
+        default=0,
+        min=0,
+        max=65536,
+        subtype="PIXEL",
+    )
     image: StringProperty(
         name="Warp Image",
         description="Image that follows the UVs: a copy is made that looks on the mesh as the old one did. "
@@ -116,6 +140,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
     def steps(self, context: bpy.types.Context):
         from ..files import images
         from ..pipelines.magnify import Region, magnify, warped_picture
+        from ..pipelines.regions.several import magnify_several
 
         objects, readings = read_writable(context)
         with complaints(objects=objects):
@@ -123,13 +148,19 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             if source == "auto":
                 source = "uv" if all(reading.uv is not None for reading in readings) else "mesh"
             picture = images.pixels_of(images.named(self.image)) if self.image and source == "uv" else None
-            weights, warnings = self._weights(context, list(zip(objects, readings, strict=True)))
+            pairs = list(zip(objects, readings, strict=True))
+            weights, warnings = self._weights(context, pairs)
             regions = [
                 Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up)
                 for r, w in zip(readings, weights, strict=True)
             ]
-            result = yield from run.aside(magnify(regions, self.settings(source)))
-        if picture is not None:
+            several = self._further(pairs, regions)
+            settings = self.settings(source)
+            steps = magnify_several(several, settings) if len(several) > 1 else magnify(regions, settings)
+            result = yield from run.aside(steps)
+        if picture is not None and (self.detail or self.image_size):
+            picture = self._detailed(picture, regions, result)
+        elif picture is not None:
             straight = images.has_straight_alpha(images.named(self.image))
             picture = warped_picture(picture, regions, result, self.margin, straight)
         return objects, replace(result, warnings=[*warnings, *result.warnings]), picture
@@ -142,6 +173,44 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             return attribute_weights(pairs, self.attribute)
         return [Weights(w) for w in region_weights(pairs, self.weight_group or _active_group(context))], []
 
+    def _detailed(self, picture, regions, result):
+        """The warped picture with the detail laid over its box. Raises GroupError."""
+        from ..blender.vertex_groups import GroupError
+        from ..files import images
+        from ..pipelines.regions.detail import box_of, detailed_picture
+        from ..solver.editing.inset_images import InsetImage
+
+        height, width = picture.shape[:2]
+        wide = self.image_size or width
+        insets = []
+        if self.detail:
+            low, high = tuple(self.detail_box[:2]), tuple(self.detail_box[2:])
+            box = (low, high) if high[0] > low[0] and high[1] > low[1] else box_of(regions)
+            if box is None:
+                raise GroupError("Detail Image: No face with UVs is in the region. Paint it, or give the box.")
+            insets.append(InsetImage(images.pixels_of(images.named(self.detail)), *box))
+        size = (max(1, round(height * wide / width)), wide)
+        return detailed_picture(picture, regions, result, insets, size, self.margin)
+
+    def _further(self, pairs, regions) -> list:
+        """The region, and those of *Further Regions*, each with its factor. Raises GroupError."""
+        from dataclasses import replace as changed
+
+        from ..blender.vertex_groups import GroupError
+        from ..blender.weights import region_weights
+        from ..pipelines.regions.several import NamedRegion, region_factors
+
+        try:
+            further = region_factors([text for text in self.further.split(",") if text.strip()])
+        except ValueError as error:
+            raise GroupError(f"Further Regions: {error}.") from error
+        found = [NamedRegion(self.weight_group or self.attribute or "Region", self.factor, tuple(regions))]
+        for name, factor in further:
+            weights = region_weights(pairs, name)
+            parts = [changed(r, weights=w, kind="vertex") for r, w in zip(regions, weights, strict=True)]
+            found.append(NamedRegion(name, factor, tuple(parts)))
+        return found
+
     def finish(self, context: bpy.types.Context, result) -> None:
         from ..files import images
 
@@ -149,12 +218,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         write_layers(objects, "", magnified)
         shares = magnified.shares
         worst = max((island["area_l1"] for mine in magnified.reports for island in mine), default=0.0)
-        self.said = (
-            ("Region before", f"{100 * shares.before:.3f} %"),
-            ("Region asked", f"{100 * shares.target:.3f} %"),
-            ("Region now", f"{100 * shares.after:.3f} %"),
-            ("Area error", f"{100 * worst:.2f} %"),
-        )
+        self.said = (*shares.said(), ("Area error", f"{100 * worst:.2f} %"))
         warn(self, objects, [*magnified.warnings, *_beyond(objects, magnified)])
         text = shares.text()
         if picture is not None:
@@ -203,6 +267,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
         choose_attribute(layout, properties, "attribute")
     else:
         choose_group(layout, properties, "weight_group")
+    layout.prop(properties, "further")
     layout.prop(properties, "exact")
     layout.prop(properties, "source")
     column = layout.column()
@@ -216,4 +281,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
         column = layout.column()
         column.active = bool(properties.image)
         column.prop(properties, "use_image")
+        column.prop(properties, "image_size")
+        column.prop_search(properties, "detail", bpy.data, "images", icon="IMAGE_DATA")
+        column.prop(properties, "detail_box")
     draw_margin(layout, properties)

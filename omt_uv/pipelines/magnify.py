@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -77,6 +78,14 @@ class Shares:
         """Figures for a report."""
         return {"before": self.before, "asked": self.target, "after": self.after, "factor": self.contrast}
 
+    def said(self) -> tuple[tuple[str, str], ...]:
+        """What the panel shows."""
+        return (
+            ("Region before", f"{100 * self.before:.3f} %"),
+            ("Region asked", f"{100 * self.target:.3f} %"),
+            ("Region now", f"{100 * self.after:.3f} %"),
+        )
+
     def text(self) -> str:
         """One sentence for the user."""
         return (
@@ -91,6 +100,19 @@ class Shares:
         return (f"The region has {100 * self.after:.4g} % of the texture instead of {100 * self.target:.4g} %",)
 
 
+class MeasuredShares(Protocol):
+    """Shares of one or several regions, for those who tell of them."""
+
+    def report(self) -> dict | list:
+        """Figures for a report."""
+
+    def said(self) -> tuple[tuple[str, str], ...]:
+        """What the panel shows."""
+
+    def text(self) -> str:
+        """One sentence for the user."""
+
+
 @dataclass(frozen=True)
 class Magnified:
     """Corners (k,) to write and their UVs (k,2) and reports, of each surface; shares of the region; warnings.
@@ -101,7 +123,7 @@ class Magnified:
     corners: list[np.ndarray]
     uv: list[np.ndarray]
     reports: list[list[dict]]
-    shares: Shares
+    shares: MeasuredShares
     warnings: list[tuple[int, str]]
 
 
@@ -115,7 +137,7 @@ def magnify(regions: Sequence[Region], settings: MagnifySettings) -> Steps[Magni
     """
     for index, region in enumerate(regions):
         try:
-            _check(region)
+            check_weights(region)
         except MeshError as error:
             raise Refusal(index, error) from error
     if settings.source == "uv":
@@ -123,7 +145,7 @@ def magnify(regions: Sequence[Region], settings: MagnifySettings) -> Steps[Magni
     return (yield from _from_mesh(regions, settings))
 
 
-def _check(region: Region) -> None:
+def check_weights(region: Region) -> None:
     """Weights that are no weights, by their elements; a region may lie on one of several surfaces alone."""
     wrong = np.flatnonzero(~np.isfinite(region.weights))
     if len(wrong):
@@ -138,7 +160,7 @@ def _check(region: Region) -> None:
 
 def _from_mesh(regions, settings: MagnifySettings) -> Steps[Magnified]:
     """Unwrap with the density as target; the share is that of all surfaces together."""
-    parts = [_triangles(region) for region in regions]
+    parts = [region_triangles(region) for region in regions]
     area = np.concatenate([a for _, a, _ in parts])
     weights = np.concatenate([w for *_, w in parts])
     try:
@@ -156,7 +178,7 @@ def _from_mesh(regions, settings: MagnifySettings) -> Steps[Magnified]:
     if settings.boundary == "own":
         settings = replace(settings, boundary="free")
     layout = yield from lay_out(jobs, settings)
-    after = [_uv_areas(*x) for x in zip(regions, parts, layout.corners, layout.uv, strict=True)]
+    after = [uv_areas(*x) for x in zip(regions, parts, layout.corners, layout.uv, strict=True)]
     shares = Shares(
         before=found.share_before,
         target=found.target_share,
@@ -175,7 +197,7 @@ def whole_factor(settings: MagnifySettings) -> float:
         return float(np.float64(settings.factor) ** settings.cascade)
 
 
-def _triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def region_triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Triangles to work on (k,), their areas in space (k,) and weights (k,)."""
     surface = region.surface
     rows = np.flatnonzero(region.faces[surface.triangle_face])
@@ -184,7 +206,7 @@ def _triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return rows, np.where(np.isfinite(area), area, 0.0), region.of_triangles(rows)
 
 
-def _uv_areas(region: Region, part, corners: np.ndarray, uv: np.ndarray) -> np.ndarray:
+def uv_areas(region: Region, part, corners: np.ndarray, uv: np.ndarray) -> np.ndarray:
     """UV areas of the triangles worked on (k,), 0 for those that were left out."""
     full = np.zeros((len(region.surface.corner_vertex), 2))
     full[corners] = uv
@@ -365,6 +387,11 @@ def warped_picture(
 
     straight : see `solver.editing.image_warp.warp_image`
     """
+    return warp_image(picture, *layouts(regions, result), int(margin), straight)
+
+
+def layouts(regions: Sequence[Region], result: Magnified) -> tuple[np.ndarray, np.ndarray]:
+    """The triangles (m,3,2) that moved, in the UVs there were and in those that the result has."""
     old, new = [], []
     for region, corners, uv in zip(regions, result.corners, result.uv, strict=True):
         before = np.asarray(region.pins.uv, float) if region.pins is not None else np.zeros((0, 2))
@@ -374,4 +401,4 @@ def warped_picture(
         triangles = region.surface.triangles[moved]
         old.append(before[triangles])
         new.append(after[triangles])
-    return warp_image(picture, np.concatenate(old), np.concatenate(new), int(margin), straight)
+    return np.concatenate(old), np.concatenate(new)

@@ -111,3 +111,47 @@ def test_pictures_that_cannot_be_written_are_refused_first(run, tmp_path, name):
     pictures = ("--image", tmp_path / "map.png", "--image-output", tmp_path / name)
     status, _, err = run("magnify", *files, "--source", "uv", *pictures)
     assert status == 1 and len(err.splitlines()) == 1 and not (tmp_path / "out.blend").exists()
+
+
+def two_regions(tmp_path):
+    obj = scenes.bump(16, 16)
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    for name, columns in (("left", range(3, 7)), ("right", range(10, 14))):
+        members = [17 * row + column for row in range(5, 12) for column in columns]
+        obj.vertex_groups.new(name=name).add(members, 1.0, "REPLACE")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+
+
+@pytest.mark.parametrize("source", ["mesh", "uv"])
+def test_several_regions_have_exact_shares_together(run, tmp_path, source):
+    two_regions(tmp_path)
+    report = tmp_path / "r.json"
+    files = ("magnify", tmp_path / "in.blend", "-o", tmp_path / "o.blend", "--source", source)
+    status, out, err = run(*files, "--region", "left=2.5", "--region", "right=0.6", "--report", report)
+    assert status == 0 and "left from" in out, err
+    for row, factor in zip(json.loads(report.read_text())["share"], (2.5, 0.6), strict=True):
+        assert row["asked"] == pytest.approx(factor * row["before"])
+        assert row["after"] == pytest.approx(row["asked"], rel=1.5e-3)
+    status, _, err = run(*files, "--region", "left=6", "--region", "right=6")
+    assert status == 1 and "together" in err and "--no-exact" in err
+    assert run(*files)[0] == 1 and run(*files, "--region", "left")[0] == 1
+    assert run(*files, "--region", "left=2", "--weights", "left")[0] == 1
+
+
+def test_detail_is_laid_over_what_is_magnified(run, tmp_path):
+    two_regions(tmp_path)
+    for name, size, colour in (("map", 64, (0.5, 0.5, 0.5, 1)), ("fine", 16, (1.0, 0.0, 0.0, 1))):
+        image = bpy.data.images.new(name, size, size)
+        image.pixels[:] = colour * size**2
+        image.filepath_raw, image.file_format = str(tmp_path / f"{name}.png"), "PNG"
+        image.save()
+    options = ("--source", "uv", "--weights", "left", "--factor", 2, "--image", tmp_path / "map.png")
+    options += ("--image-output", tmp_path / "new.png", "--image-size", 96)
+    files = ("magnify", tmp_path / "in.blend", "-o", tmp_path / "o.blend", *options)
+    status, _, err = run(*files, "--detail", f"{tmp_path / 'fine.png'}:0.2,0.3,0.4,0.7")
+    assert status == 0, err
+    new = bpy.data.images.load(str(tmp_path / "new.png"))
+    red = sum(r > 0.9 for r in new.pixels[:][0::4]) / 96**2
+    assert tuple(new.size) == (96, 96) and 0.06 < red < 0.25
+    assert run(*files, "--detail", f"{tmp_path / 'fine.png'}:0.4,0.3,0.2,0.7")[0] == 1
+    assert run(*files, "--detail", f"{tmp_path / 'none.png'}:0.2,0.3,0.4,0.7")[0] == 1

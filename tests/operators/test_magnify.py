@@ -317,3 +317,28 @@ def test_packed_copies_of_deep_images_keep_their_colours(tmp_path, suffix, kind,
     # From what was packed, as a saved file has it.
     copy.reload()
     assert copy.pixels[:] == pytest.approx(image.pixels[:], abs=2e-3)
+
+
+def test_further_regions_and_detail_over_the_region():
+    obj = scenes.bump(16, 16)
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    for name, columns in (("left", range(3, 7)), ("right", range(10, 14))):
+        members = [17 * row + column for row in range(5, 12) for column in columns]
+        obj.vertex_groups.new(name=name).add(members, 1.0, "REPLACE")
+    for name, value in (("map", 0.5), ("fine", 1.0)):
+        image = bpy.data.images.new(name, 32, 32)
+        image.pixels[:] = (value, value, value, 1.0) * 32**2
+    given = {"source": "UV", "weight_group": "left", "factor": 2.0, "further": "right=1.5", "image": "map"}
+    before = np.abs(scenes.polygon_areas(obj)[1])
+    assert bpy.ops.uv.omt_magnify(**given, detail="fine", image_size=64) == {"FINISHED"}
+    after = np.abs(scenes.polygon_areas(obj)[1])
+    whole = {"left": np.s_[3:6], "right": np.s_[10:13]}
+    for name, factor in (("left", 2.0), ("right", 1.5)):
+        grids = [a.reshape(16, 16)[5:11, whole[name]].sum() / a.sum() for a in (before, after)]
+        assert grids[1] > (1 + 0.6 * (factor - 1)) * grids[0]
+    warped = bpy.data.images["map warped"]
+    bright = sum(value > 0.9 for value in warped.pixels[:][0::4]) / 64**2
+    assert tuple(warped.size) == (64, 64) and bright > 0.1
+    state = scenes.state(obj)
+    text = scenes.error_of(bpy.ops.uv.omt_magnify, **{**given, "further": "right"})
+    assert "eyes=3" in text and scenes.state(obj) == state

@@ -24,22 +24,22 @@ def warp_image(
     straight : the last channel is alpha, and colours are not multiplied by it: what is transparent has no part in means
     """
     height, width = picture.shape[:2]
-    place, covered = _places(old, new, height, width)
-    place, known = _padded(place, covered, margin)
+    place, _, known = continued(*old_places(old, new, height, width), margin)
     result = np.array(picture, dtype=float, copy=True)
     result[known] = _by_alpha(picture, place[known]) if straight else _repeated(picture, place[known])
     if np.issubdtype(picture.dtype, np.floating):
         return result.astype(picture.dtype)
-    return _rounded(result, picture.dtype)
+    return rounded(result, picture.dtype)
 
 
-def _rounded(values: np.ndarray, dtype) -> np.ndarray:
+def rounded(values: np.ndarray, dtype) -> np.ndarray:
+    """Values as integers of a type, within its limits, in their shape."""
     limits = np.iinfo(dtype)
     return np.clip(np.rint(values), limits.min, limits.max).astype(dtype)
 
 
-def _places(old, new, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """The old UV (h,w,2) of every pixel's middle, and which pixels (h,w) bool a face covers.
+def old_places(old: np.ndarray, new: np.ndarray, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """The old UV (h,w,2) of every pixel's middle, and the triangle (h,w) that covers it, -1 for none.
 
     All pixels of the faces' bounding boxes at once, in slices of faces so that memory stays bounded.
     """
@@ -49,7 +49,7 @@ def _places(old, new, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
     high = np.clip(np.floor(corner.max(axis=1) + 1e-9) + 1, 0, size).astype(np.int64)
     span = np.maximum(high - low, 0)
     count = span.prod(axis=1)
-    place, covered = np.zeros((height, width, 2)), np.zeros((height, width), bool)
+    place, covered = np.zeros((height, width, 2)), np.full((height, width), -1, np.int64)
     for part in np.split(np.arange(len(new)), _cuts(count, ROWS * max(width, 256))):
         face, k = expand(count[part])
         face = part[face]
@@ -59,7 +59,7 @@ def _places(old, new, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
         inside = (share >= -1e-9).all(axis=1)
         x, y, face, share = x[inside], y[inside], face[inside], share[inside]
         place[y, x] = np.einsum("ki,kid->kd", share, old[face])
-        covered[y, x] = True
+        covered[y, x] = face
     return place, covered
 
 
@@ -79,13 +79,15 @@ def _barycentric(corner: np.ndarray, point: np.ndarray) -> np.ndarray:
     return np.stack([1 - v - w, v, w], axis=1)
 
 
-def _padded(place: np.ndarray, covered: np.ndarray, margin: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places continued into uncovered pixels nearer than `margin`, each that of its nearest covered pixel."""
+def continued(place: np.ndarray, face: np.ndarray, margin: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places (h,w,2) and faces (h,w) continued into uncovered pixels nearer than `margin`, each that of its nearest
+    covered pixel, and which pixels (h,w) bool have one."""
+    covered = face >= 0
     if margin <= 0 or covered.all() or not covered.any():
-        return place, covered
+        return place, face, covered
     distance, nearest = distance_transform_edt(~covered, return_indices=True)
     near = distance <= margin
-    return place[nearest[0], nearest[1]], near
+    return place[nearest[0], nearest[1]], face[nearest[0], nearest[1]], near
 
 
 def _by_alpha(picture: np.ndarray, uv: np.ndarray) -> np.ndarray:

@@ -163,7 +163,7 @@ def magnify_region(
         uv, done = step.uv, done + step.iterations
         texts += [text for text in step.warnings if text not in texts]
     has, target = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
-    error = float(np.abs(_by_polygon(has - target, polygons)).sum())
+    error = float(np.abs(by_polygon(has - target, polygons)).sum())
     texts += area_error_warnings(error, count * QUALITIES[quality].area_error)
     return RegionMagnification(
         uv=uv,
@@ -177,7 +177,7 @@ def magnify_region(
     )
 
 
-def _by_polygon(values: np.ndarray, polygons: np.ndarray | None) -> np.ndarray:
+def by_polygon(values: np.ndarray, polygons: np.ndarray | None) -> np.ndarray:
     """Values of triangles (m,) summed over their polygons, (p,)."""
     return values if polygons is None else np.bincount(np.unique(polygons, return_inverse=True)[1].ravel(), values)
 
