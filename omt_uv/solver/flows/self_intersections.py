@@ -20,9 +20,7 @@ def intersecting_pairs(vertices: np.ndarray, triangles: np.ndarray, concerned: n
     """Pairs (k,2) of triangles (m,3) of vertices (n,3) that intersect, sorted; only pairs with one that is `concerned`
     (m,) bool where this is given."""
     corner = np.asarray(vertices, float)[triangles]
-    pairs = _candidates(corner)
-    if concerned is not None and len(pairs):
-        pairs = pairs[concerned[pairs].any(axis=1)]
+    pairs = _candidates(corner, concerned)
     found = [
         pairs[k : k + BLOCK][_intersect(corner, triangles, pairs[k : k + BLOCK])] for k in range(0, len(pairs), BLOCK)
     ]
@@ -30,24 +28,33 @@ def intersecting_pairs(vertices: np.ndarray, triangles: np.ndarray, concerned: n
     return result[np.lexsort((result[:, 1], result[:, 0]))]
 
 
-def _candidates(corner: np.ndarray) -> np.ndarray:
-    """Pairs (k,2), the smaller number first, of triangles (m,3,3) whose boxes overlap."""
+def _candidates(corner: np.ndarray, concerned: np.ndarray | None = None) -> np.ndarray:
+    """Pairs (k,2), the smaller number first, of triangles (m,3,3) whose boxes overlap; see `intersecting_pairs`."""
     low, high = corner.min(axis=1), corner.max(axis=1)
     centre, radius = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
     least = float(np.median(radius)) or 1.0
     level = np.maximum(np.ceil(np.log2(np.maximum(radius / least, 1e-9))), 0).astype(int)
     classes = [np.flatnonzero(level == k) for k in np.unique(level)]
     trees = [cKDTree(centre[c]) for c in classes]
+
+    def between(mine: np.ndarray, other: np.ndarray, tree: cKDTree) -> np.ndarray:
+        around = tree.query_ball_point(centre[mine], radius[mine] + radius[other].max())
+        counts = np.array([len(a) for a in around], int)
+        flat = np.concatenate([np.asarray(a, np.int64) for a in around]) if counts.sum() else np.zeros(0, np.int64)
+        return _overlapping(np.stack([np.repeat(mine, counts), other[flat]], axis=1), low, high)
+
+    if concerned is not None:
+        mine = np.flatnonzero(concerned)
+        found = [between(mine, other, tree) for other, tree in zip(classes, trees, strict=True)] if len(mine) else []
+        pairs = np.sort(np.concatenate([np.zeros((0, 2), np.int64), *found]), axis=1)
+        # Twice where both are concerned.
+        return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
     found = []
     for k, mine in enumerate(classes):
         near = trees[k].query_pairs(2 * radius[mine].max(), output_type="ndarray")
         found.append(_overlapping(mine[near], low, high))
-        for other, tree in zip(classes[:k], trees[:k], strict=True):
-            # Queries go out from the larger, which are the fewer.
-            around = tree.query_ball_point(centre[mine], radius[mine] + radius[other].max())
-            counts = np.array([len(a) for a in around], int)
-            flat = np.concatenate([np.asarray(a, np.int64) for a in around]) if counts.sum() else np.zeros(0, np.int64)
-            found.append(_overlapping(np.stack([np.repeat(mine, counts), other[flat]], axis=1), low, high))
+        # Queries go out from the larger, which are the fewer.
+        found += [between(mine, other, tree) for other, tree in zip(classes[:k], trees[:k], strict=True)]
     return np.sort(np.concatenate(found), axis=1)
 
 

@@ -26,12 +26,6 @@ class Shell:
     value: float
 
 
-def shell_radii(count: int) -> np.ndarray:
-    """Radii (count,) of spheres that divide the unit ball into count + 1 parts of equal volume, without the last
-    one, 1."""
-    return np.cbrt(np.arange(1, count + 1) / (count + 1))
-
-
 def shell_surfaces(points: np.ndarray, positions: np.ndarray, tets: np.ndarray, count: int) -> tuple[Shell, ...]:
     """Surfaces (count) in a body, spheres of its ball map, that divide it into count + 1 parts of equal volume.
 

@@ -1,4 +1,4 @@
-"""The energy of a map of tetrahedra, shear plus error of volume, its gradient and its positive semidefinite Hessian.
+"""The energy of a map of tetrahedra, shear plus error of volume, its gradient and a positive definite Hessian.
 
 With F the Jacobian of a tetrahedron, scaled so that its determinant d is 1 where the volume is right,
 
@@ -6,7 +6,8 @@ With F the Jacobian of a tetrahedron, scaled so that its determinant d is 1 wher
 
 (Garanzha et al. 2021): with eps = 0 a barrier against inversion, above it finite for inverted tetrahedra, too.
 Functions of |F|^2 and d have Hessians whose eigenvectors are known in the frame of singular values (Smith, de Goes,
-Kim 2019): six that mix two axes, and three in the block of the singular values.
+Kim 2019): six that mix two axes, and three in the block of the singular values. Negative ones count by their size
+(Chen et al. 2024): set to zero, they let inverted tetrahedra run off along what the model takes for flat.
 """
 
 from __future__ import annotations
@@ -41,12 +42,12 @@ class TetEnergy:
 
     def jacobians(self, points: np.ndarray) -> np.ndarray:
         """F (m,3,3) of every tetrahedron at points (n,3)."""
-        return np.einsum("mai,maj->mij", points[self.tets], self.gradient)
+        return np.swapaxes(points[self.tets], 1, 2) @ self.gradient
 
     def value(self, points: np.ndarray) -> float:
         """The energy at points (n,3); infinite where a tetrahedron is inverted and eps is 0."""
         F = self.jacobians(points)
-        d = np.linalg.det(F)
+        d = determinants(F)
         if self.eps == 0 and not d.min() > 0:
             return np.inf
         chi = self._chi(d)
@@ -60,7 +61,8 @@ class TetEnergy:
         return np.where(d > 0, (d + root) / 2, np.maximum(below, 1e-30))
 
     def derivatives(self, points: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (n,3) in space, and blocks (m,4,3,4,3) of the Hessian, without its negative part, in the frames
+        """Gradient (n,3) in space, and blocks (m,4,3,4,3) of the Hessian, its eigenvalues taken by
+        their size, in the frames
         (n,3,3) of the vertices, whose columns are axes."""
         F = self.jacobians(points)
         U, s, V = signed_svd(F)
@@ -72,10 +74,12 @@ class TetEnergy:
         flat = self.tets.ravel()
         forces = np.einsum("mij,maj->mai", first, self.gradient).reshape(-1, 3)
         slope = np.stack([np.bincount(flat, forces[:, k], len(points)) for k in range(3)], axis=1)
-        blocks = self._blocks(s, minors, (by_square, by_both, by_d, by_dd), np.einsum("maj,mjk->mak", self.gradient, V))
-        turn = np.einsum("maji,mjk->maik", frames[self.tets], U)
-        half = np.einsum("maij,majbl->maibl", turn, blocks, optimize=True)
-        return slope, np.einsum("maibl,mbkl->maibk", half, turn, optimize=True)
+        inner = self._inner(s, minors, (by_square, by_both, by_d, by_dd))
+        turn = np.swapaxes(frames[self.tets], 2, 3) @ U[:, None]
+        along = self.gradient @ V
+        # What every unknown does to U^T F V.
+        B = np.einsum("mali,mak->mikal", turn, along).reshape(-1, 9, 12)
+        return slope, (np.swapaxes(B, 1, 2) @ (inner @ B)).reshape(-1, 4, 3, 4, 3)
 
     def _partial(self, square: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, ...]:
         """Derivatives (m,) by |F|^2, by both, by d, and twice by d."""
@@ -90,8 +94,8 @@ class TetEnergy:
         by_dd += w * (1 / chi - 2 * d * one / chi**2 + (d**2 + 1) * (one**2 / chi**3 - two / (2 * chi**2)))
         return by_square, by_both, by_d, by_dd
 
-    def _blocks(self, s: np.ndarray, minors: np.ndarray, partial: tuple, b: np.ndarray) -> np.ndarray:
-        """Blocks (m,4,3,4,3) in the frames of singular values; b (m,4,3): gradients there."""
+    def _inner(self, s: np.ndarray, minors: np.ndarray, partial: tuple) -> np.ndarray:
+        """The Hessian (m,9,9), its eigenvalues by their size, by the entries of U^T F V, row by row."""
         by_square, by_both, by_d, by_dd = (p[:, None, None] for p in partial)
         least = LEAST * 2 / 3
         mixed = 2 * s[:, :, None] * minors[:, None, :]
@@ -101,22 +105,16 @@ class TetEnergy:
             A[:, j, i] += partial[2] * s[:, k]
         A += 2 * by_square * np.eye(3)
         values, vectors = np.linalg.eigh(A)
-        A = np.einsum("mik,mk,mjk->mij", vectors, np.maximum(values, least), vectors, optimize=True)
-        A *= self.weight[:, None, None]
-        result = np.zeros((len(s), 4, 3, 4, 3))
-        outer = b[:, :, :, None, None] * b[:, None, None, :, :]
-        for i in range(3):
-            for k in range(3):
-                result[:, :, i, :, k] += A[:, i, k, None, None] * outer[:, :, i, :, k]
-                if i == k:
-                    continue
-                other = 3 - i - k
-                base, bend = 2 * partial[0], partial[2] * s[:, other]
-                twist, flip = np.maximum(base + bend, least), np.maximum(base - bend, least)
-                p, q = self.weight * (flip + twist) / 2, self.weight * (flip - twist) / 2
-                result[:, :, i, :, i] += p[:, None, None] * outer[:, :, k, :, k]
-                result[:, :, i, :, k] += q[:, None, None] * outer[:, :, k, :, i]
-        return result
+        A = (vectors * np.maximum(np.abs(values), least)[:, None]) @ np.swapaxes(vectors, 1, 2)
+        result = np.zeros((len(s), 3, 3, 3, 3))
+        axis = np.arange(3)
+        result[:, axis[:, None], axis[:, None], axis, axis] = A
+        for i, k in ((0, 1), (1, 2), (2, 0)):
+            base, bend = 2 * partial[0], partial[2] * s[:, 3 - i - k]
+            twist, flip = np.maximum(np.abs(base + bend), least), np.maximum(np.abs(base - bend), least)
+            result[:, i, k, i, k] = result[:, k, i, k, i] = (flip + twist) / 2
+            result[:, i, k, k, i] = result[:, k, i, i, k] = (flip - twist) / 2
+        return result.reshape(-1, 9, 9) * self.weight[:, None, None]
 
 
 def tet_energy(shape: RestShape, size: float, volume_weight: float, eps: float = 0.0) -> TetEnergy:
@@ -154,6 +152,11 @@ def rest_shape(points: np.ndarray, tets: np.ndarray, smallest: float) -> RestSha
     inverse = np.linalg.inv(rest)
     gradient = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     return RestShape(tets, gradient, asked / asked.sum())
+
+
+def determinants(F: np.ndarray) -> np.ndarray:
+    """Of matrices (m,3,3), (m,)."""
+    return np.einsum("mi,mi->m", np.cross(F[:, 0], F[:, 1]), F[:, 2])
 
 
 def signed_svd(F: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,24 +1,22 @@
 """Map tetrahedra by Newton's method: untangled first, then with volumes in stages of growing weight.
 
-Volumes of single tetrahedra cannot all be right: there are more of them than unknowns. Those around vertices can, and
-are what is made exact at the end, by an augmented Lagrangian (Hestenes 1969) whose multipliers are pressures at
-vertices, as the nodal pressures of Bonet and Burton (1998).
+Volumes of single tetrahedra cannot all be right by the places in the domain alone: there are more of them than
+unknowns. `tet_exact` does the rest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, cg
+from scipy.sparse.linalg import cg
 
 from ..errors import TetrahedraError
 from ..progress import Progress, Steps
 from .domains import BallDomain, CubeDomain
 from .tet_energy import RestShape, TetAssembly, rest_shape, tet_energy
-from .tet_mesh import around_vertices, tet_volumes, vertex_share_error, volume_gradients
+from .tet_mesh import tet_volumes
 
 # Steps that untangle; eps of the first, its factor from step to step, that after a step that failed, and its least.
 UNTANGLING = 80
@@ -31,9 +29,6 @@ COARSE = 0.1
 FINE = 0.01
 # Weights of the volumes, and the steps at each.
 STAGES = ((1.0, 2), (10.0, 4), (100.0, 3))
-# Stiffness of volumes around vertices, over the weight of the last stage, and rounds with more of it.
-PRESSURE = 30.0
-PRESSURES = 14
 # Predicted decrease over the energy at which a stage ends.
 ENOUGH = 0.02
 # Of conjugate gradients.
@@ -55,11 +50,6 @@ class TetProblem:
     coarse: RestShape
     fine: RestShape
     count: int
-
-    @cached_property
-    def vertex_share(self) -> np.ndarray:
-        """Share (n,) of the volume around every vertex."""
-        return around_vertices(self.share, self.tets, self.count)
 
 
 def tet_problem(points: np.ndarray, tets: np.ndarray, domain: BallDomain | CubeDomain) -> TetProblem:
@@ -112,10 +102,9 @@ def untangled(problem: TetProblem, points: np.ndarray) -> Steps[np.ndarray]:
     return points
 
 
-def refined(problem: TetProblem, points: np.ndarray, tolerance: float) -> Steps[tuple[np.ndarray, int]]:
-    """Points (n,3) with the volumes around vertices within `tolerance`, the sum of what they are off, and the steps."""
-    steps = 0
-    total = sum(most for _, most in STAGES) + PRESSURES
+def refined(problem: TetProblem, points: np.ndarray) -> Steps[tuple[np.ndarray, int]]:
+    """Points (n,3) with volumes nearer to what they should be, stage by stage, and the steps; nothing is inverted."""
+    steps, total = 0, sum(most for _, most in STAGES)
     for weight, most in STAGES:
         for _ in range(most):
             yield Progress("Volumes", steps / total)
@@ -124,103 +113,41 @@ def refined(problem: TetProblem, points: np.ndarray, tolerance: float) -> Steps[
             steps += 1
             if fall < ENOUGH:
                 break
-    pressure, stiff = np.zeros(problem.count), PRESSURE * STAGES[-1][0]
-    error = vertex_share_error(points, problem.tets, problem.share)
-    for _ in range(PRESSURES):
-        if error <= tolerance:
-            break
-        yield Progress("Volumes", min(steps / total, 1.0))
-        size = float(tet_volumes(points, problem.tets).sum())
-        terms = _Terms(size, STAGES[-1][0], 0.0, pressure, stiff)
-        points, fall = _step(problem, problem.fine, points, terms)
-        steps += 1
-        before, error = error, vertex_share_error(points, problem.tets, problem.share)
-        if fall < ENOUGH or error < 0.5 * before:
-            off = _volumes_off(problem, points)
-            pressure = pressure + stiff * off / problem.vertex_share
-        if error > 0.7 * before:
-            stiff *= 3
     return points, steps
 
 
 @dataclass(frozen=True)
 class _Terms:
-    """Volume of the domain, weights, eps; multipliers (n,) and stiffness of the volumes around vertices."""
+    """Volume of the domain, weight of volumes, eps."""
 
     size: float
     weight: float
     eps: float = 0.0
-    pressure: np.ndarray | None = None
-    stiffness: float = 0.0
-
-
-def _volumes_off(problem: TetProblem, points: np.ndarray, size: float = 0.0) -> np.ndarray:
-    """Volume (n,) around every vertex as a share of `size`, or of the whole, less what it should be."""
-    volume = tet_volumes(points, problem.tets)
-    mine = around_vertices(volume, problem.tets, problem.count)
-    return mine / (size or volume.sum()) - problem.vertex_share
 
 
 def _step(problem: TetProblem, shape: RestShape, points: np.ndarray, terms: _Terms) -> tuple[np.ndarray, float]:
     """Points (n,3) after a line-searched Newton step, and the predicted decrease over the energy."""
     energy = tet_energy(shape, terms.size, terms.weight, terms.eps)
-    asked = problem.vertex_share
-
-    def value(at: np.ndarray) -> float:
-        result = energy.value(at)
-        if terms.pressure is not None and np.isfinite(result):
-            off = _volumes_off(problem, at, terms.size)
-            result += float(terms.pressure @ off + terms.stiffness / 2 * (off**2 / asked).sum())
-        return result
-
     frames = problem.domain.frames(points)
     slope, blocks = energy.derivatives(points, frames)
-    rows, springs = None, np.zeros(0)
-    if terms.pressure is not None:
-        rows = _volume_rows(problem, points, frames, terms.size)
-        off = _volumes_off(problem, points, terms.size)
-        springs = terms.stiffness / asked
-        multiplier = terms.pressure + springs * off
     gradient = problem.assembly.vector(slope, frames)
-    if rows is not None:
-        gradient = gradient + rows.T @ multiplier
-    direction = _solved(problem, blocks, slope, points, gradient, rows, springs)
+    direction = _solved(problem, blocks, slope, points, gradient)
     move = problem.assembly.spread(direction, frames)
     fall = -float(gradient @ direction)
-    here, share = value(points), 1.0
+    here, share = energy.value(points), 1.0
     for _ in range(HALVINGS):
         trial = problem.domain.retract(points + share * move)
-        if value(trial) <= here - ARMIJO * share * fall:
+        if energy.value(trial) <= here - ARMIJO * share * fall:
             return trial, fall / max(abs(here), 1e-300)
         share /= 2
     return points, 0.0
 
 
-def _volume_rows(problem: TetProblem, points: np.ndarray, frames: np.ndarray, size: float) -> sp.csr_matrix:
-    """Derivatives (n,u) of the volumes around vertices, as shares of `size`, by the unknowns."""
-    tets, unknown = problem.tets, problem.assembly.unknown
-    along = np.einsum("mai,maij->maj", volume_gradients(points, tets), frames[tets]) / (4 * size)
-    shape = (len(tets), 4, 4, 3)
-    rows = np.broadcast_to(tets[:, :, None, None], shape).ravel()
-    columns = np.broadcast_to(unknown[tets][:, None], shape).ravel()
-    values = np.broadcast_to(along[:, None], shape).ravel()
-    used = columns >= 0
-    matrix = (values[used], (rows[used], columns[used]))
-    return sp.csr_matrix(matrix, shape=(problem.count, problem.assembly.size))
-
-
-def _solved(problem, blocks, slope, points, gradient, rows, springs) -> np.ndarray:
+def _solved(problem, blocks, slope, points, gradient) -> np.ndarray:
     """The Newton direction (u,), by conjugate gradients."""
     matrix = problem.assembly.matrix(blocks)
     bend = np.zeros(problem.assembly.size)
     bend[problem.assembly.unknown[problem.domain.boundary, :2]] = problem.domain.bending(slope, points)[:, None]
     matrix = matrix + sp.diags(bend)
-    diagonal = matrix.diagonal()
-    if rows is None:
-        times = matrix
-    else:
-        diagonal = diagonal + rows.multiply(rows).T @ springs
-        back = rows.T.tocsr()
-        times = LinearOperator(matrix.shape, matvec=lambda x: matrix @ x + back @ (springs * (rows @ x)), dtype=float)
-    x, _ = cg(times, -gradient, rtol=RESIDUAL, maxiter=MOST_ITERATIONS, M=sp.diags(1 / diagonal))
+    x, _ = cg(matrix, -gradient, rtol=RESIDUAL, maxiter=MOST_ITERATIONS, M=sp.diags(1 / matrix.diagonal()))
     return x

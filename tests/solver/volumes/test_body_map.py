@@ -15,6 +15,7 @@ from omt_uv.solver.volumes.domains import BallDomain, CubeDomain, cube_points
 from omt_uv.solver.volumes.meshing import tetrahedra, without_chords
 from omt_uv.solver.volumes.paper_flow import paper_flow
 from omt_uv.solver.volumes.tet_energy import REGULAR, TetAssembly, rest_shape, signed_svd, tet_energy
+from omt_uv.solver.volumes.tet_exact import exact_volumes
 from omt_uv.solver.volumes.tet_mesh import (
     FACES,
     gradients,
@@ -62,8 +63,10 @@ def test_the_derivatives_are_those_of_the_energy(eps):
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-9)
     assert np.linalg.eigvalsh(matrix).min() > -1e-9
     change = [(energy.derivatives(Y + h * u, axes)[0] - energy.derivatives(Y - h * u, axes)[0]).ravel() for u in units]
-    # But for eigenvalues below the least, which are raised to it.
-    assert np.abs(np.array(change) / (2 * h) - matrix).max() < 0.02 * np.abs(matrix).max()
+    more = matrix - np.array(change) / (2 * h)
+    # Of tetrahedra, negative eigenvalues count by their size, so that what is more is positive, and small here.
+    assert np.linalg.eigvalsh(more + more.T).min() > -1e-5 * np.abs(matrix).max()
+    assert np.abs(more).max() < (0.02 if eps == 0.3 else 0.2) * np.abs(matrix).max()
 
 
 def test_measures_of_tetrahedra_fit_together():
@@ -103,7 +106,7 @@ def test_the_surface_is_kept_and_no_edge_leads_through_the_inside():
 def test_a_ball_map_inverts_nothing_and_volumes_are_right(body):
     V, F, found = body
     assert found.inverted == 0 and (tet_volumes(found.positions, found.tets) > 0).all()
-    assert found.around_vertices < 0.01 and found.shares < 0.25
+    assert found.around_vertices < 0.01 and found.shares < 0.01
     np.testing.assert_array_equal(found.points[: len(V)], V)
     radius = np.linalg.norm(found.positions, axis=1)
     np.testing.assert_allclose(radius[: len(V)], 1.0)
@@ -113,7 +116,7 @@ def test_a_ball_map_inverts_nothing_and_volumes_are_right(body):
 def test_a_cube_is_filled_to_its_sides():
     V, F = icosphere(2)
     found = drain(volume_map(V, F, domain="cube", count=2500))
-    assert found.inverted == 0 and found.around_vertices < 0.02
+    assert found.inverted == 0 and found.shares < 0.03
     np.testing.assert_allclose(np.abs(found.positions[: len(V)]).max(axis=1), 1.0)
     assert np.abs(found.positions).max() <= 1
     np.testing.assert_allclose(cube_points(np.array([[0.0, 0, -1], [1, 1, 1]]) / [[1], [3**0.5]])[1], [1, 1, 1])
@@ -130,6 +133,23 @@ def test_the_flow_of_the_paper_brings_volumes_nearer(body):
     np.testing.assert_array_equal(flowed.kept[-1], flowed.positions)
     whole = drain(volume_map(V, F, method="flow", mesh=mesh))
     assert whole.inverted == inverted(whole.positions, whole.tets) and (not whole.inverted or whole.warnings)
+
+
+def test_volumes_of_tetrahedra_come_right_where_points_inside_may_move(body):
+    V, F, found = body
+    edge = BallDomain(np.arange(len(V)))
+    rng = np.random.default_rng(0)
+    moved = found.positions.copy()
+    moved[len(V) :] += 0.005 * rng.normal(size=moved[len(V) :].shape)
+    assert inverted(moved, found.tets) == 0
+    rest = tet_volumes(found.points, found.tets)
+    still = drain(exact_volumes(found.points, found.tets, moved, edge, 0.02, slide=False))
+    both = drain(exact_volumes(found.points, found.tets, moved, edge, 0.02))
+    np.testing.assert_array_equal(still.points, found.points)
+    np.testing.assert_array_equal(both.points[: len(V)], V)
+    errors = [share_error(x.positions, found.tets, tet_volumes(x.points, found.tets)) for x in (still, both)]
+    assert errors[1] < errors[0] < share_error(moved, found.tets, rest)
+    assert inverted(both.points, found.tets) == inverted(both.positions, found.tets) == 0
 
 
 def test_what_is_tangled_is_untangled(body):
