@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..errors import UserError
 
-READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx", ".off")
+READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx", ".off")
 # What cannot be written: the format that takes its place.
 WRITTEN_AS = {".off": ".ply"}
 # How the names of what lies beside OUT go on: the manifest, failures, previews, and the lock.

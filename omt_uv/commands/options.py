@@ -11,7 +11,7 @@ from ..supervision import MEMORY_IS_LIMITED
 
 # Levels of subdivision, as many as Blender's slider has.
 MOST_LEVELS = 6
-FORMATS = ".blend .obj .ply .stl .glb .fbx"
+FORMATS = ".blend .obj .ply .stl .glb .gltf .fbx"
 # Height over width, or width over height, of what still is a rectangle.
 MOST_ASPECT = 1e4
 # Gigabytes; with 0.35 Blender hangs while it starts.

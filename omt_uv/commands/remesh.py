@@ -146,9 +146,9 @@ def _compared(objects: list, results: list) -> list[dict]:
 
 
 def _is_split(path: Path, obj) -> bool:
-    """Whether the file had to split vertices: .glb holds one normal and one UV for each, .ply one UV."""
+    """Whether the file had to split vertices: glTF holds one normal and one UV for each, .ply one UV."""
     suffix = path.suffix.lower()
-    return suffix == ".glb" or (suffix == ".ply" and len(obj.data.uv_layers) > 0)
+    return suffix in (".glb", ".gltf") or (suffix == ".ply" and len(obj.data.uv_layers) > 0)
 
 
 def _settings(options: argparse.Namespace) -> RemeshSettings:

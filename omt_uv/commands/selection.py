@@ -26,7 +26,7 @@ def read_file(options: argparse.Namespace, layer: str = "") -> list:
     for obj in reversed(unique.values()):
         with refusals(name=obj.name):
             reading = read(obj, layer)
-        if path.suffix.lower() == ".glb":
+        if path.suffix.lower() in (".glb", ".gltf"):
             reading = weld_split_vertices(reading)
         if reading.faces.any():
             pairs.append((obj, reading))

@@ -11,6 +11,7 @@ import bmesh
 import numpy as np
 
 from ..blender.versions import known_options
+from .in_place import glb_data, gltf
 from .meshes import AXES
 from .obj_precision import restore_precision
 
@@ -137,7 +138,7 @@ def _write_stl(path: Path, objects: Objects, everything: bool) -> list[str]:
     """Write an STL file; returns warnings."""
     _select_only(exported_meshes(objects, everything))
     bpy.ops.wm.stl_export(filepath=str(path), export_selected_objects=True, apply_modifiers=False, **AXES)
-    return ["STL files hold no UVs; write .blend, .obj, .ply, .glb or .fbx to keep them"]
+    return ["STL files hold no UVs; write .blend, .obj, .ply, .glb, .gltf or .fbx to keep them"]
 
 
 def _write_glb(path: Path, objects: Objects, everything: bool) -> list[str]:
@@ -163,6 +164,15 @@ def _write_glb(path: Path, objects: Objects, everything: bool) -> list[str]:
         **options,
     )
     return []
+
+
+def _write_gltf(path: Path, objects: Objects, everything: bool) -> list[str]:
+    """Write a glTF file of text, with everything in it; returns warnings."""
+    binary = path.with_suffix(".glb")
+    told = _write_glb(binary, objects, everything)
+    path.write_bytes(gltf.embedded(glb_data.read(binary.read_bytes())))
+    binary.unlink()
+    return told
 
 
 def _is_smooth(mesh: bpy.types.Mesh) -> bool:
@@ -195,5 +205,6 @@ _WRITERS: dict[str, Callable[[Path, Objects, bool], list[str]]] = {
     ".ply": _write_ply,
     ".stl": _write_stl,
     ".glb": _write_glb,
+    ".gltf": _write_gltf,
     ".fbx": _write_fbx,
 }

@@ -7,17 +7,19 @@ from collections.abc import Sequence
 
 import bpy
 
+SCENE = {"materials", "colours", "rigs", "animations", "cameras", "lights", "empties", "shape keys", "weights"}
 # What of a scene each format holds; modifiers go along nowhere but in a .blend.
 HOLDS = {
     ".obj": {"materials", "colours"},
     ".ply": {"colours"},
     ".stl": set(),
-    ".glb": {"materials", "colours", "rigs", "animations", "cameras", "lights", "empties", "shape keys", "weights"},
-    ".fbx": {"materials", "colours", "rigs", "animations", "cameras", "lights", "empties", "shape keys", "weights"},
+    ".glb": SCENE,
+    ".gltf": SCENE,
+    ".fbx": SCENE,
 }
 KINDS = {"ARMATURE": "rigs", "CAMERA": "cameras", "LIGHT": "lights", "EMPTY": "empties"}
 # Light of these kinds has no counterpart.
-FOREIGN_LIGHTS = {".glb": {"AREA"}, ".fbx": set[str]()}
+FOREIGN_LIGHTS = {".glb": {"AREA"}, ".gltf": {"AREA"}}
 
 
 def losses(suffix: str, meshes: Sequence[bpy.types.Object]) -> list[str]:

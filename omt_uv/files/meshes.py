@@ -17,7 +17,7 @@ from .ply_uvs import add_uvs
 from .silence import silence
 from .verified import FileError, check_length
 
-READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx", ".off")
+READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx", ".off")
 # Blender turns these two formats by default; their axes are taken as they are.
 AXES = {"forward_axis": "Y", "up_axis": "Z"}
 
@@ -105,8 +105,8 @@ def _read_fbx(path: str) -> None:
             obj.matrix_basis = matrix.round().T
 
 
-def _read_glb(path: str) -> None:
-    """Read a binary glTF file."""
+def _read_gltf(path: str) -> None:
+    """Read a glTF file, binary or text."""
     # Shapes of bones would be meshes that the file does not have.
     options = known_options(bpy.ops.import_scene.gltf, disable_bone_shape=True)
     bpy.ops.import_scene.gltf(filepath=path, merge_vertices=False, **options)
@@ -128,7 +128,8 @@ _READERS: dict[str, Callable[[str], None]] = {
     ),
     ".ply": _reader(_read_ply),
     ".stl": _reader(lambda path: bpy.ops.wm.stl_import(filepath=path, use_mesh_validate=False, **AXES)),
-    ".glb": _reader(_read_glb),
+    ".glb": _reader(_read_gltf),
+    ".gltf": _reader(_read_gltf),
     ".fbx": _reader(_read_fbx),
     ".off": _reader(_read_off),
 }

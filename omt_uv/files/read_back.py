@@ -13,7 +13,7 @@ import numpy as np
 
 from ..blender.mesh import read_uv
 from . import fbx_nodes
-from .in_place import glb_data, obj_text, ply
+from .in_place import glb_data, gltf, obj_text, ply
 from .in_place.imported import InPlaceError
 from .verified import FileError
 
@@ -44,10 +44,10 @@ def check(path: Path, suffix: str, meshes: Sequence[bpy.types.Object]) -> None:
 
 def _counts(objects: Sequence[bpy.types.Object], suffix: str) -> Counts:
     """What a file has to hold; one that has instances holds each mesh once."""
-    shared = suffix in (".glb", ".fbx")
+    shared = suffix in (".glb", ".gltf", ".fbx")
     meshes = list({obj.data.name: obj.data for obj in objects}.values()) if shared else [obj.data for obj in objects]
     with_uv = [mesh for mesh in meshes if mesh.uv_layers]
-    if suffix in (".glb", ".stl"):
+    if suffix in (".glb", ".gltf", ".stl"):
         for mesh in meshes:
             mesh.calc_loop_triangles()
         triangles = sum(len(mesh.loop_triangles) for mesh in meshes)
@@ -77,8 +77,11 @@ def _count_stl(path: Path) -> Counts:
     return Counts(None, min(count, (len(data) - 84) // 50), None)
 
 
-def _count_glb(path: Path) -> Counts:
-    glb = glb_data.read(path.read_bytes())
+def _count_gltf(path: Path) -> Counts:
+    return _count_glb(gltf.read(path.read_bytes(), path.parent).glb)
+
+
+def _count_glb(glb: glb_data.Glb) -> Counts:
     primitives = [p for mesh in glb.doc.get("meshes", []) for p in mesh["primitives"]]
     corners = [glb_data.triangles(glb, primitive).ravel() for primitive in primitives]
     uv = 0
@@ -97,7 +100,8 @@ _COUNTERS: dict[str, Callable[[Path], Counts]] = {
     ".obj": _count_obj,
     ".ply": _count_ply,
     ".stl": _count_stl,
-    ".glb": _count_glb,
+    ".glb": lambda path: _count_glb(glb_data.read(path.read_bytes())),
+    ".gltf": _count_gltf,
     ".fbx": _count_fbx,
 }
 

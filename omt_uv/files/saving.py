@@ -6,6 +6,7 @@ format holds, and warnings name the rest.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from urllib.parse import unquote
@@ -17,7 +18,7 @@ import numpy as np
 from ..blender.mesh import read_uv
 from .export import export, exported_meshes
 from .fbx_nodes import count
-from .in_place import glb, glb_data, ply
+from .in_place import glb, glb_data, gltf, ply
 from .in_place import obj as obj_file
 from .in_place.imported import Imported, InPlaceError
 from .losses import losses
@@ -27,8 +28,8 @@ from .read_back import check, check_blend
 from .silence import silence
 from .verified import FileError, check_bytes, check_writable, staged
 
-WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx")
-# What can be changed in place.
+WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx")
+# What can be changed in place; glTF of text needs to know the folder as well.
 IN_PLACE: dict[str, Callable[[bytes, Sequence[Imported]], tuple[bytes, list[str]]]] = {
     ".obj": obj_file.put,
     ".ply": ply.put,
@@ -71,10 +72,13 @@ def save_uvs(path: Path, objects: Objects, source: Path) -> list[str]:
     if suffix == ".blend":
         return _save_blend(path, objects, source)
     told = []
-    if suffix == source.suffix.lower() and suffix in IN_PLACE:
+    if suffix == source.suffix.lower() and suffix in (*IN_PLACE, ".gltf"):
         try:
-            data = source.read_bytes()
-            new, warnings = IN_PLACE[suffix](data, [_imported(obj) for obj in objects])
+            data, meshes = source.read_bytes(), [_imported(obj) for obj in objects]
+            if suffix == ".gltf":
+                new, warnings = gltf.put(data, meshes, source.resolve().parent, path.resolve().parent)
+            else:
+                new, warnings = IN_PLACE[suffix](data, meshes)
         except InPlaceError as error:
             told = [
                 f"{source.name}: its UVs could not be changed in place: {error}. It was written anew, "
@@ -116,7 +120,8 @@ def _left_behind(data: bytes, suffix: str, source: Path, path: Path) -> list[str
         lines = [line.split(None, 1) for line in data.splitlines() if line.lstrip().startswith(b"mtllib ")]
         names = [line[1].strip().decode(errors="replace") for line in lines if len(line) > 1]
     else:
-        images = glb_data.read(data).doc.get("images", [])
+        doc = json.loads(data) if suffix == ".gltf" else glb_data.read(data).doc
+        images = doc.get("images", [])
         names = [unquote(image["uri"]) for image in images if not image.get("uri", "data:").startswith("data:")]
     missing = [name for name in dict.fromkeys(names) if not (path.resolve().parent / name).exists()]
     return [

@@ -129,11 +129,14 @@ def exporters():
         ".glb": lambda path: bpy.ops.export_scene.gltf(
             filepath=path, export_format="GLB", export_cameras=True, export_lights=True, export_extras=True
         ),
+        ".gltf": lambda path: bpy.ops.export_scene.gltf(
+            filepath=path, export_format="GLTF_SEPARATE", export_cameras=True, export_lights=True, export_extras=True
+        ),
         ".blend": lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, compress=True),
     }
 
 
-@pytest.mark.parametrize("suffix", [".fbx", ".glb", ".blend"])
+@pytest.mark.parametrize("suffix", [".fbx", ".glb", ".gltf", ".blend"])
 def test_a_rigged_scene_keeps_all_but_its_uvs(package, run, tmp_path, suffix):
     """D3: the rig, weights, morphs, empties, lights, cameras and actions were left out."""
     rigged_scene()
@@ -156,7 +159,7 @@ def test_a_rigged_scene_keeps_all_but_its_uvs(package, run, tmp_path, suffix):
         assert (tmp_path / "out.blend").read_bytes()[:4] == magic
 
 
-@pytest.mark.parametrize("target", [".glb", ".fbx"])
+@pytest.mark.parametrize("target", [".glb", ".gltf", ".fbx"])
 def test_all_that_a_format_holds_goes_along(package, run, tmp_path, target):
     """D3: rigs and shading got lost from .blend to glTF and FBX."""
     rigged_scene()
@@ -284,6 +287,22 @@ def test_every_command_that_changes_uvs_changes_nothing_else(run, tmp_path, comm
     assert status == 0, err
     words = {".obj": b"# a cube", ".ply": b"comment made by hand", ".glb": b"ODD_one"}
     assert words[suffix] in (tmp_path / f"b{suffix}").read_bytes()
+
+
+def test_gltf_of_text_in_another_folder_needs_nothing_from_the_old_one(package, run, tmp_path):
+    text, raw = mesh_bytes.gltf_parts(indent=2)
+    (tmp_path / "in.gltf").write_bytes(text)
+    (tmp_path / "cu be.bin").write_bytes(raw)
+    (tmp_path / "there").mkdir()
+    for out in (tmp_path / "in.gltf", tmp_path / "there" / "out.gltf"):
+        status, _, err = run("unwrap", tmp_path / "in.gltf", "-o", out, "--quality", "draft", "--strict")
+        assert (status, err) == (0, "")
+        assert (tmp_path / "cu be.bin").read_bytes() == raw
+    (tmp_path / "cu be.bin").unlink()
+    (obj,) = package("files.meshes").load(tmp_path / "there" / "out.gltf")
+    assert np.ptp(scenes.uv_of(obj), axis=0).max() > 0.5
+    status, _, err = run("unwrap", tmp_path / "in.gltf", "-o", tmp_path / "in.gltf")
+    assert status == 1 and len(err.splitlines()) == 1 and "cu be.bin" in err
 
 
 def test_compressed_gltf_is_written_anew_and_says_so(package, run, tmp_path):

@@ -21,9 +21,9 @@ LINE_OFF = b"OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"
 BEGUN = b"ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nproperty float x\nend_header\nabcd"
 # Files that no command can work on; None is a folder, "" is not there.
 BAD: dict[str, bytes | str | None] = {
-    "missing.obj": "", "folder.obj": None, "empty.ply": b"", "noise.glb": NOISE, "noise.fbx": NOISE,
-    "noise.blend": NOISE, "noise.stl": NOISE, "noise.off": NOISE, "begun.ply": BEGUN, "points.obj": POINTS,
-    "lines.obj": LINES, "flat.off": LINE_OFF, "unknown.xyz": POINTS,
+    "missing.obj": "", "folder.obj": None, "empty.ply": b"", "noise.glb": NOISE, "noise.gltf": NOISE,
+    "noise.fbx": NOISE, "noise.blend": NOISE, "noise.stl": NOISE, "noise.off": NOISE, "begun.ply": BEGUN,
+    "points.obj": POINTS, "lines.obj": LINES, "flat.off": LINE_OFF, "unknown.xyz": POINTS,
 }  # fmt: skip
 # What OUT may be: it then takes the place of what was read.
 REPLACED = {("output", "input"), ("output", "target"), ("image_out", "image"), ("image_output", "image"),

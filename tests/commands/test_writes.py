@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import scenes
 
-FORMATS = [".blend", ".obj", ".ply", ".stl", ".glb", ".fbx"]
+FORMATS = [".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx"]
 OFF = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0.5\nf 1 2 3\nf 1 3 4\n"
 
@@ -55,7 +55,7 @@ def test_a_full_disk_leaves_the_old_file_whole(run, tmp_path, target):
     assert {path.name for path in tmp_path.iterdir()} == {"in.blend", out.name}
 
 
-@pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb"])
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb", ".gltf"])
 def test_a_full_disk_leaves_a_file_that_is_changed_in_place_whole(run, tmp_path, suffix):
     big_input(tmp_path / "in.blend")
     path = tmp_path / f"in{suffix}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import struct
 
@@ -156,3 +157,13 @@ def mutants(data, count, seed=0):
             if not raw:
                 break
         yield bytes(raw)
+
+
+def gltf_parts(indent=None, embedded=False):
+    """The cube of `glb_bytes` as glTF of text, and the bytes of the file cube.bin that it names."""
+    size = struct.unpack_from("<I", glb_bytes(), 12)[0]
+    doc = json.loads(glb_bytes()[20 : 20 + size])
+    raw = glb_bytes()[28 + size :][: doc["buffers"][0]["byteLength"]]
+    where = "data:application/octet-stream;base64," + base64.b64encode(raw).decode() if embedded else "cu%20be.bin"
+    doc["buffers"][0] = {"uri": where, "byteLength": len(raw), "extras": {"mine": 1}}
+    return json.dumps(doc, ensure_ascii=False, indent=indent).encode(), raw

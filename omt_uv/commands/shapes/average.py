@@ -14,7 +14,7 @@ from ..common import CommandError, UsageError, check_paths, drain_shown, refusal
 from ..options import add_input, number
 from ..selection import of_file, read_file
 
-READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".fbx", ".off")
+READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx", ".off")
 # A z-score beyond which a vertex is told of as off.
 FAR = 3.0
 MEAN = "Mean"

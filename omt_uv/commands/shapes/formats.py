@@ -11,7 +11,7 @@ KEPT_BY = {
     "face_sets": (".blend",),
     "attribute": (".blend",),
     "seams": (".blend",),
-    "materials": (".blend", ".obj", ".glb", ".fbx"),
+    "materials": (".blend", ".obj", ".glb", ".gltf", ".fbx"),
     "points": (".blend", ".obj"),
 }
 

@@ -149,7 +149,7 @@ def _shaped(obj, result, output: Path) -> None:
     from ...blender.mesh import stretch
 
     positions = np.linalg.solve(stretch(obj), result.wrapped.T).T.astype(np.float32).ravel()
-    if output.suffix.lower() in (".blend", ".glb", ".fbx"):
+    if output.suffix.lower() in (".blend", ".glb", ".gltf", ".fbx"):
         if obj.data.shape_keys is None:
             obj.shape_key_add(name="Basis", from_mix=False)
         block = obj.shape_key_add(name=KEY, from_mix=False)

@@ -32,7 +32,7 @@ def add(commands) -> None:
     command.add_argument(
         "--inside", default="", metavar="ball|NAME", help="walls: the ball around all, or a closed mesh"
     )
-    command.add_argument("--shape-key", action="store_true", help="write a shape key, into .blend, .glb or .fbx")
+    command.add_argument("--shape-key", action="store_true", help="write a shape key, into .blend, .glb, .gltf or .fbx")
     command.add_argument("--frames", type=_count, default=1, metavar="K", help="so many shape keys along the way")
     command.add_argument("--report", type=Path, metavar="R.json", help="write volumes, intersections and steps")
 
@@ -52,8 +52,8 @@ def run_flow(options: argparse.Namespace) -> None:
     from ...pipelines.volumes.handle_file import read_handle_file
 
     keyed = options.shape_key or options.frames > 1
-    if keyed and options.output.suffix.lower() not in (".blend", ".glb", ".fbx"):
-        raise UsageError(f"{options.output}: this format has no shape keys. Write .blend, .glb or .fbx.")
+    if keyed and options.output.suffix.lower() not in (".blend", ".glb", ".gltf", ".fbx"):
+        raise UsageError(f"{options.output}: this format has no shape keys. Write .blend, .glb, .gltf or .fbx.")
     check_paths(options)
     file = read_handle_file(options.handles)
     everything = [obj for obj, _ in read_file(options)]

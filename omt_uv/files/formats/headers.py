@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 import struct
 from pathlib import Path
+from urllib.parse import unquote
 
 # Bytes of the types of PLY.
 SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2}
@@ -25,6 +27,9 @@ def check_header(path: Path) -> int | None:
     ValueError : the file is too short for what it declares. Faces of PLY may be as short as their count of vertices, so
         that files that were cut off pass, and have fewer faces than they declare
     """
+    if path.suffix.lower() == ".gltf":
+        _gltf(path)
+        return None
     check = {".ply": _ply, ".stl": _stl, ".glb": _glb}.get(path.suffix.lower())
     if check is None:
         return None
@@ -74,3 +79,18 @@ def _stl(begin: bytes, size: int) -> int | None:
 def _glb(begin: bytes, size: int) -> None:
     if begin.startswith(b"glTF") and len(begin) >= 12 and struct.unpack_from("<I", begin, 8)[0] > size:
         raise _too_short(f"it declares {struct.unpack_from('<I', begin, 8)[0]} bytes and has {size}")
+
+
+def _gltf(path: Path) -> None:
+    """The buffers that a text names are there; what else is wrong with it is for its readers to say."""
+    try:
+        buffers = json.loads(path.read_bytes())["buffers"]
+        named = [(unquote(of["uri"]), int(of["byteLength"])) for of in buffers if not of["uri"].startswith("data:")]
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return
+    for name, size in named:
+        there = path.parent / name
+        if not there.is_file():
+            raise ValueError(f"it needs {name}, which is not there. Put it beside the file.")
+        if there.stat().st_size < size:
+            raise _too_short(f"it declares {size} bytes of {name}, which has {there.stat().st_size}")

@@ -42,16 +42,29 @@ def put(data: bytes, meshes: Sequence[Imported]) -> tuple[bytes, list[str]]:
     ------
     InPlaceError : a mesh is none of the file's, or the file is compressed or has its data elsewhere
     """
+    new, told = put_into(read(data), meshes)
+    return data if new is None else write(new), told
+
+
+def put_into(glb: Glb, meshes: Sequence[Imported], grows: bool = False) -> tuple[Glb | None, list[str]]:
+    """A file with the UVs of what Blender made of it, None where nothing changes, and warnings.
+
+    grows : every byte that there is stays, and what is new comes behind
+
+    Raises
+    ------
+    InPlaceError : see `put`
+    """
     try:
-        return _put(data, meshes)
+        return _put(glb, meshes, grows)
     except InPlaceError:
         raise
     except MALFORMED as error:
         raise InPlaceError(f"the file is not as glTF has to be ({type(error).__name__}: {error})") from error
 
 
-def _put(data: bytes, meshes: Sequence[Imported]) -> tuple[bytes, list[str]]:
-    change = GlbChange(read(data))
+def _put(glb: Glb, meshes: Sequence[Imported], grows: bool) -> tuple[Glb | None, list[str]]:
+    change = GlbChange(glb, grows)
     for name in change.doc.get("extensionsUsed", []):
         if name in COMPRESSIONS:
             raise InPlaceError(f"its buffers are compressed ({name})")
@@ -62,9 +75,9 @@ def _put(data: bytes, meshes: Sequence[Imported]) -> tuple[bytes, list[str]]:
         groups.setdefault(repr((sorted(of["attributes"].items()), of.get("targets"))), []).append(part)
     changed = [part for group in groups.values() for part in _write_group(change, group)]
     if not changed:
-        return data, dropped_warning(dropped)
-    new = write(change.result())
-    _check(read(data), read(new), meshes)
+        return None, dropped_warning(dropped)
+    new = change.result()
+    _check(glb, read(write(new)), meshes)
     told = dropped_warning(dropped)
     if any("TANGENT" in part.primitive["attributes"] for part in changed):
         told.append("TANGENT attributes are those of the UVs before. Have them made anew, or removed.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,6 +121,19 @@ def _strided(glb: Glb, view: int, offset: int, like: np.ndarray) -> np.ndarray:
     if at < 0 or stride < 0 or end > len(glb.binary):
         raise InPlaceError(f"buffer view {view} leads out of the file")
     return np.ndarray(like.shape, like.dtype, glb.binary, at, (stride, like.dtype.itemsize))
+
+
+def mentions(value) -> Iterator[int]:
+    """Buffer views that stand anywhere in JSON."""
+    if isinstance(value, dict):
+        for key, of in value.items():
+            if key == "bufferView" and isinstance(of, int):
+                yield of
+            else:
+                yield from mentions(of)
+    elif isinstance(value, list):
+        for of in value:
+            yield from mentions(of)
 
 
 def normalized(values: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .glb_data import ALIGNMENT, COMPONENTS, WIDTHS, Glb, accessor
+from .glb_data import ALIGNMENT, COMPONENTS, WIDTHS, Glb, accessor, mentions
 
 CODES = {np.dtype(kind).str: code for code, kind in COMPONENTS.items()}
 # What buffer views say that they hold: attributes of vertices, or indices of these.
@@ -18,8 +18,9 @@ ELEMENTS = 34963
 class GlbChange:
     """The accessors of a file as they change: its JSON is changed in place, its bytes at the end, by `result`."""
 
-    def __init__(self, glb: Glb):
+    def __init__(self, glb: Glb, grows: bool = False):
         self.glb = Glb(json.loads(json.dumps(glb.doc)), glb.binary, glb.others)
+        self._grows = grows
         self.doc = self.glb.doc
         self._written: dict[int, bytes] = {}
         self._left: set[int] = set()
@@ -37,6 +38,8 @@ class GlbChange:
     def overwrite(self, index: int, values: np.ndarray) -> bool:
         """Write values where an accessor has them, if they are as many floats, and no other accessor reads there."""
         of = self.doc["accessors"][index]
+        if self._grows:
+            return False
         if COMPONENTS[of["componentType"]] != values.dtype.str or "sparse" in of or "bufferView" not in of:
             return False
         if of["count"] != len(values) or not self._is_alone(index):
@@ -131,7 +134,7 @@ class GlbChange:
         gone += [self._span(k) for k in self._left - self._written.keys()]
         kept = [k for k in range(len(views)) if k not in self._written and views[k].get("buffer", 0) == 0]
         dead = np.zeros(len(binary) + 1, bool)
-        for span in filter(None, gone):
+        for span in filter(None, [] if self._grows else gone):
             dead[span[0] : span[1]] = True
         for k in kept:
             begin, end = self._span(k)
@@ -161,19 +164,6 @@ def named(primitive: dict) -> Iterator[int]:
         yield from target.values()
     if "indices" in primitive:
         yield primitive["indices"]
-
-
-def mentions(value) -> Iterator[int]:
-    """Buffer views that stand anywhere in JSON."""
-    if isinstance(value, dict):
-        for key, of in value.items():
-            if key == "bufferView" and isinstance(of, int):
-                yield of
-            else:
-                yield from mentions(of)
-    elif isinstance(value, list):
-        for of in value:
-            yield from mentions(of)
 
 
 def _set_bounds(of: dict, values: np.ndarray) -> None:
