@@ -1,4 +1,7 @@
-"""Find charts that are each other's mirror image, so that one map serves both, also where quads are cut otherwise."""
+"""Find charts that are each other's mirror image, or equal but for a motion, so that one map serves both.
+
+Also where quads are cut otherwise: sides of polygons count, and diagonals do not.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..analysis.density import Target
 from ..mesh.charts import Chart
+from ..mesh.geometry import signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface
@@ -18,6 +23,10 @@ from .chart_map import ChartMap, in_unit_box, measured_chart
 SAME_DENSITY = 1e-4
 # Area error, over the goal, that a map of symmetric quads may leave in the triangles that they came as.
 AREA_KEPT = 1.5
+# Distance over the size of a chart up to which vertices of equal charts lie upon one another.
+SAME_PLACE = 1e-5
+# Most motions that are tried for a pair of charts.
+TRIALS = 32
 
 
 def mirror_partners(charts: Sequence[Chart], targets: Sequence[Target | None]) -> dict[int, tuple[int, np.ndarray]]:
@@ -56,6 +65,96 @@ def _mirror_of_all(charts: Sequence[Chart]) -> Mirror | None:
 def mirrored_map(chart_map: ChartMap, image: np.ndarray) -> ChartMap:
     """The map of a chart whose vertices are the mirror images of those `image` (n,) of the one mapped."""
     return replace(chart_map, uv=chart_map.uv[image] * [-1.0, 1.0])
+
+
+def equal_chart_map(
+    chart: Chart, target: Target | None, mapped: Sequence[tuple[Chart, Target | None, ChartMap]]
+) -> ChartMap | None:
+    """The map of a chart that equals one of those mapped but for a motion, a mirrored one, too; None if there is none.
+
+    A map that folds some triangle of the chart, which may be cut along other diagonals, is none.
+    """
+    for other, its_target, chart_map in mapped:
+        if (target is None) != (its_target is None) or chart_map.folds:
+            continue
+        found = motion_between(other, chart)
+        if found is None or not _same_targets((other, chart), (its_target, target), 0, 1, found[0]):
+            continue
+        uv = chart_map.uv[found[0]] * [found[1], 1.0]
+        if (signed_areas(uv, chart.triangles) > 0).all():
+            return replace(chart_map, uv=uv)
+    return None
+
+
+def motion_between(first: Chart, other: Chart) -> tuple[np.ndarray, float] | None:
+    """The vertex (n,) of the first chart for each of the other one's, if a motion takes one to the other, and 1.0, or
+    -1.0 if it is a mirrored one; None if there is none. Vertices that lie upon one another are told by their sides.
+    """
+    n = len(first.vertices)
+    if n != len(other.vertices) or len(first.patches) or len(other.patches):
+        return None
+    (a, sides_a), (b, sides_b) = _about_centre(first), _about_centre(other)
+    size = np.linalg.norm(a[:, :3], axis=1).max()
+    far = [np.sort(np.linalg.norm(x[:, :3], axis=1)) for x in (a, b)]
+    if len(sides_a) != len(sides_b) or np.abs(far[0] - far[1]).max() > SAME_PLACE * size:
+        return None
+    there = cKDTree(b / size)
+    keys = np.sort(sides_b[:, 0] * n + sides_b[:, 1])
+    start, trials = _beginnings(a, sides_a, b, sides_b, size)
+    for end, sign in trials:
+        rotation = _frame(b[end, :3], sign) @ _frame(a[start, :3]).T
+        moved = np.concatenate([a[:, :3] @ rotation.T, a[:, 3:] @ rotation.T], axis=1) / size
+        off, at = there.query(moved, distance_upper_bound=2 * SAME_PLACE)
+        if not np.isfinite(off).all() or len(np.unique(at)) < n:
+            continue
+        sides = at[sides_a if sign > 0 else sides_a[:, ::-1]]
+        if np.array_equal(np.sort(sides[:, 0] * n + sides[:, 1]), keys):
+            return np.argsort(at), sign
+    return None
+
+
+def _about_centre(chart: Chart) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n,6), about their mean, with the mean of their neighbours along sides, and sides (k,2) of polygons."""
+    n, faces = len(chart.vertices), np.concatenate([chart.faces] * 3)
+    tail, head = (chart.triangles[:, k].T.ravel() for k in ((0, 1, 2), (1, 2, 0)))
+    low, high = np.minimum(tail, head), np.maximum(tail, head)
+    # A diagonal has its own polygon on both sides.
+    _, place, count = np.unique(np.stack([low, high, faces]), axis=1, return_inverse=True, return_counts=True)
+    side = count[place.ravel()] == 1
+    tail, head = tail[side], head[side]
+    x = chart.vertices - chart.vertices.mean(axis=0)
+    both, of = np.concatenate([tail, head]), np.concatenate([head, tail])
+    number = np.maximum(np.bincount(both, minlength=n), 1)
+    around = np.stack([np.bincount(both, x[of, k], n) for k in range(3)], axis=1) / number[:, None]
+    return np.concatenate([x, around], axis=1), np.column_stack([tail, head])
+
+
+def _beginnings(a, sides_a, b, sides_b, size: float) -> tuple[np.ndarray, list[tuple[np.ndarray, float]]]:
+    """A side of the first chart that few others are like, and those of the other one that are, with the sign."""
+
+    def figures(x, sides):
+        p, q = x[sides[:, 0], :3], x[sides[:, 1], :3]
+        lengths = (np.linalg.norm(v, axis=1) for v in (p, q, p - q, np.cross(p, q) / size))
+        return np.column_stack([*lengths]) / size
+
+    mine, theirs = figures(a, sides_a), figures(b, sides_b)
+    # A frame needs a side that does not point to the centre.
+    kinds, inverse, count = np.unique(np.round(mine, 4), axis=0, return_inverse=True, return_counts=True)
+    count = np.where(kinds[:, 3] > 1e-2, count, len(mine) + 1)
+    start = int(count[inverse.ravel()].argmin())
+    trials: list[tuple[np.ndarray, float]] = []
+    for sign, order in ((1.0, [0, 1, 2, 3]), (-1.0, [1, 0, 2, 3])):
+        like = np.flatnonzero((np.abs(theirs[:, order] - mine[start]) < 4 * SAME_PLACE).all(axis=1))
+        trials += [(sides_b[k][:: int(sign)], sign) for k in like[: TRIALS // 2]]
+    return sides_a[start], trials
+
+
+def _frame(points: np.ndarray, sign: float = 1.0) -> np.ndarray:
+    """Axes (3,3), in columns, of two points (2,3) and the origin; sign : of the third."""
+    first = points[0] / np.linalg.norm(points[0])
+    second = points[1] - (points[1] @ first) * first
+    second /= np.linalg.norm(second)
+    return np.column_stack([first, second, sign * np.cross(first, second)])
 
 
 def with_mirrored_quads(surface: Surface, charts: Sequence[Chart]) -> list[Chart]:

@@ -21,7 +21,7 @@ from .chart_indices import chart_target, in_order_of_places, located
 from .chart_map import ChartMap, map_chart
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons
-from .mirrored_charts import as_given, mirror_partners, mirrored_map, with_mirrored_quads
+from .mirrored_charts import as_given, equal_chart_map, mirror_partners, mirrored_map, with_mirrored_quads
 from .options import UnwrapOptions
 from .shear_bound import ShearSearch, bound_shear
 from .small_charts import is_small, map_together
@@ -227,16 +227,21 @@ class _Task:
         done = sum(len(charts[k].triangles) for k in cut.alike) / total if together else 0.0
         if not cut.maps and self.markers is None:
             (cut,) = yield from part_of(map_small_charts([cut], self.options), 0.0, done)
-        maps: list[ChartMap] = []
+        # Of charts that go alone, those that are equal but for a motion have one map.
+        maps, alone = list[ChartMap](), list[tuple[Chart, Target | None, ChartMap]]()
         for k, chart in enumerate(charts):
             if k in pairs:
                 maps.append(mirrored_map(maps[pairs[k][0]], pairs[k][1]))
                 continue
             chart_map = cut.maps.get(k)
+            moves = cut.pins[k] is None and self.markers is None
+            if chart_map is None and moves:
+                chart_map = equal_chart_map(chart, cut.targets[k], alone)
             if chart_map is None:
                 share = min(len(chart.triangles) / total, 1 - done)
                 chart_map = yield from part_of(self.map_one(chart), done, share)
                 done += share
+                alone += [(chart, cut.targets[k], chart_map)] if moves else []
             maps.append(chart_map)
         return maps
 

@@ -1,0 +1,99 @@
+"""Charts that are equal but for a motion: found whatever their numbers and diagonals, and mapped once."""
+
+from __future__ import annotations
+
+import meshes
+import numpy as np
+import pytest
+from polygons import wavy_quads
+from sphere_shapes import random_rotation
+
+from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.parameterization import unwrap as unwrap_module
+from omt_uv.solver.parameterization.mirrored_charts import motion_between
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
+
+DRAFT = UnwrapOptions(quality="draft")
+
+
+def moved(V, P, seed, mirrored=False):
+    """A copy elsewhere, turned, with vertices and polygons in another order, and polygons that begin elsewhere."""
+    rng = np.random.default_rng(seed)
+    name = rng.permutation(len(V))
+    W = (V * ([-1, 1, 1] if mirrored else 1))[np.argsort(name)] @ random_rotation(seed).T + rng.normal(size=3)
+    Q = [np.roll(name[p][:: -1 if mirrored else 1], rng.integers(4)).tolist() for p in P]
+    return W, [Q[k] for k in rng.permutation(len(Q))]
+
+
+def charts_of(*parts, seams=()):
+    n = np.cumsum([0, *(len(V) for V, _ in parts)])
+    P = [[v + first for v in p] for (_, Q), first in zip(parts, n, strict=False) for p in Q]
+    surface = meshes.polygon_surface(np.concatenate([V for V, _ in parts]), P, seams)
+    return surface, strict_charts(surface)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_motion_is_found_whatever_the_numbers_and_diagonals(mirrored):
+    body = wavy_quads()[:2]
+    for seed in range(4):
+        _, (first, other) = charts_of(body, moved(*body, seed, mirrored))
+        image, sign = motion_between(first, other)
+        assert sign == (-1.0 if mirrored else 1.0)
+        a, b = first.vertices[image], other.vertices
+        np.testing.assert_allclose(
+            np.linalg.norm(a[:, None] - a, axis=2), np.linalg.norm(b[:, None] - b, axis=2), atol=1e-9
+        )
+
+
+def test_what_differs_anywhere_is_not_equal():
+    V, P = wavy_quads()[:2]
+    for k, change in enumerate(([1e-3, 0, 0], [0, 0, -1e-3])):
+        W = V.copy()
+        W[7 + k] += change
+        _, (first, other) = charts_of((V, P), moved(W, P, 2))
+        assert motion_between(first, other) is None
+    _, (first, other) = charts_of((V, P), moved(V, P[:-1], 1))
+    assert motion_between(first, other) is None
+
+
+def test_both_sides_of_a_slit_are_told_apart():
+    V, P = meshes.quad_grid()
+    V = V + 0.05 * np.random.default_rng(0).random(V.shape)
+    P = [list(map(int, p)) for p in P]
+    edges = {(a, b) for p in P for a, b in zip(p, [*p[1:], p[0]], strict=True)}
+    # A row of edges from the boundary on.
+    inside = [(a, a + 1) for a in range(len(V) // 2 - 3, len(V) // 2) if (a, a + 1) in edges or (a + 1, a) in edges]
+    W, Q = moved(V, P, 0)
+    name = np.random.default_rng(0).permutation(len(V))
+    seams = [*inside, *((name[a] + len(V), name[b] + len(V)) for a, b in inside)]
+    _, (first, other) = charts_of((V, P), (W, Q), seams=seams)
+    assert len(first.vertices) > len(V)
+    image, _ = motion_between(first, other)
+    assert sorted(image.tolist()) == list(range(len(first.vertices)))
+
+
+def test_equal_charts_are_solved_once(monkeypatch):
+    body, solved = wavy_quads()[:2], []
+
+    def counted(chart, **given):
+        solved.append(chart)
+        return map_chart(chart, **given)
+
+    map_chart = unwrap_module.map_chart
+    monkeypatch.setattr(unwrap_module, "map_chart", counted)
+    surface, charts = charts_of(body, moved(*body, 1), moved(*body, 2, mirrored=True), moved(body[0] * 1.1, body[1], 3))
+    found = drain(unwrap(surface, options=DRAFT))
+    assert len(charts) == 4 and len(solved) == 2
+    for chart, chart_map in zip(found.charts, found.maps, strict=True):
+        assert chart_map.folds == 0 and (signed_areas(chart_map.uv, chart.triangles) > 0).all()
+    assert found.maps[0].area_l1 == found.maps[1].area_l1 == found.maps[2].area_l1
+    # Densities that are not equal part them.
+    solved.clear()
+    density = np.ones(len(surface.triangles))
+    density[charts[1].faces.min() :][:3] = 2.0
+    drain(unwrap(surface, options=DRAFT, target=Target(density)))
+    assert len(solved) == 3
