@@ -5,7 +5,7 @@ from __future__ import annotations
 import meshes
 import numpy as np
 import pytest
-from broken_meshes import broken_mesh, broken_model
+from broken_meshes import arrays, broken_mesh, broken_model, check_error
 
 from omt_uv.solver.errors import MeshError
 from omt_uv.solver.mesh.surface import Surface
@@ -14,19 +14,6 @@ from omt_uv.solver.progress import drain
 
 CASES = 2100
 CHUNKS = 21
-
-
-def arrays(surface: Surface):
-    return [np.array(getattr(surface, name)) for name in Surface.__dataclass_fields__]
-
-
-def check_error(error: MeshError, surface: Surface):
-    assert error.cause and str(error).startswith(error.cause) and error.remedy
-    limit = {"vertex": len(surface.positions), "edge": len(surface.positions), "face": len(surface.face_start) - 1}
-    if len(error.elements):
-        assert error.kind in limit
-        assert error.elements.min() >= 0 and error.elements.max() < limit[error.kind]
-        assert error.elements.shape[1:] == ((2,) if error.kind == "edge" else ())
 
 
 def check_result(result, surface: Surface, faces):

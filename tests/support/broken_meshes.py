@@ -7,6 +7,8 @@ from dataclasses import replace
 import meshes
 import numpy as np
 
+from omt_uv.solver.errors import MeshError
+from omt_uv.solver.mesh.surface import Surface
 from omt_uv.solver.parameterization.options import UnwrapOptions
 
 MODELS = ["cow", "spot", "homer", "suzanne", "teapot", "camel_b", "three_holes", "fertility", "snail", "lilium", "ogre"]
@@ -252,3 +254,18 @@ def marked(rng, V, P, auto, sparse=1):
         surface = replace(surface, sharp=rng.integers(len(V), size=(8, 2)))
         arguments["avoid"] = rng.random(len(V))
     return surface, faces, arguments
+
+
+def arrays(surface: Surface):
+    """Copies of all arrays of a surface."""
+    return [np.array(getattr(surface, name)) for name in Surface.__dataclass_fields__]
+
+
+def check_error(error: MeshError, surface: Surface):
+    """A refusal has a cause, a remedy, and elements that there are."""
+    assert error.cause and str(error).startswith(error.cause) and error.remedy
+    limit = {"vertex": len(surface.positions), "edge": len(surface.positions), "face": len(surface.face_start) - 1}
+    if len(error.elements):
+        assert error.kind in limit
+        assert error.elements.min() >= 0 and error.elements.max() < limit[error.kind]
+        assert error.elements.shape[1:] == ((2,) if error.kind == "edge" else ())

@@ -93,8 +93,12 @@ def motion_between(first: Chart, other: Chart) -> tuple[np.ndarray, float] | Non
     n = len(first.vertices)
     if n != len(other.vertices) or len(first.patches) or len(other.patches):
         return None
-    (a, sides_a), (b, sides_b) = _about_centre(first), _about_centre(other)
+    # Squares of huge coordinates would be infinite.
+    unit = float(max(np.abs(first.vertices).max(), np.abs(other.vertices).max())) or 1.0
+    (a, sides_a), (b, sides_b) = _about_centre(first, unit), _about_centre(other, unit)
     size = np.linalg.norm(a[:, :3], axis=1).max()
+    if not size > 0:
+        return None
     far = [np.sort(np.linalg.norm(x[:, :3], axis=1)) for x in (a, b)]
     if len(sides_a) != len(sides_b) or np.abs(far[0] - far[1]).max() > SAME_PLACE * size:
         return None
@@ -113,8 +117,8 @@ def motion_between(first: Chart, other: Chart) -> tuple[np.ndarray, float] | Non
     return None
 
 
-def _about_centre(chart: Chart) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n,6), about their mean, with the mean of their neighbours along sides, and sides (k,2) of polygons."""
+def _about_centre(chart: Chart, unit: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n,6) over a unit, about their mean, with the mean of their neighbours, and sides (k,2) of polygons."""
     n, faces = len(chart.vertices), np.concatenate([chart.faces] * 3)
     tail, head = (chart.triangles[:, k].T.ravel() for k in ((0, 1, 2), (1, 2, 0)))
     low, high = np.minimum(tail, head), np.maximum(tail, head)
@@ -122,7 +126,8 @@ def _about_centre(chart: Chart) -> tuple[np.ndarray, np.ndarray]:
     _, place, count = np.unique(np.stack([low, high, faces]), axis=1, return_inverse=True, return_counts=True)
     side = count[place.ravel()] == 1
     tail, head = tail[side], head[side]
-    x = chart.vertices - chart.vertices.mean(axis=0)
+    x = chart.vertices / unit
+    x = x - x.mean(axis=0)
     both, of = np.concatenate([tail, head]), np.concatenate([head, tail])
     number = np.maximum(np.bincount(both, minlength=n), 1)
     around = np.stack([np.bincount(both, x[of, k], n) for k in range(3)], axis=1) / number[:, None]

@@ -1,0 +1,102 @@
+"""Meshes of all kinds through the whole path, judged by a program of somebody else: no fold and no overlap is unsaid.
+
+OMT_UV_FUZZ=20000 takes more of them than `make test` does, OMT_UV_FUZZ_FIRST=N begins later, OMT_UV_FUZZ_LOG=FILE
+keeps a line of each.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from broken_meshes import arrays, check_error
+from wide_meshes import wide_case
+
+from omt_uv.pipelines.gate import gate
+from omt_uv.pipelines.layout import Refusal, UnwrapJob
+from omt_uv.pipelines.reading import Reading
+from omt_uv.pipelines.unwrap import lay_out
+from omt_uv.solver.maps.distortion import NEGLIGIBLE_AREA
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.progress import drain
+
+SHARED = Path(__file__).resolve().parents[3] / "shared"
+JUDGE = Path(os.environ.get("OMT_UV_JUDGE", SHARED / "tools" / "judge_uv.py"))
+FIRST, CASES = int(os.environ.get("OMT_UV_FUZZ_FIRST", "0")), int(os.environ.get("OMT_UV_FUZZ", "33"))
+CHUNK = 33
+# Overlap that the judge's samples tell from none.
+SEEN = 1e-3
+# What the judge takes for a fold besides: an area below single precision.
+FLAT = 1e-12
+
+
+@pytest.fixture(scope="module")
+def judge():
+    if not JUDGE.exists():
+        return None
+    spec = importlib.util.spec_from_file_location("judge_uv", JUDGE)
+    found = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(found)
+    return found
+
+
+def judged(judge, surface, faces, uv):
+    """Folds and overlap of UVs (c,2) float32, of triangles that have an area."""
+    corner = surface.triangles[faces[surface.triangle_face]]
+    F, UV = surface.corner_vertex[corner], uv[corner].astype(float)
+    area = face_areas(surface.positions, F)
+    real = area > NEGLIGIBLE_AREA * area.sum()
+    F, UV = F[real], UV[real]
+    if not len(F):
+        return 0, 0.0
+    _, chart = judge.chart_of_face(F, UV)
+    signed = judge.signed_area(UV)
+    turned = np.bincount(chart, signed)
+    folds = int(((signed * turned[chart] <= 0) & (np.abs(signed) > FLAT * np.abs(signed).sum())).sum())
+    return folds, judge.overlap_share(UV, samples=40_000)
+
+
+def outcome(judge, seed):
+    """A word for what became of a case, with folds and overlap; what must not be raises."""
+    kind, surface, faces, settings = wide_case(seed)
+    before = arrays(surface)
+    chosen = np.ones(len(surface.face_start) - 1, bool) if faces is None else faces
+    try:
+        layout = drain(lay_out([UnwrapJob(surface, faces)], settings))
+    except Refusal as refusal:
+        check_error(refusal.error, surface)
+        return kind, type(refusal.error).__name__, 0, 0.0
+    finally:
+        same = all(np.array_equal(a, b, equal_nan=True) for a, b in zip(before, arrays(surface), strict=True))
+        assert same, "the input was changed"
+    uv = np.zeros((len(surface.corner_vertex), 2), np.float32)
+    uv[layout.corners[0]] = layout.uv[0]
+    assert np.isfinite(uv).all()
+    # Blender holds no such numbers that their squares are none.
+    used = surface.positions[np.isfinite(surface.positions).all(axis=1)]
+    surface = replace(surface, positions=surface.positions / (np.abs(used).max() or 1.0))
+    told = gate([Reading(surface, chosen, uv, None)]).warnings()
+    folds, overlap = (0, 0.0) if judge is None else judged(judge, surface, chosen, uv)
+    assert not folds or any("folded" in text for text in told), f"{folds} folds unsaid, {told}"
+    assert overlap < SEEN or any("under several faces" in text for text in told), f"overlap {overlap} unsaid, {told}"
+    return kind, "told" if told else "clean", folds, overlap
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("first", range(FIRST, FIRST + CASES, CHUNK))
+def test_no_fold_and_no_overlap_is_unsaid(judge, first):
+    for seed in range(first, min(first + CHUNK, FIRST + CASES)):
+        begin = time.process_time()
+        try:
+            found = outcome(judge, seed)
+        except Exception as error:
+            error.add_note(f"case {seed}, {wide_case(seed)[0]}, {wide_case(seed)[3]}")
+            raise
+        if "OMT_UV_FUZZ_LOG" in os.environ:
+            with open(os.environ["OMT_UV_FUZZ_LOG"], "a") as log:
+                print(seed, *found, round(time.process_time() - begin, 2), file=log)
