@@ -57,8 +57,9 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.sphere solver.remeshing.components solver.remeshing.edits",
     "solver.remeshing": "solver solver.mesh solver.analysis solver.remeshing.components solver.remeshing.edits "
     "solver.remeshing.relaxation solver.remeshing.fitting solver.remeshing.initial",
-    "solver.signatures": "solver solver.mesh solver.analysis solver.conformal solver.sphere solver.registration",
     "solver.partition": "solver solver.mesh solver.linalg solver.transport",
+    "solver.signatures": "solver solver.mesh solver.linalg solver.analysis solver.conformal solver.sphere "
+    "solver.registration solver.transport solver.partition",
     "solver.api": "solver solver.mesh solver.analysis solver.maps solver.parameterization solver.editing solver.sphere "
     "solver.remeshing",
     "remedies": "solver",
