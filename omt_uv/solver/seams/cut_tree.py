@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.topology import graph_components
 from .path_graph import PathGraph
@@ -57,12 +55,12 @@ def stretches(graph: PathGraph, steps: np.ndarray) -> list[np.ndarray]:
 def leaves(graph: PathGraph, steps: np.ndarray) -> list[np.ndarray]:
     """The stretches of steps (k,) that end in a tip, each from the tip on."""
     paths, degree = _by_stretch(graph, steps)
+    depth = graph.depth(steps)
     found = []
     for path in paths:
-        ends = graph.ends[path].ravel()
-        tips = ends[(degree[ends] == 1) & ~graph.boundary[ends]]
-        if len(tips):
-            found.append(_from_tip(graph, path, int(tips[0])))
+        ends = graph.ends[path]
+        if ((degree[ends] == 1) & ~graph.boundary[ends]).any():
+            found.append(path[np.argsort(-depth[ends].max(axis=1), kind="stable")])
     return found
 
 
@@ -81,12 +79,3 @@ def _by_stretch(graph: PathGraph, steps: np.ndarray) -> tuple[list[np.ndarray], 
     total = np.bincount(label, graph.cost[steps])
     order = np.argsort(-total, kind="stable")[: len(np.unique(label))]
     return [steps[label == c] for c in order], degree
-
-
-def _from_tip(graph: PathGraph, path: np.ndarray, tip: int) -> np.ndarray:
-    """The steps (k,) of a path in order from its end `tip`."""
-    vertices, local = np.unique(graph.ends[path], return_inverse=True)
-    local = local.reshape(-1, 2)
-    chain = csr_matrix((np.ones(len(path)), local.T), shape=(len(vertices),) * 2)
-    depth = dijkstra(chain, directed=False, unweighted=True, indices=int(np.searchsorted(vertices, tip)))
-    return path[np.argsort(depth[local].max(axis=1), kind="stable")]

@@ -58,12 +58,16 @@ def trimmed(task: Task, cut: Cut) -> Cut:
         shorter = []
         for leaf in leaves(task.graph, cut.steps):
             for part in PARTS:
-                other = cut_along(task, np.setdiff1d(cut.steps, leaf[: max(int(part * len(leaf)), 1)]))
+                gone = leaf[: max(int(part * len(leaf)), 1)]
+                other = cut_along(task, np.setdiff1d(cut.steps, gone))
                 if other.spread <= task.bound:
-                    shorter.append(((other.spread - cut.spread) / (cut.cost - other.cost), other))
+                    shorter.append(((other.spread - cut.spread) / (cut.cost - other.cost), gone))
         if not shorter:
             return cut
-        cut = min(shorter, key=lambda pair: pair[0])[1]
+        for _, gone in sorted(shorter, key=lambda pair: pair[0]):
+            other = cut_along(task, np.setdiff1d(cut.steps, gone))
+            if other.spread <= task.bound:
+                cut = other
 
 
 def rerouted(task: Task, cut: Cut) -> Cut:

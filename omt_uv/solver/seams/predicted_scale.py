@@ -16,9 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import solve_triangular
+from scipy.linalg import lapack, solve_triangular
 
-from ..linalg.sparse import Factor
 from ..mesh.geometry import LEAST_STIFFNESS, halfedge_lengths, laplacian_from_lengths
 from .coarse_surface import CoarseSurface
 
@@ -34,22 +33,61 @@ LEAST_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
+class Held:
+    """The answer of a surface to a load, held at 0 at some vertices.
+
+    Attributes
+    ----------
+    value (n,) : under the load
+    green (n,n) : Green's function, the answer to a unit load at every vertex, before what is cut was held, too
+    rows (k,n) : of a root of what cuts have taken off since: Green's function is now green - rows^T rows
+    """
+
+    value: np.ndarray
+    green: np.ndarray
+    rows: np.ndarray
+
+    @staticmethod
+    def of(green: np.ndarray, load: np.ndarray) -> Held:
+        """The answer to a load (n,) by Green's function (n,n)."""
+        return Held(green @ load, green, np.zeros((0, len(load))))
+
+    def at(self, vertices: np.ndarray) -> Held:
+        """Held at the vertices (k,), too."""
+        root = np.linalg.cholesky(self.between(vertices))
+        taken = self.green[vertices] - self.rows[:, vertices].T @ self.rows
+        rows = solve_triangular(root, taken, lower=True)
+        value = self.value - rows.T @ solve_triangular(root, self.value[vertices], lower=True)
+        return Held(value, self.green, np.concatenate([self.rows, rows]))
+
+    def between(self, vertices: np.ndarray) -> np.ndarray:
+        """Green's function (k,k) between vertices (k,) that are to be cut."""
+        part = self.rows[:, vertices]
+        block = self.green[np.ix_(vertices, vertices)] - part.T @ part
+        if len(vertices) > 1:
+            # The first pin of a closed surface takes all of its load: what gave way there would be a spread that stays.
+            own = block.diagonal()
+            block[np.diag_indices(len(own))] += ROUNDING * own + LEAST_ROUNDING * own.max()
+        return block
+
+    def own(self, vertices: np.ndarray) -> np.ndarray:
+        """Green's function (k,) of each of the vertices (k,) at itself."""
+        return self.green[vertices, vertices] - (self.rows[:, vertices] ** 2).sum(axis=0)
+
+
+@dataclass(frozen=True)
 class ScaleModel:
     """A surface under its curvature, held at its boundary.
 
     Attributes
     ----------
-    green (n,n) : Green's function of the Laplacian
-    scale (n,) : the log scale u, 0 on the boundary
-    plate (n,n) : Green's function of the bilaplacian
-    stress (n,) : under the load, 0 on the boundary
+    membrane : holds the log scale u, 0 on the boundary, by the Laplacian
+    plate : holds the stress, 0 on the boundary, by the bilaplacian
     load (n,) : the curvature, 0 on the boundary
     """
 
-    green: np.ndarray
-    scale: np.ndarray
-    plate: np.ndarray
-    stress: np.ndarray
+    membrane: Held
+    plate: Held
     load: np.ndarray
 
     @staticmethod
@@ -72,56 +110,46 @@ class ScaleModel:
         inner = columns[free] + ground * sp.diags(surface.area[free])
         columns = columns + held * sp.diags(surface.area).tocsc()[:, free]
         bend = columns.T @ sp.diags(1 / np.maximum(area, LEAST_AREA * area.mean())) @ columns
-        green, plate = _inverse(inner, free, n), _inverse(bend, free, n)
-        return ScaleModel(green, green @ load, plate, plate @ load, load)
+        membrane, plate = (Held.of(_inverse(matrix, free, n), load) for matrix in (inner, bend))
+        return ScaleModel(membrane, plate, load)
+
+    @property
+    def scale(self) -> np.ndarray:
+        """The log scale u (n,)."""
+        return self.membrane.value
 
     @property
     def spread(self) -> float:
         """Mean square of what maps shear by, up to a factor: the energy of the plate."""
-        return float(self.load @ self.stress)
+        return float(self.load @ self.plate.value)
 
     def spread_cut(self, vertices: np.ndarray) -> float:
         """The spread that is left where the stress is 0 at the vertices (k,) of a cut, too."""
         if len(vertices) == 0:
             return self.spread
-        stress = self.stress[vertices]
-        return self.spread - float(stress @ np.linalg.solve(_between(self.plate, vertices), stress))
+        stress = self.plate.value[vertices]
+        return self.spread - float(stress @ np.linalg.solve(self.plate.between(vertices), stress))
 
     def cut(self, vertices: np.ndarray) -> ScaleModel:
         """The model of the surface cut at the vertices (k,)."""
         if len(vertices) == 0:
             return self
-        green, scale = _cut(self.green, self.scale, vertices)
-        plate, stress = _cut(self.plate, self.stress, vertices)
-        return ScaleModel(green, scale, plate, stress, self.load)
+        return ScaleModel(self.membrane.at(vertices), self.plate.at(vertices), self.load)
 
     def gain(self, vertices: np.ndarray) -> np.ndarray:
         """Fall of the spread (k,) by a cut at each of the vertices (k,) alone."""
-        own = np.maximum(self.plate[vertices, vertices], 1e-300)
-        return self.stress[vertices] ** 2 / own
+        return self.plate.value[vertices] ** 2 / np.maximum(self.plate.own(vertices), 1e-300)
 
 
 def _inverse(matrix, free: np.ndarray, n: int) -> np.ndarray:
-    """The inverse (n,n) of a symmetric matrix on the vertices `free` (k,), 0 elsewhere."""
-    inverse = Factor(sp.csc_matrix(matrix)).solve(np.eye(len(free)))
+    """The inverse (n,n) of a symmetric positive matrix on the vertices `free` (k,), 0 elsewhere."""
     whole = np.zeros((n, n))
-    whole[np.ix_(free, free)] = (inverse + inverse.T) / 2
+    if len(free):
+        # Nearly all of the inverse is asked for: dense, by Cholesky, is the quickest there is.
+        root, flaw = lapack.dpotrf(matrix.toarray(), lower=1)
+        inverse, flaw = lapack.dpotri(root, lower=1) if flaw == 0 else (root, flaw)
+        if flaw:
+            raise np.linalg.LinAlgError("the matrix of a coarse surface is not positive")
+        lower = np.tril(inverse)
+        whole[np.ix_(free, free)] = lower + np.tril(inverse, -1).T
     return whole
-
-
-def _cut(green: np.ndarray, value: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Green's function (n,n) and the value (n,) under a load where both are 0 at the vertices (k,), too."""
-    root = np.linalg.cholesky(_between(green, vertices))
-    share = solve_triangular(root, green[vertices], lower=True)
-    value = value - share.T @ solve_triangular(root, value[vertices], lower=True)
-    return green - share.T @ share, value
-
-
-def _between(green: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Green's function (k,k) between the vertices (k,) of a cut."""
-    block = green[np.ix_(vertices, vertices)]
-    own = block.diagonal()
-    if len(vertices) == 1:
-        # The first pin of a closed surface takes all of its load: what gave way there would be a spread that stays.
-        return block
-    return block + np.diag(ROUNDING * own + LEAST_ROUNDING * own.max())

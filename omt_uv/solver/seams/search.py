@@ -200,7 +200,7 @@ class _Setting:
 
     def extremity(self) -> int:
         """The vertex at which a closed surface is opened: a sharp one, in the mirror plane if there is one."""
-        scale = self.model.green @ (self.coarse.curvature - self.coarse.curvature.sum() * self.coarse.area)
+        scale = self.model.membrane.green @ (self.coarse.curvature - self.coarse.curvature.sum() * self.coarse.area)
         worth = np.abs(scale) * self.tip_factor / self.factor
         if self.mirrored is not None:
             worth[self.mirrored.image != np.arange(len(worth))] = -1
