@@ -57,7 +57,8 @@ class SeamFinder(Protocol):
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
 
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
-        """Edges (e,) bool to cut, of a component that is a disk, or a disk once the edges `base` (e,) bool are cut."""
+        """Edges (e,) bool to cut, of a component that is a disk, or a disk once the edges `base` (e,) bool are cut: with
+        these, or others in their place."""
 
 
 @dataclass(frozen=True)
@@ -312,7 +313,7 @@ class _Cutter:
         closed = topology.boundaries[k] == 0 and topology.handles[k] == 0
         if not (closed or topology.is_disk[k]):
             base = cut_component(component, topology, k, 0)[0]
-        chosen = base | (yield from search(component, base))
+        chosen = yield from search(component, base)
         # A slit of a single edge would not open anything.
         if closed and chosen.sum() < 2:
             return cut_component(component, topology, k, self.extremities)

@@ -23,11 +23,12 @@ ASTRAY = 0.5
 @dataclass(frozen=True)
 class FineMirror:
     """The mirror image (n,) of every vertex of a component, and which are on the one side, (n,) bool, and in the plane
-    or within an edge of it, where no vertices are quite in it."""
+    or within an edge of it, where no vertices are quite in it; exact: whether the images are vertices, nearly all."""
 
     image: np.ndarray
     side: np.ndarray
     plane: np.ndarray
+    exact: bool = True
 
 
 def carried(
@@ -42,9 +43,9 @@ def carried(
 
     start (n,) bool: vertices that are on a boundary or cut already, from which paths set out.
     """
-    fine = _FineGraph.of(component)
+    fine = FineGraph.of(component)
     # Diagonals need not be mirrored; paths run along edges that are, where there is such a way.
-    half = fine if mirror is None else _FineGraph.of(component, mirror.image)
+    half = fine if mirror is None else FineGraph.of(component, mirror.image)
     used = start.copy()
     spacing = coarse.size * float(np.median(graph.cost)) if len(graph.cost) else 0.0
     paths = []
@@ -106,14 +107,14 @@ def _outwards(graph: PathGraph, steps: np.ndarray) -> list[tuple[np.ndarray, int
 
 
 @dataclass(frozen=True)
-class _FineGraph:
+class FineGraph:
     """Edges of a component that can be cut, and those of its boundary: what they cost, and their length, (n,n)."""
 
     cost: csr_matrix
     length: csr_matrix
 
     @staticmethod
-    def of(component: CutComponent, image: np.ndarray | None = None) -> _FineGraph:
+    def of(component: CutComponent, image: np.ndarray | None = None) -> FineGraph:
         """The graph of a component; diagonals of polygons are no edges.
 
         image (n,): mirror image of every vertex; edges whose image is no edge stay away.
@@ -130,7 +131,7 @@ class _FineGraph:
         cost = np.concatenate([component.cost[inner], length[inner.sum() :]])
         rows, columns = np.concatenate([ends, ends[:, ::-1]]).T
         shape = (component.vertex_count,) * 2
-        return _FineGraph(
+        return FineGraph(
             csr_matrix((np.tile(cost, 2), (rows, columns)), shape=shape),
             csr_matrix((np.tile(length, 2), (rows, columns)), shape=shape),
         )

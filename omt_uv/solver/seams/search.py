@@ -17,20 +17,24 @@ from scipy.spatial import cKDTree
 from ..analysis.seam_costs import SeamCosts
 from ..cutting.component import CutComponent
 from ..mesh.surface import Surface
-from ..progress import Progress, Steps
+from ..progress import Progress, Steps, part_of
 from .coarse_surface import CoarseSurface, coarse_surface
-from .cut_tree import Cut, Task, cut_along
+from .cut_tree import EXCHANGE, Cut, Task, cut_along
 from .fine_paths import FineMirror, carried
 from .growth import grow
 from .improvement import improved, rerouted, trimmed
 from .options import SearchOptions
 from .path_graph import Mirrored, PathGraph, path_graph
 from .predicted_scale import ScaleModel
+from .symmetric_base import symmetric_base
 
 # Share of the vertices that have an image in a component with a mirror plane.
 MIRRORED_SHARE = 0.97
-# Distance of a vertex from where its image belongs, or from the plane, over the extent.
+# Distance of a vertex from where its image belongs, or from the plane, over the extent; and that of scans.
 EXACT = 1e-4
+NEARLY = 0.03
+# Seams of a scan are symmetric unless that makes them cost more than so many times what others do.
+DEARER = 1.1
 # A vertex is in a face if it is so with more than this certainty, and cuts that end there are worth so much less.
 IN_FACE = 0.5
 BARRED = 0.3
@@ -65,18 +69,43 @@ class SeamSearch:
         return (self.further or not marked) and bool(np.isfinite(self.spread[polygons]).any())
 
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
-        """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut."""
+        """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut: with these,
+        or such as are symmetric where the component is."""
         yield Progress("Seams", 0.0)
         bound = float(self.spread[component.polygons[component.polygons >= 0]].min())
         bounded = bool(component.on_boundary().any())
         if bounded:
             coarse, model = self._modelled(component)
-            if model.spread <= bound:
-                return np.zeros(len(component.pair), dtype=bool)
+            if model.spread <= bound and not base.any():
+                return base
         component = self._with_costs(component)
-        mirror = None if base.any() else self._mirror(component)
-        if mirror is not None or not bounded:
-            coarse, model = self._modelled(component, mirror)
+        mirror = self._mirror(component)
+        if mirror is not None and base.any():
+            symmetric = symmetric_base(component, mirror)
+            base, mirror = (base, None) if symmetric is None else (symmetric, mirror)
+        if bounded and model.spread <= bound:
+            return base
+        plain = (coarse, model) if bounded else None
+        if mirror is None:
+            found = yield from self._searched(component, base, bound, None, plain)
+        elif mirror.exact:
+            found = yield from self._searched(component, base, bound, mirror, plain)
+        else:
+            found = yield from part_of(self._searched(component, base, bound, mirror, plain), 0.0, 0.5)
+            free = yield from part_of(self._searched(component, base, bound, None, plain), 0.5, 0.5)
+            found = min(found, free, key=lambda one: one.score * (1.0 if one.mirror is None else 1 / DEARER))
+        return base | found.carried(component)
+
+    def _searched(
+        self,
+        component: CutComponent,
+        base: np.ndarray,
+        bound: float,
+        mirror: FineMirror | None,
+        plain: tuple[CoarseSurface, ScaleModel] | None,
+    ) -> Steps[_Found]:
+        """The best cut, symmetric where there is a mirror; plain : what is known of the coarse surface without one."""
+        coarse, model = plain if mirror is None and plain is not None else self._modelled(component, mirror)
         setting = _Setting.of(component, coarse, base, mirror, model, self._tip_factor(component))
         task = setting.task(bound, setting.extremity())
         if mirror is not None and not task.graph.is_whole():
@@ -95,7 +124,7 @@ class SeamSearch:
         start[component.ends[base].ravel()] = True
         if setting.is_closed:
             start[coarse.kept[task.graph.boundary]] = True
-        return carried(component, coarse, task.graph, cut.steps, start, mirror)
+        return _Found(task, cut, coarse, start, mirror)
 
     def _grown(self, task: Task) -> Steps[Cut]:
         """The cut of arcs that pay most, one after another."""
@@ -137,9 +166,17 @@ class SeamSearch:
         height = height - np.mean(height[real] - scale * (own @ plane.normal - plane.offset))
         distance, image = cKDTree(points).query(points - 2 * height[:, None] * plane.normal)
         in_plane = (image == np.arange(len(image))) & (np.abs(height) <= EXACT)
-        if np.mean(distance <= EXACT) < MIRRORED_SHARE or not in_plane.any():
+        if np.mean(distance <= EXACT) >= MIRRORED_SHARE and in_plane.any():
+            return FineMirror(image, height >= 0, in_plane, exact=True)
+        if np.mean(distance <= NEARLY) < MIRRORED_SHARE:
             return None
-        return FineMirror(image, height >= 0, in_plane)
+        # Of every edge that crosses the plane the nearer end: these are joined all along it.
+        crossing = component.ends[height[component.ends].prod(axis=1) <= 0]
+        nearer = np.abs(height[crossing]).argmin(axis=1)
+        in_plane = np.zeros(len(image), dtype=bool)
+        in_plane[crossing[np.arange(len(crossing)), nearer]] = True
+        image[in_plane] = np.flatnonzero(in_plane)
+        return FineMirror(image, height >= 0, in_plane, exact=False) if in_plane.any() else None
 
     def _tip_factor(self, component: CutComponent) -> np.ndarray:
         """Factor (n,) on what cuts are worth that end at a vertex: less on a face."""
@@ -157,6 +194,26 @@ class SeamSearch:
         vertices, n = component.triangles[real].ravel(), component.vertex_count
         total = np.bincount(vertices, value, n) / np.maximum(np.bincount(vertices, minlength=n), 1)
         return (total - total.mean())[coarse.kept]
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A cut that was found for a task on a coarse surface, from the vertices `start` (n,) bool of the fine one on."""
+
+    task: Task
+    cut: Cut
+    coarse: CoarseSurface
+    start: np.ndarray
+    mirror: FineMirror | None
+
+    @property
+    def score(self) -> float:
+        """What it costs; less is better. One that misses the bound costs what reaching it would."""
+        return self.cut.cost * max(self.cut.spread / self.task.bound, 1.0) ** EXCHANGE
+
+    def carried(self, component: CutComponent) -> np.ndarray:
+        """The edges (e,) bool along which it runs."""
+        return carried(component, self.coarse, self.task.graph, self.cut.steps, self.start, self.mirror)
 
 
 @dataclass(frozen=True)
