@@ -57,8 +57,8 @@ class SeamFinder(Protocol):
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
 
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
-        """Edges (e,) bool to cut, of a component that is a disk, or a disk once the edges `base` (e,) bool are cut: with
-        these, or others in their place."""
+        """Edges (e,) bool to cut, of a component that is a disk, or a disk once the edges `base` (e,) bool are cut:
+        with these, or others in their place."""
 
 
 @dataclass(frozen=True)

@@ -13,23 +13,25 @@ from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import CUT_FURTHER, MORE_SEAMS
-from ..maps.distortion import face_distortion
+from ..maps.distortion import RATIO_FLOOR, face_distortion
 from ..mesh.charts import Chart
 from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import Steps, part_of
-from ..seams.search import SeamSearch
+from ..seams.search import Measured, SeamSearch
 from .chart_map import ChartMap
 from .options import ShearBound
 
 # Maps that are made at most.
-MOST_ROUNDS = 3
+MOST_ROUNDS = 4
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
 SPREAD_OF_SHEAR = 0.21
 # What a search that is made again aims below the bound, so that it need not be the last but one.
 MARGIN = 0.75
+# Beyond this, shear counts no more for where to cut.
+MOST_SHEAR = 8.0
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
 
@@ -74,20 +76,26 @@ class ShearSearch:
 
     def search(self, spread: np.ndarray) -> SeamSearch:
         """The search for a spread (f,)."""
-        return SeamSearch(spread, self.surface, self.costs, density=self._density, further=self.shear.further)
+        further, memory = self.shear.further, self._memory
+        return SeamSearch(spread, self.surface, self.costs, density=self._density, further=further, memory=memory)
 
-    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray) -> Steps[DiskCharts]:
-        """Charts that missed the bound cut anew for a spread (f,); the edges that others were cut along (k,2) stay."""
+    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, found: Measured) -> Steps[DiskCharts]:
+        """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
+        what was found of their maps; the edges that others were cut along (k,2) stay."""
         target = np.full(self._count, np.inf)
         for chart in missed:
             target[chart.faces] = spread[chart.faces]
-        search = replace(self.search(target), further=True)
+        search = replace(self.search(target), further=True, measured=found)
         surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
         return disk_charts(surface, self.faces, search=search, **self.cutting)
 
     def costs(self) -> SeamCosts:
         """What cutting the edges of the surface costs."""
         return self._costs
+
+    @cached_property
+    def _memory(self) -> dict:
+        return {}
 
     @cached_property
     def _costs(self) -> SeamCosts:
@@ -118,20 +126,25 @@ def bound_shear(
     rounds = 0
     while True:
         charts = prepared.charts
-        mean = np.array([_mean_shear(c, m) for c, m in zip(charts, maps, strict=True)])
+        shear = [_shear(c, m) for c, m in zip(charts, maps, strict=True)]
+        mean = np.array([area @ local / area.sum() for local, area in shear])
         rounds += 1
         missed = np.flatnonzero(mean > bound)
         searched = [k for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
         if rounds == MOST_ROUNDS or not searched:
             break
+        found = Measured(np.zeros(len(spread)), np.ones(len(spread)))
         for k in searched:
-            spread[charts[k].faces] *= MARGIN * (np.log(bound) / np.log(mean[k])) ** 2
+            part = MARGIN * (np.log(bound) / np.log(mean[k])) ** 2
+            spread[charts[k].faces] *= part
+            found.spread[charts[k].faces] = np.log(np.minimum(shear[k][0], MOST_SHEAR)) ** 2
+            found.share[charts[k].faces] = part
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
         worst = [charts[k] for k in searched]
         outlines = np.concatenate([_outline(chart) for chart in worst])
         kept = cuts.edges[~np.isin(pair_keys(*cuts.edges.T), outlines)]
-        again = yield from part_of(search.again(kept, worst, spread), begin, width * SEARCHING)
+        again = yield from part_of(search.again(kept, worst, spread, found), begin, width * SEARCHING)
         edges = np.concatenate([kept, _cuts(again).edges])
         if len(edges) == len(cuts.edges) and np.isin(pair_keys(*edges.T), pair_keys(*cuts.edges.T)).all():
             break
@@ -197,10 +210,12 @@ def _name(chart: Chart) -> tuple[bytes, bytes]:
     return chart.corners.tobytes(), chart.disk.tobytes()
 
 
-def _mean_shear(chart: Chart, chart_map: ChartMap) -> float:
-    """Mean of the shear s1/s2 that has the symmetric Dirichlet energy of every polygon at its exact area."""
+def _shear(chart: Chart, chart_map: ChartMap) -> tuple[np.ndarray, np.ndarray]:
+    """The shear s1/s2 (m,) of triangles that has the symmetric Dirichlet energy of their polygons at their exact areas,
+    and these areas (m,)."""
     octaves, shear = face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles], chart.faces)
     ratio = 2.0 ** np.clip(octaves, -20, 20)
     energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
-    area = polygon_areas(chart.vertices, chart.triangles, chart.faces)
-    return float(area @ (energy + np.sqrt(energy**2 - 1)) / area.sum())
+    # Quads that fold along the other diagonal are mended at last, and no seam helps against them.
+    shear = np.where(octaves <= np.log2(RATIO_FLOOR), np.minimum(shear, MOST_SHEAR), energy + np.sqrt(energy**2 - 1))
+    return shear, polygon_areas(chart.vertices, chart.triangles, chart.faces)

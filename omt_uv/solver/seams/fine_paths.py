@@ -55,7 +55,7 @@ def carried(
         allowed = np.ones(component.vertex_count, dtype=bool)
         if mirror is not None:
             # Off the plane nothing comes back to it: that would, with its mirror image, close a loop.
-            allowed = mirror.plane | used if in_plane else (mirror.side & ~mirror.plane) | used
+            allowed = mirror.plane if in_plane else (mirror.side & ~mirror.plane) | used
         path = half.path(used, int(coarse.kept[end]), along, spacing, allowed)
         if mirror is not None and len(path) == 0:
             path = fine.path(used, int(coarse.kept[end]), along, spacing, allowed)

@@ -12,7 +12,7 @@ map. Along a cut the plate is held but not clamped, which is the same where both
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -84,15 +84,23 @@ class ScaleModel:
     membrane : holds the log scale u, 0 on the boundary, by the Laplacian
     plate : holds the stress, 0 on the boundary, by the bilaplacian
     load (n,) : the curvature, 0 on the boundary
+    laplacian (n,n) : of the surface
     """
 
     membrane: Held
     plate: Held
     load: np.ndarray
+    laplacian: sp.csr_matrix
 
     @staticmethod
-    def of(surface: CoarseSurface, log_density: np.ndarray | None = None) -> ScaleModel:
-        """The model of a coarse surface; log_density (n,): half the logarithm of the area asked for, over its own."""
+    def of(
+        surface: CoarseSurface, log_density: np.ndarray | None = None, weight: np.ndarray | None = None
+    ) -> ScaleModel:
+        """The model of a coarse surface.
+
+        log_density (n,): half the logarithm of the area asked for, over its own; weight (n,): what the square of the
+        rest counts at every vertex, 1 by default
+        """
         n = len(surface.positions)
         length = halfedge_lengths(surface.positions, surface.triangles).reshape(-1, 3)
         laplacian = laplacian_from_lengths(length, surface.triangles, n, LEAST_STIFFNESS)
@@ -109,9 +117,10 @@ class ScaleModel:
             ground, held = GROUND, PLATE_GROUND
         inner = columns[free] + ground * sp.diags(surface.area[free])
         columns = columns + held * sp.diags(surface.area).tocsc()[:, free]
-        bend = columns.T @ sp.diags(1 / np.maximum(area, LEAST_AREA * area.mean())) @ columns
+        stiff = np.maximum(area, LEAST_AREA * area.mean()) * (1.0 if weight is None else weight)
+        bend = columns.T @ sp.diags(1 / stiff) @ columns
         membrane, plate = (Held.of(_inverse(matrix, free, n), load) for matrix in (inner, bend))
-        return ScaleModel(membrane, plate, load)
+        return ScaleModel(membrane, plate, load, laplacian)
 
     @property
     def scale(self) -> np.ndarray:
@@ -134,7 +143,11 @@ class ScaleModel:
         """The model of the surface cut at the vertices (k,)."""
         if len(vertices) == 0:
             return self
-        return ScaleModel(self.membrane.at(vertices), self.plate.at(vertices), self.load)
+        return replace(self, membrane=self.membrane.at(vertices), plate=self.plate.at(vertices))
+
+    def rest(self) -> np.ndarray:
+        """What is left of the log scale, times the area, at every vertex (n,): of the plate without weights."""
+        return self.laplacian @ self.plate.value
 
     def gain(self, vertices: np.ndarray) -> np.ndarray:
         """Fall of the spread (k,) by a cut at each of the vertices (k,) alone."""

@@ -10,13 +10,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ..analysis.seam_costs import SeamCosts
-from ..cutting.component import CutComponent
+from ..cutting.component import CutComponent, fingerprint
+from ..mesh.geometry import face_areas
 from ..mesh.surface import Surface
+from ..mesh.topology import halfedges
 from ..progress import Progress, Steps, part_of
 from .coarse_surface import CoarseSurface, coarse_surface
 from .cut_tree import EXCHANGE, Cut, Task, cut_along
@@ -38,8 +40,27 @@ DEARER = 1.1
 # A vertex is in a face if it is so with more than this certainty, and cuts that end there are worth so much less.
 IN_FACE = 0.5
 BARRED = 0.3
+# What maps have shown is compared with what was predicted over so many rings, where that is so much of its mean at
+# least, and counts so many times more or less at most.
+SMOOTHED = 3
+LEAST_PREDICTED = 0.05
+MOST_WEIGHT = 4.0
 # Where the time of a search goes, roughly: growth ends at this share of it.
 GROWN = 0.5
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What maps along seams that were found before have shown, of every polygon.
+
+    Attributes
+    ----------
+    spread (f,) : square of the logarithm of the shear
+    share (f,) : of what it is in the mean, that is asked for now
+    """
+
+    spread: np.ndarray
+    share: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -54,6 +75,8 @@ class SeamSearch:
     density (f,) : area that polygons ask for, over their own; None for 1
     further : components whose seams were marked by hand are searched, too
     options : see `SearchOptions`
+    measured : see `Measured`, for parts that were searched before
+    memory : of what was found for parts, by their fingerprints; shared by the searches of a surface
     """
 
     spread: np.ndarray
@@ -62,6 +85,8 @@ class SeamSearch:
     density: np.ndarray | None = None
     further: bool = False
     options: SearchOptions = field(default_factory=SearchOptions)
+    measured: Measured | None = None
+    memory: dict[tuple[bytes, ...], _FoundCut] = field(default_factory=dict)
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether a component of these polygons (m,) is searched, some of whose boundary is marked as a seam or not."""
@@ -72,6 +97,10 @@ class SeamSearch:
         """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut: with these,
         or such as are symmetric where the component is."""
         yield Progress("Seams", 0.0)
+        name = fingerprint(component)
+        if self.measured is not None and name in self.memory:
+            self.memory[name] = found = yield from self._again(component, self.memory[name], self.measured)
+            return found.edges
         bound = float(self.spread[component.polygons[component.polygons >= 0]].min())
         bounded = bool(component.on_boundary().any())
         if bounded:
@@ -86,15 +115,14 @@ class SeamSearch:
         if bounded and model.spread <= bound:
             return base
         plain = (coarse, model) if bounded else None
-        if mirror is None:
-            found = yield from self._searched(component, base, bound, None, plain)
-        elif mirror.exact:
+        if mirror is None or mirror.exact:
             found = yield from self._searched(component, base, bound, mirror, plain)
         else:
             found = yield from part_of(self._searched(component, base, bound, mirror, plain), 0.0, 0.5)
             free = yield from part_of(self._searched(component, base, bound, None, plain), 0.5, 0.5)
             found = min(found, free, key=lambda one: one.score * (1.0 if one.mirror is None else 1 / DEARER))
-        return base | found.carried(component)
+        self.memory[name] = found = found.carried(component)
+        return found.edges
 
     def _searched(
         self,
@@ -103,7 +131,7 @@ class SeamSearch:
         bound: float,
         mirror: FineMirror | None,
         plain: tuple[CoarseSurface, ScaleModel] | None,
-    ) -> Steps[_Found]:
+    ) -> Steps[_FoundCut]:
         """The best cut, symmetric where there is a mirror; plain : what is known of the coarse surface without one."""
         coarse, model = plain if mirror is None and plain is not None else self._modelled(component, mirror)
         setting = _Setting.of(component, coarse, base, mirror, model, self._tip_factor(component))
@@ -116,15 +144,34 @@ class SeamSearch:
         if setting.is_closed:
             task = setting.task(bound, _hub(task.graph, cut.steps))
             cut = cut_along(task, cut.steps)
+        cut = yield from self._improved(task, cut)
+        return _FoundCut(setting, task, cut, base, mirror, base)
+
+    def _again(self, component: CutComponent, found: _FoundCut, measured: Measured) -> Steps[_FoundCut]:
+        """A cut for what maps along the one before have shown: where they shear more than was predicted, it counts."""
+        real = component.polygons >= 0
+        polygons, n = component.polygons[real], component.vertex_count
+        area = face_areas(component.positions, component.triangles[real])
+        at = np.repeat(area * measured.spread[polygons], 3)
+        spread = np.bincount(component.triangles[real].ravel(), at, n)
+        setting = found.setting.reweighted(
+            found, component.positions, spread, self._log_density(component, found.coarse)
+        )
+        root = int(np.flatnonzero(found.task.graph.boundary)[0]) if setting.is_closed else 0
+        task = setting.task(0.0, root)
+        share = float(measured.share[polygons].min())
+        task = replace(task, bound=share * task.model.spread_cut(found.cut.vertices))
+        cut = yield from self._grown(task)
+        cut = yield from self._improved(task, cut)
+        return _FoundCut(setting, task, cut, found.base, found.mirror, found.base).carried(self._with_costs(component))
+
+    def _improved(self, task: Task, cut: Cut) -> Steps[Cut]:
+        """The cut made shorter."""
         cut = trimmed(task, rerouted(task, cut))
         for k, better in enumerate(improved(task, cut, self.options.rounds)):
             cut = better
             yield Progress("Seams", GROWN + (0.9 - GROWN) * (k + 1) / self.options.rounds)
-        start = component.on_boundary()
-        start[component.ends[base].ravel()] = True
-        if setting.is_closed:
-            start[coarse.kept[task.graph.boundary]] = True
-        return _Found(task, cut, coarse, start, mirror)
+        return cut
 
     def _grown(self, task: Task) -> Steps[Cut]:
         """The cut of arcs that pay most, one after another."""
@@ -197,23 +244,34 @@ class SeamSearch:
 
 
 @dataclass(frozen=True)
-class _Found:
-    """A cut that was found for a task on a coarse surface, from the vertices `start` (n,) bool of the fine one on."""
+class _FoundCut:
+    """A cut that was found for a task, beside edges `base` (e,) bool, and the edges (e,) bool that it runs along."""
 
+    setting: _Setting
     task: Task
     cut: Cut
-    coarse: CoarseSurface
-    start: np.ndarray
+    base: np.ndarray
     mirror: FineMirror | None
+    edges: np.ndarray
+
+    @property
+    def coarse(self) -> CoarseSurface:
+        """The surface that was searched."""
+        return self.setting.coarse
 
     @property
     def score(self) -> float:
         """What it costs; less is better. One that misses the bound costs what reaching it would."""
         return self.cut.cost * max(self.cut.spread / self.task.bound, 1.0) ** EXCHANGE
 
-    def carried(self, component: CutComponent) -> np.ndarray:
-        """The edges (e,) bool along which it runs."""
-        return carried(component, self.coarse, self.task.graph, self.cut.steps, self.start, self.mirror)
+    def carried(self, component: CutComponent) -> _FoundCut:
+        """The same, led along the edges of the component."""
+        start = component.on_boundary()
+        start[component.ends[self.base].ravel()] = True
+        if self.setting.is_closed:
+            start[self.coarse.kept[self.task.graph.boundary]] = True
+        edges = carried(component, self.coarse, self.task.graph, self.cut.steps, start, self.mirror)
+        return replace(self, edges=self.base | edges)
 
 
 @dataclass(frozen=True)
@@ -254,6 +312,25 @@ class _Setting:
     def is_closed(self) -> bool:
         """Whether there is nowhere for cuts to begin, so that they need a root."""
         return not self.start.any()
+
+    def reweighted(
+        self, found: _FoundCut, positions: np.ndarray, spread: np.ndarray, log_density: np.ndarray | None
+    ) -> _Setting:
+        """The same, where what is left counts as much as maps have shown; spread (n,): times the area, at positions."""
+        n = len(self.coarse.positions)
+        shown = np.bincount(cKDTree(self.coarse.positions).query(positions)[1], spread, n)
+        rest = found.task.model.cut(found.cut.vertices).rest()
+        tail, head = halfedges(self.coarse.triangles)
+        near = csr_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n))
+        near = diags(1 / np.maximum(near.sum(axis=1).A1, 1)) @ near
+        area = np.maximum(self.coarse.area, 1e-12)
+        predicted = rest**2 / area
+        for _ in range(SMOOTHED):
+            shown, predicted = (0.5 * (x + near @ x) for x in (shown, predicted))
+        predicted = np.maximum(predicted, LEAST_PREDICTED * predicted.sum() * area)
+        weight = shown / shown.sum() * predicted.sum() / predicted
+        weight = np.clip(weight, 1 / MOST_WEIGHT, MOST_WEIGHT)
+        return replace(self, model=ScaleModel.of(self.coarse, log_density, weight))
 
     def extremity(self) -> int:
         """The vertex at which a closed surface is opened: a sharp one, in the mirror plane if there is one."""

@@ -1,5 +1,7 @@
 """The search for seams: what it promises of the predicted scale, of symmetry, and of what is left to be a disk."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from omt_uv.solver.seams.improvement import improved, trimmed
 from omt_uv.solver.seams.options import SearchOptions
 from omt_uv.solver.seams.path_graph import path_graph
 from omt_uv.solver.seams.predicted_scale import ScaleModel
-from omt_uv.solver.seams.search import SeamSearch
+from omt_uv.solver.seams.search import Measured, SeamSearch
 
 
 @pytest.fixture(scope="module")
@@ -96,3 +98,20 @@ def test_scale_does_not_matter():
 
 def test_options_have_to_be_sound():
     assert SearchOptions().rounds > 0
+
+
+def test_what_counts_more_has_so_much_more_spread(cap):
+    weight = np.full(len(cap.kept), 3.0)
+    assert np.isclose(ScaleModel.of(cap, weight=weight).spread, 3 * ScaleModel.of(cap).spread)
+    weight = np.where(np.arange(len(cap.kept)) % 2, 3.0, 1.0)
+    assert ScaleModel.of(cap).spread < ScaleModel.of(cap, weight=weight).spread < 3 * ScaleModel.of(cap).spread
+
+
+def test_a_search_that_goes_on_takes_what_maps_have_shown():
+    V, F = meshes.cap(20, 40, 0.9)
+    surface = triangle_surface(V, F)
+    search = SeamSearch(np.full(len(F), 0.02), surface, lambda: seam_costs(surface))
+    first = cut_to_disks(surface, search=search).cuts
+    shown = Measured(np.full(len(F), 0.1), np.full(len(F), 0.4))
+    again = cut_to_disks(surface, search=replace(search, measured=shown)).cuts
+    assert 0 < first.length < again.length

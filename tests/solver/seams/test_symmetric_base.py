@@ -1,0 +1,62 @@
+"""Boundaries of symmetric bodies are joined symmetrically, and scans that nearly are get seams that nearly are."""
+
+import meshes
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from omt_uv.solver.analysis.seam_costs import seam_costs
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.seams import search
+from omt_uv.solver.seams.search import SeamSearch
+from omt_uv.solver.seams.symmetric_base import symmetric_base
+
+RINGS, SECTORS = 24, 48
+
+
+def egg(holes, noise=0.0):
+    """Quads of an egg, its own image in x = 0 with vertices there, open below, without those nearest to some points."""
+    V, _ = meshes.cap(RINGS, SECTORS, 0.93)
+    V = V * [1.0, 1.3, 1.7] + 0.3 * np.stack([0 * V[:, 0], V[:, 2] ** 2, V[:, 1] * V[:, 2]], axis=1)
+    V = V + noise * np.random.default_rng(0).standard_normal(V.shape)
+    ring, one = np.arange(RINGS - 1)[:, None] * SECTORS + 1, np.arange(SECTORS)
+    other = (one + 1) % SECTORS
+    quads = np.stack([ring + one, ring + SECTORS + one, ring + SECTORS + other, ring + other], axis=2).reshape(-1, 4)
+    polygons = [*np.column_stack([0 * one, 1 + one, 1 + other]).tolist(), *quads.tolist()]
+    away = [min([np.linalg.norm(V[p].mean(axis=0) - hole) for hole in holes], default=1.0) for p in polygons]
+    polygons = [p for p, far in zip(polygons, away, strict=True) if far > 0.3]
+    used, flat = np.unique(np.concatenate(polygons), return_inverse=True)
+    ends = np.cumsum([len(p) for p in polygons])[:-1]
+    return meshes.polygon_surface(V[used], [p.tolist() for p in np.split(flat, ends)])
+
+
+def seams_of(surface, spread):
+    count = len(surface.face_start) - 1
+    finder = SeamSearch(np.full(count, spread), surface, lambda: seam_costs(surface))
+    prepared = cut_to_disks(surface, search=finder)
+    # `cut_to_disks` refuses what is no disk.
+    assert len(prepared.charts) == 1
+    return np.sort(prepared.cuts.edges, axis=1)
+
+
+EYES = np.array([[0.5, 0.9, 0.6], [-0.5, 0.9, 0.6]])
+MOUTH = np.array([[0.0, 1.4, 0.0]])
+
+
+@pytest.mark.parametrize("spread", [0.5, 0.004])
+@pytest.mark.parametrize("holes", [EYES, [*EYES, *MOUTH], [*EYES, *MOUTH, *-EYES]], ids=["eyes", "mouth", "six"])
+def test_boundaries_are_joined_symmetrically(holes, spread, monkeypatch):
+    joined = []
+    monkeypatch.setattr(search, "symmetric_base", lambda *given: joined.append(symmetric_base(*given)) or joined[-1])
+    surface = egg(holes)
+    V, edges = surface.positions, seams_of(surface, spread)
+    far, image = cKDTree(V).query(V * [-1, 1, 1])
+    assert far.max() < 1e-9 and len(edges) and joined[0].any()
+    assert set(map(tuple, edges.tolist())) == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
+
+
+def test_seams_of_a_scan_are_nearly_symmetric():
+    surface = egg([], noise=0.004)
+    seam = surface.positions[np.unique(seams_of(surface, 0.004))]
+    far, _ = cKDTree(seam).query(seam * [-1, 1, 1])
+    assert len(seam) > 8 and far.max() < 0.5
