@@ -247,7 +247,8 @@ def ended_by_signals(end: Callable[[], None]) -> Iterator[list[int]]:
         yield received
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            # None is a handler that Python did not install, as Blender's own, and cannot put back.
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 def _crash(returned: int, memory: bool) -> tuple[int, str]:

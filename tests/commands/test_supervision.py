@@ -80,6 +80,24 @@ def test_a_signal_ends_the_child_leaves_nothing_and_is_one_line(tmp_path, number
     assert not Path(folder).exists()
 
 
+@posix
+def test_in_blender_whose_handlers_are_none_of_python_a_child_runs_all_the_same(package, monkeypatch):
+    """Blender catches signals before there is a Python: to that, these handlers are None."""
+    set_handler = signal.signal
+
+    def of_blender(number, handler):
+        before = set_handler(number, handler)
+        return None if before in (signal.SIG_DFL, signal.default_int_handler) else before
+
+    monkeypatch.setattr(package("supervision").signal, "signal", of_blender)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        assert supervise(package, "import sys; sys.exit(5)") == 5
+    finally:
+        for number, handler in before.items():
+            set_handler(number, handler)
+
+
 CHILD = """
 import os, time
 from omt_uv import supervision
