@@ -77,7 +77,9 @@ def add_cut_options(command: argparse.ArgumentParser) -> None:
 def add_marker_options(command: argparse.ArgumentParser) -> None:
     """Vertex groups that fix what a map leaves open."""
     command.add_argument("--centre", default="", metavar="GROUP", help="vertex that goes to the middle of a disk")
-    command.add_argument("--start", default="", metavar="GROUP", help="vertex of the boundary that goes to the right")
+    command.add_argument(
+        "--start", dest="start_group", default="", metavar="GROUP", help="vertex of the boundary that goes to the right"
+    )
     command.add_argument(
         "--corners", default="", metavar="GROUP", help="four vertices: corners; three, on a disk: to 1, i and -1"
     )

@@ -107,7 +107,9 @@ def run(options: argparse.Namespace) -> None:
     )
     with refusals(objects):
         free = avoided(objects, options.keep_free)
-        marked = map_markers(objects, {"centre": options.centre, "start": options.start, "corners": options.corners})
+        marked = map_markers(
+            objects, {"centre": options.centre, "start": options.start_group, "corners": options.corners}
+        )
         if options.subdivision != "auto":
             readings = [with_levels(r, options.subdivision) for r in readings]
         jobs = [
