@@ -8,8 +8,6 @@ bl_info = {
     "blender": (3, 4, 0),
     "location": "Sidebar > OMT, in the 3D View and the UV Editor",
     "category": "UV",
-    "doc_url": "https://omt-uv.github.io/omt-uv/",
-    "tracker_url": "https://github.com/omt-uv/omt-uv/issues",
 }
 
 

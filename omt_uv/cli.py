@@ -10,6 +10,7 @@ from pathlib import Path
 
 from . import __version__, supervision
 from .commands import compare, magnify, measure, refine, remesh, seams, sphere, unwrap, weights
+from .commands.arranging import islands, queue
 from .commands.batches import batch, page, serve, summary, table
 from .commands.shapes import average, distance, distances, library, match, partition, signature
 from .commands.volumes import flow, volume
@@ -18,7 +19,7 @@ from .supervision import PROGRAM, tell
 
 COMMANDS = (
     *(unwrap, refine, magnify, weights, seams, sphere, measure, compare, remesh),
-    *(flow, volume, match, average, partition, distance, signature, library, distances),
+    *(islands, queue, flow, volume, match, average, partition, distance, signature, library, distances),
 )
 # Of many files, without Blender in their own process.
 BATCHES = (batch, table, summary, page)

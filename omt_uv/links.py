@@ -1,9 +1,20 @@
-"""Where the documentation and the list of bugs are, in one place."""
+"""Where the documentation and the list of bugs are, in one place.
+
+Nothing is published yet, so both addresses are empty: pages are those that come with the extension, and nothing points
+to a list of bugs. A release that has a website or a list writes it here, and here alone; the build writes it into the
+manifest.
+"""
 
 from __future__ import annotations
 
-WEBSITE = "https://omt-uv.github.io/omt-uv/"
-BUGS = "https://github.com/omt-uv/omt-uv/issues"
+from pathlib import Path
+
+# With a slash at its end, as the folder that `make site` makes is published.
+WEBSITE = ""
+BUGS = ""
+ROOT = Path(__file__).resolve().parents[1]
+# Pages in the extension's zip, and those of a checkout, with what their addresses end in.
+PLACES = ((ROOT / "help", "/index.html"), (ROOT / "docs", ".md"))
 
 # Pages of docs/operators, by operator.
 PAGES = {
@@ -48,12 +59,26 @@ PAGES = {
 }
 
 
-def page(operator: str) -> str:
-    """Address of the page about an operator; that of all of them where it has none of its own."""
-    return f"{WEBSITE}operators/{PAGES[operator]}/" if operator in PAGES else f"{WEBSITE}operators/"
+def root() -> tuple[str, str]:
+    """Beginning and end of the addresses of all pages; both empty where there are none."""
+    if WEBSITE:
+        return WEBSITE, "/"
+    found = next(((folder, end) for folder, end in PLACES if folder.is_dir()), None)
+    return (f"{found[0].as_uri()}/", found[1]) if found else ("", "")
+
+
+def page(operator: str = "") -> str:
+    """Address of the page about an operator; that of all of them where it has none of its own; empty without pages."""
+    start, end = root()
+    if not start:
+        return ""
+    if operator not in PAGES:
+        return f"{start}operators{'/README.md' if end == '.md' else end}"
+    return f"{start}operators/{PAGES[operator]}{end}"
 
 
 def manual() -> tuple[str, tuple[tuple[str, str], ...]]:
-    """What Blender's Online Manual, by right click, opens for our operators and their settings."""
-    places = tuple((f"bpy.ops.{operator}*", page(operator).removeprefix(WEBSITE)) for operator in sorted(PAGES))
-    return WEBSITE, places
+    """What Blender's Online Manual, by right click, opens for our operators; nothing without pages."""
+    start, _ = root()
+    names = sorted(PAGES) if start else ()
+    return start, tuple((f"bpy.ops.{operator}*", page(operator).removeprefix(start)) for operator in names)

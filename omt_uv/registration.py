@@ -21,7 +21,7 @@ from .operators.magnify import UV_OT_omt_magnify
 from .operators.preset import UV_OT_omt_preset
 from .operators.refine import UV_OT_omt_refine
 from .operators.remesh import OBJECT_OT_omt_remesh
-from .operators.report import WM_OT_omt_copy_report
+from .operators.report import WM_OT_omt_copy_report, WM_OT_omt_help
 from .operators.seams import UV_OT_omt_seams
 from .operators.shapes.landmarks import (
     OBJECT_OT_omt_landmarks,
@@ -88,6 +88,7 @@ CLASSES = (
     UV_OT_omt_notices,
     UV_OT_omt_preset,
     WM_OT_omt_copy_report,
+    WM_OT_omt_help,
     OMTUVPreferences,
     UV_MT_omt,
     *PANELS,

@@ -95,10 +95,11 @@ ARROWS: dict[str, str] = {
     "commands.shapes": "settings supervision batch display solver solver.signatures solver.mesh solver.registration "
     "solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
+    "commands.arranging": "solver pipelines pipelines.arranging blender commands",
     "commands.volumes": "solver solver.flows solver.volumes pipelines.volumes blender.volumes files commands",
     "commands.batches": "supervision solver batch files commands",
-    "operators": "errors remedies settings solver solver.mesh solver.cutting solver.globe solver.parameterization "
-    "solver.editing "
+    "operators": "errors links remedies settings solver solver.mesh solver.cutting solver.globe "
+    "solver.parameterization solver.editing "
     "pipelines pipelines.regions blender files display session",
     "operators.inspection": "settings remedies solver solver.comparison pipelines pipelines.measuring blender "
     "blender.measuring display session operators",

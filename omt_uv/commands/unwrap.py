@@ -38,6 +38,13 @@ from .options import (
 def add(commands) -> None:
     command = commands.add_parser("unwrap", help="unwrap every mesh of a file, all at one texel density")
     command.set_defaults(run=run)
+    add_settings(command)
+    command.add_argument("--mark-seams", action="store_true", help="mark the edges that were cut as seams")
+    add_report(command, "chart")
+
+
+def add_settings(command: argparse.ArgumentParser) -> None:
+    """Files, and what is asked of the UVs."""
     add_files(command)
     command.add_argument(
         "--boundary", choices=names(BOUNDARIES), default=DEFAULT_BOUNDARY.lower(), help="outline of every island"
@@ -58,7 +65,6 @@ def add(commands) -> None:
         help="add seams until the mean shear of islands is below S > 1; 0: only those that open a part",
     )
     command.add_argument("--cut-further", action="store_true", help="add seams to islands whose seams are marked, too")
-    command.add_argument("--mark-seams", action="store_true", help="mark the edges that were cut as seams")
     command.add_argument(
         "--udim", type=tile, default=FIRST_TILE, metavar="TILE", help="tile to pack into; 1001 is the unit square"
     )
@@ -78,18 +84,11 @@ def add(commands) -> None:
     command.add_argument("--pack-around", action="store_true", help="leave room for islands with pins, which stay")
     command.add_argument("--no-pack", action="store_true", help="centre the islands one upon the other")
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
-    add_report(command, "chart")
 
 
-def run(options: argparse.Namespace) -> None:
-    objects, readings = read_layers(options)
-    from ..blender.seams import mark_seams
-    from ..blender.subdivision import subdivision_warnings, with_levels
-    from ..blender.vertex_groups import avoided, map_markers
-    from ..pipelines.layout import UnwrapJob
-    from ..pipelines.unwrap import lay_out
-
-    settings = Settings(
+def chosen(options: argparse.Namespace) -> Settings:
+    """The settings that the options of the command ask for."""
+    return Settings(
         boundary=options.boundary,
         quality=options.quality,
         balance=options.balance,
@@ -105,6 +104,16 @@ def run(options: argparse.Namespace) -> None:
         kind=options.map,
         aspect=options.aspect,
     )
+
+
+def run(options: argparse.Namespace) -> None:
+    objects, readings = read_layers(options)
+    from ..blender.seams import mark_seams
+    from ..blender.subdivision import subdivision_warnings, with_levels
+    from ..blender.vertex_groups import avoided, map_markers
+    from ..pipelines.layout import UnwrapJob
+    from ..pipelines.unwrap import lay_out
+
     with refusals(objects):
         free = avoided(objects, options.keep_free)
         marked = map_markers(
@@ -116,7 +125,7 @@ def run(options: argparse.Namespace) -> None:
             UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision, up=r.up, uv=r.uv, markers=marks)
             for r, avoid, marks in zip(readings, free, marked, strict=True)
         ]
-        layout = drain_shown(lay_out(jobs, settings))
+        layout = drain_shown(lay_out(jobs, chosen(options)))
         if options.subdivision != 0:
             layout.warnings.extend(subdivision_warnings(objects))
         if options.mark_seams:

@@ -1,6 +1,6 @@
 """Operators: read objects, run a solver, write what it found, and report.
 
-Imports pipelines, blender, files, display, session and, when they run, of the solver what they need.
+Imports links, pipelines, blender, files, display, session and, when they run, of the solver what they need.
 Main names: SolverOperator, QuickOperator, Complaint, and one class for every operator.
 """
 
@@ -15,7 +15,7 @@ __getattr__, __all__ = lazy(
     preset="UV_OT_omt_preset",
     refine="UV_OT_omt_refine",
     remesh="OBJECT_OT_omt_remesh",
-    report="WM_OT_omt_copy_report",
+    report="WM_OT_omt_copy_report WM_OT_omt_help",
     seams="UV_OT_omt_seams",
     sphere="UV_OT_omt_sphere",
     texel_density="UV_OT_omt_density_get UV_OT_omt_density_set",

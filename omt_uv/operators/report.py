@@ -1,10 +1,10 @@
-"""Copy what a bug report needs into the clipboard: wm.omt_copy_report."""
+"""Help, and asking for it: wm.omt_help opens a page, wm.omt_copy_report copies what a bug report needs."""
 
 from __future__ import annotations
 
 import bpy
 
-from .. import __version__
+from .. import __version__, links
 from ..session import last_run
 
 
@@ -19,6 +19,26 @@ class WM_OT_omt_copy_report(bpy.types.Operator):
         context.window_manager.clipboard = report_text(context)
         self.report({"INFO"}, "The report is in the clipboard; paste it into the bug report")
         return {"FINISHED"}
+
+
+class WM_OT_omt_help(bpy.types.Operator):
+    """Open the page of the documentation about this section"""
+
+    bl_idname = "wm.omt_help"
+    bl_label = "OMT UV Documentation"
+    bl_options = {"INTERNAL"}
+
+    operator: bpy.props.StringProperty(name="Operator", description="Whose page is opened", options={"HIDDEN"})
+    section: bpy.props.StringProperty(
+        name="Section", description="Section of the tab that the button stands in", options={"HIDDEN"}
+    )
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return bool(links.page())
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        return bpy.ops.wm.url_open(url=links.page(self.operator))
 
 
 def report_text(context: bpy.types.Context) -> str:

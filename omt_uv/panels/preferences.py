@@ -107,8 +107,9 @@ class OMTUVPreferences(bpy.types.AddonPreferences):
         layout.separator()
         layout.prop(self, "own_thread")
         row = layout.row()
-        row.operator("wm.url_open", text="Documentation", icon="HELP").url = links.WEBSITE
-        row.operator("wm.url_open", text="Report a Bug", icon="URL").url = links.BUGS
+        row.operator("wm.omt_help", text="Documentation", icon="HELP")
+        if links.BUGS:
+            row.operator("wm.url_open", text="Report a Bug", icon="URL").url = links.BUGS
         row.operator("wm.omt_copy_report", icon="COPYDOWN")
         layout.separator()
         layout.use_property_split = False

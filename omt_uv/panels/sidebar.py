@@ -54,11 +54,11 @@ class TabPanel:
         self.section.draw(self.layout, context)
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
-        self.layout.emboss = "NONE"
-        operators = self.section.operators or ("uv.omt_measure",)
-        self.layout.operator(
-            "wm.url_open", text="", icon="HELP"
-        ).url = f"{links.page(operators[0])}#{self.section.name}"
+        if links.page():
+            self.layout.emboss = "NONE"
+            button = self.layout.operator("wm.omt_help", text="", icon="HELP")
+            button.operator = (self.section.operators or ("uv.omt_measure",))[0]
+            button.section = self.section.name
 
 
 class MainPanel(TabPanel):

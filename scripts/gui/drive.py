@@ -24,13 +24,24 @@ sys.path.append(str(Path(__file__).resolve().parent))
 from widgets import Finder
 
 bpy.context.preferences.view.show_splash = False
+# Without a graphics card most of a story's time is drawing: no smoothing of edges, no flights of the view.
+bpy.context.preferences.system.viewport_aa = "OFF"
+bpy.context.preferences.view.smooth_view = 0
+# A sidebar beside its view instead of upon it: what is looked at does not draw the view anew.
+bpy.context.preferences.system.use_region_overlap = False
+# A drag ends where the mouse was told to go: Blender otherwise takes the pointer elsewhere meanwhile.
+bpy.context.preferences.inputs.use_mouse_continuous = False
 PATIENCE = 240.0
+# Seconds between two turns of a story, and between two looks whether something is done: looking takes time from it.
+TURN = 0.02
+LOOK_EVERY = 0.1
+T0 = time.monotonic()
 # The package as Blender knows it: an extension that was installed, or an add-on of a folder of scripts.
 ADDON = os.environ.get("OMT_UV_ADDON", "omt_uv")
 
 
 class Story:
-    """What a story can do. Its steps are generators that yield while Blender goes on living."""
+    """What a story can do. Its steps are generators that yield, seconds if they like, while Blender lives on."""
 
     def __init__(self, out: Path):
         self.out = out
@@ -40,21 +51,22 @@ class Story:
     def pause(self, seconds=0.3):
         """Let Blender go on for some seconds."""
         until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            yield
+        while (left := until - time.monotonic()) > 0:
+            yield min(left, LOOK_EVERY)
 
     def until(self, condition, patience=PATIENCE):
         """Let Blender go on until a condition holds; the seconds that took."""
         begin = time.monotonic()
         while not condition():
             if time.monotonic() - begin > patience:
+                yield from self.shoot("waited_in_vain")
                 raise TimeoutError(f"waited {patience} s in vain")
-            yield
+            yield LOOK_EVERY
         return time.monotonic() - begin
 
     def log(self, *words):
         """A line for whoever looks for what went wrong."""
-        print("STORY", *words, flush=True)
+        print("STORY", f"{time.monotonic() - T0:.1f} s {time.process_time():.1f} cpu", *words, flush=True)
 
     def x(self, *words):
         """xdotool, without waiting in a way that would stop the window it talks to."""
@@ -96,6 +108,7 @@ class Story:
 
     def shoot(self, name):
         """A screenshot of the whole window, mouse pointer aside."""
+        self.log("SHOOT", name)
         yield from self.pause(0.4)
         if shutil.which("import"):
             # What the screen shows, whatever Blender thinks of it: 5.2 draws nothing into screenshots of its own here.
@@ -237,11 +250,11 @@ def main():
     spec.loader.exec_module(story_module)
     story = Story(out)
     told = story_module.tell(story)
+    story.log("READY")
 
     def go_on():
         try:
-            next(told)
-            return 0.02
+            return next(told) or TURN
         except StopIteration:
             story.facts["finished"] = True
         except Exception:  # noqa: BLE001, it is told

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import bpy
 
-# Pixels between two looks, down and across; a button is higher and wider.
-DOWN = 12
-PLACES = (0.5, 0.63, 0.72, 0.2, 0.77, 0.835)
+# Pixels between two looks downwards: less than a button is high.
+DOWN = 18
+# Where rows have their buttons, as shares of the width.
+PLACES = (0.5, 0.72, 0.2, 0.835, 0.63, 0.77)
 TURNS_TO_SEE = 2
-BESIDE = (0.2, 0.8, 0.5, 0.35, 0.65)
 # Where headers have their buttons.
-HEADER = (0.83, 0.78)
-# Turns of the wheel that move a panel by about half of what is seen.
+HEADER = (0.78, 0.83)
+# Turns of the wheel that move a panel by about half of what is seen, and how often that is tried.
 TURNS = 4
+PAGES = 12
 
 
 class Finder:
@@ -39,7 +40,7 @@ class Finder:
         """The call behind the button at a place of the region, such as bpy.ops.uv.omt_unwrap(); empty if none."""
         window, region = bpy.context.window_manager.windows[0], self.region
         manager = bpy.context.window_manager
-        window.cursor_warp(region.x + x, region.y + y)
+        window.cursor_warp(region.x + int(x), region.y + int(y))
         # Blender sees the mouse at its next turn, however long that takes to draw, and the button at the one after.
         for _ in range(TURNS_TO_SEE):
             yield
@@ -49,47 +50,6 @@ class Finder:
                 bpy.ops.ui.copy_python_command_button()
         return manager.clipboard
 
-    def seek(self, words, places=PLACES):
-        """Coordinates in the region of a button whose call holds all the words, scrolled into sight; None if none."""
-        for call, place in list(self.known.items()):
-            if all(word in call for word in words):
-                x, y = self.region.view2d.view_to_region(*place, clip=False)
-                if 0 < y < self.region.height and (yield from self.under(x, y)) == call:
-                    return x, y
-        for call, (_, height) in list(self.known.items()):
-            # Buttons of one operator stand beside one another as a rule.
-            if words[0] in call:
-                y = self.region.view2d.view_to_region(0, height, clip=False)[1]
-                for share in BESIDE if 0 < y < self.region.height else ():
-                    x = int(self.region.width * share)
-                    found = yield from self.seen(x, y)
-                    if all(word in found for word in words):
-                        return x, y
-        yield from self.scroll_to_top()
-        for _ in range(12):
-            found = yield from self.look(words, places)
-            if found is not None or not (yield from self.scroll(5)):
-                return found
-        return None
-
-    def look(self, words, places):
-        """Coordinates of such a button in what is in sight: in the middle first, then beside buttons seen there."""
-        region, rows = self.region, []
-        every = range(region.height - DOWN, DOWN, -DOWN)
-        for y in every:
-            call = yield from self.seen(int(region.width * places[0]), y)
-            if all(word in call for word in words):
-                return int(region.width * places[0]), y
-            if call:
-                rows.append(y)
-        # Rows of several buttons have one in the middle as a rule.
-        for y in [*rows, *(y for y in every if y not in rows)]:
-            for x in (int(region.width * share) for share in places[1:]):
-                call = yield from self.seen(x, y)
-                if call and all(word in call for word in words):
-                    return x, y
-        return None
-
     def seen(self, x, y):
         """As `under`, and remembered."""
         call = yield from self.under(x, y)
@@ -97,13 +57,58 @@ class Finder:
             self.known[call] = self.region.view2d.region_to_view(x, y)
         return call
 
+    def seek(self, words, places=PLACES):
+        """Coordinates in the region of a button whose call holds all the words, scrolled into sight; None if none.
+
+        First where it was seen before, then beside its relatives, then in what is in sight, and then from the top.
+        """
+        found = (yield from self.where_it_was(words)) or (yield from self.beside_relatives(words, places))
+        found = found or (yield from self.look(words, places))
+        if found:
+            return found
+        yield from self.scroll_to_top()
+        for _ in range(PAGES):
+            found = yield from self.look(words, places)
+            if found or not (yield from self.scroll(5)):
+                return found
+        return None
+
+    def where_it_was(self, words):
+        """The button where it was seen before; None if it is there no more."""
+        for call, place in list(self.known.items()):
+            if matches(call, words):
+                x, y = self.region.view2d.view_to_region(*place, clip=False)
+                if 0 < y < self.region.height and (yield from self.under(x, y)) == call:
+                    return x, y
+        return None
+
+    def beside_relatives(self, words, places):
+        """The button in the rows of those that share its first words, such as omt_checker of omt_checker_remove."""
+        family = "_".join(words[0].rstrip("(").split("_")[:2])
+        rows = {place[1] for call, place in self.known.items() if family in call}
+        for height in sorted(rows, reverse=True):
+            y = self.region.view2d.view_to_region(0, height, clip=False)[1]
+            for share in places if 0 < y < self.region.height else ():
+                x = int(self.region.width * share)
+                if matches((yield from self.seen(x, y)), words):
+                    return x, y
+        return None
+
+    def look(self, words, places):
+        """Such a button in what is in sight, column by column."""
+        for share in places:
+            x = int(self.region.width * share)
+            for y in range(self.region.height - DOWN // 2, 0, -DOWN):
+                if matches((yield from self.seen(x, y)), words):
+                    return x, y
+        return None
+
     def scroll(self, button):
         """Turn the wheel over the sidebar; whether it moved. 4 is up, 5 down."""
         before = self.region.view2d.region_to_view(0, 0)
         window, region = bpy.context.window_manager.windows[0], self.region
         window.cursor_warp(region.x + region.width // 2, region.y + region.height // 2)
-        for _ in range(TURNS):
-            yield from self.story.x("click", button)
+        yield from self.story.x("click", "--repeat", TURNS, button)
         yield from self.story.pause(0.3)
         return self.region.view2d.region_to_view(0, 0) != before
 
@@ -122,14 +127,27 @@ class Finder:
     def click_at(self, x, y):
         """Click at a place of the region; the place on the screen."""
         window, region = bpy.context.window_manager.windows[0], self.region
-        place = region.x + x, window.height - (region.y + y)
+        place = region.x + int(x), window.height - (region.y + int(y))
         self.story.log("click", place, (yield from self.under(x, y)))
         yield from self.story.click(*place)
         return place
 
     def open(self, section):
-        """Open or close a section by its header: it has a button for its page of the documentation."""
-        found = yield from self.seek((f"#{section}",), HEADER)
+        """Open a section of its own and close all others: Ctrl and a click on its header.
+
+        The header has a button for its page, wm.omt_help, by which it is found.
+        """
+        self.story.log("OPEN", section)
+        found = yield from self.seek((f'section="{section}"',), HEADER)
         if found is None:
             raise LookupError(f"no section of {self.kind} is {section}")
+        yield from self.story.x("keydown", "ctrl")
         yield from self.click_at(self.region.width // 4, found[1])
+        yield from self.story.x("keyup", "ctrl")
+        self.known.clear()
+        yield from self.story.pause(0.5)
+
+
+def matches(call: str, words) -> bool:
+    """Whether a call holds all words."""
+    return bool(call) and all(word in call for word in words)

@@ -1,4 +1,4 @@
-"""Build and validate one extension zip per platform in ./dist, with the wheels of that platform inside.
+"""Build and validate one extension zip per platform in ./dist, with the wheels of that platform and the pages inside.
 
 usage: build_extension.py [--here] [PLATFORM...]     --here: only the platform this runs on; default: all
 """
@@ -16,6 +16,9 @@ from pathlib import Path
 from fetch_wheels import ROOT, fetch, manifest
 
 CONTENT = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "omt_uv")
+
+# Where omt_uv/links.py looks for the pages.
+HELP = "help"
 
 
 def this_platform() -> str:
@@ -48,6 +51,8 @@ def build(platforms: list[str]) -> list[Path]:
             shutil.copytree(source, stage / name, ignore=shutil.ignore_patterns("__pycache__"))
         elif source.exists():
             shutil.copy2(source, stage / name)
+    site = Path(__file__).with_name("site.py")
+    subprocess.run([sys.executable, str(site), "--out", str(stage / HELP)], check=True, stdout=subprocess.DEVNULL)
     (stage / "blender_manifest.toml").write_text(_manifest_text(platforms, {w.name for w in wheels}))
     run = [sys.executable, str(blender_ext())]
     subprocess.run(
@@ -63,8 +68,11 @@ def build(platforms: list[str]) -> list[Path]:
 
 
 def _manifest_text(platforms: list[str], wheels: set[str]) -> str:
-    """The manifest with only these platforms and wheels."""
+    """The manifest with only these platforms and wheels, and with the website of omt_uv/links.py if that has one."""
     text = (ROOT / "blender_manifest.toml").read_text()
+    website = re.search(r'^WEBSITE = "(.+)"$', (ROOT / "omt_uv" / "links.py").read_text(), re.MULTILINE)
+    if website:
+        text = re.sub(r"^(type = .*)$", rf'\1\nwebsite = "{website[1]}"', text, flags=re.MULTILINE)
     listed = ", ".join(f'"{p}"' for p in platforms)
     text = re.sub(r"^platforms = .*$", f"platforms = [{listed}]", text, flags=re.MULTILINE)
     unwanted = re.compile(r'^\s*"\./wheels/(.+\.whl)",\n', re.MULTILINE)

@@ -17,20 +17,22 @@ MORE = {"magnify": ["--weights", "region", "--factor", "2"], "remesh": ["--verti
 BODIES = ("flow", "volume", "partition")
 # Commands on two files or a folder: tests/commands/shapes has theirs.
 SHAPES = ("match", "average", "distance", "signature", "library", "similar")
+# Of islands that have an image or are grids, which those of a ball are not: tests/commands/arranging has theirs.
+SHAPED = ("symmetrize", "rectify")
 
 
 def names(package):
     (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
     # A batch works on folders, and has the tests of its own room.
     alone = [name for name, command in every.choices.items() if command.get_default("alone")]
-    return [name for name in every.choices if name not in (*alone, *SHAPES)]
+    return [name for name in every.choices if name not in (*alone, *SHAPES, *SHAPED)]
 
 
 def arguments(name, folder, target="out.blend"):
     """Words of a command on in.blend."""
     nothing: dict = {"measure": [], "compare": [folder / "in.blend"]}
     output = nothing.get(name, ["-o", folder / target])
-    output += ["--quality", "draft"] if name in ("unwrap", "refine", "magnify", "sphere") else []
+    output += ["--quality", "draft"] if name in ("unwrap", "queue", "refine", "magnify", "sphere") else []
     if name == "volume":
         output += ["--tets", "200"]
     if name == "flow":

@@ -122,7 +122,7 @@ def test_the_sections_work(play):
     for rows in (magnified, sphere):
         assert dict(rows)["Folded faces"] == "0"
         assert float(dict(rows)["Area error"].split()[0]) < 1
-    assert dict(remeshed)["Vertices"] == "5000"
+    assert dict(remeshed)["Vertices"] == "2000"
     assert {"Head", "Head_remesh"} <= set(facts["objects"]) and facts["original is hidden"]
 
 

@@ -36,6 +36,7 @@ READ_ONLY = {"uv.omt_measure", "uv.omt_regions", "uv.omt_histogram", "uv.omt_den
 OTHERS = {
     "uv.omt_preset",
     "wm.omt_copy_report",
+    "wm.omt_help",
     "uv.omt_notices",
     "uv.omt_checker_remove",
     "uv.omt_live_end",

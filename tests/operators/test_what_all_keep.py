@@ -24,8 +24,8 @@ RUNS: dict[str, tuple[dict, set[str]]] = {
     "object.omt_remesh": ({"target_vertices": 40}, set()),
 }
 # What ends something, is a setting, or has meshes of its own kind, looked at by tests beside it.
-OTHERS = {"uv.omt_preset", "wm.omt_copy_report", "uv.omt_notices", "uv.omt_checker", "uv.omt_checker_remove",
-          "uv.omt_live", "uv.omt_live_end", "uv.omt_remedy", "uv.omt_worst"}  # fmt: skip
+OTHERS = {"uv.omt_preset", "wm.omt_copy_report", "wm.omt_help", "uv.omt_notices", "uv.omt_checker",
+          "uv.omt_checker_remove", "uv.omt_live", "uv.omt_live_end", "uv.omt_remedy", "uv.omt_worst"}  # fmt: skip
 LAYER = "UV map of mine"
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import types
+import urllib.request
 from pathlib import Path
 
 import bpy
 
 import pytest
 import scenes
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 class Layout:
@@ -211,6 +214,7 @@ def test_every_operator_is_in_the_one_submenu(package):
     hidden = {
         "uv.omt_preset",
         "wm.omt_copy_report",
+        "wm.omt_help",
         "uv.omt_remedy",
         "uv.omt_notices",
         "uv.omt_live_end",
@@ -242,14 +246,31 @@ def test_names_say_what_operators_do():
 def test_every_operator_has_its_page(package):
     links = package("links")
     root, places = links.manual()
-    assert root == links.WEBSITE
-    folder = Path(__file__).resolve().parents[2] / "docs" / "operators"
+    pages = dict(places)
     for cls in our_classes(package, bpy.types.Operator):
         name = scenes.name_of(cls)
         if name.startswith("wm.") or name == "uv.omt_preset":
             continue
-        assert (folder / f"{links.PAGES[name]}.md").exists(), name
-        assert (f"bpy.ops.{name}*", f"operators/{links.PAGES[name]}/") in places
+        assert (ROOT / "docs" / "operators" / f"{links.PAGES[name]}.md").exists(), name
+        assert root + pages[f"bpy.ops.{name}*"] == links.page(name)
+
+
+def test_every_address_is_that_of_a_page_that_is_there(package, monkeypatch, tmp_path):
+    """In a checkout, in the zip, and where a release has a website; where there are no pages nothing points to one."""
+    links = package("links")
+    for name in [*links.PAGES, "", "uv.omt_preset"]:
+        assert urllib.request.urlopen(links.page(name)).read(), name
+    (tmp_path / "help").mkdir()
+    monkeypatch.setattr(links, "PLACES", ((tmp_path / "help", "/index.html"),))
+    root = (tmp_path / "help").as_uri()
+    assert links.page("uv.omt_unwrap") == f"{root}/operators/unwrap/index.html"
+    assert links.page() == f"{root}/operators/index.html"
+    monkeypatch.setattr(links, "PLACES", ())
+    assert links.page("uv.omt_unwrap") == "" and links.manual() == ("", ())
+    assert not bpy.ops.wm.omt_help.poll()
+    monkeypatch.setattr(links, "WEBSITE", "https://example.org/")
+    assert links.page("uv.omt_unwrap") == "https://example.org/operators/unwrap/"
+    assert links.manual()[0] == "https://example.org/"
 
 
 def test_keys_are_of_operators_and_menus_that_there_are(package):

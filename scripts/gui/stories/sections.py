@@ -17,15 +17,18 @@ def tell(story):
     space.overlay.show_stats = True
     story.look_at_it(story.area("VIEW_3D"))
     tab = yield from story.tab("VIEW_3D")
+    # Others are in sight once this one alone is open.
+    yield from tab.open("result")
     story.facts["magnified"] = yield from run(story, tab, "magnify", "omt_magnify(")
     story.facts["sphere"] = yield from run(story, tab, "sphere", "omt_sphere(")
+    bpy.context.window_manager.operator_properties_last("object.omt_remesh").target_vertices = 2000
     story.facts["remeshed"] = yield from run(story, tab, "remesh", "omt_remesh(")
     story.facts["objects"] = sorted(bpy.data.objects.keys())
     story.facts["original is hidden"] = bpy.data.objects["Head"].hide_get()
 
 
 def run(story, tab, name, button):
-    """Open a section, click its button, look, and leave the tab as it was."""
+    """Open a section, click its button, and look."""
     yield from tab.open(name)
     yield from tab.click(button)
     yield from story.until(lambda: not story.running() and story.said())
@@ -34,8 +37,6 @@ def run(story, tab, name, button):
     yield from story.shoot(name)
     said = story.said()
     story.forget()
-    yield from story.pause(0.5)
-    yield from tab.open(name)
     return said
 
 
@@ -48,7 +49,7 @@ def show_alone(story, obj):
 
 def closed_head(story):
     """The bust with its neck closed."""
-    obj = story.head(60)
+    obj = story.head(40)
     mesh = bmesh.new()
     mesh.from_mesh(obj.data)
     bmesh.ops.holes_fill(mesh, edges=[edge for edge in mesh.edges if edge.is_boundary])

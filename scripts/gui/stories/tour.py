@@ -10,7 +10,7 @@ REDO = (150, 104)
 
 def tell(story):
     """Unwrap, look at it in colours and with a checker, change a setting."""
-    obj = story.head(60)
+    obj = story.head(40)
     story.look_at_it(story.area("VIEW_3D"))
     tab = yield from story.tab("VIEW_3D")
     yield from first_unwrap(story, tab, obj)
