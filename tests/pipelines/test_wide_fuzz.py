@@ -21,6 +21,7 @@ from omt_uv.pipelines.gate import gate
 from omt_uv.pipelines.layout import Refusal, UnwrapJob
 from omt_uv.pipelines.reading import Reading
 from omt_uv.pipelines.unwrap import lay_out
+from omt_uv.solver.errors import MarginError
 from omt_uv.solver.maps.distortion import NEGLIGIBLE_AREA
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.progress import drain
@@ -68,6 +69,9 @@ def outcome(judge, seed):
     chosen = np.ones(len(surface.face_start) - 1, bool) if faces is None else faces
     try:
         layout = drain(lay_out([UnwrapJob(surface, faces)], settings))
+    except MarginError as error:
+        assert "Lower the margin" in str(error)
+        return kind, "MarginError", 0, 0.0
     except Refusal as refusal:
         check_error(refusal.error, surface)
         return kind, type(refusal.error).__name__, 0, 0.0

@@ -182,7 +182,8 @@ class SeamSearch:
             if grown is cut:
                 break
             cut = grown
-            done = np.log(begin / cut.spread) / max(np.log(begin / task.bound), 1e-9)
+            # What is flat once it is cut has no spread at all.
+            done = np.log(begin / max(cut.spread, task.bound)) / max(np.log(begin / task.bound), 1e-9)
             yield Progress(f"Seams, cut {count + 1}", GROWN * min(max(done, 0.0), 1.0))
         return cut
 

@@ -1,5 +1,6 @@
 """The shear bound: more seam, less shear, and charts that stay disks."""
 
+import hard_meshes
 import meshes
 import numpy as np
 import pytest
@@ -31,6 +32,13 @@ def test_seams_bring_the_shear_under_the_bound():
     # What was cut are seams that leave one disk.
     (chart,) = strict_charts(triangle_surface(V, F, result.seams))
     assert len(chart.triangles) == len(F)
+
+
+@pytest.mark.parametrize("sides", [3, 4, 7])
+def test_what_is_flat_once_it_is_cut_has_a_map(sides):
+    V, F = hard_meshes.fan(sides, height=3.0)
+    result = unwrapped(triangle_surface(V, F), 1.1)
+    assert len(result.seams) == 1 and max(mean_shear(result)) < 1.001
 
 
 def test_a_lower_bound_takes_longer_seams():
