@@ -25,15 +25,23 @@ MOST_FACES = 0.02
 def new_intersections(
     before: np.ndarray, after: np.ndarray, triangles: np.ndarray, concerned: np.ndarray | None = None
 ) -> np.ndarray:
-    """Pairs (k,2) of triangles (m,3) that intersect at positions `after` (n,3) and did not at `before` (n,3)."""
+    """Pairs (k,2) of triangles (m,3) that intersect at positions `after` (n,3), and neither did at `before` (n,3) nor
+    had neighbours that did: a line along which parts meet moves on from face to face."""
     pairs = intersecting_pairs(after, triangles, concerned)
     if not len(pairs):
         return pairs
-    mine = np.zeros(len(triangles), bool)
-    mine[pairs] = True
-    old = intersecting_pairs(before, triangles, mine)
-    count = len(triangles)
-    return pairs[~np.isin(pairs @ [count, 1], old @ [count, 1])]
+    near = np.zeros(len(before), bool)
+    near[triangles[pairs]] = True
+    old = intersecting_pairs(before, triangles, near[triangles].any(axis=1))
+    old = np.concatenate([old, old[:, ::-1]])
+    return pairs[~np.isin(_vertex_pairs(triangles, pairs), _vertex_pairs(triangles, old)).any(axis=1)]
+
+
+def _vertex_pairs(triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Keys (k,9) of a vertex of one and a vertex of the other of pairs (k,2) of triangles (m,3)."""
+    count = np.int64(triangles.max(initial=0) + 1)
+    one, other = triangles[pairs[:, 0]].astype(np.int64), triangles[pairs[:, 1]]
+    return (one[:, :, None] * count + other[:, None, :]).reshape(len(pairs), 9)
 
 
 def without_new_intersections(

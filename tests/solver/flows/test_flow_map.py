@@ -14,6 +14,7 @@ from omt_uv.solver.flows.flow_map import flow
 from omt_uv.solver.flows.handles import FlowHandle
 from omt_uv.solver.flows.integration import carried, planned_steps
 from omt_uv.solver.flows.options import PATHS, FlowOptions
+from omt_uv.solver.flows.self_intersections import intersecting_pairs
 from omt_uv.solver.progress import Progress, drain
 
 
@@ -150,6 +151,17 @@ def test_faces_in_a_crease_are_taken_apart():
     fixed, left = without_new_intersections(V, after, F, np.zeros(len(V), bool))
     assert len(left) == len(pairs)
     np.testing.assert_array_equal(fixed, after)
+
+
+def test_parts_that_met_before_may_meet_a_face_farther_on():
+    V, F = icosphere(3)
+    half = len(V)
+    before, faces = np.concatenate([V, 0.9 * V + [1.2, 0.1, 0]]), np.concatenate([F, F + half])
+    shift = np.where(np.arange(2 * half)[:, None] < half, 0.0, [0.02, 0.03, 0.01])
+    assert len(intersecting_pairs(before + shift, faces))
+    assert not len(new_intersections(before, before + shift, faces))
+    apart = before + np.where(np.arange(2 * half)[:, None] < half, 0.0, [2.0, 0, 0])
+    assert len(new_intersections(apart, before, faces)) == len(intersecting_pairs(before, faces))
 
 
 def test_volumes_are_given_back_part_by_part():
