@@ -70,6 +70,16 @@ class Component:
         """Whether it is closed and has no handle."""
         return len(self.boundary_edges) == 0 and self.euler == 2
 
+    @property
+    def sphericity(self) -> float:
+        """Area of the sphere of the same volume over its own (Wadell 1935): 1 for spheres, less for limbs and sheets.
+
+        Of a closed component alone.
+        """
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        volume = abs(float(np.einsum("md,md->", a, np.cross(b, c)))) / 6
+        return float(np.cbrt(36 * np.pi * volume**2) / self.area.sum())
+
 
 @dataclass(frozen=True)
 class Components:

@@ -24,6 +24,9 @@ from .stitching import stitch
 
 # Charts with up to so many inner samples need no maps: what relaxation makes of them is the same.
 FEW = 50
+# Bodies whose sphericity is less have limbs, which a sphere shows as points: by their own triangles they come out as
+# even, nearer to the surface, and sooner.
+LIMBED = 0.65
 NO_MAPS = "A part has no maps to the disk in double precision and was remeshed without"
 
 
@@ -54,14 +57,15 @@ def make_initial_mesh(
 ) -> Steps[InitialMesh]:
     """Sample a component with density (m,), and at_vertices (n,), of mean 1, and triangulate by the options' strategy.
 
-    Closed components of genus 0 without features go by way of the sphere, disks without features by way of a chart,
-    and all others, or where that fails, by collapses of their own edges. On boundaries and features samples are
+    Closed components of genus 0 without features or limbs go by way of the sphere, disks without features by way of a
+    chart, and all others, or where that fails, by collapses of their own edges. On boundaries and features samples are
     `line_spacing` edges apart, or more where there would be too many.
 
     There may be more vertices than the count, where boundaries and features take as many. Raises PrecisionError where a
     chart cannot be triangulated.
     """
-    found = (yield from _by_sphere(maps, count, density, options)) if maps.by_sphere else None
+    by_sphere = maps.by_sphere and not (options.any_mesh_will_do and maps.component.sphericity < LIMBED)
+    found = (yield from _by_sphere(maps, count, density, options)) if by_sphere else None
     if found is None and options.any_mesh_will_do and not maps.component.has_lines:
         yield Progress("Samples", 0.0)
         return _by_decimation(maps, count, density, options)

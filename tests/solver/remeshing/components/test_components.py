@@ -58,3 +58,13 @@ def test_one_sided_surfaces_are_refused():
     F = np.array([[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 0], [4, 0, 1]])
     with pytest.raises(OrientationError):
         split_components(V[:5], F, NONE)
+
+
+def test_sphericity_is_that_of_known_bodies():
+    cube, tetrahedron = meshes.cube(), np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
+    faces = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    for (V, F), known in ((cube, np.cbrt(np.pi / 6)), ((tetrahedron, faces), np.cbrt(np.pi / 6 / np.sqrt(3)))):
+        for moved in (V, 5 * V - [3, 0, 1]):
+            (component,) = split_components(moved, F, NONE).components
+            assert component.sphericity == pytest.approx(known, rel=1e-9)
+    assert split_components(*meshes.icosphere(4), NONE).components[0].sphericity == pytest.approx(1, abs=0.01)

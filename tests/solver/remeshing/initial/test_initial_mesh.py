@@ -37,3 +37,15 @@ def test_options_say_what_is_wrong():
     for wrong in ({"strategy": "cfp"}, {"count_of": "edges"}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             RemeshOptions(**wrong)
+
+
+@pytest.mark.parametrize("strategy, by_sphere", [(STRATEGIES[0], False), (STRATEGIES[1], True)])
+def test_limbs_go_by_their_own_triangles_unless_maps_are_asked_for(monkeypatch, strategy, by_sphere):
+    V, F = meshes.icosphere(3)
+    maps = RemeshSource(V * [9, 1, 1], F).maps[0]
+    asked = []
+    of_sphere = maps.of_sphere
+    monkeypatch.setattr(maps, "of_sphere", lambda density: asked.append(1) or of_sphere(density))
+    one, at_vertices = np.ones(len(maps.component.triangles)), np.ones(len(maps.component.vertices))
+    found = drain(make_initial_mesh(maps, 200, one, at_vertices, RemeshOptions(strategy=strategy)))
+    assert bool(asked) == by_sphere and topology(found.mesh.triangles) == topology(F)
