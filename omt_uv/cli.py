@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
 from . import __version__, supervision
-from .commands import compare, magnify, measure, refine, remesh, seams, sphere, unwrap, weights
-from .commands.arranging import islands, queue
-from .commands.batches import batch, page, serve, summary, table
-from .commands.shapes import average, distance, distances, library, match, partition, signature
-from .commands.volumes import flow, volume
 from .errors import UserError
 from .supervision import PROGRAM, tell
 
-COMMANDS = (
-    *(unwrap, refine, magnify, weights, seams, sphere, measure, compare, remesh),
-    *(islands, queue, flow, volume, match, average, partition, distance, signature, library, distances),
-)
-# Of many files, without Blender in their own process.
-BATCHES = (batch, table, summary, page)
+# Modules of commands, by package; a run reads that of its own command alone.
+COMMANDS = {
+    "commands": "unwrap refine magnify weights seams sphere measure compare remesh",
+    "commands.arranging": "islands queue",
+    "commands.volumes": "flow volume",
+    "commands.shapes": "match average partition distance signature library distances",
+    # Of many files, without Blender in their own process.
+    "commands.batches": "batch table summary page",
+}
+# As their modules have it, which runs of single files do not read.
+BATCH = "batch"
+SERVE = "serve"
 
 
 def script() -> None:
@@ -32,7 +34,9 @@ def script() -> None:
 
 def program(arguments: Sequence[str], words: Sequence[str]) -> int:
     """Run a command in a child process, which `words` start; returns the exit status."""
-    if supervision.is_child() and arguments[:1] == [serve.NAME]:
+    if supervision.is_child() and arguments[:1] == [SERVE]:
+        from .commands.batches import serve
+
         return serve.serve(float(arguments[1]), main)
     try:
         options = parsed(arguments)
@@ -67,10 +71,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     """The options of a command; `rest` is what a batch hands to the command that it runs, after --."""
     words, rest = list(arguments), []
-    if words[:1] == [batch.NAME] and "--" in words:
+    if words[:1] == [BATCH] and "--" in words:
         cut = words.index("--")
         words, rest = words[:cut], words[cut + 1 :]
-    options = parser().parse_args(words)
+    options = parser(words[0] if words else "").parse_args(words)
     options.rest = rest
     return options
 
@@ -104,10 +108,12 @@ def _status(stop: SystemExit) -> int:
     return stop.code if isinstance(stop.code, int) else supervision.FAILURE
 
 
-def parser() -> argparse.ArgumentParser:
+def parser(command: str = "") -> argparse.ArgumentParser:
+    """The parser of this command alone, or of all where none is of this name."""
     top = argparse.ArgumentParser(prog=PROGRAM, description="Area-preserving UV unwrapping.")
     top.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for command in (*COMMANDS, *BATCHES):
-        command.add(commands)
+    modules = {name: package for package, names in COMMANDS.items() for name in names.split()}
+    for name in [command] if command in modules else modules:
+        importlib.import_module(f".{modules[name]}.{name}", __package__).add(commands)
     return top

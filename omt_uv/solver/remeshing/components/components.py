@@ -72,7 +72,7 @@ class Component:
 
     @property
     def sphericity(self) -> float:
-        """Area of the sphere of the same volume over its own (Wadell 1935): 1 for spheres, less for limbs and sheets.
+        """Area of the sphere of the same volume over its own (Wadell 1935): 1 for spheres, less for limbs and plates.
 
         Of a closed component alone.
         """
