@@ -113,5 +113,5 @@ def run_similar(options: argparse.Namespace) -> None:
 
     index = read_index(options.index)
     mine = signature_of_file(options, options.input, index.packed.shape[1])
-    for k, found in nearest(mine, index, options.top, index.spectra):
+    for k, found in nearest(mine, index, options.top, index.coefficients):
         print(json.dumps({"name": index.names[k], "distance": found.distance, "raw": found.raw}))

@@ -60,4 +60,4 @@ def nearest_of(own: Surface, index: SignatureIndex, top: int) -> Steps[list[tupl
     MeshError : the surface has no signature
     """
     mine = yield from signature_of([own], index.packed.shape[1])
-    return [(index.names[k], found) for k, found in nearest(mine, index, top, index.spectra)]
+    return [(index.names[k], found) for k, found in nearest(mine, index, top, index.coefficients)]

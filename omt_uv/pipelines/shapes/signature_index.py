@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import UserError
 from ...solver.signatures.signature import CURVATURE, Signature
-from ...solver.signatures.wasserstein import distance_of, prepared, spectrum
+from ...solver.signatures.wasserstein import distance_of, prepared
 
 # Rows and columns of a block of distances.
 BLOCK = 24
@@ -25,13 +25,13 @@ class IndexFileError(UserError):
 @dataclass(frozen=True)
 class SignatureIndex(Sequence):
     """Signatures of files: names and marks, which change with the file, (n,); packed (n,k,4), single precision; floors
-    (n,); spectra (n,s)."""
+    (n,); coefficients (n,s,2) in spherical harmonics, by which they are searched, single precision."""
 
     names: tuple[str, ...]
     marks: tuple[str, ...]
     packed: np.ndarray
     floors: np.ndarray
-    spectra: np.ndarray
+    coefficients: np.ndarray
 
     def __len__(self) -> int:
         return len(self.names)
@@ -42,7 +42,7 @@ class SignatureIndex(Sequence):
     def bytes(self) -> bytes:
         """The index as a file."""
         data = io.BytesIO()
-        arrays = {"packed": self.packed, "floors": self.floors, "spectra": self.spectra}
+        arrays = {"packed": self.packed, "floors": self.floors, "coefficients": self.coefficients}
         np.savez(data, names=np.array(self.names), marks=np.array(self.marks), **arrays)
         return data.getvalue()
 
@@ -67,17 +67,20 @@ def index_of(rows: Mapping[str, tuple[str, Signature]], old: SignatureIndex | No
     ------
     IndexFileError : signatures of other numbers of points, or none
     """
-    own = {name: (mark, packed(s), s.floor, spectrum(prepared(s))) for name, (mark, s) in rows.items()}
+    own = {
+        name: (mark, packed(s), s.floor, prepared(s).coefficients.astype(np.float32))
+        for name, (mark, s) in rows.items()
+    }
     if old is not None:
-        for name, *row in zip(old.names, old.marks, old.packed, old.floors, old.spectra, strict=True):
+        for name, *row in zip(old.names, old.marks, old.packed, old.floors, old.coefficients, strict=True):
             own.setdefault(name, tuple(row))
     counts = {len(row[1]) for row in own.values()}
     if len(counts) != 1:
         raise IndexFileError(f"Signatures have {sorted(counts) or 'no'} points. Make all of an index with one number.")
     names = sorted(own)
-    marks, arrays, floors, spectra = zip(*(own[name] for name in names), strict=True)
+    marks, arrays, floors, coefficients = zip(*(own[name] for name in names), strict=True)
     return SignatureIndex(
-        tuple(names), tuple(map(str, marks)), np.stack(arrays), np.array(floors, float), np.stack(spectra)
+        tuple(names), tuple(map(str, marks)), np.stack(arrays), np.array(floors, float), np.stack(coefficients)
     )
 
 
@@ -89,7 +92,7 @@ def chosen(index: SignatureIndex, names: Sequence[str]) -> SignatureIndex:
         tuple(index.marks[k] for k in rows),
         index.packed[rows],
         index.floors[rows],
-        index.spectra[rows],
+        index.coefficients[rows],
     )
 
 
@@ -99,11 +102,11 @@ def read_index(path: Path) -> SignatureIndex:
         raise IndexFileError(f"{path}: there is no such index. Make one by the command library.")
     try:
         with np.load(path, allow_pickle=False) as data:
-            parts = [data[name] for name in ("packed", "floors", "spectra")]
+            parts = [data[name] for name in ("packed", "floors", "coefficients")]
             found = SignatureIndex(tuple(data["names"].tolist()), tuple(data["marks"].tolist()), *parts)
     except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
         raise IndexFileError(f"{path}: is no index of signatures. Make one by the command library.") from error
-    if not len(found) == len(found.marks) == len(found.packed) == len(found.floors) == len(found.spectra):
+    if not len(found) == len(found.marks) == len(found.packed) == len(found.floors) == len(found.coefficients):
         raise IndexFileError(f"{path}: is no whole index of signatures. Make one by the command library.")
     return found
 

@@ -34,8 +34,8 @@ APART = 0.35
 # A search looks at so many by the best agreement of the grid, and at so many by transport, for each that is asked for,
 # and at no fewer than these.
 BY_SPECTRUM = 10
-BY_AGREEMENT = 1.3
-FEWEST = 8
+BY_AGREEMENT = 1.2
+FEWEST = 5
 
 
 @dataclass(frozen=True)
@@ -172,30 +172,30 @@ def _refined(
     return best, found
 
 
-def spectrum(s: Prepared) -> np.ndarray:
-    """What no rotation or mirroring changes, (2 * DEGREES,): the power of density and curvature in each degree of
-    spherical harmonics."""
+def spectrum(coefficients: np.ndarray) -> np.ndarray:
+    """What no rotation or mirroring changes of coefficients (...,s,c), (..., c * DEGREES): the power of density and
+    curvature in each degree of spherical harmonics."""
     first = np.cumsum([0, *(2 * degree + 1 for degree in range(1, DEGREES))])
-    return np.sqrt(np.add.reduceat(s.coefficients**2, first)).ravel()
+    power = np.sqrt(np.add.reduceat(np.square(coefficients, dtype=float), first, axis=-2))
+    return power.reshape(*power.shape[:-2], -1)
 
 
 def nearest(
-    s: Signature, library: Sequence[Signature], top: int, spectra: np.ndarray | None = None
+    s: Signature, library: Sequence[Signature], top: int, coefficients: np.ndarray | None = None
 ) -> list[tuple[int, ShapeDistance]]:
-    """The `top` nearest of a library, nearest first; spectra (l,2 * DEGREES) of it, if at hand.
+    """The `top` nearest of a library, nearest first; coefficients (l,s,2) of all of it, if at hand.
 
     Spectra choose several times as many as asked for, and of these those that agree best under a rotation of the grid;
     these alone are compared by transport.
     """
     mine = prepared(s)
-    if spectra is None:
-        spectra = np.stack([spectrum(prepared(other)) for other in library])
-    away = ((spectra - spectrum(mine)) ** 2).sum(axis=1)
+    if coefficients is None:
+        coefficients = np.stack([prepared(other).coefficients for other in library])
+    away = ((spectrum(coefficients) - spectrum(mine.coefficients)) ** 2).sum(axis=1)
     order = np.argsort(away, kind="stable")[: max(BY_SPECTRUM * top, FEWEST)]
-    candidates = [prepared(library[int(k)]) for k in order]
-    targets = np.stack([candidate.coefficients for candidate in candidates])
+    targets = coefficients[order].astype(float)
     # The least squared difference of the functions, but for what is the same for all.
     away = (targets**2).sum(axis=(1, 2)) - 2 * _agreements(mine.coefficients, targets).max(axis=(0, 2))
-    chosen = np.argsort(away, kind="stable")[: max(round(BY_AGREEMENT * top), FEWEST)]
-    found = [(int(order[k]), distance_of(mine, candidates[k])) for k in chosen]
+    chosen = order[np.argsort(away, kind="stable")[: max(round(BY_AGREEMENT * top), FEWEST)]]
+    found = [(int(k), distance_of(mine, prepared(library[int(k)]))) for k in chosen]
     return sorted(found, key=lambda pair: (pair[1].raw ** 2 - pair[1].floor ** 2, pair[0]))[:top]

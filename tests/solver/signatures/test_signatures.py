@@ -46,7 +46,7 @@ def test_distances_are_symmetric_and_zero_on_the_diagonal():
 def test_the_nearest_of_a_library_is_the_body_itself():
     library = [of(seed) for seed in (1, 2, 0, 3)]
     assert nearest(of(0, "moved"), library, 2)[0][0] == 2
-    mine, moved, other = (spectrum(prepared(s)) for s in (of(0), of(0, "moved"), of(1)))
+    mine, moved, other = (spectrum(prepared(s).coefficients) for s in (of(0), of(0, "moved"), of(1)))
     assert np.linalg.norm(mine - moved) < 0.5 * np.linalg.norm(mine - other)
 
 
