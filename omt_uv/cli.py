@@ -17,6 +17,7 @@ from .supervision import PROGRAM, tell
 COMMANDS = {
     "commands": "unwrap refine magnify weights seams sphere measure compare remesh",
     "commands.arranging": "islands queue",
+    "commands.pictures": "test_texture diagram",
     "commands.volumes": "flow volume",
     "commands.shapes": "match average partition distance signature library distances",
     # Of many files, without Blender in their own process.

@@ -52,6 +52,8 @@ PAGES = {
     "uv.omt_density_get": "texel_density",
     "uv.omt_density_set": "texel_density",
     "uv.omt_checker": "result",
+    "uv.omt_layout_image": "result",
+    "object.omt_diagram": "result",
     "uv.omt_checker_remove": "result",
     "uv.omt_worst": "result",
     "uv.omt_remedy": "result",

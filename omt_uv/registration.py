@@ -13,6 +13,7 @@ from .operators.distortion import UV_OT_omt_histogram, UV_OT_omt_measure, UV_OT_
 from .operators.inspection.checker import UV_OT_omt_checker, UV_OT_omt_checker_remove
 from .operators.inspection.compare import OBJECT_OT_omt_compare
 from .operators.inspection.distance import OBJECT_OT_omt_distance
+from .operators.inspection.layouts import OBJECT_OT_omt_diagram, UV_OT_omt_layout_image
 from .operators.inspection.regions import UV_OT_omt_attributes, UV_OT_omt_regions
 from .operators.inspection.remedy import UV_OT_omt_notices, UV_OT_omt_remedy
 from .operators.inspection.worst import UV_OT_omt_worst
@@ -69,6 +70,8 @@ CLASSES = (
     UV_OT_omt_flow,
     OBJECT_OT_omt_volume,
     MESH_OT_omt_partition,
+    UV_OT_omt_layout_image,
+    OBJECT_OT_omt_diagram,
     UV_OT_omt_overlay,
     UV_OT_omt_histogram,
     UV_OT_omt_density_get,

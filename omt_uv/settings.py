@@ -271,6 +271,14 @@ DEFAULT_GROUP = "omt_weights"
 DEFAULT_LOW = 0.5
 DEFAULT_HIGH = 0.95
 
+# What the cells of a power diagram fill.
+DOMAINS = (
+    ("DISK", "Disk", "Cells of the unit disk, for the largest part, cut open where it has to be"),
+    ("SQUARE", "Square", "Cells of a square"),
+    ("RECTANGLE", "Rectangle", "Cells of a rectangle of the part's own aspect"),
+    ("SPHERE", "Sphere", "Cells of the sphere, for closed meshes"),
+)
+
 # What a partition becomes.
 CELL_WRITES = (
     ("FACE_SETS", "Face Sets", "A face set of Sculpt Mode for each cell; cells follow faces"),

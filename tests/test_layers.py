@@ -71,7 +71,8 @@ ARROWS: dict[str, str] = {
     "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
     "solver.strain solver.partition solver.signatures pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
-    "pipelines.measuring": "solver solver.mesh solver.maps pipelines",
+    "pipelines.measuring": "solver solver.mesh solver.maps solver.canonical solver.conformal solver.cutting "
+    "solver.sphere solver.transport pipelines",
     "pipelines.regions": "settings solver solver.mesh solver.analysis solver.maps solver.editing "
     "solver.parameterization pipelines",
     "pipelines.arranging": "settings solver solver.mesh solver.editing solver.arranging pipelines",
@@ -85,6 +86,7 @@ ARROWS: dict[str, str] = {
     "files.in_place": "errors solver",
     "files": "errors supervision solver blender files.formats files.in_place",
     "display": "solver solver.mesh solver.maps pipelines blender",
+    "display.textures": "solver solver.maps pipelines pipelines.measuring display",
     "session": "errors settings solver solver.mesh solver.maps solver.editing solver.parameterization pipelines "
     "blender",
     "batch": "errors supervision solver",
@@ -92,6 +94,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization pipelines pipelines.measuring pipelines.regions pipelines.volumes blender blender.volumes "
     "blender.measuring pipelines.shapes blender.shapes "
     "files display solver.flows solver.volumes solver.strain solver.editing",
+    "commands.pictures": "settings solver pipelines.measuring display.textures files commands",
     "commands.shapes": "settings supervision batch display solver solver.signatures solver.mesh solver.registration "
     "solver.strain pipelines.shapes blender "
     "blender.shapes files commands",
@@ -102,7 +105,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.editing "
     "pipelines pipelines.regions blender files display session",
     "operators.inspection": "settings remedies solver solver.comparison pipelines pipelines.measuring blender "
-    "blender.measuring display session operators",
+    "blender.measuring display display.textures session operators",
     "operators.shapes": "settings solver solver.registration pipelines pipelines.shapes blender "
     "blender.shapes session operators",
     "operators.volumes": "solver solver.flows pipelines pipelines.volumes blender blender.volumes session operators",

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import bpy
 
+import numpy as np
+
 NAME = "OMT UV Checker"
 # Property of an object or mesh with the materials that its slots had, by number; "" stands for a slot that was made.
 _KEPT = "omt_uv_materials"
 _NO_SLOT = "none"
 
 
-def put(obj: bpy.types.Object, kind: str, size: int) -> None:
-    """Show a checker on every face; kind as `Image.generated_type`, size in pixels."""
-    material = _material(kind, size)
+def put(obj: bpy.types.Object, kind: str, size: int, picture: np.ndarray | None = None) -> None:
+    """Show a checker on every face; kind as `Image.generated_type`, or the name of a picture (h,w,3) in [0,1], top row
+    first; size in pixels."""
+    material = _material(kind, size, picture)
     if not obj.material_slots:
         obj.data.materials.append(material)
         obj.data[_KEPT] = {_NO_SLOT: True}
@@ -61,13 +64,26 @@ def wears_one(obj: bpy.types.Object) -> bool:
     return _KEPT in obj or _KEPT in obj.data
 
 
-def _material(kind: str, size: int) -> bpy.types.Material:
+def _image(name: str, kind: str, size: int, picture: np.ndarray | None) -> bpy.types.Image:
+    if picture is None:
+        image = bpy.data.images.new(name, size, size)
+        image.source, image.generated_type = "GENERATED", kind
+        return image
+    height, width = picture.shape[:2]
+    image = bpy.data.images.new(name, width, height)
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :3] = picture[::-1]
+    image.pixels.foreach_set(pixels.ravel())
+    image.pack()
+    return image
+
+
+def _material(kind: str, size: int, picture: np.ndarray | None) -> bpy.types.Material:
     name = f"{NAME} {kind.split('_')[0].lower()} {size}"
     found = bpy.data.materials.get(name)
     if found is not None:
         return found
-    image = bpy.data.images.get(name) or bpy.data.images.new(name, size, size)
-    image.source, image.generated_type = "GENERATED", kind
+    image = bpy.data.images.get(name) or _image(name, kind, size, picture)
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree

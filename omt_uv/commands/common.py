@@ -18,7 +18,7 @@ Y_IS_UP = (".obj", ".off", ".ply")
 Y_TO_Z = ((1, 0, 0), (0, 0, -1), (0, 1, 0))
 # Options that hold files which commands write beside OUT, and such as they read, with what they are called.
 WRITTEN = {name: f"--{name.replace('_', '-')}" for name in (
-    "report", "histogram", "preview", "plot", "image_out", "image_output")}  # fmt: skip
+    "report", "histogram", "preview", "plot", "image_out", "image_output")} | {"made": "OUT"}  # fmt: skip
 READ = {"input": "IN", "target": "DST", "other": "B", "others": "B", "image": "--image", "handles": "--handles",
         "index": "--index", "landmarks": "--landmarks"}  # fmt: skip
 # What is read, and what may take its place.
@@ -137,12 +137,19 @@ def write_preview(options: argparse.Namespace, pairs) -> None:
     """Draw objects with their Readings into a PNG file, if there is to be one."""
     if options.preview is None:
         return
+    from ..display.png import png_bytes
+    from ..display.preview import preview
+    from ..files.verified import write_bytes
+
+    write_bytes(options.preview, png_bytes(preview(place_objects(options, pairs))))
+
+
+def place_objects(options: argparse.Namespace, pairs) -> list:
+    """Objects with their Readings as they stand in the world, where Z is up: `preview.Placed`."""
     import numpy as np
 
     from ..blender.mesh import place_of
-    from ..display.png import png_bytes
-    from ..display.preview import Placed, preview
-    from ..files.verified import write_bytes
+    from ..display.preview import Placed
 
     # Their axes are taken as they are.
     upright = np.array(Y_TO_Z if options.input.suffix.lower() in Y_IS_UP else np.eye(3), float)
@@ -150,7 +157,7 @@ def write_preview(options: argparse.Namespace, pairs) -> None:
     for obj, reading in pairs:
         rotation, shift = place_of(obj)
         placed.append(Placed(reading, upright @ rotation, upright @ shift))
-    write_bytes(options.preview, png_bytes(preview(placed)))
+    return placed
 
 
 def check_picture(path: Path | None) -> None:

@@ -40,11 +40,13 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         max=1000.0,
         soft_max=10.0,
     )
-    centre: StringProperty(name="Centre", description="Vertex group of the vertex that goes to the middle of a disk")
-    start: StringProperty(
+    centre_group: StringProperty(
+        name="Centre", description="Vertex group of the vertex that goes to the middle of a disk"
+    )
+    start_group: StringProperty(
         name="Start", description="Vertex group of the vertex of the boundary that goes to the right of the middle"
     )
-    corners: StringProperty(
+    corner_group: StringProperty(
         name="Corners",
         description="Vertex group of four vertices that go into the corners of a rectangle; of three, to the right, "
         "upper and left end of a disk",
@@ -128,7 +130,9 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
             used = self.use_subdivision
-            marked = map_markers(objects, {"centre": self.centre, "start": self.start, "corners": self.corners})
+            marked = map_markers(
+                objects, {"centre": self.centre_group, "start": self.start_group, "corners": self.corner_group}
+            )
             jobs = [
                 UnwrapJob(
                     r.surface,
@@ -181,11 +185,11 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     column = layout.column()
     column.active = properties.boundary == "RECTANGLE"
     column.prop(properties, "aspect")
-    choose_group(layout, properties, "start")
+    choose_group(layout, properties, "start_group")
     column = layout.column()
     column.active = properties.boundary != "FREE"
-    choose_group(column, properties, "corners")
-    choose_group(column, properties, "centre")
+    choose_group(column, properties, "corner_group")
+    choose_group(column, properties, "centre_group")
     layout.separator()
     layout.prop(properties, "seams")
     column = layout.column()

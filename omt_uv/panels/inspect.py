@@ -33,6 +33,9 @@ def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     row.operator("object.omt_distance", text="Compare", icon="MOD_MESHDEFORM")
     row.operator("uv.omt_regions", text="Copy Table", icon="COPYDOWN")
     row.operator("uv.omt_attributes", text="", icon="SPREADSHEET")
+    row = layout.row(align=True)
+    row.operator("uv.omt_layout_image", text="Layout to Image", icon="IMAGE_DATA")
+    row.operator("object.omt_diagram", text="", icon="MESH_CIRCLE")
     image = bpy.data.images.get(HISTOGRAM)
     if image is not None and image.preview is not None:
         layout.template_icon(icon_value=image.preview.icon_id, scale=7.0)
@@ -82,6 +85,8 @@ SECTION = Section(
         "object.omt_distance",
         "uv.omt_regions",
         "uv.omt_attributes",
+        "uv.omt_layout_image",
+        "object.omt_diagram",
     ),
     is_open=True,
 )

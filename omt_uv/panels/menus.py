@@ -13,6 +13,7 @@ ENTRIES: list[list[str]] = [
     ["uv.omt_magnify", "object.omt_weights", "object.omt_remesh", "object.omt_compare", "uv.omt_sphere"],
     ["uv.omt_checker", "uv.omt_checker_remove", "uv.omt_overlay", "uv.omt_histogram", "uv.omt_measure", "uv.omt_worst"],
     ["object.omt_distance", "uv.omt_regions", "uv.omt_attributes", "uv.omt_density_get", "uv.omt_density_set"],
+    ["uv.omt_layout_image", "object.omt_diagram"],
     [
         "object.omt_match",
         "object.omt_landmarks",

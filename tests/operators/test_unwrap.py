@@ -398,7 +398,7 @@ def test_a_conformal_disk_with_its_centre_and_start_where_they_are_marked():
     obj = scenes.bump(columns=12, rows=12)
     for name, vertex in (("middle", 84), ("right", 90)):
         obj.vertex_groups.new(name=name).add([vertex], 1.0, "REPLACE")
-    unwrap(kind="CONFORMAL", boundary="DISK", centre="middle", start="right", margin=0)
+    unwrap(kind="CONFORMAL", boundary="DISK", centre_group="middle", start_group="right", margin=0)
     places = {}
     for loop, uv in zip(obj.data.loops, scenes.uv_of(obj), strict=True):
         places[loop.vertex_index] = uv

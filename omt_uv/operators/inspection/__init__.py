@@ -11,6 +11,7 @@ __getattr__, __all__ = lazy(
     checker="UV_OT_omt_checker UV_OT_omt_checker_remove",
     compare="OBJECT_OT_omt_compare",
     distance="OBJECT_OT_omt_distance",
+    layouts="OBJECT_OT_omt_diagram UV_OT_omt_layout_image",
     regions="UV_OT_omt_attributes UV_OT_omt_regions",
     remedy="UV_OT_omt_remedy",
     worst="UV_OT_omt_worst",

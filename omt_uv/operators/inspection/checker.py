@@ -11,7 +11,12 @@ from ..base import Complaint, QuickOperator, check_all_local, mesh_objects
 KINDS = (
     ("COLOR_GRID", "Labelled", "Coloured squares with a letter and a number, so that every place can be told"),
     ("UV_GRID", "Plain", "Grey squares with small crosses in colours"),
+    ("CIRCLES", "Circle Packing", "Equal circles that touch: round where angles are kept, equal where areas are"),
+    ("WORLD", "World Map", "A map of the world in longitude and latitude, for globes"),
 )
+
+# Blender has no generator for these.
+DRAWN = ("CIRCLES", "WORLD")
 
 
 class UV_OT_omt_checker(QuickOperator, bpy.types.Operator):
@@ -43,8 +48,13 @@ class UV_OT_omt_checker(QuickOperator, bpy.types.Operator):
         for obj in objects:
             # Another checker gives way.
             checker.take_off(obj)
+        picture = None
+        if self.kind in DRAWN:
+            from ...display.textures.patterns import picture_of
+
+            picture = picture_of(self.kind.lower(), self.size)
         for obj in objects:
-            checker.put(obj, self.kind, self.size)
+            checker.put(obj, self.kind, self.size, picture)
         checker.tidy()
         shading.show_textures(context)
 

@@ -7,5 +7,8 @@ Main names: FaceValues, RegionFigures, face_values, figures_by_region.
 from ...solver.lazy import lazy
 
 __getattr__, __all__ = lazy(
-    __name__, per_face="FaceValues face_values", region_figures="RegionFigures figures_by_region"
+    __name__,
+    diagrams="Diagram",
+    per_face="FaceValues face_values",
+    region_figures="RegionFigures figures_by_region",
 )

@@ -54,6 +54,7 @@ class NamedMap:
     """A map uv (n,2) by name: what it comes from, and warnings.
 
     untangled : faces that lay wrongly, and were moved back
+    sites : (n,2) in the domain of the transport, if there is one
     """
 
     uv: np.ndarray
@@ -61,6 +62,7 @@ class NamedMap:
     cells: Transport | None = None
     untangled: int = 0
     warnings: tuple[str, ...] = ()
+    sites: np.ndarray | None = None
 
 
 def conformal_map(disk: NamedProblem) -> Steps[NamedMap]:
@@ -122,7 +124,7 @@ def polar_map(disk: NamedProblem, balance: float = 0.0) -> Steps[NamedMap]:
         uv, warning = untangle(uv, disk.vertices, disk.triangles, disk.loop, uv[disk.loop])
         warnings += [warning] if warning else []
     uv = uv if disk.corners is not None else disk.markers.turned(uv)
-    return NamedMap(uv, found.conformal, cells, folds - count_folds(uv, disk.triangles), tuple(warnings))
+    return NamedMap(uv, found.conformal, cells, folds - count_folds(uv, disk.triangles), tuple(warnings), sites)
 
 
 def _in_domain(disk: NamedProblem, found: NamedMap) -> tuple[Domain, np.ndarray]:

@@ -15,7 +15,7 @@ from ..mesh.geometry import face_areas, face_normals
 from ..mesh.topology import boundary_edges, expand
 from ..progress import Progress, Steps, part_of
 from .bumps import Bumps, bumps_of, curvature_error
-from .triangle_shapes import compare_shapes, topology_of
+from .triangle_shapes import TriangleShapes, compare_shapes, topology_of
 
 # Positions (n,3) and triangles (m,3).
 Mesh: TypeAlias = tuple[np.ndarray, np.ndarray]
@@ -31,7 +31,7 @@ BOUNDARY_POINTS = 2000
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(TriangleShapes):
     """Figures of a surface B beside a surface A; lengths are shares of the diagonal of the box of A.
 
     vertices, faces : of B
@@ -40,7 +40,7 @@ class Comparison:
     normal_mean, normal_p99 : angle in degrees between the normals at closest points, from A to B
     gaussian_error, mean_error : curvature measures under bumps, `sum |phi_A - phi_B| / sum |phi_A|`
     boundary : Hausdorff distance of the boundaries; None where one has none
-    angle_min, angle_p1, angle_mean, below_30, quality, edge_cv, area_cv : of B, see `TriangleShapes`
+    those of its triangles : of B, see `TriangleShapes`
     topology_kept : as many components and boundary loops, the same Euler characteristic, manifold and oriented
     components, loops, euler : of B
     """
@@ -58,13 +58,6 @@ class Comparison:
     gaussian_error: float
     mean_error: float
     boundary: float | None
-    angle_min: float
-    angle_p1: float
-    angle_mean: float
-    below_30: float
-    quality: float
-    edge_cv: float
-    area_cv: float
     topology_kept: bool
     components: int
     loops: int

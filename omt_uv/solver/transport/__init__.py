@@ -8,6 +8,7 @@ from ..lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
+    cell_polygons="CellPolygons planar_cells spherical_cell_polygons",
     convex_domain="ConvexPolygon Disk Domain Rectangle",
     polar_factorization="PolarFactorisation polar_factorisation",
     power_diagram="PowerDiagram",

@@ -61,7 +61,7 @@ class SphericalCells:
 def spherical_cells(sites: np.ndarray, site_weights: np.ndarray, hull: Hull) -> SphericalCells:
     """Cells of unit vectors (n,3) with weights (n,), whose convex hull is given."""
     triangles = hull.triangles
-    normal = _normals(sites, site_weights, triangles)
+    normal = facet_normals(sites, site_weights, triangles)
     tail, head = halfedges(triangles)
     # Around the tail, counter-clockwise, the facet to the right of a halfedge comes before its own.
     before, after = normal[hull.twin // 3], np.repeat(normal, 3, axis=0)
@@ -135,7 +135,7 @@ def _from(sites, site_weights, i, j) -> tuple[np.ndarray, np.ndarray]:
     return np.expm1(change) - scale * half, scale[:, None] * (d + half[:, None] * sites[i])
 
 
-def _normals(sites, site_weights, triangles) -> np.ndarray:
+def facet_normals(sites, site_weights, triangles) -> np.ndarray:
     """Unit outer normals (m,3) of the facets."""
     i, j, k = triangles.T
     (ra, a), (rb, b) = _from(sites, site_weights, i, j), _from(sites, site_weights, i, k)

@@ -1,0 +1,46 @@
+"""Cells as polygons have the areas of the cells, and fill the domain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.mesh.spherical_geometry import triangle_areas
+from omt_uv.solver.progress import drain
+from omt_uv.solver.transport.cell_polygons import planar_cells, spherical_cell_polygons
+from omt_uv.solver.transport.convex_domain import Disk, Rectangle
+from omt_uv.solver.transport.power_diagram import power_diagram
+from omt_uv.solver.transport.semidiscrete import transport
+from omt_uv.solver.transport.spherical_power_diagram import by_hull, spherical_cells
+
+
+@pytest.mark.parametrize("domain", [Disk(), Rectangle(), Rectangle(2.0, 0.5)], ids=["disk", "square", "strap"])
+def test_polygons_of_the_plane_have_the_areas_of_the_cells(domain):
+    rng = np.random.default_rng(5)
+    sites = rng.uniform(-0.45, 0.45, (150, 2)) * [1, 0.5]
+    weights = 0.002 * rng.random(150)
+    polygons, cells = planar_cells(sites, weights, domain), power_diagram(sites, weights, domain)
+    # Arcs are drawn as polygons of many sides.
+    assert polygons.areas() == pytest.approx(cells.area, abs=2e-4 if isinstance(domain, Disk) else 1e-9)
+    triangles, owner = polygons.fans()
+    assert len(np.unique(owner)) == (cells.area > 1e-9).sum() and triangles.max() < len(polygons.points)
+
+
+def test_transported_cells_have_their_masses():
+    rng = np.random.default_rng(2)
+    sites, mass = rng.uniform(-0.6, 0.6, (60, 2)), rng.uniform(0.5, 2, 60)
+    found = drain(transport(sites, mass * np.pi / mass.sum(), Disk()))
+    polygons = planar_cells(sites, found.site_weights, Disk())
+    assert polygons.areas() / np.pi == pytest.approx(mass / mass.sum(), abs=1e-4)
+
+
+def test_polygons_of_the_sphere_have_the_areas_of_the_cells():
+    rng = np.random.default_rng(7)
+    sites = rng.normal(size=(200, 3))
+    sites /= np.linalg.norm(sites, axis=1)[:, None]
+    weights = 1e-3 * rng.random(200)
+    hull = by_hull(sites, weights)
+    polygons = spherical_cell_polygons(sites, weights, hull)
+    triangles, owner = polygons.fans()
+    areas = np.bincount(owner, triangle_areas(*np.moveaxis(polygons.points[triangles], 1, 0)), 200)
+    assert areas == pytest.approx(spherical_cells(sites, weights, hull).area, rel=1e-6)
