@@ -22,13 +22,28 @@ ASTRAY = 0.5
 
 @dataclass(frozen=True)
 class FineMirror:
-    """The mirror image (n,) of every vertex of a component, and which are on the one side, (n,) bool, and in the plane
-    or within an edge of it, where no vertices are quite in it; exact: whether the images are vertices, nearly all."""
+    """The mirror image (n,) of every vertex of a component, its height (n,) over the plane, and which lie in it or on a
+    line of edges along it, (n,) bool; exact: whether images are vertices, nearly all, and no such line is needed."""
 
     image: np.ndarray
-    side: np.ndarray
+    height: np.ndarray
     plane: np.ndarray
-    exact: bool = True
+    exact: bool
+
+    @property
+    def side(self) -> np.ndarray:
+        """Vertices (n,) bool on the one side."""
+        return self.height >= 0
+
+
+def with_line(component: CutComponent, mirror: FineMirror) -> FineMirror | None:
+    """The mirror with a line along the plane, of every edge that crosses it the nearer end; None if none does."""
+    height = mirror.height
+    crossing = component.ends[height[component.ends].prod(axis=1) <= 0]
+    plane, image = np.zeros(len(height), dtype=bool), mirror.image.copy()
+    plane[crossing[np.arange(len(crossing)), np.abs(height[crossing]).argmin(axis=1)]] = True
+    image[plane] = np.flatnonzero(plane)
+    return FineMirror(image, height, plane, exact=False) if plane.any() else None
 
 
 def carried(

@@ -22,7 +22,7 @@ from ..mesh.topology import halfedges
 from ..progress import Progress, Steps, part_of
 from .coarse_surface import CoarseSurface, coarse_surface
 from .cut_tree import EXCHANGE, Cut, Task, cut_along
-from .fine_paths import FineMirror, carried
+from .fine_paths import FineMirror, carried, with_line
 from .growth import grow
 from .improvement import improved, rerouted, trimmed
 from .options import SearchOptions
@@ -36,7 +36,7 @@ MIRRORED_SHARE = 0.97
 EXACT = 1e-4
 NEARLY = 0.03
 # Seams of a scan are symmetric unless that makes them cost more than so many times what others do.
-DEARER = 1.1
+DEARER = 1.5
 # A vertex is in a face if it is so with more than this certainty, and cuts that end there are worth so much less.
 IN_FACE = 0.5
 BARRED = 0.3
@@ -115,12 +115,13 @@ class SeamSearch:
         if bounded and model.spread <= bound:
             return base
         plain = (coarse, model) if bounded else None
-        if mirror is None or mirror.exact:
-            found = yield from self._searched(component, base, bound, mirror, plain)
-        else:
-            found = yield from part_of(self._searched(component, base, bound, mirror, plain), 0.0, 0.5)
-            free = yield from part_of(self._searched(component, base, bound, None, plain), 0.5, 0.5)
-            found = min(found, free, key=lambda one: one.score * (1.0 if one.mirror is None else 1 / DEARER))
+        # Where the plane runs between the vertices, there is hardly a symmetric cut without a line along it.
+        line = None if mirror is None else mirror if not mirror.exact else with_line(component, mirror)
+        first = None if line is mirror else mirror
+        found = yield from part_of(self._searched(component, base, bound, first, plain), 0.0, 0.5)
+        if line is not None and found.mirror is None:
+            mirrored = yield from part_of(self._searched(component, base, bound, line, plain), 0.5, 0.5)
+            found = mirrored if mirrored.score <= DEARER * found.score else found
         self.memory[name] = found = found.carried(component)
         return found.edges
 
@@ -137,7 +138,6 @@ class SeamSearch:
         setting = _Setting.of(component, coarse, base, mirror, model, self._tip_factor(component))
         task = setting.task(bound, setting.extremity())
         if mirror is not None and not task.graph.is_whole():
-            # The plane runs between the vertices: there is hardly a symmetric cut.
             mirror, setting = None, replace(setting, mirrored=None)
             task = setting.task(bound, setting.extremity())
         cut = yield from self._grown(task)
@@ -214,17 +214,10 @@ class SeamSearch:
         height = height - np.mean(height[real] - scale * (own @ plane.normal - plane.offset))
         distance, image = cKDTree(points).query(points - 2 * height[:, None] * plane.normal)
         in_plane = (image == np.arange(len(image))) & (np.abs(height) <= EXACT)
+        mirror = FineMirror(image, height, in_plane, exact=True)
         if np.mean(distance <= EXACT) >= MIRRORED_SHARE and in_plane.any():
-            return FineMirror(image, height >= 0, in_plane, exact=True)
-        if np.mean(distance <= NEARLY) < MIRRORED_SHARE:
-            return None
-        # Of every edge that crosses the plane the nearer end: these are joined all along it.
-        crossing = component.ends[height[component.ends].prod(axis=1) <= 0]
-        nearer = np.abs(height[crossing]).argmin(axis=1)
-        in_plane = np.zeros(len(image), dtype=bool)
-        in_plane[crossing[np.arange(len(crossing)), nearer]] = True
-        image[in_plane] = np.flatnonzero(in_plane)
-        return FineMirror(image, height >= 0, in_plane, exact=False) if in_plane.any() else None
+            return mirror
+        return with_line(component, mirror) if np.mean(distance <= NEARLY) >= MIRRORED_SHARE else None
 
     def _tip_factor(self, component: CutComponent) -> np.ndarray:
         """Factor (n,) on what cuts are worth that end at a vertex: less on a face."""
