@@ -49,6 +49,7 @@ ARROWS: dict[str, str] = {
     "solver.strain": "solver solver.mesh solver.analysis",
     "solver.registration": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement "
     "solver.parameterization solver.sphere",
+    "solver.registration.charts": "solver solver.mesh solver.linalg solver.registration",
     "solver.remeshing.components": "solver solver.mesh",
     "solver.remeshing.edits": "solver solver.mesh solver.remeshing.components",
     "solver.remeshing.relaxation": "solver solver.mesh solver.linalg solver.remeshing.edits",
@@ -69,6 +70,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization solver.editing solver.sphere solver.globe solver.remeshing "
     "xatlas_charts",
     "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
+    "solver.registration.charts "
     "solver.strain solver.partition solver.signatures pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
     "pipelines.measuring": "solver solver.mesh solver.maps solver.canonical solver.conformal solver.cutting "

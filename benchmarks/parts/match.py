@@ -11,9 +11,10 @@ from benchmarks.timing import timed
 from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.mesh.geometry import vertex_normals
 from omt_uv.solver.progress import drain
-from omt_uv.solver.registration.coarse_polish import far_vertices
+from omt_uv.solver.registration.coarse_meshes import far_vertices
 from omt_uv.solver.registration.landmarks import Landmarks
-from omt_uv.solver.registration.register import RegistrationOptions, register
+from omt_uv.solver.registration.register import register
+from omt_uv.solver.registration.results import RegistrationOptions
 from omt_uv.solver.remeshing import RemeshOptions, RemeshSource, remesh
 from omt_uv.solver.sphere.sphere_map import sphere_map
 

@@ -17,7 +17,7 @@ from ...solver.analysis.feature_edges import edge_union
 from ...solver.errors import EmptyMeshError
 from ...solver.mesh.surface import Surface
 from ...solver.mesh.topology import pair_keys
-from ...solver.registration.register import RegistrationOptions
+from ...solver.registration.results import RegistrationOptions
 from .. import mesh as blender_mesh
 from ..read_attributes import get, read_attributes
 from ..vertex_groups import write_group

@@ -89,7 +89,7 @@ def _registered(options: argparse.Namespace, files: list[Path]):
     """All shapes with the vertices of the first, its surface, and its polygons."""
     from ...pipelines.shapes.landmark_pairs import pairs_of
     from ...pipelines.shapes.match import MatchJob, match_surfaces
-    from ...solver.registration.register import RegistrationOptions
+    from ...solver.registration.results import RegistrationOptions
 
     first, shapes, polygons = None, [], []
     for path in files:

@@ -121,7 +121,7 @@ def _match(options: argparse.Namespace, source, target):
     from ...pipelines.shapes.landmark_pairs import pairs_of, read_pairs
     from ...pipelines.shapes.match import match_surfaces
     from ...pipelines.shapes.onto import transferred
-    from ...solver.registration.register import RegistrationOptions
+    from ...solver.registration.results import RegistrationOptions
 
     if options.landmarks.endswith(".json"):
         pairs = read_pairs(Path(options.landmarks))

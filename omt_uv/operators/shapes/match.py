@@ -103,7 +103,7 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
         from ...blender.shapes.landmarks import read_landmarks
         from ...blender.shapes.match_objects import check_room, match_job, read_carrier, stretched_offsets
         from ...pipelines.shapes.landmark_pairs import pairs_of
-        from ...solver.registration.register import RegistrationOptions
+        from ...solver.registration.results import RegistrationOptions
 
         source, target = source_and_target(context)
         if self.mode in ("WRAP", "MORPH") and not self.shape_key:

@@ -13,6 +13,7 @@ MATCH_DOMAINS = (
     ("AUTO", "Automatic", "The disk where both are open, the sphere otherwise"),
     ("SPHERE", "Sphere", "All holes are closed for the match"),
     ("DISK", "Disk", "Both keep their longest boundary, which slides along the other"),
+    ("CHARTS", "Charts Cut Alike", "Any topology: seams cut both into disks that correspond, and go onto one another"),
 )
 # What can be transferred, by the words of the command line.
 TRANSFERS = (

@@ -11,8 +11,11 @@ from ...solver.mesh.geometry import face_areas, halfedge_lengths
 from ...solver.mesh.surface import Surface
 from ...solver.mesh.topology import graph_components, halfedges
 from ...solver.progress import Progress, Steps, part_of
+from ...solver.registration.charts.chart_maps import register_charts
+from ...solver.registration.domains import CHARTS
 from ...solver.registration.landmarks import Landmarks
-from ...solver.registration.register import Registration, RegistrationOptions, register
+from ...solver.registration.register import register
+from ...solver.registration.results import Registration, RegistrationOptions
 from ...solver.strain.figures import MatchFigures, match_figures
 from .landmark_pairs import Pairs, landmarks_on
 
@@ -96,7 +99,12 @@ def match_surfaces(job: MatchJob) -> Steps[MatchResult]:
     source, target = _largest(job.source, "source"), _largest(job.target, "target")
     own, other = (source.vertices, source.triangles), (target.vertices, target.triangles)
     landmarks = landmarks_on(_renamed(job.pairs, source, target), own, other)
-    found = yield from part_of(register(own, other, landmarks, job.options), 0.0, MATCHING)
+    if job.options.domain == CHARTS:
+        cut = (*own, _seams(job.source, source)), (*other, _seams(job.target, target))
+        steps = register_charts(*cut, landmarks, job.options)
+    else:
+        steps = register(own, other, landmarks, job.options)
+    found = yield from part_of(steps, 0.0, MATCHING)
     yield Progress("Figures", MATCHING)
     wrapped = job.source.positions.copy()
     wrapped[source.used] = found.forward.positions(*other)
@@ -146,6 +154,14 @@ def _largest(surface: Surface, name: str) -> _Part:
     used, inverse = np.unique(triangles[rows], return_inverse=True)
     rest = np.setdiff1d(np.unique(triangles), used)
     return _Part(used, rows, surface.positions[used], inverse.reshape(-1, 3).astype(np.int64), rest)
+
+
+def _seams(surface: Surface, part: _Part) -> np.ndarray:
+    """The seams (s,2) of a surface that lie on its part, as vertices of that."""
+    number = np.full(len(surface.positions), -1)
+    number[part.used] = np.arange(len(part.used))
+    seams = number[surface.seams]
+    return seams[(seams >= 0).all(axis=1)]
 
 
 def _count_parts(surface: Surface) -> int:

@@ -10,6 +10,6 @@ from ..lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     landmarks="Landmarks vertex_landmarks",
-    register="OnSurface Registration RegistrationOptions",
+    results="OnSurface Registration RegistrationOptions",
     suggestions="Suggestions suggest_landmarks",
 )

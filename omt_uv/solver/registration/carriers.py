@@ -6,7 +6,9 @@ the same for all positions on the surface that a map without folds has.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -33,6 +35,11 @@ class InPlace:
         """These places, and those of the other where take (n,) is False."""
         parts = zip(vars(self).values(), vars(other).values(), strict=True)
         return InPlace(*(np.where(take.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in parts))
+
+    def put(self, vertices: np.ndarray, places: InPlace, take: np.ndarray) -> None:
+        """Set vertices (k,) to those of the places (l,) that take (l,) bool says, in these very arrays."""
+        for part, place in zip(vars(self).values(), vars(places).values(), strict=True):
+            part[vertices] = place[take]
 
 
 class Carrier(Protocol):
@@ -132,7 +139,17 @@ class TargetCarrier:
         self.vertices, self.triangles, self.domain = vertices, triangles, domain
         self.loop = np.zeros(0, np.int64) if loop is None else loop
         self.walks = StraightWalks(vertices, triangles)
-        self.outline = _Outline(vertices, triangles) if len(self.loop) else None
+
+    def sliding(self, loop: np.ndarray) -> TargetCarrier:
+        """The same for a mesh whose vertices (k,) slide on the boundary."""
+        other = copy(self)
+        other.loop = loop
+        return other
+
+    @cached_property
+    def outline(self) -> _Outline:
+        """The boundary of the surface."""
+        return _Outline(self.vertices, self.triangles)
 
     def place(self, domain: np.ndarray) -> InPlace:
         """Points of the domain (k,d) as places on the surface."""
@@ -153,7 +170,7 @@ class TargetCarrier:
     def axes(self, placed: InPlace) -> np.ndarray:
         """Tangents (n,2,3) in the planes of the faces; along the boundary for the loop."""
         axes = tangents(self.walks.normals[placed.faces])
-        if self.outline is not None:
+        if len(self.loop):
             axes[self.loop] = 0
             axes[self.loop, 0] = self.outline.direction(placed.faces[self.loop], placed.barycentric[self.loop])
         return axes
@@ -172,7 +189,7 @@ class TargetCarrier:
     def move(self, placed: InPlace, step: np.ndarray) -> InPlace:
         """Where straight walks (n,) end; the nearest points of the boundary for the loop."""
         faces, barycentric = self.walks(placed.faces, placed.barycentric, step)
-        if self.outline is not None:
+        if len(self.loop):
             target = placed.positions[self.loop] + step[self.loop]
             faces[self.loop], barycentric[self.loop] = self.outline.nearest(target)
         return self.at(faces, barycentric)

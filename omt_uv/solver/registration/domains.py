@@ -6,7 +6,8 @@ first: one part each, no handles, and the same kind of boundary.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,18 +18,27 @@ from ..errors import (
     PinchedVertexError,
     SeveralComponentsError,
     TopologyMismatchError,
+    ZeroAreaFaceError,
 )
+from ..linalg.nested_dissection import mesh_order
+from ..mesh.geometry import face_areas
 from ..mesh.surface import check_finite, triangle_surface
 from ..mesh.topology import boundary_edges, boundary_loops, graph_components, halfedges, pair_keys, with_fans
 from ..parameterization.options import UnwrapOptions
 from ..parameterization.unwrap import unwrap
 from ..progress import Steps
 from ..sphere.sphere_map import sphere_map
+from .carriers import DiskCarrier, InPlace, SphereCarrier, TargetCarrier
+from .descriptors import descriptors
+from .functional_maps import eigenfunctions
+from .landmarks import Landmarks, SplitSurface, check_landmarks, points_of, split_at
+from .surface_newton import Features, flat
 
 SPHERE = "sphere"
 DISK = "disk"
 AUTO = "auto"
-DOMAINS = (AUTO, SPHERE, DISK)
+CHARTS = "charts"
+DOMAINS = (AUTO, SPHERE, DISK, CHARTS)
 
 
 @dataclass(frozen=True)
@@ -84,7 +94,7 @@ def checked(vertices: np.ndarray, triangles: np.ndarray, name: str) -> None:
         handles = (2 - euler) // 2
         raise TopologyMismatchError(
             f"The {name} has {'a handle' if handles == 1 else f'{handles} handles'}",
-            "Match surfaces without handles; close them, or cut both alike by seams",
+            "Match surfaces without handles; or mark the same seams on both, and match charts cut alike",
         )
 
 
@@ -130,3 +140,92 @@ def domain_map(surface: FilledSurface, domain: str, balance: float) -> Steps[np.
     places = np.zeros((len(surface.vertices), 2))
     places[surface.triangles.ravel()[corners]] = uv
     return places / np.linalg.norm(places[surface.loop], axis=1).mean()
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both surfaces, ready: the source with holes filled, landmarks as vertices, renumbered; all in units of extent 1
+    and of equal area. order (n,): vertex of `split` that each vertex was; targets: triangle and coordinates of each
+    landmark's place."""
+
+    source: FilledSurface
+    target: FilledSurface
+    split: SplitSurface
+    order: np.ndarray
+    vertices: np.ndarray
+    triangles: np.ndarray
+    landmarks: np.ndarray
+    targets: tuple[np.ndarray, np.ndarray]
+    loop: np.ndarray
+    domain: str
+
+    @cached_property
+    def described(self) -> tuple[np.ndarray, np.ndarray]:
+        """Descriptors (n,c) of the source's vertices and (k,c) of the target's."""
+        return descriptors(self.vertices, self.triangles), descriptors(self.target.vertices, self.target.triangles)
+
+
+def prepared(source, target, landmarks: Landmarks, domain: str) -> Pair:
+    """Holes filled, landmarks made vertices, sizes alike, vertices in the order of elimination.
+
+    source, target : vertices (n,3) and triangles (m,3). Raises LandmarkError, TopologyMismatchError, ZeroAreaFaceError.
+    """
+    domain = kind_of(source[1], target[1], domain)
+    first, second = filled(source, domain, "source"), filled(target, domain, "target")
+    sizes = [np.sqrt(face_areas(surface.vertices, surface.triangles).sum()) for surface in (first, second)]
+    if not min(sizes) > 0:
+        raise ZeroAreaFaceError("A surface has no area", "Give meshes whose faces are no lines and no points")
+    first = replace(first, vertices=(first.vertices - first.vertices.mean(axis=0)) / sizes[0])
+    second = replace(second, vertices=(second.vertices - second.vertices.mean(axis=0)) / sizes[1])
+    check_landmarks(
+        landmarks, *points_of(landmarks, (first.vertices, first.triangles), (second.vertices, second.triangles))
+    )
+    split = split_at(first.vertices, first.triangles, landmarks.source_faces, landmarks.source_barycentric)
+    order = mesh_order(split.vertices, split.triangles)
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    return Pair(
+        source=first,
+        target=second,
+        split=split,
+        order=order,
+        vertices=split.vertices[order],
+        triangles=place[split.triangles],
+        landmarks=place[split.landmarks],
+        targets=(landmarks.target_faces, landmarks.target_barycentric),
+        loop=place[first.loop],
+        domain=domain,
+    )
+
+
+@dataclass(frozen=True)
+class Case:
+    """A pair, and what both maps to the domain made of it: where the source's vertices lie there, (n,d), turned onto
+    the target's map; the target as a carrier; features that are to be kept."""
+
+    pair: Pair
+    aligned: np.ndarray
+    carrier: TargetCarrier
+    features: Features | None
+
+    @cached_property
+    def targets(self) -> InPlace:
+        """The places of the landmarks."""
+        return self.carrier.at(*self.pair.targets)
+
+    @cached_property
+    def spectra(self) -> tuple[np.ndarray, np.ndarray]:
+        """As many eigenfunctions (n,c) of the source as (k,c) of the target."""
+        target = self.pair.target
+        first = eigenfunctions(self.pair.vertices, self.pair.triangles)
+        second = eigenfunctions(target.vertices, target.triangles)
+        count = min(first.shape[1], second.shape[1])
+        return first[:, :count], second[:, :count]
+
+    def domain_carrier(self, loop: np.ndarray) -> SphereCarrier | DiskCarrier:
+        """The domain as a carrier, for a mesh with vertices (k,) on its circle."""
+        return SphereCarrier() if self.pair.domain == SPHERE else DiskCarrier(loop)
+
+    def flat_targets(self) -> InPlace:
+        """The places of the landmarks in the domain."""
+        return flat(self.targets)

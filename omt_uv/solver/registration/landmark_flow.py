@@ -60,7 +60,9 @@ def draw_landmarks(problem: Deformation, placed: InPlace, vertices: np.ndarray, 
         if left < NEAR:
             break
         share = max(1 / max(count - k, 1), min(1.0, STRIDE / left) if k >= count else 0.0)
-        moved = problem.carrier.move(placed, _field(placed.positions, vertices, share * move))
+        field = _field(placed.positions, vertices, share * move)
+        field[problem.held] = 0
+        moved = problem.carrier.move(placed, field)
         placed = without_folds(problem, placed, moved)
         placed, more = yield from minimise_on(held, placed, RELAXING_STEPS, LOOSE, "Landmarks")
         steps += more
@@ -88,6 +90,7 @@ def put_landmarks(
     landmarks = vertices.tolist()
     met = np.zeros(len(landmarks), bool)
     triangles = problem.faces.triangles
+    triangles = triangles[np.isin(triangles, vertices).any(axis=1)]
     for k, vertex in enumerate(landmarks):
         around = triangles[(triangles == vertex).any(axis=1)]
         trial = InPlace(*(part.copy() for part in vars(placed).values()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -133,3 +133,23 @@ def split_at(vertices: np.ndarray, triangles: np.ndarray, faces: np.ndarray, bar
         parent=np.concatenate([parent, *parents[1:]]),
         corners=np.concatenate([corners, *coordinates[1:]]),
     )
+
+
+def points_of(
+    landmarks: Landmarks, source: tuple[np.ndarray, np.ndarray], target: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where landmarks are, (k,3) and (k,3), on surfaces, each vertices (n,3) and triangles (m,3)."""
+    first = source[0][source[1][landmarks.source_faces]]
+    second = target[0][target[1][landmarks.target_faces]]
+    return (
+        np.einsum("kc,kcd->kd", landmarks.source_barycentric, first),
+        np.einsum("kc,kcd->kd", landmarks.target_barycentric, second),
+    )
+
+
+def reflected(
+    vertices: np.ndarray, triangles: np.ndarray, landmarks: Landmarks
+) -> tuple[np.ndarray, np.ndarray, Landmarks]:
+    """The mirror image of a surface (n,3), (m,3) that looks outside, and the landmarks on it."""
+    turned = landmarks.source_barycentric[:, [0, 2, 1]]
+    return vertices * [-1, 1, 1], triangles[:, [0, 2, 1]], replace(landmarks, source_barycentric=turned)

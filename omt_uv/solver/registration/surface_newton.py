@@ -8,13 +8,13 @@ stiffness (a penalty method), and put into their places where that folds nothing
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..linalg.sparse import Factor
-from ..maps.energy import Elements, derivatives_of, energies_of, energy_of
-from ..mesh.geometry import plane_axes
+from ..maps.energy import Elements, derivatives_of, elements, energies_of, energy_of
+from ..mesh.geometry import face_areas, plane_axes
 from ..progress import Progress, Steps
 from ..refinement.hessian_blocks import Assembly
 from ..refinement.projected_newton import FOLD_SHARE, SHIFT, fold_shares
@@ -30,6 +30,8 @@ BARRIER = 1e-2
 # Predicted decrease over energy at which a stage of drawing is left, and the last one.
 LOOSE = 1e-2
 STRICT = 1e-4
+# Area weight of the energy, in the domain and on the surface.
+AREA_WEIGHT = 1.0
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,29 @@ class Deformation:
             _, corner = frames(in_space(placed.domain), self.within.triangles)
             value += BARRIER * energy_of(self.within, *derivatives(self.within, corner), self.area_weight)
         return value
+
+
+def deformation(
+    reference: np.ndarray,
+    triangles: np.ndarray,
+    carrier: Carrier,
+    features: Features | None = None,
+    within: np.ndarray | None = None,
+) -> Deformation:
+    """The problem of a mesh with shapes (n,3), (m,3) that moves on a carrier, no vertex held.
+
+    within (n,d): places in the domain; distortion from there is a barrier against folds
+    """
+    assembly = Assembly(triangles, len(reference))
+    held = np.zeros(len(reference), bool)
+    inside = None if within is None else _shapes(in_space(within), triangles)
+    return Deformation(_shapes(reference, triangles), assembly, carrier, held, AREA_WEIGHT, features, inside)
+
+
+def _shapes(positions: np.ndarray, triangles: np.ndarray) -> Elements:
+    """Triangles (m,3) as they are, of positions (n,3)."""
+    area = face_areas(positions, triangles)
+    return elements(positions, triangles, np.maximum(area, 1e-12 * area.mean()))
 
 
 def frames(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -232,6 +257,11 @@ def _local(faces: Elements, positions: np.ndarray, axes: np.ndarray, area_weight
 def in_space(domain: np.ndarray) -> np.ndarray:
     """Points of the domain (n,d) as points in space (n,3)."""
     return domain if domain.shape[1] == 3 else np.column_stack([domain, np.zeros(len(domain))])
+
+
+def flat(placed: InPlace) -> InPlace:
+    """Places on a surface as places (n,3) in its domain."""
+    return replace(placed, positions=in_space(placed.domain))
 
 
 def _add_vertex_blocks(blocks: np.ndarray, triangles: np.ndarray, forms: np.ndarray) -> None:

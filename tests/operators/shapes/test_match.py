@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scenes
 from match_scenes import choose, corners_of, pair
+from meshes import torus
 
 
 def match(**settings):
@@ -193,3 +194,22 @@ def test_strain_of_keys_uvs_and_poses():
     choose(source, target)
     assert "one other object" in scenes.error_of(bpy.ops.object.omt_strain, of="OBJECT")
     assert "has no shape key" in scenes.error_of(bpy.ops.object.omt_strain, of="KEY")
+
+
+def test_handles_are_no_hindrance_where_seams_cut_both_alike():
+    (V, F), (W, G) = torus(16, 8), torus(24, 10)
+    source, target = scenes.add(V, F, "Source"), scenes.add(W * [1.2, 1, 1], G, "Target")
+    for obj, major, minor in ((source, 16, 8), (target, 24, 10)):
+        long = {frozenset((k * minor, (k + 1) % major * minor)) for k in range(major)}
+        short = {frozenset((k, (k + 1) % minor)) for k in range(minor)}
+        for edge in obj.data.edges:
+            edge.use_seam = frozenset(edge.vertices) in long | short
+    choose(source, target)
+    match(mode="WRAP", domain="CHARTS")
+    expected = positions(source) * [1.2, 1, 1]
+    assert np.linalg.norm(positions(source, "OMT Match") - expected, axis=1).max() < 0.2
+    before = scenes.state(source)
+    choose(source, target)
+    with pytest.raises(RuntimeError, match="handle"):
+        match(domain="SPHERE")
+    assert scenes.state(source) == before

@@ -5,18 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from meshes import bumpy, icosphere
+from scipy.spatial import cKDTree
 from sphere_shapes import blob, random_rotation
 
 from omt_uv.solver.errors import LandmarkError
 from omt_uv.solver.maps.energy import elements
-from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.geometry import face_areas, vertex_areas
+from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.registration import alignment
 from omt_uv.solver.registration.carriers import DiskCarrier, SphereCarrier, TargetCarrier
-from omt_uv.solver.registration.coarse_polish import far_vertices
+from omt_uv.solver.registration.coarse_meshes import coarse_mesh, far_vertices, laid_out, straightened
+from omt_uv.solver.registration.coarse_start import coarse_start
 from omt_uv.solver.registration.descriptors import descriptors
-from omt_uv.solver.registration.domains import checked, filled, kind_of
+from omt_uv.solver.registration.domains import Case, checked, filled, kind_of, prepared
+from omt_uv.solver.registration.functional_maps import eigenfunctions, refined_correspondence
 from omt_uv.solver.registration.landmark_flow import draw_landmarks
 from omt_uv.solver.registration.landmarks import split_at, vertex_landmarks
 from omt_uv.solver.registration.straight_walks import StraightWalks
@@ -121,6 +125,53 @@ def test_far_vertices_start_with_those_that_are_given():
     V, _ = icosphere(3)
     chosen = far_vertices(V, np.array([7, 9]), np.zeros(0, np.int64), 40)
     assert chosen[:2].tolist() == [7, 9] and len(np.unique(chosen)) == 40
+
+
+def test_a_coarse_mesh_has_the_landmarks_and_carries_all_others():
+    P, F = icosphere(3)
+    mesh = coarse_mesh(P, P, np.array([7, 9]), np.zeros(0, np.int64), 60)
+    assert mesh.chosen[mesh.landmarks].tolist() == [7, 9] and len(mesh.triangles) == 2 * 60 - 4
+    R = random_rotation(4)
+    assert np.allclose(mesh.carried(mesh.domain @ R.T, P), P @ R.T)
+
+
+def test_folds_are_straightened_and_what_is_held_stays():
+    P, F = icosphere(3)
+    rng = np.random.default_rng(0)
+    folded, held = P.copy(), np.zeros(len(P), bool)
+    spot = np.flatnonzero(P[:, 2] > 0.8)
+    folded[spot] += 0.1 * rng.normal(size=(len(spot), 3))
+    folded /= np.linalg.norm(folded, axis=1, keepdims=True)
+    held[P[:, 2] < 0] = True
+    assert (signed_volumes(folded, F) <= 0).any()
+    found = drain(straightened(P, F, folded, held))
+    assert (signed_volumes(found, F) > 0).all() and np.allclose(found[held], P[held], atol=1e-12)
+    fresh = laid_out(P, F, folded, P[:, 2] > 0.8)
+    assert (signed_volumes(fresh, F) > 0).all() and np.allclose(fresh[held], P[held])
+
+
+def test_functional_maps_mend_a_rough_correspondence():
+    V, F = blob(3)
+    values = eigenfunctions(V, F, 40)
+    area = vertex_areas(V, F)
+    assert np.allclose(values.T @ (area[:, None] / area.sum() * values), np.eye(40), atol=1e-4)
+    rough = cKDTree(V).query(V + 0.15 * np.random.default_rng(1).normal(size=V.shape))[1]
+    assert (rough != np.arange(len(V))).mean() > 0.8
+    marks = values[[0, 40, 99, 200]]
+    found = refined_correspondence(values, values, rough, (marks, marks))
+    assert (found == np.arange(len(V))).mean() > 0.99
+
+
+def test_of_two_starts_the_better_one_is_taken():
+    V, F = blob(3, seed=4)
+    chosen = np.arange(0, len(V), 130)
+    pair = prepared((V, F), (V, F), vertex_landmarks((chosen, F), (chosen, F)), "sphere")
+    aligned = normalized(pair.vertices + 0.1 * np.sin(4 * pair.vertices[:, [1, 2, 0]]))
+    turned = random_rotation(6)
+    case = Case(pair, aligned @ turned.T, TargetCarrier(pair.target.vertices, F, aligned[np.argsort(pair.order)]), None)
+    found = drain(coarse_start(case))
+    assert found.met.all() and (signed_volumes(found.placed.domain, pair.triangles) > 0).all()
+    assert np.linalg.norm(found.placed.domain - aligned, axis=1).mean() < 0.05
 
 
 def problem_on(carrier, positions, triangles):

@@ -16,7 +16,8 @@ from omt_uv.solver.errors import (
 )
 from omt_uv.solver.progress import drain
 from omt_uv.solver.registration import RegistrationOptions, vertex_landmarks
-from omt_uv.solver.registration.register import register, stretches
+from omt_uv.solver.registration.register import register
+from omt_uv.solver.registration.results import stretches
 
 
 def shape():

@@ -1,0 +1,160 @@
+"""Find a map of few vertices, well begun: from landmarks that flow to their places, and from functional maps.
+
+A flow goes the short way, which around a limb may be the wrong way round, and then no descent leads out of it.
+Functional maps know no ways; what they find is put onto the domain and untangled there (`sphere.untangle`). Both are
+polished on the coarse mesh, and the one that distorts less is carried to all vertices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..mesh.spherical_geometry import signed_volumes
+from ..progress import Progress, Steps, part_of
+from .carriers import InPlace
+from .coarse_meshes import FewVertices, coarse_mesh, far_vertices, on_coarse, straightened
+from .domains import SPHERE, Case
+from .functional_maps import refined_correspondence
+from .landmark_flow import Drawn, draw_landmarks, put_landmarks
+from .surface_newton import STRICT, deformation, in_space, minimise_on, without_folds
+
+# Vertices of the coarse mesh, and Newton steps on it.
+COARSE = 500
+COARSE_STEPS = 60
+TOLERANCE = 1e-3
+# Vertices whose correspondence functional maps find.
+SAMPLES = 1000
+# Energy, on surfaces of area 1, below which nothing else is tried.
+GOOD_ENERGY = 0.04
+# Rounds of functional maps, and steps of relaxation from which the polish starts in each.
+ROUNDS = 2
+RELAXING_STEPS = (2, 5)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A polished map of the coarse mesh: its places, the landmarks (l,) bool that are met, its energy, its steps."""
+
+    placed: InPlace
+    met: np.ndarray
+    energy: float
+    steps: int
+
+
+def coarse_start(case: Case) -> Steps[Drawn]:
+    """Where all vertices lie in the domain to begin with, without folds, and which landmarks are met there."""
+    pair = case.pair
+    mesh = _whole(case)
+    if len(pair.vertices) >= 2 * COARSE:
+        mesh = coarse_mesh(pair.vertices, case.aligned, pair.landmarks, pair.loop, COARSE) or mesh
+    flow = yield from part_of(_flowed(case, mesh), 0.0, 0.2)
+    best = yield from part_of(_polished(case, mesh, flow.placed.domain, flow.met), 0.2, 0.2)
+    if pair.domain == SPHERE:
+        best = yield from part_of(_improved(case, mesh, best), 0.4, 0.4)
+    moved = mesh.carried(best.placed.domain, case.aligned)
+    return (yield from _finished(case, moved, best.met, flow.steps + best.steps))
+
+
+def _improved(case: Case, mesh: FewVertices, best: _Trial) -> Steps[_Trial]:
+    """The best of a map and of those that functional maps make of it, again as long as that helps."""
+    for k in range(ROUNDS):
+        if best.energy < GOOD_ENERGY and best.met.all():
+            return best
+        places = yield from part_of(_corresponding(case, mesh, best.placed.domain), k / ROUNDS, 0.5 / ROUNDS)
+        if places is None:
+            return best
+        tried = [best]
+        for relaxing in RELAXING_STEPS:
+            relaxed = yield from _relaxed(case, mesh, places, relaxing)
+            found = yield from _polished(case, mesh, relaxed, np.ones(len(best.met), bool))
+            tried.append(replace(found, steps=found.steps + best.steps))
+        before, best = best, min(tried, key=lambda trial: (int((~trial.met).sum()), trial.energy))
+        if best is before:
+            return best
+    return best
+
+
+def _relaxed(case: Case, mesh: FewVertices, places: np.ndarray, most: int) -> Steps[np.ndarray]:
+    """Places (k,d) after a few Newton steps within the domain: what was only just straightened would be stuck."""
+    carrier = case.domain_carrier(mesh.loop)
+    problem = deformation(in_space(mesh.domain), mesh.triangles, carrier)
+    problem.held[mesh.landmarks] = True
+    placed, _ = yield from minimise_on(problem, carrier.place(places), most, STRICT, "Polishing")
+    return placed.domain
+
+
+def _whole(case: Case) -> FewVertices:
+    """All vertices, as they are."""
+    pair = case.pair
+    return FewVertices(np.arange(len(pair.vertices)), pair.triangles, case.aligned, pair.landmarks, pair.loop)
+
+
+def _flowed(case: Case, mesh: FewVertices) -> Steps[Drawn]:
+    """The coarse mesh in the domain, with its landmarks drawn to their places."""
+    carrier = case.domain_carrier(mesh.loop)
+    start = carrier.place(mesh.domain)
+    if not len(mesh.landmarks):
+        return Drawn(start, np.zeros(0, bool), 0)
+    problem = deformation(start.positions, mesh.triangles, carrier)
+    return (yield from draw_landmarks(problem, start, mesh.landmarks, case.flat_targets()))
+
+
+def _polished(case: Case, mesh: FewVertices, domain: np.ndarray, met: np.ndarray) -> Steps[_Trial]:
+    """The coarse mesh from places in the domain (k,d), of least distortion on the target."""
+    reference = case.pair.vertices[mesh.chosen]
+    carrier = case.carrier.sliding(mesh.loop)
+    features = on_coarse(case.features, mesh, reference)
+    problem = deformation(reference, mesh.triangles, carrier, features, domain)
+    placed = carrier.place(domain)
+    placed.put(mesh.landmarks[met], case.targets, met)
+    problem.held[mesh.landmarks[met]] = True
+    placed, steps = yield from minimise_on(problem, placed, COARSE_STEPS, TOLERANCE, "Polishing")
+    if not met.all():
+        placed, met = put_landmarks(problem, placed, mesh.landmarks, case.targets)
+    return _Trial(placed, met, replace(problem, within=None).energy(placed), steps)
+
+
+def _corresponding(case: Case, mesh: FewVertices, start: np.ndarray) -> Steps[np.ndarray | None]:
+    """Places (k,3) of the coarse mesh on the sphere where functional maps have them, from a start there, untangled.
+
+    None where folds are left.
+    """
+    yield Progress("Functional maps", 0.0)
+    pair, target = case.pair, case.pair.target
+    samples = far_vertices(pair.vertices, mesh.chosen, np.zeros(0, np.int64), SAMPLES)
+    source, other = case.spectra
+    yield Progress("Functional maps", 0.6)
+    corners = target.triangles[pair.targets[0]]
+    landmarks = (source[pair.landmarks], np.einsum("kc,kcf->kf", pair.targets[1], other[corners]))
+    near = cKDTree(case.carrier.domain).query(mesh.carried(start, case.aligned[samples]))[1]
+    found = refined_correspondence(source[samples], other, near, landmarks)
+    # The coarse mesh's vertices are the first of the samples, sorted.
+    places = case.carrier.domain[found[np.argsort(np.argsort(mesh.chosen))]]
+    places[mesh.landmarks] = case.targets.domain
+    held = np.zeros(len(places), bool)
+    held[mesh.landmarks] = True
+    places = yield from part_of(straightened(mesh.domain, mesh.triangles, places, held), 0.7, 0.3)
+    return places if (signed_volumes(places, mesh.triangles) > 0).all() else None
+
+
+def _finished(case: Case, moved: np.ndarray, met: np.ndarray, steps: int) -> Steps[Drawn]:
+    """All vertices at places (n,d) in the domain, straightened; landmarks that are not there drawn to theirs."""
+    pair = case.pair
+    carrier = case.domain_carrier(pair.loop)
+    held = np.zeros(len(moved), bool)
+    held[pair.landmarks] = True
+    moved = yield from part_of(straightened(case.aligned, pair.triangles, moved, held), 0.8, 0.1)
+    before = carrier.place(case.aligned)
+    problem = deformation(before.positions, pair.triangles, carrier)
+    placed = without_folds(problem, before, carrier.place(moved))
+    if not len(pair.landmarks):
+        return Drawn(placed, met, steps)
+    targets = case.flat_targets()
+    placed, met = put_landmarks(problem, placed, pair.landmarks, targets)
+    if met.all():
+        return Drawn(placed, met, steps)
+    drawn = yield from part_of(draw_landmarks(problem, placed, pair.landmarks, targets), 0.9, 0.1)
+    return replace(drawn, steps=drawn.steps + steps)
