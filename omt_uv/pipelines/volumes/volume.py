@@ -12,6 +12,7 @@ from ...solver.progress import Steps, part_of
 from ...solver.volumes.body_map import VolumeMap, into_body, volume_map
 from ...solver.volumes.registration import registered
 from ...solver.volumes.slices import dilation
+from ...solver.volumes.transfer import TetLocation
 
 BODY = "body"
 
@@ -67,7 +68,7 @@ def mapped_volume(body: VolumeBody, settings: VolumeSettings, other: VolumeBody 
     HandleError : the domain is "body", and there is none, or landmarks contradict each other
     """
     domain = "ball" if settings.domain == BODY else settings.domain
-    width = 0.4 if settings.domain == BODY else 1.0
+    width = 0.35 if settings.domain == BODY else 1.0
     steps = volume_map(body.positions, body.triangles, domain, settings.method, settings.count)
     first = yield from part_of(steps, 0.0, width)
     if settings.domain != BODY:
@@ -81,6 +82,9 @@ def mapped_volume(body: VolumeBody, settings: VolumeSettings, other: VolumeBody 
     if len(names) >= 3:
         mine = np.stack([first.positions[body.landmarks[name]].mean(axis=0) for name in names])
         theirs = np.stack([second.positions[other.landmarks[name]].mean(axis=0) for name in names])
-        found = yield from part_of(registered(first.positions, mine, theirs), 2 * width, 1 - 2 * width)
+        found = yield from part_of(registered(first.positions, mine, theirs), 2 * width, 0.1)
         placed = found.positions
-    return MappedVolume(into_body(first, second, placed), first.positions if placed is None else placed)
+    mapped = yield from part_of(into_body(first, second, placed), 0.8, 0.2)
+    # Points inside have moved, and their places in the ball with them.
+    ball = TetLocation(first.points, first.tets).values(mapped.points, first.positions if placed is None else placed)
+    return MappedVolume(mapped, ball)

@@ -13,17 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import TetrahedraError
 from ..flows.enclosed_volume import corner_volumes
 from ..flows.paths import rotation_between
 from ..linalg.sparse import Factor
 from ..mesh.closed_surface import closed_surface
 from ..progress import Progress, Steps, part_of
 from ..sphere.sphere_map import sphere_map
-from .domains import BALL, CUBE, DOMAINS, BallDomain, CubeDomain
+from .domains import BALL, CUBE, DOMAINS, BallDomain, CubeDomain, HeldDomain
 from .meshing import TetMesh, tetrahedra
 from .paper_flow import paper_flow
 from .tet_exact import exact_volumes
-from .tet_mesh import graph_laplacian, share_error, stiffness, tet_volumes, vertex_share_error
+from .tet_mesh import boundary_vertices, graph_laplacian, share_error, stiffness, tet_volumes, vertex_share_error
 from .tet_newton import inverted, refined, tet_problem, untangled
 from .transfer import TetLocation
 
@@ -159,20 +160,34 @@ def _mapped(
     return TetMesh(found.points, mesh.tets), found.positions, steps + found.rounds
 
 
-def into_body(first: VolumeMap, other: VolumeMap, placed: np.ndarray | None = None) -> VolumeMap:
-    """The inside of the first body in the other one: through the ball, where both are; `placed` (n,3) instead of the
-    first one's positions there, as after a registration."""
+def into_body(first: VolumeMap, other: VolumeMap, placed: np.ndarray | None = None) -> Steps[VolumeMap]:
+    """Map the inside of the first body to the other one: through the ball, where both are, and then inside the other
+    until volumes are right; `placed` (n,3) instead of the first one's positions there, as after a registration.
+
+    Where that leaves tetrahedra inverted, as between tetrahedra of the other body that are too large, the result is
+    what goes through the ball, with a warning.
+    """
     at = first.positions if placed is None else placed
-    positions = TetLocation(other.positions, other.tets).values(at, other.points)
-    target = tet_volumes(first.points, first.tets)
-    count = inverted(positions, first.tets)
-    told = (f"{count} of {len(first.tets)} tetrahedra are inverted where they lie between those of the other body",)
+    through = TetLocation(other.positions, other.tets).values(at, other.points)
+    edge = HeldDomain(boundary_vertices(first.tets))
+    points, positions = first.points, through
+    told: tuple[str, ...] = ()
+    try:
+        free = yield from part_of(untangled(tet_problem(first.points, first.tets, edge), through), 0.0, 0.4)
+        exact = exact_volumes(first.points, first.tets, free, edge, TOLERANCE)
+        found = yield from part_of(exact, 0.4, 0.6)
+        points, positions = found.points, found.positions
+    except TetrahedraError:
+        count = inverted(through, first.tets)
+        told = (f"{count} of {len(first.tets)} tetrahedra are inverted where they lie between those of the other body",)
+    target = tet_volumes(points, first.tets)
     return replace(
         first,
+        points=points,
         positions=positions,
         domain="body",
         shares=share_error(positions, first.tets, target),
         around_vertices=vertex_share_error(positions, first.tets, target),
-        inverted=count,
-        warnings=(*first.warnings, *other.warnings, *(told if count else ())),
+        inverted=inverted(positions, first.tets),
+        warnings=(*first.warnings, *other.warnings, *told),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ class BallDomain:
     """The unit ball: boundary vertices (b,) slide along the sphere."""
 
     boundary: np.ndarray
+    sliding: ClassVar[int] = 2
 
     def start(self, sphere: np.ndarray) -> np.ndarray:
         """Boundary places (b,3) for unit vectors (b,3)."""
@@ -50,6 +52,7 @@ class CubeDomain:
 
     boundary: np.ndarray
     side: np.ndarray
+    sliding: ClassVar[int] = 2
 
     def start(self, sphere: np.ndarray) -> np.ndarray:
         """Boundary places (b,3) for unit vectors (b,3)."""
@@ -71,6 +74,29 @@ class CubeDomain:
         result = points.copy()
         result[self.boundary] = np.clip(points[self.boundary], -1.0, 1.0)
         return result
+
+
+@dataclass(frozen=True)
+class HeldDomain:
+    """A body whose boundary vertices (b,) stay where they are."""
+
+    boundary: np.ndarray
+    sliding: ClassVar[int] = 0
+
+    def frames(self, points: np.ndarray) -> np.ndarray:
+        """Axes (n,3,3) of space."""
+        return np.tile(np.eye(3), (len(points), 1, 1))
+
+    def bending(self, slope: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Nothing (b,)."""
+        return np.zeros(len(self.boundary))
+
+    def retract(self, points: np.ndarray) -> np.ndarray:
+        """The points (n,3), of whose boundary nothing has moved."""
+        return points
+
+
+Domain = BallDomain | CubeDomain | HeldDomain
 
 
 def cube_points(sphere: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
 from ..progress import Progress, Steps
-from .domains import BallDomain, CubeDomain
+from .domains import Domain
 from .tet_mesh import EDGES, gradients, graph_laplacian, tet_volumes, volume_gradients
 
 # Rounds, and those in a row that gain less than this share of the error and end them.
@@ -74,7 +74,7 @@ def exact_volumes(
     points: np.ndarray,
     tets: np.ndarray,
     positions: np.ndarray,
-    domain: BallDomain | CubeDomain,
+    domain: Domain,
     tolerance: float,
     slide: bool = True,
 ) -> Steps[ExactVolumes]:
@@ -107,7 +107,7 @@ def _both(tets: np.ndarray, points: np.ndarray, positions: np.ndarray) -> _Both:
     return _Both(tets, points, positions, tet_volumes(points, tets), there / there.sum())
 
 
-def _round(both: _Both, domain: BallDomain | CubeDomain, damping: float, slide: bool) -> tuple[_Both | None, bool]:
+def _round(both: _Both, domain: Domain, damping: float, slide: bool) -> tuple[_Both | None, bool]:
     """The mesh after a step, None if there is none, and whether it went as foreseen."""
     n, m = len(both.points), len(both.tets)
     share = np.maximum(both.here, SMALLEST / m)
@@ -121,13 +121,13 @@ def _round(both: _Both, domain: BallDomain | CubeDomain, damping: float, slide: 
         rows.append(_volume_rows(both.points, both.tets, -weight))
         stiff.append(_strain(both.points, both.tets, both.here))
     matrix = sp.hstack(rows, format="csr")
-    normal = domain.frames(both.positions)[domain.boundary][:, :, 2]
+    tangent = domain.frames(both.positions)[domain.boundary][:, :, : domain.sliding]
+    along = tangent @ np.swapaxes(tangent, 1, 2)
 
     def allowed(x: np.ndarray) -> np.ndarray:
         """Of moves only what the boundary lets happen: along the domain's, none of the body's."""
         moves = x.reshape(len(rows), n, 3).copy()
-        edge = moves[0, domain.boundary]
-        moves[0, domain.boundary] = edge - np.einsum("bi,bi->b", edge, normal)[:, None] * normal
+        moves[0, domain.boundary] = np.einsum("bij,bj->bi", along, moves[0, domain.boundary])
         moves[1:, domain.boundary] = 0.0
         return moves
 

@@ -16,6 +16,13 @@ def tet_volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     return np.einsum("mi,mi->m", np.cross(a, b), c) / 6
 
 
+def boundary_vertices(tets: np.ndarray) -> np.ndarray:
+    """Vertices (b,) of the triangles that one of tetrahedra (m,4) has alone."""
+    every = tets[:, FACES].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.unique(every[first[count == 1]])
+
+
 def vertex_volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     """A quarter of the volume (n,) of the tetrahedra (m,4) around every one of points (n,3)."""
     return around_vertices(tet_volumes(points, tets), tets, len(points))

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import cg
 
 from ..errors import TetrahedraError
 from ..progress import Progress, Steps
-from .domains import BallDomain, CubeDomain
+from .domains import Domain
 from .tet_energy import RestShape, TetAssembly, rest_shape, tet_energy
 from .tet_mesh import tet_volumes
 
@@ -45,21 +45,22 @@ class TetProblem:
 
     tets: np.ndarray
     share: np.ndarray
-    domain: BallDomain | CubeDomain
+    domain: Domain
     assembly: TetAssembly
     coarse: RestShape
     fine: RestShape
     count: int
 
 
-def tet_problem(points: np.ndarray, tets: np.ndarray, domain: BallDomain | CubeDomain) -> TetProblem:
+def tet_problem(points: np.ndarray, tets: np.ndarray, domain: Domain) -> TetProblem:
     """What is to be solved for tetrahedra (m,4) of points (n,3)."""
     inside = np.ones(len(points), bool)
     inside[domain.boundary] = False
     b = len(domain.boundary)
     unknown = np.full((len(points), 3), -1, np.int64)
-    unknown[domain.boundary, :2] = np.arange(2 * b).reshape(b, 2)
-    unknown[inside] = 2 * b + np.arange(3 * int(inside.sum())).reshape(-1, 3)
+    free = domain.sliding
+    unknown[domain.boundary, :free] = np.arange(free * b).reshape(b, free)
+    unknown[inside] = free * b + np.arange(3 * int(inside.sum())).reshape(-1, 3)
     volume = tet_volumes(points, tets)
     return TetProblem(
         tets=tets,
@@ -147,7 +148,8 @@ def _solved(problem, blocks, slope, points, gradient) -> np.ndarray:
     """The Newton direction (u,), by conjugate gradients."""
     matrix = problem.assembly.matrix(blocks)
     bend = np.zeros(problem.assembly.size)
-    bend[problem.assembly.unknown[problem.domain.boundary, :2]] = problem.domain.bending(slope, points)[:, None]
+    edge = problem.assembly.unknown[problem.domain.boundary, : problem.domain.sliding]
+    bend[edge] = problem.domain.bending(slope, points)[:, None]
     matrix = matrix + sp.diags(bend)
     x, _ = cg(matrix, -gradient, rtol=RESIDUAL, maxiter=MOST_ITERATIONS, M=sp.diags(1 / matrix.diagonal()))
     return x

@@ -26,6 +26,7 @@ def test_a_body_goes_into_another_with_its_landmarks():
         assert np.linalg.norm(found.map.positions[row] - W[row]) < 0.25
     assert (np.linalg.norm(found.map.positions, axis=1) <= np.linalg.norm(W, axis=1).max() + 1e-6).all()
     report = found.report()
+    assert found.map.inverted == 0 and found.map.shares < 0.03 and not found.map.warnings
     assert report["tetrahedra"] == len(found.map.tets) and sum(report["log2_dilation_histogram"]) > 0
     with pytest.raises(HandleError, match="no other body"):
         drain(mapped_volume(one, settings))
