@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ..analysis.seam_costs import SeamCosts
+from ..analysis.symmetry_plane import NEAR
 from ..cutting.component import CutComponent, fingerprint
 from ..mesh.geometry import face_areas
 from ..mesh.surface import Surface
@@ -35,8 +36,9 @@ MIRRORED_SHARE = 0.97
 # Distance of a vertex from where its image belongs, or from the plane, over the extent; and that of scans.
 EXACT = 1e-4
 NEARLY = 0.03
-# Seams of a scan are symmetric unless that makes them cost more than so many times what others do.
-DEARER = 1.5
+# Seams of what is nearly its own image are symmetric unless that makes them cost so many times what others do: of a
+# body, and, with all between, of one that is hardly a mirror image any more.
+DEARER = (1.5, 1.0)
 # A vertex is in a face if it is so with more than this certainty, and cuts that end there are worth so much less.
 IN_FACE = 0.5
 BARRED = 0.3
@@ -121,7 +123,7 @@ class SeamSearch:
         found = yield from part_of(self._searched(component, base, bound, first, plain), 0.0, 0.5)
         if line is not None and found.mirror is None:
             mirrored = yield from part_of(self._searched(component, base, bound, line, plain), 0.5, 0.5)
-            found = mirrored if mirrored.score <= DEARER * found.score else found
+            found = mirrored if mirrored.score <= self._worth_of_symmetry() * found.score else found
         self.memory[name] = found = found.carried(component)
         return found.edges
 
@@ -172,6 +174,11 @@ class SeamSearch:
             cut = better
             yield Progress("Seams", GROWN + (0.9 - GROWN) * (k + 1) / self.options.rounds)
         return cut
+
+    def _worth_of_symmetry(self) -> float:
+        """How many times as much symmetric seams may cost."""
+        plane = self.costs().plane
+        return float(np.interp(0.0 if plane is None else plane.residual, [0, NEAR], DEARER))
 
     def _grown(self, task: Task) -> Steps[Cut]:
         """The cut of arcs that pay most, one after another."""
