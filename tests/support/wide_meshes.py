@@ -15,6 +15,7 @@ from omt_uv.settings import Settings
 
 
 def voxels(rng):
+    """Cubes by chance, side by side."""
     return hard_meshes.voxel_blob(int(rng.integers(3, 7)), rng.uniform(0.2, 0.7), int(rng.integers(1000)))
 
 
@@ -26,6 +27,7 @@ def porous(rng):
 
 
 def one_sided(rng):
+    """A Klein bottle, or a strip with half turns."""
     if rng.random() < 0.5:
         return hard_meshes.klein_bottle(int(rng.integers(8, 20)), int(rng.integers(6, 14)))
     n, turns = int(rng.integers(8, 40)), int(rng.integers(1, 4))
@@ -38,6 +40,7 @@ def one_sided(rng):
 
 
 def strip(rng):
+    """A strip of quads, rolled."""
     V, P = hard_meshes.strip(int(10 ** rng.uniform(0, 2.8)))
     V[:, 2] = rng.uniform(0, 2) * np.sin(V[:, 0] * rng.uniform(0, 1))
     V[:, 1] *= 10 ** rng.uniform(-3, 3)
@@ -45,27 +48,32 @@ def strip(rng):
 
 
 def fan(rng):
+    """A cone of few or many sides, flat, steep or jagged."""
     V, P = hard_meshes.fan(int(10 ** rng.uniform(0.6, 3)), rng.choice([0.0, 0.01, 0.5, 3.0, 50.0]))
     V[:-1] *= rng.uniform(0.2, 1, (len(V) - 1, 1)) if rng.random() < 0.5 else 1
     return V, P
 
 
 def pieces(rng):
+    """Triangles that have nothing in common, of one size or of many."""
     V, P = hard_meshes.pieces(int(rng.integers(2, 80)), int(rng.integers(1000)))
     V *= np.repeat(10 ** rng.uniform(-3, 3, len(P)), 3)[:, None] if rng.random() < 0.3 else 1
     return V, P
 
 
 def poles(rng):
+    """A ball whose poles have many neighbours."""
     V, P = hard_meshes.sliver_sphere(int(10 ** rng.uniform(2.2, 3.4)))
     return V * 10 ** rng.uniform(-1, 1, 3), P
 
 
 def sieve(rng):
+    """A patch with holes by chance."""
     return hard_meshes.percolation(int(rng.integers(6, 24)), rng.uniform(0.05, 0.35), int(rng.integers(1000)))
 
 
 def slivers(rng):
+    """A bumpy patch, stretched along the axes."""
     V, P = meshes.bumpy(int(rng.integers(4, 24)), int(rng.integers(4, 24)))
     return V * 10 ** rng.uniform(-3, 3, 3), P
 
