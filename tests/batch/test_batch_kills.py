@@ -26,18 +26,23 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are those of
 PROGRAM = """
 import os, pathlib, random, sys, time
 from omt_uv import supervision
+from omt_uv.commands.batches.serve import serve
+def carry(words):
+    source, output = pathlib.Path(words[1]), pathlib.Path(words[words.index("-o") + 1])
+    def say(what):
+        with open(os.environ["OMT_UV_TEST_LOG"], "a") as log:
+            log.write(f"{what} {source.name}\\n")
+    say("begin")
+    time.sleep(random.random() * 0.3)
+    made = output.with_name(f".part{os.getpid()}")
+    made.write_bytes(source.read_bytes()[::-1] * 1000)
+    os.replace(made, output)
+    say("end")
+    return 0
+if sys.argv[1] == "serve":
+    serve(0, carry)
 supervision.begin_child(0)
-words = sys.argv[1:]
-source, output = pathlib.Path(words[1]), pathlib.Path(words[words.index("-o") + 1])
-def say(what):
-    with open(os.environ["OMT_UV_TEST_LOG"], "a") as log:
-        log.write(f"{what} {source.name}\\n")
-say("begin")
-time.sleep(random.random() * 0.3)
-made = output.with_name(f".part{os.getpid()}")
-made.write_bytes(source.read_bytes()[::-1] * 1000)
-os.replace(made, output)
-say("end")
+carry(sys.argv[1:])
 """
 BATCH = """
 import json, sys
@@ -54,7 +59,7 @@ with only_one(path), Manifest(path) as manifest:
         runner = Cluster(plan, start, address)
     else:
         from omt_uv.batch.pool import LocalPool
-        runner = LocalPool(plan, start, 2)
+        runner = LocalPool(plan, start, 2, shared=sys.argv[4] == "shared")
     carry_out(plan, tasks_of(plan, root / "in"), manifest, runner)
 """
 DASK = "import sys; from distributed.cli.dask_{0} import main; main(sys.argv[1:])"
@@ -72,8 +77,8 @@ def start(*words):
     return subprocess.Popen([sys.executable, *map(str, words)], stderr=subprocess.DEVNULL, start_new_session=True)
 
 
-def batch(work, address=""):
-    return start("-c", BATCH, work.root, json.dumps(work.start), address)
+def batch(work, address="", shared=False):
+    return start("-c", BATCH, work.root, json.dumps(work.start), address, "shared" if shared else "apart")
 
 
 def running(work):
@@ -97,16 +102,17 @@ def check(work, flights):
     assert not {name: n for name, n in ended.items() if n > 1 + flights[name]}
 
 
-def test_a_killed_batch_goes_on(work):
+@pytest.mark.parametrize("shared", [False, True], ids=["apart", "shared"])
+def test_a_killed_batch_goes_on(work, shared):
     rng, flights = np.random.default_rng(1), Counter()
     for _ in range(KILLS):
-        process = batch(work)
+        process = batch(work, shared=shared)
         with suppress(subprocess.TimeoutExpired):
             process.wait(0.4 + rng.random())
         process.kill()
         process.wait()
         flights.update(running(work))
-    assert batch(work).wait(120) == 0
+    assert batch(work, shared=shared).wait(120) == 0
     check(work, flights)
 
 
