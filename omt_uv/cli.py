@@ -110,11 +110,11 @@ def _status(stop: SystemExit) -> int:
 
 
 def parser(command: str = "") -> argparse.ArgumentParser:
-    """The parser of this command alone, or of all where none is of this name."""
+    """The parser of this command alone; of all where none is of this name, and for a batch, which runs any of them."""
     top = argparse.ArgumentParser(prog=PROGRAM, description="Area-preserving UV unwrapping.")
     top.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     modules = {name: package for package, names in COMMANDS.items() for name in names.split()}
-    for name in [command] if command in modules else modules:
+    for name in [command] if command in modules and command != BATCH else modules:
         importlib.import_module(f".{modules[name]}.{name}", __package__).add(commands)
     return top
