@@ -22,6 +22,7 @@ check: $(STAMP)
 
 papers: $(STAMP)
 	$(PY) scripts/papers/gu_2018.py
+	$(PY) scripts/papers/hu_2014.py
 
 bench: $(STAMP)
 	$(PY) benchmarks/run.py
