@@ -8,7 +8,7 @@ from ..lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
-    beltrami="Beltrami corner_beltrami vertex_means",
+    beltrami="Beltrami corner_beltrami",
     collection="MeanShape mean_shape",
     figures="MatchFigures match_figures",
     regions="RegionStrain compare_regions region_strain",

@@ -72,14 +72,6 @@ def corner_beltrami(corners: np.ndarray, image: np.ndarray) -> Beltrami:
     return Beltrami(mu, np.abs(mu), direction, area)
 
 
-def vertex_means(values: np.ndarray, triangles: np.ndarray, area: np.ndarray, n: int) -> np.ndarray:
-    """Means (n,) by area (m,) of values (m,) of the triangles (m,3) around every vertex; 0 at those of none."""
-    weight = np.repeat(area, 3)
-    total = np.bincount(triangles.ravel(), weight, n)
-    mean = np.bincount(triangles.ravel(), weight * np.repeat(values, 3), n)
-    return mean / np.where(total > 0, total, 1)
-
-
 def _in(vectors: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Vectors (m,3) as complex numbers (m,) in the axes (m,3)."""
     return np.einsum("md,md->m", vectors, first) + 1j * np.einsum("md,md->m", vectors, second)
