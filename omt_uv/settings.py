@@ -81,7 +81,7 @@ DENSITIES = (
 STRATEGIES = (
     (
         "APP-CFP",
-        "Even and Well Shaped",
+        "Even, Well Shaped",
         "Vertices where areas ask for them, joined where angles are right (APP, CFP): "
         "sample on the area-preserving map, triangulate on the conformal map",
     ),

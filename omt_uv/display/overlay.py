@@ -15,7 +15,7 @@ OUTLINE = (0.0, 0.0, 0.0, 0.35)
 
 @dataclass
 class _Shown:
-    """kind: NONE, AREA or SHEAR; what is drawn in the UV editor; how the 3D Views were shaded, by pointer."""
+    """kind: NONE, AREA, SHEAR or OTHER; what is drawn in the UV editor; how the 3D Views were shaded, by pointer."""
 
     kind: str = "NONE"
     places: list = field(default_factory=list)
@@ -31,7 +31,7 @@ _shown = _Shown()
 
 
 def kind() -> str:
-    """What is shown: NONE, AREA or SHEAR."""
+    """What is shown: NONE, AREA, SHEAR, or OTHER, colours that others wrote."""
     return _shown.kind
 
 
@@ -71,6 +71,19 @@ def show(context: bpy.types.Context, pairs: list, figure: str) -> None:
     redraw(context)
 
 
+def show_written(context: bpy.types.Context) -> None:
+    """Let the 3D Views show colours that others wrote into the attribute; `hide` takes them back as well."""
+    _paint_views(context)
+    if _shown.handle is not None:
+        bpy.types.SpaceImageEditor.draw_handler_remove(_shown.handle, "WINDOW")
+        _shown.handle = None
+    _shown.kind = "OTHER"
+    for kind, function in _handlers():
+        if function not in kind:
+            kind.append(function)
+    redraw(context)
+
+
 def hide(context: bpy.types.Context) -> None:
     """Take everything back: attributes, shading, drawing."""
     from ..blender import colour_attributes
@@ -98,7 +111,7 @@ def forget() -> None:
 
 def refresh(context: bpy.types.Context, pairs: list) -> None:
     """Colour anew what is shown, after the UVs changed."""
-    if _shown.kind != "NONE":
+    if _shown.kind in {"AREA", "SHEAR"}:
         show(context, pairs, _shown.kind)
 
 

@@ -136,7 +136,7 @@ class UV_OT_omt_sphere(AreaSettings, SolverOperator, bpy.types.Operator):
         self.said = (
             ("Area error", f"{100 * max(r['area_l1_sphere'] for r in reports):.2f} %"),
             ("Shear", f"{max(r['angle_mean_sphere'] for r in reports):.3f}"),
-            ("Folds", str(sum(r["folds_sphere"] for r in reports))),
+            ("Folds on the sphere", str(sum(r["folds_sphere"] for r in reports))),
         )
         write_layers(objects, self.uv_layer, globes)
         if pixels is not None:

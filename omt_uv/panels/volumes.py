@@ -26,7 +26,10 @@ FLOW = Section("flow", "Move Incompressibly", _draw_flow, (OBJECT_FLOW, UV_FLOW)
 
 def _draw_volume(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if not is_available():
-        layout.label(text="Needs TetGen: python -m pip install tetgen", icon="INFO")
+        # In two lines: one is cut off in a sidebar of the usual width.
+        column = layout.column(align=True)
+        column.label(text="Needs the library TetGen:", icon="INFO")
+        column.label(text="python -m pip install tetgen", icon="BLANK1", translate=False)
     draw_settings(layout.column(), MAP_VOLUME, settings_of(context, MAP_VOLUME))
     big_button(layout, MAP_VOLUME, "MESH_ICOSPHERE")
 

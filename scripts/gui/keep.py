@@ -15,7 +15,8 @@ KEPT = {
     "tour": ("tab", "unwrapped", "area", "shear", "histogram", "checker", "outdated", "redo"),
     "escape": ("progress",),
     "sections": ("magnify", "sphere", "remesh"),
-    "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear", "uv_object_mode"),
+    "shapes": ("partition", "distance", "match", "arrange", "flow"),
+    "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear"),
 }
 
 

@@ -53,7 +53,8 @@ def run(options: argparse.Namespace) -> None:
 
     settings, done = chosen(options), _Done()
     free = avoided(objects, options.keep_free)
-    marked = map_markers(objects, {"centre": options.centre, "start": options.start, "corners": options.corners})
+    groups = {"centre": options.centre, "start": options.start_group, "corners": options.corners}
+    marked = map_markers(objects, groups)
     for obj, reading, avoid, marks in zip(objects, readings, free, marked, strict=True):
         try:
             with refusals([obj]):

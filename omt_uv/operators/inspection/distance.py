@@ -23,6 +23,7 @@ class OBJECT_OT_omt_distance(QuickOperator, bpy.types.Operator):
 
         from ...blender.colour_attributes import write_colours
         from ...blender.measuring.distances import NAME, placed_mesh, write_distances
+        from ...display import overlay
         from ...display.colormaps import SHEAR_TOP, shear_colours
         from ...solver.comparison.comparison_figures import compare, distances_to
         from ...solver.progress import drain
@@ -43,6 +44,7 @@ class OBJECT_OT_omt_distance(QuickOperator, bpy.types.Operator):
         obj.data.loops.foreach_get("vertex_index", vertices)
         share = distance[vertices] / max(float(distance.max()), 1e-300)
         write_colours(obj, np.arange(len(vertices)), shear_colours(SHEAR_TOP**share))
+        overlay.show_written(context)
         self.report(
             {"INFO"},
             f"Hausdorff {100 * figures.hausdorff:.3f} %, rms {100 * figures.rms:.4f} % of the diagonal of "

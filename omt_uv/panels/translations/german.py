@@ -85,7 +85,7 @@ GERMAN: dict[str, str] = {
     "Compare": "Vergleichen",
     "Hide Original": "Original verbergen",
     "Strategy": "Strategie",
-    "Even and Well Shaped": "Gleichmäßig und wohlgeformt",
+    "Even, Well Shaped": "Gleichmäßig und wohlgeformt",
     "Inside the Tile": "Innerhalb der Kachel",
     "Projection": "Projektion",
     "Documentation": "Dokumentation",

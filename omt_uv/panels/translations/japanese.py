@@ -85,7 +85,7 @@ JAPANESE: dict[str, str] = {
     "Compare": "比較",
     "Hide Original": "元を隠す",
     "Strategy": "方式",
-    "Even and Well Shaped": "均一で整った形",
+    "Even, Well Shaped": "均一で整った形",
     "Inside the Tile": "タイル内に収める",
     "Projection": "投影",
     "Documentation": "ドキュメント",

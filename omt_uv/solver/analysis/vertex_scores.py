@@ -18,6 +18,8 @@ from .saliency import EPSILON, saliency, unit_size
 KINDS = ("saliency", "gaussian", "mean", "sharpness", "distance")
 # Curvature is averaged over so much of the diagonal: single vertices are noise.
 SMOOTH = 3 * EPSILON
+# Saliency jumps from vertex to vertex where the sign of its differences changes, and densities that jump shear.
+SMOOTH_SALIENCY = 5 * EPSILON
 # Densities of curvature, on a surface of unit size, below which there is none: planes have so much by the rounding of
 # single precision. Round spheres have 12 and 3.5.
 NO_CURVATURE = {"gaussian": 1e-3, "mean": 0.03}
@@ -41,7 +43,9 @@ def vertex_score(
         raise EmptyMeshError("There are no faces to weigh", "Add some faces")
     check_finite(positions, triangles)
     if kind == "saliency":
-        return saliency(positions, triangles)
+        found = saliency(positions, triangles)
+        means = HeatMeans(unit_size(positions, triangles), triangles, SMOOTH_SALIENCY)
+        return means.means(found * means.area, np.array([SMOOTH_SALIENCY]))[0]
     if kind == "sharpness":
         return curvature.sharpness(positions, triangles)
     if kind == "distance":

@@ -28,15 +28,20 @@ def two(package, monkeypatch):
     return first, second
 
 
-def test_the_active_object_gets_its_distances(two):
+def test_the_active_object_gets_its_distances(package, two):
     first, second = two
+    space = next(a for w in bpy.context.window_manager.windows for a in w.screen.areas if a.type == "VIEW_3D").spaces[0]
+    before = space.shading.color_type
     assert bpy.ops.object.omt_distance() == {"FINISHED"}
     values = np.zeros(len(second.data.vertices), np.float32)
     second.data.attributes["OMT Distance"].data.foreach_get("value", values)
     assert values == pytest.approx(0.25, abs=1e-6)
     assert second.data.color_attributes.active_color.name == "OMT UV Distortion"
     assert "OMT Distance" not in first.data.attributes
+    # The views show it, and Off gives their shading back.
+    assert space.shading.color_type == "VERTEX" and package("display.overlay").kind() == "OTHER"
     bpy.ops.uv.omt_overlay(show="NONE")
+    assert space.shading.color_type == before
     assert not second.data.color_attributes
 
 
