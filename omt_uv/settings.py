@@ -98,6 +98,8 @@ DEFAULT_STRATEGY = "APP-CFP"
 # Mean shear s1/s2 above which islands are cut further. A checker on a surface shows 1.5 at a glance, 1.2 hardly; seams
 # for 1.35 are about as long as those that artists cut into heads and animals.
 DEFAULT_MAX_SHEAR = 1.35
+# What is magnified shears where the density changes: seams for less would be longer than an artist wants.
+DEFAULT_MAGNIFIED_SHEAR = 1.5
 # A result is good up to these, as shares of the area of the texture: standard quality keeps to the first one.
 AREA_BOUND = 0.01
 OVERLAP_BOUND = 1e-4

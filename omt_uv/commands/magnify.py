@@ -9,6 +9,7 @@ from pathlib import Path
 from ..settings import (
     BOUNDARIES,
     DEFAULT_FACTOR,
+    DEFAULT_MAGNIFIED_SHEAR,
     DEFAULT_MARGIN,
     DEFAULT_QUALITY,
     DEFAULT_SOURCE,
@@ -20,7 +21,7 @@ from ..settings import (
 )
 from .common import CommandError, drain_shown, refusals, require_blender, write_report
 from .layers import read_layers, write_layers
-from .options import FORMATS, add_files, add_report, margin, names, positive, texture_size
+from .options import FORMATS, add_files, add_report, margin, names, positive, shear, texture_size
 
 
 def add(commands) -> None:
@@ -58,6 +59,13 @@ def add(commands) -> None:
         default=OWN_BOUNDARY[0].lower(),
         help="outline of every island; own: free for the mesh, as it is for UVs",
     )
+    command.add_argument(
+        "--max-shear",
+        type=shear,
+        default=DEFAULT_MAGNIFIED_SHEAR,
+        metavar="S",
+        help="where the mesh is unwrapped, add seams until islands shear less than S > 1 in the mean; 0: none",
+    )
     command.add_argument("--cascade", type=times, default=1, metavar="K", help="magnify K times in a row")
     command.add_argument("--quality", choices=names(QUALITIES), default=DEFAULT_QUALITY.lower(), help="see unwrap")
     command.add_argument(
@@ -65,6 +73,12 @@ def add(commands) -> None:
     )
     command.add_argument("--texture-size", type=texture_size, default=DEFAULT_TEXTURE_SIZE, metavar="PX")
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to use; default: the active one")
+    _add_pictures(command)
+    add_report(command, "island")
+
+
+def _add_pictures(command: argparse.ArgumentParser) -> None:
+    """Options of pictures that follow the UVs."""
     command.add_argument("--image", type=Path, metavar="FILE", help="picture of the old UVs that shall follow them")
     command.add_argument(
         "--image-output",
@@ -82,7 +96,6 @@ def add(commands) -> None:
     command.add_argument(
         "--image-size", type=texture_size, default=0, metavar="PX", help="width of --image-output; default: of --image"
     )
-    add_report(command, "island")
 
 
 def times(text: str) -> int:
@@ -107,6 +120,7 @@ def run(options: argparse.Namespace) -> None:
         exact=options.exact,
         source=options.source,
         cascade=options.cascade,
+        max_shear=options.max_shear,
     )
     objects, readings = read_layers(options)
     with refusals(objects):

@@ -13,6 +13,7 @@ from ..settings import (
     BOUNDARIES,
     DEFAULT_BALANCE,
     DEFAULT_FACTOR,
+    DEFAULT_MAGNIFIED_SHEAR,
     DEFAULT_QUALITY,
     DEFAULT_REGION,
     OWN_BOUNDARY,
@@ -90,6 +91,14 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
         max=1.0,
         subtype="FACTOR",
     )
+    max_shear: FloatProperty(
+        name="Max Shear",
+        description="Where UVs are made anew, seams are added until the mean shear of islands is below this. "
+        "0: only those that are needed to open a part. Islands whose seams you marked are left as they are",
+        default=DEFAULT_MAGNIFIED_SHEAR,
+        min=0.0,
+        soft_max=3.0,
+    )
     use_image: BoolProperty(
         name="Show Warped Image",
         description="Let the materials of the objects show the warped image in place of the old one",
@@ -134,6 +143,7 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             exact=self.exact,
             source=source,
             balance=self.balance if source == "mesh" else 0.0,
+            max_shear=self.max_shear if self.max_shear > 1 else 0.0,
             cascade=self.cascade,
         )
 
@@ -273,6 +283,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     column = layout.column()
     column.active = properties.source != "UV"
     column.prop(properties, "balance", text="Area - Angle", slider=True)
+    column.prop(properties, "max_shear")
     layout.prop(properties, "boundary")
     layout.prop(properties, "cascade")
     layout.prop(properties, "quality")

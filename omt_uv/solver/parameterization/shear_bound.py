@@ -25,6 +25,8 @@ from .options import ShearBound
 
 # Maps that are made at most.
 MOST_ROUNDS = 4
+# No more are made where the last left more than this share of the logarithm of the worst mean shear.
+STALLED = 0.95
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
 SPREAD_OF_SHEAR = 0.21
@@ -123,16 +125,18 @@ def bound_shear(
     """
     prepared, bound = first, search.shear.bound
     cuts, spread = _cuts(first), search.first_spread()
-    rounds = 0
+    rounds, before = 0, np.inf
     while True:
         charts = prepared.charts
-        shear = [_shear(c, m) for c, m in zip(charts, maps, strict=True)]
+        shear = [_shear(c, m, search.target is None) for c, m in zip(charts, maps, strict=True)]
         mean = np.array([area @ local / area.sum() for local, area in shear])
         rounds += 1
         missed = np.flatnonzero(mean > bound)
         searched = [k for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
-        if rounds == MOST_ROUNDS or not searched:
+        worst = float(np.log(mean[searched]).max()) if searched else 0.0
+        if rounds == MOST_ROUNDS or not searched or worst > STALLED * before:
             break
+        before = worst
         found = Measured(np.zeros(len(spread)), np.ones(len(spread)))
         for k in searched:
             part = MARGIN * (np.log(bound) / np.log(mean[k])) ** 2
@@ -141,10 +145,10 @@ def bound_shear(
             found.share[charts[k].faces] = part
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        worst = [charts[k] for k in searched]
-        outlines = np.concatenate([_outline(chart) for chart in worst])
+        missing = [charts[k] for k in searched]
+        outlines = np.concatenate([_outline(chart) for chart in missing])
         kept = cuts.edges[~np.isin(pair_keys(*cuts.edges.T), outlines)]
-        again = yield from part_of(search.again(kept, worst, spread, found), begin, width * SEARCHING)
+        again = yield from part_of(search.again(kept, missing, spread, found), begin, width * SEARCHING)
         edges = np.concatenate([kept, _cuts(again).edges])
         if len(edges) == len(cuts.edges) and np.isin(pair_keys(*edges.T), pair_keys(*cuts.edges.T)).all():
             break
@@ -210,12 +214,16 @@ def _name(chart: Chart) -> tuple[bytes, bytes]:
     return chart.corners.tobytes(), chart.disk.tobytes()
 
 
-def _shear(chart: Chart, chart_map: ChartMap) -> tuple[np.ndarray, np.ndarray]:
-    """The shear s1/s2 (m,) of triangles that has the symmetric Dirichlet energy of their polygons at their exact areas,
-    and these areas (m,)."""
+def _shear(chart: Chart, chart_map: ChartMap, kept: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The shear s1/s2 (m,) of triangles, and the areas (m,) of these.
+
+    kept : areas are to be kept; then it is the shear that has the symmetric Dirichlet energy of their polygons
+    """
     octaves, shear = face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles], chart.faces)
-    ratio = 2.0 ** np.clip(octaves, -20, 20)
-    energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
-    # Quads that fold along the other diagonal are mended at last, and no seam helps against them.
-    shear = np.where(octaves <= np.log2(RATIO_FLOOR), np.minimum(shear, MOST_SHEAR), energy + np.sqrt(energy**2 - 1))
+    if kept:
+        ratio = 2.0 ** np.clip(octaves, -20, 20)
+        energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
+        # Quads that fold along the other diagonal are mended at last, and no seam helps against them.
+        folded = octaves <= np.log2(RATIO_FLOOR)
+        shear = np.where(folded, np.minimum(shear, MOST_SHEAR), energy + np.sqrt(energy**2 - 1))
     return shear, polygon_areas(chart.vertices, chart.triangles, chart.faces)
