@@ -35,8 +35,9 @@ def slope(points: Sequence[tuple[float, float]]) -> float:
     return float(np.polyfit(known[:, 0], known[:, 1], 1)[0])
 
 
-def plot(curves: Curves, title: str, cloud: bool = False) -> np.ndarray:
-    """A picture (h,w,3) in [0,1] of curves: points (x, y) > 0 by name; a cloud is points without lines."""
+def plot(curves: Curves, title: str, cloud: bool = False, below: str = "faces") -> np.ndarray:
+    """A picture (h,w,3) in [0,1] of curves: points (x, y) > 0 by name; a cloud is points without lines;
+    below : what x is."""
     picture = np.ones((HEIGHT, WIDTH, 3))
     points = np.array([p for curve in curves.values() for p in curve if p[0] > 0 and p[1] > 0]).reshape(-1, 2)
     if not len(points):
@@ -62,7 +63,7 @@ def plot(curves: Curves, title: str, cloud: bool = False) -> np.ndarray:
         text = name if np.isnan(exponent) else f"{name}  {exponent:+.2f}"
         write(picture, text, WIDTH - RIGHT + 14, TOP + 16 + 22 * k, 15, colour)
     write(picture, title, LEFT + size[0] / 2, 32, 20, INK, "middle")
-    write(picture, "faces", LEFT + size[0] / 2, HEIGHT - 16, 16, INK, "middle")
+    write(picture, below, LEFT + size[0] / 2, HEIGHT - 16, 16, INK, "middle")
     return np.clip(picture, 0, 1)
 
 

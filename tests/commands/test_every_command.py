@@ -19,13 +19,15 @@ BODIES = ("flow", "volume", "partition")
 SHAPES = ("match", "average", "distance", "signature", "library", "similar")
 # Of islands that have an image or are grids, which those of a ball are not: tests/commands/arranging has theirs.
 SHAPED = ("symmetrize", "rectify")
+# Commands that draw: tests/commands/pictures has theirs.
+PICTURES = ("test-texture", "diagram")
 
 
 def names(package):
     (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
     # A batch works on folders, and has the tests of its own room.
     alone = [name for name, command in every.choices.items() if command.get_default("alone")]
-    return [name for name in every.choices if name not in (*alone, *SHAPES, *SHAPED)]
+    return [name for name in every.choices if name not in (*alone, *SHAPES, *SHAPED, *PICTURES)]
 
 
 def arguments(name, folder, target="out.blend"):
@@ -97,7 +99,7 @@ def test_every_report_has_all_of_its_keys(package, run, tmp_path):
     ball("A"), ball("B", 3.0)
     save(tmp_path / "in.blend")
     common = {"version", "input", "output", "quality", "balance", "charts", "gate", "warnings"}
-    own = {"unwrap": {"boundary", "packing"}, "refine": {"keep_boundary"}, "sphere": {"projection", "method"},
+    own = {"unwrap": {"boundary", "map", "packing"}, "refine": {"keep_boundary"}, "sphere": {"projection", "method"},
            "magnify": {"weights", "factor", "exact", "source", "cascade", "share"}}  # fmt: skip
     (every,) = (a for a in package("cli").parser()._actions if isinstance(a, argparse._SubParsersAction))
     reporting = [n for n, c in every.choices.items() if any("--report" in a.option_strings for a in c._actions)]

@@ -32,7 +32,15 @@ def test_every_float_refuses_nan_and_what_blender_makes_of_infinity(package):
 
 
 # What reads meshes, or looks at none.
-READ_ONLY = {"uv.omt_measure", "uv.omt_regions", "uv.omt_histogram", "uv.omt_density_get", "object.omt_remesh"}
+READ_ONLY = {
+    "uv.omt_measure",
+    "uv.omt_regions",
+    "uv.omt_histogram",
+    "uv.omt_density_get",
+    "uv.omt_layout_image",
+    "object.omt_diagram",
+    "object.omt_remesh",
+}
 OTHERS = {
     "uv.omt_preset",
     "wm.omt_copy_report",

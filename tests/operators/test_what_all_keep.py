@@ -21,6 +21,7 @@ RUNS: dict[str, tuple[dict, set[str]]] = {
     "uv.omt_measure": ({}, set()),
     "uv.omt_histogram": ({}, set()),
     "uv.omt_density_get": ({}, set()),
+    "uv.omt_layout_image": ({"size": 32}, set()),
     "object.omt_remesh": ({"target_vertices": 40}, set()),
 }
 # What ends something, is a setting, or has meshes of its own kind, looked at by tests beside it.
