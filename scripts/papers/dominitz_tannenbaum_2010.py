@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import sys
 
-import numpy as np
-from common import BUILD, models, saved, told
+from common import BUILD, models, told
 
 FOLDER = BUILD / "dominitz_tannenbaum_2010"
 # Models, and what the paper has of its own meshes of them: means of r + 1/r of areas and of s + 1/s of shear.
@@ -16,8 +15,8 @@ PAPER = {"max_planck": (2.007, 2.29), "stanford_bunny": (2.66, 2.76)}
 METHODS = ("newton", "flow")
 
 
-def spheres() -> tuple[list[dict], dict[str, list[tuple[float, float]]]]:
-    """Rows of the methods of each model, and the costs of the flow, over its steps."""
+def spheres() -> tuple[list[dict], list[dict]]:
+    """Rows of the methods of each model, and those of the costs of the flow, step by step."""
     import meshes
 
     from omt_uv.pipelines.globe import GlobeJob, project
@@ -27,7 +26,7 @@ def spheres() -> tuple[list[dict], dict[str, list[tuple[float, float]]]]:
     from omt_uv.solver.sphere.figures import sphere_figures
 
     rows: list[dict] = []
-    costs: dict[str, list[tuple[float, float]]] = {}
+    costs: list[dict] = []
     for name in models(sys.argv[1:] or tuple(PAPER)):
         surface = triangle_surface(*meshes.load_model(name))
         for method in METHODS:
@@ -38,8 +37,7 @@ def spheres() -> tuple[list[dict], dict[str, list[tuple[float, float]]]]:
             if globe.sphere.flow is not None:
                 flow = globe.sphere.flow
                 places = {"conformal": globe.sphere.conformal, "Moser": flow.moser, "flow": flow.positions} | places
-                values = np.array(flow.costs)
-                costs[name] = [(k + 1.0, float(cost)) for k, cost in enumerate(values)]
+                costs += [{"model": name, "step": k, "cost": f"{cost:.8f}"} for k, cost in enumerate(flow.costs)]
             for title, positions in places.items():
                 figures = sphere_figures(component.vertices, component.triangles, positions[:n])
                 rows.append(_row(name, len(component.triangles), title, figures))
@@ -67,12 +65,9 @@ def _paper(name: str) -> dict:
 
 
 def main() -> None:
-    from omt_uv.display.plots import plot
-
     rows, costs = spheres()
     told(FOLDER, "tables", rows)
-    saved(FOLDER / "costs.png", [plot(costs, "cost of the transport", below="steps of the flow")], 480)
-    print(f"\nPictures are in {FOLDER}")
+    told(FOLDER, "costs", costs)
 
 
 if __name__ == "__main__":
