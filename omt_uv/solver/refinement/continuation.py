@@ -28,6 +28,7 @@ from .continuation_rules import (
     Quality,
     is_enough,
     is_futile,
+    is_out_of_reach,
     is_squeezed,
     judge_step,
     next_pressure,
@@ -211,19 +212,26 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         max_steps=min(steps_left, STAGE_STEPS) if balance == 0 else steps_left,
         tolerance=tolerance,
         loose_tolerance=loose,
+        # Its share is what a stage with a region is for.
+        foreseeing=balance == 0 and not on_the_way and problem.faces.region is None,
     )
 
 
 @dataclass(frozen=True)
 class StageLimits:
-    """When a stage ends: area error to reach, Newton steps at most, tolerances as in `continuation_rules.Quality`, an
-    energy that is low enough in any case."""
+    """When a stage ends.
+
+    area_error : to reach; max_steps : of Newton's method; tolerance, loose_tolerance : as in
+    `continuation_rules.Quality`; relaxed : an energy that is low enough in any case; foreseeing : it ends, too, where
+    the area error is out of reach, see `continuation_rules.is_out_of_reach`
+    """
 
     area_error: float
     max_steps: int
     tolerance: float = LOOSE
     loose_tolerance: float = LOOSE
     relaxed: float = 0.0
+    foreseeing: bool = False
 
 
 @dataclass(frozen=True)
@@ -266,7 +274,7 @@ def minimise(
     stage ends "crossed".
     """
     value = problem.energy(w)
-    steps, residual, status, pressure = 0, np.inf, "steps", FIRST_PRESSURE
+    steps, residual, status, pressure, error = 0, np.inf, "steps", FIRST_PRESSURE, np.inf
     while steps < max(limits.max_steps, 1):
         step, used = problem.step(w, value, pressure), pressure
         if forbidden is not None and forbidden(step.w):
@@ -279,6 +287,9 @@ def minimise(
         met = value < limits.relaxed or (
             residual < limits.loose_tolerance and problem.area_error(w) <= limits.area_error
         )
+        if limits.foreseeing and not met and residual < limits.loose_tolerance:
+            before, error = error, problem.area_error(w)
+            met = bool(is_out_of_reach(error, before, limits.area_error))
         verdict = judge_step(step.share, used, residual, met, limits.tolerance)
         if verdict.stalled or verdict.converged:
             status = "stalled" if verdict.stalled else "converged"

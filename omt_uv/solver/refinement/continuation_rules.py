@@ -5,7 +5,7 @@ Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entr
 
     start a stage            `planned_weights`, `is_squeezed`, `next_weight`
     within a stage           `next_pressure`
-    end a stage              `stage_tolerances`, `judge_step`
+    end a stage              `stage_tolerances`, `judge_step`, `is_out_of_reach`
     end the refinement       `is_enough`, `is_futile`
 
 A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, since its steps are those of
@@ -69,6 +69,8 @@ LEAST_PRESSURE = 0.01
 # By how much it falls after a full step that has kept its promise, and after one that has gained what it promised.
 PRESSURE_FALLS = 3.0
 PRESSURE_DROPS = 10.0
+# A stage cannot reach an area error that is less than this share of its own and takes more than another step as good.
+WITHIN_REACH = 0.95
 # A full step keeps its promise where it gains more than this share of it, and a poor one gains less than that.
 KEPT_PROMISE = 0.7
 # One that gains this share of it to that has a Hessian that is true.
@@ -212,6 +214,12 @@ def judge_step(share: Number, pressure: Number, residual: Number, met: Truth, to
         converged=met | (low & true_hessian),
         sharpen=low & (pressure > LEAST_PRESSURE),
     )
+
+
+def is_out_of_reach(error: Number, before: Number, goal: Number) -> Truth:
+    """Whether a stage that is nearly through, with these area errors after its last step and before, will not reach
+    its goal: a greater weight takes it on from here."""
+    return (goal < WITHIN_REACH * error) & (before - error < error - goal)
 
 
 def is_enough(quality: Quality, balance: float, error: Number, weight: Number) -> Truth:

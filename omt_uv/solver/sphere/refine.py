@@ -210,7 +210,8 @@ def _stages(problem: SphereProblem, p: np.ndarray, balance: float, settings: Qua
         left = settings.max_steps - steps
         allowed = min(left, STAGE_STEPS) if balance == 0 else left
         tolerance = TOLERANCE if balance == 0 else STRICT
-        stage = yield from minimise(current, p, StageLimits(goal, allowed, tolerance), k)
+        limits = StageLimits(goal, allowed, tolerance, foreseeing=balance == 0 and np.isfinite(goal))
+        stage = yield from minimise(current, p, limits, k)
         p, steps, weight, k = stage.w, steps + stage.steps, weights[k], k + 1
         before, error = error, problem.area_error(p)
         enough = is_enough(settings, balance, error, weights[-1])

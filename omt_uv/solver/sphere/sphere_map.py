@@ -38,6 +38,8 @@ TRANSPORT = (0.15, 0.25)
 REFINEMENT = (0.4, 0.6)
 # Area error, over that of symmetric quads, that a map of these may have in the triangles that they came as.
 AREA_KEPT = 1.5
+# Cells may be off by this share of their areas: the refinement that follows starts as well from these.
+START_TOLERANCE = 0.1
 # From coarse to fine, where the transport failed.
 MULTILEVEL = (0.4, 0.3)
 
@@ -204,7 +206,7 @@ def _transport_start(found: ConformalSphere, surface: ClosedSurface, density: np
     """Every vertex in the middle of its cell, (n,3)."""
     mass = vertex_areas(surface.vertices, surface.triangles, density)
     hull = Hull(found.triangles, twins(found.triangles))
-    return (yield from sphere_transport(found.sites, mass, hull=hull)).cells.centroids()
+    return (yield from sphere_transport(found.sites, mass, START_TOLERANCE, hull)).cells.centroids()
 
 
 def _at_once(flow: SphereFlow) -> Steps[np.ndarray]:

@@ -84,3 +84,10 @@ def test_stages_on_the_way_end_sooner():
     assert rules.stage_tolerances(quality, 0.0, True, early=True)[1] > quality.loose_tolerance
     assert rules.stage_tolerances(quality, 0.0, True, early=False)[1] == quality.loose_tolerance
     assert rules.stage_tolerances(quality, 0.5, True, early=True) == (rules.STRICT, rules.LOOSE)
+
+
+def test_a_goal_is_out_of_reach_where_steps_gain_less_than_is_missing():
+    assert rules.is_out_of_reach(0.010, 0.0105, 0.008) and not rules.is_out_of_reach(0.010, 0.013, 0.008)
+    # Nearly there, there already, or after the first step that says anything: the stage goes on.
+    assert not rules.is_out_of_reach(0.0082, 0.0083, 0.008) and not rules.is_out_of_reach(0.007, 0.0071, 0.008)
+    assert not rules.is_out_of_reach(0.5, np.inf, 0.008)
