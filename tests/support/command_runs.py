@@ -14,7 +14,7 @@ from sphere_shapes import blob
 
 # What the options that hold paths are for; a new one has to be named here.
 READ = {"input", "target", "other", "others", "handles", "index", "image"}
-WRITTEN = {"output", "report", "preview", "histogram", "plot", "attributes", "image_out", "image_output"}
+WRITTEN = {"output", "report", "preview", "histogram", "plot", "attributes", "image_out", "image_output", "made"}
 FOLDERS = ("average", "library")
 # What writes an .npz.
 ARRAYS = ("library", "signature")
@@ -76,7 +76,8 @@ def words(name: str, folder: Path, given: str = "", **replaced: str) -> list:
 FILES = {"output": "out.blend", "report": "report.json", "preview": "preview.png", "histogram": "histogram.png",
          "plot": "plot.png", "attributes": "out.blend", "image_out": "image_out.png", "image_output": "image_out.png",
          "target": "other.blend", "other": "other.blend", "others": "other.blend", "handles": "handles.json",
-         "index": "index.npz", "image": "image.png", "npz": "out.npz"}  # fmt: skip
+         "index": "index.npz", "image": "image.png", "npz": "out.npz",
+         "made": "made.png"}  # fmt: skip
 CALLS = {
     "unwrap": "-o @output --quality draft --max-shear 0 --report @report --preview @preview",
     "refine": "-o @output --quality draft --report @report --preview @preview",
@@ -89,6 +90,12 @@ CALLS = {
     "compare": "@others --plot @plot",
     "remesh": "-o @output --vertices 60 --report @report --preview @preview",
     "flow": "-o @output --handles @handles --report @report",
+    "stack": "-o @output --preview @preview",
+    "symmetrize": "-o @output --preview @preview",
+    "rectify": "-o @output --preview @preview",
+    "queue": "-o @output --quality draft --max-shear 0 --preview @preview",
+    "test-texture": "-o @made --kind area --size 64",
+    "diagram": "-o @made --size 64",
     "volume": "-o @output --tets 200 --report @report",
     "match": "@target -o @output --report @report",
     "average": "-o @output --report @report",
