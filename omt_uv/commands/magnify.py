@@ -21,7 +21,18 @@ from ..settings import (
 )
 from .common import CommandError, drain_shown, refusals, require_blender, write_report
 from .layers import read_layers, write_layers
-from .options import FORMATS, add_files, add_report, margin, names, positive, shear, texture_size
+from .options import (
+    FORMATS,
+    add_files,
+    add_report,
+    add_subdivision,
+    chosen_subdivision,
+    margin,
+    names,
+    positive,
+    shear,
+    texture_size,
+)
 
 
 def add(commands) -> None:
@@ -72,6 +83,7 @@ def add(commands) -> None:
         "--margin", type=margin, default=DEFAULT_MARGIN, metavar="PX", help="least distance of islands"
     )
     command.add_argument("--texture-size", type=texture_size, default=DEFAULT_TEXTURE_SIZE, metavar="PX")
+    add_subdivision(command)
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to use; default: the active one")
     _add_pictures(command)
     add_report(command, "island")
@@ -124,6 +136,7 @@ def run(options: argparse.Namespace) -> None:
     )
     objects, readings = read_layers(options)
     with refusals(objects):
+        readings = chosen_subdivision(options, readings)
         several, told = _regions(named, list(zip(objects, readings, strict=True)))
         regions = several[0].parts
         steps = magnify_several(several, settings) if options.region else magnify(regions, settings)
@@ -163,7 +176,7 @@ def _regions(named: list[tuple[str, float]], pairs: list) -> tuple[list, list[tu
         weights, texts = named_weights(pairs, name)
         told += texts
         parts = [
-            Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up)
+            Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up, r.subdivision)
             for (_, r), w in zip(pairs, weights, strict=True)
         ]
         found.append(NamedRegion(name, factor, tuple(parts)))

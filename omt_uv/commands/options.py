@@ -167,6 +167,24 @@ def subdivision(text: str) -> str | int:
     return value
 
 
+def add_subdivision(command) -> None:
+    """--subdivision, whose value `chosen_subdivision` applies."""
+    command.add_argument(
+        "--subdivision",
+        type=subdivision,
+        default="auto",
+        metavar="auto|off|N",
+        help="keep the areas of the subdivided surface: of the modifier's, of the mesh alone, or of N levels",
+    )
+
+
+def chosen_subdivision(options: argparse.Namespace, readings: list) -> list:
+    """The readings with the levels that were asked for."""
+    from ..blender.subdivision import with_levels
+
+    return readings if options.subdivision == "auto" else [with_levels(r, options.subdivision) for r in readings]
+
+
 def margin(text: str) -> float:
     value = number(text)
     if value < 0:

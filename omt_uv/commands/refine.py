@@ -7,7 +7,7 @@ import argparse
 from ..settings import RefineSettings
 from .common import CommandError, drain_shown, refusals, write_report
 from .layers import read_layers, write_layers
-from .options import FORMATS, add_area_options, add_files, add_report
+from .options import FORMATS, add_area_options, add_files, add_report, add_subdivision, chosen_subdivision
 
 
 def add(commands) -> None:
@@ -16,6 +16,7 @@ def add(commands) -> None:
     add_files(command, accepts=f"{FORMATS}, with UVs")
     add_area_options(command)
     command.add_argument("--keep-boundary", action="store_true", help="leave the outline of every island as it is")
+    add_subdivision(command)
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to refine; default: the active one")
     add_report(command, "island")
 
@@ -29,7 +30,9 @@ def run(options: argparse.Namespace) -> None:
             raise CommandError(f"{obj.name} has no UV map {options.uv_layer!r}. Name one that it has.")
     settings = RefineSettings(quality=options.quality, balance=options.balance, keep_boundary=options.keep_boundary)
     with refusals(objects):
-        refined = drain_shown(refine_islands([(r.surface, r.faces, r.all_pins) for r in readings], settings))
+        readings = chosen_subdivision(options, readings)
+        surfaces, modifiers = [(r.surface, r.faces, r.all_pins) for r in readings], [r.subdivision for r in readings]
+        refined = drain_shown(refine_islands(surfaces, settings, modifiers))
         written = write_layers(options, zip(objects, readings, strict=True), refined, existed=True)
     if options.report:
         write_report(options, {"keep_boundary": options.keep_boundary}, objects, refined.reports, written)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from .common import CommandError, check_paths, refusals, require_blender, warn
-from .options import add_cut_options, add_files
+from .options import add_cut_options, add_files, add_subdivision, chosen_subdivision
 from .selection import read_file
 
 
@@ -14,6 +14,7 @@ def add(commands) -> None:
     command.set_defaults(run=run)
     add_files(command, writes=".blend, which keeps seams")
     add_cut_options(command)
+    add_subdivision(command)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -22,6 +23,7 @@ def run(options: argparse.Namespace) -> None:
     from ..blender.seams import mark_seams
     from ..blender.vertex_groups import avoided
     from ..files.saving import save
+    from ..pipelines.subdivision import on_subdivided_surface
     from ..solver.cutting.cuts import cut
     from ..solver.parameterization.chart_pins import clear_of_pins
 
@@ -34,10 +36,13 @@ def run(options: argparse.Namespace) -> None:
         check_local(obj)
     told, lines = [], []
     free = avoided(objects, options.keep_free)
-    for k, ((obj, reading), avoid) in enumerate(zip(pairs, free, strict=True)):
+    readings = chosen_subdivision(options, [reading for _, reading in pairs])
+    for k, (obj, reading, avoid) in enumerate(zip(objects, readings, free, strict=True)):
         with refusals(name=obj.name):
             avoid = clear_of_pins(reading.surface, reading.pins, avoid)
-            cuts = cut(reading.surface, reading.faces, avoid=avoid, fill=options.fill_holes)
+            surface, modifier = reading.surface, reading.subdivision
+            surface = surface if modifier is None else on_subdivided_surface(surface, modifier)
+            cuts = cut(surface, reading.faces, avoid=avoid, fill=options.fill_holes)
         told += [(k, text) for text in cuts.warnings]
         mark_seams(obj, cuts.edges)
         lines.append(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")

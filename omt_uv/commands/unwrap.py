@@ -25,11 +25,12 @@ from .options import (
     add_files,
     add_marker_options,
     add_report,
+    add_subdivision,
     aspect,
+    chosen_subdivision,
     margin,
     names,
     shear,
-    subdivision,
     texture_size,
     tile,
 )
@@ -74,13 +75,7 @@ def add_settings(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--texture-size", type=texture_size, default=DEFAULT_TEXTURE_SIZE, metavar="PX", help="width of the texture"
     )
-    command.add_argument(
-        "--subdivision",
-        type=subdivision,
-        default="auto",
-        metavar="auto|off|N",
-        help="keep the areas of the subdivided surface: of the modifier's, of the mesh alone, or of N levels",
-    )
+    add_subdivision(command)
     command.add_argument("--pack-around", action="store_true", help="leave room for islands with pins, which stay")
     command.add_argument("--no-pack", action="store_true", help="centre the islands one upon the other")
     command.add_argument("--uv-layer", default="", metavar="NAME", help="UV map to write or make; default: the active")
@@ -109,7 +104,7 @@ def chosen(options: argparse.Namespace) -> Settings:
 def run(options: argparse.Namespace) -> None:
     objects, readings = read_layers(options)
     from ..blender.seams import mark_seams
-    from ..blender.subdivision import subdivision_warnings, with_levels
+    from ..blender.subdivision import subdivision_warnings
     from ..blender.vertex_groups import avoided, map_markers
     from ..pipelines.layout import UnwrapJob
     from ..pipelines.unwrap import lay_out
@@ -119,8 +114,7 @@ def run(options: argparse.Namespace) -> None:
         marked = map_markers(
             objects, {"centre": options.centre, "start": options.start_group, "corners": options.corners}
         )
-        if options.subdivision != "auto":
-            readings = [with_levels(r, options.subdivision) for r in readings]
+        readings = chosen_subdivision(options, readings)
         jobs = [
             UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision, up=r.up, uv=r.uv, markers=marks)
             for r, avoid, marks in zip(readings, free, marked, strict=True)

@@ -82,8 +82,9 @@ class UV_OT_omt_live(bpy.types.Operator):
 
         try:
             pairs = check_all_local(_read_touched(context))
+            last = context.window_manager.operator_properties_last(UNWRAP)
             with complaints(objects=[obj for obj, _ in pairs]):
-                session = Session(context, pairs, self.pins == "SOFT")
+                session = Session(context, pairs, self.pins == "SOFT", last.use_subdivision)
         except Complaint as complaint:
             return tell(self, context, complaint)
         self._steps, self._looked = len(context.window_manager.operators), 0.0

@@ -23,10 +23,10 @@ from ..settings import (
     MagnifySettings,
 )
 from .base import SolverOperator, complaints, read_writable, warn, write_layers
-from .properties import MarginSettings, choose_attribute, choose_group, draw_margin
+from .properties import MarginSettings, SubdivisionSettings, choose_attribute, choose_group, draw_margin
 
 
-class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
+class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy.types.Operator):
     """Give a painted region a chosen number of times its share of the texture, smoothly and without folds"""
 
     bl_idname = "uv.omt_magnify"
@@ -161,8 +161,8 @@ class UV_OT_omt_magnify(MarginSettings, SolverOperator, bpy.types.Operator):
             pairs = list(zip(objects, readings, strict=True))
             weights, warnings = self._weights(context, pairs)
             regions = [
-                Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up)
-                for r, w in zip(readings, weights, strict=True)
+                Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up, modifier)
+                for r, w, modifier in zip(readings, weights, self.subdivisions(readings), strict=True)
             ]
             several = self._further(pairs, regions)
             settings = self.settings(source)
@@ -283,7 +283,9 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     column = layout.column()
     column.active = properties.source != "UV"
     column.prop(properties, "balance", text="Area - Angle", slider=True)
+    column.use_property_split = True
     column.prop(properties, "max_shear")
+    column.prop(properties, "use_subdivision")
     layout.prop(properties, "boundary")
     layout.prop(properties, "cascade")
     layout.prop(properties, "quality")

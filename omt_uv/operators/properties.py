@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..settings import DEFAULT_BALANCE, DEFAULT_MARGIN, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, FIRST_TILE, QUALITIES
 
@@ -22,6 +22,21 @@ class AreaSettings:
     quality: EnumProperty(
         name="Quality", description="How exact the areas become", items=QUALITIES, default=DEFAULT_QUALITY
     )
+
+
+class SubdivisionSettings:
+    """Whether what counts is the mesh, or the surface that its modifier makes of it."""
+
+    use_subdivision: BoolProperty(
+        name="Use Subdivision Surface",
+        description="Where an object has a Subdivision Surface modifier, keep the areas of the subdivided surface, "
+        "as it is rendered, instead of those of the mesh",
+        default=True,
+    )
+
+    def subdivisions(self, readings: list) -> list:
+        """The modifiers of readings that count, None for each that does not."""
+        return [reading.subdivision if self.use_subdivision else None for reading in readings]
 
 
 class MarginSettings:

@@ -8,10 +8,10 @@ from bpy.props import BoolProperty
 from ..session import run
 from ..settings import RefineSettings
 from .base import SolverOperator, complaints, read_writable, warn, write_layers
-from .properties import AreaSettings, MarginSettings, draw_balance, draw_margin
+from .properties import AreaSettings, MarginSettings, SubdivisionSettings, draw_balance, draw_margin
 
 
-class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.Operator):
+class UV_OT_omt_refine(AreaSettings, SubdivisionSettings, MarginSettings, SolverOperator, bpy.types.Operator):
     """Give every part of existing UV islands its share of the texture. Islands stay whole and in place, pins too"""
 
     bl_idname = "uv.omt_refine"
@@ -48,7 +48,8 @@ class UV_OT_omt_refine(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         objects, readings = read_writable(context)
         surfaces = [(reading.surface, reading.faces, reading.all_pins) for reading in readings]
         with complaints(objects=objects):
-            refined = yield from run.aside(refine_islands(surfaces, self.settings()))
+            steps = refine_islands(surfaces, self.settings(), self.subdivisions(readings))
+            refined = yield from run.aside(steps)
         return objects, refined
 
     def finish(self, context: bpy.types.Context, result) -> None:
@@ -64,6 +65,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     draw_balance(layout, properties)
     layout.prop(properties, "quality")
     layout.prop(properties, "keep_boundary")
+    layout.prop(properties, "use_subdivision")
     column = layout.column()
     column.active = not properties.keep_boundary
     column.prop(properties, "pack")

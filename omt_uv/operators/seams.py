@@ -7,10 +7,10 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..session import run
 from .base import SolverOperator, check_all_local, complaints, read_objects, warn
-from .properties import choose_group
+from .properties import SubdivisionSettings, choose_group
 
 
-class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
+class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
     """Mark short seams that open every part into one island, along creases and hollows. Seams that exist are kept"""
 
     bl_idname = "uv.omt_seams"
@@ -46,7 +46,9 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
         options = {"fill": self.fill_holes, "extremities": self.extremities}
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
-            cutting = [_cut(reading, avoid, options) for (_, reading), avoid in zip(pairs, free, strict=True)]
+            readings = [reading for _, reading in pairs]
+            every = zip(readings, free, self.subdivisions(readings), strict=True)
+            cutting = [_cut(reading, avoid, modifier, options) for reading, avoid, modifier in every]
             cuts = yield from run.aside(in_turn(cutting))
         return list(zip(objects, cuts, strict=True))
 
@@ -62,15 +64,17 @@ class UV_OT_omt_seams(SolverOperator, bpy.types.Operator):
             self.report({"INFO"}, "Every part is an island already; no seam is needed")
 
 
-def _cut(reading, avoid, options: dict):
-    """The cuts of a surface."""
+def _cut(reading, avoid, modifier, options: dict):
+    """The cuts of a surface, as it is or as a modifier subdivides it."""
+    from ..pipelines.subdivision import on_subdivided_surface
     from ..solver.cutting.cuts import cut
     from ..solver.parameterization.chart_pins import clear_of_pins
     from ..solver.progress import Progress
 
     yield Progress("Seams", 0.0)
     clear = clear_of_pins(reading.surface, reading.pins, avoid)
-    return cut(reading.surface, reading.faces, avoid=clear, **options)
+    surface = reading.surface if modifier is None else on_subdivided_surface(reading.surface, modifier)
+    return cut(surface, reading.faces, avoid=clear, **options)
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
@@ -79,4 +83,5 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.use_property_decorate = False
     layout.prop(properties, "extremities")
     layout.prop(properties, "fill_holes")
+    layout.prop(properties, "use_subdivision")
     choose_group(layout, properties, "keep_free")

@@ -17,10 +17,18 @@ from ..settings import (
     Settings,
 )
 from .base import SolverOperator, complaints, read_writable, warn, write_layers
-from .properties import AreaSettings, MarginSettings, choose_group, choose_layer, draw_balance, draw_margin
+from .properties import (
+    AreaSettings,
+    MarginSettings,
+    SubdivisionSettings,
+    choose_group,
+    choose_layer,
+    draw_balance,
+    draw_margin,
+)
 
 
-class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.Operator):
+class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, SolverOperator, bpy.types.Operator):
     """Unwrap so that every part of the surface gets its share of the texture. Islands follow the seams, pins stay"""
 
     bl_idname = "uv.omt_unwrap"
@@ -87,12 +95,6 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         "that are not selected. Otherwise they are packed as if there were none",
         default=False,
     )
-    use_subdivision: BoolProperty(
-        name="Use Subdivision Surface",
-        description="Where an object has a Subdivision Surface modifier, keep the areas of the subdivided surface, "
-        "as it is rendered, instead of those of the mesh",
-        default=True,
-    )
     uv_layer: StringProperty(
         name="UV Map", description="UV map to write, made if there is none of this name. Empty: the active one"
     )
@@ -129,7 +131,6 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
         objects, readings = read_writable(context, self.uv_layer)
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
-            used = self.use_subdivision
             marked = map_markers(
                 objects, {"centre": self.centre_group, "start": self.start_group, "corners": self.corner_group}
             )
@@ -139,12 +140,12 @@ class UV_OT_omt_unwrap(AreaSettings, MarginSettings, SolverOperator, bpy.types.O
                     r.faces,
                     r.pins,
                     avoid,
-                    subdivision=r.subdivision if used else None,
+                    subdivision=modifier,
                     up=r.up,
                     uv=r.uv,
                     markers=marks,
                 )
-                for r, avoid, marks in zip(readings, free, marked, strict=True)
+                for r, avoid, marks, modifier in zip(readings, free, marked, self.subdivisions(readings), strict=True)
             ]
             layout = yield from run.aside(lay_out(jobs, self.settings()))
         return objects, layout

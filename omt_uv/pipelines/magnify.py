@@ -38,6 +38,8 @@ from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.options import MapOptions
 from ..solver.progress import Steps, part_of
 from .layout import UP, PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
+from .reading import SubdivisionModifier
+from .subdivision import polygon_uv_areas, subdivided_target
 from .unwrap import lay_out
 
 # Shares that miss their target by more than this, relative to it, are said.
@@ -47,7 +49,10 @@ MISSED = 5e-3
 @dataclass(frozen=True)
 class Region:
     """A surface, the polygons (f,) bool to work on, weights of its vertices (n,), or of its polygons (f,) where
-    `kind` is "face", UVs and pins if it has any, and what is up."""
+    `kind` is "face", UVs and pins if it has any, what is up, and the modifier on whose surface shares are asked for.
+
+    Regions of existing UVs are magnified in the plane: there is no surface in it.
+    """
 
     surface: Surface
     faces: np.ndarray
@@ -55,6 +60,7 @@ class Region:
     pins: CornerPins | None = None
     kind: str = "vertex"
     up: tuple[float, float, float] = UP
+    subdivision: SubdivisionModifier | None = None
 
     def of_triangles(self, rows: np.ndarray) -> np.ndarray:
         """Weights (k,) of some triangles (k,) of the surface: those of their polygons."""
@@ -174,7 +180,16 @@ def _from_mesh(regions, settings: MagnifySettings) -> Steps[Magnified]:
         full[rows], inside[rows] = density[start : start + len(a)], w
         start += len(a)
         pins = region.pins if region.pins is not None and region.pins.pinned.any() else None
-        jobs.append(UnwrapJob(region.surface, region.faces, pins, target=Target(full, inside), up=region.up))
+        jobs.append(
+            UnwrapJob(
+                region.surface,
+                region.faces,
+                pins,
+                target=Target(full, inside),
+                subdivision=region.subdivision,
+                up=region.up,
+            )
+        )
     if settings.boundary == "own":
         settings = replace(settings, boundary="free")
     layout = yield from lay_out(jobs, settings)
@@ -203,6 +218,8 @@ def region_triangles(region: Region) -> tuple[np.ndarray, np.ndarray, np.ndarray
     rows = np.flatnonzero(region.faces[surface.triangle_face])
     vertices = surface.corner_vertex[surface.triangles[rows]]
     area = polygon_areas(surface.positions, vertices, surface.triangle_face[rows])
+    if region.subdivision is not None:
+        area = area * subdivided_target(surface, region.subdivision).density[rows]
     return rows, np.where(np.isfinite(area), area, 0.0), region.of_triangles(rows)
 
 
@@ -210,7 +227,13 @@ def uv_areas(region: Region, part, corners: np.ndarray, uv: np.ndarray) -> np.nd
     """UV areas of the triangles worked on (k,), 0 for those that were left out."""
     full = np.zeros((len(region.surface.corner_vertex), 2))
     full[corners] = uv
-    return np.abs(signed_areas(full, region.surface.triangles[part[0]]))
+    rows = part[0]
+    if region.subdivision is None:
+        return np.abs(signed_areas(full, region.surface.triangles[rows]))
+    # Triangles of a polygon have the same weight.
+    owner = region.surface.triangle_face
+    whole = polygon_uv_areas(region.surface, full, region.subdivision) / np.maximum(np.bincount(owner), 1)
+    return np.where(np.isin(region.surface.triangles[rows, 0], corners), whole[owner[rows]], 0.0)
 
 
 # ---- from existing UVs --------------------------------------------------------------------------------------

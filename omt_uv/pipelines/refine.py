@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,16 +12,21 @@ from ..solver.editing.refine_island import refine_island
 from ..solver.editing.uv_islands import Island, uv_islands
 from ..solver.errors import EmptyMeshError, FoldedUVError, MeshError, PinError
 from ..solver.maps.distortion import distortion
+from ..solver.maps.similarity import fit_similarity
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_edges
-from ..solver.parameterization.chart_indices import located
+from ..solver.parameterization.chart_indices import chart_target, located
+from ..solver.parameterization.chart_map import ChartMap
 from ..solver.parameterization.chart_pins import ChartPins, CornerPins, pins_of_chart
+from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
 from ..solver.refinement.refine import Refinement
 from .layout import PACKING_FROM, PlacedIsland, Refusal, corner_uvs, grown_together, pack_islands
+from .reading import SubdivisionModifier
+from .subdivision import refined_on_subdivision, subdivided_target
 
 # Of `Distortion`, what a report says of an island before and after.
 FIGURES = ("area_l1", "area_sd", "angle_mean", "folds")
@@ -45,6 +50,7 @@ class _RefinedIsland:
     """An island of surface `owner` and its refinement.
 
     pins : those it has, which keep it from being packed; fixed_scale : whether they also fix how large it is
+    density : (m,) of the area that its triangles ask for, if that is not their own
     """
 
     owner: int
@@ -52,18 +58,21 @@ class _RefinedIsland:
     pins: ChartPins | None
     fixed_scale: bool
     refinement: Refinement
+    density: np.ndarray | None = None
 
     @property
     def areas(self) -> tuple[float, float]:
         """Area of the surface and of the UVs."""
         chart = self.island.chart
         covered = abs(float(signed_areas(self.refinement.uv, chart.triangles).sum()))
-        return float(polygon_areas(chart.vertices, chart.triangles, chart.faces).sum()), covered
+        area = polygon_areas(chart.vertices, chart.triangles, chart.faces)
+        return float(area.sum() if self.density is None else area @ self.density), covered
 
 
 def refine_islands(
     surfaces: Sequence[tuple[Surface, np.ndarray | None, CornerPins | None]],
     settings: RefineSettings,
+    subdivisions: Sequence[SubdivisionModifier | None] | None = None,
 ) -> Steps[RefinedLayout]:
     """Improve the UV islands that contain the given polygons (f,) bool of surfaces with UVs and pins.
 
@@ -71,27 +80,36 @@ def refine_islands(
     the UV area they had; islands with two or more pins, or with their outline kept, have their own. Nothing is
     packed unless the settings say so, and then only islands without pins.
 
+    subdivisions : of each surface, the modifier on whose surface the areas shall be right; none by default
+
     Raises
     ------
     Refusal : with the index of the surface and the MeshError that says why
     MarginError : the margins leave no room for the islands
     """
     found, warnings = found_islands(surfaces)
+    modifiers = subdivisions or [None] * len(surfaces)
+    targets = [
+        None if modifier is None else subdivided_target(surface, modifier)
+        for (surface, _, _), modifier in zip(surfaces, modifiers, strict=True)
+    ]
     total = sum(len(island.chart.triangles) for _, island, _ in found)
     refined, done = [], 0
     working = PACKING_FROM if settings.pack else 1.0
     for owner, island, pins in found:
         share = len(island.chart.triangles)
-        steps = _improve(island, pins, settings)
+        target = chart_target(targets[owner], surfaces[owner][0], island.chart)
+        density = None if target is None else target.density
+        steps = _improve(island, pins, settings, density)
         try:
             fixed_scale, refinement = yield from part_of(steps, working * done / total, working * share / total)
         except MeshError as error:
             raise Refusal(owner, located(_shown(error, island.chart), island.chart)) from error
-        refined.append(
-            _RefinedIsland(owner=owner, island=island, pins=pins, fixed_scale=fixed_scale, refinement=refinement)
-        )
+        refined.append(_RefinedIsland(owner, island, pins, fixed_scale, refinement, density))
         warnings += [(owner, text) for text in (*refinement.warnings, *_unfinished(refinement))]
         done += share
+    refined, more = yield from _on_subdivisions(surfaces, refined, modifiers, settings)
+    warnings += more
     uvs = _at_one_density(refined)
     if settings.pack:
         uvs = yield from part_of(_packed(refined, uvs, settings), PACKING_FROM, 1 - PACKING_FROM)
@@ -136,8 +154,10 @@ def found_islands(surfaces) -> tuple[list[tuple[int, Island, ChartPins | None]],
     return found, warnings
 
 
-def _improve(island: Island, pins: ChartPins | None, settings: RefineSettings) -> Steps[tuple[bool, Refinement]]:
-    """Whether the scale of the island is fixed, and its refinement."""
+def _improve(
+    island: Island, pins: ChartPins | None, settings: RefineSettings, density: np.ndarray | None
+) -> Steps[tuple[bool, Refinement]]:
+    """Whether the scale of the island is fixed, and its refinement; density (m,): see `_RefinedIsland`."""
     chart = island.chart
     vertices = np.zeros(0, np.int64) if pins is None else pins.vertices
     places = np.zeros((0, 2)) if pins is None else pins.places
@@ -153,6 +173,7 @@ def _improve(island: Island, pins: ChartPins | None, settings: RefineSettings) -
             quality=settings.quality,
             pins=(vertices, places) if len(vertices) else None,
             polygons=chart.faces,
+            target=density,
         )
     except PinError as error:
         if not settings.keep_boundary:
@@ -164,6 +185,78 @@ def _improve(island: Island, pins: ChartPins | None, settings: RefineSettings) -
             elements=error.elements,
         ) from error
     return len(vertices) > 1, refinement
+
+
+def _on_subdivisions(
+    surfaces: Sequence[tuple[Surface, np.ndarray | None, CornerPins | None]],
+    refined: Sequence[_RefinedIsland],
+    modifiers: Sequence[SubdivisionModifier | None],
+    settings: RefineSettings,
+) -> Steps[tuple[list[_RefinedIsland], list[tuple[int, str]]]]:
+    """All islands, those of surfaces with modifiers refined for the subdivided surfaces, and warnings."""
+    found: list[_RefinedIsland] = []
+    warnings: list[tuple[int, str]] = []
+    for owner, (surface, modifier) in enumerate(zip(surfaces, modifiers, strict=True)):
+        mine = [r for r in refined if r.owner == owner]
+        if modifier is not None and mine:
+            mine, texts = yield from _on_subdivision(surface, mine, modifier, settings)
+            warnings += [(owner, text) for text in texts]
+        found += mine
+    return found, warnings
+
+
+def _on_subdivision(
+    given: tuple[Surface, np.ndarray | None, CornerPins | None],
+    refined: Sequence[_RefinedIsland],
+    modifier: SubdivisionModifier,
+    settings: RefineSettings,
+) -> Steps[tuple[list[_RefinedIsland], tuple[str, ...]]]:
+    """The islands of a surface refined for the areas of its subdivided surface, where they lay, and warnings."""
+    surface, _, pins = given
+    # Islands that look to the other side are mapped as in a mirror.
+    mirrors = [np.array([np.sign(signed_areas(r.refinement.uv, r.island.chart.triangles).sum()), 1]) for r in refined]
+    charts = [r.island.chart for r in refined]
+    maps = [_as_chart_map(r.refinement, mirror) for r, mirror in zip(refined, mirrors, strict=True)]
+    kept = "kept" if settings.keep_boundary else "free"
+    found = SurfaceMap(charts, maps, np.zeros((0, 2), np.int64))
+    found = yield from refined_on_subdivision(surface, found, modifier, pins, kept)
+    better = []
+    for r, mirror, chart_map in zip(refined, mirrors, found.maps, strict=True):
+        uv = chart_map.uv * mirror
+        if not r.fixed_scale and r.pins is None:
+            uv = _placed_like(uv, r.refinement.uv, r.island.chart)
+        warnings = (*r.refinement.warnings, *chart_map.warnings)
+        better.append(replace(r, refinement=replace(r.refinement, uv=uv, warnings=warnings)))
+    return better, (*found.warnings, *(text for m in found.maps for text in m.warnings))
+
+
+def _as_chart_map(refinement: Refinement, mirror: np.ndarray) -> ChartMap:
+    """A refinement as the map of a chart, to refine it further."""
+    return ChartMap(
+        uv=refinement.uv * mirror,
+        newton_conformal=None,
+        residual_conformal=None,
+        newton_transport=None,
+        residual_transport=None,
+        newton_refinement=refinement.iterations,
+        residual_refinement=refinement.residual,
+        status=refinement.status,
+        area_l1=0.0,
+        area_sd=0.0,
+        angle_mean=0.0,
+        folds=0,
+        warnings=(),
+        seconds={},
+        area_weight=refinement.area_weight,
+    )
+
+
+def _placed_like(uv: np.ndarray, given: np.ndarray, chart: Chart) -> np.ndarray:
+    """A map uv (n,2) with the area, the place and the direction of another one."""
+    now, before = (abs(float(signed_areas(x, chart.triangles).sum())) for x in (uv, given))
+    w = np.sqrt(before / now) * (uv @ [1, 1j])
+    w = fit_similarity(w, given @ [1, 1j], rigid=True)(w)
+    return np.column_stack([w.real, w.imag])
 
 
 def _shown(error: MeshError, chart: Chart) -> MeshError:
@@ -211,7 +304,14 @@ def _report(refined: _RefinedIsland, uv: np.ndarray) -> dict:
     """Figures of an island for a report, before and after."""
     chart, done = refined.island.chart, refined.refinement
     before, after = (
-        distortion(chart.vertices, chart.triangles, x[chart.triangles], overlap=False, polygons=chart.faces)
+        distortion(
+            chart.vertices,
+            chart.triangles,
+            x[chart.triangles],
+            overlap=False,
+            density=refined.density,
+            polygons=chart.faces,
+        )
         for x in (refined.island.uv, uv)
     )
     return {

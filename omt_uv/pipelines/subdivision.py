@@ -88,10 +88,24 @@ def evaluated(reading: Reading) -> Reading:
     )
     uv = None
     if reading.uv is not None:
-        vertex, first = _uv_vertices(surface.corner_vertex, np.asarray(reading.uv, float))
-        mapped = subdivided_uv(vertex, surface.face_start, surface.corner_vertex[first], modifier, fine.levels)
-        uv = (mapped.matrix @ np.asarray(reading.uv, float)[first])[mapped.quads].reshape(-1, 2)
+        uv = _quad_uvs(surface, reading.uv, modifier, fine.levels).reshape(-1, 2)
     return Reading(subdivided, reading.faces[polygon], uv, None)
+
+
+def _quad_uvs(surface: Surface, uv: np.ndarray, modifier: SubdivisionModifier, levels: int) -> np.ndarray:
+    """UVs (q,4,2) of the quads of a subdivided surface whose cage has the UVs (c,2)."""
+    values = np.asarray(uv, float)
+    vertex, first = _uv_vertices(surface.corner_vertex, values)
+    mapped = subdivided_uv(vertex, surface.face_start, surface.corner_vertex[first], modifier, levels)
+    return (mapped.matrix @ values[first])[mapped.quads]
+
+
+def polygon_uv_areas(surface: Surface, uv: np.ndarray, modifier: SubdivisionModifier) -> np.ndarray:
+    """Areas (f,) of the polygons of a cage in the UVs that the modifier makes of its own, (c,2)."""
+    fine = subdivided_surface(surface, modifier, MOST_QUADS)
+    quads = _quad_uvs(surface, uv, modifier, fine.levels)
+    areas = _quad_areas(np.pad(quads, ((0, 0), (0, 0), (0, 1))))
+    return np.bincount(fine.subdivision.polygon, areas, len(surface.face_start) - 1)
 
 
 def subdivided_surface(surface: Surface, modifier: SubdivisionModifier, most: int) -> SubdividedSurface:
@@ -137,8 +151,9 @@ def subdivided_uv(
     return subdivide(cage, levels, modifier.limit)
 
 
-def subdivided_target(surface: Surface, modifier: SubdivisionModifier) -> Target:
-    """What every polygon of a cage shall get: its area on the subdivided surface."""
+def subdivided_target(surface: Surface, modifier: SubdivisionModifier, other: Target | None = None) -> Target:
+    """What every polygon of a cage shall get: its area on the subdivided surface, times the density of another target,
+    with whose region."""
     count = len(surface.face_start) - 1
     fine = subdivided_surface(surface, modifier, MOST_QUADS).polygon_areas(count)
     area = face_areas(surface.positions, surface.corner_vertex[surface.triangles])
@@ -147,7 +162,17 @@ def subdivided_target(surface: Surface, modifier: SubdivisionModifier) -> Target
     density = np.where(usable, fine / np.where(usable, own, 1), 1.0)
     middle = np.median(density[usable]) if usable.any() else 1.0
     # A polygon that vanishes on either side still needs a place.
-    return Target(np.clip(density, 1e-2 * middle, 1e2 * middle)[surface.triangle_face])
+    density = np.clip(density, 1e-2 * middle, 1e2 * middle)[surface.triangle_face]
+    return Target(density) if other is None else Target(density * other.density, other.region)
+
+
+def on_subdivided_surface(surface: Surface, modifier: SubdivisionModifier) -> Surface:
+    """The cage with its vertices where they are on the subdivided surface, whose curvature and lengths it has then."""
+    used = np.unique(surface.corner_vertex)
+    positions, n = surface.positions.copy(), len(surface.positions)
+    fine = subdivided_surface(surface, modifier, MOST_QUADS).subdivision
+    positions[used] = (fine.matrix[:n] @ surface.positions)[used]
+    return replace(surface, positions=positions)
 
 
 def refinable(surface: Surface) -> bool:
@@ -161,15 +186,21 @@ def refined_on_subdivision(
     modifier: SubdivisionModifier,
     pins: CornerPins | None,
     boundary: str,
+    density: np.ndarray | None = None,
 ) -> Steps[SurfaceMap]:
     """The maps of the charts of a cage refined for the areas of the subdivided surface, with its figures.
 
-    Pinned vertices stay, and so do the outlines of disks and squares.
+    Pinned vertices stay, and so do the outlines of disks and squares. density (m,): of the cage's triangles, which
+    multiplies the area on the subdivided surface that their polygons ask for
     """
     if not refinable(surface):
         return found
     fine = subdivided_surface(surface, modifier, REFINED_QUADS)
     part = _mapped_part(surface, found, fine, modifier)
+    if density is not None:
+        of_polygon = np.ones(len(surface.face_start) - 1)
+        of_polygon[surface.triangle_face] = density
+        part = replace(part, density=of_polygon[part.polygon])
     if not len(part.corners):
         return found
     fixed = _fixed(found, pins, boundary)
@@ -209,17 +240,24 @@ def _refined_in_stages(
 @dataclass(frozen=True)
 class _MappedQuads:
     """The quads of a subdivided surface that charts map: corners (q,4,3) in space, the polygon and the chart (q,) of
-    each, the UVs' subdivision, and the first (k+1,) of each chart's vertices among all."""
+    each, the density (q,) by which its area counts, the UVs' subdivision, and the first (k+1,) of each chart's vertices
+    among all."""
 
     corners: np.ndarray
     polygon: np.ndarray
     chart: np.ndarray
+    density: np.ndarray
     mapping: Subdivision
     first: np.ndarray
 
+    @property
+    def areas(self) -> np.ndarray:
+        """Areas (q,) that the quads ask for."""
+        return _quad_areas(self.corners) * self.density
+
     def resized(self, found: SurfaceMap, fixed: np.ndarray) -> SurfaceMap:
         """The maps with the area of the subdivided surface, where no vertex (n,) bool is fixed."""
-        space = np.bincount(self.chart, _quad_areas(self.corners), len(found.charts))
+        space = np.bincount(self.chart, self.areas, len(found.charts))
         maps = []
         for k, (chart, old) in enumerate(zip(found.charts, found.maps, strict=True)):
             covered = signed_areas(old.uv, chart.triangles).sum()
@@ -241,7 +279,7 @@ class _MappedQuads:
     def _shares(self, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Shares (q,) that quads have of the area in UVs (n,2) of the cage, and in space."""
         mapped = (self.mapping.matrix @ uv)[self.mapping.quads]
-        area, space = _quad_areas(np.pad(mapped, ((0, 0), (0, 0), (0, 1)))), _quad_areas(self.corners)
+        area, space = _quad_areas(np.pad(mapped, ((0, 0), (0, 0), (0, 1)))), self.areas
         return area / area.sum(), space / space.sum()
 
     def symmetry(
@@ -250,7 +288,7 @@ class _MappedQuads:
         """UVs (n,2) about the axes of their charts, and their symmetry; as they are, and none, with fixed vertices."""
         if fixed.any():
             return uv, None
-        polygon_area = np.bincount(self.polygon, _quad_areas(self.corners), int(self.polygon.max()) + 1)
+        polygon_area = np.bincount(self.polygon, self.areas, int(self.polygon.max()) + 1)
         around = []
         for chart in found.charts:
             n = len(chart.vertices)
@@ -268,11 +306,11 @@ class _MappedQuads:
         triangles = np.concatenate([c.triangles + k for c, k in zip(found.charts, self.first, strict=False)])
         covered = np.bincount(owner[triangles[:, 0]], signed_areas(uv, triangles), count)
         triangles = triangles[signed_areas(uv, triangles) > 0]
-        space = np.bincount(self.chart, _quad_areas(self.corners), count)
+        space = np.bincount(self.chart, self.areas, count)
         bound = np.bincount(owner, fixed, count) > 0
         scale = np.where(bound & (space > 0), covered / np.where(space > 0, space, 1), 1.0)
         positions = np.concatenate([c.vertices for c in found.charts])
-        scales = np.concatenate([scale[self.chart], scale[owner[triangles[:, 0]]]])
+        scales = np.concatenate([scale[self.chart] * self.density, scale[owner[triangles[:, 0]]]])
         return subdivided_elements(self.corners, self.mapping.quads, positions[triangles], triangles, scales)
 
 
@@ -293,7 +331,8 @@ def _mapped_part(
     owner = np.repeat(np.arange(len(found.charts)), np.diff(first))
     chart = owner[vertex[start[:-1]]][mapping.polygon]
     mine = whole[fine.subdivision.polygon]
-    return _MappedQuads(fine.corners[mine], fine.subdivision.polygon[mine], chart, mapping, first)
+    polygon = fine.subdivision.polygon[mine]
+    return _MappedQuads(fine.corners[mine], polygon, chart, np.ones(len(polygon)), mapping, first)
 
 
 def _with_figures(old: ChartMap, uv: np.ndarray, corners: np.ndarray, mapped: np.ndarray) -> ChartMap:

@@ -136,7 +136,7 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
     if modifier is not None:
         share = CAGE_SHARE
         if options.boundary != "free" or not refinable(job.surface):
-            target = subdivided_target(job.surface, modifier)
+            target = subdivided_target(job.surface, modifier, job.target)
     given: dict[str, Any] = {
         "options": options,
         "pins": job.pins,
@@ -148,7 +148,8 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
     found = yield from part_of(steps, 0.0, share)
     if modifier is None or options.kind != "authalic":
         return found
-    rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary)
+    density = None if job.target is None else job.target.density
+    rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary, density)
     return (yield from part_of(rest, share, 1 - share))
 
 

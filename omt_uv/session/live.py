@@ -12,11 +12,13 @@ import numpy as np
 from ..blender import mesh as blender_mesh
 from ..pipelines.layout import Refusal, pack_islands
 from ..pipelines.refine import found_islands
+from ..pipelines.subdivision import subdivided_target
 from ..settings import Settings
+from ..solver.analysis.density import Target
 from ..solver.editing.live_map import LiveMap
 from ..solver.errors import MeshError
 from ..solver.mesh.charts import Chart
-from ..solver.parameterization.chart_indices import located
+from ..solver.parameterization.chart_indices import chart_target, located
 from ..solver.progress import drain
 from .run import Disturbed
 
@@ -32,6 +34,7 @@ MOVED = 1e-5
 class _LiveIsland:
     """An island of object number `owner`: corners (k,) to write, their vertices (k,), and corners of its pins (p,).
 
+    density : (m,) of the area that its triangles ask for, if that is not their own
     targets : where soft pins were dragged to, (p,2); written : UVs (k,2) as this session wrote them last
     """
 
@@ -41,6 +44,7 @@ class _LiveIsland:
     vertices: np.ndarray
     pin_corners: np.ndarray
     live_map: LiveMap
+    density: np.ndarray | None = None
     targets: np.ndarray | None = None
     written: np.ndarray | None = None
 
@@ -49,13 +53,14 @@ class Session:
     """Islands of the chosen faces, from the moment on when it is made.
 
     soft : pins give way to the shape of their island, which follows them as a whole
+    subdivided : polygons ask for their areas on the surface that their object's modifier makes of them
 
     Raises
     ------
     Refusal : with the index of the object and the MeshError that says why an island cannot follow
     """
 
-    def __init__(self, context: bpy.types.Context, pairs: list, soft: bool = False):
+    def __init__(self, context: bpy.types.Context, pairs: list, soft: bool = False, subdivided: bool = False):
         # Until the artist ends it.
         self.is_on = True
         self.soft = soft
@@ -67,6 +72,8 @@ class Session:
         self._sizes = [self._size(obj) for obj in self.objects]
         self._before = [reading.uv for _, reading in pairs]
         self._lost = False
+        self._targets = [_target(reading) if subdivided else None for _, reading in pairs]
+        self._surfaces = [reading.surface for _, reading in pairs]
         self._islands = [self._live(*found) for found in _islands(pairs)]
         self._whole = all(self._covers(k, reading) for k, (_, reading) in enumerate(pairs))
         self._handlers = [bpy.app.handlers.undo_post, bpy.app.handlers.redo_post, bpy.app.handlers.load_pre]
@@ -84,11 +91,13 @@ class Session:
             order = np.argsort(at[0])
             at = (at[0][order], at[1][order])
         free = np.full(len(vertices), True) if self.soft else ~np.isin(vertices, pinned)
+        target = chart_target(self._targets[owner], self._surfaces[owner], chart)
+        density = None if target is None else target.density
         try:
-            live_map = LiveMap(chart.vertices, chart.triangles, island.uv, at, chart.faces, self.soft)
+            live_map = LiveMap(chart.vertices, chart.triangles, island.uv, at, chart.faces, self.soft, density)
         except MeshError as error:
             raise Refusal(owner, located(error, chart)) from error
-        return _LiveIsland(owner, chart, corners[free], vertices[free], pin_corners, live_map)
+        return _LiveIsland(owner, chart, corners[free], vertices[free], pin_corners, live_map, density)
 
     def _covers(self, owner: int, reading) -> bool:
         """Whether every face of an object is part of an island that follows."""
@@ -156,7 +165,7 @@ class Session:
         """Distortion of the islands as they are, all together."""
         from ..solver.maps.distortion import distortion
 
-        positions, triangles, uv, polygons = [], [], [], []
+        positions, triangles, uv, polygons, density = [], [], [], [], []
         vertices = faces = 0
         for island in self._islands:
             chart = island.chart
@@ -164,10 +173,11 @@ class Session:
             triangles.append(chart.triangles + vertices)
             uv.append(island.live_map.uv[chart.triangles])
             polygons.append(chart.faces + faces)
+            density.append(np.ones(len(chart.triangles)) if island.density is None else island.density)
             vertices += len(chart.vertices)
             faces += int(chart.faces.max()) + 1
-        V, F, places, of = map(np.concatenate, (positions, triangles, uv, polygons))
-        return distortion(V, F, places, overlap=False, polygons=of)
+        V, F, places, of, asked = map(np.concatenate, (positions, triangles, uv, polygons, density))
+        return distortion(V, F, places, overlap=False, density=asked, polygons=of)
 
     def pack(self, settings: Settings) -> bool:
         """Pack the islands into the tile again, if they are all that the objects have, and none is pinned."""
@@ -216,6 +226,13 @@ class Session:
 
     def _on_exchange(self, *_) -> None:
         self._lost = True
+
+
+def _target(reading) -> Target | None:
+    """What the polygons of a reading ask for, None for their own areas."""
+    if reading.subdivision is None:
+        return None
+    return subdivided_target(reading.surface, reading.subdivision)
 
 
 def _islands(pairs: list) -> list:

@@ -169,3 +169,50 @@ def test_pins_stay():
     unwrap()
     assert np.allclose(scenes.uv_of(obj)[pinned], before[pinned], atol=1e-6)
     assert (applied(obj)[1] > 0).all() and error(obj) < 0.05
+
+
+def test_refine_keeps_the_areas_of_the_subdivided_surface():
+    obj = bump()
+    unwrap(use_subdivision=False)
+    without = error(obj)
+    assert bpy.ops.uv.omt_refine() == {"FINISHED"}
+    assert (applied(obj)[1] > 0).all() and error(obj) < min(0.02, 0.7 * without)
+    bpy.ops.uv.omt_refine(use_subdivision=False)
+    assert error(obj) > 0.7 * without
+
+
+def test_magnify_asks_for_shares_of_the_subdivided_surface(package):
+    obj = bump()
+    group = obj.vertex_groups.new(name="Region")
+    group.add([k for k, v in enumerate(obj.data.vertices) if v.co.x < 0.4], 1.0, "REPLACE")
+    assert bpy.ops.uv.omt_magnify(factor=1.5, source="MESH", weight_group="Region") == {"FINISHED"}
+    rows = dict(package("session.last_run").state.summary.rows)
+    asked, now = (float(rows[name].split()[0]) for name in ("Region asked", "Region now"))
+    assert now == pytest.approx(asked, rel=0.02)
+    assert (applied(obj)[1] > 0).all()
+
+
+def test_seams_are_searched_on_the_subdivided_surface(package):
+    obj = scenes.cube()
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 2
+    values = package("blender.mesh").read(obj)
+    surface = package("pipelines.subdivision").on_subdivided_surface(values.surface, values.subdivision)
+    assert np.ptp(surface.positions, axis=0).max() < 0.9 * np.ptp(values.surface.positions, axis=0).max()
+    assert bpy.ops.uv.omt_seams() == {"FINISHED"}
+    assert sum(edge.use_seam for edge in obj.data.edges) > 2
+
+
+def test_live_gives_polygons_their_areas_on_the_subdivided_surface():
+    obj = bump()
+    unwrap(use_subdivision=False)
+    # Blender's own quads lie polygon by polygon, 16 of two triangles each.
+    space = applied(obj)[0].reshape(-1, 32).sum(axis=1)
+    errors = []
+    for used in (False, True):
+        bpy.context.window_manager.operator_properties_last("uv.omt_unwrap").use_subdivision = used
+        assert bpy.ops.uv.omt_live() == {"FINISHED"}
+        uv = scenes.polygon_areas(obj)[1]
+        errors.append(np.abs(uv / uv.sum() - space / space.sum()).sum())
+    bpy.context.window_manager.operator_properties_last("uv.omt_unwrap").use_subdivision = True
+    assert errors[1] < 0.01 < errors[0]

@@ -18,6 +18,7 @@ from ..mesh.topology import halfedges, pair_keys, pair_up
 from .facing import Facing, ahead, facing, salient_weights, towards
 from .feature_edges import fold_angles
 from .occlusion import vertex_occlusion
+from .order_of_places import order_of_places
 from .saliency import curvature_means, saliency_of, unit_size
 from .symmetry_plane import NEAR, SymmetryPlane, symmetry_plane
 
@@ -115,11 +116,11 @@ def seam_costs(
     # Vertices of no triangle may be anywhere, and nowhere.
     used, triangles = np.unique(surface.corner_vertex[corners], return_inverse=True)
     triangles = triangles.reshape(-1, 3)
-    space = surface.positions[used]
-    if degenerate_triangles(space, triangles).all():
+    if degenerate_triangles(surface.positions[used], triangles).all():
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
     side = polygon_sides(len(surface.corner_vertex), surface.face_start, corners)
-    keys = np.unique(pair_keys(*(ends[side] for ends in halfedges(triangles))))
+    used, triangles = _in_order(surface.positions, used, triangles)
+    space, keys = surface.positions[used], np.unique(pair_keys(*(ends[side] for ends in halfedges(triangles))))
     edges = np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
     positions = unit_size(space, triangles)
     plane = symmetry_plane(positions, triangles, owner)
@@ -135,13 +136,24 @@ def seam_costs(
     for name, reason in reasons.items():
         cost *= getattr(preferences, name) ** reason
     cost = np.clip(cost, LEAST, MOST)
-    ends, n = used[edges], len(surface.positions)
+    ends, n = np.sort(used[edges], axis=1), len(surface.positions)
+    ascending = np.lexsort(ends.T[::-1])
+    ends, cost = ends[ascending], cost[ascending]
+    reasons = {name: reason[ascending] for name, reason in reasons.items()}
     count = np.bincount(ends.ravel(), minlength=n)
     total = np.bincount(ends.ravel(), np.repeat(cost, 2), n)
     vertex_cost = np.where(count > 0, total / np.maximum(count, 1), 1.0)
     face = np.zeros(n)
     face[used] = in_face
     return SeamCosts(ends, cost, reasons, vertex_cost, face, plane, seen)
+
+
+def _in_order(positions: np.ndarray, used: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices `used` (u,) in the order of their places, and triangles (m,3) of these."""
+    order = order_of_places(positions[used], triangles)
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    return used[order], place[triangles]
 
 
 def _among_all(plane: SymmetryPlane, used: np.ndarray, n: int) -> SymmetryPlane:

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from ..analysis.feature_edges import fold_angles
 from ..mesh.gluing import Gluing, groups
 from ..mesh.topology import halfedges
+from .component_order import in_order
 
 # Cost of a cut per length. A sharp edge or a fold hides a cut, most of all in a hollow; an edge at a full right
 # angle counts as these shares of its length. Shares near 1 keep cuts short: their length is bounded by them.
@@ -135,6 +136,8 @@ def make_component(
 ) -> CutComponent:
     """The component of the triangles `members` (m,), in ascending order, and the pairs (e,) between them.
 
+    Its arrays are in the order of `component_order.in_order`.
+
     Parameters
     ----------
     positions : (n,3) of the surface, in a unit box
@@ -144,12 +147,15 @@ def make_component(
     """
     corners = gluing.triangles[members]
     _, index, inverse = np.unique(corner_class[corners], return_index=True, return_inverse=True)
-    triangles = inverse.reshape(-1, 3).astype(np.int64)
     vertex_ids = gluing.vertex[corners.ravel()[index]]
     pair = np.stack([gluing.first[pairs], gluing.second[pairs]], axis=1)
-    filled = (gluing.owner[pair // 3] < 0).any(axis=1)
-    diagonal = ~gluing.side[pair[:, 0]] & ~filled
     pair = 3 * np.searchsorted(members, pair // 3) + pair % 3
+    given = inverse.reshape(-1, 3).astype(np.int64)
+    order = in_order(positions[vertex_ids], given, pair)
+    triangles, pair = order.triangles, order.pair
+    members, pairs, vertex_ids = members[order.rows], pairs[order.pairs], vertex_ids[order.vertices]
+    filled = (gluing.owner[members[pair // 3]] < 0).any(axis=1)
+    diagonal = ~gluing.side[gluing.first[pairs]] & ~filled
     tail, head = halfedges(triangles)
     ends = np.stack([tail[pair[:, 0]], head[pair[:, 0]]], axis=1)
     p = positions[vertex_ids]

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from ..errors import MERGING, TURN_OUTSIDE
+from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups, orientations, turn_over
 from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluing
@@ -126,6 +127,7 @@ def cut(
     ------
     EmptyMeshError, NonFiniteError : see `charts.strict_charts`; everything else is repaired and said in the warnings
     """
+    surface = cut_along_shorter(surface)
     faces, triangles, owner = chosen_triangles(surface, faces)
     repaired = repaired_gluing(surface, faces, triangles, owner)
     options: dict[str, Any] = {

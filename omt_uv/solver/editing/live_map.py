@@ -36,6 +36,7 @@ class LiveMap:
     pins : vertices (k,) and their places (k,2)
     polygons : (m,) polygon of every triangle; by default each is its own
     soft : whether the pins give way to the shape of the island, which follows them as a whole
+    target : (m,) density of the area that each triangle asks for, see `refine_island.refine_island`
 
     Attributes
     ----------
@@ -54,10 +55,11 @@ class LiveMap:
         pins: tuple[np.ndarray, np.ndarray] | None = None,
         polygons: np.ndarray | None = None,
         soft: bool = False,
+        target: np.ndarray | None = None,
     ):
         self._mesh = mesh = renumbered(vertices, triangles, uv, pins, polygons)
         self._given = given = mesh.uv @ [1, 1j]
-        self._faces = faces = island_elements(mesh, polygons)
+        self._faces = faces = island_elements(mesh, polygons, target)
         boundary = boundary_edges(mesh.triangles)
         start, self.warnings = island_start(mesh.vertices, mesh.triangles, given, boundary, mesh.pins is not None)
         guard = None if meets_itself(start, boundary) else boundary

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import FoldedUVError, MeshError
+from ..errors import FoldedUVError, MeshError, positive_density
 from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import Elements, area_error
 from ..maps.mirror_symmetry import MirrorSymmetry
@@ -47,6 +47,7 @@ def refine_island(
     quality: str = "standard",
     pins: tuple[np.ndarray, np.ndarray] | None = None,
     polygons: np.ndarray | None = None,
+    target: np.ndarray | None = None,
 ) -> Steps[Refinement]:
     """Refine a map uv (n,2) of a connected surface (n,3), (m,3) with one or more boundaries.
 
@@ -58,9 +59,11 @@ def refine_island(
     balance, quality : see `refine.refine`
     pins : vertices (k,) and their places (k,2); two or more fix place, direction and scale
     polygons : (m,) polygon of every triangle, whose area counts as a whole; by default each is its own
+    target : density (m,) > 0 of the area that each triangle asks for, relative to its own; 1 by default
 
     Raises
     ------
+    DensityError : a target that is not positive and finite
     FoldedUVError : a map without area, or folds that no other start could remove
     PinError : pins that contradict each other or force a fold
 
@@ -73,7 +76,8 @@ def refine_island(
     yield Progress("Refinement", 0.0)
     mesh = renumbered(vertices, triangles, uv, pins, polygons)
     try:
-        found, error, warnings = yield from _refined(mesh, polygons, balance, QUALITIES[quality])
+        faces = island_elements(mesh, polygons, target)
+        found, error, warnings = yield from _refined(mesh, polygons, faces, balance, QUALITIES[quality])
     except MeshError as problem:
         raise mesh.original_error(problem) from problem
     refined = mesh.original(found.w)
@@ -83,11 +87,10 @@ def refine_island(
 
 
 def _refined(
-    mesh: Renumbered, polygons: np.ndarray | None, balance: float, settings: Quality
+    mesh: Renumbered, polygons: np.ndarray | None, faces: Elements, balance: float, settings: Quality
 ) -> Steps[tuple[ContinuationResult, float, tuple[str, ...]]]:
     """What was found from the map given, in its place; its area error; warnings."""
     given, pins, n = mesh.uv @ [1, 1j], mesh.pins, len(mesh.uv)
-    faces = island_elements(mesh, polygons)
     boundary = boundary_edges(mesh.triangles)
     several = pins if pins is not None and len(pins.vertices) > 2 else None
     fixed = several is not None
@@ -119,13 +122,17 @@ def _refined(
     return found, error, (*warnings, *found.warnings)
 
 
-def island_elements(mesh: Renumbered, polygons: np.ndarray | None) -> Elements:
-    """Elements of a surface whose polygons (m,) shall have their own areas.
+def island_elements(mesh: Renumbered, polygons: np.ndarray | None, target: np.ndarray | None = None) -> Elements:
+    """Elements of a surface whose polygons (m,) shall have their own areas, times a density (m,) of its triangles.
 
     The energy weighs lengths: surface and map are measured in the same unit, in which both have the area 1.
     """
     vertices = mesh.vertices / np.sqrt(face_areas(mesh.vertices, mesh.triangles).sum())
-    return polygon_elements(vertices, mesh.triangles, face_areas(vertices, mesh.triangles), polygons)
+    asked = face_areas(vertices, mesh.triangles)
+    if target is not None:
+        asked = asked * positive_density(target)
+        asked = asked / asked.sum()
+    return polygon_elements(vertices, mesh.triangles, asked, polygons)
 
 
 def _symmetric(

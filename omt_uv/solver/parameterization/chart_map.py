@@ -39,7 +39,7 @@ from .initial_map import (
     mean_value_sites,
 )
 from .options import MapOptions
-from .polygon_disk import of_polygon_disk, polygon_disk
+from .polygon_disk import of_polygon_disk, polygon_disk, with_centres
 
 # Where the time of a chart goes, roughly, as start and width in [0, 1]: a bar that moves evenly needs no more.
 INITIAL = (0.0, 0.4)
@@ -156,6 +156,20 @@ def _refuse_pins(pins: ChartPins | None, options: MapOptions) -> None:
     refuse_pins_on_outline(pins, options.boundary)
     if pins is not None and options.kind != "authalic":
         raise PinError("Pins are kept by area preserving maps alone", "Unpin these vertices, or map by areas")
+
+
+def refined_again(chart: Chart, uv: np.ndarray, options: MapOptions, target: Target | None = None) -> Steps[np.ndarray]:
+    """A map uv (n,2) of a chart without pins, refined further from where it is; errors are those of `map_chart`."""
+    vertices, unit = in_unit_box(chart.vertices)
+    disk = _disk_mesh(vertices, chart, options, target, RunLog(), ChartMarkers())
+    start = with_centres(uv / unit, disk.triangles, len(disk.vertices))
+    again = RefinementOptions(boundary=disk.boundary, balance=options.balance, quality=options.quality, warm_start=True)
+    asked = None if target is None else disk.target
+    refined = yield from refine(
+        disk.vertices, disk.triangles, start, again, target=asked, region=disk.region, polygons=disk.polygons
+    )
+    density = None if target is None else target.density
+    return placed_chart(refined.uv[: len(uv)], vertices, chart, density, unit, None, disk.boundary == "free")
 
 
 def _chart_map(

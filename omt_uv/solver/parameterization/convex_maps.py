@@ -8,16 +8,19 @@ from dataclasses import replace
 import numpy as np
 
 from ..analysis.density import Target
+from ..errors import MeshError
+from ..maps.distortion import Distortion
 from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart
 from ..mesh.geometry import signed_areas
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops
+from ..progress import Steps
 from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import chart_target
-from .chart_map import FOLDED, ChartMap, in_unit_box, measured_chart
+from .chart_map import FOLDED, ChartMap, in_unit_box, measured_chart, refined_again
 from .chart_pins import ChartPins
-from .convexity import keep_convex
+from .convexity import keep_convex, reflex_triangles
 from .options import MapOptions
 from .polygon_disk import cut_as_mapped
 
@@ -32,21 +35,27 @@ def with_convex_polygons(
     pins: Sequence[ChartPins | None],
     options: MapOptions,
     target: Target | None = None,
-) -> list[ChartMap]:
+    drawn: Surface | None = None,
+) -> Steps[list[ChartMap]]:
     """The maps with polygons that are convex on the surface convex in them, too, as far as may be: `keep_convex`.
 
-    pins : of every chart; options and target : those of the maps. A map that would lose its areas stays as it is.
+    Charts without pins are opened there whatever it costs, and refined from then on: quads that are convex stay so.
+    Where that fails, corners are opened as far as areas can be spared. A map that would lose its areas stays as it is.
+    pins : of every chart; options and target : those of the maps; drawn : the surface with the triangles of who draws
+    it
     """
+    drawn = surface if drawn is None else drawn
     if not (np.diff(surface.face_start) > 3).any():
         return maps
+    targets = [chart_target(target, surface, c) for c in charts]
+    maps = yield from _opened(drawn, charts, maps, pins, options, targets)
     given, charts = charts, [cut_as_mapped(c, m.uv) for c, m in zip(charts, maps, strict=True)]
     fixed = [_fixed(c, p, options.boundary) for c, p in zip(charts, pins, strict=True)]
-    targets = [chart_target(target, surface, c) for c in charts]
     density = [None if t is None else t.density for t in targets]
     goal = QUALITIES[options.quality].area_error
     spare = [AREA_KEPT * max(m.area_l1, goal) - m.area_l1 for m in maps]
     new = list(maps)
-    found = keep_convex(surface, charts, [m.uv for m in maps], fixed, density, [m.area_weight for m in maps], spare)
+    found = keep_convex(drawn, charts, [m.uv for m in maps], fixed, density, [m.area_weight for m in maps], spare)
     for k, uv in found.items():
         chart, old = given[k], maps[k]
         (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
@@ -54,10 +63,65 @@ def with_convex_polygons(
         if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and not figures.folds:
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
-            names = ("area_l1", "area_sd", "angle_mean", "folds")
-            warnings = tuple(text for text in old.warnings if not text.endswith(FOLDED))
-            new[k] = replace(old, uv=uv, warnings=warnings, **{name: getattr(figures, name) for name in names})
+            new[k] = _measured(old, uv, figures)
     return new
+
+
+def _opened(
+    surface: Surface,
+    charts: list[Chart],
+    maps: list[ChartMap],
+    pins: Sequence[ChartPins | None],
+    options: MapOptions,
+    targets: Sequence[Target | None],
+) -> Steps[list[ChartMap]]:
+    """The maps, those in which corners are folded refined again from where they are open, if that keeps them so."""
+    folded = reflex_triangles(surface, charts, [m.uv for m in maps])
+    some = [k for k in np.flatnonzero(folded) if pins[k] is None]
+    # Corners of squares and rectangles, and drafts, stay as they were chosen.
+    if not some or options.quality == "draft" or options.boundary not in ("free", "disk"):
+        return maps
+    fixed = [_fixed(charts[k], None, options.boundary) for k in some]
+    density = [None if t is None else t.density for t in (targets[k] for k in some)]
+    cut = [cut_as_mapped(charts[k], maps[k].uv) for k in some]
+    uvs, weights = [maps[k].uv for k in some], [maps[k].area_weight for k in some]
+    opened = keep_convex(surface, cut, uvs, fixed, density, weights, None)
+    new, goal = list(maps), QUALITIES[options.quality].area_error
+    for place, start in opened.items():
+        k = some[place]
+        chart, old = charts[k], maps[k]
+        try:
+            uv = yield from refined_again(chart, start, options, targets[k])
+        except MeshError:
+            # The map that there is has no error.
+            continue
+        if options.boundary == "free":
+            (flat, unit) = in_unit_box(uv)
+            uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
+        (vertices, _), (flat, _) = in_unit_box(chart.vertices), in_unit_box(uv)
+        figures = measured_chart(vertices, chart, flat, density[place])
+        fewer = reflex_triangles(surface, [chart], [uv])[0] < folded[k] and figures.folds <= old.folds
+        if fewer and figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal):
+            new[k] = _measured(old, uv, figures)
+    return new
+
+
+def _measured(old: ChartMap, uv: np.ndarray, figures: Distortion) -> ChartMap:
+    """A map with other UVs and their figures."""
+    names = ("area_l1", "area_sd", "angle_mean", "folds")
+    warnings = tuple(text for text in old.warnings if not text.endswith(FOLDED))
+    return replace(old, uv=uv, warnings=warnings, **{name: getattr(figures, name) for name in names})
+
+
+def with_folds_counted(chart: Chart, chart_map: ChartMap) -> ChartMap:
+    """The map with the folds of the triangles that the chart has now."""
+    area = signed_areas(chart_map.uv, chart.triangles)
+    # Pins may turn a chart over as a whole.
+    folds = len(np.unique(chart.faces[area * np.sign(area.sum()) <= 0]))
+    if folds == chart_map.folds:
+        return chart_map
+    warnings = tuple(text for text in chart_map.warnings if not text.endswith(FOLDED))
+    return replace(chart_map, folds=folds, warnings=(*warnings, f"{folds} {FOLDED}") if folds else warnings)
 
 
 def _fixed(chart: Chart, pins: ChartPins | None, boundary: str) -> np.ndarray:

@@ -46,7 +46,7 @@ def keep_convex(
     fixed: Sequence[np.ndarray],
     density: Sequence[np.ndarray | None],
     area_weights: Sequence[float],
-    spare: Sequence[float],
+    spare: Sequence[float] | None,
 ) -> dict[int, np.ndarray]:
     """Make the corners of convex polygons convex in the maps: new maps, by the number of the chart, where any changed.
 
@@ -58,7 +58,7 @@ def keep_convex(
     fixed : (n_i,) bool, vertices that stay
     density : (m_i,) of the triangles, None where they get their own areas
     area_weights : of the area term, one for each chart
-    spare : by how much the area error of each chart may grow
+    spare : by how much the area error of each chart may grow; None for a start of a refinement, whatever it costs
     """
     first = np.cumsum([0, *(len(uv) for uv in maps)])
     # In units of the map, so that no area under- or overflows.
@@ -71,7 +71,7 @@ def keep_convex(
     mesh = _union(charts, first, density, area_weights, spare, w)
     immobile = np.concatenate(fixed)
     for attempt in range(ATTEMPTS):
-        moved = _relaxed(mesh, w, corners, immobile)
+        moved = _relaxed(mesh, w, corners, immobile, spare is None)
         changed = np.unique(np.searchsorted(first, np.flatnonzero(moved != w), side="right") - 1)
         loops = [boundary_loops(charts[k].disk)[0] + first[k] for k in changed]
         crossed = [_crossed(w, moved, loop, attempt == ATTEMPTS - 2) for loop in loops]
@@ -84,6 +84,16 @@ def keep_convex(
         rows = np.flatnonzero(moved[mine] != w[mine])
         uv[rows] = unit * np.column_stack([moved.real, moved.imag])[mine][rows]
     return new
+
+
+def reflex_triangles(surface: Surface, charts: Sequence[Chart], maps: Sequence[np.ndarray]) -> np.ndarray:
+    """How many corners of convex polygons of each chart (c,) are triangles without area, or folded, in maps (n_i,2)."""
+    first = np.cumsum([0, *(len(uv) for uv in maps)])
+    w = np.concatenate(maps) @ [1, 1j]
+    triangles = np.concatenate([c.triangles + k for c, k in zip(charts, first, strict=False)])
+    corners = _mapped_corners(surface, charts, triangles, w)
+    folded = corners.triangles[corners.areas(w) <= 0, 0]
+    return np.bincount(np.searchsorted(first, folded, side="right") - 1, minlength=len(charts))
 
 
 def _union(charts, first, density, area_weights, spare, w) -> CornerMesh:
@@ -102,7 +112,7 @@ def _union(charts, first, density, area_weights, spare, w) -> CornerMesh:
         # Pins give a chart a scale of its own.
         target[begin[k] : begin[k + 1]] *= covered[own].sum() / target[own].sum()
     chart = np.repeat(np.arange(len(charts)), np.diff(begin))
-    spare = np.asarray(spare, float) * np.bincount(chart, target, len(charts))
+    spare = np.asarray(np.zeros(len(charts)) if spare is None else spare) * np.bincount(chart, target, len(charts))
     return CornerMesh(
         positions=positions,
         triangles=triangles,
@@ -123,6 +133,7 @@ def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.nda
     area = np.bincount(owner, 0.5 * ((b - a).conj() * (c - a)).imag, len(surface.face_start) - 1)
     ears = vertex[corner]
     kept = (ears >= 0).all(1) & (area[polygon] > 0)
+    kept[kept] &= _possible(ears[kept], corner[kept], surface)
     ears, polygon = ears[kept], polygon[kept]
     share, whole = share[kept], area[polygon]
     kept_share = np.maximum(share, STRAIGHT)
@@ -137,6 +148,25 @@ def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.nda
     return replace(found, triangles=np.where(turned[:, None], ears[:, [0, 2, 1]], ears))
 
 
+def _possible(ears: np.ndarray, corner: np.ndarray, surface: Surface) -> np.ndarray:
+    """Which corners (k,), triangles of vertices `ears` (k,3) and of `corner` (k,3) of the surface, may all be convex.
+
+    Around a vertex that only two polygons share no more than one of them is. It is the one whose corner is a triangle
+    of the surface: who draws it has the other diagonal in the other one.
+    """
+    _, label, count = np.unique(np.sort(ears, axis=1), axis=0, return_inverse=True, return_counts=True)
+    label = label.ravel()
+    twice = count[label] > 1
+    if not twice.any():
+        return ~twice
+    asked = np.sort(corner[twice], axis=1)
+    near = np.sort(surface.triangles[np.isin(surface.triangles, asked).all(axis=1)], axis=1)
+    same = np.unique(np.concatenate([near, asked]), axis=0, return_inverse=True)[1].ravel()
+    shown = np.zeros(len(ears), bool)
+    shown[twice] = np.isin(same[len(near) :], same[: len(near)])
+    return ~twice | (shown & (np.bincount(label, shown)[label] == 1))
+
+
 def _crossed(w: np.ndarray, moved: np.ndarray, loop: np.ndarray, all_of_it: bool) -> np.ndarray:
     """Vertices of an outline (b,) about the places where it crosses itself, or all of it, if it did not before."""
     pairs = crossings(moved, loop)
@@ -145,8 +175,11 @@ def _crossed(w: np.ndarray, moved: np.ndarray, loop: np.ndarray, all_of_it: bool
     return loop if all_of_it else np.unique([np.roll(loop, -k)[pairs] for k in range(-2, 4)])
 
 
-def _relaxed(mesh: CornerMesh, w: np.ndarray, corners: PolygonCorners, fixed: np.ndarray) -> np.ndarray:
-    """The map w (n,) complex with the vertices around reflex corners placed anew, those `fixed` (n,) excepted."""
+def _relaxed(mesh: CornerMesh, w: np.ndarray, corners: PolygonCorners, fixed: np.ndarray, opening: bool) -> np.ndarray:
+    """The map w (n,) complex with the vertices around reflex corners placed anew, those `fixed` (n,) excepted.
+
+    opening: as a start of a refinement, which gives the faces their areas back
+    """
     triangles = mesh.triangles
     free = _around(corners.triangles[corners.reflex(w)], triangles, len(w)) & ~fixed
     here = free[corners.triangles].any(1)
@@ -163,7 +196,7 @@ def _relaxed(mesh: CornerMesh, w: np.ndarray, corners: PolygonCorners, fixed: np
     place[vertices] = np.arange(len(vertices))
     patches = CornerPatches(mesh.of(vertices, faces, place), corners.of(here, place), free[vertices])
     moved = w.copy()
-    moved[vertices] = patches.convexified(w[vertices])
+    moved[vertices] = patches.opened(w[vertices]) if opening else patches.convexified(w[vertices])
     return moved
 
 

@@ -93,15 +93,16 @@ class CornerPatches:
         # As `Elements` measures areas.
         self.spare = mesh.spare / face_areas(mesh.positions, triangles).sum()
 
+    def opened(self, w: np.ndarray) -> np.ndarray:
+        """The map w (n,) with corners made convex in those patches where fewer are reflex then, at whatever cost."""
+        given, w = w, self._forced(w)
+        w = self._stepped(w, self.area_weight, self._barrier(w, self.strength))
+        return np.where((self._reflex_count(w) < self._reflex_count(given))[self.of_vertex], w, given)
+
     def convexified(self, w: np.ndarray) -> np.ndarray:
         """The map w (n,) with corners made convex in those patches where fewer are reflex then, and areas kept."""
-        given, strength, weight = w, self.strength, self.area_weight
-        for _ in range(CONVEXIFYING):
-            reflex = self.corners.reflex(w)
-            if not reflex.any():
-                break
-            w = self._stepped(w, weight, self._barrier(w, strength))
-            strength = np.where(reflex, 2 * strength, strength)
+        given, weight = w, self.area_weight
+        w = self._forced(w)
         for k in range(SETTLING):
             worse = (self._area_errors(w) > GROWTH * self._area_errors(given)) & (k > 1)
             weight = np.where(worse[self.of_face], HEAVIER * weight, weight)
@@ -109,6 +110,17 @@ class CornerPatches:
         gain, cost = self._reflex_count(given) - self._reflex_count(w), self._area_errors(w) - self._area_errors(given)
         good = affordable(gain, cost, self.chart, self.spare)
         return np.where(good[self.of_vertex], w, given)
+
+    def _forced(self, w: np.ndarray) -> np.ndarray:
+        """The map w (n,) after rounds with a barrier that grows stronger at corners while these are reflex."""
+        strength = self.strength
+        for _ in range(CONVEXIFYING):
+            reflex = self.corners.reflex(w)
+            if not reflex.any():
+                break
+            w = self._stepped(w, self.area_weight, self._barrier(w, strength))
+            strength = np.where(reflex, 2 * strength, strength)
+        return w
 
     def _barrier(self, w, strength) -> CornerBarrier:
         target = self.corners.target

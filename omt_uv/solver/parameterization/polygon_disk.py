@@ -12,13 +12,11 @@ import numpy as np
 
 from ..maps.polygon_elements import polygon_mesh
 from ..mesh.charts import Chart
+from ..mesh.edge_flips import shorter_diagonals
 from ..mesh.geometry import face_areas, signed_areas
-from ..mesh.topology import pair_keys
 
 # Sine, squared, of the angle by which a corner may turn inwards and count as straight.
 STRAIGHT = -1e-9
-# Share of a quad's area that the triangle at each of its corners needs for the quad to be cut anew.
-LEAST_CORNER = 1e-3
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     """The chart, with its vertices at (n,3), cut for its map."""
     faces = _numbered(chart.faces)
     cut = polygon_mesh(chart.triangles, faces, most=len(faces))
-    quads = _shorter(vertices, cut.quads, chart.disk)
+    quads = shorter_diagonals(vertices, cut.quads, chart.disk)
     own = faces[cut.rows[: len(cut.triangles)]]
     of_quads = faces[cut.rows[len(cut.triangles) :]].reshape(-1, 2)[:, 0]
     centres, fans, of_fans = _fans(vertices, cut.triangles, own)
@@ -57,6 +55,19 @@ def of_polygon_disk(values: np.ndarray, vertices: np.ndarray, chart: Chart, disk
     area = face_areas(vertices, chart.triangles)
     mean = np.bincount(faces, area * values) / np.bincount(faces, area)
     return np.where(disk.polygons >= 0, mean[disk.polygons], patch)
+
+
+def with_centres(uv: np.ndarray, triangles: np.ndarray, count: int) -> np.ndarray:
+    """A map (n,2) of a chart's vertices with the centres of its fans, `count` vertices in all, in the middle of each.
+
+    triangles (t,3): those of the disk
+    """
+    n = len(uv)
+    corner = triangles[(triangles >= n).any(axis=1)]
+    centre = corner.max(axis=1, initial=0) - n
+    others = [corner[corner < n].reshape(-1, 2)[:, k] for k in range(2)]
+    total = sum(np.column_stack([np.bincount(centre, uv[o, k], count - n) for k in range(2)]) for o in others)
+    return np.concatenate([uv, total / np.maximum(2 * np.bincount(centre, minlength=count - n), 1)[:, None]])
 
 
 def cut_as_mapped(chart: Chart, uv: np.ndarray) -> Chart:
@@ -83,32 +94,6 @@ def _numbered(faces: np.ndarray) -> np.ndarray:
     """Faces (m,) by numbers from 0 in the order in which they come, whatever they are called."""
     _, first, label = np.unique(faces, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[label.ravel()]
-
-
-def _shorter(vertices: np.ndarray, quads: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Quads (q,4) turned so that the diagonal from the first to the third corner is the shorter one that may be cut.
-
-    triangles (m,3): of the mesh; a diagonal between vertices that an edge joins would double that edge.
-    """
-    p = vertices[quads]
-    length = np.linalg.norm(p[:, [0, 1]] - p[:, [2, 3]], axis=2)
-    normal = np.cross(p[:, [1, 2, 3, 0]] - p, p[:, [3, 0, 1, 2]] - p)
-    own = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    # A triangle next to a corner that is nearly straight is a sliver: if it was given, the map has to keep it open.
-    convex = (np.einsum("qkd,qd->qk", normal, own) > LEAST_CORNER * (own**2).sum(axis=1)[:, None]).all(axis=1)
-    # Between equal ones the first corner in space decides.
-    first = np.lexsort(vertices.T[::-1])
-    rank = np.empty(len(vertices), np.int64)
-    rank[first] = np.arange(len(vertices))
-    equal = np.abs(length[:, 1] - length[:, 0]) <= 1e-9 * length.max(axis=1)
-    turned = np.where(equal, rank[quads].argmin(axis=1) % 2 == 1, length[:, 1] < length[:, 0])
-    keys = pair_keys(quads[:, 1], quads[:, 3])
-    edges = pair_keys(triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
-    _, label, count = np.unique(keys, return_inverse=True, return_counts=True)
-    single = ~np.isin(keys, edges) & (count[label] == 1)
-    cut = np.where((convex & turned & single)[:, None], np.roll(quads, -1, axis=1), quads)
-    # From the lower of the ends of the diagonal on, however the quad came.
-    return np.where((cut[:, 2] < cut[:, 0])[:, None], np.roll(cut, 2, axis=1), cut)
 
 
 def _fans(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray):

@@ -14,13 +14,14 @@ from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError
 from ..mesh.charts import Chart
+from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
-from .chart_indices import chart_target, in_order_of_places, located
+from .chart_indices import chart_target, cut_as_given, in_order_of_places, located
 from .chart_map import ChartMap, map_chart
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
-from .convex_maps import with_convex_polygons
+from .convex_maps import with_convex_polygons, with_folds_counted
 from .mirrored_charts import as_given, equal_chart_map, mirror_partners, mirrored_map, with_mirrored_quads
 from .options import UnwrapOptions
 from .shear_bound import ShearSearch, bound_shear
@@ -90,6 +91,8 @@ def unwrap(
 ) -> Steps[SurfaceMap]:
     """Map the polygons `faces` (f,) bool of a surface, all by default, so that areas are kept.
 
+    Quads are cut along their shorter diagonals for that, whichever they came with; the charts have the given ones.
+
     Parameters
     ----------
     pins : corners that keep their places, with a free boundary
@@ -103,6 +106,7 @@ def unwrap(
     MeshError : see `disk_charts.cut_to_disks` and `chart_map.map_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
+    given, surface = surface, cut_along_shorter(surface)
     task = _Task(surface, options or UnwrapOptions(), pins, target, markers)
     begin = 0.0
     if cut is None:
@@ -118,7 +122,9 @@ def unwrap(
         prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps
     charts, chart_pins = prepared.charts, [pins_of_chart(pins, chart) for chart in prepared.charts]
     if task.options.kind == "authalic":
-        maps = with_convex_polygons(surface, charts, maps, chart_pins, task.options, target)
+        maps = yield from with_convex_polygons(surface, charts, maps, chart_pins, task.options, target, given)
+    charts = [cut_as_given(chart, surface, given) for chart in charts]
+    maps = [with_folds_counted(chart, chart_map) for chart, chart_map in zip(charts, maps, strict=True)]
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
@@ -138,6 +144,7 @@ def cut_charts(
     ------
     MeshError : see `disk_charts.cut_to_disks`
     """
+    surface = cut_along_shorter(surface)
     avoid = clear_of_pins(surface, pins, avoid)
     bound = options.shear_bound()
     given: dict[str, Any] = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}

@@ -6,6 +6,7 @@ import pytest
 from short_cuts import component_of, gluing_of
 
 from omt_uv.solver.cutting.component import boundary_vertices, classify, fingerprint, fold_angles
+from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.gluing import components, corner_classes
 
 
@@ -56,4 +57,31 @@ def test_fingerprints_are_equal_for_moved_copies_alone():
     V, F = meshes.bumpy(5, 4)
     own = fingerprint(component_of(V, F))
     assert own == fingerprint(component_of(V + [0.25, 0.5, -1], F))
-    assert own != fingerprint(component_of(V * [1, 1, 1.1], F)) and own != fingerprint(component_of(V, F[::-1]))
+    assert own != fingerprint(component_of(V * [1, 1, 1.1], F)) and own == fingerprint(component_of(V, F[::-1]))
+
+
+def test_neither_order_nor_diagonals_move_a_seam():
+    surface = meshes.polygon_surface(*quad_ball())
+    rng = np.random.default_rng(1)
+    order, rows = rng.permutation(len(surface.positions)), rng.permutation(len(surface.face_start) - 1)
+    inverse = np.argsort(order)
+    faces = inverse[surface.corner_vertex.reshape(-1, 4)[rows]]
+    # From another corner on: the other diagonal.
+    shuffled = meshes.polygon_surface(surface.positions[order], np.roll(faces, 1, axis=1).tolist())
+    mine, theirs = (
+        {tuple(sorted(e)) for e in edges.tolist()} for edges in (cut(surface).edges, order[cut(shuffled).edges])
+    )
+    assert mine == theirs and len(mine) > 2
+
+
+def quad_ball():
+    """A bumpy ball of quads, without symmetry."""
+    n = 7
+    t, p = np.meshgrid(np.linspace(0.3, 2.8, n), 2 * np.pi * np.arange(10) / 10, indexing="ij")
+    r = 1 + 0.2 * np.sin(3 * p + t) + 0.1 * np.cos(2 * t + 1)
+    V = np.column_stack(
+        [(r * np.sin(t) * np.cos(p)).ravel(), (r * np.sin(t) * np.sin(p)).ravel(), (r * np.cos(t)).ravel()]
+    )
+    a = (10 * np.arange(n - 1)[:, None] + np.arange(10)).ravel()
+    b = (10 * np.arange(n - 1)[:, None] + (np.arange(10) + 1) % 10).ravel()
+    return V, np.column_stack([a, a + 10, b + 10, b]).tolist()

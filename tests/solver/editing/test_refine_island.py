@@ -8,6 +8,7 @@ from polygons import cut
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.refine import refine_islands
 from omt_uv.settings import RefineSettings
+from omt_uv.solver.editing.live_map import LiveMap
 from omt_uv.solver.editing.refine_island import STRAIGHTENED, refine_island
 from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import FoldedUVError, PinError
@@ -54,6 +55,18 @@ def figures(V, F, uv):
 def centroid(V, F, uv):
     area = face_areas(V, F)
     return area @ uv[F].mean(1) / area.sum()
+
+
+def test_a_density_of_areas_is_kept():
+    V, F, uv = bump()
+    density = np.exp(np.sin(4 * V[F].mean(axis=1)[:, 0]))
+    refined = run(V, F, uv, target=density)
+    found = distortion(V, F, refined.uv[F], density=density)
+    assert found.area_l1 <= 0.01 and found.folds == 0
+    live = LiveMap(V, F, uv, target=density)
+    while not live.at_rest:
+        live.follow(0.0)
+    assert distortion(V, F, live.uv[F], density=density).area_l1 <= 0.02
 
 
 # ---- maps ---------------------------------------------------------------------------------------------------

@@ -130,6 +130,21 @@ def test_the_order_of_vertices_and_faces_does_not_matter(boundary):
     np.testing.assert_array_equal(maps[1], maps[0][order])
 
 
+def test_the_diagonals_of_quads_do_not_matter():
+    V, _ = meshes.grid(6, 6)
+    V = np.column_stack([V[:, :2], 0.3 * np.sin(5 * V[:, 0] + 1) * np.cos(3 * V[:, 1])])
+    a = (7 * np.arange(6)[:, None] + np.arange(6)).ravel()
+    surface = meshes.polygon_surface(V, np.column_stack([a, a + 1, a + 8, a + 7]).tolist())
+    other = surface.triangles.reshape(-1, 6)[:, [0, 1, 5, 1, 2, 5]].reshape(-1, 3)
+    some = np.repeat(np.random.default_rng(0).random(len(other) // 2) < 0.5, 2)
+    cut_otherwise = replace(surface, triangles=np.where(some[:, None], other, surface.triangles))
+    found = [drain(unwrap(s)) for s in (surface, cut_otherwise)]
+    for given, one in zip((surface, cut_otherwise), found, strict=True):
+        drawn = np.sort(one.charts[0].corners, axis=1)
+        assert {tuple(t) for t in drawn} == {tuple(t) for t in np.sort(given.triangles, axis=1)}
+    np.testing.assert_array_equal(found[0].corner_uv()[1], found[1].corner_uv()[1])
+
+
 def test_progress_never_runs_backwards():
     seen: list[Progress] = []
     drain(unwrap(two_charts(), options=UnwrapOptions("disk")), seen.append)

@@ -1,0 +1,71 @@
+"""Put vertices in an order that their places alone decide, along a Morton curve (Morton 1966).
+
+Neighbours are near in memory, and what is solved in that order is the same to the last bit, in whatever order a file
+has its vertices and faces.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Bits of each coordinate along a Morton curve, and the masks that spread them.
+BITS = 21
+MASKS = (0x1F00000000FFFF, 0x1F0000FF0000FF, 0x100F00F00F00F00F, 0x10C30C30C30C30C3, 0x1249249249249249)
+OFF_BORDER = 0.123
+# Relative difference of principal axes, and lopsidedness along them, by which they are told apart.
+DISTINCT = 1e-3
+# Steps in the extent of a chart by which places of triangles around vertices in one place are told apart.
+SAME_MIDDLE = 1e9
+
+
+def order_of_places(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The order (n,) of points (n,3); those in one place, as along a cut, go by where their triangles (m,3) are."""
+    p, n = _in_own_frame(points), len(points)
+    low, high = p.min(axis=0), p.max(axis=0)
+    extent = max(float((high / 2 - low / 2).max()), float(np.finfo(float).tiny))
+    # Off the borders of cells, where rounding would decide about vertices of a regular grid.
+    cell = np.clip((p / 2 - low / 2) / extent * (2**BITS - 2) + OFF_BORDER, 0, 2**BITS - 1).astype(np.uint64)
+    code = _spread(cell[:, 0]) | _spread(cell[:, 1]) << np.uint64(1) | _spread(cell[:, 2]) << np.uint64(2)
+    order = np.argsort(code, kind="stable")
+    same = code[order][1:] == code[order][:-1]
+    tied = np.flatnonzero(np.append(same, False) | np.append(False, same))
+    if len(tied):
+        middle = p[triangles].mean(axis=1) / 2 - low / 2
+        flat = triangles.ravel()
+        count = np.maximum(np.bincount(flat, minlength=n), 1)
+        around = [np.bincount(flat, np.repeat(x, 3), n) / count for x in middle.T]
+        # Sums in another order differ by rounding.
+        keys = [np.round(x / extent * SAME_MIDDLE) for x in around]
+        some = order[tied]
+        order[tied] = some[np.lexsort((*(x[some] for x in keys), *p[some].T, code[some]))]
+    return order
+
+
+def _in_own_frame(points: np.ndarray) -> np.ndarray:
+    """Points (n,3) along their principal axes, as they are where these are not told apart: a pose plays no part."""
+    extent = float(np.ptp(points / 2, axis=0).max())
+    if not extent > 0:
+        return points
+    p = (points - points.mean(axis=0)) / (2 * extent)
+    values, axes = np.linalg.eigh(p.T @ p / len(p))
+    skew = ((p @ axes) ** 3).mean(axis=0)
+    if np.diff(values).min() < DISTINCT * values[-1] or np.sort(np.abs(skew))[1] < DISTINCT * values[-1] ** 1.5:
+        return points
+    axes = axes * np.where(skew < 0, -1, 1)
+    # The least lopsided one is across the others: a mirror image of the points is no pose of them.
+    k = int(np.abs(skew).argmin())
+    axes[:, k] = np.cross(axes[:, (k + 1) % 3], axes[:, (k + 2) % 3])
+    return p @ axes
+
+
+def _spread(x: np.ndarray) -> np.ndarray:
+    """The bits of numbers (n,) below 2^21 with two zeros after each."""
+    for shift, mask in zip((32, 16, 8, 4, 2), MASKS, strict=True):
+        x = (x | x << np.uint64(shift)) & np.uint64(mask)
+    return x
+
+
+def lowest_first(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (m,3) from their lowest vertex on, and which corners (m,3) these were."""
+    turn = (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3 if len(triangles) else np.zeros((0, 3), np.int64)
+    return np.take_along_axis(triangles, turn, axis=1), turn
