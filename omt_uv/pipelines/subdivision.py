@@ -166,6 +166,13 @@ def subdivided_target(surface: Surface, modifier: SubdivisionModifier, other: Ta
     return Target(density) if other is None else Target(density * other.density, other.region)
 
 
+def target_of(reading: Reading) -> Target | None:
+    """What the polygons of a reading ask for on the surface of its modifier; None for their own areas."""
+    if reading.subdivision is None:
+        return None
+    return subdivided_target(reading.surface, reading.subdivision)
+
+
 def on_subdivided_surface(surface: Surface, modifier: SubdivisionModifier) -> Surface:
     """The cage with its vertices where they are on the subdivided surface, whose curvature and lengths it has then."""
     used = np.unique(surface.corner_vertex)

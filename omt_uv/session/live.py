@@ -12,9 +12,8 @@ import numpy as np
 from ..blender import mesh as blender_mesh
 from ..pipelines.layout import Refusal, pack_islands
 from ..pipelines.refine import found_islands
-from ..pipelines.subdivision import subdivided_target
+from ..pipelines.subdivision import target_of
 from ..settings import Settings
-from ..solver.analysis.density import Target
 from ..solver.editing.live_map import LiveMap
 from ..solver.errors import MeshError
 from ..solver.mesh.charts import Chart
@@ -72,7 +71,7 @@ class Session:
         self._sizes = [self._size(obj) for obj in self.objects]
         self._before = [reading.uv for _, reading in pairs]
         self._lost = False
-        self._targets = [_target(reading) if subdivided else None for _, reading in pairs]
+        self._targets = [target_of(reading) if subdivided else None for _, reading in pairs]
         self._surfaces = [reading.surface for _, reading in pairs]
         self._islands = [self._live(*found) for found in _islands(pairs)]
         self._whole = all(self._covers(k, reading) for k, (_, reading) in enumerate(pairs))
@@ -226,13 +225,6 @@ class Session:
 
     def _on_exchange(self, *_) -> None:
         self._lost = True
-
-
-def _target(reading) -> Target | None:
-    """What the polygons of a reading ask for, None for their own areas."""
-    if reading.subdivision is None:
-        return None
-    return subdivided_target(reading.surface, reading.subdivision)
 
 
 def _islands(pairs: list) -> list:
