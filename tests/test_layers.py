@@ -33,7 +33,7 @@ ARROWS: dict[str, str] = {
     "solver.maps": "solver solver.mesh solver.linalg",
     "solver.packing": "solver solver.mesh",
     "solver.transport": "solver solver.mesh solver.linalg",
-    "solver.cutting": "solver solver.mesh solver.linalg solver.analysis",
+    "solver.cutting": "solver solver.mesh solver.linalg solver.analysis solver.maps",
     "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.cutting",
     "solver.conformal": "solver solver.mesh solver.linalg solver.maps",
     "solver.canonical": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal",

@@ -11,9 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..analysis.feature_edges import fold_angles
+from ..maps.development import developed
+from ..maps.overlap import overlap_share
 from ..mesh.geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
 from .component import CutComponent
-from .cut_graph import greedy_arcs
+from .cut_graph import cut_classes, greedy_arcs
 from .hard_surface import net_factors, rounded_corners
 
 # An edge at which the normal turns by more is hard. Prisms with 4, 5, 6 and 8 sides are clear of it.
@@ -32,6 +34,13 @@ MOST_SPIKES = 4
 MOST_LEFT = 0.3
 # A net is worth its seams up to this many times the side of a square with the area of the surface.
 LONGEST = 5.0
+# Nets that lie on themselves are drawn anew so many times, on components of so many triangles at most, with costs whose
+# logarithms vary by so much; by so many samples, and a share of the area that is less is rounding.
+NETS = 24
+SAMPLES = 10_000
+MOST_TRIANGLES = 20_000
+VARIED = 0.5
+COVERED = 1e-3
 # Edges within flat or developable sides count so many times, which leaves these in one component.
 ACROSS = 1.5
 
@@ -58,7 +67,31 @@ def net(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     if len(tips) < 3 or (component.avoid[tips] > 0).any():
         return None
     cost = np.where(folded, component.cost, ACROSS * component.cost) * net_factors(component, folded)
-    return greedy_arcs(replace(component, cost=cost), tips), tips
+    return _spread_out(component, cost, tips), tips
+
+
+def _spread_out(component: CutComponent, cost: np.ndarray, tips: np.ndarray) -> np.ndarray:
+    """The shortest cut (e,) bool through the tips (t,), by the cost (e,) of edges, or, where the component laid flat
+    along it lies on itself, the shortest of some others along which it does not."""
+    first = greedy_arcs(replace(component, cost=cost), tips)
+    if len(component.triangles) > MOST_TRIANGLES or not _covers_itself(component, first):
+        return first
+    random = np.random.default_rng(0)
+    varied = [cost * np.exp(VARIED * random.standard_normal(len(cost))) for _ in range(NETS)]
+    cuts = [greedy_arcs(replace(component, cost=one), tips) for one in varied]
+    cuts.sort(key=lambda cut: cost[cut].sum())
+    return next((cut for cut in cuts if not _covers_itself(component, cut)), first)
+
+
+def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:
+    """Whether the component covers itself where it is laid flat, open along the cut (e,) bool."""
+    corners = cut_classes(component, cut)
+    positions = np.zeros((int(corners.max()) + 1, 3))
+    positions[corners.ravel()] = component.positions[component.triangles.ravel()]
+    flat, gap = developed(positions, corners)
+    uv = np.stack([flat.real, flat.imag], axis=1)
+    # What is not quite flat is laid somewhere else by its map.
+    return bool(gap.max() <= FLAT * np.abs(flat).max()) and overlap_share(uv[corners], samples=SAMPLES) > COVERED
 
 
 def _defects(component: CutComponent) -> np.ndarray:

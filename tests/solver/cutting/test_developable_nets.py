@@ -7,6 +7,8 @@ from short_cuts import component_of
 
 from omt_uv.solver.cutting.cut_graph import cut_classes
 from omt_uv.solver.cutting.developable_nets import is_long, net
+from omt_uv.solver.maps.development import developed
+from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
 
 
@@ -43,3 +45,19 @@ def test_the_net_of_a_cylinder_of_many_sides_opens_both_caps():
     sides = [(i, j, n + j), (i, n + j, n + i), (j, i, 2 * n + 0 * i), (n + i, n + j, 2 * n + 1 + 0 * i)]
     cut, tips = net(component_of(V, np.concatenate([np.column_stack(side) for side in sides])))
     assert len(tips) == 2 * n and cut.sum() == 2 * n - 1
+
+
+def test_the_net_of_a_bracket_does_not_cover_itself():
+    outline = np.array([(0, 0), (3, 0), (3, 0.5), (0.5, 0.5), (0.5, 3), (0, 3)])
+    V = np.concatenate([np.column_stack([outline, np.full(6, z)]) for z in (0.0, 1.0)])
+    caps = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)])
+    i, j = np.arange(6), (np.arange(6) + 1) % 6
+    sides = [np.column_stack([i, j, j + 6]), np.column_stack([i, j + 6, i + 6])]
+    component = component_of(V, np.concatenate([caps[:, ::-1], caps + 6, *sides]))
+    cut, tips = net(component)
+    classes = cut_classes(component, cut)
+    positions = np.zeros((classes.max() + 1, 3))
+    positions[classes.ravel()] = component.positions[component.triangles.ravel()]
+    flat, gap = developed(positions, classes)
+    assert len(tips) == 12 and gap.max() < 1e-9
+    assert overlap_share(np.stack([flat.real, flat.imag], axis=1)[classes]) == 0
