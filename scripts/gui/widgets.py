@@ -11,6 +11,7 @@ import bpy
 DOWN = 18
 # Where rows have their buttons, as shares of the width.
 PLACES = (0.5, 0.72, 0.2, 0.835, 0.63, 0.77)
+FEW = 3
 TURNS_TO_SEE = 2
 # Where headers have their buttons.
 HEADER = (0.78, 0.83)
@@ -95,12 +96,15 @@ class Finder:
         return None
 
     def look(self, words, places):
-        """Such a button in what is in sight, column by column."""
-        for share in places:
+        """Such a button in what is in sight: row by row where its places are few, otherwise column by column."""
+        rows = range(self.region.height - DOWN // 2, 0, -DOWN)
+        every = [(share, y) for share in places for y in rows]
+        if len(places) <= FEW:
+            every = [(share, y) for y in rows for share in places]
+        for share, y in every:
             x = int(self.region.width * share)
-            for y in range(self.region.height - DOWN // 2, 0, -DOWN):
-                if matches((yield from self.seen(x, y)), words):
-                    return x, y
+            if matches((yield from self.seen(x, y)), words):
+                return x, y
         return None
 
     def scroll(self, button):
