@@ -22,8 +22,8 @@ PATIENCE = 3.0
 TRIES = 3
 # Stories that are not reliable, and why: their tests are skipped with these words. OMT_UV_GUI_ALL=1 plays all.
 UNRELIABLE: dict[str, str] = {}
-# What is left to later ages: this machine's Blender, 3.4 on Debian, is older than any that the extension installs on, and
-# draws so slowly that a search for buttons takes minutes.
+# What is left to later ages: this machine's Blender, 3.4 on Debian, is older than any that the extension installs on,
+# and draws so slowly that a search for buttons takes minutes.
 LATER = ("shapes", "sections", "uv_editor")
 
 
