@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
+from ..settings import DEFAULT_MAX_SHEAR
 from .common import CommandError, check_paths, refusals, require_blender, warn
-from .options import add_cut_options, add_files, add_subdivision, chosen_subdivision
+from .options import add_cut_options, add_files, add_subdivision, chosen_subdivision, shear
 from .selection import read_file
 
 
@@ -14,6 +15,13 @@ def add(commands) -> None:
     command.set_defaults(run=run)
     add_files(command, writes=".blend, which keeps seams")
     add_cut_options(command)
+    command.add_argument(
+        "--max-shear",
+        type=shear,
+        default=DEFAULT_MAX_SHEAR,
+        metavar="S",
+        help="add seams until maps are predicted to shear less than S > 1 in the mean; 0: only those that open a part",
+    )
     add_subdivision(command)
 
 
@@ -26,6 +34,8 @@ def run(options: argparse.Namespace) -> None:
     from ..pipelines.subdivision import on_subdivided_surface
     from ..solver.cutting.cuts import cut
     from ..solver.parameterization.chart_pins import clear_of_pins
+    from ..solver.parameterization.options import ShearBound
+    from ..solver.parameterization.shear_bound import predicted_seams
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")
@@ -42,7 +52,9 @@ def run(options: argparse.Namespace) -> None:
             avoid = clear_of_pins(reading.surface, reading.pins, avoid)
             surface, modifier = reading.surface, reading.subdivision
             surface = surface if modifier is None else on_subdivided_surface(surface, modifier)
-            cuts = cut(surface, reading.faces, avoid=avoid, fill=options.fill_holes)
+            bound = ShearBound(options.max_shear) if options.max_shear else None
+            search = None if bound is None else predicted_seams(surface, bound, reading.faces)
+            cuts = cut(surface, reading.faces, avoid=avoid, fill=options.fill_holes, search=search)
         told += [(k, text) for text in cuts.warnings]
         mark_seams(obj, cuts.edges)
         lines.append(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")

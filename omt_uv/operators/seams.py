@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ..session import run
+from ..settings import DEFAULT_MAX_SHEAR
 from .base import SolverOperator, check_all_local, complaints, read_objects, warn
 from .properties import SubdivisionSettings, choose_group
 
@@ -17,9 +18,17 @@ class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
     bl_label = "Seams for Area Preserving"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
+    max_shear: FloatProperty(
+        name="Max Shear",
+        description="Seams are added until maps are predicted to shear less than this in the mean, where they are seen "
+        "least. 0: only those that open a part, and to extremities",
+        default=DEFAULT_MAX_SHEAR,
+        min=0.0,
+        soft_max=3.0,
+    )
     extremities: IntProperty(
         name="Extremities",
-        description="Tips such as ears and limbs that a part may be cut to, at most. "
+        description="Without Max Shear: tips such as ears and limbs that a part may be cut to, at most. "
         "More seams let the map shear less; no more are added than pay",
         default=8,
         min=0,
@@ -44,11 +53,12 @@ class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
         pairs = check_all_local(read_objects(context))
         objects = [obj for obj, _ in pairs]
         options = {"fill": self.fill_holes, "extremities": self.extremities}
+        bound = self.max_shear if self.max_shear > 1 else 0.0
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
             readings = [reading for _, reading in pairs]
             every = zip(readings, free, self.subdivisions(readings), strict=True)
-            cutting = [_cut(reading, avoid, modifier, options) for reading, avoid, modifier in every]
+            cutting = [_cut(reading, avoid, modifier, bound, options) for reading, avoid, modifier in every]
             cuts = yield from run.aside(in_turn(cutting))
         return list(zip(objects, cuts, strict=True))
 
@@ -64,24 +74,30 @@ class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
             self.report({"INFO"}, "Every part is an island already; no seam is needed")
 
 
-def _cut(reading, avoid, modifier, options: dict):
-    """The cuts of a surface, as it is or as a modifier subdivides it."""
+def _cut(reading, avoid, modifier, bound: float, options: dict):
+    """The cuts of a surface, as it is or as a modifier subdivides it, for a bound of the shear or, with 0, none."""
     from ..pipelines.subdivision import on_subdivided_surface
     from ..solver.cutting.cuts import cut
     from ..solver.parameterization.chart_pins import clear_of_pins
+    from ..solver.parameterization.options import ShearBound
+    from ..solver.parameterization.shear_bound import predicted_seams
     from ..solver.progress import Progress
 
     yield Progress("Seams", 0.0)
     clear = clear_of_pins(reading.surface, reading.pins, avoid)
     surface = reading.surface if modifier is None else on_subdivided_surface(reading.surface, modifier)
-    return cut(surface, reading.faces, avoid=clear, **options)
+    search = predicted_seams(surface, ShearBound(bound), reading.faces) if bound else None
+    return cut(surface, reading.faces, avoid=clear, search=search, **options)
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     """The settings of the operator, for the redo panel and the sidebar."""
     layout.use_property_split = True
     layout.use_property_decorate = False
-    layout.prop(properties, "extremities")
+    layout.prop(properties, "max_shear")
+    column = layout.column()
+    column.active = properties.max_shear <= 1
+    column.prop(properties, "extremities")
     layout.prop(properties, "fill_holes")
     layout.prop(properties, "use_subdivision")
     choose_group(layout, properties, "keep_free")

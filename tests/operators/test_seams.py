@@ -137,3 +137,12 @@ def test_pinned_vertices_are_not_cut_through(mode):
     if mode == "EDIT":
         scenes.leave_edit()
     assert cut_edges(obj) and not {v for edge in cut_edges(obj) for v in edge} & used
+
+
+def test_seams_are_those_of_unwrap_before_its_map():
+    obj = sphere()
+    mark(max_shear=1.2)
+    long = seams_of(obj).sum()
+    obj = sphere()
+    mark(max_shear=0.0, extremities=0)
+    assert 0 < seams_of(obj).sum() < long

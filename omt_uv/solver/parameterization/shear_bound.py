@@ -112,6 +112,15 @@ class ShearSearch:
         return len(self.surface.face_start) - 1
 
 
+def predicted_seams(surface: Surface, shear: ShearBound, faces: np.ndarray | None = None) -> SeamSearch:
+    """The search, for `cutting.cuts.cut`, that finds what `unwrap` cuts for a bound of the shear before its first map.
+
+    faces (f,) bool : polygons of the surface, by default all
+    """
+    search = ShearSearch(surface, faces, shear, None, {})
+    return search.search(search.first_spread())
+
+
 def bound_shear(
     search: ShearSearch,
     first: DiskCharts,

@@ -15,6 +15,8 @@ MOST_TIPS = 12
 LEAST_WORTH = 0.015
 # Cuts end when they cost so many sides.
 MOST_COST = 14.0
+# A cut ends where it is worth more than this share of what it takes, rather than in what is to be kept free.
+BARRED = 0.5
 # Shares of the way to an extremity at which a path may end.
 STOPS = (1.0, 0.8, 0.6)
 
@@ -51,9 +53,11 @@ def _best_arc(task: Task, cut: Cut, model: ScaleModel) -> _Arc | None:
     for tip in _tips(task, model, cost):
         path = path_to(before, int(tip))
         reach = cost[path]
-        for stop in STOPS:
-            # From the first vertex that is near enough; the last is on the cut already.
-            part = path[int(np.argmax(reach <= stop * reach[0] + 1e-12)) :]
+        # From the first vertex that is near enough, or where a cut may end as anywhere; the last is on the cut already.
+        begins = {int(np.argmax(reach <= stop * reach[0] + 1e-12)) for stop in STOPS}
+        begins.add(int(np.argmax(task.tip_factor[path] > BARRED)))
+        for begin in sorted(begins):
+            part = path[begin:]
             new = np.union1d(part[:-1], graph.image[part[:-1]])
             if len(new) == 0:
                 continue
