@@ -1,0 +1,32 @@
+"""The order of vertices by their places: a file's own order plays no part."""
+
+import meshes
+import numpy as np
+
+from omt_uv.solver.analysis.order_of_places import lowest_first, order_of_places
+
+
+def test_the_order_of_a_file_plays_no_part():
+    V, F = meshes.head()
+    random = np.random.default_rng(0)
+    shuffle = random.permutation(len(V))
+    other = np.argsort(shuffle)[F][random.permutation(len(F))]
+    order = order_of_places(V[shuffle], other)
+    assert np.array_equal(np.sort(order), np.arange(len(V)))
+    assert np.array_equal(V[order_of_places(V, F)], V[shuffle][order])
+
+
+def test_vertices_in_one_place_go_by_their_triangles():
+    """As along a cut: two triangles that touch, each with vertices of its own."""
+    V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)
+    F = np.array([[0, 1, 2], [3, 5, 4]])
+    swapped = np.array([3, 1, 4, 2, 0, 5])
+    order, other = order_of_places(V, F), order_of_places(V[swapped], np.argsort(swapped)[F])
+    assert np.array_equal(order, swapped[other])
+
+
+def test_triangles_begin_at_their_lowest_vertex():
+    F = np.array([[4, 2, 7], [1, 3, 2], [5, 6, 0]])
+    turned, corners = lowest_first(F)
+    assert np.array_equal(turned, [[2, 7, 4], [1, 3, 2], [0, 5, 6]])
+    assert np.array_equal(np.take_along_axis(F, corners, axis=1), turned)
