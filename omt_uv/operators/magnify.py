@@ -285,7 +285,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     column.prop(properties, "balance", text="Area - Angle", slider=True)
     column.use_property_split = True
     column.prop(properties, "max_shear")
-    column.prop(properties, "use_subdivision")
+    column.prop(properties, "use_subdivision", text="Subdivision")
     layout.prop(properties, "boundary")
     layout.prop(properties, "cascade")
     layout.prop(properties, "quality")

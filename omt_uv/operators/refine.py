@@ -65,7 +65,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     draw_balance(layout, properties)
     layout.prop(properties, "quality")
     layout.prop(properties, "keep_boundary")
-    layout.prop(properties, "use_subdivision")
+    layout.prop(properties, "use_subdivision", text="Subdivision")
     column = layout.column()
     column.active = not properties.keep_boundary
     column.prop(properties, "pack")

@@ -99,5 +99,5 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     column.active = properties.max_shear <= 1
     column.prop(properties, "extremities")
     layout.prop(properties, "fill_holes")
-    layout.prop(properties, "use_subdivision")
+    layout.prop(properties, "use_subdivision", text="Subdivision")
     choose_group(layout, properties, "keep_free")

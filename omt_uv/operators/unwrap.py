@@ -202,7 +202,7 @@ def draw_more(layout: bpy.types.UILayout, properties) -> None:
     column.prop(properties, "max_shear")
     column.prop(properties, "cut_further")
     layout.prop(properties, "mark_seams")
-    layout.prop(properties, "use_subdivision")
+    layout.prop(properties, "use_subdivision", text="Subdivision")
     layout.separator()
     layout.prop(properties, "pack")
     column = layout.column()
