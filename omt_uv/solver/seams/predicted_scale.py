@@ -149,6 +149,12 @@ class ScaleModel:
         """What is left of the log scale, times the area, at every vertex (n,): of the plate without weights."""
         return self.laplacian @ self.plate.value
 
+    def bare(self) -> ScaleModel:
+        """The same without Green's functions, which take the memory: nothing more can be cut."""
+        none = np.zeros((0, 0))
+        membrane, plate = (replace(held, green=none, rows=none) for held in (self.membrane, self.plate))
+        return replace(self, membrane=membrane, plate=plate)
+
     def gain(self, vertices: np.ndarray) -> np.ndarray:
         """Fall of the spread (k,) by a cut at each of the vertices (k,) alone."""
         return self.plate.value[vertices] ** 2 / np.maximum(self.plate.own(vertices), 1e-300)

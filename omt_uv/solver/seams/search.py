@@ -78,7 +78,7 @@ class SeamSearch:
     further : components whose seams were marked by hand are searched, too
     options : see `SearchOptions`
     measured : see `Measured`, for parts that were searched before
-    memory : of what was found for parts, by their fingerprints; shared by the searches of a surface
+    memory : of what was found for parts, bare, by their fingerprints; shared by the searches of a surface
     """
 
     spread: np.ndarray
@@ -101,7 +101,8 @@ class SeamSearch:
         yield Progress("Seams", 0.0)
         name = fingerprint(component)
         if self.measured is not None and name in self.memory:
-            self.memory[name] = found = yield from self._again(component, self.memory[name], self.measured)
+            found = yield from self._again(component, self.memory[name], self.measured)
+            self.memory[name] = found.bare()
             return found.edges
         bound = float(self.spread[component.polygons[component.polygons >= 0]].min())
         bounded = bool(component.on_boundary().any())
@@ -124,7 +125,8 @@ class SeamSearch:
         if line is not None and found.mirror is None:
             mirrored = yield from part_of(self._searched(component, base, bound, line, plain), 0.5, 0.5)
             found = mirrored if mirrored.score <= self._worth_of_symmetry() * found.score else found
-        self.memory[name] = found = found.carried(component)
+        found = found.carried(component)
+        self.memory[name] = found.bare()
         return found.edges
 
     def _searched(
@@ -255,6 +257,11 @@ class _FoundCut:
     mirror: FineMirror | None
     edges: np.ndarray
 
+    def bare(self) -> _FoundCut:
+        """What a further search has to know of it."""
+        left = self.task.model.cut(self.cut.vertices).bare()
+        return replace(self, setting=replace(self.setting, model=left), task=replace(self.task, model=left))
+
     @property
     def coarse(self) -> CoarseSurface:
         """The surface that was searched."""
@@ -320,7 +327,7 @@ class _Setting:
         """The same, where what is left counts as much as maps have shown; spread (n,): times the area, at positions."""
         n = len(self.coarse.positions)
         shown = np.bincount(cKDTree(self.coarse.positions).query(positions)[1], spread, n)
-        rest = found.task.model.cut(found.cut.vertices).rest()
+        rest = found.task.model.rest()
         tail, head = halfedges(self.coarse.triangles)
         near = csr_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n))
         near = diags(1 / np.maximum(near.sum(axis=1).A1, 1)) @ near
