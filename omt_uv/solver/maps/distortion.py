@@ -22,6 +22,7 @@ from .overlap import overlap_share
 
 SHEAR_CAP = 1e6  # a face squashed onto a line must not drown the mean of all others
 RATIO_FLOOR = 1e-12  # likewise for the octaves of a face without UV area
+VANISHED = 1e-4  # a triangle of a quad with so small a share of its area counts as turned over
 NEGLIGIBLE_AREA = 1e-14  # share of the surface below which a face has no meaningful Jacobian
 WELD = 1e-7  # corners of one vertex closer than this, relative to the UV extent, are one UV vertex
 
@@ -250,8 +251,11 @@ def _shear_of_polygons(mesh: _Triangles, polygons, mirrored) -> tuple[np.ndarray
     area = face_areas(mesh.V, F)
     real = area > NEGLIGIBLE_AREA * area.sum()
     F, uv, of, flip, area = F[real], uv[real], of[real], flip[real], area[real]
+    least = np.where(np.flatnonzero(real) < alone.sum(), 0, VANISHED)
     a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    forward = cross2(a, b) * np.where(flip, -1, 1) > 0
+    # A triangle that is about to turn over says no more of its quad than one that has.
+    has = cross2(a, b) * np.where(flip, -1, 1)
+    forward = has > least * area * max(np.abs(has).sum(), np.finfo(float).tiny) / area.sum()
     count = int(polygons.max()) + 1
     turned = np.bincount(of, forward, count) == 0
     weight = np.where(forward | turned[of], area, 0)

@@ -13,7 +13,7 @@ from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import CUT_FURTHER, MORE_SEAMS
-from ..maps.distortion import RATIO_FLOOR, face_distortion
+from ..maps.distortion import face_distortion
 from ..mesh.charts import Chart
 from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface, is_seam
@@ -26,7 +26,7 @@ from .options import ShearBound
 # Maps that are made at most.
 MOST_ROUNDS = 4
 # No more are made where the last left more than this share of the logarithm of the worst mean shear.
-STALLED = 0.95
+STALLED = 1.0
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
 SPREAD_OF_SHEAR = 0.21
@@ -34,6 +34,8 @@ SPREAD_OF_SHEAR = 0.21
 MARGIN = 0.75
 # Beyond this, shear counts no more for where to cut.
 MOST_SHEAR = 8.0
+# Shear of what has no area to speak of.
+VANISHED = 50.0
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
 
@@ -134,6 +136,7 @@ def bound_shear(
     """
     prepared, bound = first, search.shear.bound
     cuts, spread = _cuts(first), search.first_spread()
+    promised = np.full(len(spread), np.inf)
     rounds, before = 0, np.inf
     while True:
         charts = prepared.charts
@@ -148,7 +151,11 @@ def bound_shear(
         before = worst
         found = Measured(np.zeros(len(spread)), np.ones(len(spread)))
         for k in searched:
-            part = MARGIN * (np.log(bound) / np.log(mean[k])) ** 2
+            reached = np.log(mean[k]) ** 2
+            # What the last search has promised and its map has not kept is asked for on top.
+            kept_part = min(float(promised[charts[k].faces].min()) / reached, 1.0)
+            part = MARGIN * kept_part * np.log(bound) ** 2 / reached
+            promised[charts[k].faces] = part * reached
             spread[charts[k].faces] *= part
             found.spread[charts[k].faces] = np.log(np.minimum(shear[k][0], MOST_SHEAR)) ** 2
             found.share[charts[k].faces] = part
@@ -232,7 +239,6 @@ def _shear(chart: Chart, chart_map: ChartMap, kept: bool) -> tuple[np.ndarray, n
     if kept:
         ratio = 2.0 ** np.clip(octaves, -20, 20)
         energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
-        # Quads that fold along the other diagonal are mended at last, and no seam helps against them.
-        folded = octaves <= np.log2(RATIO_FLOOR)
-        shear = np.where(folded, np.minimum(shear, MOST_SHEAR), energy + np.sqrt(energy**2 - 1))
+        # Quads that fold or vanish, also along the other diagonal, are mended at last: no seam helps against them.
+        shear = np.minimum(energy + np.sqrt(energy**2 - 1), VANISHED)
     return shear, polygon_areas(chart.vertices, chart.triangles, chart.faces)
