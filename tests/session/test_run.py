@@ -24,7 +24,15 @@ OPERATORS = {
     "object.omt_remesh": {"target_vertices": 60},
 }
 # What needs handles, tetrahedra, a second object or an object of its own is tested in its room.
-IN_ROOMS = {"object.omt_match", "object.omt_flow", "uv.omt_flow", "object.omt_volume", "mesh.omt_partition"}
+IN_ROOMS = {
+    "object.omt_diagram",
+    "object.omt_similar",
+    "object.omt_match",
+    "object.omt_flow",
+    "uv.omt_flow",
+    "object.omt_volume",
+    "mesh.omt_partition",
+}
 # What makes new objects works in Object Mode alone.
 CASES = [
     (name, mode) for name in OPERATORS for mode in ("OBJECT", "EDIT") if name != "object.omt_remesh" or mode == "OBJECT"
