@@ -16,7 +16,7 @@ LEAST_WORTH = 0.015
 # Cuts end when they cost so many sides.
 MOST_COST = 14.0
 # A cut ends where it is worth more than this share of what it takes, rather than in what is to be kept free.
-BARRED = 0.5
+BARRED = 0.05
 # Shares of the way to an extremity at which a path may end.
 STOPS = (1.0, 0.8, 0.6)
 
