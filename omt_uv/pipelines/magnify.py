@@ -25,7 +25,7 @@ from ..solver.analysis.density import (
 from ..solver.analysis.region_density import RegionDensity, target_density
 from ..solver.editing.image_warp import warp_image
 from ..solver.editing.magnify import OUTLINES, RegionMagnification, magnify_region, placed_like_outside, refuse_folds
-from ..solver.editing.uv_islands import Island, uv_islands
+from ..solver.editing.uv_islands import Island, Islands, uv_islands
 from ..solver.errors import EmptyMeshError, MeshError, WeightError
 from ..solver.maps.distortion import distortion
 from ..solver.mesh.charts import check_disk, triangle_rows
@@ -280,16 +280,21 @@ def _from_uv(regions, settings: MagnifySettings) -> Steps[Magnified]:
     return Magnified(corners=corners, uv=uv, reports=reports, shares=shares, warnings=warnings)
 
 
+def islands_of(index: int, region: Region) -> Islands:
+    """The islands of surface number `index`; Refusal where it has no UVs, or such as make none."""
+    try:
+        if region.pins is None:
+            raise EmptyMeshError("There are no UVs to magnify", remedy="Unwrap the mesh first")
+        return uv_islands(region.surface, region.pins.uv, region.faces)
+    except MeshError as error:
+        raise Refusal(index, error) from error
+
+
 def _islands(regions) -> tuple[list[tuple[int, Island]], list[tuple[int, str]]]:
     """Islands with a part of the region and a rest, and warnings."""
     found, warnings, constant = [], [], 0
     for index, region in enumerate(regions):
-        try:
-            if region.pins is None:
-                raise EmptyMeshError("There are no UVs to magnify", remedy="Unwrap the mesh first")
-            islands = uv_islands(region.surface, region.pins.uv, region.faces)
-        except MeshError as error:
-            raise Refusal(index, error) from error
+        islands = islands_of(index, region)
         warnings += [(index, text) for text in islands.warnings]
         for island in islands.islands:
             weights = _weights_of(region, island)

@@ -6,13 +6,12 @@ By reflection over the parser: a command, and an option that holds a path, canno
 from __future__ import annotations
 
 import itertools
-import resource
-from contextlib import contextmanager
 
 import command_runs
 import numpy as np
 import pytest
 from command_runs import FOLDERS, READ, WRITTEN, contents, words
+from small_disks import small_disk
 
 NOISE = np.random.default_rng(0).bytes(600)
 POINTS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -160,17 +159,6 @@ def test_no_two_files_of_a_command_may_be_one(package, run, folder):
             assert refused(run, folder, call, ["one file.", "Name.", "Use.", "Write.", of_b])
             tried += 1
     assert tried > 60
-
-
-@contextmanager
-def small_disk(size):
-    """No file grows over so many bytes: what writes more fails, as on a full disk, if it looks."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.mark.parametrize("command", [c for c in command_runs.CALLS if c not in NOTHING_WRITTEN])

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import stat
-from contextlib import contextmanager
 
 import bpy
 
 import numpy as np
 import pytest
 import scenes
+from small_disks import small_disk
 
 FORMATS = [".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx"]
 OFF = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0.5\nf 1 2 3\nf 1 3 4\n"
-
-
-@contextmanager
-def small_disk(size):
-    """No file grows over so many bytes: what writes more fails, as on a full disk, if it looks."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def big_input(path):

@@ -16,15 +16,15 @@ from ...solver.analysis.density import Target, normalised_density
 from ...solver.analysis.joint_density import joint_density, shares_of
 from ...solver.editing.magnify import OUTLINES
 from ...solver.editing.magnify_regions import JointMagnification, magnify_regions
-from ...solver.editing.uv_islands import Island, uv_islands
-from ...solver.errors import BoundaryError, EmptyMeshError, MeshError, WeightError
+from ...solver.editing.uv_islands import Island
+from ...solver.errors import BoundaryError, MeshError, WeightError
 from ...solver.maps.distortion import distortion
 from ...solver.mesh.charts import triangle_rows
 from ...solver.mesh.geometry import signed_areas
 from ...solver.parameterization.chart_indices import located
 from ...solver.progress import Steps, part_of
 from ..layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
-from ..magnify import MISSED, Magnified, Region, check_weights, region_triangles, uv_areas
+from ..magnify import MISSED, Magnified, Region, check_weights, islands_of, region_triangles, uv_areas
 from ..unwrap import lay_out
 
 # Runs from the mesh that ask for what the one before has missed, at most; and relative errors that need none.
@@ -241,12 +241,7 @@ def _islands(regions: Sequence[NamedRegion]) -> tuple[list, list[tuple[int, str]
     """Triples of surface, island and regions (k,m) on islands with a part of a region and a rest; and warnings."""
     found, warnings = [], []
     for index, part in enumerate(regions[0].parts):
-        try:
-            if part.pins is None:
-                raise EmptyMeshError("There are no UVs to magnify", remedy="Unwrap the mesh first")
-            islands = uv_islands(part.surface, part.pins.uv, part.faces)
-        except MeshError as error:
-            raise Refusal(index, error) from error
+        islands = islands_of(index, part)
         warnings += [(index, text) for text in islands.warnings]
         for island in islands.islands:
             rows = triangle_rows(part.surface, island.chart)

@@ -162,8 +162,7 @@ def magnify_region(
         step = yield from part_of(job, k / count, 1 / count)
         uv, done = step.uv, done + step.iterations
         texts += [text for text in step.warnings if text not in texts]
-    has, target = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
-    error = float(np.abs(by_polygon(has - target, polygons)).sum())
+    error = share_error(uv, triangles, before * whole.density, polygons)
     texts += area_error_warnings(error, count * QUALITIES[quality].area_error)
     return RegionMagnification(
         uv=uv,
@@ -175,6 +174,12 @@ def magnify_region(
         warnings=tuple(texts),
         target=whole,
     )
+
+
+def share_error(uv: np.ndarray, triangles: np.ndarray, asked: np.ndarray, polygons: np.ndarray | None) -> float:
+    """Sum of the differences of polygons' shares of the area from what is asked for (m,), in any unit."""
+    has, target = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), asked))
+    return float(np.abs(by_polygon(has - target, polygons)).sum())
 
 
 def by_polygon(values: np.ndarray, polygons: np.ndarray | None) -> np.ndarray:

@@ -17,7 +17,7 @@ from ..analysis.joint_density import JointDensity, joint_density, shares_of
 from ..mesh.geometry import signed_areas
 from ..progress import Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
-from .magnify import LARGEST_STEP, Magnification, by_polygon, magnify_map, refuse_folds
+from .magnify import LARGEST_STEP, Magnification, magnify_map, refuse_folds, share_error
 
 # Steps that only mend shares, at most; relative errors of shares that need none; and how exact their areas are.
 MENDING = 4
@@ -76,8 +76,7 @@ def magnify_regions(
         step = yield from part_of(job, begin, width)
         uv, done = step.uv, done + step.iterations
         texts += [text for text in step.warnings if text not in texts]
-    has, target = (x / x.sum() for x in (np.abs(signed_areas(uv, triangles)), before * whole.density))
-    error = float(np.abs(by_polygon(has - target, polygons)).sum())
+    error = share_error(uv, triangles, before * whole.density, polygons)
     return JointMagnification(
         uv=uv,
         outline=step.outline,

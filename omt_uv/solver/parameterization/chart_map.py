@@ -182,23 +182,34 @@ def _chart_map(
 ) -> ChartMap:
     """What the stages of a map found, in one."""
     conformal, cells = initial.conformal, initial.cells
+    bare = _stages(uv, conformal, cells, figures, log, refined.warnings)
+    return replace(
+        bare,
+        newton_refinement=refined.iterations,
+        residual_refinement=refined.residual,
+        status=refined.status,
+        pinned=pinned,
+        area_weight=refined.area_weight,
+    )
+
+
+def _stages(uv: np.ndarray, conformal, cells, figures: Distortion, log: RunLog, warnings: tuple[str, ...]) -> ChartMap:
+    """A map that is not refined, from what its stages, None for those it has not, and its figures say."""
     return ChartMap(
         uv=uv,
         newton_conformal=conformal.iterations if conformal else None,
         residual_conformal=conformal.residual if conformal else None,
         newton_transport=cells.iterations if cells else None,
         residual_transport=cells.residual if cells else None,
-        newton_refinement=refined.iterations,
-        residual_refinement=refined.residual,
-        status=refined.status,
+        newton_refinement=0,
+        residual_refinement=0.0,
+        status="",
         area_l1=figures.area_l1,
         area_sd=figures.area_sd,
         angle_mean=figures.angle_mean,
         folds=figures.folds,
-        warnings=tuple(dict.fromkeys((*log.warnings, *refined.warnings))),
+        warnings=tuple(dict.fromkeys((*log.warnings, *warnings))),
         seconds=log.seconds,
-        pinned=pinned,
-        area_weight=refined.area_weight,
     )
 
 
@@ -226,23 +237,8 @@ def _named_map(
         figures = measured_chart(vertices, chart, uv, None)
     if figures.folds:
         log.warnings.append(f"{figures.folds} {FOLDED}")
-    conformal, cells = found.conformal, found.cells
-    return ChartMap(
-        uv=placed_chart(uv, vertices, chart, None, unit, None, disk.boundary == "free"),
-        newton_conformal=conformal.iterations if conformal else None,
-        residual_conformal=conformal.residual if conformal else None,
-        newton_transport=cells.iterations if cells else None,
-        residual_transport=cells.residual if cells else None,
-        newton_refinement=0,
-        residual_refinement=0.0,
-        status=options.kind,
-        area_l1=figures.area_l1,
-        area_sd=figures.area_sd,
-        angle_mean=figures.angle_mean,
-        folds=figures.folds,
-        warnings=tuple(dict.fromkeys((*log.warnings, *found.warnings))),
-        seconds=log.seconds,
-    )
+    placed = placed_chart(uv, vertices, chart, None, unit, None, disk.boundary == "free")
+    return replace(_stages(placed, found.conformal, found.cells, figures, log, found.warnings), status=options.kind)
 
 
 def _disk_mesh(

@@ -12,7 +12,7 @@ from ..cutting.component import CutComponent
 from ..mesh.topology import graph_components, halfedges, pair_keys
 from .coarse_surface import CoarseSurface
 from .cut_tree import stretches
-from .path_graph import PathGraph
+from .path_graph import PathGraph, path_to
 
 # How far from the coarse path a fine one may run, in lengths of coarse edges.
 REACH = 6.0
@@ -171,7 +171,5 @@ class FineGraph:
         graph = csr_matrix((cost, (graph.row, graph.col)), shape=graph.shape)
         begin = np.flatnonzero(start[near])
         _, before, _ = dijkstra(graph, indices=begin, min_only=True, return_predecessors=True)
-        path = [int(np.searchsorted(near, end))]
-        while before[path[-1]] >= 0:
-            path.append(int(before[path[-1]]))
-        return near[path] if start[near[path[-1]]] else np.zeros(0, np.int64)
+        path = near[path_to(before, int(np.searchsorted(near, end)))]
+        return path if start[path[-1]] else np.zeros(0, np.int64)

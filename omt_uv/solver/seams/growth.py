@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .cut_tree import Cut, Task, cut_along
+from .path_graph import path_to
 from .predicted_scale import ScaleModel
 
 # Extremities that paths are tried to.
@@ -77,11 +78,3 @@ def _tips(task: Task, model: ScaleModel, cost: np.ndarray) -> np.ndarray:
     peaks = np.flatnonzero((height >= around) & (height > 0) & np.isfinite(cost) & (cost > 0))
     worth = model.gain(peaks) * task.tip_factor[peaks] / cost[peaks]
     return peaks[np.argsort(-worth, kind="stable")[:MOST_TIPS]]
-
-
-def path_to(before: np.ndarray, end: int) -> np.ndarray:
-    """Vertices (k,) from `end` back to where the predecessors (n,) stop."""
-    path = [end]
-    while before[path[-1]] >= 0:
-        path.append(int(before[path[-1]]))
-    return np.array(path)

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..mesh.topology import graph_components
 from .cut_tree import Cut, Task, cut_along, leaves, stretches
-from .growth import grow, path_to
+from .growth import grow
+from .path_graph import path_to
 
 # Shares of a leaf that may be taken off its end.
 PARTS = (1.0, 0.5, 0.25)

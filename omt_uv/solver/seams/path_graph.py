@@ -121,6 +121,14 @@ def path_graph(
     )
 
 
+def path_to(before: np.ndarray, end: int) -> np.ndarray:
+    """Vertices (k,) from `end` back to where the predecessors (n,) stop."""
+    path = [end]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return np.array(path)
+
+
 def _across(positions, tail, head, twin) -> tuple[np.ndarray, np.ndarray]:
     """Corners (k,2) opposite each other across an edge, and the length (k,) of the straight line between them."""
     h = np.flatnonzero(twin > np.arange(len(twin)))

@@ -18,6 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import lapack, solve_triangular
 
+from ..errors import PrecisionError
 from ..mesh.geometry import LEAST_STIFFNESS, halfedge_lengths, laplacian_from_lengths
 from .coarse_surface import CoarseSurface
 
@@ -168,7 +169,7 @@ def _inverse(matrix, free: np.ndarray, n: int) -> np.ndarray:
         root, flaw = lapack.dpotrf(matrix.toarray(), lower=1)
         inverse, flaw = lapack.dpotri(root, lower=1) if flaw == 0 else (root, flaw)
         if flaw:
-            raise np.linalg.LinAlgError("the matrix of a coarse surface is not positive")
+            raise PrecisionError("The matrix of a coarse surface is singular in double precision")
         lower = np.tril(inverse)
         whole[np.ix_(free, free)] = lower + np.tril(inverse, -1).T
     return whole

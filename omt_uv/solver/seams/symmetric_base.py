@@ -16,6 +16,7 @@ from ..cutting.component import CutComponent, boundary_vertices
 from ..cutting.cut_graph import cut_boundary, cut_classes
 from ..mesh.topology import graph_components, halfedges, pair_keys
 from .fine_paths import FineGraph, FineMirror
+from .path_graph import path_to
 
 
 @dataclass(frozen=True)
@@ -96,10 +97,8 @@ def _cheapest(graph: csr_matrix, ways: list[_ArcPlace]) -> np.ndarray | None:
         if len(begin) == 0 or len(goal) == 0:
             continue
         cost, before, _ = dijkstra(graph[inner][:, inner], indices=begin, min_only=True, return_predecessors=True)
-        path = [int(goal[np.argmin(cost[goal])])]
-        if way.count * cost[path[0]] < least:
-            least = way.count * cost[path[0]]
-            while before[path[-1]] >= 0:
-                path.append(int(before[path[-1]]))
-            best = inner[path[::-1]]
+        last = int(goal[np.argmin(cost[goal])])
+        if way.count * cost[last] < least:
+            least = way.count * cost[last]
+            best = inner[path_to(before, last)[::-1]]
     return best
