@@ -32,10 +32,8 @@ def run(options: argparse.Namespace) -> None:
     from ..blender.vertex_groups import avoided
     from ..files.saving import save
     from ..pipelines.subdivision import on_subdivided_surface
-    from ..solver.cutting.cuts import cut
     from ..solver.parameterization.chart_pins import clear_of_pins
-    from ..solver.parameterization.options import ShearBound
-    from ..solver.parameterization.shear_bound import predicted_seams
+    from ..solver.parameterization.shear_bound import predicted_cuts
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")
@@ -50,11 +48,8 @@ def run(options: argparse.Namespace) -> None:
     for k, (obj, reading, avoid) in enumerate(zip(objects, readings, free, strict=True)):
         with refusals(name=obj.name):
             avoid = clear_of_pins(reading.surface, reading.pins, avoid)
-            surface, modifier = reading.surface, reading.subdivision
-            surface = surface if modifier is None else on_subdivided_surface(surface, modifier)
-            bound = ShearBound(options.max_shear) if options.max_shear else None
-            search = None if bound is None else predicted_seams(surface, bound, reading.faces)
-            cuts = cut(surface, reading.faces, avoid=avoid, fill=options.fill_holes, search=search)
+            surface = on_subdivided_surface(reading.surface, reading.subdivision)
+            cuts = predicted_cuts(surface, reading.faces, options.max_shear, avoid=avoid, fill=options.fill_holes)
         told += [(k, text) for text in cuts.warnings]
         mark_seams(obj, cuts.edges)
         lines.append(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")

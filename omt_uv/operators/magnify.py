@@ -23,7 +23,7 @@ from ..settings import (
     MagnifySettings,
 )
 from .base import SolverOperator, complaints, read_writable, warn, write_layers
-from .properties import MarginSettings, SubdivisionSettings, choose_attribute, choose_group, draw_margin
+from .properties import MarginSettings, SubdivisionSettings, choose_attribute, choose_group, draw_margin, shear_bound
 
 
 class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy.types.Operator):
@@ -143,7 +143,7 @@ class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy
             exact=self.exact,
             source=source,
             balance=self.balance if source == "mesh" else 0.0,
-            max_shear=self.max_shear if self.max_shear > 1 else 0.0,
+            max_shear=shear_bound(self.max_shear),
             cascade=self.cascade,
         )
 

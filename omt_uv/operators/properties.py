@@ -24,6 +24,11 @@ class AreaSettings:
     )
 
 
+def shear_bound(chosen: float) -> float:
+    """The bound of the shear that a property asks for, 0 for none: nothing shears less than 1."""
+    return chosen if chosen > 1 else 0.0
+
+
 class SubdivisionSettings:
     """Whether what counts is the mesh, or the surface that its modifier makes of it."""
 

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 from ..session import run
 from ..settings import DEFAULT_MAX_SHEAR
 from .base import SolverOperator, check_all_local, complaints, read_objects, warn
-from .properties import SubdivisionSettings, choose_group
+from .properties import SubdivisionSettings, choose_group, shear_bound
 
 
 class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
@@ -53,7 +53,7 @@ class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
         pairs = check_all_local(read_objects(context))
         objects = [obj for obj, _ in pairs]
         options = {"fill": self.fill_holes, "extremities": self.extremities}
-        bound = self.max_shear if self.max_shear > 1 else 0.0
+        bound = shear_bound(self.max_shear)
         with complaints(objects=objects):
             free = avoided(objects, self.keep_free)
             readings = [reading for _, reading in pairs]
@@ -77,17 +77,14 @@ class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
 def _cut(reading, avoid, modifier, bound: float, options: dict):
     """The cuts of a surface, as it is or as a modifier subdivides it, for a bound of the shear or, with 0, none."""
     from ..pipelines.subdivision import on_subdivided_surface
-    from ..solver.cutting.cuts import cut
     from ..solver.parameterization.chart_pins import clear_of_pins
-    from ..solver.parameterization.options import ShearBound
-    from ..solver.parameterization.shear_bound import predicted_seams
+    from ..solver.parameterization.shear_bound import predicted_cuts
     from ..solver.progress import Progress
 
     yield Progress("Seams", 0.0)
     clear = clear_of_pins(reading.surface, reading.pins, avoid)
-    surface = reading.surface if modifier is None else on_subdivided_surface(reading.surface, modifier)
-    search = predicted_seams(surface, ShearBound(bound), reading.faces) if bound else None
-    return cut(surface, reading.faces, avoid=clear, search=search, **options)
+    surface = on_subdivided_surface(reading.surface, modifier)
+    return predicted_cuts(surface, reading.faces, bound, avoid=clear, **options)
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:

@@ -25,6 +25,7 @@ from .properties import (
     choose_layer,
     draw_balance,
     draw_margin,
+    shear_bound,
 )
 
 
@@ -117,7 +118,7 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
             tile=self.tile,
             seams=self.seams.lower(),
             fill_holes=self.fill_holes,
-            max_shear=self.max_shear if self.max_shear > 1 else 0.0,
+            max_shear=shear_bound(self.max_shear),
             cut_further=self.cut_further,
             kind=self.kind.lower(),
             aspect=self.aspect,

@@ -173,8 +173,11 @@ def target_of(reading: Reading) -> Target | None:
     return subdivided_target(reading.surface, reading.subdivision)
 
 
-def on_subdivided_surface(surface: Surface, modifier: SubdivisionModifier) -> Surface:
-    """The cage with its vertices where they are on the subdivided surface, whose curvature and lengths it has then."""
+def on_subdivided_surface(surface: Surface, modifier: SubdivisionModifier | None) -> Surface:
+    """The cage with its vertices where they are on the subdivided surface, whose curvature and lengths it has then;
+    as it is without a modifier."""
+    if modifier is None:
+        return surface
     used = np.unique(surface.corner_vertex)
     positions, n = surface.positions.copy(), len(surface.positions)
     fine = subdivided_surface(surface, modifier, MOST_QUADS).subdivision

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..analysis.density import Target
 from ..analysis.seam_costs import SeamCosts, seam_costs
-from ..cutting.cuts import Cuts
+from ..cutting.cuts import Cuts, cut
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import CUT_FURTHER, MORE_SEAMS
 from ..maps.distortion import face_distortion
@@ -114,13 +115,15 @@ class ShearSearch:
         return len(self.surface.face_start) - 1
 
 
-def predicted_seams(surface: Surface, shear: ShearBound, faces: np.ndarray | None = None) -> SeamSearch:
-    """The search, for `cutting.cuts.cut`, that finds what `unwrap` cuts for a bound of the shear before its first map.
+def predicted_cuts(surface: Surface, faces: np.ndarray, bound: float, **options: Any) -> Cuts:
+    """What `unwrap` cuts for a bound of the shear before its first map; with 0 for none, only what `cuts.cut` does.
 
-    faces (f,) bool : polygons of the surface, by default all
+    faces (f,) bool : polygons of the surface; options and errors are those of `cuts.cut`
     """
-    search = ShearSearch(surface, faces, shear, None, {})
-    return search.search(search.first_spread())
+    if not bound:
+        return cut(surface, faces, **options)
+    search = ShearSearch(surface, faces, ShearBound(bound), None, {})
+    return cut(surface, faces, search=search.search(search.first_spread()), **options)
 
 
 def bound_shear(
