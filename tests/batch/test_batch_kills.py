@@ -82,11 +82,17 @@ def batch(work, address="", shared=False):
 
 
 def running(work):
-    """Files that the manifest says are in flight."""
-    with suppress(sqlite3.OperationalError):
-        base = sqlite3.connect(f"file:{work.root / 'out.manifest.sqlite'}?mode=ro", uri=True, timeout=20)
-        return {name for (name,) in base.execute("SELECT name FROM runs WHERE state = 'running'")}
-    return set()
+    """Files that the manifest says are in flight; none while there is no manifest.
+
+    It is opened to be written: what was killed within a transaction is rolled back first, as the next batch does.
+    """
+    path = work.root / "out.manifest.sqlite"
+    if not path.exists():
+        return set()
+    base = sqlite3.connect(path, timeout=20)
+    if not base.execute("SELECT COUNT(*) FROM sqlite_master WHERE name = 'runs'").fetchone()[0]:
+        return set()
+    return {name for (name,) in base.execute("SELECT name FROM runs WHERE state = 'running'")}
 
 
 def check(work, flights):
