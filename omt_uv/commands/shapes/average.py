@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from ... import __version__
+from ...batch.plan import READABLE
 from ...pipelines.shapes.choices import DEFAULT_PREFIX
 from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn_of
 from ..options import add_input, number
 from ..selection import of_file, read_file
 
-READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx", ".off")
 # A z-score beyond which a vertex is told of as off.
 FAR = 3.0
 MEAN = "Mean"

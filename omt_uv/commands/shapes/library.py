@@ -7,9 +7,9 @@ import json
 from pathlib import Path
 
 from ... import __version__
+from ...batch.plan import READABLE
 from ..common import CommandError, check_paths, require_blender, warn_of
 from ..options import add_input, vertices
-from .average import READABLE
 from .distance import add_points, signature_of_file
 from .many import add_jobs, carried_out
 from .signature import NAME, SUFFIX, read_signature

@@ -15,7 +15,7 @@ from ...errors import LandmarkError, PrecisionError
 from ...linalg.nested_dissection import mesh_order
 from ...linalg.sparse import solve_spd
 from ...mesh.charts import Chart, strict_charts
-from ...mesh.geometry import face_areas, halfedge_lengths, laplacian_from_lengths, signed_areas
+from ...mesh.geometry import LEAST_STIFFNESS, face_areas, halfedge_lengths, laplacian_from_lengths, signed_areas
 from ...mesh.point_location import locate
 from ...mesh.surface import triangle_surface
 from ...mesh.topology import boundary_loops, on_boundary, twins
@@ -29,8 +29,6 @@ from ..results import MET, OnSurface, Registration, RegistrationOptions, stretch
 from ..surface_newton import STRICT, deformation, flat, in_space, minimise_on
 from .seam_arcs import SeamArcs, corresponding_arcs, seam_arcs
 
-# Least stiffness of an edge of the harmonic map: what is not positive could fold.
-LEAST_STIFFNESS = 1e-3
 # Newton steps of the polish.
 POLISHING_STEPS = 60
 # A landmark with a coordinate this near to 1 is at a vertex.
@@ -309,6 +307,7 @@ def _harmonic(uv: np.ndarray, triangles: np.ndarray, outline: np.ndarray, places
     """The harmonic map (n,2) of a disk (n,2), (m,3), its outline (r,) at places (r,2) around a convex outline."""
     n = len(uv)
     length = halfedge_lengths(in_space(uv), triangles).reshape(-1, 3)
+    # What is not positive could fold.
     stiffness = laplacian_from_lengths(length, triangles, n, least=LEAST_STIFFNESS)
     found = np.zeros((n, 2))
     found[outline] = places
