@@ -208,6 +208,8 @@ NAVIGATION = {
 }
 
 
+# Keys that end a run with what it has so far, where that is a result.
+KEEP = ("RET", "NUMPAD_ENTER")
 # Seconds between two looks of the user at the progress.
 SHOW_EVERY = 0.1
 
@@ -286,6 +288,9 @@ class SolverOperator:
             self.cancel(context)
             self.report({"INFO"}, f"Cancelled after {seconds:.1f} s; nothing was changed")  # type: ignore[attr-defined]
             return {"CANCELLED"}
+        if event.type in KEEP and event.value == "PRESS" and run.current and run.current.end_early():
+            show_progress(context, run.current.text())
+            return {"RUNNING_MODAL"}
         if event.type == "TIMER":
             return self._advance(context)
         return {"PASS_THROUGH"} if event.type in NAVIGATION else {"RUNNING_MODAL"}
@@ -406,5 +411,5 @@ def show_progress(context: bpy.types.Context, text: str | None) -> None:
     """Say in the status bar and in our panels how far a run is; None: there is none."""
     if context.workspace is None:
         return
-    context.workspace.status_text_set(f"{text}      Esc: Cancel" if text else None)
+    context.workspace.status_text_set(text)
     last_run.redraw(context)

@@ -23,7 +23,11 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     else:
         big_button(layout, UNWRAP, "UV", "Unwrap", HEIGHT)
     properties = settings_of(context, UNWRAP)
-    draw_live(layout, properties)
+    if run.current is None:
+        draw_live(layout, properties)
+    else:
+        # In place of the slider, which nobody can move meanwhile.
+        layout.label(text=run.current.keys())
     draw_main(layout.column(), properties)
 
 

@@ -8,8 +8,12 @@ from __future__ import annotations
 
 import gc
 import time
+from typing import TYPE_CHECKING
 
 import bpy
+
+if TYPE_CHECKING:
+    from ..solver.progress import EarlyEnd
 
 # Seconds of work between two looks at the keyboard.
 SLICE = 0.05
@@ -27,6 +31,8 @@ class Run:
         self.began = time.monotonic()
         self.stage, self.fraction = "Reading", 0.0
         self.result = None
+        self.early: EarlyEnd | None = None
+        self.is_ending = False
         self._watch = Watch(context, objects)
 
     @property
@@ -52,13 +58,30 @@ class Run:
                 self.result = stop.value
                 self._watch.check(thoroughly=True)
                 return True
-            self.stage, self.fraction = progress.stage, progress.fraction
+            self.stage, self.fraction, self.early = progress.stage, progress.fraction, progress.early
+            if self.is_ending and self.early is not None:
+                self.early.ask()
             more = time.monotonic() - begin < seconds and not isinstance(progress, ThreadProgress)
         return False
 
+    def end_early(self) -> bool:
+        """End with what there is already, of every object that comes; whether there is anything."""
+        if self.early is None:
+            return False
+        self.early.ask()
+        self.is_ending = True
+        return True
+
     def text(self) -> str:
-        """One line for the status bar."""
-        return f"{self.label}: {self.stage}   {100 * self.fraction:.0f} %   {self.seconds:.1f} s"
+        """One line for the status bar: what it does, and the keys that end it."""
+        line = f"{self.label}: {self.stage}   {100 * self.fraction:.0f} %   {self.seconds:.1f} s"
+        return f"{line}      {self.keys()}"
+
+    def keys(self) -> str:
+        """The keys that end it, as things are."""
+        if self.is_ending:
+            return "Keeping the Best So Far      Esc: Cancel"
+        return "Enter: Keep Best So Far      Esc: Cancel" if self.early is not None else "Esc: Cancel"
 
     def close(self) -> None:
         self._watch.close()

@@ -18,12 +18,27 @@ from .blas_threads import one_blas_thread
 T = TypeVar("T")
 
 
+class EarlyEnd:
+    """Lets a solver end with the best it has so far: whoever steps it asks, and the solver looks at every Progress."""
+
+    def __init__(self):
+        self.is_asked = False
+
+    def ask(self) -> None:
+        """End soon, with a result."""
+        self.is_asked = True
+
+
 @dataclass(frozen=True)
 class Progress:
-    """What a solver is doing and how far it is, `fraction` in [0, 1] of the named stage."""
+    """What a solver is doing and how far it is, `fraction` in [0, 1] of the named stage.
+
+    early : ends the solver with a result that it has already, None as long as there is none
+    """
 
     stage: str
     fraction: float
+    early: EarlyEnd | None = None
 
 
 class ThreadProgress(Progress):
@@ -52,7 +67,19 @@ def part_of(steps: Steps[T], start: float, width: float) -> Steps[T]:
             progress = next(steps)
         except StopIteration as stop:
             return stop.value
-        yield Progress(progress.stage, min(start + width * progress.fraction, 1.0))
+        yield Progress(progress.stage, min(start + width * progress.fraction, 1.0), progress.early)
+
+
+def unless_ended(steps: Steps[T], early: EarlyEnd) -> Steps[T | None]:
+    """Run a solver that can be done without, until it is at its end or that of the whole is asked for; then None."""
+    while not early.is_asked:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            return stop.value
+        yield Progress(progress.stage, progress.fraction, early)
+    steps.close()
+    return None
 
 
 def on_thread(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
@@ -82,7 +109,7 @@ def on_thread(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
     threading.Thread(target=work, name="omt_uv solver", daemon=True).start()
     try:
         while not done.wait(patience):
-            yield ThreadProgress(latest[0].stage, latest[0].fraction)
+            yield ThreadProgress(latest[0].stage, latest[0].fraction, latest[0].early)
     finally:
         closed.set()
     if errors:

@@ -182,6 +182,49 @@ def uv_bytes(mesh):
     return values.tobytes()
 
 
+def offered(package, operator):
+    """Timer events until the run has a whole map to offer."""
+    running = package("session.run")
+    assert step(operator, 0) == {"RUNNING_MODAL"}
+    while running.current.early is None:
+        assert "Enter" not in running.current.text()
+        assert operator.modal(bpy.context, event("RET", "PRESS")) == {"RUNNING_MODAL"}
+        assert not running.current.is_ending
+        assert operator.modal(bpy.context, event("TIMER")) == {"RUNNING_MODAL"}
+    return running.current
+
+
+def steep(package, monkeypatch):
+    """A part that several rounds of seams cut, since the first is content with anything."""
+    monkeypatch.setattr(package("solver.parameterization.shear_bound"), "SPREAD_OF_SHEAR", 1e4)
+    return scenes.bump(20, 16, height=1.5)
+
+
+def test_enter_keeps_the_best_so_far_and_escape_restores_everything(package, monkeypatch):
+    """Enter does nothing before there is a whole map; what it keeps is one undo step, and says why it shears."""
+    obj = steep(package, monkeypatch)
+    before = everything()
+    operator = scenes.stand_in("uv.omt_unwrap", max_shear=1.02)
+    current = offered(package, operator)
+    assert "Enter: Keep Best So Far" in current.text() and "Esc: Cancel" in current.text()
+    assert operator.modal(bpy.context, event("ESC", "PRESS")) == {"CANCELLED"}
+    assert everything() == before
+    operator = scenes.stand_in("uv.omt_unwrap", max_shear=1.02)
+    current = offered(package, operator)
+    assert operator.modal(bpy.context, event("RET", "PRESS")) == {"RUNNING_MODAL"}
+    assert "Keeping" in current.text()
+    state = {"RUNNING_MODAL"}
+    while "RUNNING_MODAL" in state:
+        state = operator.modal(bpy.context, event("TIMER"))
+    assert state == {"FINISHED"}
+    summary = package("session.last_run").state.summary
+    assert any("not searched to the end" in notice.text for notice in summary.notices)
+    kept = scenes.uv_of(obj)
+    monkeypatch.setattr(package("solver.parameterization.shear_bound"), "MOST_ROUNDS", 1)
+    assert bpy.ops.uv.omt_unwrap(max_shear=1.02) == {"FINISHED"}
+    assert np.array_equal(scenes.uv_of(obj), kept)
+
+
 def test_the_view_can_be_moved_and_nothing_else_gets_through():
     scene("uv.omt_unwrap", "OBJECT")
     operator = scenes.stand_in("uv.omt_unwrap")

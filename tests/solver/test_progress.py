@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from omt_uv.solver.progress import Progress, RunLog, ThreadProgress, drain, on_thread, part_of
+from omt_uv.solver.progress import EarlyEnd, Progress, RunLog, ThreadProgress, drain, on_thread, part_of, unless_ended
 
 
 def count_to(n):
@@ -23,6 +23,30 @@ def test_a_part_of_a_job():
     seen = []
     assert drain(part_of(count_to(4), 0.5, 0.2), seen.append) == 4
     assert [p.fraction for p in seen] == pytest.approx([0.5, 0.55, 0.6, 0.65])
+
+
+def test_what_can_be_done_without_ends_when_it_is_asked():
+    """Through parts of jobs and threads, too; the solver is closed, and without being asked it goes to its end."""
+    closed, early = [], EarlyEnd()
+
+    def endless():
+        try:
+            while True:
+                yield Progress("Here", 0.0)
+        finally:
+            closed.append(True)
+
+    def whole():
+        yield Progress("First", 0.0)
+        return (yield from part_of(unless_ended(endless(), early), 0.5, 0.5))
+
+    def ask(progress):
+        assert (progress.early is None) == (progress.stage in ("", "First"))
+        if progress.early is not None:
+            progress.early.ask()
+
+    assert drain(on_thread(whole()), ask) is None and closed == [True]
+    assert drain(unless_ended(count_to(4), EarlyEnd())) == 4
 
 
 def test_a_thread_gives_the_same_result():

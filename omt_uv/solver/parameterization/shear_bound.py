@@ -13,13 +13,13 @@ from ..analysis.density import Target
 from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.cuts import Cuts, cut
 from ..cutting.disk_charts import DiskCharts, disk_charts
-from ..errors import CUT_FURTHER, MORE_SEAMS
+from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
 from ..maps.distortion import face_distortion
 from ..mesh.charts import Chart
 from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
-from ..progress import Steps, part_of
+from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.search import Measured, SeamSearch
 from .chart_map import ChartMap
 from .options import ShearBound
@@ -135,9 +135,10 @@ def bound_shear(
     """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or it is too much.
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts.
-    Errors are those of `disk_charts.disk_charts` and of `map_charts`.
+    Progress offers an early end: with the maps of the last round. Errors are those of `disk_charts.disk_charts` and of
+    `map_charts`.
     """
-    prepared, bound = first, search.shear.bound
+    prepared, bound, early = first, search.shear.bound, EarlyEnd()
     cuts, spread = _cuts(first), search.first_spread()
     promised = np.full(len(spread), np.inf)
     rounds, before = 0, np.inf
@@ -167,16 +168,23 @@ def bound_shear(
         missing = [charts[k] for k in searched]
         outlines = np.concatenate([_outline(chart) for chart in missing])
         kept = cuts.edges[~np.isin(pair_keys(*cuts.edges.T), outlines)]
-        again = yield from part_of(search.again(kept, missing, spread, found), begin, width * SEARCHING)
+        searching = part_of(search.again(kept, missing, spread, found), begin, width * SEARCHING)
+        again = yield from unless_ended(searching, early)
+        if again is None:
+            break
         edges = np.concatenate([kept, _cuts(again).edges])
         if len(edges) == len(cuts.edges) and np.isin(pair_keys(*edges.T), pair_keys(*cuts.edges.T)).all():
             break
-        prepared, cuts = again, replace(cuts, edges=edges, length=_length(search.surface, edges))
-        mapping = _mapped(prepared.charts, charts, maps, map_charts)
-        maps = yield from part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
+        mapping = _mapped(again.charts, charts, maps, map_charts)
+        further = part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
+        mapped = yield from unless_ended(further, early)
+        if mapped is None:
+            break
+        prepared, maps = again, mapped
+        cuts = replace(cuts, edges=edges, length=_length(search.surface, edges))
     prepared = DiskCharts(charts, cuts, first.warnings)
     by_hand = np.array([k not in searched for k in missed], dtype=bool)
-    warnings = tuple(_warnings(mean[missed], by_hand, bound))
+    warnings = tuple(_warnings(mean[missed], by_hand, bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
     return BoundedShear(prepared, maps, warnings)
 
 
@@ -187,9 +195,9 @@ def _cuts(prepared: DiskCharts) -> Cuts:
     return prepared.cuts
 
 
-def _warnings(mean: np.ndarray, by_hand: np.ndarray, bound: float) -> Iterator[str]:
-    """Warnings of charts (k,) that shear more than a bound, those with seams marked by hand apart."""
-    for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, MORE_SEAMS)):
+def _warnings(mean: np.ndarray, by_hand: np.ndarray, bound: float, why: str) -> Iterator[str]:
+    """Warnings of charts (k,) that shear more than a bound, those with seams marked by hand apart; why others do."""
+    for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, why)):
         if chosen.any():
             who = "An island shears" if chosen.sum() == 1 else f"{chosen.sum()} islands shear"
             what = what if chosen.sum() == 1 else what.replace("its seams", "their seams")

@@ -5,7 +5,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.errors import CUT_FURTHER, MORE_SEAMS
+from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -108,3 +108,41 @@ def test_charts_of_disks_and_squares_are_not_cut_for_shear():
 def test_the_bound_must_be_possible(bound):
     with pytest.raises(ValueError, match="bound"):
         ShearBound(bound)
+
+
+def ended_at(surface, bound, when):
+    """The result of an unwrapping that was told to end at the offer with number `when`, and the offers until then."""
+    steps, offers = unwrap(surface, options=UnwrapOptions(max_shear=bound)), 0
+    while True:
+        try:
+            progress = next(steps)
+        except StopIteration as stop:
+            return stop.value, offers
+        offers += progress.early is not None
+        if progress.early is not None and offers >= when:
+            progress.early.ask()
+
+
+def test_an_early_end_keeps_the_last_whole_map(monkeypatch):
+    """The first of several rounds, as if it had been the only one; its warning says why it shears."""
+    monkeypatch.setattr(shear_bound, "SPREAD_OF_SHEAR", 2.0)
+    surface = triangle_surface(*meshes.cap(rings=12, sectors=24, opening=0.9))
+    whole = unwrapped(surface, 1.2)
+    ended, offers = ended_at(surface, 1.2, when=1)
+    assert offers == 1
+    middle, more = ended_at(surface, 1.2, when=8)
+    assert more == 8
+    monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
+    first = unwrapped(surface, 1.2)
+    for found in (ended, middle):
+        assert np.array_equal(found.seams, first.seams) and len(found.seams) < len(whole.seams)
+        assert np.array_equal(found.maps[0].uv, first.maps[0].uv)
+        (warning,) = found.warnings
+        assert ENDED_EARLY in warning and MORE_SEAMS not in warning
+
+
+def test_nothing_is_offered_before_the_first_map():
+    surface = triangle_surface(*meshes.cap(rings=12, sectors=24, opening=0.9))
+    steps = unwrap(surface, options=UnwrapOptions(max_shear=1.3))
+    stages = [progress.stage for progress in steps if progress.early is None]
+    assert stages[0] == "Charts" and stages[-1] != "Charts"
