@@ -13,6 +13,8 @@ from .geometry import face_areas
 
 # Corners of a quad's four triangles: those of the diagonal given, then the others.
 BOTH = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
+# Sine, squared, of the angle by which a corner of a fan may turn inwards and count as straight.
+STRAIGHT = -1e-9
 
 
 def polygon_areas(positions: np.ndarray, triangles: np.ndarray, polygons: np.ndarray | None = None) -> np.ndarray:
@@ -73,6 +75,46 @@ def quad_corners(triangles: np.ndarray, first: np.ndarray, second: np.ndarray) -
     # one = (a, b, d) and two = (c, d, b): the quad b, c, d, a.
     place = 3 * first[:, None] + turn
     return np.column_stack([place[:, 1], 3 * second + other, place[:, 2], place[:, 0]]), joined
+
+
+def polygon_fans(
+    vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fans in place of convex polygons of at least three triangles (m,3) of a surface (n,3).
+
+    owner (m,): polygon of every triangle, counted from 0. Centres (k,3), the vertices from n on; triangles (t,3) of the
+    fans, and the polygon (t,) of each.
+    """
+    several = np.bincount(owner, minlength=1)[owner] > 2
+    triangles, owner, n = triangles[several], owner[several], len(vertices)
+    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    of_edge = np.repeat(owner, 3)
+    key = (of_edge * n + np.minimum(tail, head)) * n + np.maximum(tail, head)
+    _, where, count = np.unique(key, return_index=True, return_counts=True)
+    sides = where[count == 1]
+    # By polygon and tail: the side after the one that ends there.
+    sides = sides[np.lexsort((tail[sides], of_edge[sides]))]
+    tail, head, of_side = tail[sides], head[sides], of_edge[sides]
+    start = of_side * n + tail
+    after = np.searchsorted(start, of_side * n + head)
+    sound = np.bincount(of_side, minlength=1) == np.bincount(owner, minlength=1) + 2
+    after = np.minimum(after, len(start) - 1)
+    broken = (start[after] != of_side * n + head) | (np.diff(start, prepend=-1) == 0)
+    sound[of_side[broken]] = False
+    label, index = np.unique(of_side, return_inverse=True)
+    centre = np.stack([np.bincount(index, vertices[tail, k]) for k in range(3)], axis=1) / np.bincount(index)[:, None]
+    p, q, r, c = vertices[tail], vertices[head], vertices[head[after]], centre[index]
+    fan = np.cross(q - c, p - c) * -1
+    normal = np.stack([np.bincount(index, fan[:, k]) for k in range(3)], axis=1)[index]
+    size = np.linalg.norm(normal, axis=1)
+    ear = np.einsum("sd,sd->s", np.cross(q - p, r - q), normal)
+    flat = ear < STRAIGHT * size * np.linalg.norm(q - p, axis=1) * np.linalg.norm(r - q, axis=1)
+    sound[of_side[flat | (np.einsum("sd,sd->s", fan, normal) <= 0)]] = False
+    kept = sound[of_side]
+    chosen = np.unique(index[kept])
+    place = np.full(len(label), -1)
+    place[chosen] = n + np.arange(len(chosen))
+    return centre[chosen], np.column_stack([tail, head, place[index]])[kept], of_side[kept]
 
 
 def _fans(positions, triangles, polygons, count: int) -> tuple[np.ndarray, np.ndarray]:

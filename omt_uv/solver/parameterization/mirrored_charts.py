@@ -16,7 +16,8 @@ from ..mesh.charts import Chart
 from ..mesh.geometry import signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
-from ..mesh.surface import Surface
+from ..mesh.surface import Surface, chosen_triangles
+from ..mesh.topology import pair_keys
 from .chart_map import ChartMap, in_unit_box, measured_chart
 
 # Relative difference of densities of mirror images up to which they are the same.
@@ -27,6 +28,8 @@ AREA_KEPT = 1.5
 SAME_PLACE = 1e-5
 # Most motions that are tried for a pair of charts.
 TRIALS = 32
+# Cuts may be so many times as long if they are symmetric then.
+LONGER = 1.5
 
 
 def mirror_partners(charts: Sequence[Chart], targets: Sequence[Target | None]) -> dict[int, tuple[int, np.ndarray]]:
@@ -60,6 +63,35 @@ def _mirror_of_all(charts: Sequence[Chart]) -> Mirror | None:
     size += max(len(c.patches) for c in charts)
     polygons = np.concatenate([faces + k * size for k, faces in enumerate(owners)])
     return find_mirror(np.concatenate([c.vertices for c in charts]), triangles, polygons)
+
+
+def images_of_cuts(surface: Surface, faces: np.ndarray | None, cuts: np.ndarray) -> np.ndarray:
+    """Mirror images (k,2) of those of the cuts (c,2) that have none among them, where the rest is symmetric.
+
+    None where the polygons `faces` (f,) bool of the surface, or its seams, are not their own image, or where the images
+    would make the cuts much longer. A slit to one corner of a mouth spoils the symmetry of a head.
+    """
+    none, n = np.zeros((0, 2), np.int64), len(surface.positions)
+    _, triangles, owner = chosen_triangles(surface, faces)
+    used, compact = np.unique(surface.corner_vertex[triangles], return_inverse=True)
+    place = np.full(n, -1)
+    place[used] = np.arange(len(used))
+    seams, cuts = (place[edges][(place[edges] >= 0).all(axis=1)] for edges in (surface.seams, cuts))
+    if not len(cuts):
+        return none
+    # What lies where: a slit is no seam that was there before.
+    every = np.concatenate([seams, cuts])
+
+    def accepted(image: np.ndarray) -> bool:
+        return bool(np.isin(pair_keys(*image[seams].T), pair_keys(*seams.T)).all())
+
+    mirror = find_mirror(surface.positions[used], compact.reshape(-1, 3), owner, accepted=accepted)
+    if mirror is None:
+        return none
+    images = mirror.image[cuts]
+    images = images[~np.isin(pair_keys(*images.T), pair_keys(*every.T))]
+    length, more = (np.linalg.norm(np.diff(surface.positions[used][e], axis=1), axis=2).sum() for e in (cuts, images))
+    return used[images] if length + more <= LONGER * length else none
 
 
 def mirrored_map(chart_map: ChartMap, image: np.ndarray) -> ChartMap:

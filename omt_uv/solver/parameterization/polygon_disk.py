@@ -14,9 +14,7 @@ from ..maps.polygon_elements import polygon_mesh
 from ..mesh.charts import Chart
 from ..mesh.edge_flips import shorter_diagonals
 from ..mesh.geometry import face_areas, signed_areas
-
-# Sine, squared, of the angle by which a corner may turn inwards and count as straight.
-STRAIGHT = -1e-9
+from ..mesh.polygon_areas import polygon_fans
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,7 @@ def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     quads = shorter_diagonals(vertices, cut.quads, chart.disk)
     own = faces[cut.rows[: len(cut.triangles)]]
     of_quads = faces[cut.rows[len(cut.triangles) :]].reshape(-1, 2)[:, 0]
-    centres, fans, of_fans = _fans(vertices, cut.triangles, own)
+    centres, fans, of_fans = polygon_fans(vertices, cut.triangles, own)
     kept = ~np.isin(own, of_fans)
     halves = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
     return PolygonDisk(
@@ -94,37 +92,3 @@ def _numbered(faces: np.ndarray) -> np.ndarray:
     """Faces (m,) by numbers from 0 in the order in which they come, whatever they are called."""
     _, first, label = np.unique(faces, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[label.ravel()]
-
-
-def _fans(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray):
-    """Centres (k,3), triangles (t,3) and polygons (t,) of fans of the convex polygons of at least three triangles."""
-    several = np.bincount(owner, minlength=1)[owner] > 2
-    triangles, owner, n = triangles[several], owner[several], len(vertices)
-    tail, head = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    of_edge = np.repeat(owner, 3)
-    key = (of_edge * n + np.minimum(tail, head)) * n + np.maximum(tail, head)
-    _, where, count = np.unique(key, return_index=True, return_counts=True)
-    sides = where[count == 1]
-    # By polygon and tail: the side after the one that ends there.
-    sides = sides[np.lexsort((tail[sides], of_edge[sides]))]
-    tail, head, of_side = tail[sides], head[sides], of_edge[sides]
-    start = of_side * n + tail
-    after = np.searchsorted(start, of_side * n + head)
-    sound = np.bincount(of_side, minlength=1) == np.bincount(owner, minlength=1) + 2
-    after = np.minimum(after, len(start) - 1)
-    broken = (start[after] != of_side * n + head) | (np.diff(start, prepend=-1) == 0)
-    sound[of_side[broken]] = False
-    label, index = np.unique(of_side, return_inverse=True)
-    centre = np.stack([np.bincount(index, vertices[tail, k]) for k in range(3)], axis=1) / np.bincount(index)[:, None]
-    p, q, r, c = vertices[tail], vertices[head], vertices[head[after]], centre[index]
-    fan = np.cross(q - c, p - c) * -1
-    normal = np.stack([np.bincount(index, fan[:, k]) for k in range(3)], axis=1)[index]
-    size = np.linalg.norm(normal, axis=1)
-    ear = np.einsum("sd,sd->s", np.cross(q - p, r - q), normal)
-    flat = ear < STRAIGHT * size * np.linalg.norm(q - p, axis=1) * np.linalg.norm(r - q, axis=1)
-    sound[of_side[flat | (np.einsum("sd,sd->s", fan, normal) <= 0)]] = False
-    kept = sound[of_side]
-    chosen = np.unique(index[kept])
-    place = np.full(len(label), -1)
-    place[chosen] = n + np.arange(len(chosen))
-    return centre[chosen], np.column_stack([tail, head, place[index]])[kept], of_side[kept]

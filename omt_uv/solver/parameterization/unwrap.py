@@ -22,7 +22,14 @@ from .chart_indices import chart_target, cut_as_given, in_order_of_places, locat
 from .chart_map import ChartMap, map_chart
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons, with_folds_counted
-from .mirrored_charts import as_given, equal_chart_map, mirror_partners, mirrored_map, with_mirrored_quads
+from .mirrored_charts import (
+    as_given,
+    equal_chart_map,
+    images_of_cuts,
+    mirror_partners,
+    mirrored_map,
+    with_mirrored_quads,
+)
 from .options import UnwrapOptions
 from .shear_bound import ShearSearch, bound_shear
 from .small_charts import is_small, map_together
@@ -151,7 +158,26 @@ def cut_charts(
     search = None if bound is None else ShearSearch(surface, faces, bound, target, given)
     finder = None if search is None else search.search(search.first_spread())
     prepared = yield from disk_charts(surface, faces, seams=options.seams, search=finder, **given)
+    prepared = yield from _cut_alike(surface, faces, prepared, given)
     return replace(_to_be_mapped(surface, prepared, pins, target), search=search)
+
+
+def _cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts, given: dict) -> Steps[DiskCharts]:
+    """The charts cut along the mirror images of their cuts, too, where that leaves as many charts, all without holes;
+    as they are otherwise. given : further arguments of `disk_charts`"""
+    if prepared.cuts is None or not len(prepared.cuts.edges) or any(len(c.patches) for c in prepared.charts):
+        return prepared
+    more = images_of_cuts(surface, faces, prepared.cuts.edges)
+    if not len(more):
+        return prepared
+    edges = np.concatenate([prepared.cuts.edges, more])
+    open_there = replace(surface, seams=np.concatenate([surface.seams, edges]))
+    found = yield from disk_charts(open_there, faces, extremities=0, **given)
+    if len(found.charts) > len(prepared.charts) or found.cuts is None or len(found.cuts.edges):
+        return prepared
+    length = np.linalg.norm(np.diff(surface.positions[more], axis=1), axis=2).sum()
+    cuts = replace(prepared.cuts, edges=edges, length=prepared.cuts.length + float(length))
+    return replace(prepared, charts=found.charts, cuts=cuts)
 
 
 def _to_be_mapped(surface: Surface, prepared: DiskCharts, pins: CornerPins | None, target: Target | None) -> CutCharts:

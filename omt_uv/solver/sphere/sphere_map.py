@@ -6,7 +6,7 @@ from coarse to fine instead, which always exists.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ..transport.spherical_power_diagram import Hull
 from .conformal import ConformalSphere, conformal_sphere
 from .dominitz_tannenbaum import SphereFlow, flow_map
 from .multilevel import multilevel_start
+from .polygon_surface import PolygonSurface, with_polygon_fans
 from .refine import SphereRefinement, sphere_refine
 from .symmetry import with_mirrored_quads
 
@@ -97,22 +98,37 @@ def sphere_map(
     """
     _check_method(method)
     surface = closed_surface(vertices, triangles)
-    target, warnings = _target(surface, density), list(surface.warnings)
+    given = PolygonSurface(surface, polygons, _target(surface, density))
+    fanned, options = with_polygon_fans(given), {"balance": balance, "quality": quality}
+    if fanned is not None:
+        found = yield from _mapped(fanned, method, options)
+        n = len(surface.vertices)
+        found = replace(found, positions=found.positions[:n], conformal=found.conformal[:n])
+        # A cap that is no longer convex may fold the triangles that it came as.
+        if method == MOSER or signed_volumes(found.positions, surface.triangles).min() > 0:
+            return found
+    return (yield from _mapped(given, method, options))
+
+
+def _mapped(given: PolygonSurface, method: str, options: dict) -> Steps[SphereMap]:
+    """The map of a surface as it is cut; options : balance and quality."""
+    surface, polygons, target = given.surface, given.polygons, given.target
+    warnings = list(surface.warnings)
     joined = with_mirrored_quads(surface.vertices, surface.triangles, polygons)
-    options = {"balance": balance, "quality": quality, "polygons": joined}
+    options = options | {"polygons": joined}
     found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
     refined, flow = None, (yield from part_of(_flow(found, surface, target, method), *TRANSPORT))
     if found is not None and flow is not None and method == MOSER:
         return _unrefined(flow, found, warnings)
     if found is not None:
-        begin = _transport_start(found, surface, density) if flow is None else _at_once(flow)
+        begin = _transport_start(found, surface, target) if flow is None else _at_once(flow)
         refined = yield from _refined_start(surface, begin, target, warnings, options)
     if refined is None:
         start, _ = yield from part_of(multilevel_start(surface.vertices, surface.triangles, target), *MULTILEVEL)
         refined = yield from _refined(surface, start, target, options)
     if joined is not polygons and not _as_given(refined.positions, surface, target, refined.area_error):
         refined = yield from _refined(surface, refined.positions, target, options | {"polygons": polygons})
-    if balance == 0 and refined.area_error > QUALITIES[quality].area_error:
+    if options["balance"] == 0 and refined.area_error > QUALITIES[options["quality"]].area_error:
         warnings.append(_area_warning(refined.positions, surface.triangles, target, polygons))
     conformal = found.positions if found else (yield from _least_shear(surface, refined))
     return SphereMap(
@@ -202,9 +218,10 @@ def _refined_start(
     return None
 
 
-def _transport_start(found: ConformalSphere, surface: ClosedSurface, density: np.ndarray | None) -> Steps[np.ndarray]:
+def _transport_start(found: ConformalSphere, surface: ClosedSurface, target: np.ndarray) -> Steps[np.ndarray]:
     """Every vertex in the middle of its cell, (n,3)."""
-    mass = vertex_areas(surface.vertices, surface.triangles, density)
+    area = face_areas(surface.vertices, surface.triangles)
+    mass = vertex_areas(surface.vertices, surface.triangles, target / area)
     hull = Hull(found.triangles, twins(found.triangles))
     return (yield from sphere_transport(found.sites, mass, START_TOLERANCE, hull)).cells.centroids()
 

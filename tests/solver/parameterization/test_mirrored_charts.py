@@ -11,8 +11,9 @@ from sphere_shapes import random_rotation
 from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.mesh.mirror import find_mirror
 from omt_uv.solver.parameterization import unwrap as unwrap_module
-from omt_uv.solver.parameterization.mirrored_charts import motion_between
+from omt_uv.solver.parameterization.mirrored_charts import images_of_cuts, motion_between
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -97,3 +98,46 @@ def test_equal_charts_are_solved_once(monkeypatch):
     density[charts[1].faces.min() :][:3] = 2.0
     drain(unwrap(surface, options=DRAFT, target=Target(density)))
     assert len(solved) == 3
+
+
+def bent_grid(turned=0):
+    """A surface of 8 by 8 quads that is its own image in x alone, and what takes (column, row) to a vertex."""
+    n = 8
+    y, x = np.divmod(np.arange((n + 1) ** 2), n + 1)
+    V = np.column_stack([x - n / 2, y, 0.1 * (x - n / 2) ** 2 + 0.03 * y**2 + 0.05 * y])
+    V = V @ random_rotation(turned).T
+    corner = np.arange(n * (n + 1)).reshape(n, n + 1)[:, :-1].ravel()
+    P = np.column_stack([corner, corner + 1, corner + n + 2, corner + n + 1]).tolist()
+    return V, P, lambda column, row: row * (n + 1) + column
+
+
+def test_a_slit_on_one_side_has_an_image_on_the_other():
+    V, P, at = bent_grid(turned=3)
+    surface = meshes.polygon_surface(V, P)
+    slit = np.array([[at(4, 0), at(4, 1)], [at(4, 1), at(4, 2)], [at(4, 2), at(5, 2)]])
+    assert np.sort(images_of_cuts(surface, None, slit)).tolist() == [[at(3, 2), at(4, 2)]]
+    both = np.concatenate([slit, [[at(4, 2), at(3, 2)]]])
+    assert len(images_of_cuts(surface, None, both)) == 0
+
+
+def test_what_is_not_symmetric_or_would_be_much_longer_has_no_image():
+    V, P, at = bent_grid()
+    surface = meshes.polygon_surface(V, P)
+    assert len(images_of_cuts(surface, None, np.array([[at(0, 2), at(1, 2)]]))) == 0
+    slit = np.array([[at(4, k), at(4, k + 1)] for k in range(3)] + [[at(4, 3), at(5, 3)]])
+    assert len(images_of_cuts(surface, None, slit)) == 1
+    marked = meshes.polygon_surface(V, P, [(at(7, 6), at(6, 6))])
+    assert len(images_of_cuts(marked, None, slit)) == 0
+    faces = np.ones(len(P), bool)
+    faces[0] = False
+    assert len(images_of_cuts(surface, faces, slit)) == 0
+
+
+def test_suzanne_is_cut_and_mapped_symmetrically():
+    V, P = meshes.load_polygons("suzanne")
+    surface = meshes.polygon_surface(V, P)
+    found = drain(unwrap(surface, options=UnwrapOptions(quality="draft")))
+    mirror = find_mirror(V, surface.corner_vertex[surface.triangles], surface.triangle_face)
+    cuts = {tuple(sorted(e)) for e in found.seams.tolist()}
+    assert cuts == {tuple(sorted(e)) for e in mirror.image[found.seams].tolist()}
+    assert all(m.folds == 0 for m in found.maps)
