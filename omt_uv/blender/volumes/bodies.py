@@ -42,6 +42,8 @@ def read_body(obj: bpy.types.Object, keep: str = "") -> FlowBody:
         mesh.calc_loop_triangles()
         triangles = np.zeros(3 * len(mesh.loop_triangles), np.int32)
         mesh.loop_triangles.foreach_get("vertices", triangles)
+        polygons = np.zeros(len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("polygon_index", polygons)
     finally:
         if copy is not None:
             bpy.data.meshes.remove(copy)
@@ -50,7 +52,7 @@ def read_body(obj: bpy.types.Object, keep: str = "") -> FlowBody:
     # A mirrored object shows its faces from the other side.
     faces = faces if np.linalg.det(matrix[:3, :3]) > 0 else faces[:, ::-1]
     stays = members(obj, keep) if keep else None
-    return FlowBody(obj.name, world, faces, stays)
+    return FlowBody(obj.name, world, faces, stays, polygons)
 
 
 def _matrix(obj: bpy.types.Object) -> np.ndarray:

@@ -119,7 +119,25 @@ class OBJECT_OT_omt_flow(SolverOperator, bpy.types.Operator):
             ("New intersections", f"{found.intersecting}"),
         )
         warn(self, objects, [(-1, text) for text in found.warnings])
+        self._show_crossing(context, objects, found.crossing)
         self.report({"INFO"}, f"Moved {', '.join(obj.name for obj in objects)}; volume change {found.volume:.1e}")
+
+    def _show_crossing(self, context: bpy.types.Context, objects: list, crossing: tuple) -> None:
+        """Say which faces newly intersect, and have them selected when Edit Mode is entered."""
+        from ...blender.mesh import select_elements, select_mode
+
+        for k, (obj, faces) in enumerate(zip(objects, crossing, strict=True)):
+            if not len(faces):
+                continue
+            first = ", ".join(map(str, faces[:5].tolist()))
+            text = (
+                f"Faces that newly pass through one another ({len(faces)}): {first}{', ...' if len(faces) > 5 else ''}"
+            )
+            warn(self, objects, [(k, text)])
+            # In Edit Mode the selection is what moves, also in the redo panel.
+            if obj.mode != "EDIT":
+                context.tool_settings.mesh_select_mode = select_mode("face")
+                select_elements(obj, "face", faces)
 
     # ---- live ---------------------------------------------------------------------------------------------------
 

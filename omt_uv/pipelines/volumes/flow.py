@@ -16,12 +16,18 @@ from ...solver.progress import Steps
 
 @dataclass(frozen=True)
 class FlowBody:
-    """A body in space: positions (n,3), triangles (m,3) of them, and vertices that stay, (n,) bool or None."""
+    """A body in space: positions (n,3), triangles (m,3) of them, vertices that stay, (n,) bool or None, and the
+    polygon (m,) of every triangle, None where these are the polygons."""
 
     name: str
     positions: np.ndarray
     triangles: np.ndarray
     stays: np.ndarray | None = None
+    polygons: np.ndarray | None = None
+
+    def polygons_of(self, triangles: np.ndarray) -> np.ndarray:
+        """Polygons (k,), each once, of triangles (t,)."""
+        return np.unique(triangles if self.polygons is None else self.polygons[triangles])
 
 
 @dataclass(frozen=True)
@@ -41,24 +47,30 @@ class FlowResult:
 
     volume: greatest relative change of an enclosed volume, 0 where nothing is closed; drift: the same by the flow
     alone;
-    missed: greatest distance of a handle's point from its end, over the diagonal, before it was set there
+    missed: greatest distance of a handle's point from its end, over the diagonal, before it was set there; surge:
+    greatest speed of what flows over that of the handles; intersecting: pairs of faces that newly intersect; crossing:
+    the polygons (k,) of those, of every body
     """
 
     frames: tuple[tuple[np.ndarray, ...], ...]
     volume: float
     drift: float
     missed: float
+    surge: float
     intersecting: int
+    crossing: tuple[np.ndarray, ...]
     steps: int
     warnings: tuple[str, ...]
 
-    def report(self) -> dict[str, float]:
+    def report(self) -> dict[str, float | list[list[int]]]:
         """Figures for a report."""
         return {
             "volume_change": self.volume,
             "drift": self.drift,
             "missed": self.missed,
+            "surge": self.surge,
             "new_intersections": self.intersecting,
+            "new_intersections_faces": [faces.tolist() for faces in self.crossing],
             "steps": self.steps,
         }
 
@@ -86,10 +98,19 @@ def flow_bodies(job: FlowJob) -> Steps[FlowResult]:
         volume=float(np.abs(found.volumes).max(initial=0.0)),
         drift=float(np.abs(found.drift).max(initial=0.0)),
         missed=found.missed,
+        surge=found.surge,
         intersecting=len(found.intersecting),
+        crossing=_crossing(job.bodies, np.unique(found.intersecting)),
         steps=found.steps,
         warnings=found.warnings,
     )
+
+
+def _crossing(bodies: tuple[FlowBody, ...], triangles: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Polygons of every body that triangles (t,), counted among those of all bodies, are of."""
+    first = np.cumsum([0, *(len(body.triangles) for body in bodies)])
+    owner = np.searchsorted(first, triangles, side="right") - 1
+    return tuple(body.polygons_of(triangles[owner == k] - first[k]) for k, body in enumerate(bodies))
 
 
 def _placed(handle: FlowHandle, first: int) -> FlowHandle:

@@ -9,11 +9,11 @@ from ..lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     domain="FlowDomain ball_domain mesh_domain",
-    enclosed_volume="component_volumes restore_volumes",
+    enclosed_volume="EnclosedParts component_volumes restore_volumes",
     flow_map="Flow flow",
     handles="FlowHandle sampled_handles",
     kernel="FlowField interpolated_field",
     options="FlowOptions",
     paths="handle_paths",
-    self_intersections="intersecting_pairs",
+    self_intersections="FaceCrossings intersecting_pairs",
 )

@@ -1,8 +1,9 @@
 """Keep faces of a mesh that flowed from passing through one another where it is creased more finely than it is divided.
 
 A flow takes no two points to one, but flat faces between vertices may meet where the surface nearly touches itself
-within an edge. There, the flow is replaced by its best affine map, which takes faces apart to faces apart, and blended
-with the flow over a few rings of vertices.
+within an edge. Pairs of faces are taken apart again along the planes that were between them (`separation`). Where that
+does not suffice, the flow is replaced by its best affine map, which takes faces apart to faces apart, and blended with
+the flow over a few rings of vertices.
 """
 
 from __future__ import annotations
@@ -12,27 +13,32 @@ import scipy.sparse as sp
 
 from ..mesh.geometry import nearest_rotations
 from ..mesh.topology import graph_components, halfedges
-from .self_intersections import intersecting_pairs
+from .self_intersections import FaceCrossings
+from .separation import separated
 
 # Rings of vertices around faces that intersect, in the rounds of mending; beyond them the blend takes as many again.
 RINGS = (1, 2, 3, 4, 6, 8)
+# Times that pairs which others have been moved into are taken apart with those.
+SEPARATIONS = 8
 # Mending moves nothing farther than this share of the diagonal, and is for creases, not for more than this share of all
 # faces.
 FARTHEST = 0.02
-MOST_FACES = 0.02
+MOST_FACES = 0.05
 
 
 def new_intersections(
-    before: np.ndarray, after: np.ndarray, triangles: np.ndarray, concerned: np.ndarray | None = None
+    before: np.ndarray, after: np.ndarray, faces: FaceCrossings, concerned: np.ndarray | None = None
 ) -> np.ndarray:
     """Pairs (k,2) of triangles (m,3) that intersect at positions `after` (n,3), and neither did at `before` (n,3) nor
-    had neighbours that did: a line along which parts meet moves on from face to face."""
-    pairs = intersecting_pairs(after, triangles, concerned)
+    had neighbours that did: a line along which parts meet moves on from face to face. Only pairs with a triangle that
+    is `concerned` (m,) bool where this is given."""
+    triangles = faces.triangles
+    pairs = faces.pairs(after, concerned)
     if not len(pairs):
         return pairs
     near = np.zeros(len(before), bool)
     near[triangles[pairs]] = True
-    old = intersecting_pairs(before, triangles, near[triangles].any(axis=1))
+    old = faces.pairs(before, near[triangles].any(axis=1))
     old = np.concatenate([old, old[:, ::-1]])
     return pairs[~np.isin(_vertex_pairs(triangles, pairs), _vertex_pairs(triangles, old)).any(axis=1)]
 
@@ -45,14 +51,53 @@ def _vertex_pairs(triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 
 
 def without_new_intersections(
-    before: np.ndarray, after: np.ndarray, triangles: np.ndarray, free: np.ndarray
+    before: np.ndarray, after: np.ndarray, faces: FaceCrossings, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n,3) close to `after` (n,3), and the pairs (k,2) of triangles (m,3) that still intersect and did not
     at `before` (n,3). Only vertices `free` (n,) bool move."""
-    pairs = new_intersections(before, after, triangles, (before != after).any(axis=1)[triangles].any(axis=1))
-    best, fewest, position = after, pairs, after
+    triangles = faces.triangles
+    pairs = new_intersections(before, after, faces, _touched(before, after, triangles))
+    if not len(pairs) or len(np.unique(pairs)) > MOST_FACES * len(triangles):
+        return after, pairs
+    best, fewest = _separated_all(before, after, faces, free, pairs)
+    if len(fewest):
+        best, fewest = _blended_all(before, after, faces, free, (best, fewest))
+    return best, fewest
+
+
+def _touched(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Which triangles (m,) bool have a vertex that is elsewhere."""
+    return (before != after).any(axis=1)[triangles].any(axis=1)
+
+
+def _separated_all(before, after, faces: FaceCrossings, free, pairs) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n,3) and pairs that are left, with pairs (k,2) moved behind the planes that were between them, and
+    those that come to intersect by that, too."""
+    triangles = faces.triangles
     farthest = FARTHEST * np.linalg.norm(np.ptp(before, axis=0))
-    n = len(before)
+    best, fewest = after, pairs
+    for _ in range(SEPARATIONS):
+        position = separated(before, after, triangles, pairs, free)
+        if np.abs(position - after).max() > farthest:
+            break
+        near = _touched(after, position, triangles)
+        near[fewest] = True
+        left = new_intersections(before, position, faces, near)
+        if len(left) < len(fewest):
+            best, fewest = position, left
+        both = np.unique(np.concatenate([pairs, left]), axis=0)
+        if not len(left) or len(both) == len(pairs):
+            break
+        pairs = both
+    return best, fewest
+
+
+def _blended_all(before, after, faces: FaceCrossings, free, found) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n,3) and pairs that are left, of those `found`, with affine maps of more and more rings around."""
+    triangles, n = faces.triangles, len(before)
+    best, fewest = found
+    position, pairs = found
+    farthest = FARTHEST * np.linalg.norm(np.ptp(before, axis=0))
     tail, head = halfedges(triangles)
     graph = sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
     graph = graph + sp.identity(n, format="csr")
@@ -62,9 +107,9 @@ def without_new_intersections(
         position = _blended(before, after, position, graph, triangles[pairs].reshape(len(pairs), -1), free, rings)
         if np.abs(position - after).max() > farthest:
             break
-        near = (position != best).any(axis=1)[triangles].any(axis=1)
+        near = _touched(best, position, triangles)
         near[fewest] = True
-        pairs = new_intersections(before, position, triangles, near)
+        pairs = new_intersections(before, position, faces, near)
         if len(pairs) < len(fewest):
             best, fewest = position, pairs
     return best, fewest

@@ -6,12 +6,17 @@ it, with the square of their size; a move along the normals, much smaller than a
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..mesh.topology import graph_components, halfedges, pair_keys
 
-# Newton steps on the offset; the volume is a polynomial of degree 3 in it.
-ROUNDS = 6
+# Steps on the offset at most, and how many go along the same normals.
+ROUNDS = 16
+SAME_NORMALS = 4
+# A relative change of volume that needs no further step.
+EXACT = 1e-13
 
 
 def corner_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -21,12 +26,34 @@ def corner_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.einsum("mi,mi->m", corner[:, 0], np.cross(corner[:, 1], corner[:, 2]))
 
 
+@dataclass(frozen=True)
+class EnclosedParts:
+    """Connected parts of triangles (m,3): the part (n,) of each vertex, and which parts (c,) bool are closed.
+
+    Vertices of no triangle are parts of no volume; that of open parts depends on the origin and means nothing.
+    """
+
+    triangles: np.ndarray
+    part: np.ndarray
+    closed: np.ndarray
+
+    @staticmethod
+    def of(triangles: np.ndarray, n: int) -> EnclosedParts:
+        """The parts of triangles (m,3) among n vertices."""
+        _, part = graph_components(*halfedges(triangles), n)
+        return EnclosedParts(triangles, part, closed_parts(triangles, part))
+
+    def volumes(self, vertices: np.ndarray) -> np.ndarray:
+        """Signed volume (c,) that every part encloses at vertices (n,3)."""
+        volume = corner_volumes(vertices - vertices.mean(axis=0), self.triangles) / 6
+        return np.bincount(self.part[self.triangles[:, 0]], volume, len(self.closed))
+
+
 def component_volumes(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Signed volume (c,) enclosed by every connected part of triangles (m,3) of vertices (n,3), and the part (n,) of
-    each vertex. Loose vertices are parts of no volume; that of open parts depends on the origin and means nothing."""
-    count, part = graph_components(*halfedges(triangles), len(vertices))
-    volume = corner_volumes(vertices - vertices.mean(axis=0), triangles) / 6
-    return np.bincount(part[triangles[:, 0]], volume, count), part
+    each vertex; see `EnclosedParts`."""
+    parts = EnclosedParts.of(triangles, len(vertices))
+    return parts.volumes(vertices), parts.part
 
 
 def closed_parts(triangles: np.ndarray, part: np.ndarray) -> np.ndarray:
@@ -51,20 +78,22 @@ def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def restore_volumes(
-    before: np.ndarray, after: np.ndarray, triangles: np.ndarray, free: np.ndarray
+    before: np.ndarray, after: np.ndarray, parts: EnclosedParts, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n,3) near `after` (n,3) whose closed parts enclose what those of `before` (n,3) did, and the relative
     change of every closed part that is left. Only vertices `free` (n,) bool move, all of a part by one length."""
-    target, part = component_volumes(before, triangles)
-    closed = closed_parts(triangles, part) & (np.abs(target) > 0)
+    target = parts.volumes(before)
+    closed = parts.closed & (np.abs(target) > 0)
     position = after.copy()
-    for _ in range(ROUNDS):
-        volume, _ = component_volumes(position, triangles)
-        normal = vertex_normals(position, triangles)
-        length = np.linalg.norm(normal, axis=1)
-        unit = np.where(length[:, None] > 0, normal / np.where(length > 0, length, 1)[:, None], 0.0) * free[:, None]
-        slope = np.bincount(part, np.einsum("nd,nd->n", normal, unit), len(target))
-        offset = np.where(closed & (slope > 0), (target - volume) / np.where(slope > 0, slope, 1), 0.0)
-        position += offset[part][:, None] * unit
-    volume, _ = component_volumes(position, triangles)
-    return position, (volume[closed] - target[closed]) / np.abs(target[closed])
+    for left in range(ROUNDS, -1, -1):
+        missing = np.where(closed, target - parts.volumes(position), 0.0)
+        if not left or (np.abs(missing) <= EXACT * np.abs(target)).all():
+            break
+        if (ROUNDS - left) % SAME_NORMALS == 0:
+            normal = vertex_normals(position, parts.triangles)
+            length = np.linalg.norm(normal, axis=1)
+            unit = normal * (free / np.where(length > 0, length, 1))[:, None]
+            slope = np.bincount(parts.part, np.einsum("nd,nd->n", normal, unit), len(target))
+        offset = np.where(slope > 0, missing / np.where(slope > 0, slope, 1), 0.0)
+        position += offset[parts.part][:, None] * unit
+    return position, -missing[closed] / np.abs(target[closed])

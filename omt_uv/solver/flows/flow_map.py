@@ -7,6 +7,7 @@ moment has a field of its own, of as many unknowns as there are handles then.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,12 +15,14 @@ from ..errors import EmptyMeshError, HandleError, NonFiniteError
 from ..progress import Progress, Steps
 from .creases import new_intersections, without_new_intersections
 from .domain import FlowDomain
-from .enclosed_volume import closed_parts, component_volumes, restore_volumes
+from .enclosed_volume import EnclosedParts, restore_volumes
 from .handles import SPACING, FlowHandle, check_handles, farthest_points, joined, sampled_handles
 from .integration import BLOCK, FlowStep, carried, planned_steps
 from .kernel import FlowField, conditions, interpolated_field
 from .options import STRAIGHT, FlowOptions
+from .passing import Surge, greatest_surge
 from .paths import handle_paths
+from .self_intersections import FaceCrossings
 
 # Points on which steps are planned, besides those next to the handles.
 PROBES = 300
@@ -38,6 +41,7 @@ class Flow:
     positions (n,d); frames: positions (n,d) at even steps of time, the last one these; steps: of Runge and Kutta's;
     missed: greatest distance of a handle's point from its end, over the diagonal, before such points were set there;
     drift: relative changes (c,) of the volumes of closed parts by the flow alone; volumes: what is left of them (c,)
+    surge: greatest speed of what flows over that of the handles at that time, about 1 unless these pass one another
     intersecting: pairs (k,2) of triangles that pass through one another, and did not before
     """
 
@@ -45,6 +49,7 @@ class Flow:
     frames: tuple[np.ndarray, ...]
     steps: int
     missed: float
+    surge: float
     drift: np.ndarray
     volumes: np.ndarray
     intersecting: np.ndarray
@@ -53,9 +58,11 @@ class Flow:
 
 @dataclass(frozen=True)
 class _Way:
-    """Places (k + 1, p, d) of handle samples at even steps of time, walls, and lambda: what fields are made of."""
+    """Places (k + 1, p, d) of handle samples at even steps of time, the handle (p,) of each, walls, and lambda: what
+    fields are made of."""
 
     path: np.ndarray
+    owner: np.ndarray
     domain: FlowDomain | None
     sharpness: float
 
@@ -117,18 +124,22 @@ def flow(
     way = _way(points / size, handles, options, domain, size)
     yield Progress("Paths", 0.0)
     everything = np.concatenate([points, *(h.start for h in handles)]) / size
-    plan = _plan(way, everything, options, len(points), frames)
+    plan, surge = _plan(way, everything, options, len(points), frames)
     merged = yield from _carry_all(everything, plan, way.domain)
     ends = np.concatenate([h.end for h in handles]) / size
     missed = float(np.abs(merged[-1][len(points) :] - ends).max(initial=0.0))
     positions = [at[: len(points)] * size for at in merged]
     _set_handles(positions[-1], points, handles)
-    shape = _Shape(points, triangles if points.shape[1] == 3 else None, _free(len(points), handles))
-    return (yield from _sound(positions, shape, options.mend, sum(map(len, plan)), missed))
+    flat = triangles is None or points.shape[1] == 2
+    shape = _Shape(points, np.zeros((0, 3), np.int64) if flat else np.asarray(triangles), _free(len(points), handles))
+    rough = yield from _sound(positions, shape, options.mend)
+    told = surge.warning([h.name or f"number {k}" for k, h in enumerate(handles)], options.radius)
+    warnings = _warnings(missed, rough.volumes, len(rough.intersecting)) + (() if told is None else (told,))
+    return replace(rough, steps=sum(map(len, plan)), missed=missed, surge=surge.rate, warnings=warnings)
 
 
-def _sound(positions: list[np.ndarray], shape: _Shape, mend: bool, steps: int, missed: float) -> Steps[Flow]:
-    """The result, of positions (n,3) at every frame that get their volumes back."""
+def _sound(positions: list[np.ndarray], shape: _Shape, mend: bool) -> Steps[Flow]:
+    """Positions (n,3) at every frame with their volumes given back, and figures of these; the others are to come."""
     drift = shape.changes(positions[-1])
     for k, at in enumerate(list(positions)):
         yield Progress("Volumes", k / len(positions))
@@ -137,46 +148,62 @@ def _sound(positions: list[np.ndarray], shape: _Shape, mend: bool, steps: int, m
     return Flow(
         positions=positions[-1],
         frames=tuple(positions),
-        steps=steps,
-        missed=missed,
+        steps=0,
+        missed=0.0,
+        surge=0.0,
         drift=drift,
         volumes=volumes,
         intersecting=intersecting,
-        warnings=_warnings(missed, volumes, len(intersecting)),
+        warnings=(),
     )
 
 
 @dataclass(frozen=True)
 class _Shape:
-    """Points (n,3) before the flow, triangles (m,3) if there are any, and which points (n,) bool may be put right."""
+    """Points (n,3) before the flow, triangles (m,3), none in the plane, and which points (n,) bool may be put right."""
 
     points: np.ndarray
-    triangles: np.ndarray | None
+    triangles: np.ndarray
     free: np.ndarray
+
+    @cached_property
+    def parts(self) -> EnclosedParts:
+        """Connected parts of the triangles."""
+        return EnclosedParts.of(self.triangles, len(self.points))
+
+    @cached_property
+    def faces(self) -> FaceCrossings:
+        """The triangles, to be asked which of them intersect."""
+        return FaceCrossings(self.triangles)
 
     def changes(self, after: np.ndarray) -> np.ndarray:
         """Relative changes (c,) of the volumes of closed parts."""
-        if self.triangles is None or not len(self.triangles):
+        if not len(self.triangles):
             return np.zeros(0)
-        old, part = component_volumes(self.points, self.triangles)
-        new, _ = component_volumes(after, self.triangles)
-        closed = closed_parts(self.triangles, part) & (old != 0)
+        old, new = self.parts.volumes(self.points), self.parts.volumes(after)
+        closed = self.parts.closed & (old != 0)
         return (new[closed] - old[closed]) / np.abs(old[closed])
 
     def sound(self, after: np.ndarray, mend: bool) -> tuple[np.ndarray, np.ndarray]:
         """Positions with the volumes of before and, with `mend`, no faces that newly intersect; pairs that still do."""
         none = np.zeros((0, 2), np.int64)
-        if self.triangles is None or not len(self.triangles):
+        if not len(self.triangles):
             return after, none
-        restored, _ = restore_volumes(self.points, after, self.triangles, self.free)
+        restored, _ = restore_volumes(self.points, after, self.parts, self.free)
         if not mend:
             return restored, none
-        mended, pairs = without_new_intersections(self.points, restored, self.triangles, self.free)
+        mended, pairs = without_new_intersections(self.points, restored, self.faces, self.free)
         if mended is restored:
             return restored, pairs
-        result, _ = restore_volumes(self.points, mended, self.triangles, self.free)
-        touched = (mended != restored).any(axis=1)[self.triangles].any(axis=1)
-        return result, new_intersections(self.points, result, self.triangles, touched)
+        # What has not been mended keeps its place, and needs no further look.
+        moved = (mended != restored).any(axis=1)
+        near = moved[self.triangles].any(axis=1)
+        around = np.zeros(len(moved), bool)
+        around[self.triangles[near]] = True
+        result, _ = restore_volumes(self.points, mended, self.parts, self.free & around)
+        concerned = around[self.triangles].any(axis=1)
+        concerned[pairs] = True
+        return result, new_intersections(self.points, result, self.faces, concerned)
 
 
 def _checked(points: np.ndarray, handles: tuple[FlowHandle, ...], options: FlowOptions) -> float:
@@ -219,11 +246,13 @@ def _way(points, handles, options: FlowOptions, domain: FlowDomain | None, size:
     if np.abs(path - straight).max() < 1e-12:
         # Nothing turns: one chord does.
         path = path[[0, -1]]
-    return _Way(path, domain, 1 / options.radius**2)
+    return _Way(path, owner, domain, 1 / options.radius**2)
 
 
-def _plan(way: _Way, everything: np.ndarray, options: FlowOptions, n: int, frames: int) -> list[list[FlowStep]]:
-    """Steps of every frame."""
+def _plan(
+    way: _Way, everything: np.ndarray, options: FlowOptions, n: int, frames: int
+) -> tuple[list[list[FlowStep]], Surge]:
+    """Steps of every frame, and the greatest surge in them."""
     stride = max(n // PROBES, 1)
     probes = np.concatenate([everything[:n:stride], _nearest(everything[:n], way.path[0])])
     stretches = len(way.path) - 1
@@ -234,8 +263,9 @@ def _plan(way: _Way, everything: np.ndarray, options: FlowOptions, n: int, frame
         return way.field(stretch, time)
 
     plan = planned_steps(field_at, knots, probes, options.tolerance)
+    surge = greatest_surge(way.path, way.owner, [step for steps in plan for step in steps], probes)
     frame = np.minimum(((knots[:-1] + knots[1:]) / 2 * frames).astype(int), frames - 1)
-    return [[step for k in np.flatnonzero(frame == f) for step in plan[k]] for f in range(frames)]
+    return [[step for k in np.flatnonzero(frame == f) for step in plan[k]] for f in range(frames)], surge
 
 
 def _nearest(points: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -1,87 +1,130 @@
 """Find pairs of triangles of a mesh in space that pass through one another.
 
-Candidates come from a tree of the triangles' centres, class by class of size. Two triangles intersect where an edge of
-one passes through the other (Guigue, Devillers 2003 decide it by the same signed volumes); with a vertex in common,
-where the side opposite to it does. Triangles with an edge in common, and those in one plane, are let pass.
+Candidates are triangles whose boxes overlap (`box_pairs`). Two triangles intersect where an edge of one passes through
+the other (Guigue, Devillers 2003 decide it by the same signed volumes); with a vertex in common, where the side
+opposite to it does. That is asked only around vertices whose triangles do not lie side by side when one looks along the
+mean of their normals. Triangles with an edge in common, and those in one plane, are let pass.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.spatial import cKDTree
+from dataclasses import dataclass
+from functools import cached_property
 
-# Candidate pairs that are looked at together.
-BLOCK = 400_000
+import numpy as np
+
+from ..mesh.topology import halfedges, pair_keys
+from .box_pairs import box_pairs
+
+# Candidate pairs that are looked at together: their arrays stay in the cache.
+BLOCK = 1 << 14
 # Signed volumes below this share of the sixth of a cube of the pair's size are zero.
 FLAT = 1e-14
+# A fan lies side by side if normals lean from their mean by a cosine of more than this, and turns by less than a full
+# turn and this.
+LEANING = 1e-3
+TURN = 2 * np.pi + 1e-3
 
 
 def intersecting_pairs(vertices: np.ndarray, triangles: np.ndarray, concerned: np.ndarray | None = None) -> np.ndarray:
     """Pairs (k,2) of triangles (m,3) of vertices (n,3) that intersect, sorted; only pairs with one that is `concerned`
     (m,) bool where this is given."""
-    corner = np.asarray(vertices, float)[triangles]
-    pairs = _candidates(corner, concerned)
-    found = [
-        pairs[k : k + BLOCK][_intersect(corner, triangles, pairs[k : k + BLOCK])] for k in range(0, len(pairs), BLOCK)
-    ]
-    result = np.concatenate(found) if found else np.zeros((0, 2), np.int64)
-    return result[np.lexsort((result[:, 1], result[:, 0]))]
+    return FaceCrossings(triangles).pairs(vertices, concerned)
 
 
-def _candidates(corner: np.ndarray, concerned: np.ndarray | None = None) -> np.ndarray:
-    """Pairs (k,2), the smaller number first, of triangles (m,3,3) whose boxes overlap; see `intersecting_pairs`."""
-    low, high = corner.min(axis=1), corner.max(axis=1)
-    centre, radius = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
-    least = float(np.median(radius)) or 1.0
-    level = np.maximum(np.ceil(np.log2(np.maximum(radius / least, 1e-9))), 0).astype(int)
-    classes = [np.flatnonzero(level == k) for k in np.unique(level)]
-    trees = [cKDTree(centre[c]) for c in classes]
+@dataclass(frozen=True)
+class FaceCrossings:
+    """Triangles (m,3), at whatever positions, and what only depends on how they are connected."""
 
-    def between(mine: np.ndarray, other: np.ndarray, tree: cKDTree) -> np.ndarray:
-        around = tree.query_ball_point(centre[mine], radius[mine] + radius[other].max())
-        counts = np.array([len(a) for a in around], int)
-        flat = np.concatenate([np.asarray(a, np.int64) for a in around]) if counts.sum() else np.zeros(0, np.int64)
-        return _overlapping(np.stack([np.repeat(mine, counts), other[flat]], axis=1), low, high)
+    triangles: np.ndarray
 
-    if concerned is not None:
-        mine = np.flatnonzero(concerned)
-        found = [between(mine, other, tree) for other, tree in zip(classes, trees, strict=True)] if len(mine) else []
-        pairs = np.sort(np.concatenate([np.zeros((0, 2), np.int64), *found]), axis=1)
-        # Twice where both are concerned.
-        return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
-    found = []
-    for k, mine in enumerate(classes):
-        near = trees[k].query_pairs(2 * radius[mine].max(), output_type="ndarray")
-        found.append(_overlapping(mine[near], low, high))
-        # Queries go out from the larger, which are the fewer.
-        found += [between(mine, other, tree) for other, tree in zip(classes[:k], trees[:k], strict=True)]
-    return np.sort(np.concatenate(found), axis=1)
+    @cached_property
+    def _plain(self) -> np.ndarray:
+        """Which vertices (n,) bool have one fan of triangles around them, the same side up."""
+        tail, head = halfedges(self.triangles)
+        n = int(self.triangles.max(initial=-1)) + 1
+        keys = pair_keys(tail, head)
+        order = np.argsort(keys)
+        ordered = keys[order]
+        first = np.r_[True, ordered[1:] != ordered[:-1]] if len(keys) else np.zeros(0, bool)
+        edge = np.cumsum(first) - 1
+        uses = np.bincount(edge)
+        turns = np.bincount(edge, np.where(tail < head, 1, -1)[order])
+        wrong = (uses > 2) | ((uses == 2) & (turns != 0))
+        one, other = ordered[first] >> 32, ordered[first] & 0xFFFFFFFF
+        plain = np.ones(n, bool)
+        plain[one[wrong]] = plain[other[wrong]] = False
+        # A fan that is open has an edge more than triangles; two of them are no single one.
+        edges = np.bincount(one, minlength=n) + np.bincount(other, minlength=n)
+        return plain & (edges - np.bincount(self.triangles.ravel(), minlength=n) <= 1)
+
+    def pairs(self, vertices: np.ndarray, concerned: np.ndarray | None = None) -> np.ndarray:
+        """See `intersecting_pairs`."""
+        corner = np.asarray(vertices, float)[self.triangles]
+        one, two, three = corner[:, 0], corner[:, 1], corner[:, 2]
+        low, high = (f(f(one, two), three) for f in (np.minimum, np.maximum))
+        pairs = box_pairs(low, high, concerned)
+        apart, touching = self._apart_or_touching(corner, pairs)
+        blocks = [apart[k : k + BLOCK] for k in range(0, len(apart), BLOCK)]
+        found = [pairs[:0], *(rows[_apart(corner[rows[:, 0]], corner[rows[:, 1]])] for rows in blocks)]
+        if len(touching):
+            found.append(touching[_touching(corner, self.triangles, touching)])
+        result = np.concatenate(found)
+        return result[np.lexsort((result[:, 1], result[:, 0]))]
+
+    def _apart_or_touching(self, corner: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs (k,2) without a common vertex, and those with one around which triangles may overlap."""
+        common = np.zeros(len(pairs), np.int8)
+        shared = np.zeros(len(pairs), np.int64)
+        columns = [np.ascontiguousarray(c) for c in self.triangles.T]
+        for start in range(0, len(pairs), BLOCK):
+            here = slice(start, start + BLOCK)
+            one, other = pairs[here].T
+            others = [column[other] for column in columns]
+            for column in columns:
+                vertex = column[one]
+                for far in others:
+                    same = vertex == far
+                    common[here] += same
+                    shared[here][same] = vertex[same]
+        touching = np.flatnonzero(common == 1)
+        return pairs[common == 0], pairs[touching[~self._side_by_side(corner, shared[touching])[shared[touching]]]]
+
+    def _side_by_side(self, corner: np.ndarray, asked: np.ndarray) -> np.ndarray:
+        """Of vertices (n,), those `asked` whose triangles do not overlap when one looks along the mean of their
+        normals, so that they do not in space."""
+        n = len(self._plain)
+        near = np.zeros(n, bool)
+        near[asked] = True
+        rows = np.flatnonzero(near[self.triangles].any(axis=1))
+        corner, around = corner[rows], self.triangles[rows]
+        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        length = np.linalg.norm(normal, axis=1)
+        normal = normal / np.maximum(length, np.finfo(float).tiny)[:, None]
+        flat = around.ravel()
+        mean = np.stack([np.bincount(flat, np.repeat(normal[:, k], 3), n) for k in range(3)], axis=1)
+        mean = mean / np.maximum(np.linalg.norm(mean, axis=1), np.finfo(float).tiny)[:, None]
+        sound = self._plain & near
+        total = np.zeros(n)
+        for k in range(3):
+            vertex = around[:, k]
+            axis = mean[vertex]
+            ahead, back = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
+            lean = np.einsum("mi,mi->m", normal, axis)
+            sound[vertex[~(lean > LEANING)]] = False
+            along = np.einsum("mi,mi->m", ahead, back)
+            along -= np.einsum("mi,mi->m", ahead, axis) * np.einsum("mi,mi->m", back, axis)
+            total += np.bincount(vertex, np.arctan2(lean * length, along), n)
+        return sound & (total < TURN)
 
 
-def _overlapping(pairs: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Those of pairs (k,2) whose boxes, from low to high (m,3), overlap."""
-    a, b = pairs[:, 0], pairs[:, 1]
-    apart = np.zeros(len(pairs), bool)
-    for k in range(3):
-        apart |= (low[a, k] > high[b, k]) | (low[b, k] > high[a, k])
-    return pairs[~apart]
-
-
-def _intersect(corner: np.ndarray, triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Which of pairs (k,2) of triangles intersect, (k,) bool."""
-    same = triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]
-    common = same.sum(axis=(1, 2))
-    result = np.zeros(len(pairs), bool)
-    apart = np.flatnonzero(common == 0)
-    result[apart] = _apart(corner[pairs[apart, 0]], corner[pairs[apart, 1]])
-    touching = np.flatnonzero(common == 1)
-    if len(touching):
-        where = same[touching]
-        a, b = corner[pairs[touching, 0]], corner[pairs[touching, 1]]
-        # The common vertex first: then the side opposite to it is from 1 to 2.
-        a, b = _turned(a, where.any(axis=2).argmax(axis=1)), _turned(b, where.any(axis=1).argmax(axis=1))
-        result[touching] = _pierces(a[:, 1], a[:, 2], b) | _pierces(b[:, 1], b[:, 2], a)
-    return result
+def _touching(corner: np.ndarray, triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Which of pairs (k,2) of triangles with one common vertex intersect elsewhere."""
+    where = triangles[pairs[:, 0]][:, :, None] == triangles[pairs[:, 1]][:, None, :]
+    a, b = corner[pairs[:, 0]], corner[pairs[:, 1]]
+    # The common vertex first: then the side opposite to it is from 1 to 2.
+    a, b = _turned(a, where.any(axis=2).argmax(axis=1)), _turned(b, where.any(axis=1).argmax(axis=1))
+    return _pierces(a[:, 1], a[:, 2], b) | _pierces(b[:, 1], b[:, 2], a)
 
 
 def _turned(corner: np.ndarray, first: np.ndarray) -> np.ndarray:

@@ -9,12 +9,12 @@ from bodies import icosphere, limbed
 from omt_uv.solver.errors import EmptyMeshError, HandleError, NonFiniteError
 from omt_uv.solver.flows.creases import new_intersections, without_new_intersections
 from omt_uv.solver.flows.domain import ball_domain, mesh_domain
-from omt_uv.solver.flows.enclosed_volume import component_volumes, restore_volumes, vertex_normals
+from omt_uv.solver.flows.enclosed_volume import EnclosedParts, component_volumes, restore_volumes, vertex_normals
 from omt_uv.solver.flows.flow_map import flow
 from omt_uv.solver.flows.handles import FlowHandle
 from omt_uv.solver.flows.integration import carried, planned_steps
 from omt_uv.solver.flows.options import PATHS, FlowOptions
-from omt_uv.solver.flows.self_intersections import intersecting_pairs
+from omt_uv.solver.flows.self_intersections import FaceCrossings, intersecting_pairs
 from omt_uv.solver.progress import Progress, drain
 
 
@@ -140,15 +140,15 @@ def test_bad_input_is_refused_by_name():
 
 def test_faces_in_a_crease_are_taken_apart():
     V, F = icosphere(3)
-    assert not len(new_intersections(V, V, F))
+    assert not len(new_intersections(V, V, FaceCrossings(F)))
     V = V * [1, 1, 0.02]
     after = V.copy()
     after[V[:, 2].argmax()] -= [0.02, 0.013, 0.05]
-    pairs = new_intersections(V, after, F)
+    pairs = new_intersections(V, after, FaceCrossings(F))
     assert len(pairs)
-    mended, left = without_new_intersections(V, after, F, np.ones(len(V), bool))
+    mended, left = without_new_intersections(V, after, FaceCrossings(F), np.ones(len(V), bool))
     assert not len(left) and np.abs(mended - after).max() < 0.2
-    fixed, left = without_new_intersections(V, after, F, np.zeros(len(V), bool))
+    fixed, left = without_new_intersections(V, after, FaceCrossings(F), np.zeros(len(V), bool))
     assert len(left) == len(pairs)
     np.testing.assert_array_equal(fixed, after)
 
@@ -159,9 +159,9 @@ def test_parts_that_met_before_may_meet_a_face_farther_on():
     before, faces = np.concatenate([V, 0.9 * V + [1.2, 0.1, 0]]), np.concatenate([F, F + half])
     shift = np.where(np.arange(2 * half)[:, None] < half, 0.0, [0.02, 0.03, 0.01])
     assert len(intersecting_pairs(before + shift, faces))
-    assert not len(new_intersections(before, before + shift, faces))
+    assert not len(new_intersections(before, before + shift, FaceCrossings(faces)))
     apart = before + np.where(np.arange(2 * half)[:, None] < half, 0.0, [2.0, 0, 0])
-    assert len(new_intersections(apart, before, faces)) == len(intersecting_pairs(before, faces))
+    assert len(new_intersections(apart, before, FaceCrossings(faces))) == len(intersecting_pairs(before, faces))
 
 
 def test_volumes_are_given_back_part_by_part():
@@ -169,9 +169,10 @@ def test_volumes_are_given_back_part_by_part():
     two, faces = np.concatenate([V, V + [3, 0, 0]]), np.concatenate([F, F + len(V)])
     squeezed = two * [1, 1, 0.95]
     squeezed[len(V) :, 1] *= 0.9
-    restored, change = restore_volumes(two, squeezed, faces, np.ones(len(two), bool))
+    parts = EnclosedParts.of(faces, len(two))
+    restored, change = restore_volumes(two, squeezed, parts, np.ones(len(two), bool))
     assert change.shape == (2,) and np.abs(change).max() < 1e-12
-    _, change = restore_volumes(two, squeezed, faces, np.zeros(len(two), bool))
+    _, change = restore_volumes(two, squeezed, parts, np.zeros(len(two), bool))
     np.testing.assert_allclose(change, [-0.05, 0.95 * 0.9 - 1], atol=1e-9)
     np.testing.assert_allclose(vertex_normals(V, F).sum(axis=0), 0, atol=1e-12)
 

@@ -1,0 +1,53 @@
+"""Faces that came into one another go back behind the plane that was between them, and no farther."""
+
+from __future__ import annotations
+
+import numpy as np
+from bodies import icosphere
+
+from omt_uv.solver.flows.creases import without_new_intersections
+from omt_uv.solver.flows.self_intersections import FaceCrossings, intersecting_pairs
+from omt_uv.solver.flows.separation import separated
+
+
+def two_balls(gap):
+    """Two balls side by side with a gap between them."""
+    V, F = icosphere(3)
+    return np.concatenate([V, V + [np.ptp(V[:, 0]) + gap, 0.03, 0.02]]), np.concatenate([F, F + len(V)])
+
+
+def test_two_balls_pressed_together_part_again():
+    V, F = two_balls(0.05)
+    half = len(V) // 2
+    after = V.copy()
+    after[half:, 0] -= 0.07
+    pairs = intersecting_pairs(after, F)
+    assert len(pairs)
+    mended, left = without_new_intersections(V, after, FaceCrossings(F), np.ones(len(V), bool))
+    assert not len(left) and not len(intersecting_pairs(mended, F))
+    assert np.abs(mended - after).max() < 0.05
+    assert ((mended != after).any(axis=1)).mean() < 0.1
+
+
+def test_what_is_held_stays_and_the_other_gives_way():
+    V, F = two_balls(0.05)
+    half = len(V) // 2
+    after = V.copy()
+    after[half:, 0] -= 0.06
+    free = np.arange(len(V)) >= half
+    pairs = intersecting_pairs(after, F)
+    mended = separated(V, after, F, pairs, free)
+    np.testing.assert_array_equal(mended[:half], after[:half])
+    assert not set(map(tuple, pairs)) & set(map(tuple, intersecting_pairs(mended, F)))
+
+
+def test_faces_with_a_common_vertex_part_too():
+    V = np.array([[0.0, 0, 0], [1, 0.2, 0.3], [1, -0.2, 0.3], [1.3, 0.2, -0.3], [1.3, -0.2, -0.3]])
+    F = np.array([[0, 1, 2], [0, 4, 3]])
+    after = V.copy()
+    after[1, 2], after[3, 2] = -0.1, 0.1
+    pairs = intersecting_pairs(after, F)
+    assert len(pairs) == 1
+    mended = separated(V, after, F, pairs, np.ones(5, bool))
+    assert not len(intersecting_pairs(mended, F))
+    assert np.abs(mended - after).max() < 0.2
