@@ -59,8 +59,8 @@ ARROWS: dict[str, str] = {
     "solver.remeshing": "solver solver.mesh solver.analysis solver.remeshing.components solver.remeshing.edits "
     "solver.remeshing.relaxation solver.remeshing.fitting solver.remeshing.initial",
     "solver.partition": "solver solver.mesh solver.linalg solver.transport",
-    "solver.signatures": "solver solver.mesh solver.linalg solver.analysis solver.conformal solver.sphere "
-    "solver.registration solver.transport solver.partition",
+    "solver.signatures": "solver solver.mesh solver.linalg solver.analysis solver.conformal solver.canonical "
+    "solver.sphere solver.registration solver.transport solver.partition",
     "solver.api": "solver solver.mesh solver.analysis solver.maps solver.parameterization solver.editing solver.sphere "
     "solver.remeshing",
     "remedies": "solver",
@@ -71,7 +71,7 @@ ARROWS: dict[str, str] = {
     "xatlas_charts",
     "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
     "solver.registration.charts "
-    "solver.strain solver.partition solver.signatures pipelines",
+    "solver.strain solver.canonical solver.partition solver.signatures pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
     "pipelines.measuring": "solver solver.mesh solver.maps solver.canonical solver.conformal solver.cutting "
     "solver.sphere solver.transport pipelines",

@@ -6,7 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
-from ..common import drain_shown, refusals, require_blender
+from ..common import CommandError, drain_shown, refusals, require_blender
 from ..options import add_input, vertices
 from ..selection import of_file, read_file
 
@@ -31,6 +31,25 @@ def add_points(command: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"of a signature: more are slower, default {POINTS}",
     )
+    add_markers(command)
+
+
+def add_markers(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--markers",
+        type=pair_of_markers,
+        default=None,
+        metavar="P,Q",
+        help="vertex groups, or numbers of vertices: P goes to the middle of a disk, Q of the boundary to its right",
+    )
+
+
+def pair_of_markers(text: str) -> tuple[str, str]:
+    """Two names."""
+    parts = tuple(part.strip() for part in text.split(","))
+    if len(parts) != 2 or not all(parts):
+        raise argparse.ArgumentTypeError(f"{text!r}: markers are two names with a comma between them")
+    return parts
 
 
 def run(options: argparse.Namespace) -> None:
@@ -51,4 +70,24 @@ def signature_of_file(options: argparse.Namespace, path: Path, points: int = 0):
 
     pairs = read_file(of_file(options, path))
     with refusals(name=path.name):
-        return drain_shown(signature_of([reading.surface for _, reading in pairs], points or options.points))
+        markers = _markers(options, path, [obj for obj, _ in pairs])
+        surfaces = [reading.surface for _, reading in pairs]
+        return drain_shown(signature_of(surfaces, points or options.points, markers))
+
+
+def _markers(options: argparse.Namespace, path: Path, objects: list) -> list | None:
+    """The markers of each object, None without any. Raises CommandError, GroupError."""
+    if options.markers is None:
+        return None
+    from ...blender.vertex_groups import map_markers
+    from ...pipelines.shapes.distance import markers_of
+
+    if not all(name.isdecimal() for name in options.markers):
+        return map_markers(objects, dict(zip(("centre", "start", "corners"), (*options.markers, ""), strict=True)))
+    if len(objects) > 1:
+        raise CommandError(f"{path}: numbers of vertices are those of one mesh. Choose it by --object.")
+    centre, start = map(int, options.markers)
+    count = len(objects[0].data.vertices)
+    if max(centre, start) >= count:
+        raise CommandError(f"{path}: there is no vertex {max(centre, start)}. It has {count}, from 0.")
+    return [markers_of(centre, start)]

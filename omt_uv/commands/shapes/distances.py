@@ -11,6 +11,7 @@ from pathlib import Path
 from ... import __version__
 from ..common import CommandError, UsageError, write_picture
 from ..options import number
+from .distance import add_points
 from .library import run as run_library
 from .many import add_jobs, carried_out
 
@@ -30,9 +31,9 @@ def add(commands) -> None:
     command.add_argument("-o", "--output", "--csv", type=Path, metavar="D.csv", required=True, help="the matrix")
     command.add_argument("--picture", type=Path, metavar="D.png", help="the matrix as shades of grey")
     command.add_argument("--mds", type=Path, metavar="MAP.png", help="all shapes as points of a map")
-    command.add_argument("--labels", type=Path, metavar="L.csv", help="names of files and their classes")
+    command.add_argument("--labels", type=Path, metavar="L.csv", help="names of files, their classes, and of whom")
     command.add_argument("--knn", type=int, default=0, metavar="K", help="how often K neighbours tell the class")
-    command.add_argument("--points", type=int, default=400, metavar="N", help="of a signature, default 400")
+    add_points(command)
     command.add_argument(
         "--curvature", type=number, default=None, metavar="W", help="weight of curvature, default 0.15"
     )
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace) -> None:
     if options.knn and options.labels is None:
         raise UsageError("--knn asks for the classes of the files. Give --labels.")
     index = read_index(options.input if options.input.suffix.lower() == ".npz" else _indexed(options))
-    classes = None if options.labels is None else _classes(options.labels, index.names)
+    classes, owners = (None, None) if options.labels is None else _classes(options.labels, index.names)
     found = _matrix(options, index)
     table = io.StringIO()
     writer = csv.writer(table, lineterminator="\n")
@@ -79,6 +80,11 @@ def run(options: argparse.Namespace) -> None:
         told = classes_of_nearest(found[1], classes, options.knn)
         right = np.mean([a == b for a, b in zip(told, classes, strict=True)])
         print(f"{100 * right:.1f} % of the classes are those of {options.knn} neighbours")
+        if owners is not None and any(owners):
+            same = np.array([[a == b != "" for a in owners] for b in owners])
+            told = classes_of_nearest(np.where(same, np.inf, found[1]), classes, options.knn)
+            right = np.mean([a == b for a, b in zip(told, classes, strict=True)])
+            print(f"{100 * right:.1f} % are those of {options.knn} neighbours of others")
 
 
 def _indexed(options: argparse.Namespace) -> Path:
@@ -89,17 +95,18 @@ def _indexed(options: argparse.Namespace) -> Path:
     return path
 
 
-def _classes(path: Path, names: tuple[str, ...]) -> list[str]:
-    """The class of every name, of a table with a name and a class on each line. Raises CommandError."""
+def _classes(path: Path, names: tuple[str, ...]) -> tuple[list[str], list[str]]:
+    """The class of every name, of a table with a name and a class on each line, and whose it is, "" unless a third
+    column says so. Raises CommandError."""
     try:
         with open(path, newline="", encoding="utf-8") as file:
-            rows = {row[0]: row[1] for row in csv.reader(file) if len(row) > 1}
+            rows = {row[0]: (row[1], row[2] if len(row) > 2 else "") for row in csv.reader(file) if len(row) > 1}
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise CommandError(f"{path}: is no table of names and classes ({error})") from error
     missing = [name for name in names if name not in rows]
     if missing:
         raise CommandError(f"{path}: has no class for {len(missing)} shapes, as {missing[0]}. Add a line for each.")
-    return [rows[name] for name in names]
+    return [rows[name][0] for name in names], [rows[name][1] for name in names]
 
 
 def _matrix(options: argparse.Namespace, index):

@@ -10,7 +10,7 @@ from ... import __version__
 from ...batch.plan import READABLE
 from ..common import CommandError, check_paths, require_blender, warn_of
 from ..options import add_input, vertices
-from .distance import add_points, signature_of_file
+from .distance import add_markers, add_points, signature_of_file
 from .many import add_jobs, carried_out
 from .signature import NAME, SUFFIX, read_signature
 
@@ -28,6 +28,7 @@ def add(commands) -> None:
     similar = commands.add_parser("similar", help="the nearest shapes of an index")
     similar.set_defaults(run=run_similar)
     add_input(similar)
+    add_markers(similar)
     similar.add_argument("--index", type=Path, metavar="INDEX.npz", required=True, help="of the command library")
     similar.add_argument("--top", type=vertices, default=10, metavar="K", help="how many, default 10")
 
@@ -47,7 +48,9 @@ def run(options: argparse.Namespace) -> None:
     files = sorted(p for p in options.input.rglob("*") if p.suffix.lower() in READABLE)
     known = dict(zip(old.names, old.marks, strict=True)) if old else {}
     due = {p.relative_to(options.input).as_posix(): p for p in files}
-    marks = {name: _mark(path) for name, path in due.items()}
+    if old and old.marked != (options.markers is not None):
+        raise CommandError(f"{options.output}: has shapes {'with' if old.marked else 'without'} markers. Name another.")
+    marks = {name: _mark(path, options.markers) for name, path in due.items()}
     due = {name: path for name, path in due.items() if known.get(name) != marks[name]}
     if options.jobs or options.scheduler:
         found = _by_batch(options, set(due))
@@ -73,15 +76,18 @@ def run(options: argparse.Namespace) -> None:
     print(f"{len(found)} new, {len(index)} in {options.output}")
 
 
-def _mark(path: Path) -> str:
-    return f"{path.stat().st_size} {path.stat().st_mtime_ns}"
+def _mark(path: Path, markers: tuple[str, str] | None) -> str:
+    of_file = f"{path.stat().st_size} {path.stat().st_mtime_ns}"
+    return of_file if markers is None else f"{of_file} {','.join(markers)}"
 
 
 def _by_batch(options: argparse.Namespace, due: set[str]) -> dict:
     """Signatures of files by name, made by a batch, which goes on where another was stopped."""
     from ...batch.plan import BatchPlan, tasks_of
 
-    words = ["--points", str(options.points), *(f"--object={name}" for name in options.object)]
+    words = ["--points", str(options.points)]
+    words += [] if options.markers is None else ["--markers", ",".join(options.markers)]
+    words += [*(f"--object={name}" for name in options.object)]
     words += [f"--scene={options.scene}"] if options.scene else []
     words += ["--skip-linked"] if options.skip_linked else []
     words += ["--strict"] if options.strict else []
@@ -112,6 +118,9 @@ def run_similar(options: argparse.Namespace) -> None:
     from ...solver.signatures.wasserstein import nearest
 
     index = read_index(options.index)
+    if index.marked != (options.markers is not None):
+        given = "was made without markers" if options.markers else "has markers: give them by --markers, too"
+        raise CommandError(f"{options.index}: {given}.")
     mine = signature_of_file(options, options.input, index.packed.shape[1])
     for k, found in nearest(mine, index, options.top, index.coefficients):
         print(json.dumps({"name": index.names[k], "distance": found.distance, "raw": found.raw}))

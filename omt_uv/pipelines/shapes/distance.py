@@ -6,28 +6,51 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...solver.errors import MeshError
+from ...solver.canonical.markers import MapMarkers
+from ...solver.errors import LandmarkError, MeshError
 from ...solver.mesh.surface import Surface, chosen_triangles
 from ...solver.progress import Steps, part_of
+from ...solver.signatures.marked import marked_signature
 from ...solver.signatures.signature import POINTS, Signature, signature
 from ...solver.signatures.wasserstein import ShapeDistance, distance_of, nearest, prepared
 from .signature_index import SignatureIndex
 
 
-def signature_of(surfaces: Sequence[Surface], count: int = POINTS) -> Steps[Signature]:
-    """The signature of the largest part of several surfaces.
+def signature_of(
+    surfaces: Sequence[Surface], count: int = POINTS, markers: Sequence[MapMarkers | None] | None = None
+) -> Steps[Signature]:
+    """The signature of the largest part of several surfaces; with markers of the part that has them.
 
     Raises
     ------
-    MeshError : nothing to compare, or a body with handles
+    MeshError : nothing to compare, a body with handles, or markers that are not one centre and one start
     """
     triangles, positions, n = [], [], 0
-    for surface in surfaces:
+    marked: dict[str, list] = {"centre": [], "start": []}
+    for k, surface in enumerate(surfaces):
         _, corners, _ = chosen_triangles(surface, None)
         triangles.append(surface.corner_vertex[corners] + n)
         positions.append(surface.positions)
+        if markers is not None and markers[k] is not None:
+            for name, found in marked.items():
+                found += (np.asarray(getattr(markers[k], name)) + n).tolist()
         n += len(surface.positions)
+    if markers is not None:
+        centre, start = (_single(found, name) for name, found in marked.items())
+        return (yield from marked_signature(np.concatenate(positions), np.concatenate(triangles), centre, start, count))
     return (yield from signature(np.concatenate(positions), np.concatenate(triangles), count))
+
+
+def markers_of(centre: int, start: int) -> MapMarkers:
+    """The markers that two vertices are."""
+    return MapMarkers(np.array([centre]), np.array([start]), np.zeros(0, int))
+
+
+def _single(found: list, name: str) -> int:
+    if len(found) != 1:
+        cause = f"{len(found) or 'No'} vertices are marked as the {name}"
+        raise LandmarkError(cause, "Mark one vertex inside, and one of the boundary around it", "vertex", found)
+    return int(found[0])
 
 
 def alike(

@@ -24,14 +24,19 @@ class IndexFileError(UserError):
 
 @dataclass(frozen=True)
 class SignatureIndex(Sequence):
-    """Signatures of files: names and marks, which change with the file, (n,); packed (n,k,4), single precision; floors
-    (n,); coefficients (n,s,2) in spherical harmonics, by which they are searched, single precision."""
+    """Signatures of files: names and marks, which change with the file, (n,); packed (n,k,4), or (n,k,3) with
+    markers, single precision; floors (n,); coefficients (n,s,2) by which they are searched, single precision."""
 
     names: tuple[str, ...]
     marks: tuple[str, ...]
     packed: np.ndarray
     floors: np.ndarray
     coefficients: np.ndarray
+
+    @property
+    def marked(self) -> bool:
+        """Whether its shapes were compared by markers."""
+        return self.packed.shape[2] == 3
 
     def __len__(self) -> int:
         return len(self.names)
@@ -48,15 +53,17 @@ class SignatureIndex(Sequence):
 
 
 def packed(found: Signature) -> np.ndarray:
-    """A signature as one small array (k,4), single precision."""
+    """A signature as one small array (k,4), or (k,3) with markers, single precision."""
     return np.column_stack([found.points, found.curvature]).astype(np.float32)
 
 
 def unpacked(array: np.ndarray, floor: float) -> Signature:
-    """The signature of an array (k,4) and its floor."""
+    """The signature of an array (k,4) or (k,3) and its floor."""
     array = array.astype(float)
-    points = array[:, :3] / np.linalg.norm(array[:, :3], axis=1, keepdims=True)
-    return Signature(points, array[:, 3], float(floor))
+    points = array[:, :-1]
+    if points.shape[1] == 3:
+        points = points / np.linalg.norm(points, axis=1, keepdims=True)
+    return Signature(points, array[:, -1], float(floor))
 
 
 def index_of(rows: Mapping[str, tuple[str, Signature]], old: SignatureIndex | None = None) -> SignatureIndex:
@@ -75,6 +82,8 @@ def index_of(rows: Mapping[str, tuple[str, Signature]], old: SignatureIndex | No
         for name, *row in zip(old.names, old.marks, old.packed, old.floors, old.coefficients, strict=True):
             own.setdefault(name, tuple(row))
     counts = {len(row[1]) for row in own.values()}
+    if len({row[1].shape[1] for row in own.values()}) > 1:
+        raise IndexFileError("Signatures with markers and others do not go together. Make an index for each.")
     if len(counts) != 1:
         raise IndexFileError(f"Signatures have {sorted(counts) or 'no'} points. Make all of an index with one number.")
     names = sorted(own)

@@ -39,11 +39,17 @@ OTHER = np.linalg.qr(np.array([[3.0, 1, 2], [-1, 4, 1], [2, -3, 5]]))[0]
 @dataclass(frozen=True)
 class Signature:
     """points (k,3): unit vectors of equal masses; curvature (k,): mean curvature there for a surface of area 4 pi,
-    squashed to [-1, 1]; floor: how far apart two quantisations of this surface are"""
+    squashed to [-1, 1]; floor: how far apart two quantisations of this surface are. With markers points (k,2) of the
+    unit disk, and curvature for an area of pi"""
 
     points: np.ndarray
     curvature: np.ndarray
     floor: float = 0.0
+
+    @property
+    def on_disk(self) -> bool:
+        """Whether markers have fixed it."""
+        return self.points.shape[1] == 2
 
 
 def signature(positions: np.ndarray, triangles: np.ndarray, count: int = POINTS) -> Steps[Signature]:
@@ -77,12 +83,22 @@ def signature(positions: np.ndarray, triangles: np.ndarray, count: int = POINTS)
 
 
 def pair_costs(a: Signature, b: Signature, curvature: float = CURVATURE) -> np.ndarray:
-    """What it costs (k,l) to take each point of one signature to each of another: squared angles and, by a weight,
-    squared differences of curvature."""
-    # By the chord: a cosine near 1 has lost half its digits.
-    square = np.maximum(2 - 2 * (a.points @ b.points.T), 0)
-    angle = 2 * np.arcsin(np.minimum(np.sqrt(square) / 2, 1))
-    return angle**2 + curvature * (a.curvature[:, None] - b.curvature) ** 2
+    """What it costs (k,l) to take each point of one signature to each of another: squared angles, or squared distances
+    in the disk, and, by a weight, squared differences of curvature."""
+    own, its = (s.curvature * np.sqrt(curvature) for s in (a, b))
+    cost = np.subtract.outer(own, its)
+    cost *= cost
+    if a.on_disk:
+        for x, y in zip(a.points.T, b.points.T, strict=True):
+            cost += np.subtract.outer(x, y) ** 2
+        return cost
+    # By the chord: a cosine near 1 has lost half its digits. Single precision rounds an angle by a share of itself.
+    half = (a.points @ b.points.T).clip(-1, 1)
+    half = np.sqrt(np.float32(0.5) * (1 - half).astype(np.float32))
+    angle = np.arcsin(half, out=half)
+    angle *= angle
+    cost += 4 * angle
+    return cost
 
 
 def _other_lattice(count: int) -> np.ndarray:

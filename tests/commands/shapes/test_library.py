@@ -68,3 +68,42 @@ def test_a_folder_goes_into_an_index_and_a_matrix_by_a_batch_as_it_does_without(
     assert run(*words)[0] == 0 and blocks.stat().st_mtime_ns == before
     (tmp_path / "labels.csv").write_text("long.blend,long\n")
     assert "no class for 3 shapes" in run(*words)[2]
+
+
+def test_markers_compare_faces_as_they_lie(run, tmp_path):
+    """By groups or by numbers; an index with markers asks for them, and whose a face is can be left out."""
+    (tmp_path / "faces").mkdir()
+    for name, bump in (("anna_flat", 0), ("anna_deep", 2), ("bert_flat", 0.1), ("bert_deep", 2.1)):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        bpy.ops.mesh.primitive_grid_add(x_subdivisions=12, y_subdivisions=12)
+        own = bpy.context.object
+        for vertex in own.data.vertices:
+            x, y, _ = vertex.co
+            vertex.co.z = 0.4 * bump * np.exp(-8 * ((x - 0.4) ** 2 + y**2))
+        for group, row in (("P", 84), ("Q", 90)):
+            own.vertex_groups.new(name=group).add([row], 1.0, "REPLACE")
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "faces" / f"{name}.blend"))
+    one, other = tmp_path / "faces" / "anna_flat.blend", tmp_path / "faces" / "bert_deep.blend"
+    told = [
+        json.loads(run("distance", one, other, "--points", 100, "--markers", words, "--json")[1])
+        for words in ("P,Q", "84,90")
+    ]
+    assert told[0]["raw"] == told[1]["raw"] > 0.1
+    assert "no vertex group 'X'" in run("distance", one, other, "--markers", "X,Q")[2]
+    assert "no vertex 999" in run("distance", one, other, "--markers", "84,999")[2]
+    assert "on no boundary" in run("distance", one, other, "--markers", "84,85")[2]
+    assert run("distance", one, other, "--markers", "P")[0] == 2
+    (tmp_path / "labels.csv").write_text(
+        "".join(f"{who}_{kind}.blend,{kind},{who}\n" for who in ("anna", "bert") for kind in ("flat", "deep"))
+    )
+    words = ["distances", tmp_path / "faces", "-o", tmp_path / "d.csv", "--markers", "P,Q", "--points", 100]
+    status, out, err = run(*words, "--labels", tmp_path / "labels.csv", "--knn", 1)
+    assert status == 0 and "100.0 % are those of 1 neighbours of others" in out, err
+    assert "markers" in run("similar", one, "--index", tmp_path / "d.index.npz")[2]
+    status, out, _ = run("similar", other, "--index", tmp_path / "d.index.npz", "--markers", "P,Q", "--top", 2)
+    assert status == 0 and [json.loads(line)["name"] for line in out.splitlines()] == [
+        "bert_deep.blend",
+        "anna_deep.blend",
+    ]
+    assert "without" not in run("library", tmp_path / "faces", "-o", tmp_path / "d.index.npz")[1]
+    assert "with markers" in run("library", tmp_path / "faces", "-o", tmp_path / "d.index.npz")[2]

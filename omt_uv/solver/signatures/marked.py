@@ -1,0 +1,135 @@
+"""Quantise a surface with a boundary for comparison, where markers leave nothing open: points of the conformal disk.
+
+A marker p inside goes to 0 and one q of the boundary to 1 (Su 2015, section 2.6.3), so that no rotation is looked for:
+faces are compared as faces, nose upon nose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse import diags
+
+from ..analysis.curvature import mean_curvature
+from ..canonical.markers import ChartMarkers
+from ..conformal.disk_map import conformal_disk
+from ..errors import EmptyMeshError, LandmarkError, NotADiskError
+from ..linalg.sparse import solve_spd
+from ..mesh.closest_point import subdivision_centroids
+from ..mesh.geometry import cotangent_laplacian, face_areas, vertex_areas
+from ..mesh.surface import check_finite
+from ..mesh.topology import boundary_loops, graph_components, halfedges, with_fans
+from ..progress import Steps
+from .signature import FINE, POINTS, SMOOTHING, SQUASH, Signature, pair_costs
+
+# Triangles are cut into as many squared at most.
+FINEST = 8
+
+
+def marked_signature(
+    positions: np.ndarray, triangles: np.ndarray, centre: int, start: int, count: int = POINTS
+) -> Steps[Signature]:
+    """The signature of a mesh (n,3), (m,3) with markers: of the part with the vertex `centre`, whose boundary with the
+    vertex `start` becomes the circle; other holes are filled.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError : nothing, or coordinates that are no numbers
+    LandmarkError : a centre on the boundary or of no face, a start that is not on a boundary of the same part
+    NotADiskError : handles
+    PrecisionError : the map leaves double precision
+
+    References
+    ----------
+    Su 2015, sections 2.6.3 and 4.4
+
+    >>> import numpy as np
+    >>> from omt_uv.solver.progress import drain
+    >>> from omt_uv.solver.signatures.marked import marked_signature
+    >>> roof = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 0.5]])
+    >>> found = drain(marked_signature(roof, np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]), 4, 0, 50))
+    >>> found.points.shape
+    (50, 2)
+    """
+    vertices, faces, centre, start = _outlined(positions, triangles, centre, start)
+    found = yield from conformal_disk(vertices, faces)
+    loop = boundary_loops(faces)[0]
+    uv = ChartMarkers(centre=centre, start=start).in_disk(found.uv, loop)
+    mass = vertex_areas(vertices, faces)
+    # One implicit step of diffusion, as wide as the other signature's smoothing on a surface of this area.
+    unit = mass.sum() / np.pi
+    spread = diags(mass) + SMOOTHING**2 / 2 * unit * cotangent_laplacian(vertices, faces)
+    bend = np.tanh(solve_spd(spread.tocsc(), mean_curvature(vertices, faces)) * np.sqrt(unit) / SQUASH)
+    values, area = np.column_stack([uv, bend]), face_areas(vertices, faces)
+    places, weights = _pieces(values, faces, area, FINE * count)
+    one, other = (_quantised(places * side, weights, count) for side in ([1, 1, 1], [1, -1, 1]))
+    other = Signature(other.points * [1, -1], other.curvature)
+    cost = pair_costs(one, other)
+    return Signature(one.points, one.curvature, float(np.sqrt(cost[linear_sum_assignment(cost)].mean())))
+
+
+def _outlined(
+    positions: np.ndarray, triangles: np.ndarray, centre: int, start: int
+) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """The part of the centre, with all its holes filled but that of the start; and both markers in it."""
+    if not len(triangles):
+        raise EmptyMeshError("There are no faces to compare")
+    check_finite(positions, triangles)
+    remedy = "Mark one vertex inside, and one of the boundary around it"
+    label = graph_components(*halfedges(triangles), len(positions))[1]
+    used, local = np.unique(triangles[label[triangles[:, 0]] == label[centre]], return_inverse=True)
+    for vertex, name in ((centre, "centre"), (start, "start")):
+        if vertex not in used:
+            raise LandmarkError(f"The marker of the {name} is no vertex of the part", remedy, "vertex", [vertex])
+    faces, vertices = local.reshape(-1, 3).astype(np.int64), positions[used]
+    inner, outer = (int(k) for k in np.searchsorted(used, [centre, start]))
+    try:
+        loops = boundary_loops(faces)
+    except (ValueError, IndexError) as error:
+        raise NotADiskError("The boundary is no set of loops", "Merge vertices that coincide") from error
+    own = [loop for loop in loops if outer in loop]
+    if not own:
+        raise LandmarkError("The marker of the start is on no boundary", remedy, "vertex", [start])
+    if inner in own[0]:
+        raise LandmarkError("The marker of the centre lies on the boundary", remedy, "vertex", [centre])
+    vertices, faces = with_fans(vertices, faces, [loop for loop in loops if loop is not own[0]])
+    edges = (3 * len(faces) + len(own[0])) // 2
+    if len(vertices) - edges + len(faces) != 1:
+        raise NotADiskError("The surface has handles", "Only what is a disk without its other holes has markers")
+    return vertices, faces, inner, outer
+
+
+def _pieces(values: np.ndarray, faces: np.ndarray, area: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (m,3) cut alike into `count` pieces or more, if they are not too few: values (k,c) in the middles, and
+    shares of the area (k,)."""
+    cuts = min(FINEST, int(np.ceil(np.sqrt(count / len(faces)))))
+    shares = subdivision_centroids(cuts)
+    places = np.einsum("kc,mcd->mkd", shares, values[faces]).reshape(-1, values.shape[1])
+    return places, np.repeat(area / area.sum() / len(shares), len(shares))
+
+
+def _quantised(values: np.ndarray, weights: np.ndarray, count: int) -> Signature:
+    """Means of as many groups of the same mass: places and curvature (k,3) with weights (k,)."""
+    groups = _halved(values[:, :2], np.arange(len(values)), weights, count)
+    mean = np.array([share @ values[rows] / share.sum() for rows, share in groups])
+    return Signature(mean[:, :2], mean[:, 2])
+
+
+def _halved(at: np.ndarray, rows: np.ndarray, weights: np.ndarray, count: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Rows (r,) of places (k,2) with weights (r,) in `count` groups of the same weight; rows in between are in both."""
+    if count == 1:
+        return [(rows, weights)]
+    along = at[rows, np.ptp(at[rows], axis=0).argmax()]
+    order = np.argsort(along, kind="stable")
+    rows, weights = rows[order], weights[order]
+    total = np.cumsum(weights)
+    low = count // 2
+    goal = total[-1] * low / count
+    cut = min(int(np.searchsorted(total, goal)), len(rows) - 1)
+    first, second = weights[: cut + 1].copy(), weights[cut:].copy()
+    second[0] = total[cut] - goal
+    first[-1] -= second[0]
+    return [
+        *_halved(at, rows[: cut + 1], first, low),
+        *_halved(at, rows[cut:], second, count - low),
+    ]
