@@ -49,7 +49,21 @@ def load(path: Path) -> list[bpy.types.Object]:
     if not objects:
         lines = [line for line in log().splitlines() if "error" in line.lower()]
         raise FileError(f"{path}: {last_line(lines[-1]) if lines else 'the file has no mesh'}")
+    _check_names(path, objects)
     return objects
+
+
+def _check_names(path: Path, objects: list[bpy.types.Object]) -> None:
+    """Raise FileError where a name is no text: Blender reads it, and everything else would stumble over it later."""
+    data = bpy.data
+    named = [data.scenes, data.collections, data.objects, data.meshes, data.materials]
+    named += [x for o in objects for x in (o.vertex_groups, o.data.uv_layers, o.data.attributes)]
+    for collection in named:
+        try:
+            # One by one: of all names at once, the error would be lost in Blender.
+            [item.name for item in collection]
+        except UnicodeDecodeError as error:
+            raise FileError(f"{path}: a name in the file is no text, {error.object!r}. The file is damaged.") from error
 
 
 def check_suffix(path: Path, known: tuple[str, ...]) -> None:

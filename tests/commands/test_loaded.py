@@ -7,6 +7,7 @@ import struct
 
 import bpy
 
+import mesh_bytes
 import numpy as np
 import pytest
 import scenes
@@ -93,6 +94,34 @@ def test_what_headers_declare_has_to_be_there(run, tmp_path, name, data, message
     write(tmp_path / name, data)
     status, out, err = run("measure", tmp_path / name)
     assert (status, out) == (1, "") and len(err.splitlines()) == 1 and message in err
+
+
+@pytest.mark.parametrize("place", ["Qobject", "Qmesh", "Qlayer", "Qgroup", "Qattribute", "Qmaterial", "Qscene"])
+def test_names_that_are_no_text_are_refused(run, tmp_path, place):
+    """A damaged byte in a name of a .blend: Blender reads it, Python cannot."""
+    obj = scenes.add(POINTS.tolist(), FACES.tolist(), "Qobject")
+    obj.data.name, bpy.context.scene.name = "Qmesh", "Qscene"
+    obj.data.uv_layers.new(name="Qlayer")
+    obj.vertex_groups.new(name="Qgroup")
+    obj.data.attributes.new("Qattribute", "FLOAT", "POINT")
+    obj.data.materials.append(bpy.data.materials.new("Qmaterial"))
+    source = tmp_path / "in.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(source), compress=False)
+    raw = source.read_bytes()
+    assert place.encode() in raw
+    source.write_bytes(raw.replace(place.encode(), b"Q\xd8" + place[2:].encode()))
+    status, out, err = run("unwrap", source, "-o", tmp_path / "out.obj", "--quality", "draft")
+    # Some names Blender mends itself.
+    refused = bool(status) or place in ("Qobject", "Qlayer", "Qmaterial")
+    assert (status, out) == (int(refused), "") and len(err.splitlines()) == status and ("no text" in err) == refused
+    assert (tmp_path / "out.obj").exists() != refused
+
+
+def test_attributes_of_a_ply_whose_names_are_no_text_are_refused(run, tmp_path):
+    data = mesh_bytes.ply_bytes().replace(b"property float s\n", b"property float \xa7\n")
+    write(tmp_path / "in.ply", data)
+    status, out, err = run("unwrap", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "--quality", "draft")
+    assert (status, out) == (1, "") and len(err.splitlines()) == 1 and "no text" in err
 
 
 def test_whole_files_are_read_without_a_word(run, tmp_path):

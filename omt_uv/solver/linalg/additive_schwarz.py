@@ -15,10 +15,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from .nested_dissection import kd_parts, vertex_graph
-from .sparse import Factor, gradient_steps, minimum_degree
+from .sparse import Factor, fill, gradient_steps, minimum_degree
 
 # Meshes of fewer vertices are factored at once.
 LARGE = 50_000
+# So are those of more whose factors have fewer entries for a vertex: slivers and strips hang together by few vertices,
+# and parts cut them where they are stiff. A mesh of LARGE vertices as wide as it is long has 41.
+LITTLE_FILL = 20
+# Vertices up to which that is found out.
+COUNTED = 250_000
 # Vertices of a part without its overlap.
 PART_SIZE = 1000
 # Rings of vertices that parts overlap by.
@@ -101,8 +106,14 @@ class AdditiveSchwarz:
 
 
 def schwarz_solver(points: np.ndarray, triangles: np.ndarray) -> AdditiveSchwarz | None:
-    """Parts of a mesh (n,d), (m,3) that is so large that it should be solved in parts."""
-    return AdditiveSchwarz(points, triangles) if len(points) >= LARGE else None
+    """Parts of a mesh (n,d), (m,3) that is so large that it should be solved in parts.
+
+    The order of the vertices is that of their elimination.
+    """
+    n = len(points)
+    if n < LARGE or (n < COUNTED and fill(vertex_graph(triangles, n)) < LITTLE_FILL * n):
+        return None
+    return AdditiveSchwarz(points, triangles)
 
 
 def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:

@@ -135,10 +135,19 @@ def minimum_degree(A: sp.spmatrix) -> np.ndarray:
 
     Ordering takes longer than factoring: compute it once on the graph of the vertices, not on their coordinates.
     """
+    return np.argsort(_splu(_dominant(A), "MMD_AT_PLUS_A").perm_c)
+
+
+def fill(A: sp.spmatrix) -> int:
+    """Entries of the lower factor of a symmetric pattern (n,n) whose unknowns are eliminated as they come."""
+    return int(_splu(_dominant(A), "NATURAL").L.nnz)
+
+
+def _dominant(A: sp.spmatrix) -> sp.spmatrix:
+    """A positive definite matrix of this pattern."""
     A = sp.csc_matrix(A)
     degree = np.diff(A.indptr)
-    dominant = sp.csc_matrix((np.full(A.nnz, -1.0), A.indices, A.indptr), shape=A.shape) + sp.diags(3.0 + degree)
-    return np.argsort(_splu(dominant, "MMD_AT_PLUS_A").perm_c)
+    return sp.csc_matrix((np.full(A.nnz, -1.0), A.indices, A.indptr), shape=A.shape) + sp.diags(3.0 + degree)
 
 
 def _splu(A: sp.spmatrix, spec: str):

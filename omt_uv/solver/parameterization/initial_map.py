@@ -58,6 +58,9 @@ DIRECT_FAR = 20000
 # A disk whose log scale spreads less than this over the surface, flattened with the boundary as it comes, is as near to
 # the map looked for as the transport would bring it.
 LITTLE_SPREAD = 0.5
+# Mean energy of a mean value map above which a large chart starts from a flat map with the boundary as it comes: where
+# slivers make the former so bad, coarser meshes say nothing, and the way from it is long.
+HOPELESS = 50.0
 # Energy below which a map is an isometry, but for rounding, and nothing is left to refine.
 ISOMETRY = 1e-8
 # Drafts of charts with more vertices than this come by way of a coarser mesh, unless their log scale spreads less.
@@ -134,16 +137,25 @@ def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD)
     None where it would scale unevenly: areas are farther from a mean value map than from the transport's, then.
     """
     with log.timed("flattening"):
-        mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
-        try:
-            flat = boundary_first(disk.vertices, disk.triangles, disk.loop)
-        except PrecisionError:
-            return None
-        if not flat.spread(mass) < spread:
-            return None
-        if count_folds(flat.uv, disk.triangles) == 0 and not covers_itself(flat.uv @ [1, 1j], disk.loop):
-            return InitialChartMap(flat.uv)
+        flat = _evenly_flattened(disk, spread)
+        if flat is None or _one_to_one(disk, flat):
+            return None if flat is None else InitialChartMap(flat)
         return InitialChartMap(mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk()))
+
+
+def _evenly_flattened(disk: DiskMesh, spread: float) -> np.ndarray | None:
+    """A disk flattened (n,2) with the boundary as it comes; None where that scales unevenly."""
+    mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
+    try:
+        flat = boundary_first(disk.vertices, disk.triangles, disk.loop)
+    except PrecisionError:
+        return None
+    return flat.uv if flat.spread(mass) < spread else None
+
+
+def _one_to_one(disk: DiskMesh, uv: np.ndarray) -> bool:
+    """Whether no face of a map uv (n,2) folds, and it does not cover itself."""
+    return count_folds(uv, disk.triangles) == 0 and not covers_itself(uv @ [1, 1j], disk.loop)
 
 
 def coarse_initial_map(
@@ -158,6 +170,9 @@ def coarse_initial_map(
     with log.timed("coarsening"):
         if flat is None:
             flat = mean_value_sites(vertices, triangles, disk.loop, None, Disk())
+            even = _even_start(disk, flat) if disk.boundary == "free" and not far else None
+            if even is not None:
+                return InitialChartMap(even)
         goal = len(vertices) // (COARSER_FAR if far else COARSER)
         density = _density(vertices, triangles, disk.target, goal) if far else None
         steps = coarsen_disk(vertices, triangles, flat, disk.target, goal, disk.region, density)
@@ -192,6 +207,14 @@ def coarse_initial_map(
         if not (far or draft) and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(flat)
     return InitialChartMap(uv, found.conformal, found.cells, far, refined.multiplier)
+
+
+def _even_start(disk: DiskMesh, flat: np.ndarray) -> np.ndarray | None:
+    """A start (n,2) that scales evenly, in place of a mean value map (n,2) from which there is hardly a way."""
+    if map_energy(flat, disk.vertices, disk.triangles) < HOPELESS:
+        return None
+    even = _evenly_flattened(disk, LITTLE_SPREAD)
+    return even if even is not None and _one_to_one(disk, even) else None
 
 
 def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, quality: str) -> Steps[Refinement]:

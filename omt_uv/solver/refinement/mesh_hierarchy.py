@@ -204,7 +204,9 @@ def _places(V, flat, vertex, row, new, ahead):
     a, b, c = flat[new].transpose(1, 0, 2)
     p = flat[vertex[row]]
     weights = np.column_stack([cross2(b - p, c - p), cross2(c - p, a - p), cross2(a - p, b - p)])
-    weights /= weights.sum(1)[:, None]
+    total = weights.sum(1)[:, None]
+    # Of a triangle without area: outside of it.
+    weights = np.divide(weights, total, out=np.tile([-1.0, 1.0, 1.0], (len(total), 1)), where=total != 0)
     order = np.lexsort((-weights.min(1), row))
     around = order[np.searchsorted(row[order], np.arange(len(vertex)))]
     corner, share = new[around], weights[around]

@@ -11,6 +11,7 @@ from work import counted_work
 from omt_uv.solver.errors import PrecisionError
 from omt_uv.solver.linalg import additive_schwarz as schwarz
 from omt_uv.solver.linalg.additive_schwarz import AdditiveSchwarz
+from omt_uv.solver.linalg.nested_dissection import mesh_order
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -53,6 +54,16 @@ def test_steps_follow_a_turned_and_enlarged_map():
     step, _ = newton_direction(parted, w)
     turned, _ = newton_direction(larger, scale * w)
     assert np.abs(turned - scale * step).max() <= 1e-5 * np.abs(scale * step).max()
+
+
+def test_long_and_narrow_meshes_are_factored_at_once(monkeypatch):
+    monkeypatch.setattr(schwarz, "LARGE", 1000)
+    V, F = meshes.bumpy(400, 5)
+    order = mesh_order(V, F)
+    assert schwarz.schwarz_solver(V[order], np.argsort(order)[F]) is None
+    V, F = meshes.bumpy(150, 150)
+    order = mesh_order(V, F)
+    assert schwarz.schwarz_solver(V[order], np.argsort(order)[F]) is not None
 
 
 def test_what_takes_too_long_is_factored(monkeypatch):

@@ -6,7 +6,7 @@ import pytest
 import scipy.sparse as sp
 
 from omt_uv.solver.errors import PrecisionError
-from omt_uv.solver.linalg.sparse import Factor, minimum_degree, solve_general, solve_spd
+from omt_uv.solver.linalg.sparse import Factor, fill, minimum_degree, solve_general, solve_spd
 from omt_uv.solver.mesh.geometry import cotangent_laplacian
 
 
@@ -29,6 +29,16 @@ def test_minimum_degree_is_a_permutation_with_less_fill_than_none():
     order = minimum_degree(A)
     assert np.array_equal(np.sort(order), np.arange(A.shape[0]))
     assert Factor(A, order)._lu.nnz < Factor(A, "natural")._lu.nnz
+
+
+def test_fill_is_that_of_the_order_given():
+    n = 12
+    path = sp.diags([np.ones(n - 1), np.ones(n), np.ones(n - 1)], [-1, 0, 1])
+    assert fill(path) == 2 * n - 1
+    star = sp.lil_matrix(sp.identity(n))
+    star[0] = star[:, 0] = 1
+    assert fill(star) == n * (n + 1) // 2
+    assert fill(star[::-1][:, ::-1]) == 2 * n - 1
 
 
 def test_unsymmetric_dominant_systems():

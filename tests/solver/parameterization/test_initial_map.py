@@ -80,6 +80,24 @@ def test_a_mesh_of_boundary_vertices_is_not_coarsened():
     assert drain(coarse_initial_map(disk_of(*meshes.spiral_strip(1.0, 20), "disk"), 0.0, RunLog())) is None
 
 
+def test_slivers_that_a_mean_value_map_squeezes_start_from_a_flat_map_that_scales_evenly(monkeypatch):
+    V, F = hard_meshes.sliver_sphere(6_000)
+    chart = cut_to_disks(triangle_surface(V, F)).charts[0]
+    disk = disk_of(chart.vertices, chart.triangles)
+    flat = mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk())
+    squeezed = map_energy(flat, disk.vertices, disk.triangles)
+    monkeypatch.setattr(initial_maps, "HOPELESS", 0.9 * squeezed)
+    monkeypatch.setattr(initial_maps, "coarsen_disk", None)
+    found = drain(coarse_initial_map(disk, 0.0, RunLog()))
+    assert count_folds(found.uv, disk.triangles) == 0
+    assert map_energy(found.uv, disk.vertices, disk.triangles) < 0.2 * squeezed
+    # A domain that is asked for is not left.
+    monkeypatch.undo()
+    monkeypatch.setattr(initial_maps, "HOPELESS", 0.0)
+    given = drain(coarse_initial_map(disk_of(chart.vertices, chart.triangles, "disk"), 0.0, RunLog()))
+    assert given is None or count_folds(given.uv, disk.triangles) == 0
+
+
 def test_slivers_start_from_no_worse_than_a_mean_value_map(monkeypatch):
     V, F = hard_meshes.sliver_sphere(20_000)
     chart = cut_to_disks(triangle_surface(V, F)).charts[0]
