@@ -32,7 +32,21 @@ def add(commands) -> None:
         "--beltrami", action="store_true", help="how far apart the strain of the UV maps is instead, region by region"
     )
     command.add_argument("--shape-key", default="", metavar="NAME", help="with --beltrami: of this shape key")
+    command.add_argument(
+        "--samples",
+        type=_count,
+        default=0,
+        metavar="N",
+        help="distances of N random points a surface and of its vertices alone, as programs that sample have them",
+    )
     command.add_argument("--plot", type=Path, metavar="P.png", help="draw errors over the number of faces")
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of points")
+    return value
 
 
 def run(options: argparse.Namespace) -> None:
@@ -62,7 +76,7 @@ def compared(options: argparse.Namespace) -> list[dict]:
     for path in options.others:
         second = _mesh(options, path)
         with refusals(name=f"{options.input}, {path}"):
-            rows.append({"file": str(path), **vars(drain_shown(compare(first, second)))})
+            rows.append({"file": str(path), **vars(drain_shown(compare(first, second, options.samples)))})
     return rows
 
 

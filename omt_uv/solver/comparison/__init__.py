@@ -10,5 +10,6 @@ __getattr__, __all__ = lazy(
     __name__,
     bumps="Bumps bumps_of curvature_error",
     comparison_figures="Comparison compare distances_to",
+    greatest="GreatestDistance exact_distances greatest_distance",
     triangle_shapes="TriangleShapes compare_shapes",
 )

@@ -10,11 +10,12 @@ from scipy.spatial import cKDTree
 
 from ..analysis.curvature import gaussian_curvature, mean_curvature
 from ..errors import EmptyMeshError, NonFiniteError
-from ..mesh.closest_point import ClosestPoint, SurfacePoints, random_points, subdivision_centroids
+from ..mesh.closest_point import ClosestPoint, SurfacePoints, random_points
 from ..mesh.geometry import face_areas, face_normals
 from ..mesh.topology import boundary_edges, expand
 from ..progress import Progress, Steps, part_of
 from .bumps import Bumps, bumps_of, curvature_error
+from .greatest import by_position, farthest, greatest_distance
 from .triangle_shapes import TriangleShapes, compare_shapes, topology_of
 
 # Positions (n,3) and triangles (m,3).
@@ -23,9 +24,6 @@ Mesh: TypeAlias = tuple[np.ndarray, np.ndarray]
 POINTS = 100_000
 # Points that are looked for at once, for memory.
 CHUNK = 100_000
-# Triangles with the farthest points that are looked at again, each at the square of so many points.
-PEAKS = 100
-PEAK_LEVEL = 16
 # Points along the boundary for each diagonal.
 BOUNDARY_POINTS = 2000
 
@@ -36,6 +34,7 @@ class Comparison(TriangleShapes):
 
     vertices, faces : of B
     hausdorff, hausdorff_a, hausdorff_b : greatest distance: of both ways, from A to B, and from B to A
+    hausdorff_bound : no distance is above it; None where distances are those of points alone
     rms, rms_a, rms_b : root of the mean square over the area, both ways, from A to B, and from B to A
     normal_mean, normal_p99 : angle in degrees between the normals at closest points, from A to B
     gaussian_error, mean_error : curvature measures under bumps, `sum |phi_A - phi_B| / sum |phi_A|`
@@ -50,6 +49,7 @@ class Comparison(TriangleShapes):
     hausdorff: float
     hausdorff_a: float
     hausdorff_b: float
+    hausdorff_bound: float | None
     rms: float
     rms_a: float
     rms_b: float
@@ -67,32 +67,34 @@ class Comparison(TriangleShapes):
 @dataclass(frozen=True)
 class _OneWay:
     """From a surface to another: the triangles (k,) of points that stand for the same area each; then, of these and of
-    all vertices, the closest points, distances, and the greatest of them."""
+    all vertices, the closest points and distances, the greatest of the surface, and a bound of it, if there is one."""
 
     owner: np.ndarray
     found: SurfacePoints
     distance: np.ndarray
     most: float
+    bound: float | None
 
 
 def compare(A: Mesh, B: Mesh, points: int = 0) -> Steps[Comparison]:
     """Figures of B beside A, each positions (n,3) and triangles (m,3).
 
-    Distances are exact from a point to a surface, from so many points of it (100,000) and all of its vertices: the
-    greatest is short of the true one by about the distance of these points.
+    Distances are taken from 100,000 points of a surface and from all of its vertices, and the greatest is looked for
+    between them. points : from so many points of a surface and its vertices alone, as programs that sample have it
 
     Raises
     ------
     EmptyMeshError : one of them has no faces
     NonFiniteError : a position is NaN or infinite
     """
-    A, B, points = _checked(*A), _checked(*B), points or POINTS
+    A, B = _checked(*A), _checked(*B)
     diagonal = float(np.linalg.norm(np.ptp(A[0], axis=0)))
     bumps = yield from part_of(bumps_of(*A), 0.0, 0.4)
     there = yield from part_of(_way(A, B, points), 0.4, 0.3)
     back = yield from part_of(_way(B, A, points), 0.7, 0.3)
     rms_a, rms_b = (float(np.sqrt(np.mean(_spread(w) ** 2))) / diagonal for w in (there, back))
     most_a, most_b = (way.most / diagonal for way in (there, back))
+    bounds = [way.bound / diagonal for way in (there, back) if way.bound is not None]
     # A point of a triangle and its closest point are about where the surfaces are the same.
     n = len(there.owner)
     cosine = (face_normals(*A)[there.owner] * face_normals(*B)[there.found.faces[:n]]).sum(axis=1)
@@ -106,6 +108,7 @@ def compare(A: Mesh, B: Mesh, points: int = 0) -> Steps[Comparison]:
         hausdorff=max(most_a, most_b),
         hausdorff_a=most_a,
         hausdorff_b=most_b,
+        hausdorff_bound=max(bounds, default=None),
         rms=float(np.hypot(rms_a, rms_b) / np.sqrt(2)),
         rms_a=rms_a,
         rms_b=rms_b,
@@ -126,7 +129,7 @@ def distances_to(positions: np.ndarray, triangles: np.ndarray, points: np.ndarra
     """Distance (k,) of points (k,3) from the surface of positions (n,3) and triangles (m,3)."""
     V, F = _checked(positions, triangles)
     index = ClosestPoint(V, F, _spacing(V, F))
-    found = np.concatenate([_closest(index, part) for part in _parts(points)])
+    found = np.concatenate([by_position(index, part).points for part in _parts(points)])
     return np.linalg.norm(found - points, axis=1)
 
 
@@ -153,38 +156,22 @@ def _parts(points: np.ndarray) -> list[np.ndarray]:
     return np.array_split(points, max(-(-len(points) // CHUNK), 1))
 
 
-def _closest(index: ClosestPoint, points: np.ndarray) -> np.ndarray:
-    return _search(index, points).points
-
-
-def _search(index: ClosestPoint, points: np.ndarray) -> SurfacePoints:
-    """The closest points by position alone, whichever way the surface looks there."""
-    none = np.zeros(points.shape)
-    return index.closer(points, none, index(points, none))
-
-
 def _way(source: Mesh, target: Mesh, count: int) -> Steps[_OneWay]:
-    """Distances from a surface to another."""
-    owner, points = _scattered(*source, count)
+    """Distances from a surface to another, of so many points, or of POINTS and what is between them."""
+    owner, points = _scattered(*source, count or POINTS)
     every = np.concatenate([points, source[0]])
     index = ClosestPoint(*target, _spacing(*target))
     parts, chunks = [], _parts(every)
     for k, part in enumerate(chunks):
-        yield Progress("distances", k / len(chunks))
-        parts.append(_search(index, part))
+        yield Progress("distances", 0.5 * k / len(chunks))
+        parts.append(by_position(index, part))
     found = SurfacePoints(*(np.concatenate(x) for x in zip(*(vars(p).values() for p in parts), strict=True)))
     distance = np.linalg.norm(found.points - every, axis=1)
-    most = max(float(distance.max()), _greatest_around(source, owner[np.argsort(distance[:count])[::-1]], index))
-    return _OneWay(owner, found, distance, most)
-
-
-def _greatest_around(source: Mesh, owner: np.ndarray, index: ClosestPoint) -> float:
-    """The greatest distance within the first few different triangles (k,) of `owner`, by many points of each."""
-    _, first = np.unique(owner, return_index=True)
-    V, F = source
-    pattern = subdivision_centroids(PEAK_LEVEL)
-    points = np.einsum("sc,fcj->fsj", pattern, V[F[owner[np.sort(first)[:PEAKS]]]]).reshape(-1, 3)
-    return float(np.linalg.norm(_closest(index, points) - points, axis=1).max())
+    if count:
+        return _OneWay(owner, found, distance, farthest(index, every, distance), None)
+    steps = greatest_distance(*source, index, found.faces[len(points) :], (every, distance))
+    greatest = yield from part_of(steps, 0.5, 0.5)
+    return _OneWay(owner, found, distance, greatest.distance, greatest.bound)
 
 
 def _scattered(V: np.ndarray, F: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
