@@ -22,7 +22,7 @@ PAGE = """<!doctype html>
   th.sorted.down::after { content: " \\25BC" }
   td.number { text-align: right; font-variant-numeric: tabular-nums }
   tr.failed td { color: var(--bad) }
-  td.message { max-width: 34em }
+  .message { max-width: 25em; overflow-wrap: anywhere }
   img { display: block; height: 120px; background: var(--soft) }
   button, input, select { font: inherit }
   details { margin: .4em 0 }
@@ -136,6 +136,9 @@ function draw() {
       link.append(picture);
       cell.append(link);
     }
+    // What failed has no picture: its message stands there, within the window however many columns there are.
+    const message = data.rows[k][at("message")];
+    if (message) cell.append(element("div", message, "message"));
     row.append(cell, ...columns.map(name => {
       const value = data.rows[k][at(name)];
       return element("td", shown(name, value), typeof value === "number" ? "number" : name);

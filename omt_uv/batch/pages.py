@@ -12,9 +12,9 @@ from urllib.parse import quote
 from .figures import columns_of, flat_row
 from .page_text import PAGE
 
-# Columns that a page shows first, where they are there; the others are chosen on the page.
+# Columns that a page shows first, where they are there; the others are chosen on the page. Messages stand at pictures.
 FIRST = ("name", "state", "faces", "area_l1", "angle_mean", "folds", "gate.overlap", "hausdorff", "rms", "seconds",
-         "memory", "message")  # fmt: skip
+         "memory")  # fmt: skip
 
 
 def page_of(rows: Sequence[Mapping], folder: Path, title: str) -> str:

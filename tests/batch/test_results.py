@@ -105,6 +105,7 @@ def shown(page, tmp_path, address="", then=""):
     const seen = { rows: [...document.querySelectorAll('tbody tr')].map(r => [...r.cells].map(c => c.textContent)),
       heads: [...document.querySelectorAll('th')].map(c => c.textContent), title: document.title, hash: location.hash,
       place: document.querySelector('#place').textContent, on: document.querySelector('#on').disabled,
+      edge: Math.max(0, ...[...document.querySelectorAll('.message')].map(c => c.getBoundingClientRect().right)),
       pictures: [...document.querySelectorAll('img')].map(i => i.getAttribute('src')) };
     document.documentElement.innerHTML = '<pre></pre>';
     const text = btoa(unescape(encodeURIComponent(JSON.stringify(seen))));
@@ -112,7 +113,8 @@ def shown(page, tmp_path, address="", then=""):
     </script></body>"""
     text = page.read_text(encoding="utf-8")
     copy.write_text(text.replace("</body>", end.replace("THEN", then)), encoding="utf-8")
-    words = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}", "--dump-dom"]
+    words = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}", "--dump-dom",
+             "--window-size=1300,1000"]  # fmt: skip
     done = subprocess.run([*words, f"{copy.as_uri()}{address}"], capture_output=True, text=True, timeout=120)
     assert "SEEN" in done.stdout, done.stderr
     return json.loads(base64.b64decode(done.stdout.partition("SEEN")[2].partition("END")[0]))
@@ -142,8 +144,23 @@ def test_a_page_sorts_filters_and_turns_pages_by_clicks(page, tmp_path):
 def test_an_address_is_a_view(page, tmp_path):
     seen = shown(page, tmp_path, "#state=failed&filter=BAD&sort=name&down=1")
     assert column(seen, "name") == [f"f{k}.obj" for k in range(29, -1, -1)]
-    assert set(column(seen, "message")) == {"bad face"}
+    assert {cells[0] for cells in seen["rows"]} == {"bad face"}
     assert shown(page, tmp_path, "#sort=none&page=99")["place"].endswith("page 3 of 3")
+
+
+@in_browser
+def test_long_messages_stay_within_the_window(package, tmp_path):
+    """With as many columns as a batch has, and a path that nothing can break but its letters."""
+    figures = dict.fromkeys(("area_l1", "angle_mean", "hausdorff", "rms"), 0.123456)
+    report = json.dumps({"charts": [{"faces": 10**6, "folds": 10, **figures}], "gate": {"overlap": 0.0}})
+    rows = [row(f"a_name_of_a_file_{k}.obj", report=report, preview=str(tmp_path / "none.png")) for k in range(3)]
+    rows.append(
+        row("b.obj", "failed", status=1, report="", message=f"/{'folder' * 40}/b.obj: " + "face 17 is a line. " * 20)
+    )
+    path = tmp_path / "out.html"
+    path.write_text(package("batch.pages").page_of(rows, tmp_path, "long"), encoding="utf-8")
+    seen = shown(path, tmp_path)
+    assert 0 < seen["edge"] <= 1300 and "face 17 is a line" in seen["rows"][3][0]
 
 
 @in_browser
