@@ -21,6 +21,8 @@ PAGES = {
     "uv.omt_unwrap": "unwrap",
     "uv.omt_refine": "refine",
     "uv.omt_magnify": "magnify",
+    "uv.omt_region_add": "magnify",
+    "uv.omt_region_remove": "magnify",
     "object.omt_weights": "weights",
     "uv.omt_sphere": "sphere",
     "uv.omt_seams": "seams",

@@ -21,6 +21,8 @@ from .operators.live import UV_OT_omt_live, UV_OT_omt_live_end
 from .operators.magnify import UV_OT_omt_magnify
 from .operators.preset import UV_OT_omt_preset
 from .operators.refine import UV_OT_omt_refine
+from .operators.regions.factors import UV_OT_omt_region_add, UV_OT_omt_region_remove
+from .operators.regions.weights import OBJECT_OT_omt_weights
 from .operators.remesh import OBJECT_OT_omt_remesh
 from .operators.report import WM_OT_omt_copy_report, WM_OT_omt_help
 from .operators.seams import UV_OT_omt_seams
@@ -39,19 +41,24 @@ from .operators.unwrap import UV_OT_omt_unwrap
 from .operators.volumes.flow import OBJECT_OT_omt_flow
 from .operators.volumes.uv_flow import UV_OT_omt_flow
 from .operators.volumes.volume import OBJECT_OT_omt_volume
-from .operators.weights import OBJECT_OT_omt_weights
 from .panels import keymap
 from .panels.menus import UV_MT_omt, draw_menu, draw_remesh, menus, remesh_menus
 from .panels.preferences import OMTUVPreferences, apply_soon
 from .panels.sidebar import PANELS
+from .panels.tools import UV_UL_omt_regions
 from .panels.translations.registered import tables_of
 from .session import last_run
 from .session.presets import register_folder, unregister_folder
+from .session.region_list import OMTUVRegion, OMTUVRegionList, register_list, unregister_list
 
 CLASSES = (
+    OMTUVRegion,
+    OMTUVRegionList,
     UV_OT_omt_unwrap,
     UV_OT_omt_refine,
     UV_OT_omt_magnify,
+    UV_OT_omt_region_add,
+    UV_OT_omt_region_remove,
     OBJECT_OT_omt_weights,
     UV_OT_omt_seams,
     UV_OT_omt_sphere,
@@ -94,6 +101,7 @@ CLASSES = (
     WM_OT_omt_help,
     OMTUVPreferences,
     UV_MT_omt,
+    UV_UL_omt_regions,
     *PANELS,
 )
 COMMAND = "omt_uv"
@@ -107,6 +115,8 @@ def register() -> None:
         for cls in CLASSES:
             bpy.utils.register_class(cls)
             _undo.append((bpy.utils.unregister_class, cls))
+        register_list()
+        _undo.append((unregister_list, None))
         entries = ((draw_menu, menus()), (draw_remesh, remesh_menus()))
         for draw, places in entries:
             for menu in places:

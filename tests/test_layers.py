@@ -111,6 +111,7 @@ ARROWS: dict[str, str] = {
     "operators.shapes": "settings solver solver.registration pipelines pipelines.shapes blender "
     "blender.shapes session operators",
     "operators.volumes": "solver solver.flows pipelines pipelines.volumes blender blender.volumes session operators",
+    "operators.regions": "settings solver display pipelines blender session operators",
     "operators.arranging": "solver pipelines pipelines.arranging blender session operators",
     "panels.translations": "solver",
     "panels": "links errors remedies settings solver blender display session operators operators.inspection "

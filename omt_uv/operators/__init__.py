@@ -20,5 +20,4 @@ __getattr__, __all__ = lazy(
     sphere="UV_OT_omt_sphere",
     texel_density="UV_OT_omt_density_get UV_OT_omt_density_set",
     unwrap="UV_OT_omt_unwrap",
-    weights="OBJECT_OT_omt_weights",
 )

@@ -8,6 +8,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ..session import run
+from ..session.region_list import NAME as REGION_LIST
+from ..session.region_list import RegionListError, pairs_of, rows_of
 from ..settings import (
     AUTO_SOURCE,
     BOUNDARIES,
@@ -56,7 +58,9 @@ class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy
     further: StringProperty(
         name="Further Regions",
         description="Vertex groups that get factors of their own at the same time, such as: eyes=3, mouth=1.5. "
-        "All shares are exact together",
+        "All shares are exact together. Empty: those of the list that the active object keeps",
+        # The list stands in the panel, and what a script gave once shall not stand above it.
+        options={"SKIP_SAVE"},
     )
     exact: BoolProperty(
         name="Exact Share",
@@ -130,7 +134,7 @@ class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy
     )
 
     def draw(self, _context: bpy.types.Context) -> None:
-        draw_settings(self.layout, self)
+        draw_settings(self.layout, self, listed=False)
 
     def settings(self, source: str) -> MagnifySettings:
         return MagnifySettings(
@@ -164,7 +168,7 @@ class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy
                 Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up, modifier)
                 for r, w, modifier in zip(readings, weights, self.subdivisions(readings), strict=True)
             ]
-            several = self._further(pairs, regions)
+            several = self._further(pairs, regions, self._factors(context))
             settings = self.settings(source)
             steps = magnify_several(several, settings) if len(several) > 1 else magnify(regions, settings)
             result = yield from run.aside(steps)
@@ -202,20 +206,30 @@ class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy
         size = (max(1, round(height * wide / width)), wide)
         return detailed_picture(picture, regions, result, insets, size, self.margin)
 
-    def _further(self, pairs, regions) -> list:
-        """The region, and those of *Further Regions*, each with its factor. Raises GroupError."""
+    def _factors(self, context: bpy.types.Context) -> list[tuple[str, float]]:
+        """Pairs of group and factor of *Further Regions*. Raises GroupError."""
+        from ..blender.vertex_groups import GroupError
+        from ..pipelines.regions.several import region_factors
+
+        texts = [text for text in self.further.split(",") if text.strip()]
+        try:
+            return region_factors(texts) if texts else pairs_of(context.view_layer.objects.active)
+        except (ValueError, RegionListError) as error:
+            raise GroupError(f"Further Regions: {str(error).rstrip('.')}.") from error
+
+    def _further(self, pairs, regions, factors: list[tuple[str, float]]) -> list:
+        """The region, and others with factors of their own. Raises GroupError."""
         from dataclasses import replace as changed
 
         from ..blender.vertex_groups import GroupError
         from ..blender.weights import region_weights
-        from ..pipelines.regions.several import NamedRegion, region_factors
+        from ..pipelines.regions.several import NamedRegion
 
-        try:
-            further = region_factors([text for text in self.further.split(",") if text.strip()])
-        except ValueError as error:
-            raise GroupError(f"Further Regions: {error}.") from error
-        found = [NamedRegion(self.weight_group or self.attribute or "Region", self.factor, tuple(regions))]
-        for name, factor in further:
+        group = "" if self.region == "ATTRIBUTE" else self.weight_group or _active_group(bpy.context)
+        if group and group in dict(factors):
+            raise GroupError(f"Further Regions: {group!r} is the region itself, whose factor stands above.")
+        found = [NamedRegion(group or self.attribute or "Region", self.factor, tuple(regions))]
+        for name, factor in factors:
             weights = region_weights(pairs, name)
             parts = [changed(r, weights=w, kind="vertex") for r, w in zip(regions, weights, strict=True)]
             found.append(NamedRegion(name, factor, tuple(parts)))
@@ -267,8 +281,9 @@ def _active_group(context: bpy.types.Context) -> str:
     return group.name if group is not None else ""
 
 
-def draw_settings(layout: bpy.types.UILayout, properties) -> None:
-    """The settings of the operator that count as others stand, for the redo panel and the sidebar."""
+def draw_settings(layout: bpy.types.UILayout, properties, listed: bool = True) -> None:
+    """The settings of the operator that count as others stand, for the redo panel and the sidebar; further regions as
+    the list that the object keeps, or as text."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "factor")
@@ -277,7 +292,10 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
         choose_attribute(layout, properties, "attribute")
     else:
         choose_group(layout, properties, "weight_group")
-    layout.prop(properties, "further")
+    if listed:
+        _draw_list(layout, bpy.context.object)
+    else:
+        layout.prop(properties, "further")
     layout.prop(properties, "exact")
     layout.prop(properties, "source")
     column = layout.column()
@@ -298,3 +316,17 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
         column.prop_search(properties, "detail", bpy.data, "images", icon="IMAGE_DATA")
         column.prop(properties, "detail_box")
     draw_margin(layout, properties)
+
+
+def _draw_list(layout: bpy.types.UILayout, obj: bpy.types.Object | None) -> None:
+    """The list of further regions of an object."""
+    if obj is None or obj.type != "MESH" or not hasattr(obj, REGION_LIST):
+        return
+    found = rows_of(obj)
+    layout.label(text="Further Regions")
+    row = layout.row()
+    lines = 3 if found.rows else 1
+    row.template_list("UV_UL_omt_regions", "", found, "rows", found, "active", rows=lines, maxrows=6)
+    column = row.column(align=True)
+    column.operator("uv.omt_region_add", text="", icon="ADD")
+    column.operator("uv.omt_region_remove", text="", icon="REMOVE")

@@ -38,6 +38,13 @@ class Layout:
     def template_icon(self, icon_value, scale):
         self.record.append("icon")
 
+    def template_list(self, name, _, data, listed, chosen, active, **_more):
+        assert hasattr(bpy.types, name) and {listed, active} <= set(data.bl_rna.properties.keys()) and data == chosen
+        for item in getattr(data, listed):
+            getattr(bpy.types, name).draw_item(None, bpy.context, self, data, item, 0, chosen, active)
+
+    ui_units_x = 0
+
     def prop(self, data, name, **_):
         assert name in data.bl_rna.properties, name
         self.record.append(name)
@@ -146,7 +153,8 @@ def test_settings_that_count_for_some_choices_only_come_with_them(package, opera
         if p.type in ("ENUM", "BOOLEAN", "STRING") and p.identifier in settings_of(operator)
     ]
     switches += [("levels", [1, 3])] if module == "remesh" else []
-    seen = set()
+    # The tab has a list of the object's in its place.
+    seen = {"further"} & settings_of(operator)
     for name, values in switches:
         for value in values:
             setattr(properties, name, value)
@@ -156,6 +164,22 @@ def test_settings_that_count_for_some_choices_only_come_with_them(package, opera
             seen |= set(record)
         properties.property_unset(name)
     assert seen == settings_of(operator)
+
+
+def test_the_list_of_further_regions_is_that_of_the_object(package):
+    obj = scenes.bump()
+    properties = bpy.context.window_manager.operator_properties_last("uv.omt_magnify")
+    draw_settings = package("operators.magnify").draw_settings
+    record = []
+    draw_settings(Layout(record), properties, listed=False)
+    assert "further" in record and "uv.omt_region_add" not in record
+    for group in ("eyes", "gone"):
+        obj.omt_uv_regions.rows.add().group = group
+    obj.vertex_groups.new(name="eyes")
+    record = []
+    draw_settings(Layout(record), properties)
+    assert "further" not in record and {"uv.omt_region_add", "uv.omt_region_remove"} < set(record)
+    assert record.count("group") == 2 and record.count("factor") == 3
 
 
 def test_the_result_of_the_last_run_is_shown(package):
@@ -219,6 +243,8 @@ def test_every_operator_is_in_the_one_submenu(package):
         "uv.omt_notices",
         "uv.omt_live_end",
         "uv.omt_queue_stop",
+        "uv.omt_region_add",
+        "uv.omt_region_remove",
     }
     names = {scenes.name_of(cls) for cls in our_classes(package, bpy.types.Operator)}
     assert names - hidden == set(record) and len(record) == len(set(record))

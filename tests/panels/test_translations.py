@@ -19,6 +19,29 @@ def test_words_keep_their_values_and_are_of_the_tab(package, language):
         assert not re.search(r"^\s|\s$", words)
 
 
+# What measures, compares and magnifies, with the maps of the papers and the globe.
+SPOKEN = (
+    "uv.omt_magnify uv.omt_region_add uv.omt_region_remove object.omt_weights uv.omt_measure uv.omt_overlay "
+    "uv.omt_histogram uv.omt_regions uv.omt_attributes uv.omt_layout_image object.omt_diagram uv.omt_checker "
+    "uv.omt_checker_remove uv.omt_worst object.omt_distance object.omt_compare uv.omt_unwrap uv.omt_sphere"
+)
+
+
+@pytest.mark.parametrize("name", SPOKEN.split())
+def test_labels_settings_and_choices_have_words(package, name):
+    group, verb = name.split(".")
+    operator = getattr(getattr(bpy.ops, group), verb).get_rna_type()
+    found = {operator.name}
+    for prop in operator.properties:
+        if prop.identifier == "rna_type" or prop.is_hidden:
+            continue
+        found.add(prop.name)
+        if prop.type == "ENUM":
+            found |= {item.name for item in prop.enum_items}
+    missing = found - set(package("panels.translations.registered").LANGUAGES["de_DE"])
+    assert not missing
+
+
 def test_blender_speaks_them(package):
     view = bpy.context.preferences.view
     words = package("panels.section").words

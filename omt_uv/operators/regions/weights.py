@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..display.shading import view_spaces
-from ..session import run
-from ..settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
-from .base import SolverOperator, complaints, mesh_objects
-from .properties import choose_group
+from ...display.shading import view_spaces
+from ...session import run
+from ...settings import DEFAULT_GROUP, DEFAULT_HIGH, DEFAULT_KIND, DEFAULT_LOW, WEIGHT_KINDS
+from ..base import SolverOperator, complaints, mesh_objects
+from ..properties import choose_group
 
 
 class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
@@ -54,9 +54,9 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         draw_settings(self.layout, self)
 
     def steps(self, context: bpy.types.Context):
-        from ..blender.mesh import read
-        from ..blender.vertex_groups import check_group_target, selected_vertices
-        from ..pipelines.layout import in_turn
+        from ...blender.mesh import read
+        from ...blender.vertex_groups import check_group_target, selected_vertices
+        from ...pipelines.layout import in_turn
 
         objects = [context.object] if context.mode == "PAINT_WEIGHT" else mesh_objects(context)
         jobs = []
@@ -72,7 +72,7 @@ class OBJECT_OT_omt_weights(SolverOperator, bpy.types.Operator):
         return list(zip(objects, weights, strict=True))
 
     def finish(self, context: bpy.types.Context, result) -> None:
-        from ..blender.vertex_groups import write_group
+        from ...blender.vertex_groups import write_group
 
         for obj, weights in result:
             write_group(obj, self.weight_group, weights)
@@ -98,8 +98,8 @@ def _show(context: bpy.types.Context) -> None:
 
 def _weigh(reading, selected, kind: str, options: dict):
     """Weights (n,) for a reading and a selection."""
-    from ..blender.weights import computed_weights
-    from ..solver.progress import Progress
+    from ...blender.weights import computed_weights
+    from ...solver.progress import Progress
 
     yield Progress("Weights", 0.0)
     return computed_weights(reading, kind, selected=selected, **options)
