@@ -23,6 +23,7 @@ from benchmarks.parts import (
     magnify,
     match,
     memory,
+    polygons,
     profile,
     remesh,
     saliency,
@@ -47,6 +48,7 @@ MODULES = (
     cuts,
     hard,
     match,
+    polygons,
 )
 PARTS: dict[str, Part] = {part.name: part for module in MODULES for part in module.PARTS}
 OPTIONS: dict[str, Option] = {option.name: option for part in PARTS.values() for option in part.options}

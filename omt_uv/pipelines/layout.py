@@ -21,6 +21,7 @@ from ..solver.maps.overlap import overlap_share
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.surface import Surface
 from ..solver.packing.pack_square import Packing, pack, stack
+from ..solver.packing.single_precision import without_rounded_folds
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
@@ -141,6 +142,16 @@ def corner_uvs(surface_count: int, islands: Sequence[PlacedIsland]) -> tuple[lis
         corners.append(unique)
         uv.append(values[first])
     return corners, uv
+
+
+def in_single_precision(islands: Sequence[PlacedIsland]) -> list[PlacedIsland]:
+    """The islands with UVs that fold no triangle when they are rounded to single precision, as Blender keeps them."""
+    if not islands:
+        return []
+    first = np.cumsum([0, *(len(i.uv) for i in islands)])
+    triangles = [i.chart.triangles + k for i, k in zip(islands, first, strict=False)]
+    uv = without_rounded_folds(np.concatenate([i.uv for i in islands]), np.concatenate(triangles))
+    return [replace(i, uv=uv[a:b]) for i, a, b in zip(islands, first, first[1:], strict=False)]
 
 
 def grown_together(islands: Sequence[PlacedIsland]) -> str:

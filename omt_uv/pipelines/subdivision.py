@@ -44,7 +44,10 @@ GOAL = 0.01
 WORTHWHILE = 0.75
 # Area error on the subdivided surface that is worth a warning.
 INEXACT = 0.05
-COARSE = "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface"
+COARSE = (
+    "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface; "
+    "apply one level of the modifier before"
+)
 # How warnings about the areas of a cage begin.
 AREA_WARNING = "Areas are"
 # Corners of one vertex closer than this have one UV, as for Blender.

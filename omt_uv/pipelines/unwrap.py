@@ -21,7 +21,16 @@ from ..solver.parameterization.small_charts import SMALL
 from ..solver.parameterization.unwrap import CutCharts, SurfaceMap, cut_charts, map_small_charts, unwrap
 from ..solver.progress import Progress, Steps, part_of
 from ..xatlas_charts import SegmentationError, chart_seams
-from .layout import PACKING_FROM, Layout, PlacedIsland, Refusal, UnwrapJob, corner_uvs, pack_islands
+from .layout import (
+    PACKING_FROM,
+    Layout,
+    PlacedIsland,
+    Refusal,
+    UnwrapJob,
+    corner_uvs,
+    in_single_precision,
+    pack_islands,
+)
 from .subdivision import refinable, refined_on_subdivision, subdivided_target
 
 # Share of the time that the cage's own maps take where those of its subdivided surface follow.
@@ -78,8 +87,9 @@ def lay_out(
     upright = _upright(free, jobs)
     steps = pack_islands(upright, triangles, settings, around)
     packed = yield from part_of(steps, PACKING_FROM, 1 - PACKING_FROM)
-    packed_uv = iter(packed.islands)
-    placed = [i if stays else replace(i, uv=next(packed_uv)) for i, stays in zip(mapped, pinned, strict=True)]
+    moved = [replace(i, uv=uv) for i, uv in zip(free, packed.islands, strict=True)]
+    rounded = iter(in_single_precision(moved))
+    placed = [i if stays else next(rounded) for i, stays in zip(mapped, pinned, strict=True)]
     corners, uv = corner_uvs(len(maps), placed)
     return Layout(corners=corners, uv=uv, maps=maps, packing=packed, warnings=warnings)
 

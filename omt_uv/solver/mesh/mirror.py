@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .topology import halfedges, pair_keys, pair_up
+from .topology import halfedges, pair_keys, pair_up, row_labels
 
 # Distance between a vertex and the image of its partner, over the extent of the mesh, up to which they are a pair.
 MIRROR_TOLERANCE = 1e-4
@@ -159,12 +159,7 @@ def _recut(triangles: np.ndarray, image: np.ndarray) -> np.ndarray:
 def _among(rows: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Which rows (k,q) of vertices are some other's (l,q), in any order, (k,) bool."""
     both = np.sort(np.concatenate([others, rows]), axis=1)
-    bits = int(both.max(initial=0)).bit_length()
-    if bits * both.shape[1] < 64:
-        # One integer for a row is found ten times as fast.
-        label = (both.astype(np.int64) << (bits * np.arange(both.shape[1]))).sum(axis=1)
-    else:
-        label = np.unique(both, axis=0, return_inverse=True)[1].ravel()
+    label = row_labels(both)
     return np.isin(label[len(others) :], label[: len(others)])
 
 

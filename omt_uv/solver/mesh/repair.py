@@ -224,8 +224,7 @@ def coincident_boundary_vertices(surface: Surface, gluing: Gluing, component: np
     open_ = np.ones(3 * len(gluing.triangles), dtype=bool)
     open_[gluing.first] = open_[gluing.second] = False
     boundary = np.flatnonzero(open_)
-    rows = np.unique(np.stack([gluing.ends(boundary)[0], component[boundary // 3]], axis=1), axis=0)
-    vertex, owner = rows.T
+    vertex, owner = np.divmod(np.unique(_keys(gluing.ends(boundary)[0], component[boundary // 3])), 1 << 32)
     # Adding zero makes -0.0 and 0.0 the same.
     place = np.unique(surface.positions[vertex] + 0.0, axis=0, return_inverse=True)[1].ravel()
     apart = _more_than_one(place, vertex)
@@ -234,8 +233,13 @@ def coincident_boundary_vertices(surface: Surface, gluing: Gluing, component: np
 
 def _more_than_one(group: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Whether the group (k,) of each item has items of different values (k,), per item."""
-    pairs = np.unique(np.stack([group, value], axis=1), axis=0)
-    return np.bincount(pairs[:, 0], minlength=int(group.max(initial=0)) + 1)[group] > 1
+    first = np.unique(_keys(group, value)) >> 32
+    return np.bincount(first, minlength=int(group.max(initial=0)) + 1)[group] > 1
+
+
+def _keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """One integer (k,) for each pair of integers from 0 to 2^31 - 1."""
+    return (a.astype(np.int64) << 32) | b.astype(np.int64)
 
 
 def _count(number: int, what: str) -> str:

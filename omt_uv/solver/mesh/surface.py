@@ -18,7 +18,7 @@ from ..errors import (
     ZeroAreaFaceError,
 )
 from .gluing import Gluing, polygon_gluing
-from .topology import pair_keys, pair_up
+from .topology import pair_keys, pair_up, row_labels
 
 # A triangle whose area is below this share of its longest side squared is a line.
 DEGENERATE = 1e-10
@@ -134,8 +134,8 @@ def duplicate_faces(surface: Surface, faces: np.ndarray) -> np.ndarray:
     for s in np.unique(size[faces]):
         index = np.flatnonzero(faces & (size == s))
         vertices = np.sort(surface.corner_vertex[surface.face_start[index][:, None] + np.arange(s)], axis=1)
-        _, inverse, count = np.unique(vertices, axis=0, return_inverse=True, return_counts=True)
-        inverse = inverse.ravel()
+        inverse = row_labels(vertices)
+        count = np.bincount(inverse)
         order = np.argsort(inverse, kind="stable")
         number = np.zeros(len(index), np.int64)
         number[order] = np.arange(len(index)) - (np.cumsum(count) - count)[inverse[order]]

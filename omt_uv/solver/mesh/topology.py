@@ -25,6 +25,18 @@ def pair_keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (np.minimum(a, b) << 32) | np.maximum(a, b)
 
 
+def row_labels(rows: np.ndarray) -> np.ndarray:
+    """A number (k,), from 0 on, for each of rows (k,q) of integers >= 0: the same where rows are."""
+    rows = np.ascontiguousarray(rows, np.int64)
+    bits = int(rows.max(initial=0)).bit_length()
+    if bits * rows.shape[1] < 64:
+        # One integer for a row is found ten times as fast.
+        keys = (rows << (bits * np.arange(rows.shape[1]))).sum(axis=1)
+    else:
+        keys = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1]))).ravel()
+    return np.unique(keys, return_inverse=True)[1].ravel()
+
+
 def pair_up(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the two members of every key (k,) that occurs exactly twice, (p,) and (p,)."""
     order = np.argsort(keys)

@@ -13,4 +13,5 @@ __getattr__, __all__ = lazy(
     placement="Item Turned place turned_masks",
     raster_grid="RasterGrid runs_of",
     shelves="Block blocks_of",
+    single_precision="without_rounded_folds",
 )

@@ -24,7 +24,7 @@ from ..linalg.sparse import minimum_degree
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.surface import Surface
-from ..mesh.topology import boundary_loops
+from ..mesh.topology import boundary_loops, row_labels
 from ..refinement.boundary_barrier import crossings
 from .corner_solver import CornerMesh, CornerPatches
 from .polygon_corners import CONVEX, DENTED, STRAIGHT, PolygonCorners, convex_corners
@@ -154,14 +154,14 @@ def _possible(ears: np.ndarray, corner: np.ndarray, surface: Surface) -> np.ndar
     Around a vertex that only two polygons share no more than one of them is. It is the one whose corner is a triangle
     of the surface: who draws it has the other diagonal in the other one.
     """
-    _, label, count = np.unique(np.sort(ears, axis=1), axis=0, return_inverse=True, return_counts=True)
-    label = label.ravel()
+    label = row_labels(np.sort(ears, axis=1))
+    count = np.bincount(label)
     twice = count[label] > 1
     if not twice.any():
         return ~twice
     asked = np.sort(corner[twice], axis=1)
     near = np.sort(surface.triangles[np.isin(surface.triangles, asked).all(axis=1)], axis=1)
-    same = np.unique(np.concatenate([near, asked]), axis=0, return_inverse=True)[1].ravel()
+    same = row_labels(np.concatenate([near, asked]))
     shown = np.zeros(len(ears), bool)
     shown[twice] = np.isin(same[len(near) :], same[: len(near)])
     return ~twice | (shown & (np.bincount(label, shown)[label] == 1))

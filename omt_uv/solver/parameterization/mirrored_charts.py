@@ -17,7 +17,7 @@ from ..mesh.geometry import signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
-from ..mesh.topology import pair_keys
+from ..mesh.topology import graph_components, on_boundary, pair_keys
 from .chart_map import ChartMap, in_unit_box, measured_chart
 
 # Relative difference of densities of mirror images up to which they are the same.
@@ -69,7 +69,8 @@ def images_of_cuts(surface: Surface, faces: np.ndarray | None, cuts: np.ndarray)
     """Mirror images (k,2) of those of the cuts (c,2) that have none among them, where the rest is symmetric.
 
     None where the polygons `faces` (f,) bool of the surface, or its seams, are not their own image, or where the images
-    would make the cuts much longer. A slit to one corner of a mouth spoils the symmetry of a head.
+    would part what hangs together, or make the cuts much longer. A slit to one corner of a mouth spoils the symmetry
+    of a head.
     """
     none, n = np.zeros((0, 2), np.int64), len(surface.positions)
     _, triangles, owner = chosen_triangles(surface, faces)
@@ -90,8 +91,23 @@ def images_of_cuts(surface: Surface, faces: np.ndarray | None, cuts: np.ndarray)
         return none
     images = mirror.image[cuts]
     images = images[~np.isin(pair_keys(*images.T), pair_keys(*every.T))]
+    if not _are_slits(images, compact.reshape(-1, 3), every):
+        return none
     length, more = (np.linalg.norm(np.diff(surface.positions[used][e], axis=1), axis=2).sum() for e in (cuts, images))
     return used[images] if length + more <= LONGER * length else none
+
+
+def _are_slits(edges: np.ndarray, triangles: np.ndarray, cuts: np.ndarray) -> bool:
+    """Whether edges (k,2) are trees that hang on the cuts (c,2), or the boundary of triangles (m,3), by one vertex."""
+    if not len(edges):
+        return True
+    nodes, ends = np.unique(edges, return_inverse=True)
+    a, b = ends.reshape(-1, 2).T
+    label = graph_components(a, b, len(nodes))[1]
+    held = on_boundary(triangles, int(triangles.max()) + 1)
+    held[cuts] = True
+    loose = np.bincount(label, held[nodes]) != 1
+    return not (loose | (np.bincount(label[a]) != np.bincount(label) - 1)).any()
 
 
 def mirrored_map(chart_map: ChartMap, image: np.ndarray) -> ChartMap:

@@ -42,6 +42,9 @@ LEAST = 1e-3
 # After so many steps, triangles of the other diagonals and of the cage that are still folded are left out: a quad with
 # three corners on a straight boundary cannot be convex.
 PATIENCE = 12
+# Area over squared sides of triangles that no symmetric map opens: two quads that share two sides on the axis are
+# straight there, and what rounding leaves of their corners would be all of the energy.
+FLAT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -152,7 +155,9 @@ def _chi(det: np.ndarray, eps: float) -> tuple[np.ndarray, np.ndarray, np.ndarra
     if eps == 0:
         return det, np.ones(len(det)), np.zeros(len(det))
     root = np.sqrt(det**2 + eps**2)
-    return (det + root) / 2, (1 + det / root) / 2, eps**2 / (2 * root**3)
+    # The same without a difference of what is nearly equal, deep in a fold.
+    chi = np.where(det > 0, (det + root) / 2, eps**2 / (2 * (root - det)))
+    return chi, chi / root, eps**2 / (2 * root**3)
 
 
 def _squares(rows: np.ndarray) -> np.ndarray:
@@ -210,12 +215,14 @@ def refine_cage(
     # The second of a quad's triangulations, and the cage.
     spare = np.arange(len(faces.triangles)) % 4 > 1
     spare |= faces.triangles.min(axis=1) >= matrix.shape[0]
+    if symmetry is not None:
+        problem = replace(problem, counted=~_flat(problem))
     for k in range(STEPS if problem.unknowns.shape[1] else 0):
         yield Progress("Subdivision", k / STEPS)
         if k == PATIENCE:
             bad = np.zeros(len(spare), bool)
             bad[problem.counted] = problem.dets(w) <= 0
-            problem = replace(problem, counted=~(spare & bad))
+            problem = replace(problem, counted=problem.counted & ~(spare & bad))
         least = float(problem.dets(w).min())
         eps = 0.0 if least > 0 else float(np.hypot(LEAST, REGULAR * least))
         before = problem.energy(w, eps)
@@ -236,6 +243,14 @@ def refine_cage(
             break
     folds = int((problem.dets(w) <= 0).sum())
     return CageMap(np.column_stack([w.real, w.imag]), iterations, folds)
+
+
+def _flat(problem: _CageProblem) -> np.ndarray:
+    """Triangles (m,) bool that have no area in any map that the unknowns stand for."""
+    anywhere = np.random.default_rng(0).normal(size=problem.unknowns.shape[1])
+    z = (problem.matrix @ (problem.unknowns @ anywhere).view(complex))[problem.faces.triangles]
+    one, other = z[:, 1] - z[:, 0], z[:, 2] - z[:, 0]
+    return np.abs((one.conj() * other).imag) <= FLAT * (squared(one) + squared(other))
 
 
 def _searched(problem: _CageProblem, w: np.ndarray, eps: float, before: float) -> tuple[np.ndarray | None, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -124,3 +125,30 @@ def test_an_outline_does_not_come_to_cross_itself():
     free = drain(refine_cage(elements, mapping.matrix, uv, none, 1000.0)).uv
     kept = drain(refine_cage(elements, mapping.matrix, uv, none, 1000.0, None, [loop])).uv
     assert len(crossings(free @ [1, 1j], loop)) and not len(crossings(kept @ [1, 1j], loop))
+
+
+@pytest.mark.parametrize("turn", [0.3, 1.1, 2.0])
+def test_two_quads_that_share_two_sides_on_the_axis_do_not_stop_the_others(turn):
+    # Both are straight in their common corner, vertex 3, in any symmetric map.
+    positions = np.array([[0, 1.2, 0], [-1, 0, 0.2], [0, -1, 0], [0, 0.3, -0.4], [1, 0, 0.2]])
+    quads = np.array([[1, 2, 3, 0], [3, 2, 4, 0]])
+    quads = np.concatenate([quads, [[1, 5, 6, 2], [2, 6, 7, 4]]])
+    positions = np.concatenate([positions, [[-1.2, -1.5, 0], [0, -2, 0.3], [1.2, -1.5, 0]]])
+    cage = cage_of(quads.ravel(), np.arange(0, 17, 4), len(positions))
+    triangles = quads[:, HALVES].reshape(-1, 3)
+    chart = CageChart(positions, triangles, np.repeat(np.arange(4), 2), np.ones(len(positions)))
+    symmetry, w = cage_symmetry([chart], np.exp(1j * turn) * (positions[:, 0] + 0.8j * positions[:, 1]), {})
+    assert symmetry.on_axis.sum() == 4
+    mapping, none = subdivide(straight_boundary(cage), 2), np.zeros(len(positions), bool)
+    elements = elements_of(cage, quads, positions, mapping)
+    uv, offs = np.column_stack([w.real, w.imag]), []
+    space = face_areas(
+        positions=(subdivide(cage, 2).matrix @ positions), triangles=mapping.quads[:, HALVES].reshape(-1, 3)
+    )
+    for weight in (1.0, 10.0, 1000.0):
+        found = drain(refine_cage(elements, mapping.matrix, uv, none, weight, symmetry))
+        uv = found.uv
+        plane = signed_areas(mapping.matrix @ uv, mapping.quads[:, HALVES].reshape(-1, 3))
+        assert found.iterations > 0 and found.folds == 0 and plane.min() > 0
+        offs.append(error(space, plane))
+    assert offs[2] < 0.98 * offs[1] < 0.98 * offs[0]
