@@ -142,5 +142,7 @@ def polygon_table(args) -> Table:
 
 
 PARTS = (
-    Part("polygons", "quad meshes: areas of polygons, symmetry of their maps", polygon_table, (NAMES,), by_default=False),
+    Part(
+        "polygons", "quad meshes: areas of polygons, symmetry of their maps", polygon_table, (NAMES,), by_default=False
+    ),
 )
