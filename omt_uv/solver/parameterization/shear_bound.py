@@ -20,21 +20,17 @@ from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
-from ..seams.search import Measured, SeamSearch
+from ..seams.search import SeamSearch
 from .chart_map import ChartMap
 from .options import ShearBound
 
 # Maps that are made at most.
 MOST_ROUNDS = 4
-# No more are made where the last left more than this share of the logarithm of the worst mean shear.
-STALLED = 1.0
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
-SPREAD_OF_SHEAR = 0.21
+SPREAD_OF_SHEAR = 0.19
 # What a search that is made again aims below the bound, so that it need not be the last but one.
-MARGIN = 0.75
-# Beyond this, shear counts no more for where to cut.
-MOST_SHEAR = 8.0
+MARGIN = 0.95
 # Shear of what has no area to speak of.
 VANISHED = 50.0
 # Where the time goes, roughly: seams take this share of every round.
@@ -84,13 +80,13 @@ class ShearSearch:
         further, memory = self.shear.further, self._memory
         return SeamSearch(spread, self.surface, self.costs, density=self._density, further=further, memory=memory)
 
-    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, found: Measured) -> Steps[DiskCharts]:
+    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, share: np.ndarray) -> Steps[DiskCharts]:
         """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
-        what was found of their maps; the edges that others were cut along (k,2) stay."""
+        the share (f,) of what was left; the edges that others were cut along (k,2) stay."""
         target = np.full(self._count, np.inf)
         for chart in missed:
             target[chart.faces] = spread[chart.faces]
-        search = replace(self.search(target), further=True, measured=found)
+        search = replace(self.search(target), further=True, share=share)
         surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
         return disk_charts(surface, self.faces, search=search, **self.cutting)
 
@@ -132,7 +128,7 @@ def bound_shear(
     maps: list[ChartMap],
     map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
 ) -> Steps[BoundedShear]:
-    """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or it is too much.
+    """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or no round betters the worst.
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts.
     Progress offers an early end: with the maps of the last round. Errors are those of `disk_charts.disk_charts` and of
@@ -141,7 +137,7 @@ def bound_shear(
     prepared, bound, early = first, search.shear.bound, EarlyEnd()
     cuts, spread = _cuts(first), search.first_spread()
     promised = np.full(len(spread), np.inf)
-    rounds, before = 0, np.inf
+    rounds, before, best = 0, np.inf, None
     while True:
         charts = prepared.charts
         shear = [_shear(c, m, search.target is None) for c, m in zip(charts, maps, strict=True)]
@@ -150,25 +146,27 @@ def bound_shear(
         missed = np.flatnonzero(mean > bound)
         searched = [k for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
         worst = float(np.log(mean[searched]).max()) if searched else 0.0
-        if rounds == MOST_ROUNDS or not searched or worst > STALLED * before:
+        if worst > before:
+            charts, maps, cuts, mean, searched = best
             break
-        before = worst
-        found = Measured(np.zeros(len(spread)), np.ones(len(spread)))
+        before, best = worst, (charts, maps, cuts, mean, searched)
+        if rounds == MOST_ROUNDS or not searched:
+            break
+        share = np.ones(len(spread))
         for k in searched:
             reached = np.log(mean[k]) ** 2
             # What the last search has promised and its map has not kept is asked for on top.
             kept_part = min(float(promised[charts[k].faces].min()) / reached, 1.0)
-            part = MARGIN * kept_part * np.log(bound) ** 2 / reached
+            part = MARGIN * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
             promised[charts[k].faces] = part * reached
             spread[charts[k].faces] *= part
-            found.spread[charts[k].faces] = np.log(np.minimum(shear[k][0], MOST_SHEAR)) ** 2
-            found.share[charts[k].faces] = part
+            share[charts[k].faces] = part
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
         missing = [charts[k] for k in searched]
         outlines = np.concatenate([_outline(chart) for chart in missing])
         kept = cuts.edges[~np.isin(pair_keys(*cuts.edges.T), outlines)]
-        searching = part_of(search.again(kept, missing, spread, found), begin, width * SEARCHING)
+        searching = part_of(search.again(kept, missing, spread, share), begin, width * SEARCHING)
         again = yield from unless_ended(searching, early)
         if again is None:
             break
@@ -183,6 +181,7 @@ def bound_shear(
         prepared, maps = again, mapped
         cuts = replace(cuts, edges=edges, length=_length(search.surface, edges))
     prepared = DiskCharts(charts, cuts, first.warnings)
+    missed = np.flatnonzero(mean > bound)
     by_hand = np.array([k not in searched for k in missed], dtype=bool)
     warnings = tuple(_warnings(mean[missed], by_hand, bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
     return BoundedShear(prepared, maps, warnings)

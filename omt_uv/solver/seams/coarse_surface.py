@@ -53,11 +53,12 @@ class CoarseSurface:
 
 
 def coarse_surface(
-    positions: np.ndarray, triangles: np.ndarray, count: int, line: np.ndarray | None = None
+    positions: np.ndarray, triangles: np.ndarray, count: int, line: np.ndarray | None = None, trial: int = 0
 ) -> CoarseSurface:
     """Coarsen a surface (n,3), (m,3) to about `count` vertices; one with fewer stays as it is.
 
-    line (n,) bool: vertices that collapse only among themselves, as those of a boundary do, so that lines stay lines
+    line (n,) bool: vertices that collapse only among themselves, as those of a boundary do, so that lines stay lines;
+    trial: which of several coarse surfaces
     """
     n = len(positions)
     tail, head = halfedges(triangles)
@@ -77,7 +78,7 @@ def coarse_surface(
         kind[:n][line] = 1
     kind[:n][on_boundary] += 2
     kind[n:] = -1
-    mesh = _ShrinkingMesh(np.concatenate([positions, np.zeros((total - n, 3))]), faces, kind, n)
+    mesh = _ShrinkingMesh(np.concatenate([positions, np.zeros((total - n, 3))]), faces, kind, n, trial)
     into = np.arange(n)
     left = n
     while left > count:
@@ -110,9 +111,9 @@ class _ShrinkingMesh:
     Vertices from number n on are cones over boundaries, of kind -1.
     """
 
-    def __init__(self, points: np.ndarray, faces: np.ndarray, kind: np.ndarray, n: int):
+    def __init__(self, points: np.ndarray, faces: np.ndarray, kind: np.ndarray, n: int, trial: int):
         self.points, self.faces, self.kind, self.n = points, faces, kind, n
-        self.round = 0
+        self.round, self.trial = 0, trial
 
     def collapse(self, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Collapse an independent set of vertices, `most` at most: those that went (k,), and where to (k,)."""
@@ -143,7 +144,7 @@ class _ShrinkingMesh:
             return candidates, candidates
         cheap = cost <= np.quantile(cost[candidates], QUANTILE)
         turn = np.full(size, size)
-        turn[cheap] = np.random.default_rng(self.round).permutation(size)[cheap]
+        turn[cheap] = np.random.default_rng([self.trial, self.round]).permutation(size)[cheap]
         least = turn.copy()
         np.minimum.at(least, tail, turn[head])
         chosen = (turn < size) & (turn == least)

@@ -59,8 +59,8 @@ def carried(
     start (n,) bool: vertices that are on a boundary or cut already, from which paths set out.
     """
     fine = FineGraph.of(component)
-    # Diagonals need not be mirrored; paths run along edges that are, where there is such a way.
-    half = fine if mirror is None else FineGraph.of(component, mirror.image)
+    # Diagonals need not be mirrored; paths run along edges that are, where there is such a way. Scans have none.
+    half = FineGraph.of(component, mirror.image) if mirror is not None and mirror.exact else fine
     used = start.copy()
     spacing = coarse.size * float(np.median(graph.cost)) if len(graph.cost) else 0.0
     paths = []

@@ -48,7 +48,8 @@ def grow(task: Task, cut: Cut, most: int) -> Cut:
 
 def _best_arc(task: Task, cut: Cut, model: ScaleModel) -> _Arc | None:
     graph = task.graph
-    start = np.union1d(np.flatnonzero(graph.boundary), cut.vertices)
+    # Not from images: a path there would hang on nothing where these are not quite on the other side.
+    start = np.union1d(np.flatnonzero(graph.boundary), graph.ends[cut.steps])
     cost, before = graph.paths_from(start)
     best = None
     for tip in _tips(task, model, cost):
@@ -70,11 +71,15 @@ def _best_arc(task: Task, cut: Cut, model: ScaleModel) -> _Arc | None:
 
 
 def _tips(task: Task, model: ScaleModel, cost: np.ndarray) -> np.ndarray:
-    """Extremities (k,): peaks of the log scale that can be reached, those of most gain for their cost."""
-    graph, height = task.graph, np.abs(model.scale)
-    around = np.zeros(len(height))
-    np.maximum.at(around, graph.ends[:, 0], height[graph.ends[:, 1]])
-    np.maximum.at(around, graph.ends[:, 1], height[graph.ends[:, 0]])
-    peaks = np.flatnonzero((height >= around) & (height > 0) & np.isfinite(cost) & (cost > 0))
-    worth = model.gain(peaks) * task.tip_factor[peaks] / cost[peaks]
+    """Extremities (k,): peaks of what is left of the scale, and of what a cut of one vertex would save, that can be
+    reached; those of most gain for their cost."""
+    graph, gain = task.graph, model.gain(np.arange(len(cost)))
+    peak = np.zeros(len(gain), dtype=bool)
+    for height in (gain, np.abs(model.scale)):
+        around = np.zeros(len(gain))
+        np.maximum.at(around, graph.ends[:, 0], height[graph.ends[:, 1]])
+        np.maximum.at(around, graph.ends[:, 1], height[graph.ends[:, 0]])
+        peak |= (height >= around) & (height > 0)
+    peaks = np.flatnonzero(peak & np.isfinite(cost) & (cost > 0))
+    worth = gain[peaks] * task.tip_factor[peaks] / cost[peaks]
     return peaks[np.argsort(-worth, kind="stable")[:MOST_TIPS]]

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 # Vertices of the coarse surface that seams are searched on.
 COARSE_VERTICES = 1200
+# Coarse surfaces that seams are grown on.
+TRIALS = 3
 # Arcs that one component gets at most.
 MOST_ARCS = 160
 
@@ -17,12 +19,14 @@ class SearchOptions:
     Attributes
     ----------
     vertices : of the coarse surface
+    trials : coarse surfaces that seams are grown on; the best are improved
     arcs : that are added at most
     rounds : of taking arcs back and growing others; 0 for none
     symmetric : seams of a surface that is its own mirror image are their own, too
     """
 
     vertices: int = COARSE_VERTICES
+    trials: int = TRIALS
     arcs: int = MOST_ARCS
     rounds: int = 8
     symmetric: bool = True

@@ -22,8 +22,6 @@ from ..errors import PrecisionError
 from ..mesh.geometry import LEAST_STIFFNESS, halfedge_lengths, laplacian_from_lengths
 from .coarse_surface import CoarseSurface
 
-# A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
-GROUND = 1e-6
 # The plate of a closed surface is held a little everywhere: its Green's function has digits left for the first pin.
 PLATE_GROUND = 1e-2
 # Areas below this share of the mean would make a plate stiff without end.
@@ -82,25 +80,22 @@ class ScaleModel:
 
     Attributes
     ----------
-    membrane : holds the log scale u, 0 on the boundary, by the Laplacian
     plate : holds the stress, 0 on the boundary, by the bilaplacian
     load (n,) : the curvature, 0 on the boundary
     laplacian (n,n) : of the surface
+    area (n,) : asked for at every vertex
     """
 
-    membrane: Held
     plate: Held
     load: np.ndarray
     laplacian: sp.csr_matrix
+    area: np.ndarray
 
     @staticmethod
-    def of(
-        surface: CoarseSurface, log_density: np.ndarray | None = None, weight: np.ndarray | None = None
-    ) -> ScaleModel:
+    def of(surface: CoarseSurface, log_density: np.ndarray | None = None) -> ScaleModel:
         """The model of a coarse surface.
 
-        log_density (n,): half the logarithm of the area asked for, over its own; weight (n,): what the square of the
-        rest counts at every vertex, 1 by default
+        log_density (n,): half the logarithm of the area asked for, over its own
         """
         n = len(surface.positions)
         length = halfedge_lengths(surface.positions, surface.triangles).reshape(-1, 3)
@@ -112,21 +107,16 @@ class ScaleModel:
             area = area / area.sum()
         load = np.where(surface.boundary, 0.0, curvature)
         free = np.flatnonzero(~surface.boundary)
-        columns = laplacian[:, free]
-        ground, held = 0.0, 0.0
-        if len(free) == n:
-            ground, held = GROUND, PLATE_GROUND
-        inner = columns[free] + ground * sp.diags(surface.area[free])
-        columns = columns + held * sp.diags(surface.area).tocsc()[:, free]
-        stiff = np.maximum(area, LEAST_AREA * area.mean()) * (1.0 if weight is None else weight)
-        bend = columns.T @ sp.diags(1 / stiff) @ columns
-        membrane, plate = (Held.of(_inverse(matrix, free, n), load) for matrix in (inner, bend))
-        return ScaleModel(membrane, plate, load, laplacian)
+        held = PLATE_GROUND if len(free) == n else 0.0
+        columns = laplacian[:, free] + held * sp.diags(surface.area).tocsc()[:, free]
+        area = np.maximum(area, LEAST_AREA * area.mean())
+        plate = Held.of(_inverse(columns.T @ sp.diags(1 / area) @ columns, free, n), load)
+        return ScaleModel(plate, load, laplacian, area)
 
     @property
     def scale(self) -> np.ndarray:
-        """The log scale u (n,)."""
-        return self.membrane.value
+        """What is left of the log scale at every vertex (n,), without what goes for nothing."""
+        return self.laplacian @ self.plate.value / self.area
 
     @property
     def spread(self) -> float:
@@ -144,17 +134,7 @@ class ScaleModel:
         """The model of the surface cut at the vertices (k,)."""
         if len(vertices) == 0:
             return self
-        return replace(self, membrane=self.membrane.at(vertices), plate=self.plate.at(vertices))
-
-    def rest(self) -> np.ndarray:
-        """What is left of the log scale, times the area, at every vertex (n,): of the plate without weights."""
-        return self.laplacian @ self.plate.value
-
-    def bare(self) -> ScaleModel:
-        """The same without Green's functions, which take the memory: nothing more can be cut."""
-        none = np.zeros((0, 0))
-        membrane, plate = (replace(held, green=none, rows=none) for held in (self.membrane, self.plate))
-        return replace(self, membrane=membrane, plate=plate)
+        return replace(self, plate=self.plate.at(vertices))
 
     def gain(self, vertices: np.ndarray) -> np.ndarray:
         """Fall of the spread (k,) by a cut at each of the vertices (k,) alone."""

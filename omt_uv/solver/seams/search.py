@@ -17,9 +17,8 @@ from scipy.spatial import cKDTree
 from ..analysis.seam_costs import SeamCosts
 from ..analysis.symmetry_plane import NEAR
 from ..cutting.component import CutComponent, fingerprint
-from ..mesh.geometry import face_areas
+from ..linalg.sparse import solve_spd
 from ..mesh.surface import Surface
-from ..mesh.topology import halfedges
 from ..progress import Progress, Steps, part_of
 from .coarse_surface import CoarseSurface, coarse_surface
 from .cut_tree import EXCHANGE, Cut, Task, cut_along
@@ -42,27 +41,14 @@ DEARER = (1.5, 1.0)
 # A vertex is in a face if it is so with more than this certainty, and cuts that end there are worth so much less.
 IN_FACE = 0.5
 BARRED = 0.3
-# What maps have shown is compared with what was predicted over so many rings, where that is so much of its mean at
-# least, and counts so many times more or less at most.
-SMOOTHED = 3
-LEAST_PREDICTED = 0.05
-MOST_WEIGHT = 4.0
+# What is searched again is harder than it seemed: on a coarse surface of so many times the vertices.
+FINER = 1.5
+# A cut grows on where this share of its spread is asked for, at least.
+NEARLY_THERE = 0.6
+# A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
+GROUND = 1e-6
 # Where the time of a search goes, roughly: growth ends at this share of it.
 GROWN = 0.5
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What maps along seams that were found before have shown, of every polygon.
-
-    Attributes
-    ----------
-    spread (f,) : square of the logarithm of the shear
-    share (f,) : of what it is in the mean, that is asked for now
-    """
-
-    spread: np.ndarray
-    share: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -77,8 +63,8 @@ class SeamSearch:
     density (f,) : area that polygons ask for, over their own; None for 1
     further : components whose seams were marked by hand are searched, too
     options : see `SearchOptions`
-    measured : see `Measured`, for parts that were searched before
-    memory : of what was found for parts, bare, by their fingerprints; shared by the searches of a surface
+    share (f,) : of the spread that cuts left which were found before, that is asked for now; None for a first search
+    memory : what was found for parts, by their fingerprints; shared by the searches of a surface
     """
 
     spread: np.ndarray
@@ -87,8 +73,8 @@ class SeamSearch:
     density: np.ndarray | None = None
     further: bool = False
     options: SearchOptions = field(default_factory=SearchOptions)
-    measured: Measured | None = None
-    memory: dict[tuple[bytes, ...], _FoundCut] = field(default_factory=dict)
+    share: np.ndarray | None = None
+    memory: dict[tuple[bytes, ...], Found] = field(default_factory=dict)
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether a component of these polygons (m,) is searched, some of whose boundary is marked as a seam or not."""
@@ -99,12 +85,12 @@ class SeamSearch:
         """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut: with these,
         or such as are symmetric where the component is."""
         yield Progress("Seams", 0.0)
-        name = fingerprint(component)
-        if self.measured is not None and name in self.memory:
-            found = yield from self._again(component, self.memory[name], self.measured)
-            self.memory[name] = found.bare()
-            return found.edges
-        bound = float(self.spread[component.polygons[component.polygons >= 0]].min())
+        name, polygons = fingerprint(component), component.polygons[component.polygons >= 0]
+        if self.share is not None and name in self.memory:
+            costly, share = self._with_costs(component), float(self.share[polygons].min())
+            self.memory[name] = yield from self._again(costly, self.memory[name], share)
+            return self.memory[name].edges
+        bound = float(self.spread[polygons].min())
         bounded = bool(component.on_boundary().any())
         if bounded:
             coarse, model = self._modelled(component)
@@ -118,16 +104,32 @@ class SeamSearch:
         if bounded and model.spread <= bound:
             return base
         plain = (coarse, model) if bounded else None
-        # Where the plane runs between the vertices, there is hardly a symmetric cut without a line along it.
-        line = None if mirror is None else mirror if not mirror.exact else with_line(component, mirror)
-        first = None if line is mirror else mirror
-        found = yield from part_of(self._searched(component, base, bound, first, plain), 0.0, 0.5)
-        if line is not None and found.mirror is None:
-            mirrored = yield from part_of(self._searched(component, base, bound, line, plain), 0.5, 0.5)
-            found = mirrored if mirrored.score <= self._worth_of_symmetry() * found.score else found
-        found = found.carried(component)
-        self.memory[name] = found.bare()
-        return found.edges
+        best = yield from part_of(self._best(component, base, bound, mirror, plain), 0.0, 0.9)
+        self.memory[name] = best.carried(component)
+        return self.memory[name].edges
+
+    def _best(
+        self,
+        component: CutComponent,
+        base: np.ndarray,
+        bound: float,
+        mirror: FineMirror | None,
+        plain: tuple[CoarseSurface, ScaleModel] | None,
+    ) -> Steps[_CoarseCut]:
+        """The best cut, a symmetric one where that is not much dearer; the other arguments are those of `_searched`."""
+        line = mirror
+        if mirror is not None and mirror.exact:
+            best = yield from part_of(self._searched(component, base, bound, mirror, None), 0.0, 0.4)
+            if best is not None:
+                return best
+            # Where the plane runs between the vertices, there is hardly a symmetric cut without a line along it.
+            line = with_line(component, mirror)
+        found = [(yield from part_of(self._searched(component, base, bound, None, plain), 0.4, 0.3))]
+        if line is not None:
+            found.append((yield from part_of(self._searched(component, base, bound, line, None), 0.7, 0.3)))
+        worth = self._worth_of_symmetry() if line is not None else 1.0
+        cuts = [cut for cut in found if cut is not None]
+        return min(cuts, key=lambda cut: cut.score / (1.0 if cut.mirror is None else worth))
 
     def _searched(
         self,
@@ -136,38 +138,83 @@ class SeamSearch:
         bound: float,
         mirror: FineMirror | None,
         plain: tuple[CoarseSurface, ScaleModel] | None,
-    ) -> Steps[_FoundCut]:
-        """The best cut, symmetric where there is a mirror; plain : what is known of the coarse surface without one."""
-        coarse, model = plain if mirror is None and plain is not None else self._modelled(component, mirror)
+    ) -> Steps[_CoarseCut | None]:
+        """The best cut on several coarse surfaces, where there is a mirror a symmetric one, None if that cannot be.
+
+        plain : the first of the surfaces, where it is known
+        """
+        best, trials = None, self.options.trials
+        # Where a search ends hangs on the coarse surface: of several, the one on which most has grown is improved.
+        for k in range(trials):
+            known = plain if k == 0 else None
+            coarse, model = self._modelled(component, mirror, k) if known is None else known
+            growing = self._grown_on(component, base, bound, mirror, coarse, model)
+            found = yield from part_of(growing, GROWN * k / trials, GROWN / trials)
+            if found is not None and (best is None or found.score < best.score):
+                best = found
+        if best is None:
+            return None
+        cut = yield from self._improved(best.task, best.cut)
+        return replace(best, cut=cut)
+
+    def _again(self, component: CutComponent, found: Found, share: float) -> Steps[Found]:
+        """A cut that leaves a share of the spread that another has left: that one grown on, or where much is missing or
+        its coarse surface is too coarse for that, one on finer surfaces."""
+        best = None
+        if share >= NEARLY_THERE:
+            best = yield from part_of(self._grown_further(component, found, share), 0.0, GROWN / 2)
+        if best is None or best.cut.spread > best.task.bound:
+            best = yield from part_of(self._grown_finer(component, found, share), GROWN / 2, GROWN / 2)
+        cut = yield from self._improved(best.task, best.cut)
+        return replace(best, cut=cut).carried(component)
+
+    def _grown_further(self, component: CutComponent, found: Found, share: float) -> Steps[_CoarseCut]:
+        """A cut grown on from where it was."""
+        coarse = found.coarse
+        model = ScaleModel.of(coarse, self._log_density(component, coarse))
+        setting = _Setting.of(component, coarse, found.base, found.mirror, model, self._tip_factor(component))
+        task = setting.task(0.0, found.root)
+        cut = cut_along(task, found.steps)
+        task = replace(task, bound=share * cut.spread)
+        cut = yield from self._grown(task, cut)
+        return _CoarseCut(setting, task, cut, found.base, found.mirror)
+
+    def _grown_finer(self, component: CutComponent, found: Found, share: float) -> Steps[_CoarseCut]:
+        """A cut grown anew on finer surfaces, the best of several."""
+        best, trials = None, max(self.options.trials - 1, 1)
+        before = component.positions[np.unique(component.ends[found.edges])]
+        for k in range(trials):
+            coarse, model = self._modelled(component, found.mirror, k, FINER)
+            cut = np.unique(cKDTree(coarse.positions).query(before)[1])
+            cut = cut[~coarse.boundary[cut]]
+            bound = share * model.cut(cut[:1]).spread_cut(cut[1:])
+            growing = self._grown_on(component, found.base, bound, found.mirror, coarse, model)
+            other = yield from part_of(growing, k / trials, 1 / trials)
+            if other is not None and (best is None or other.score < best.score):
+                best = other
+        if best is None:
+            return (yield from self._grown_finer(component, replace(found, mirror=None), share))
+        return best
+
+    def _grown_on(
+        self,
+        component: CutComponent,
+        base: np.ndarray,
+        bound: float,
+        mirror: FineMirror | None,
+        coarse: CoarseSurface,
+        model: ScaleModel,
+    ) -> Steps[_CoarseCut | None]:
+        """A cut grown on a coarse surface; None where symmetric ones cannot get along the plane of the mirror."""
         setting = _Setting.of(component, coarse, base, mirror, model, self._tip_factor(component))
         task = setting.task(bound, setting.extremity())
         if mirror is not None and not task.graph.is_whole():
-            mirror, setting = None, replace(setting, mirrored=None)
-            task = setting.task(bound, setting.extremity())
+            return None
         cut = yield from self._grown(task)
         if setting.is_closed:
             task = setting.task(bound, _hub(task.graph, cut.steps))
             cut = cut_along(task, cut.steps)
-        cut = yield from self._improved(task, cut)
-        return _FoundCut(setting, task, cut, base, mirror, base)
-
-    def _again(self, component: CutComponent, found: _FoundCut, measured: Measured) -> Steps[_FoundCut]:
-        """A cut for what maps along the one before have shown: where they shear more than was predicted, it counts."""
-        real = component.polygons >= 0
-        polygons, n = component.polygons[real], component.vertex_count
-        area = face_areas(component.positions, component.triangles[real])
-        at = np.repeat(area * measured.spread[polygons], 3)
-        spread = np.bincount(component.triangles[real].ravel(), at, n)
-        setting = found.setting.reweighted(
-            found, component.positions, spread, self._log_density(component, found.coarse)
-        )
-        root = int(np.flatnonzero(found.task.graph.boundary)[0]) if setting.is_closed else 0
-        task = setting.task(0.0, root)
-        share = float(measured.share[polygons].min())
-        task = replace(task, bound=share * task.model.spread_cut(found.cut.vertices))
-        cut = yield from self._grown(task)
-        cut = yield from self._improved(task, cut)
-        return _FoundCut(setting, task, cut, found.base, found.mirror, found.base).carried(self._with_costs(component))
+        return _CoarseCut(setting, task, trimmed(task, rerouted(task, cut)), base, mirror)
 
     def _improved(self, task: Task, cut: Cut) -> Steps[Cut]:
         """The cut made shorter."""
@@ -182,9 +229,9 @@ class SeamSearch:
         plane = self.costs().plane
         return float(np.interp(0.0 if plane is None else plane.residual, [0, NEAR], DEARER))
 
-    def _grown(self, task: Task) -> Steps[Cut]:
-        """The cut of arcs that pay most, one after another."""
-        cut = cut_along(task, np.zeros(0, np.int64))
+    def _grown(self, task: Task, cut: Cut | None = None) -> Steps[Cut]:
+        """The cut of arcs that pay most, one after another, from a cut on or from nothing."""
+        cut = cut_along(task, np.zeros(0, np.int64)) if cut is None else cut
         begin = max(cut.spread, task.bound)
         for count in range(self.options.arcs):
             grown = grow(task, cut, 1)
@@ -193,13 +240,15 @@ class SeamSearch:
             cut = grown
             # What is flat once it is cut has no spread at all.
             done = np.log(begin / max(cut.spread, task.bound)) / max(np.log(begin / task.bound), 1e-9)
-            yield Progress(f"Seams, cut {count + 1}", GROWN * min(max(done, 0.0), 1.0))
+            yield Progress(f"Seams, cut {count + 1}", min(max(done, 0.0), 1.0))
         return cut
 
-    def _modelled(self, component: CutComponent, mirror: FineMirror | None = None) -> tuple[CoarseSurface, ScaleModel]:
-        """The coarse surface of a component, whose mirror plane stays a line, and its model."""
-        line = None if mirror is None else mirror.plane
-        coarse = coarse_surface(component.positions, component.triangles, self.options.vertices, line)
+    def _modelled(
+        self, component: CutComponent, mirror: FineMirror | None = None, trial: int = 0, finer: float = 1.0
+    ) -> tuple[CoarseSurface, ScaleModel]:
+        """One of the coarse surfaces of a component, whose mirror plane stays a line, and its model."""
+        line, count = None if mirror is None else mirror.plane, round(finer * self.options.vertices)
+        coarse = coarse_surface(component.positions, component.triangles, count, line, trial)
         return coarse, ScaleModel.of(coarse, self._log_density(component, coarse))
 
     def _with_costs(self, component: CutComponent) -> CutComponent:
@@ -247,39 +296,48 @@ class SeamSearch:
 
 
 @dataclass(frozen=True)
-class _FoundCut:
-    """A cut that was found for a task, beside edges `base` (e,) bool, and the edges (e,) bool that it runs along."""
+class Found:
+    """What was cut of a part.
+
+    Attributes
+    ----------
+    edges (e,) bool : that were cut; base (e,) bool : those of them that made a disk of it first
+    mirror : if the others are symmetric
+    coarse, steps (k,), root : where and along what they were found, and where on a closed surface they begin
+    """
+
+    edges: np.ndarray
+    base: np.ndarray
+    mirror: FineMirror | None
+    coarse: CoarseSurface
+    steps: np.ndarray
+    root: int
+
+
+@dataclass(frozen=True)
+class _CoarseCut:
+    """A cut that was found for a task, beside edges `base` (e,) bool."""
 
     setting: _Setting
     task: Task
     cut: Cut
     base: np.ndarray
     mirror: FineMirror | None
-    edges: np.ndarray
-
-    def bare(self) -> _FoundCut:
-        """What a further search has to know of it."""
-        left = self.task.model.cut(self.cut.vertices).bare()
-        return replace(self, setting=replace(self.setting, model=left), task=replace(self.task, model=left))
-
-    @property
-    def coarse(self) -> CoarseSurface:
-        """The surface that was searched."""
-        return self.setting.coarse
 
     @property
     def score(self) -> float:
         """What it costs; less is better. One that misses the bound costs what reaching it would."""
         return self.cut.cost * max(self.cut.spread / self.task.bound, 1.0) ** EXCHANGE
 
-    def carried(self, component: CutComponent) -> _FoundCut:
+    def carried(self, component: CutComponent) -> Found:
         """The same, led along the edges of the component."""
-        start = component.on_boundary()
+        start, coarse = component.on_boundary(), self.setting.coarse
         start[component.ends[self.base].ravel()] = True
         if self.setting.is_closed:
-            start[self.coarse.kept[self.task.graph.boundary]] = True
-        edges = carried(component, self.coarse, self.task.graph, self.cut.steps, start, self.mirror)
-        return replace(self, edges=self.base | edges)
+            start[coarse.kept[self.task.graph.boundary]] = True
+        edges = carried(component, coarse, self.task.graph, self.cut.steps, start, self.mirror)
+        root = int(np.argmax(self.task.graph.boundary))
+        return Found(self.base | edges, self.base, self.mirror, coarse, self.cut.steps, root)
 
 
 @dataclass(frozen=True)
@@ -298,12 +356,16 @@ class _Setting:
         tree = cKDTree(coarse.positions)
         mirrored = None
         if mirror is not None:
-            image = tree.query(component.positions[mirror.image[coarse.kept]])[1]
-            plane = mirror.plane[coarse.kept]
-            image[plane] = np.flatnonzero(plane)
+            plane, side = mirror.plane[coarse.kept], mirror.side[coarse.kept]
+            image = np.arange(len(plane))
+            # Images are on the other side, or a cut would meet them where nothing but they are cut.
+            for here, there in ((side & ~plane, ~side & ~plane), (~side & ~plane, side & ~plane)):
+                if there.any():
+                    at = component.positions[mirror.image[coarse.kept[here]]]
+                    image[here] = np.flatnonzero(there)[cKDTree(coarse.positions[there]).query(at)[1]]
             # Nothing else is its own image, or a path there would count once and have none.
             other = ~plane & (image == np.arange(len(image)))
-            mirrored = Mirrored(image, (mirror.side[coarse.kept] & ~other) | plane)
+            mirrored = Mirrored(image, (side & ~other) | plane)
         start = coarse.boundary.copy()
         if base.any():
             start[tree.query(component.positions[np.unique(component.ends[base])])[1]] = True
@@ -321,28 +383,11 @@ class _Setting:
         """Whether there is nowhere for cuts to begin, so that they need a root."""
         return not self.start.any()
 
-    def reweighted(
-        self, found: _FoundCut, positions: np.ndarray, spread: np.ndarray, log_density: np.ndarray | None
-    ) -> _Setting:
-        """The same, where what is left counts as much as maps have shown; spread (n,): times the area, at positions."""
-        n = len(self.coarse.positions)
-        shown = np.bincount(cKDTree(self.coarse.positions).query(positions)[1], spread, n)
-        rest = found.task.model.rest()
-        tail, head = halfedges(self.coarse.triangles)
-        near = csr_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n))
-        near = diags(1 / np.maximum(near.sum(axis=1).A1, 1)) @ near
-        area = np.maximum(self.coarse.area, 1e-12)
-        predicted = rest**2 / area
-        for _ in range(SMOOTHED):
-            shown, predicted = (0.5 * (x + near @ x) for x in (shown, predicted))
-        predicted = np.maximum(predicted, LEAST_PREDICTED * predicted.sum() * area)
-        weight = shown / shown.sum() * predicted.sum() / predicted
-        weight = np.clip(weight, 1 / MOST_WEIGHT, MOST_WEIGHT)
-        return replace(self, model=ScaleModel.of(self.coarse, log_density, weight))
-
     def extremity(self) -> int:
         """The vertex at which a closed surface is opened: a sharp one, in the mirror plane if there is one."""
-        scale = self.model.membrane.green @ (self.coarse.curvature - self.coarse.curvature.sum() * self.coarse.area)
+        model, area = self.model, self.coarse.area
+        load = self.coarse.curvature - self.coarse.curvature.sum() * area
+        scale = solve_spd(model.laplacian + GROUND * diags(area), load)
         worth = np.abs(scale) * self.tip_factor / self.factor
         if self.mirrored is not None:
             worth[self.mirrored.image != np.arange(len(worth))] = -1

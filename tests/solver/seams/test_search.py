@@ -16,7 +16,7 @@ from omt_uv.solver.seams.improvement import improved, trimmed
 from omt_uv.solver.seams.options import SearchOptions
 from omt_uv.solver.seams.path_graph import path_graph
 from omt_uv.solver.seams.predicted_scale import ScaleModel
-from omt_uv.solver.seams.search import Measured, SeamSearch
+from omt_uv.solver.seams.search import SeamSearch
 
 
 @pytest.fixture(scope="module")
@@ -34,11 +34,10 @@ def test_a_cut_by_green_functions_is_that_of_a_new_solve(cap):
     model, vertices = ScaleModel.of(cap), np.flatnonzero(~cap.boundary)[:12]
     cut = model.cut(vertices)
     assert np.isclose(cut.spread, model.spread_cut(vertices), rtol=1e-6) and cut.spread < model.spread
-    assert np.abs(cut.scale[vertices]).max() < 1e-6
     assert np.abs(cut.plate.value[vertices]).max() < 1e-6 * np.abs(model.plate.value).max()
     # Cut one after another, it is the same.
     twice = model.cut(vertices[:5]).cut(vertices[5:])
-    assert np.allclose(twice.scale, cut.scale, atol=1e-6)
+    assert np.allclose(twice.scale, cut.scale, atol=1e-5 * np.abs(cut.scale).max())
     one = vertices[:1]
     assert np.isclose(model.gain(one)[0], model.spread - model.spread_cut(one), rtol=1e-6)
 
@@ -100,18 +99,10 @@ def test_options_have_to_be_sound():
     assert SearchOptions().rounds > 0
 
 
-def test_what_counts_more_has_so_much_more_spread(cap):
-    weight = np.full(len(cap.kept), 3.0)
-    assert np.isclose(ScaleModel.of(cap, weight=weight).spread, 3 * ScaleModel.of(cap).spread)
-    weight = np.where(np.arange(len(cap.kept)) % 2, 3.0, 1.0)
-    assert ScaleModel.of(cap).spread < ScaleModel.of(cap, weight=weight).spread < 3 * ScaleModel.of(cap).spread
-
-
-def test_a_search_that_goes_on_takes_what_maps_have_shown():
+def test_a_search_that_goes_on_leaves_a_share_of_the_spread():
     V, F = meshes.cap(20, 40, 0.9)
     surface = triangle_surface(V, F)
     search = SeamSearch(np.full(len(F), 0.02), surface, lambda: seam_costs(surface))
     first = cut_to_disks(surface, search=search).cuts
-    shown = Measured(np.full(len(F), 0.1), np.full(len(F), 0.4))
-    again = cut_to_disks(surface, search=replace(search, measured=shown)).cuts
+    again = cut_to_disks(surface, search=replace(search, share=np.full(len(F), 0.4))).cuts
     assert 0 < first.length < again.length
