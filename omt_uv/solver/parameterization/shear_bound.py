@@ -73,7 +73,7 @@ class ShearSearch:
 
     def first_spread(self) -> np.ndarray:
         """The spread (f,) to begin with, see `SeamSearch`."""
-        return np.full(self._count, SPREAD_OF_SHEAR * np.log(self.shear.bound) ** 2)
+        return np.full(self.count, SPREAD_OF_SHEAR * np.log(self.shear.bound) ** 2)
 
     def search(self, spread: np.ndarray) -> SeamSearch:
         """The search for a spread (f,)."""
@@ -83,7 +83,7 @@ class ShearSearch:
     def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, share: np.ndarray) -> Steps[DiskCharts]:
         """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
         the share (f,) of what was left; the edges that others were cut along (k,2) stay."""
-        target = np.full(self._count, np.inf)
+        target = np.full(self.count, np.inf)
         for chart in missed:
             target[chart.faces] = spread[chart.faces]
         search = replace(self.search(target), further=True, share=share)
@@ -107,7 +107,8 @@ class ShearSearch:
         return _polygon_density(self.surface, self.target)
 
     @property
-    def _count(self) -> int:
+    def count(self) -> int:
+        """Polygons of the surface."""
         return len(self.surface.face_start) - 1
 
 
@@ -128,63 +129,84 @@ def bound_shear(
     maps: list[ChartMap],
     map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
 ) -> Steps[BoundedShear]:
-    """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or no round betters the worst.
+    """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or the worst stays.
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts.
     Progress offers an early end: with the maps of the last round. Errors are those of `disk_charts.disk_charts` and of
     `map_charts`.
     """
-    prepared, bound, early = first, search.shear.bound, EarlyEnd()
-    cuts, spread = _cuts(first), search.first_spread()
-    promised = np.full(len(spread), np.inf)
-    rounds, before, best = 0, np.inf, None
-    while True:
-        charts = prepared.charts
-        shear = [_shear(c, m, search.target is None) for c, m in zip(charts, maps, strict=True)]
-        mean = np.array([area @ local / area.sum() for local, area in shear])
-        rounds += 1
-        missed = np.flatnonzero(mean > bound)
-        searched = [k for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
-        worst = float(np.log(mean[searched]).max()) if searched else 0.0
-        if worst > before:
-            charts, maps, cuts, mean, searched = best
+    bound, early = search.shear.bound, EarlyEnd()
+    best = last = _Round.of(search, first.charts, maps, _cuts(first))
+    spread, promised = search.first_spread(), np.full(search.count, np.inf)
+    for rounds in range(1, MOST_ROUNDS):
+        if not last.searched or last.worst > best.worst:
             break
-        before, best = worst, (charts, maps, cuts, mean, searched)
-        if rounds == MOST_ROUNDS or not searched:
-            break
-        share = np.ones(len(spread))
-        for k in searched:
-            reached = np.log(mean[k]) ** 2
+        best, share = last, np.ones(search.count)
+        for k in last.searched:
+            faces, reached = last.charts[k].faces, np.log(last.mean[k]) ** 2
             # What the last search has promised and its map has not kept is asked for on top.
-            kept_part = min(float(promised[charts[k].faces].min()) / reached, 1.0)
-            part = MARGIN * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
-            promised[charts[k].faces] = part * reached
-            spread[charts[k].faces] *= part
-            share[charts[k].faces] = part
+            kept_part = min(float(promised[faces].min()) / reached, 1.0)
+            share[faces] = MARGIN * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
+            promised[faces] = share[faces] * reached
+        spread = spread * share
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        missing = [charts[k] for k in searched]
+        missing = [last.charts[k] for k in last.searched]
         outlines = np.concatenate([_outline(chart) for chart in missing])
-        kept = cuts.edges[~np.isin(pair_keys(*cuts.edges.T), outlines)]
+        kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), outlines)]
         searching = part_of(search.again(kept, missing, spread, share), begin, width * SEARCHING)
         again = yield from unless_ended(searching, early)
         if again is None:
             break
         edges = np.concatenate([kept, _cuts(again).edges])
-        if len(edges) == len(cuts.edges) and np.isin(pair_keys(*edges.T), pair_keys(*cuts.edges.T)).all():
+        known = last.cuts.edges
+        if len(edges) == len(known) and np.isin(pair_keys(*edges.T), pair_keys(*known.T)).all():
             break
-        mapping = _mapped(again.charts, charts, maps, map_charts)
+        mapping = _mapped(again.charts, last.charts, last.maps, map_charts)
         further = part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
         mapped = yield from unless_ended(further, early)
         if mapped is None:
             break
-        prepared, maps = again, mapped
-        cuts = replace(cuts, edges=edges, length=_length(search.surface, edges))
-    prepared = DiskCharts(charts, cuts, first.warnings)
-    missed = np.flatnonzero(mean > bound)
-    by_hand = np.array([k not in searched for k in missed], dtype=bool)
-    warnings = tuple(_warnings(mean[missed], by_hand, bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
-    return BoundedShear(prepared, maps, warnings)
+        cuts = replace(last.cuts, edges=edges, length=_length(search.surface, edges))
+        last = _Round.of(search, again.charts, mapped, cuts)
+    best = last if last.worst <= best.worst else best
+    warnings = tuple(best.warnings(bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
+    return BoundedShear(DiskCharts(best.charts, best.cuts, first.warnings), best.maps, warnings)
+
+
+@dataclass(frozen=True)
+class _Round:
+    """Charts, their maps and cuts, their mean shear (k,), and the numbers of those that miss the bound and may be cut
+    for that."""
+
+    charts: list[Chart]
+    maps: list[ChartMap]
+    cuts: Cuts
+    mean: np.ndarray
+    searched: list[int]
+
+    @staticmethod
+    def of(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: Cuts) -> _Round:
+        shear = [_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
+        mean = np.array([area @ local / area.sum() for local, area in shear])
+        missed = np.flatnonzero(mean > search.shear.bound)
+        searched = [int(k) for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
+        return _Round(charts, maps, cuts, mean, searched)
+
+    @property
+    def worst(self) -> float:
+        """The most mean shear of what is searched, 1 for nothing."""
+        return float(self.mean[self.searched].max()) if self.searched else 1.0
+
+    def warnings(self, bound: float, why: str) -> Iterator[str]:
+        """Warnings of charts that shear more than a bound, those with seams marked by hand apart; why others do."""
+        missed = np.flatnonzero(self.mean > bound)
+        mean, by_hand = self.mean[missed], ~np.isin(missed, self.searched)
+        for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, why)):
+            if chosen.any():
+                who = "An island shears" if chosen.sum() == 1 else f"{chosen.sum()} islands shear"
+                what = what if chosen.sum() == 1 else what.replace("its seams", "their seams")
+                yield f"{who} {mean[chosen].max():.3g} in the mean, above {bound:.3g}: {what}"
 
 
 def _cuts(prepared: DiskCharts) -> Cuts:
@@ -192,15 +214,6 @@ def _cuts(prepared: DiskCharts) -> Cuts:
     if prepared.cuts is None:
         raise ValueError("charts along existing seams alone have no cuts to add to")
     return prepared.cuts
-
-
-def _warnings(mean: np.ndarray, by_hand: np.ndarray, bound: float, why: str) -> Iterator[str]:
-    """Warnings of charts (k,) that shear more than a bound, those with seams marked by hand apart; why others do."""
-    for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, why)):
-        if chosen.any():
-            who = "An island shears" if chosen.sum() == 1 else f"{chosen.sum()} islands shear"
-            what = what if chosen.sum() == 1 else what.replace("its seams", "their seams")
-            yield f"{who} {mean[chosen].max():.3g} in the mean, above {bound:.3g}: {what}"
 
 
 def _outline(chart: Chart) -> np.ndarray:
