@@ -21,6 +21,8 @@ class UV_UL_omt_regions(bpy.types.UIList):
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_name) -> None:
         row = layout.row(align=True)
         owner = item.id_data
+        # Fields take every click: here one chooses the row.
+        row.label(text="", icon="DOT")
         if item.group and item.group not in owner.vertex_groups:
             # A search field would lose a name that is to come, or of another object.
             row.prop(item, "group", text="", icon="ERROR", emboss=False)

@@ -21,7 +21,7 @@ TOLERANCE = 1e-3
 # Lengths below this share of the other surface's diagonal are nothing.
 NOTHING = 1e-6
 # Points that are looked for at most; what is left then shows in the bound.
-MOST_POINTS = 200_000
+MOST_POINTS = 400_000
 # Triangles that are cut in a round, those with the highest bounds first.
 MOST_AT_ONCE = 20_000
 # A triangle's corners and the middles of the edges opposite of them, as four triangles.
@@ -118,10 +118,11 @@ def farthest(index: ClosestPoint, points: np.ndarray, most: np.ndarray, least: f
 def _cut(index: ClosestPoint, pieces: _Pieces) -> tuple[_Pieces, np.ndarray, np.ndarray]:
     """Four pieces of each; then the middles (k,3) of their edges, and distances (k,) that may be too great."""
     middles = 0.5 * (pieces.corners[:, [1, 2, 0]] + pieces.corners[:, [2, 0, 1]])
-    points = middles.reshape(-1, 3)
+    # Neighbours share their edges.
+    points, place = np.unique(middles.reshape(-1, 3), axis=0, return_inverse=True)
     closest = by_position(index, points)
     six = np.concatenate([pieces.corners, middles], axis=1)[:, QUARTERS].reshape(-1, 3, 3)
-    near = np.concatenate([pieces.nearest, closest.faces.reshape(-1, 3)], axis=1)[:, QUARTERS].reshape(-1, 3)
+    near = np.concatenate([pieces.nearest, closest.faces[place.reshape(-1, 3)]], axis=1)[:, QUARTERS].reshape(-1, 3)
     parts = _bounded(index, six, near)
     # What bounds the whole bounds its parts.
     parts = replace(parts, bound=np.minimum(parts.bound, np.repeat(pieces.bound, 4)))
