@@ -105,6 +105,8 @@ class SeamSearch:
             return base
         plain = (coarse, model) if bounded else None
         best = yield from part_of(self._best(component, base, bound, mirror, plain), 0.0, 0.9)
+        if best is None:
+            return base
         self.memory[name] = best.carried(component)
         return self.memory[name].edges
 
@@ -115,7 +117,7 @@ class SeamSearch:
         bound: float,
         mirror: FineMirror | None,
         plain: tuple[CoarseSurface, ScaleModel] | None,
-    ) -> Steps[_CoarseCut]:
+    ) -> Steps[_CoarseCut | None]:
         """The best cut, a symmetric one where that is not much dearer; the other arguments are those of `_searched`."""
         line = mirror
         if mirror is not None and mirror.exact:
@@ -124,12 +126,14 @@ class SeamSearch:
                 return best
             # Where the plane runs between the vertices, there is hardly a symmetric cut without a line along it.
             line = with_line(component, mirror)
-        found = [(yield from part_of(self._searched(component, base, bound, None, plain), 0.4, 0.3))]
         if line is not None:
-            found.append((yield from part_of(self._searched(component, base, bound, line, None), 0.7, 0.3)))
-        worth = self._worth_of_symmetry() if line is not None else 1.0
-        cuts = [cut for cut in found if cut is not None]
-        return min(cuts, key=lambda cut: cut.score / (1.0 if cut.mirror is None else worth))
+            best = yield from part_of(self._searched(component, base, bound, line, None), 0.4, 0.2)
+            # One trial says what others cost, about.
+            once = replace(self, options=replace(self.options, trials=1))
+            other = yield from part_of(once._searched(component, base, bound, None, plain), 0.6, 0.1)
+            if best is not None and (other is None or best.score <= self._worth_of_symmetry() * other.score):
+                return best
+        return (yield from part_of(self._searched(component, base, bound, None, plain), 0.7, 0.3))
 
     def _searched(
         self,
@@ -169,15 +173,18 @@ class SeamSearch:
         return replace(best, cut=cut).carried(component)
 
     def _grown_further(self, component: CutComponent, found: Found, share: float) -> Steps[_CoarseCut]:
-        """A cut grown on from where it was."""
+        """A cut grown on from where it was, or anew on the same surface where that is better."""
         coarse = found.coarse
         model = ScaleModel.of(coarse, self._log_density(component, coarse))
         setting = _Setting.of(component, coarse, found.base, found.mirror, model, self._tip_factor(component))
         task = setting.task(0.0, found.root)
         cut = cut_along(task, found.steps)
         task = replace(task, bound=share * cut.spread)
-        cut = yield from self._grown(task, cut)
-        return _CoarseCut(setting, task, cut, found.base, found.mirror)
+        cuts = []
+        for k, begin in enumerate((cut, None)):
+            grown = yield from part_of(self._grown(task, begin), k / 2, 0.5)
+            cuts.append(_CoarseCut(setting, task, trimmed(task, rerouted(task, grown)), found.base, found.mirror))
+        return min(cuts, key=lambda one: one.score)
 
     def _grown_finer(self, component: CutComponent, found: Found, share: float) -> Steps[_CoarseCut]:
         """A cut grown anew on finer surfaces, the best of several."""
