@@ -24,7 +24,7 @@ TRIES = 3
 UNRELIABLE: dict[str, str] = {}
 # What is left to later ages: this machine's Blender, 3.4 on Debian, is older than any that the extension installs on,
 # and draws so slowly that a search for buttons takes minutes.
-LATER = ("shapes", "sections", "uv_editor")
+LATER = ("shapes", "sections", "uv_editor", "drag")
 
 
 def load():
@@ -140,7 +140,19 @@ def test_the_sections_of_shapes_work(play):
     assert abs(facts["volume after"] / facts["volume before"] - 1) < 1e-5
 
 
-STORIES = [("tour", 4), ("escape", 2), ("uv_editor", 4), ("sections", 3), ("shapes", 6)]
+def test_a_body_follows_while_it_is_dragged(play):
+    facts = play("drag")
+    assert facts["vertices"] > 20_000 and len(facts["shown while pulled"]) >= 4
+    assert dict(facts["pulled"][1:])["New intersections"] == "0"
+
+
+def test_uvs_follow_the_mouse_and_go_back_on_escape(play):
+    facts = play("drag")
+    assert len(facts["shown while pushed"]) >= 4 and facts["uvs moved"] > 0.01
+    assert facts["uvs moved before Esc"] > 0.01 and facts["uvs moved after Esc"] == 0
+
+
+STORIES = [("tour", 4), ("escape", 2), ("uv_editor", 4), ("sections", 3), ("shapes", 6), ("drag", 2)]
 
 
 @pytest.mark.parametrize(("story", "least"), STORIES)

@@ -141,13 +141,13 @@ def _push_all(jobs: list, start, move, options):
     """A UVFlow for every job."""
     import numpy as np
 
-    from ...pipelines.volumes.flow import flow_uvs
+    from ...pipelines.volumes.flow import UVPlaces, flow_uvs
 
     here = np.array([start], float)
     found = []
     for _, reading, corners in jobs:
-        uv, pinned = reading.uv[corners].astype(float), reading.pinned[corners]
-        found.append((yield from flow_uvs(uv, pinned, here, here + np.array([move], float), options)))
+        at = UVPlaces.of(reading.uv[corners].astype(float), reading.pinned[corners])
+        found.append((yield from flow_uvs(at, here, here + np.array([move], float), options)))
     return found
 
 

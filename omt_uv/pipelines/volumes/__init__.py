@@ -8,7 +8,7 @@ from ...solver.lazy import lazy
 
 __getattr__, __all__ = lazy(
     __name__,
-    flow="FlowBody FlowJob FlowResult flow_bodies flow_uvs",
+    flow="FlowBody FlowJob FlowResult UVPlaces flow_bodies flow_uvs",
     volume="MappedVolume VolumeBody VolumeSettings mapped_volume",
     vtu="vtu_text",
     handle_file="HandleFileError handles_of read_handle_file",

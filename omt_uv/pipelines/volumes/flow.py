@@ -127,21 +127,33 @@ class UVFlow:
     warnings: tuple[str, ...]
 
 
-def flow_uvs(
-    uv: np.ndarray, pinned: np.ndarray, start: np.ndarray, end: np.ndarray, options: FlowOptions
-) -> Steps[UVFlow]:
-    """Move UVs (c,2) so that the places `start` (k,2) go to `end` (k,2) and `pinned` (c,) bool stay; areas stay, too.
+@dataclass(frozen=True)
+class UVPlaces:
+    """Places (p,2) where UVs are, the place (c,) of each, and places (q,) with a pin: corners at one place stay
+    together."""
+
+    places: np.ndarray
+    place: np.ndarray
+    pinned: np.ndarray
+
+    @staticmethod
+    def of(uv: np.ndarray, pinned: np.ndarray) -> UVPlaces:
+        """The places of UVs (c,2), of which `pinned` (c,) bool stay."""
+        places, inverse = np.unique(uv, axis=0, return_inverse=True)
+        inverse = inverse.ravel()
+        return UVPlaces(places, inverse, np.unique(inverse[pinned]))
+
+
+def flow_uvs(at: UVPlaces, start: np.ndarray, end: np.ndarray, options: FlowOptions) -> Steps[UVFlow]:
+    """Move UVs so that the places `start` (k,2) go to `end` (k,2) and pins stay; areas stay, too.
 
     Raises
     ------
     MeshError : those of `solver.flows.flow`
     """
-    # Corners at one place stay together.
-    places, inverse = np.unique(uv, axis=0, return_inverse=True)
-    inverse = inverse.ravel()
-    handles = [FlowHandle(np.asarray(start, float), np.asarray(end, float))]
-    rows = np.unique(inverse[pinned])
-    if len(rows):
-        handles.append(FlowHandle(places[rows], places[rows], rows, "pins"))
-    found = yield from flow(places, tuple(handles), options)
-    return UVFlow(found.positions[inverse], found.warnings)
+    handles = [FlowHandle(np.asarray(start, float), np.asarray(end, float), name="what is pushed")]
+    if len(at.pinned):
+        pins = at.places[at.pinned]
+        handles.append(FlowHandle(pins, pins, at.pinned, "pins"))
+    found = yield from flow(at.places, tuple(handles), options)
+    return UVFlow(found.positions[at.place], found.warnings)

@@ -20,10 +20,11 @@ from .separation import separated
 RINGS = (1, 2, 3, 4, 6, 8)
 # Times that pairs which others have been moved into are taken apart with those.
 SEPARATIONS = 8
-# Mending moves nothing farther than this share of the diagonal, and is for creases, not for more than this share of all
-# faces.
+# Mending moves nothing farther than this share of the diagonal or, on a coarse mesh, than an edge is long; and is for
+# creases, not for more than this share of all faces, unless they are so few that it costs nothing to try.
 FARTHEST = 0.02
 MOST_FACES = 0.05
+FEW_FACES = 1000
 
 
 def new_intersections(
@@ -57,7 +58,7 @@ def without_new_intersections(
     at `before` (n,3). Only vertices `free` (n,) bool move."""
     triangles = faces.triangles
     pairs = new_intersections(before, after, faces, _touched(before, after, triangles))
-    if not len(pairs) or len(np.unique(pairs)) > MOST_FACES * len(triangles):
+    if not len(pairs) or _too_many(pairs, triangles):
         return after, pairs
     best, fewest = _separated_all(before, after, faces, free, pairs)
     if len(fewest):
@@ -70,11 +71,23 @@ def _touched(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -> np
     return (before != after).any(axis=1)[triangles].any(axis=1)
 
 
+def _too_many(pairs: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether pairs (k,2) have more of the triangles (m,3) than are mended."""
+    return len(np.unique(pairs)) > max(MOST_FACES * len(triangles), FEW_FACES)
+
+
+def _farthest(before: np.ndarray, triangles: np.ndarray) -> float:
+    """How far mending may move a vertex of triangles (m,3)."""
+    tail, head = halfedges(triangles)
+    edge = float(np.linalg.norm(before[tail] - before[head], axis=1).mean())
+    return max(FARTHEST * float(np.linalg.norm(np.ptp(before, axis=0))), edge)
+
+
 def _separated_all(before, after, faces: FaceCrossings, free, pairs) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n,3) and pairs that are left, with pairs (k,2) moved behind the planes that were between them, and
     those that come to intersect by that, too."""
     triangles = faces.triangles
-    farthest = FARTHEST * np.linalg.norm(np.ptp(before, axis=0))
+    farthest = _farthest(before, triangles)
     best, fewest = after, pairs
     for _ in range(SEPARATIONS):
         position = separated(before, after, triangles, pairs, free)
@@ -97,12 +110,12 @@ def _blended_all(before, after, faces: FaceCrossings, free, found) -> tuple[np.n
     triangles, n = faces.triangles, len(before)
     best, fewest = found
     position, pairs = found
-    farthest = FARTHEST * np.linalg.norm(np.ptp(before, axis=0))
+    farthest = _farthest(before, triangles)
     tail, head = halfedges(triangles)
     graph = sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
     graph = graph + sp.identity(n, format="csr")
     for rings in RINGS:
-        if not len(pairs) or len(np.unique(pairs)) > MOST_FACES * len(triangles):
+        if not len(pairs) or _too_many(pairs, triangles):
             break
         position = _blended(before, after, position, graph, triangles[pairs].reshape(len(pairs), -1), free, rings)
         if np.abs(position - after).max() > farthest:

@@ -16,11 +16,11 @@ from ..progress import Progress, Steps
 from .creases import new_intersections, without_new_intersections
 from .domain import FlowDomain
 from .enclosed_volume import EnclosedParts, restore_volumes
-from .handles import SPACING, FlowHandle, check_handles, farthest_points, joined, sampled_handles
+from .handles import FlowHandle, check_handles, farthest_points, joined, sampled_handles
 from .integration import BLOCK, FlowStep, carried, planned_steps
 from .kernel import FlowField, conditions, interpolated_field
 from .options import STRAIGHT, FlowOptions
-from .passing import Surge, greatest_surge
+from .passing import Passing, closest_passing, greatest_surge
 from .paths import handle_paths
 from .self_intersections import FaceCrossings
 
@@ -28,6 +28,8 @@ from .self_intersections import FaceCrossings
 PROBES = 300
 # Samples of walls are this share of the radius apart: closer, and they make the equations ill-conditioned.
 WALL_SPACING = 0.35
+# What moves by less than this share of the tolerance stays: the field falls like exp(-(distance / radius)^2).
+UNMOVED = 1e-3
 # Handle points that are missed by more than this share of the diagonal before they are set are worth a warning,
 MISSED = 1e-3
 # and volumes that change by more.
@@ -58,13 +60,13 @@ class Flow:
 
 @dataclass(frozen=True)
 class _Way:
-    """Places (k + 1, p, d) of handle samples at even steps of time, the handle (p,) of each, walls, and lambda: what
-    fields are made of."""
+    """Places (k + 1, p, d) of handle samples at even steps of time, walls, lambda, and how handles pass one another:
+    what fields are made of."""
 
     path: np.ndarray
-    owner: np.ndarray
     domain: FlowDomain | None
     sharpness: float
+    passing: Passing
 
     def field(self, stretch: int, time: float) -> FlowField:
         """The field at a time within a stretch."""
@@ -75,7 +77,7 @@ class _Way:
         walls = np.zeros((0, d)) if self.domain is None else self.domain.points
         normals = np.zeros((0, d)) if self.domain is None else self.domain.normals
         values = np.concatenate([((there - here) * count).ravel(), np.zeros(len(walls))])
-        return interpolated_field(conditions(at, walls, normals), values, self.sharpness)
+        return interpolated_field(conditions(at, walls, normals), values, self.sharpness, self.passing.near)
 
 
 def flow(
@@ -125,17 +127,23 @@ def flow(
     yield Progress("Paths", 0.0)
     everything = np.concatenate([points, *(h.start for h in handles)]) / size
     plan, surge = _plan(way, everything, options, len(points), frames)
-    merged = yield from _carry_all(everything, plan, way.domain)
+    reached = _reached(everything, way, UNMOVED * options.tolerance)
+    merged = yield from _carry_all(everything, plan, way.domain, reached)
     ends = np.concatenate([h.end for h in handles]) / size
     missed = float(np.abs(merged[-1][len(points) :] - ends).max(initial=0.0))
-    positions = [at[: len(points)] * size for at in merged]
+    moved = np.isin(np.arange(len(points)), reached)[:, None]
+    positions = [np.where(moved, at[: len(points)] * size, points) for at in merged]
     _set_handles(positions[-1], points, handles)
+    rough = yield from _sound(positions, _shape(points, triangles, handles), options.mend)
+    crossing = way.passing.warning([h.name or f"number {k}" for k, h in enumerate(handles)], surge, rough.intersecting)
+    warnings = _warnings(missed, rough.volumes, len(rough.intersecting)) + crossing
+    return replace(rough, steps=sum(map(len, plan)), missed=missed, surge=surge, warnings=warnings)
+
+
+def _shape(points: np.ndarray, triangles: np.ndarray | None, handles: tuple[FlowHandle, ...]) -> _Shape:
+    """Points (n,3) with their triangles (m,3), none in the plane."""
     flat = triangles is None or points.shape[1] == 2
-    shape = _Shape(points, np.zeros((0, 3), np.int64) if flat else np.asarray(triangles), _free(len(points), handles))
-    rough = yield from _sound(positions, shape, options.mend)
-    told = surge.warning([h.name or f"number {k}" for k, h in enumerate(handles)], options.radius)
-    warnings = _warnings(missed, rough.volumes, len(rough.intersecting)) + (() if told is None else (told,))
-    return replace(rough, steps=sum(map(len, plan)), missed=missed, surge=surge.rate, warnings=warnings)
+    return _Shape(points, np.zeros((0, 3), np.int64) if flat else np.asarray(triangles), _free(len(points), handles))
 
 
 def _sound(positions: list[np.ndarray], shape: _Shape, mend: bool) -> Steps[Flow]:
@@ -226,7 +234,7 @@ def _checked(points: np.ndarray, handles: tuple[FlowHandle, ...], options: FlowO
 def _way(points, handles, options: FlowOptions, domain: FlowDomain | None, size: float) -> _Way:
     """Samples of handles on their way, in units of the diagonal."""
     scaled = tuple(FlowHandle(h.start / size, h.end / size, h.vertices, h.name) for h in handles)
-    sampled = sampled_handles(scaled, SPACING * options.radius)
+    sampled = sampled_handles(scaled, options.spacing * options.radius, options.most_samples)
     start, end, owner = joined(sampled, options.radius)
     if domain is not None:
         rows = farthest_points(domain.points / size, WALL_SPACING * options.radius, len(domain.points))
@@ -246,12 +254,12 @@ def _way(points, handles, options: FlowOptions, domain: FlowDomain | None, size:
     if np.abs(path - straight).max() < 1e-12:
         # Nothing turns: one chord does.
         path = path[[0, -1]]
-    return _Way(path, owner, domain, 1 / options.radius**2)
+    return _Way(path, domain, 1 / options.radius**2, closest_passing(path, owner, options.radius))
 
 
 def _plan(
     way: _Way, everything: np.ndarray, options: FlowOptions, n: int, frames: int
-) -> tuple[list[list[FlowStep]], Surge]:
+) -> tuple[list[list[FlowStep]], float]:
     """Steps of every frame, and the greatest surge in them."""
     stride = max(n // PROBES, 1)
     probes = np.concatenate([everything[:n:stride], _nearest(everything[:n], way.path[0])])
@@ -263,7 +271,7 @@ def _plan(
         return way.field(stretch, time)
 
     plan = planned_steps(field_at, knots, probes, options.tolerance)
-    surge = greatest_surge(way.path, way.owner, [step for steps in plan for step in steps], probes)
+    surge = greatest_surge(way.path, [step for steps in plan for step in steps], probes)
     frame = np.minimum(((knots[:-1] + knots[1:]) / 2 * frames).astype(int), frames - 1)
     return [[step for k in np.flatnonzero(frame == f) for step in plan[k]] for f in range(frames)], surge
 
@@ -275,17 +283,33 @@ def _nearest(points: np.ndarray, places: np.ndarray) -> np.ndarray:
     return points[np.unique(cKDTree(points).query(places, k=min(3, len(points)))[1].ravel())]
 
 
-def _carry_all(everything: np.ndarray, plan: list[list[FlowStep]], domain: FlowDomain | None) -> Steps[list]:
-    """Positions (n,d) of all points after every frame."""
-    results = [np.empty_like(everything) for _ in plan]
-    for start in range(0, len(everything), BLOCK):
-        block = everything[start : start + BLOCK]
+def _reached(everything: np.ndarray, way: _Way, small: float) -> np.ndarray:
+    """Rows (r,) of points (n,d) that some handle on its way comes near enough to to move them by more than `small`."""
+    from scipy.spatial import cKDTree
+
+    if way.domain is not None:
+        return np.arange(len(everything))
+    chord = float(np.linalg.norm(np.diff(way.path, axis=0), axis=2).max(initial=0.0))
+    farthest = np.sqrt(-np.log(small) / way.sharpness) + chord / 2
+    places = way.path.reshape(-1, everything.shape[1])
+    distance, _ = cKDTree(places).query(everything, distance_upper_bound=farthest)
+    return np.flatnonzero(np.isfinite(distance))
+
+
+def _carry_all(
+    everything: np.ndarray, plan: list[list[FlowStep]], domain: FlowDomain | None, reached: np.ndarray
+) -> Steps[list]:
+    """Positions (n,d) of all points after every frame; those not reached (r,) stay."""
+    results = [everything.copy() for _ in plan]
+    for start in range(0, len(reached), BLOCK):
+        rows = reached[start : start + BLOCK]
+        block = everything[rows]
         for steps, result in zip(plan, results, strict=True):
             block = carried(block, steps)
             if domain is not None:
                 block = domain.held(block)
-            result[start : start + BLOCK] = block
-        yield Progress("Flow", min((start + BLOCK) / len(everything), 1.0))
+            result[rows] = block
+        yield Progress("Flow", min((start + BLOCK) / len(reached), 1.0))
     return results
 
 

@@ -8,10 +8,6 @@ import numpy as np
 
 from ..errors import HandleError, NonFiniteError
 
-# Samples of one handle are at least this share of the radius apart, so that the system is well conditioned,
-SPACING = 0.18
-# and at most so many.
-MOST_SAMPLES = 96
 # Handles that start closer together than this share of the radius must go the same way.
 TOUCHING = 1e-3
 
@@ -46,9 +42,7 @@ def check_handles(handles: tuple[FlowHandle, ...], dimension: int) -> None:
         raise HandleError("No handle moves", "Move at least one")
 
 
-def sampled_handles(
-    handles: tuple[FlowHandle, ...], spacing: float, most: int = MOST_SAMPLES
-) -> tuple[FlowHandle, ...]:
+def sampled_handles(handles: tuple[FlowHandle, ...], spacing: float, most: int) -> tuple[FlowHandle, ...]:
     """Every handle with those of its points (k,d) that are at least `spacing` apart, at most `most`, chosen farthest
     first."""
     chosen: list[FlowHandle] = []

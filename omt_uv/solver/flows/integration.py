@@ -19,8 +19,8 @@ from .kernel import FlowField
 SHORTER = 0.2
 LONGER = 4.0
 SAFETY = 0.85
-# The first step, and the shortest, of a unit of time.
-FIRST = 0.05
+# The first step that is tried, and the shortest, of a unit of time: to try costs little, as probes are few.
+FIRST = 1.0
 SHORTEST = 1e-5
 # Points that go through the steps together.
 BLOCK = 2048

@@ -9,6 +9,10 @@ RADIUS = "radius"
 BLEND = "blend"
 RIGID = "rigid"
 PATHS = (RIGID, STRAIGHT, RADIUS, BLEND)
+# Samples of one handle are at least this share of the radius apart, so that the system is well conditioned,
+SPACING = 0.18
+# and at most so many.
+MOST_SAMPLES = 96
 
 
 @dataclass(frozen=True)
@@ -23,6 +27,7 @@ class FlowOptions:
     tolerance : error of the flow, as a share of the diagonal, per unit of time; handles move in a unit of time
     diagonal : the length that radius and tolerance are shares of; 0: of what flows. A flow and the one that takes it
         back have it in common
+    spacing : samples of a handle of many points are so far apart, as a share of the radius; most_samples of one
     mend : look for faces that newly pass through one another, and take them apart
     """
 
@@ -31,4 +36,6 @@ class FlowOptions:
     samples: int = 32
     tolerance: float = 5e-5
     diagonal: float = 0.0
+    spacing: float = SPACING
+    most_samples: int = MOST_SAMPLES
     mend: bool = True

@@ -1,7 +1,9 @@
-"""Notice handles that pass closely by one another: what is around them then moves farther than they do.
+"""Notice handles that pass closely by one another, and keep what is around them calm.
 
 A field that is to differ within a distance much smaller than the radius needs strong sources, and moves what is a
-radius away by about radius / distance as much as the handles. On a coarse mesh faces meet there by hundreds.
+radius away by about radius / distance as much as the handles; on a coarse mesh faces then meet by hundreds. A second,
+narrower kernel beside the first takes the difference over. How much of it depends on the ways of handles alone, and is
+the same on the way back.
 """
 
 from __future__ import annotations
@@ -12,59 +14,73 @@ import numpy as np
 
 from .integration import FlowStep
 
-# Rates of flow over those of the handles from which on it is worth a warning.
-STRONG = 3.0
-# A radius of so many distances of the handles is calm.
-CALM = 2.0
+# Moments at which handles are looked at, and fewer where samples are more than so many.
+MOMENTS = 32
+FEW_MOMENTS = 8
+MANY_SAMPLES = 256
+# Strength of a passing up to which one kernel does, from which on the second has all of its share, and that share.
+CALM = 3.0
+STRONG = 6.0
+NEAR = 0.2
+# Speed of what flows over that of the handles from which on it is worth a warning.
+FAST = 3.0
 
 
 @dataclass(frozen=True)
-class Surge:
-    """The greatest speed of what flows over that of the handles at the same time; the two handles (numbers) that are
-    closest for how they differ then, and their distance, or -1, -1 and 0 where one handle alone is there."""
+class Passing:
+    """How strongly two handles (numbers) contradict each other at the worst moment: by what they differ, over the
+    fastest, times radius over distance; and that distance. 0, -1, -1 and 0 where one handle alone is there."""
 
-    rate: float
+    strength: float
     handles: tuple[int, int]
     distance: float
 
-    def warning(self, names: list[str], radius: float) -> str | None:
-        """What to tell, if anything; radius and distance as shares of the diagonal."""
-        if self.rate < STRONG or self.handles[0] < 0:
-            return None
+    @property
+    def near(self) -> float:
+        """The share of the narrow kernel."""
+        return NEAR * float(np.clip((self.strength - CALM) / (STRONG - CALM), 0.0, 1.0))
+
+    def warning(self, names: list[str], surge: float, intersecting: np.ndarray) -> tuple[str, ...]:
+        """What to tell, if anything, of a flow with a surge, and pairs (k,2) of faces that newly intersect."""
+        if self.handles[0] < 0 or not (surge > FAST or (len(intersecting) and self.strength > CALM)):
+            return ()
         one, other = (names[k] for k in self.handles)
-        text = (
+        return (
             f"{one} and {other} are {100 * self.distance:.2g} % of the diagonal apart on their way and go different "
-            f"ways, so that what is around them moves {self.rate:.2g} times as fast as they do"
+            f"ways; what is around them moves up to {surge:.2g} times as fast as they do",
         )
-        calm = CALM * self.distance
-        return f"{text}; a radius of {calm:.2g} is calmer" if calm < radius else text
 
 
-def greatest_surge(path: np.ndarray, owner: np.ndarray, steps: list[FlowStep], probes: np.ndarray) -> Surge:
-    """The greatest surge of steps, seen by probes (q,d) that flow along; samples of handles are at places
-    path (k + 1, p, d) at even steps of time, owner (p,) says of which handle."""
-    found = Surge(0.0, (-1, -1), 0.0)
-    time, count = 0.0, len(path) - 1
-    for step in steps:
-        k = min(int((time + 0.5 * step.length) * count), count - 1)
-        velocity = (path[k + 1] - path[k]) * count
+def closest_passing(path: np.ndarray, owner: np.ndarray, radius: float) -> Passing:
+    """The closest passing of samples of handles at places path (k + 1, p, d) at even steps of time, owner (p,) says of
+    which handle; lengths are shares of the diagonal."""
+    chords, found = len(path) - 1, Passing(0.0, (-1, -1), 0.0)
+    count = MOMENTS if len(owner) <= MANY_SAMPLES else FEW_MOMENTS
+    different = owner[:, None] != owner[None]
+    for time in (np.arange(count) + 0.5) / count:
+        k = min(int(time * chords), chords - 1)
+        velocity = (path[k + 1] - path[k]) * chords
         fastest = float(np.linalg.norm(velocity, axis=1).max())
-        field = step.fields[0]
-        rate = float(np.linalg.norm(field(probes), axis=1).max()) / fastest if fastest > 0 else 0.0
-        if rate > found.rate:
-            found = Surge(rate, *_closest(field.centres[: len(owner)], velocity, owner))
-        probes = step(probes)
-        time += step.length
+        at = path[k] + (time * chords - k) * (path[k + 1] - path[k])
+        apart = np.linalg.norm(at[:, None] - at[None], axis=2)
+        differ = np.linalg.norm(velocity[:, None] - velocity[None], axis=2)
+        strength = np.where(different, differ / np.maximum(apart, np.finfo(float).tiny), 0.0)
+        i, j = np.unravel_index(int(strength.argmax()), strength.shape)
+        if fastest > 0 and strength[i, j] * radius > found.strength * fastest:
+            pair = min(int(owner[i]), int(owner[j])), max(int(owner[i]), int(owner[j]))
+            found = Passing(float(strength[i, j]) * radius / fastest, pair, float(apart[i, j]))
     return found
 
 
-def _closest(places: np.ndarray, velocity: np.ndarray, owner: np.ndarray) -> tuple[tuple[int, int], float]:
-    """Two handles that differ most for their distance, of samples at places (p,d), and that distance."""
-    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
-    differ = np.linalg.norm(velocity[:, None] - velocity[None], axis=2)
-    strength = np.where(owner[:, None] != owner[None], differ / np.maximum(apart, np.finfo(float).tiny), 0.0)
-    i, j = np.unravel_index(int(strength.argmax()), strength.shape)
-    if not strength[i, j] > 0:
-        return (-1, -1), 0.0
-    first, second = sorted((int(owner[i]), int(owner[j])))
-    return (first, second), float(apart[i, j])
+def greatest_surge(path: np.ndarray, steps: list[FlowStep], probes: np.ndarray) -> float:
+    """The greatest speed of probes (q,d) that flow along with steps over that of handles at the same time, whose
+    samples are at places path (k + 1, p, d) at even steps of time."""
+    surge, time, chords = 0.0, 0.0, len(path) - 1
+    for step in steps:
+        k = min(int((time + 0.5 * step.length) * chords), chords - 1)
+        fastest = float(np.linalg.norm((path[k + 1] - path[k]) * chords, axis=1).max())
+        if fastest > 0:
+            surge = max(surge, float(np.linalg.norm(step.fields[0](probes), axis=1).max()) / fastest)
+        probes = step(probes)
+        time += step.length
+    return surge

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bodies import icosphere
 
-from omt_uv.pipelines.volumes.flow import FlowBody, FlowJob, flow_bodies, flow_uvs
+from omt_uv.pipelines.volumes.flow import FlowBody, FlowJob, UVPlaces, flow_bodies, flow_uvs
 from omt_uv.pipelines.volumes.handle_file import HandleFileError, euler_matrix, handles_of, read_handle_file
 from omt_uv.solver.flows.handles import FlowHandle
 from omt_uv.solver.flows.options import FlowOptions
@@ -66,7 +66,9 @@ def test_uvs_keep_their_areas_and_pins():
     pinned = np.zeros(len(corners), bool)
     pinned[0] = True
     moved = drain(
-        flow_uvs(corners, pinned, np.array([[0.5, 0.5]]), np.array([[0.6, 0.5]]), FlowOptions(0.2, diagonal=1.0))
+        flow_uvs(
+            UVPlaces.of(corners, pinned), np.array([[0.5, 0.5]]), np.array([[0.6, 0.5]]), FlowOptions(0.2, diagonal=1.0)
+        )
     )
     np.testing.assert_array_equal(moved.uv[: len(uv)], moved.uv[len(uv) :])
     np.testing.assert_array_equal(moved.uv[0], uv[0])

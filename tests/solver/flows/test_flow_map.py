@@ -84,6 +84,16 @@ def test_what_stays_stays_and_frames_lead_to_the_end():
     np.testing.assert_allclose(component_volumes(found.positions, F)[0], component_volumes(V, F)[0], rtol=1e-9)
 
 
+def test_what_no_handle_comes_near_to_stays_to_the_bit():
+    rng = np.random.default_rng(0)
+    points = rng.uniform(size=(2000, 2))
+    handle = FlowHandle(np.array([[0.2, 0.2]]), np.array([[0.3, 0.25]]))
+    found = drain(flow(points, (handle,), FlowOptions(radius=0.03))).positions
+    far = np.linalg.norm(points - [0.25, 0.22], axis=1) > 0.4
+    np.testing.assert_array_equal(found[far], points[far])
+    assert (found[~far] != points[~far]).any()
+
+
 def test_areas_stay_in_the_plane():
     x = np.linspace(0, 1, 81)
     grid = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1)

@@ -60,7 +60,7 @@ def test_handles_are_thinned_out_evenly_and_checked():
     apart = np.linalg.norm(cloud[rows][:, None] - cloud[rows][None], axis=2) + np.eye(len(rows))
     assert len(rows) < 50 and apart.min() >= 0.3
     assert np.linalg.norm(cloud[:, None] - cloud[rows], axis=2).min(axis=1).max() < 0.3
-    (thin,) = sampled_handles((FlowHandle(cloud, cloud + 1, np.arange(400)),), 0.3)
+    (thin,) = sampled_handles((FlowHandle(cloud, cloud + 1, np.arange(400)),), 0.3, 96)
     np.testing.assert_array_equal(thin.end, thin.start + 1)
     np.testing.assert_array_equal(cloud[thin.vertices], thin.start)
     one, other = FlowHandle(cloud[:1], cloud[:1] + 1, name="a"), FlowHandle(cloud[:1], cloud[:1], name="b")
