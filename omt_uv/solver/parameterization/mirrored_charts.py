@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..analysis.density import Target
+from ..cutting.cuts import Cuts
 from ..mesh.charts import Chart
 from ..mesh.geometry import signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads
@@ -95,6 +96,15 @@ def images_of_cuts(surface: Surface, faces: np.ndarray | None, cuts: np.ndarray)
         return none
     length, more = (np.linalg.norm(np.diff(surface.positions[used][e], axis=1), axis=2).sum() for e in (cuts, images))
     return used[images] if length + more <= LONGER * length else none
+
+
+def with_images(surface: Surface, faces: np.ndarray | None, cuts: Cuts) -> Cuts:
+    """The cuts of the polygons `faces` (f,) bool of a surface with those images that `images_of_cuts` finds."""
+    more = images_of_cuts(surface, faces, cuts.edges)
+    if not len(more):
+        return cuts
+    length = float(np.linalg.norm(np.diff(surface.positions[more], axis=1), axis=2).sum())
+    return replace(cuts, edges=np.concatenate([cuts.edges, more]), length=cuts.length + length)
 
 
 def _are_slits(edges: np.ndarray, triangles: np.ndarray, cuts: np.ndarray) -> bool:

@@ -22,6 +22,7 @@ from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.search import SeamSearch
 from .chart_map import ChartMap
+from .mirrored_charts import with_images
 from .options import ShearBound
 
 # Maps that are made at most.
@@ -113,14 +114,15 @@ class ShearSearch:
 
 
 def predicted_cuts(surface: Surface, faces: np.ndarray, bound: float, **options: Any) -> Cuts:
-    """What `unwrap` cuts for a bound of the shear before its first map; with 0 for none, only what `cuts.cut` does.
+    """What `unwrap` cuts for a bound of the shear before its first map; with 0 for none, what it cuts without one.
 
     faces (f,) bool : polygons of the surface; options and errors are those of `cuts.cut`
     """
-    if not bound:
-        return cut(surface, faces, **options)
-    search = ShearSearch(surface, faces, ShearBound(bound), None, {})
-    return cut(surface, faces, search=search.search(search.first_spread()), **options)
+    if bound:
+        search = ShearSearch(surface, faces, ShearBound(bound), None, {})
+        options |= {"search": search.search(search.first_spread())}
+    cuts = cut(surface, faces, **options)
+    return cuts if options.get("fill") else with_images(surface, faces, cuts)
 
 
 def bound_shear(

@@ -25,9 +25,9 @@ from .convex_maps import with_convex_polygons, with_folds_counted
 from .mirrored_charts import (
     as_given,
     equal_chart_map,
-    images_of_cuts,
     mirror_partners,
     mirrored_map,
+    with_images,
     with_mirrored_quads,
 )
 from .options import UnwrapOptions
@@ -167,16 +167,13 @@ def _cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts,
     as they are otherwise. given : further arguments of `disk_charts`"""
     if prepared.cuts is None or not len(prepared.cuts.edges) or any(len(c.patches) for c in prepared.charts):
         return prepared
-    more = images_of_cuts(surface, faces, prepared.cuts.edges)
-    if not len(more):
+    cuts = with_images(surface, faces, prepared.cuts)
+    if cuts is prepared.cuts:
         return prepared
-    edges = np.concatenate([prepared.cuts.edges, more])
-    open_there = replace(surface, seams=np.concatenate([surface.seams, edges]))
+    open_there = replace(surface, seams=np.concatenate([surface.seams, cuts.edges]))
     found = yield from disk_charts(open_there, faces, extremities=0, **given)
     if len(found.charts) > len(prepared.charts) or found.cuts is None or len(found.cuts.edges):
         return prepared
-    length = np.linalg.norm(np.diff(surface.positions[more], axis=1), axis=2).sum()
-    cuts = replace(prepared.cuts, edges=edges, length=prepared.cuts.length + float(length))
     return replace(prepared, charts=found.charts, cuts=cuts)
 
 

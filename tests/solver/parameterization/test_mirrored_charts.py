@@ -15,6 +15,7 @@ from omt_uv.solver.mesh.mirror import find_mirror
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.mirrored_charts import images_of_cuts, motion_between
 from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.shear_bound import predicted_cuts
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
@@ -141,3 +142,5 @@ def test_suzanne_is_cut_and_mapped_symmetrically():
     cuts = {tuple(sorted(e)) for e in found.seams.tolist()}
     assert cuts == {tuple(sorted(e)) for e in mirror.image[found.seams].tolist()}
     assert all(m.folds == 0 for m in found.maps)
+    predicted = predicted_cuts(surface, np.ones(len(P), bool), 0.0).edges
+    assert cuts == {tuple(sorted(e)) for e in predicted.tolist()}
