@@ -46,8 +46,8 @@ def told(folder: Path, name: str, rows: Sequence[dict]) -> None:
     print(f"\n{name}\n{text}", flush=True)
 
 
-def saved(path: Path, pictures: Sequence[np.ndarray], height: int) -> None:
-    """Write pictures (h,w,3) in [0,1], top row first, side by side, so many pixels high."""
+def saved(path: Path, pictures: Sequence[np.ndarray], height: int, colours: int = 128) -> None:
+    """Write pictures (h,w,3) in [0,1], top row first, side by side, so many pixels high, in so many colours, or 0."""
     images = [Image.fromarray(np.rint(255 * np.clip(p, 0, 1)).astype(np.uint8)) for p in pictures]
     images = [i.resize((round(i.width * height / i.height), height), Image.Resampling.LANCZOS) for i in images]
     gap = height // 40
@@ -57,4 +57,5 @@ def saved(path: Path, pictures: Sequence[np.ndarray], height: int) -> None:
         whole.paste(image, (left, 0))
         left += image.width + gap
     path.parent.mkdir(parents=True, exist_ok=True)
-    whole.quantize(128).save(path, optimize=True)
+    # The palette is that of most pixels: a few dots would lose their colours.
+    (whole.quantize(colours) if colours else whole).save(path, optimize=True)

@@ -27,7 +27,7 @@ PIXELS = 620
 LIGHT = np.array([0.62, 0.45, 0.64])
 PANELS = 200
 DOTS = 6000
-SCALES = 1500
+SCALES = 900
 TONES = np.array([[0.93, 0.89, 0.80], [0.80, 0.62, 0.42], [0.56, 0.67, 0.70], [0.86, 0.78, 0.62], [0.70, 0.76, 0.68]])
 
 
@@ -87,14 +87,17 @@ def stipples(path):
 
 
 def scales(path):
-    """Cells that overlap downwards."""
+    """Cells that overlap downwards, each with a dark border."""
     V, F = meshes.load_model("armadillo")
-    division = drain(divide(V, F, SCALES, options=DivisionOptions(relax=5)))
-    P, T, cell = shrunk(V, F, division, 1.08, lambda along: 0.12 + 0.22 * along)
-    tone = 0.75 + 0.25 * np.random.default_rng(0).random(SCALES)
-    colours = np.array([0.55, 0.66, 0.40]) * tone[cell, None]
-    body = np.concatenate([colours, np.full((len(F), 3), [0.16, 0.19, 0.13])])
-    render_colours(np.concatenate([P, V]), np.concatenate([T, F + len(P)]), body, VIEWS["armadillo"], path, PIXELS)
+    division = drain(divide(V, F, SCALES, options=DivisionOptions(relax=3)))
+    base, T, cell = shrunk(V, F, division, 1.06, lambda along: 0.10 + 0.10 * along)
+    top, _, _ = shrunk(V, F, division, 0.84, lambda along: 0.17 + 0.10 * along)
+    tone = 0.88 + 0.12 * np.random.default_rng(0).random(SCALES)
+    light, dark = (np.array(colour) * tone[cell, None] for colour in ([0.62, 0.70, 0.42], [0.30, 0.38, 0.20]))
+    colours = np.concatenate([dark, light, np.full((len(F), 3), [0.24, 0.30, 0.17])])
+    n = len(base)
+    faces = np.concatenate([T, T + n, F + 2 * n])
+    render_colours(np.concatenate([base, top, V]), faces, colours, VIEWS["armadillo"], path, PIXELS)
 
 
 def main(out: Path) -> None:

@@ -13,14 +13,13 @@ from scipy.sparse import diags
 from ..analysis.curvature import mean_curvature
 from ..canonical.markers import ChartMarkers
 from ..conformal.disk_map import conformal_disk
-from ..errors import EmptyMeshError, LandmarkError, NotADiskError
+from ..errors import LandmarkError, NotADiskError
 from ..linalg.sparse import solve_spd
 from ..mesh.closest_point import subdivision_centroids
 from ..mesh.geometry import cotangent_laplacian, face_areas, vertex_areas
-from ..mesh.surface import check_finite
-from ..mesh.topology import boundary_loops, graph_components, halfedges, with_fans
+from ..mesh.topology import boundary_loops, with_fans
 from ..progress import Steps
-from .signature import FINE, POINTS, SMOOTHING, SQUASH, Signature, pair_costs
+from .signature import FINE, POINTS, SMOOTHING, SQUASH, Signature, pair_costs, sound_parts
 
 # Triangles are cut into as many squared at most.
 FINEST = 8
@@ -72,21 +71,17 @@ def _outlined(
     positions: np.ndarray, triangles: np.ndarray, centre: int, start: int
 ) -> tuple[np.ndarray, np.ndarray, int, int]:
     """The part of the centre, with all its holes filled but that of the start; and both markers in it."""
-    if not len(triangles):
-        raise EmptyMeshError("There are no faces to compare")
-    check_finite(positions, triangles)
     remedy = "Mark one vertex inside, and one of the boundary around it"
-    label = graph_components(*halfedges(triangles), len(positions))[1]
-    used, local = np.unique(triangles[label[triangles[:, 0]] == label[centre]], return_inverse=True)
-    for vertex, name in ((centre, "centre"), (start, "start")):
-        if vertex not in used:
-            raise LandmarkError(f"The marker of the {name} is no vertex of the part", remedy, "vertex", [vertex])
-    faces, vertices = local.reshape(-1, 3).astype(np.int64), positions[used]
-    inner, outer = (int(k) for k in np.searchsorted(used, [centre, start]))
-    try:
-        loops = boundary_loops(faces)
-    except (ValueError, IndexError) as error:
-        raise NotADiskError("The boundary is no set of loops", "Merge vertices that coincide") from error
+    part = next((part for part in sound_parts(positions, triangles) if (part.vertex_ids == centre).any()), None)
+    if part is None:
+        raise LandmarkError("The marker of the centre is on no face", remedy, "vertex", [centre])
+    vertices, faces = part.vertices, part.triangles
+    loops = boundary_loops(faces)
+    # A vertex where the boundary meets itself is several ones by now: the first counts.
+    places = [np.flatnonzero(part.vertex_ids == vertex) for vertex in (centre, start)]
+    if not len(places[1]):
+        raise LandmarkError("The marker of the start is on another part than the centre", remedy, "vertex", [start])
+    inner, outer = (int(found[0]) for found in places)
     own = [loop for loop in loops if outer in loop]
     if not own:
         raise LandmarkError("The marker of the start is on no boundary", remedy, "vertex", [start])

@@ -14,12 +14,15 @@ from scipy.spatial import cKDTree
 
 from ..analysis.curvature import mean_curvature
 from ..conformal.moebius import centre_on_sphere
-from ..errors import EmptyMeshError, NotASphereError, ZeroAreaFaceError
+from ..errors import EmptyMeshError, ZeroAreaFaceError
+from ..mesh.charts import Chart, charts_of
 from ..mesh.geometry import face_areas, vertex_areas
+from ..mesh.gluing import orientations, turn_over
 from ..mesh.point_location import locate
-from ..mesh.spherical_geometry import fibonacci_sphere, normalized
-from ..mesh.surface import check_finite
-from ..mesh.topology import boundary_loops, graph_components, halfedges, with_fans
+from ..mesh.repair import repaired_gluing
+from ..mesh.spherical_geometry import fibonacci_sphere, normalized, signed_volumes
+from ..mesh.surface import check_finite, triangle_surface
+from ..mesh.topology import boundary_loops, with_fans
 from ..progress import Steps
 from ..sphere.sphere_map import sphere_map
 
@@ -121,19 +124,31 @@ def closed_part(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarra
     Raises
     ------
     EmptyMeshError, NonFiniteError, ZeroAreaFaceError : nothing, or coordinates that are no numbers, or no area
-    NotASphereError : a boundary that is no loop
+    """
+    parts = sound_parts(positions, triangles)
+    area = [face_areas(part.vertices, part.triangles).sum() for part in parts]
+    if not max(area) > 0:
+        raise ZeroAreaFaceError("The surface has no area", "Give a mesh whose faces are no lines and no points")
+    part = parts[int(np.argmax(area))]
+    vertices, faces = with_fans(part.vertices, part.triangles, boundary_loops(part.triangles))
+    # A mirror image with the faces of before is inside out.
+    inside_out = signed_volumes(vertices - vertices.mean(axis=0), faces).sum() < 0
+    return vertices, faces[:, ::-1] if inside_out else faces
+
+
+def sound_parts(positions: np.ndarray, triangles: np.ndarray) -> list[Chart]:
+    """The parts of a mesh (n,3), (m,3), each with two faces at most at every edge, which agree about what is outside,
+    and one fan at every vertex: open where it is not so.
+
+    Raises
+    ------
+    EmptyMeshError, NonFiniteError : nothing, or coordinates that are no numbers
     """
     if not len(triangles):
         raise EmptyMeshError("There are no faces to compare")
     check_finite(positions, triangles)
-    label = graph_components(*halfedges(triangles), len(positions))[1][triangles[:, 0]]
-    area = np.bincount(label, face_areas(positions, triangles))
-    if not area.max() > 0:
-        raise ZeroAreaFaceError("The surface has no area", "Give a mesh whose faces are no lines and no points")
-    used, local = np.unique(triangles[label == area.argmax()], return_inverse=True)
-    faces, vertices = local.reshape(-1, 3).astype(np.int64), positions[used]
-    try:
-        loops = boundary_loops(faces)
-    except (ValueError, IndexError) as error:
-        raise NotASphereError("The boundary is no set of loops", "Merge vertices that coincide") from error
-    return with_fans(vertices, faces, loops)
+    surface = triangle_surface(positions, triangles)
+    every = np.ones(len(triangles), bool)
+    gluing = repaired_gluing(surface, every, surface.triangles, surface.triangle_face).gluing
+    turned, _ = orientations(gluing, face_areas(positions, triangles))
+    return charts_of(surface, turn_over(gluing, turned))

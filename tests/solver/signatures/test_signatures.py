@@ -8,7 +8,7 @@ import pytest
 import sphere_shapes
 
 from omt_uv.solver import errors
-from omt_uv.solver.mesh.spherical_geometry import fibonacci_sphere
+from omt_uv.solver.mesh.spherical_geometry import fibonacci_sphere, signed_volumes
 from omt_uv.solver.progress import drain
 from omt_uv.solver.registration.alignment import rotation_grid
 from omt_uv.solver.signatures.harmonics import grid_matrices, harmonics
@@ -83,6 +83,21 @@ def test_holes_are_filled_and_small_parts_left_out():
     W, G = meshes.icosphere(1)
     P, T = closed_part(np.concatenate([V, 0.1 * W + 9]), np.concatenate([F, G + len(V)]))
     assert len(P) == len(V) + 1 and len(P) - len(T) // 2 == 2
+
+
+def test_what_is_pinched_or_inside_out_is_compared_all_the_same():
+    V, F = sphere_shapes.blob(seed=0)
+    n = len(V)
+    # A fin on an edge, and another blob that hangs by a vertex.
+    fin = np.concatenate([F, [[F[0, 0], F[0, 1], n]]])
+    P, T = closed_part(np.concatenate([V, V[:1] * 1.2]), fin)
+    assert len(P) - len(T) // 2 == 2 and abs(len(T) - len(F)) <= 6
+    hanging = np.where(F == 0, 0, F + n - 1)
+    P, T = closed_part(np.concatenate([V, 0.5 * (V[1:] - V[0]) + V[0]]), np.concatenate([F, hanging]))
+    assert len(P) == n and len(T) == len(F)
+    for faces in (F, F[:, ::-1]):
+        P, T = closed_part(V, faces)
+        assert signed_volumes(P, T).sum() > 0
 
 
 def test_handles_are_named():
