@@ -23,6 +23,7 @@ check: $(STAMP)
 papers: $(STAMP)
 	$(PY) scripts/papers/zhao_2013.py
 	$(PY) scripts/papers/su_2015.py
+	$(PY) scripts/papers/su_registration.py
 	$(PY) scripts/papers/dominitz_tannenbaum_2010.py
 	$(PY) scripts/papers/gu_2018.py
 	$(PY) scripts/papers/hu_2014.py

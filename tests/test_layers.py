@@ -71,7 +71,7 @@ ARROWS: dict[str, str] = {
     "xatlas_charts",
     "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
     "solver.registration.charts "
-    "solver.strain solver.canonical solver.partition solver.signatures pipelines",
+    "solver.strain solver.canonical solver.partition solver.signatures solver.flows pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
     "pipelines.measuring": "solver solver.mesh solver.maps solver.canonical solver.conformal solver.cutting "
     "solver.sphere solver.transport pipelines",

@@ -88,7 +88,8 @@ def _shape_files(options: argparse.Namespace) -> list[Path]:
 def _registered(options: argparse.Namespace, files: list[Path]):
     """All shapes with the vertices of the first, its surface, and its polygons."""
     from ...pipelines.shapes.landmark_pairs import pairs_of
-    from ...pipelines.shapes.match import MatchJob, match_surfaces
+    from ...pipelines.shapes.match import MatchJob
+    from ...pipelines.shapes.wrap import wrap_surfaces
     from ...solver.registration.results import RegistrationOptions
 
     first, shapes, polygons = None, [], []
@@ -105,7 +106,7 @@ def _registered(options: argparse.Namespace, files: list[Path]):
         with refusals(name=obj.name):
             pairs = pairs_of(first_landmarks, landmarks, (shapes[0].name, obj.name))
             job = MatchJob(first, surface, pairs, RegistrationOptions(), first.seams[:0])
-            found = drain_shown(match_surfaces(job))
+            found = drain_shown(wrap_surfaces(job))
         shapes.append(Registered(path, obj.name, found.wrapped, True))
         for text in found.warnings:
             warn_of(f"{obj.name}: {text}")

@@ -121,6 +121,7 @@ def _match(options: argparse.Namespace, source, target):
     from ...pipelines.shapes.landmark_pairs import pairs_of, read_pairs
     from ...pipelines.shapes.match import match_surfaces
     from ...pipelines.shapes.onto import transferred
+    from ...pipelines.shapes.wrap import wrap_surfaces
     from ...solver.registration.results import RegistrationOptions
 
     if options.landmarks.endswith(".json"):
@@ -136,7 +137,7 @@ def _match(options: argparse.Namespace, source, target):
     )
     job = match_job(source[1], target[1], pairs, settings)
     with refusals(name=f"{source[3]}, {target[3]}"):
-        result = drain_shown(match_surfaces(job))
+        result = drain_shown((wrap_surfaces if options.wrap else match_surfaces)(job))
         attributes = None if options.wrap else transferred(job, result, source[1].attributes)
     told = [*source[1].warnings, *target[1].warnings, *result.warnings]
     return result, attributes, told

@@ -16,6 +16,8 @@ from ...session import run
 from ..base import Complaint, SolverOperator, complaints, warn
 
 KEY = "OMT Match"
+# Modes that write the shape of the target.
+SHAPING = ("WRAP", "MORPH")
 
 
 def source_and_target(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object]:
@@ -106,7 +108,7 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
         from ...solver.registration.results import RegistrationOptions
 
         source, target = source_and_target(context)
-        if self.mode in ("WRAP", "MORPH") and not self.shape_key:
+        if self.mode in SHAPING and not self.shape_key:
             raise Complaint("The shape key has no name. Name the one to write.")
         with complaints(source):
             first = stretched_offsets(read_carrier(source))
@@ -114,7 +116,7 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
             second = read_carrier(target)
         with complaints():
             check_room(target, first.attributes, self.kinds())
-            for obj in (source,) if self.mode in ("WRAP", "MORPH") else (source, target)[self.mode == "TRANSFER" :]:
+            for obj in (source,) if self.mode in SHAPING else (source, target)[self.mode == "TRANSFER" :]:
                 check_local(obj)
             points = (read_landmarks(source, self.landmark_prefix), read_landmarks(target, self.landmark_prefix))
             pairs = (
@@ -128,7 +130,7 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
                 features=self.features,
             )
             job = match_job(first, second, pairs, options)
-            result, attributes = yield from run.aside(_matched(job, first, self.mode == "TRANSFER"))
+            result, attributes = yield from run.aside(_matched(job, first, self.mode))
         return source, target, first, job, result, attributes, second.warnings
 
     def finish(self, context: bpy.types.Context, result) -> None:
@@ -157,21 +159,23 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
 def _figures(match) -> tuple[tuple[str, str], ...]:
     """Rows for the panel."""
     count, met = len(match.found.met), int(match.found.met.sum())
-    return (
+    rows = (
         ("Landmarks met", f"{met} of {count}" if count else "none set"),
         ("Flipped", f"{100 * match.found.flipped:.2g} %"),
         ("Area ratio, mean", f"{match.figures.mean_area:.2f}"),
         ("Distance, rms", f"{100 * match.fit:.2g} %"),
     )
+    return rows if match.intersections is None else (*rows, ("Faces that meet", str(match.intersections)))
 
 
-def _matched(job, carried, transfer: bool):
+def _matched(job, carried, mode: str):
     """The match, and, to transfer, the attributes of the target and how many faces reach across a seam."""
     from ...pipelines.shapes.match import match_surfaces
     from ...pipelines.shapes.onto import transferred
+    from ...pipelines.shapes.wrap import wrap_surfaces
 
-    result = yield from match_surfaces(job)
-    return result, transferred(job, result, carried.attributes) if transfer else None
+    result = yield from (wrap_surfaces if mode in SHAPING else match_surfaces)(job)
+    return result, transferred(job, result, carried.attributes) if mode == "TRANSFER" else None
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
@@ -181,7 +185,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
     layout.prop(properties, "mode")
     if properties.mode == "TRANSFER":
         layout.column(align=True).prop(properties, "transfer")
-    if properties.mode in ("WRAP", "MORPH"):
+    if properties.mode in SHAPING:
         layout.prop(properties, "shape_key")
     if properties.mode == "MORPH":
         layout.prop(properties, "factor", slider=True)

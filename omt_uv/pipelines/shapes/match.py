@@ -43,7 +43,8 @@ class MatchResult:
 
     wrapped (n,3): the source's vertices on the target; source_faces (k,) and source_barycentric (k,3): triangle of the
     source's surface and coordinates of every vertex of the target; found: of the matched parts
-    landmarks: names; figures: see `strain.figures`; warnings
+    landmarks: names; figures: see `strain.figures`; fit: see `distance_from`; intersections: pairs of faces of a
+    wrapped source that pass through one another and did not before, None where nothing was wrapped; warnings
     """
 
     wrapped: np.ndarray
@@ -54,6 +55,7 @@ class MatchResult:
     figures: MatchFigures
     fit: float
     warnings: tuple[str, ...]
+    intersections: int | None = None
 
     def report(self) -> dict:
         """Figures for a JSON file."""
@@ -71,13 +73,14 @@ class MatchResult:
             },
             "area_distortion": {"mean": self.figures.mean_area, "histogram": self.figures.area.round(6).tolist()},
             "fit_rms": self.fit,
+            **({} if self.intersections is None else {"intersections": self.intersections}),
             "steps": list(self.found.steps),
             "warnings": list(self.warnings),
         }
 
 
 @dataclass(frozen=True)
-class _Part:
+class MatchedPart:
     """The largest part of a surface: its vertices (k,) and triangles (m,) there, and both as arrays of their own."""
 
     used: np.ndarray
@@ -96,7 +99,7 @@ def match_surfaces(job: MatchJob) -> Steps[MatchResult]:
     MeshError : see `registration.register`; elements are those of the surface that the message names
     """
     yield Progress("Reading", 0.0)
-    source, target = _largest(job.source, "source"), _largest(job.target, "target")
+    source, target = largest_part(job.source, "source"), largest_part(job.target, "target")
     own, other = (source.vertices, source.triangles), (target.vertices, target.triangles)
     landmarks = landmarks_on(_renamed(job.pairs, source, target), own, other)
     if job.options.domain == CHARTS:
@@ -125,12 +128,12 @@ def match_surfaces(job: MatchJob) -> Steps[MatchResult]:
         found=found,
         landmarks=landmarks,
         figures=match_figures(own, other, image, wrapped[source.used]),
-        fit=_fit(other, wrapped[source.used], source.triangles),
+        fit=distance_from(other, wrapped[source.used], source.triangles),
         warnings=tuple(warnings),
     )
 
 
-def _renamed(pairs: Pairs, source: _Part, target: _Part) -> Pairs:
+def _renamed(pairs: Pairs, source: MatchedPart, target: MatchedPart) -> Pairs:
     """The pairs with vertices numbered as in the parts; one that is elsewhere gets a number that is in none."""
     sides = []
     for points, part in ((pairs.source, source), (pairs.target, target)):
@@ -140,7 +143,7 @@ def _renamed(pairs: Pairs, source: _Part, target: _Part) -> Pairs:
     return Pairs(*sides)
 
 
-def _largest(surface: Surface, name: str) -> _Part:
+def largest_part(surface: Surface, name: str) -> MatchedPart:
     """The part of a surface that has the most area."""
     triangles = surface.corner_vertex[surface.triangles]
     if not len(triangles):
@@ -153,10 +156,10 @@ def _largest(surface: Surface, name: str) -> _Part:
     rows = np.flatnonzero(part == area.argmax())
     used, inverse = np.unique(triangles[rows], return_inverse=True)
     rest = np.setdiff1d(np.unique(triangles), used)
-    return _Part(used, rows, surface.positions[used], inverse.reshape(-1, 3).astype(np.int64), rest)
+    return MatchedPart(used, rows, surface.positions[used], inverse.reshape(-1, 3).astype(np.int64), rest)
 
 
-def _seams(surface: Surface, part: _Part) -> np.ndarray:
+def _seams(surface: Surface, part: MatchedPart) -> np.ndarray:
     """The seams (s,2) of a surface that lie on its part, as vertices of that."""
     number = np.full(len(surface.positions), -1)
     number[part.used] = np.arange(len(part.used))
@@ -170,7 +173,9 @@ def _count_parts(surface: Surface) -> int:
     return len(np.unique(part[triangles[:, 0]]))
 
 
-def _back(surface: Surface, source: _Part, target: _Part, found: Registration) -> tuple[np.ndarray, np.ndarray]:
+def _back(
+    surface: Surface, source: MatchedPart, target: MatchedPart, found: Registration
+) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (k,) of the source's surface and coordinates (k,3) of all vertices of the target."""
     from scipy.spatial import cKDTree
 
@@ -179,7 +184,7 @@ def _back(surface: Surface, source: _Part, target: _Part, found: Registration) -
     return source.rows[found.backward.faces][near], found.backward.barycentric[near]
 
 
-def _carry_parts(wrapped: np.ndarray, surface: Surface, part: _Part) -> None:
+def _carry_parts(wrapped: np.ndarray, surface: Surface, part: MatchedPart) -> None:
     """Move smaller parts as the nearest vertices of the largest move: the similarity that fits them best."""
     if not len(part.rest):
         return
@@ -202,7 +207,7 @@ def _carry_parts(wrapped: np.ndarray, surface: Surface, part: _Part) -> None:
         wrapped[mine] = scale * (surface.positions[mine] - middle) @ ((left * sign) @ right).T + there
 
 
-def _fit(target: tuple[np.ndarray, np.ndarray], wrapped: np.ndarray, triangles: np.ndarray) -> float:
+def distance_from(target: tuple[np.ndarray, np.ndarray], wrapped: np.ndarray, triangles: np.ndarray) -> float:
     """Root mean square distance of the wrapped surface (n,3), (m,3) from the target, over the target's diagonal.
 
     Measured at the middles of the wrapped triangles, by area; its vertices lie on the target.

@@ -1,8 +1,9 @@
 """Find a map of few vertices, well begun: from landmarks that flow to their places, and from functional maps.
 
 A flow goes the short way, which around a limb may be the wrong way round, and then no descent leads out of it.
-Functional maps know no ways; what they find is put onto the domain and untangled there (`sphere.untangle`). Both are
-polished on the coarse mesh, and the one that distorts less is carried to all vertices.
+Functional maps know no ways, but fold: what they find guides maps without folds, from the flow and from what
+untangles it in the domain (`sphere.untangle`). All are polished on the coarse mesh, and the one that distorts less is
+carried to all vertices.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..mesh.geometry import face_areas, vertex_areas
 from ..mesh.spherical_geometry import signed_volumes
 from ..progress import Progress, Steps, part_of
 from .carriers import InPlace
@@ -19,7 +21,7 @@ from .coarse_meshes import FewVertices, coarse_mesh, far_vertices, on_coarse, st
 from .domains import SPHERE, Case
 from .functional_maps import refined_correspondence
 from .landmark_flow import Drawn, draw_landmarks, put_landmarks
-from .surface_newton import STRICT, deformation, in_space, minimise_on, without_folds
+from .surface_newton import STRICT, Features, deformation, in_space, minimise_on, without_folds
 
 # Vertices of the coarse mesh, and Newton steps on it.
 COARSE = 500
@@ -29,18 +31,28 @@ TOLERANCE = 1e-3
 SAMPLES = 1000
 # Energy, on surfaces of area 1, below which nothing else is tried.
 GOOD_ENERGY = 0.04
-# Rounds of functional maps, and steps of relaxation from which the polish starts in each.
+# Rounds of functional maps, and steps that relax what was untangled.
 ROUNDS = 2
-RELAXING_STEPS = (2, 5)
+RELAXING_STEPS = 5
+# Guides: their weight, Newton steps, and distances, on surfaces of area 1, beyond which they pull little: from far away
+# one after the other, and from near.
+GUIDE_WEIGHT = 30.0
+GUIDED_STEPS = 30
+FAR = (0.3, 0.1, 0.05)
+NEAR = (0.1,)
+# Energy over area of a face that counts half: a few faces that are stuck say little about a map.
+SATURATION = 0.5
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """A polished map of the coarse mesh: its places, the landmarks (l,) bool that are met, its energy, its steps."""
+    """A polished map of the coarse mesh: its places, the landmarks (l,) bool that are met, its energy, the distortion
+    by which it is compared, its steps."""
 
     placed: InPlace
     met: np.ndarray
     energy: float
+    distortion: float
     steps: int
 
 
@@ -53,36 +65,63 @@ def coarse_start(case: Case) -> Steps[Drawn]:
     flow = yield from part_of(_flowed(case, mesh), 0.0, 0.2)
     best = yield from part_of(_polished(case, mesh, flow.placed.domain, flow.met), 0.2, 0.2)
     if pair.domain == SPHERE:
-        best = yield from part_of(_improved(case, mesh, best), 0.4, 0.4)
+        best = yield from part_of(_improved(case, mesh, flow, best), 0.4, 0.4)
     moved = mesh.carried(best.placed.domain, case.aligned)
     return (yield from _finished(case, moved, best.met, flow.steps + best.steps))
 
 
-def _improved(case: Case, mesh: FewVertices, best: _Trial) -> Steps[_Trial]:
-    """The best of a map and of those that functional maps make of it, again as long as that helps."""
+def _improved(case: Case, mesh: FewVertices, flow: Drawn, best: _Trial) -> Steps[_Trial]:
+    """The best of a map that a flow began and of those that functional maps guide, again as long as that helps."""
     for k in range(ROUNDS):
         if best.energy < GOOD_ENERGY and best.met.all():
             return best
-        places = yield from part_of(_corresponding(case, mesh, best.placed.domain), k / ROUNDS, 0.5 / ROUNDS)
-        if places is None:
-            return best
+        places = yield from part_of(_corresponding(case, mesh, best.placed.domain), k / ROUNDS, 0.3 / ROUNDS)
+        guide = case.carrier.place(places).positions
+        starts = [(flow.placed.domain, flow.met, FAR)]
+        held = np.zeros(len(places), bool)
+        held[mesh.landmarks] = True
+        straight = yield from straightened(mesh.domain, mesh.triangles, places, held)
+        if (signed_volumes(straight, mesh.triangles) > 0).all():
+            relaxed = yield from _relaxed(case, mesh, straight)
+            starts += [(start, np.ones(len(best.met), bool), NEAR) for start in (straight, relaxed)]
         tried = [best]
-        for relaxing in RELAXING_STEPS:
-            relaxed = yield from _relaxed(case, mesh, places, relaxing)
-            found = yield from _polished(case, mesh, relaxed, np.ones(len(best.met), bool))
+        for start, met, widths in starts:
+            guided = yield from _guided(case, mesh, (start, met), guide, widths)
+            found = yield from _polished(case, mesh, guided, met)
             tried.append(replace(found, steps=found.steps + best.steps))
-        before, best = best, min(tried, key=lambda trial: (int((~trial.met).sum()), trial.energy))
+        before, best = best, min(tried, key=lambda trial: (int((~trial.met).sum()), trial.distortion))
         if best is before:
             return best
     return best
 
 
-def _relaxed(case: Case, mesh: FewVertices, places: np.ndarray, most: int) -> Steps[np.ndarray]:
+def _guided(case: Case, mesh: FewVertices, begun: tuple, guide: np.ndarray, widths) -> Steps[np.ndarray]:
+    """Places (k,d) that are drawn towards points of the target (k,3), as far as nothing folds.
+
+    begun : places (k,d) to start from, and which landmarks (l,) bool are met there
+    """
+    domain, met = begun
+    reference = case.pair.vertices[mesh.chosen]
+    area = vertex_areas(reference, mesh.triangles)
+    share = GUIDE_WEIGHT * area / area.sum()
+    carrier = case.carrier.sliding(mesh.loop)
+    for width in widths:
+        features = Features(guide / width, case.pair.target.vertices / width, share)
+        problem = deformation(reference, mesh.triangles, carrier, features, domain)
+        placed = carrier.place(domain)
+        placed.put(mesh.landmarks[met], case.targets, met)
+        problem.held[mesh.landmarks[met]] = True
+        placed, _ = yield from minimise_on(problem, placed, GUIDED_STEPS, TOLERANCE, "Polishing")
+        domain = placed.domain
+    return domain
+
+
+def _relaxed(case: Case, mesh: FewVertices, places: np.ndarray) -> Steps[np.ndarray]:
     """Places (k,d) after a few Newton steps within the domain: what was only just straightened would be stuck."""
     carrier = case.domain_carrier(mesh.loop)
     problem = deformation(in_space(mesh.domain), mesh.triangles, carrier)
     problem.held[mesh.landmarks] = True
-    placed, _ = yield from minimise_on(problem, carrier.place(places), most, STRICT, "Polishing")
+    placed, _ = yield from minimise_on(problem, carrier.place(places), RELAXING_STEPS, STRICT, "Polishing")
     return placed.domain
 
 
@@ -114,14 +153,13 @@ def _polished(case: Case, mesh: FewVertices, domain: np.ndarray, met: np.ndarray
     placed, steps = yield from minimise_on(problem, placed, COARSE_STEPS, TOLERANCE, "Polishing")
     if not met.all():
         placed, met = put_landmarks(problem, placed, mesh.landmarks, case.targets)
-    return _Trial(placed, met, replace(problem, within=None).energy(placed), steps)
+    each = problem.energies(placed)
+    distortion = float((each / (1 + each / (SATURATION * face_areas(reference, mesh.triangles)))).sum())
+    return _Trial(placed, met, replace(problem, within=None).energy(placed), distortion, steps)
 
 
-def _corresponding(case: Case, mesh: FewVertices, start: np.ndarray) -> Steps[np.ndarray | None]:
-    """Places (k,3) of the coarse mesh on the sphere where functional maps have them, from a start there, untangled.
-
-    None where folds are left.
-    """
+def _corresponding(case: Case, mesh: FewVertices, start: np.ndarray) -> Steps[np.ndarray]:
+    """Places (k,3) of the coarse mesh on the sphere where functional maps have them, from a start; they may fold."""
     yield Progress("Functional maps", 0.0)
     pair, target = case.pair, case.pair.target
     samples = far_vertices(pair.vertices, mesh.chosen, np.zeros(0, np.int64), SAMPLES)
@@ -134,10 +172,7 @@ def _corresponding(case: Case, mesh: FewVertices, start: np.ndarray) -> Steps[np
     # The coarse mesh's vertices are the first of the samples, sorted.
     places = case.carrier.domain[found[np.argsort(np.argsort(mesh.chosen))]]
     places[mesh.landmarks] = case.targets.domain
-    held = np.zeros(len(places), bool)
-    held[mesh.landmarks] = True
-    places = yield from part_of(straightened(mesh.domain, mesh.triangles, places, held), 0.7, 0.3)
-    return places if (signed_volumes(places, mesh.triangles) > 0).all() else None
+    return places
 
 
 def _finished(case: Case, moved: np.ndarray, met: np.ndarray, steps: int) -> Steps[Drawn]:

@@ -15,6 +15,7 @@ import numpy as np
 from ..mesh.closest_point import ClosestPoint
 from ..mesh.geometry import face_areas, halfedge_lengths, vertex_areas, vertex_normals
 from ..mesh.point_location import locate
+from ..mesh.spherical_geometry import normalized
 from ..progress import Progress, Steps, part_of
 from .alignment import moebius_of_pairs, rotation_by_search, rotation_of_pairs, turn_by_search
 from .carriers import InPlace, TargetCarrier
@@ -41,6 +42,7 @@ def register(
     target: tuple[np.ndarray, np.ndarray],
     landmarks: Landmarks | None = None,
     options: RegistrationOptions | None = None,
+    maps: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
 ) -> Steps[Registration]:
     """Match a source, vertices (n,3) and triangles (m,3), with a target (k,3), (l,3).
 
@@ -48,9 +50,12 @@ def register(
     ----------
     landmarks : pairs of points that are to meet; without any, the rotation of the domains is searched for
     options : see `RegistrationOptions`
+    maps : of the source (n,d) and of the target (k,d) to the domain, where they are known, as `domains.domain_map`
+        makes them of `domains.filled` surfaces: what is matched with many is mapped once
 
     Raises
     ------
+    ValueError : a map has not as many rows as its surface has vertices
     MeshError : what is no manifold surface of one part; TopologyMismatchError: handles, or one closed and one open in
         a disk; LandmarkError: landmarks that coincide, are mirrored, or, if strict, cannot be met
 
@@ -68,9 +73,7 @@ def register(
     if options.mirrored:
         vertices, triangles, landmarks = reflected(vertices, triangles, landmarks)
     pair = prepared((vertices, triangles), (others, other_triangles), landmarks, options.domain)
-    first = replace(pair.source, vertices=pair.split.vertices, triangles=pair.split.triangles)
-    source_map = yield from part_of(domain_map(first, pair.domain, options.balance), *SOURCE_MAP)
-    target_map = yield from part_of(domain_map(pair.target, pair.domain, options.balance), *TARGET_MAP)
+    source_map, target_map = yield from _domain_maps(pair, landmarks, options, maps)
     aligned, error = _aligned(pair, source_map[pair.order], target_map, landmarks)
     carrier = TargetCarrier(pair.target.vertices, pair.target.triangles, target_map, pair.loop)
     case = Case(pair, aligned, carrier, _features(pair, options.features))
@@ -81,6 +84,29 @@ def register(
         backward = found.backward
         found = replace(found, backward=replace(backward, barycentric=backward.barycentric[:, [0, 2, 1]]))
     return with_missed(found, landmarks, options.strict)
+
+
+def _domain_maps(pair: Pair, landmarks: Landmarks, options: RegistrationOptions, known) -> Steps:
+    """The maps of both to the domain, (n,d) with landmarks as vertices and (k,d); those that are known as they are."""
+    sides = (pair.source, pair.target)
+    for places, surface, name in zip(known, sides, ("source", "target"), strict=True):
+        if places is not None and len(places) != len(surface.vertices):
+            raise ValueError(f"the map of the {name} has {len(places)} rows, and its surface {len(surface.vertices)}")
+    if known[0] is None:
+        first = replace(pair.source, vertices=pair.split.vertices, triangles=pair.split.triangles)
+        source_map = yield from part_of(domain_map(first, pair.domain, options.balance), *SOURCE_MAP)
+    else:
+        places = known[0] * ([-1] + [1] * (known[0].shape[1] - 1) if options.mirrored else 1)
+        new = pair.split.landmarks >= len(places)
+        corners = pair.source.triangles[landmarks.source_faces[new]]
+        added = np.zeros((len(pair.split.vertices) - len(places), places.shape[1]))
+        inside = np.einsum("kc,kcd->kd", landmarks.source_barycentric[new], places[corners])
+        added[pair.split.landmarks[new] - len(places)] = normalized(inside) if pair.domain == SPHERE else inside
+        source_map = np.concatenate([places, added])
+    target_map = known[1]
+    if target_map is None:
+        target_map = yield from part_of(domain_map(pair.target, pair.domain, options.balance), *TARGET_MAP)
+    return source_map, target_map
 
 
 def _as_arrays(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,6 +16,7 @@ from omt_uv.solver.errors import (
 )
 from omt_uv.solver.progress import drain
 from omt_uv.solver.registration import RegistrationOptions, vertex_landmarks
+from omt_uv.solver.registration.domains import domain_map, filled
 from omt_uv.solver.registration.register import register
 from omt_uv.solver.registration.results import stretches
 
@@ -60,6 +61,26 @@ def test_there_and_back_again():
     again = np.einsum("nc,ncd->nd", found.forward.barycentric, back[G[found.forward.faces]])
     assert np.linalg.norm(again - V, axis=1).mean() < 0.02
     assert found.residuals.max() < 1e-6 and found.flipped == 0
+
+
+def test_maps_that_are_known_are_taken():
+    V, F, chosen = shape()
+    W, G, name = renumbered(V * [1.2, 0.9, 1.0], F)
+    landmarks = vertex_landmarks((chosen, F), (name[chosen], G))
+    # One within a triangle, which is no vertex of the map.
+    landmarks.source_barycentric[0] = landmarks.target_barycentric[0] = np.array([0.5, 0.3, 0.2])
+    maps = tuple(drain(domain_map(filled(each, "sphere", ""), "sphere", 0.5)) for each in ((V, F), (W, G)))
+    found = drain(register((V, F), (W, G), landmarks, maps=maps))
+    fresh = drain(register((V, F), (W, G), landmarks))
+    assert found.flipped == 0 and found.met.all()
+    away = found.forward.positions(W, G) - fresh.forward.positions(W, G)
+    assert np.linalg.norm(away, axis=1).max() < 0.01
+    assert np.allclose(found.target_domain, maps[1])
+    mirrored = drain(register((V * [-1, 1, 1], F[:, [0, 2, 1]]), (V, F), None, RegistrationOptions(mirrored=True),
+                              (maps[0] * [-1, 1, 1], maps[0])))  # fmt: skip
+    assert np.linalg.norm(mirrored.forward.positions(V, F) - V, axis=1).max() < 0.02
+    with pytest.raises(ValueError, match="3 rows"):
+        drain(register((V, F), (W, G), maps=(maps[0][:3], None)))
 
 
 def test_landmarks_far_from_where_they_would_go_are_met():
