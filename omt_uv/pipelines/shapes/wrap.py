@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...solver.flows.creases import without_new_intersections
+from ...solver.flows.self_intersections import FaceCrossings
 from ...solver.mesh.geometry import face_areas
 from ...solver.progress import Progress, Steps, part_of
 from .match import MatchJob, MatchResult, distance_from, largest_part, match_surfaces
@@ -19,7 +20,7 @@ def wrap_surfaces(job: MatchJob) -> Steps[MatchResult]:
     """The same as `match_surfaces`, the source's faces apart where they are apart on the source.
 
     All vertices of a wrapped surface lie on the target, but the flat faces between them cut its creases short, and may
-    meet across one. Around those the wrap is blended with the affine map of the source that is nearest to it.
+    meet across one. They are moved behind planes that are between them on the source, carried along.
     """
     result = yield from part_of(match_surfaces(job), 0.0, MATCHING)
     yield Progress("Wrapping", MATCHING)
@@ -31,7 +32,7 @@ def wrap_surfaces(job: MatchJob) -> Steps[MatchResult]:
         before = before * [-1, 1, 1]
     free = np.ones(len(before), bool)
     free[source.triangles[result.landmarks.source_faces].ravel()] = False
-    positions, pairs = without_new_intersections(before, after, source.triangles, free)
+    positions, pairs = without_new_intersections(before, after, FaceCrossings(source.triangles), free)
     wrapped, warnings = result.wrapped.copy(), result.warnings
     wrapped[source.used] = positions
     if len(pairs):

@@ -77,7 +77,7 @@ def _improved(case: Case, mesh: FewVertices, flow: Drawn, best: _Trial) -> Steps
             return best
         places = yield from part_of(_corresponding(case, mesh, best.placed.domain), k / ROUNDS, 0.3 / ROUNDS)
         guide = case.carrier.place(places).positions
-        starts = [(flow.placed.domain, flow.met, FAR)]
+        starts: list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]] = [(flow.placed.domain, flow.met, FAR)]
         held = np.zeros(len(places), bool)
         held[mesh.landmarks] = True
         straight = yield from straightened(mesh.domain, mesh.triangles, places, held)
