@@ -78,3 +78,12 @@ def test_a_new_layer_is_a_copy_and_becomes_the_active_one(blender_mesh):
     assert (scenes.uv_of(obj, "New") == scenes.uv_of(obj, "UVMap")).all()
     with pytest.raises(blender_mesh.TargetError, match="too long"):
         blender_mesh.check_target(obj, "ä" * 32)
+
+
+@pytest.mark.parametrize("scales, flat", [
+    ((1, 1, 1), False), ((1, 1, 0), True), ((0, 0, 0), True), ((-2, 1, 1), False), ((1, 1, 1e-6), False),
+    ((1, 1, 1e-13), True), ((1e-8, 1e-8, 1e-8), False), ((1e6, 1e6, 0), True), ((-1e-9, 1, 1), False)])  # fmt: skip
+def test_what_is_flattened_is_told_at_any_size(package, scales, flat):
+    turn = np.array(Euler((0.3, 0.4, 0.5)).to_matrix())
+    for matrix in (np.diag(scales), turn.T @ np.diag(scales) @ turn):
+        assert package("blender.mesh").is_flattened(matrix.astype(float)) == flat

@@ -64,3 +64,13 @@ def test_axes_reach_over_the_surface_and_no_farther():
     assert (axis.low, axis.high) == (0, 3) and [text for _, text in axis.ticks] == ["1", "2", "4", "8"]
     assert axis.places(np.array([0.0, 3.0])) == pytest.approx([0, 1])
     assert np.array_equal(axis.scale(np.array([1.0])), shear_colours(np.array([8.0])))
+
+
+def test_ends_and_middle_of_the_scales_have_their_colours():
+    first, middle, last = np.array([[68, 1, 84], [33, 144, 141], [253, 231, 37]]) / 255
+    np.testing.assert_allclose(shear_colours(np.array([0.5, 1, 2, 4, 9])), [first, first, middle, last, last])
+    blue, white, red = np.array([[5, 48, 97], [247, 247, 247], [103, 0, 31]]) / 255
+    np.testing.assert_allclose(area_colours(np.array([-3.0, -2, 0, 2, 5])), [blue, blue, white, red, red])
+    # Half an octave of shear, an octave of area: the anchors between.
+    np.testing.assert_allclose(shear_colours(np.array([2**0.5]))[0], np.array([59, 81, 139]) / 255)
+    np.testing.assert_allclose(area_colours(np.array([-1.0, 1.0])) * 255, [[67, 147, 195], [214, 96, 77]])

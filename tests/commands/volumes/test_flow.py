@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import bpy
 
@@ -58,3 +59,15 @@ def test_what_makes_no_sense_is_refused(run, ball):
     (ball / "h.json").write_text("[]")
     status, _, err = run(*words)
     assert status == 1 and "no list of handles" in err
+
+
+def test_the_ball_that_keeps_a_flow_in_is_around_all_bodies_wherever_they_are(package, monkeypatch):
+    V, _ = icosphere(2)
+    flow, made = package("commands.volumes.flow"), []
+    monkeypatch.setattr(package("solver.flows.domain"), "ball_domain", lambda *given: made.append(given))
+    bodies = [SimpleNamespace(positions=V * [1, 1, 2] + [40.0, -70, 5]), SimpleNamespace(positions=V + [43.0, -70, 5])]
+    flow._domain(SimpleNamespace(inside="ball"), bodies)
+    ((middle, radius),) = made
+    np.testing.assert_allclose(middle, [41.5, -70, 5])
+    distance = np.linalg.norm(np.concatenate([body.positions for body in bodies]) - middle, axis=1)
+    assert radius == pytest.approx(1.1 * distance.max())

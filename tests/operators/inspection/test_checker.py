@@ -89,3 +89,15 @@ def test_kept_materials_survive_a_file(tmp_path):
 def test_without_uvs_it_says_so():
     scenes.bump()
     assert "Unwrap the mesh first" in scenes.error_of(bpy.ops.uv.omt_checker)
+
+
+def test_textures_are_hidden_with_the_last_checker_only(package, monkeypatch):
+    hidden = []
+    monkeypatch.setattr(package("display.shading"), "hide_textures", hidden.append)
+    objects = [with_uvs(name) for name in "ABC"]
+    scenes.select(objects)
+    bpy.ops.uv.omt_checker()
+    for k, obj in enumerate(objects):
+        scenes.select([obj])
+        bpy.ops.uv.omt_checker_remove()
+        assert len(hidden) == (k == 2)

@@ -32,3 +32,13 @@ def test_what_is_wound_alike_has_no_lines_where_it_turns():
     surface, gluing = glued(*meshes.icosphere(1))
     none = turning_lines(gluing, components(gluing), np.zeros(len(gluing.triangles), dtype=bool))
     assert not none.any() and (cost_factors(surface, gluing) == 1).all()
+
+
+def test_every_component_has_a_curvature_those_without_inner_vertices_none():
+    (V, F), (W, G) = meshes.icosphere(1), meshes.grid(1, 1)
+    for parts in ([(V, F), (W, G)], [(W, G), (V, F)], [(W, G), (W, G)]):
+        starts = np.cumsum([0, *(len(v) for v, _ in parts)])
+        points = np.concatenate([v + 9.0 * k for k, (v, _) in enumerate(parts)])
+        surface, gluing = glued(points, np.concatenate([f + s for (_, f), s in zip(parts, starts, strict=False)]))
+        found = total_curvature(gluing, corner_classes(gluing), components(gluing), surface.positions)
+        np.testing.assert_allclose(found, [4 * np.pi if v is V else 0 for v, _ in parts], atol=1e-9)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from sphere_shapes import random_sphere
 
+from omt_uv.solver.globe import exact_areas
 from omt_uv.solver.globe.exact_areas import correct_areas, equirectangular_areas
 from omt_uv.solver.globe.projections import EQUIRECT, LAMBERT, OCTAHEDRAL, PROJECTIONS
 from omt_uv.solver.globe.unfolding import Polygons, unfold
@@ -72,3 +75,23 @@ def test_equirectangular_faces_keep_the_areas_of_their_images():
     np.testing.assert_array_equal(target[middle], straight[middle])
     # The square has the area 1; what is missing is at the poles, where half of every row is covered.
     assert 0.9 < target.sum() < 1
+
+
+def test_lengths_on_the_sphere_are_those_of_the_projection():
+    """Squared lengths of the unit directions beside differences of the points that a cylinder stands for."""
+    rng = np.random.default_rng(0)
+    uv = np.column_stack([rng.random(40), np.linspace(0.1, 0.9, 40)])
+    unfolded = SimpleNamespace(uv=uv, poles=np.zeros(40, bool))
+    sines = {EQUIRECT: lambda v: np.sin(np.pi * (v - 0.5)), LAMBERT: lambda v: 2 * v - 1}
+
+    def point(uv, sine):
+        z = sine(uv[:, 1])
+        return np.column_stack([np.sqrt(1 - z * z) * f(2 * np.pi * uv[:, 0]) for f in (np.cos, np.sin)] + [z])
+
+    for projection, sine in sines.items():
+        found = exact_areas._sphere_metric(unfolded, projection)
+        for axis, step in enumerate(1e-6 * np.eye(2)):
+            true = (((point(uv + step, sine) - point(uv - step, sine)) / 2e-6) ** 2).sum(axis=1)
+            inside = slice(2, -2)
+            np.testing.assert_allclose(found[inside, axis], true[inside], rtol=1e-5)
+    np.testing.assert_allclose(exact_areas._sphere_metric(unfolded, OCTAHEDRAL), 4 * np.pi)

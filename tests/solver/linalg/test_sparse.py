@@ -6,7 +6,15 @@ import pytest
 import scipy.sparse as sp
 
 from omt_uv.solver.errors import PrecisionError
-from omt_uv.solver.linalg.sparse import Factor, fill, minimum_degree, solve_general, solve_spd
+from omt_uv.solver.linalg.sparse import (
+    Factor,
+    conjugate_gradients,
+    fill,
+    minimum_degree,
+    solve_conjugate_gradients,
+    solve_general,
+    solve_spd,
+)
 from omt_uv.solver.mesh.geometry import cotangent_laplacian
 
 
@@ -53,3 +61,21 @@ def test_a_singular_matrix_is_named():
         solve_spd(sp.csc_matrix((3, 3)), np.ones(3))
     with pytest.raises(PrecisionError):
         solve_spd(sp.diags([1.0, np.nan, 1.0]), np.ones(3))
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-10])
+def test_conjugate_gradients_leave_no_more_than_their_tolerance(tolerance):
+    A, b = system()
+    b = b[:, 0]
+    x = solve_conjugate_gradients(A, b, tolerance, 2000)
+    left = np.linalg.norm(A @ x - b) / np.linalg.norm(b)
+    assert left <= tolerance * (1 + 1e-6) and left > tolerance * 1e-3
+    assert not solve_conjugate_gradients(A, 0 * b).any()
+    # The error falls in the norm of A from one iteration to the next.
+    exact = solve_spd(A, b)
+    some = [solve_conjugate_gradients(A, b, 1e-300, k) - exact for k in range(6)]
+    energies = [e @ (A @ e) for e in some]
+    assert (np.diff(energies) < 0).all()
+    # Preconditioned by its inverse, one iteration is enough.
+    inverse = sp.csr_matrix(np.linalg.inv(A.toarray()))
+    np.testing.assert_allclose(conjugate_gradients(lambda y: A @ y, b, inverse, 1e-12, 1), exact, rtol=1e-6, atol=1e-9)

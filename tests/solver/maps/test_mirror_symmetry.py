@@ -63,3 +63,22 @@ def test_parts_and_restrictions():
     np.testing.assert_array_equal(
         whole.restricted(np.arange(3, 9), place).representative, mirror_symmetry(ONE).representative
     )
+
+
+@pytest.mark.parametrize("fixed", [[], [0], [4], [1, 4], range(4)], ids=str)
+def test_unknowns_are_all_symmetric_changes_that_leave_fixed_vertices(symmetry, fixed):
+    n = symmetry.images.shape[1]
+    held = np.isin(np.arange(n), fixed)
+    found = symmetry.unknowns(held).toarray()
+    changes = (found[0::2] + 1j * found[1::2]).T
+    for change in changes:
+        np.testing.assert_allclose(change[symmetry.images[0]], symmetry.phase * change.conj(), atol=1e-14)
+        np.testing.assert_allclose(symmetry.spread(change), change, atol=1e-14)
+        assert not change[held].any()
+    # None is missing, and none there twice: as many as there are such changes at all.
+    units = np.concatenate([np.eye(n), 1j * np.eye(n)])
+    spread = np.array([symmetry.spread(u) - u for u in units])
+    stay = [np.where(held, x, 0) for x in (units.real, units.imag)]
+    conditions = np.concatenate([spread.real, spread.imag, *stay], axis=1)
+    rank = np.linalg.matrix_rank(found) if found.size else 0
+    assert found.shape[1] == rank == 2 * n - np.linalg.matrix_rank(conditions)

@@ -5,7 +5,7 @@ import polygons
 import pytest
 
 from omt_uv.solver.mesh.geometry import face_areas
-from omt_uv.solver.mesh.polygon_areas import polygon_areas, quad_corners, quads, triangle_pairs
+from omt_uv.solver.mesh.polygon_areas import polygon_areas, polygon_fans, quad_corners, quads, triangle_pairs
 
 
 def of_each(V, faces, turn=0):
@@ -68,3 +68,28 @@ def test_two_triangles_that_only_touch_are_no_quad():
     first, second = triangle_pairs(np.array([0, 0, 1, 1]))
     assert (first.tolist(), second.tolist()) == ([0, 2], [1, 3])
     assert quad_corners(F, first, second)[1].tolist() == [False, True]
+
+
+def test_fans_are_the_polygons_around_their_centres():
+    """Of a pentagon and a hexagon in a plane and a quad beside them: the same outlines, areas and turns."""
+    corners = [np.exp(2j * np.pi * np.arange(k) / k) + 3 * k for k in (5, 4, 6)]
+    w = np.concatenate(corners)
+    V = np.column_stack([w.real, w.imag, 0.5 * w.real])
+    faces = np.split(np.arange(15), [5, 9])
+    for turn in range(4):
+        F, owner = polygons.cut(faces, turn)
+        centres, fans, of_fan = polygon_fans(V, F, owner)
+        np.testing.assert_array_equal(np.bincount(of_fan, minlength=3), [5, 0, 6])
+        both = np.concatenate([V, centres])
+        normals = np.cross(both[fans[:, 1]] - both[fans[:, 0]], both[fans[:, 2]] - both[fans[:, 0]])
+        assert (normals[:, 2] > 0).all()
+        for k in (0, 2):
+            mine = fans[of_fan == k]
+            sides = {(int(a), int(b)) for t in mine for a, b in zip(t, np.roll(t, -1), strict=True) if max(a, b) < 15}
+            around = faces[k]
+            assert sides == {(int(a), int(b)) for a, b in zip(around, np.roll(around, -1), strict=True)}
+            middle = np.unique(mine[mine >= 15])
+            assert len(middle) == 1
+            np.testing.assert_allclose(both[middle[0]], V[around].mean(axis=0), atol=1e-9)
+            whole = face_areas(V, F)[owner == k].sum()
+            np.testing.assert_allclose(face_areas(both, mine), whole / len(mine), rtol=1e-9)

@@ -140,3 +140,12 @@ def test_what_returns_to_the_boundary_stays_inside(make):
     fine = drain(coarse.prolonged(squeezed, len(V)))
     assert (signed_areas(fine, F) > 0).all()
     assert signed_areas(fine, F).sum() <= signed_areas(squeezed, coarse.triangles).sum() * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_region_keeps_its_share_of_the_mass_on_the_way_up(name):
+    V, F, flat, mass, _ = coarse_of(name)
+    weights = np.random.default_rng(0).random(len(F))
+    coarse = drain(coarsen_disk(V, F, flat, mass, len(V) // 8, weights))
+    assert (coarse.region >= 0).all() and (coarse.region <= 1 + 1e-12).all()
+    assert coarse.region @ coarse.mass == pytest.approx(weights @ mass, rel=1e-9)

@@ -223,3 +223,18 @@ def test_a_disk_keeps_its_boundary_on_the_circle():
     moved = carrier.move(placed, step)
     assert np.allclose(np.linalg.norm(moved.domain[:4], axis=1), 1) and not carrier.folded(moved, F).any()
     assert frames(moved.positions, F)[1].shape == (4, 3)
+
+
+@pytest.mark.parametrize("count", [25, 40])
+def test_far_vertices_hold_the_first_ones_some_of_the_boundary_and_each_time_the_farthest(count):
+    V = np.random.default_rng(0).random((400, 3))
+    loop, first = np.arange(100, 200), np.array([5, 3, 5, 120])
+    found = far_vertices(V, first, loop, count)
+    assert len(np.unique(found)) == len(found) == count and np.isin(first, found).all()
+    given = np.union1d(first, loop[:: 100 // 12])
+    np.testing.assert_array_equal(found[: len(given)], given)
+    for k in range(len(given), count):
+        distance = np.linalg.norm(V[:, None] - V[found[:k]], axis=2).min(axis=1)
+        assert distance[found[k]] == pytest.approx(distance.max())
+    np.testing.assert_array_equal(far_vertices(V[:6], first[:0], loop[:0], 20)[:1], [0])
+    assert len(far_vertices(V[:6], first[:0], loop[:0], 20)) == 6

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from sphere_shapes import blob, lopsided, random_rotation, random_sphere
 
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, spherical_areas
-from omt_uv.solver.progress import drain
+from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.sphere import refine
 from omt_uv.solver.sphere.multilevel import multilevel_start
 from omt_uv.solver.sphere.refine import relax, sphere_refine
 from omt_uv.solver.sphere.sphere_map import sphere_map
@@ -74,3 +78,22 @@ def test_a_balance_lies_between_0_and_1(balance):
     P, F = random_sphere(60)
     with pytest.raises(ValueError, match="balance"):
         drain(sphere_refine(P, F, P, spherical_areas(P, F), balance=balance))
+
+
+@pytest.mark.parametrize("balance, error, share, free", [
+    (0.0, 0.5, 0.9, True), (0.0, 0.5, 0.0, False), (0.5, 0.5, 0.9, False), (0.0, 1e-9, 0.9, False)])  # fmt: skip
+def test_a_symmetric_map_without_its_areas_gives_way_to_a_free_one_that_has_them(
+    monkeypatch, balance, error, share, free
+):
+    P, F = random_sphere(200)
+    plain = drain(sphere_refine(P, F, P, lopsided(P, F, 1.0), balance=balance))
+
+    def symmetric(*_):
+        yield Progress("Refinement", 0.5)
+        return replace(plain, area_error=error, status="symmetric"), 7
+
+    monkeypatch.setattr(refine, "find_symmetry", lambda *_: SimpleNamespace(images=None))
+    monkeypatch.setattr(refine, "_symmetric", symmetric)
+    monkeypatch.setattr(refine, "MUCH_LESS", 1e9 if share == 0 else refine.MUCH_LESS)
+    found = drain(sphere_refine(P, F, P, lopsided(P, F, 1.0), balance=balance))
+    assert (found.status != "symmetric") == free and found.untangling >= 7

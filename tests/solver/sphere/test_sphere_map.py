@@ -15,6 +15,7 @@ from omt_uv.solver.mesh.polygon_areas import polygon_areas
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.progress import drain
+from omt_uv.solver.sphere import sphere_map as sphere_maps
 from omt_uv.solver.sphere.conformal import conformal_sphere
 from omt_uv.solver.sphere.newton import derivatives, project_faces
 from omt_uv.solver.sphere.sphere_map import sphere_map
@@ -159,3 +160,16 @@ def test_models(name):
     mass = vertex_areas(V, F)
     carried = drain(sphere_transport(found.sites, mass, hull=Hull(found.triangles, twins(found.triangles))))
     assert carried.residual <= 1e-6 and carried.iterations <= 25
+
+
+def test_the_warning_about_areas_has_the_figures_of_the_map():
+    V, F = blob(2)
+    p, target = V / np.linalg.norm(V, axis=1)[:, None], face_areas(V, F)
+    pairs = np.arange(len(F)) // 2
+    for polygons in (None, pairs):
+        owner = np.arange(len(F)) if polygons is None else polygons
+        share = np.array([target[owner == k].sum() for k in range(owner.max() + 1)]) / target.sum()
+        has = np.array([spherical_areas(p, F)[owner == k].sum() for k in range(owner.max() + 1)]) / (4 * np.pi)
+        mean, deviation = 100 * np.abs(has - share).sum(), 100 * np.sqrt((share * (has / share - 1) ** 2).sum())
+        text = sphere_maps._area_warning(p, F, 7 * target, polygons)
+        assert f"off by {mean:.1f} % on average, standard deviation {deviation:.1f} %" in text and mean > 1

@@ -10,6 +10,7 @@ from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.remeshing.edits.working_mesh import WorkingMesh
+from omt_uv.solver.remeshing.relaxation import cvt
 from omt_uv.solver.remeshing.relaxation.cvt import relax_cvt
 from omt_uv.solver.remeshing.relaxation.surface_carrier import SurfaceCarrier
 from omt_uv.solver.remeshing.relaxation.voronoi_cells import voronoi_cells
@@ -44,3 +45,13 @@ def test_without_rounds_vertices_go_to_the_surface_alone():
     same, step = drain(relax_cvt(mesh, 0, carrier))
     np.testing.assert_allclose(same.points, mesh.points, atol=1e-12)
     assert step == 0
+
+
+def test_samples_correct_no_cell_that_covers_what_is_seen():
+    mesh, carrier = shaken()
+    normals = np.tile([0.0, 0, 1], (len(mesh.points), 1))
+    found = cvt._sample_correction(mesh.points, mesh.triangles, normals, carrier)
+    assert (found.share >= 0).all() and (found.share[~mesh.fixed] < 1).all() and found.share.mean() < 0.1
+    # Of a mesh that covers a tenth of what is seen, every cell is corrected, to the mass and the middle that are seen.
+    small = cvt._sample_correction(0.3 * mesh.points, mesh.triangles, normals, carrier)
+    assert small.share[small.mass > 0].mean() > 0.5 and not small.share[small.mass == 0].any()
