@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+from types import SimpleNamespace
 
 import mesh_bytes
 import numpy as np
@@ -97,3 +98,19 @@ def test_mutants_are_refused_or_changed_and_nothing_else_is_raised(tmp_path):
             gltf.put(mutant, [imported_triangles(spread(36))], tmp_path, tmp_path)
         except InPlaceError as error:
             assert str(error)
+
+
+@pytest.mark.parametrize("count", [0, 2, 3, 4, 7])
+def test_lists_strips_and_fans_are_the_triangles_that_the_format_says(count):
+    glb = SimpleNamespace(doc={"accessors": [{"count": count}]})
+    expected = {
+        4: [(k, k + 1, k + 2) for k in range(0, count - 2, 3)],
+        # Every other one of a strip is turned.
+        5: [(k, k + 1, k + 2) if k % 2 == 0 else (k, k + 2, k + 1) for k in range(count - 2)],
+        6: [(0, k, k + 1) for k in range(1, count - 1)],
+        1: [],
+    }
+    for mode, faces in expected.items():
+        found = glb_data.triangles(glb, {"attributes": {"POSITION": 0}, "mode": mode})
+        assert found.tolist() == [list(face) for face in faces], mode
+    assert glb_data.triangles(glb, {"attributes": {}}).shape == (0, 3)

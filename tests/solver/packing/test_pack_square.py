@@ -177,3 +177,17 @@ def test_a_single_island_is_in_the_middle_as_it_was():
     (found,) = packed.islands
     np.testing.assert_allclose(0.5 * (found.min(axis=0) + found.max(axis=0)), 0.5)
     np.testing.assert_allclose(found - found[0], packed.scale * (island - island[0]))
+
+
+def test_where_islands_come_from_plays_no_part_in_blocks_either(monkeypatch):
+    """Islands far from the origin, and more than are placed one by one: inside, apart, and where they were from 0."""
+    monkeypatch.setattr(pack_square, "MOST_ITEMS", 16)
+    monkeypatch.setattr(pack_square, "BLOCKS", 4)
+    rng = np.random.default_rng(1)
+    there = [corner(*rng.uniform(0.5, 2, 2), rng.uniform(0, 7)) for _ in range(24)]
+    shifted = [points + rng.uniform(-30, 30, 2) for points in there]
+    here, found = (pack(islands, [FAN] * 24, 1, 128).islands for islands in (there, shifted))
+    for old, new in zip(here, found, strict=True):
+        np.testing.assert_allclose(new, old, atol=1e-9)
+    points = np.concatenate(found)
+    assert points.min() > 0 and points.max() < 1 and least_distance(found) >= 1 / 128

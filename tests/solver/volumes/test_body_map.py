@@ -183,3 +183,16 @@ def test_bad_input_is_named_and_has_a_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, "tetgen", None)
     with pytest.raises(LibraryError, match="pip install tetgen"):
         drain(volume_map(V, F))
+
+
+def test_the_inside_is_where_the_body_is_in_its_units():
+    V, F = icosphere(2)
+    V = 7 * V * [1, 1, 1.5] + [40, -30, 5]
+    found = drain(volume_map(V, F, count=300))
+    inner = found.points[len(V) :]
+    np.testing.assert_array_equal(found.points[: len(V)], V)
+    assert len(inner) and (np.linalg.norm((inner - [40, -30, 5]) / [7, 7, 10.5], axis=1) < 1).all()
+    p = V[F]
+    volumes = tet_volumes(found.points, found.tets)
+    assert (volumes > 0).all()
+    assert volumes.sum() == pytest.approx(np.einsum("ij,ij->", p[:, 0], np.cross(p[:, 1], p[:, 2])) / 6, rel=1e-6)
