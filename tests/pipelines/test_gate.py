@@ -91,3 +91,11 @@ def test_only_what_has_not_grown_is_as_before(folds, old_folds, overlap, old_ove
     assert [text.endswith(", as before") for text in told] == [folds <= old_folds, overlap <= old_overlap]
     assert told[0].startswith("1 face is" if folds == 1 else f"{folds} faces are")
     assert not any("before" in text for text in Gate(9, folds, overlap).warnings())
+
+
+@pytest.mark.parametrize("overlap, told", [(0.0, False), (5e-5, False), (2e-4, True), (0.3, True)])
+def test_overlap_is_told_from_a_ten_thousandth_on(overlap, told):
+    assert any("under several faces" in text for text in Gate(100, 0, overlap).warnings()) == told
+    # Of what was there before, only what is new by so much counts as new.
+    old = Gate(100, 0, 0.1)
+    assert (Gate(100, 0, 0.1 + overlap).warnings(old) == old.warnings(old)) == (not told or overlap == 0)

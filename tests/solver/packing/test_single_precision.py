@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.packing import single_precision
 from omt_uv.solver.packing.single_precision import without_rounded_folds
 
 
@@ -51,3 +52,11 @@ def test_triangles_without_area_are_left_alone():
     uv = np.array([[0, 0], [0.3, 0.3], [0.6, 0.6], [0.3, 0.1]])
     faces = np.array([[0, 1, 2], [0, 3, 1]])
     assert (without_rounded_folds(uv, faces) == uv).all()
+
+
+def test_vertices_that_move_at_once_share_no_triangle():
+    triangles = np.array([[k, k + 1, k + 2] for k in range(40)])
+    for seed, vertices in enumerate([np.arange(42), np.arange(5, 30), np.array([7]), np.array([3, 4])]):
+        found = single_precision._apart(vertices, triangles, 42, np.random.default_rng(seed))
+        assert len(found) and np.isin(found, vertices).all() and len(np.unique(found)) == len(found)
+        assert (np.isin(triangles, found).sum(axis=1) <= 1).all()

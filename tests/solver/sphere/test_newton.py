@@ -97,3 +97,19 @@ def test_fixed_vertices_stay_and_the_energy_falls():
     energy = problem.energy(P)
     step = problem.step(P, energy, 1.0)
     assert step.energy < energy
+
+
+def test_one_folded_face_is_enough_for_no_energy():
+    P, F = random_sphere(60)
+    target = spherical_areas(P, F)
+    faces = elements(P, F, target)
+    problem = SphereProblem(faces, target, faces.ratio, Assembly(F, len(P)), 3.0)
+    assert np.isfinite(problem.energy(P))
+    # A vertex goes through one of its edges alone.
+    p, (a, b, c) = P.copy(), F[0]
+    middle = normalized((P[b] + P[c])[None])[0]
+    for share in np.linspace(0, 1.5, 61):
+        p[a] = normalized((P[a] + share * (middle - P[a]))[None])[0]
+        folded = signed_volumes(p, F) <= 0
+        assert np.isinf(problem.energy(p)) == folded.any()
+    assert folded.any() and not folded.all()
