@@ -178,7 +178,11 @@ class FaceDerivatives:
 
 
 def face_derivatives(
-    faces: Elements, w: np.ndarray, area_weight: float | np.ndarray, pressure: float | np.ndarray = 1.0
+    faces: Elements,
+    w: np.ndarray,
+    area_weight: float | np.ndarray,
+    pressure: float | np.ndarray = 1.0,
+    eagerness: float | np.ndarray = 0.0,
 ) -> FaceDerivatives:
     """Gradients and projected Hessians of all faces of a map w (n,) complex without folds.
 
@@ -186,15 +190,21 @@ def face_derivatives(
     curvature of the area itself. The second part is indefinite, and nearly cancels between neighbours (a constant
     pressure on all faces has no effect inside), but not once it is projected face by face: then it only holds the
     faces back. `pressure` in [0, 1] is the share of it that the Hessian keeps; at 0 the term is Gauss-Newton's.
+    eagerness : see `eager_bend`
     """
-    return derivatives_of(faces, *faces.derivatives(w), area_weight, pressure)
+    return derivatives_of(faces, *faces.derivatives(w), area_weight, pressure, eagerness)
 
 
 def derivatives_of(
-    faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float | np.ndarray, pressure: float | np.ndarray
+    faces: Elements,
+    a: np.ndarray,
+    b: np.ndarray,
+    area_weight: float | np.ndarray,
+    pressure: float | np.ndarray,
+    eagerness: float | np.ndarray = 0.0,
 ) -> FaceDerivatives:
     """As `face_derivatives`, from the derivatives a, b (m,) complex of the map."""
-    return face_derivatives_of(faces, a, b, *_by_squares(faces, a, b, area_weight, pressure))
+    return face_derivatives_of(faces, a, b, *_by_squares(faces, a, b, area_weight, pressure, eagerness))
 
 
 def face_derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, kept, block) -> FaceDerivatives:
@@ -217,7 +227,7 @@ def face_derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, ke
     return FaceDerivatives(corner, np.stack([turn_a, turn_b, radial1, radial2], axis=1))
 
 
-def _by_squares(faces, a, b, area_weight, pressure):
+def _by_squares(faces, a, b, area_weight, pressure, eagerness):
     """Derivatives by |a|^2 and |b|^2, the same for the Hessian, and the Hessian's entries by |a| and |b|."""
     outer, inner = squared(a), squared(b)
     det = outer - inner
@@ -227,8 +237,9 @@ def _by_squares(faces, a, b, area_weight, pressure):
         weight, ratio = faces.weight[faces.polygon] * faces.part, faces.ratio[faces.polygon]
         whole = faces.sums(det)[faces.polygon]
         area_weight, pressure = faces.of_triangles(area_weight), faces.of_triangles(pressure)
+        eagerness = faces.of_triangles(eagerness)
     slope = area_weight / 2 * (1 / ratio - ratio / whole**2)
-    bend = area_weight * ratio / whole**3
+    bend = area_weight * eager_bend(whole / ratio, eagerness) / ratio**2
     if faces.alone is not None:
         # That of a polygon of several triangles is a row of its own, see `area_forms`.
         bend = np.where(faces.alone, bend, 0)
@@ -242,19 +253,41 @@ def _by_squares(faces, a, b, area_weight, pressure):
     return first, kept, (aa, ab, bb)
 
 
-def area_forms(faces: Elements, w: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
+def eager_bend(r: np.ndarray, eagerness: float | np.ndarray) -> np.ndarray:
+    """Second derivative of (r + 1/r)/2 at area ratios r (p,), less where r is small, and more where it is great.
+
+    With its own, r^-3, Newton's method makes a tiny r half as large again a step, and overshoots a large one. Times
+    (r^2 - 1) / (2 log r) it takes the step of log r to 0. eagerness : the power of that factor, 0 for its own
+    """
+    if not np.any(eagerness):
+        return 1 / r**3
+    log = np.log(r)
+    even = np.abs(log) < 1e-4
+    factor = np.where(even, 1 + log, (r * r - 1) / np.where(even, 1, 2 * log))
+    return factor**eagerness / r**3
+
+
+def area_forms(
+    faces: Elements, w: np.ndarray, area_weight: float | np.ndarray, eagerness: float | np.ndarray = 0.0
+) -> np.ndarray:
     """Rows of the area term's Hessian, corner by corner (m,3) complex: a polygon's row is the sum over its triangles.
 
     The row is the slope of the polygon's area times the root of the area term's second derivative by it. 0 for polygons
-    of one triangle, whose term is among the rows of `face_derivatives`.
+    of one triangle, whose term is among the rows of `face_derivatives`. eagerness : see `eager_bend`
     """
-    return area_forms_of(faces, *faces.derivatives(w), area_weight)
+    return area_forms_of(faces, *faces.derivatives(w), area_weight, eagerness)
 
 
-def area_forms_of(faces: Elements, a: np.ndarray, b: np.ndarray, area_weight: float | np.ndarray) -> np.ndarray:
+def area_forms_of(
+    faces: Elements,
+    a: np.ndarray,
+    b: np.ndarray,
+    area_weight: float | np.ndarray,
+    eagerness: float | np.ndarray = 0.0,
+) -> np.ndarray:
     """As `area_forms`, from the derivatives a, b (m,) complex of the map."""
     whole = faces.sums(squared(a) - squared(b))
-    size = np.sqrt(faces.weight * area_weight * faces.ratio / whole**3)
+    size = np.sqrt(faces.weight * area_weight * eager_bend(whole / faces.ratio, eagerness)) / faces.ratio
     g = faces.gradient
     alone = faces.alone
     if alone is None or faces.part is None:

@@ -13,13 +13,14 @@ from typing import Protocol
 
 import numpy as np
 
-from ..maps.energy import Elements, missing_tilt, target_error, target_error_but_share, tilted
+from ..maps.energy import Elements, energies, missing_tilt, target_error, target_error_but_share, tilted
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import with_convex_quads
 from ..progress import Progress, Steps
 from .boundary_barrier import BoundaryBarrier, crossings, make_barrier
 from .continuation_rules import (
     FIRST_PRESSURE,
+    FORESEEN,
     LOOSE,
     NEAR,
     SQUEEZED_WEIGHT,
@@ -29,6 +30,7 @@ from .continuation_rules import (
     is_enough,
     is_futile,
     is_out_of_reach,
+    is_settled,
     is_squeezed,
     judge_step,
     next_pressure,
@@ -160,7 +162,7 @@ def minimise_in_stages(
             w = problem.smoother.smoothed(newton.faces, w, weight, FIRST_SWEEPS)
         limits = _limits(problem, balance, quality, k - len(weights) + 1, quality.max_steps - steps)
         if k == 0 and squeezed:
-            limits = replace(limits, relaxed=UNSQUEEZED)
+            limits = replace(limits, relaxed=UNSQUEEZED, shear=None)
         forbidden = None if with_barrier or overlap else problem.boundary_crosses
         stage = yield from minimise(newton, w, limits, k, forbidden)
         w, steps = stage.w, steps + stage.steps
@@ -214,7 +216,13 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         loose_tolerance=loose,
         # Its share is what a stage with a region is for.
         foreseeing=balance == 0 and not on_the_way and problem.faces.region is None,
+        foreseen=FORESEEN,
+        shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
     )
+
+
+def _shear_of(faces: Elements) -> Callable[[np.ndarray], float]:
+    return lambda w: float(energies(faces, w, 0.0).sum())
 
 
 @dataclass(frozen=True)
@@ -223,7 +231,8 @@ class StageLimits:
 
     area_error : to reach; max_steps : of Newton's method; tolerance, loose_tolerance : as in
     `continuation_rules.Quality`; relaxed : an energy that is low enough in any case; foreseeing : it ends, too, where
-    the area error is out of reach, see `continuation_rules.is_out_of_reach`
+    the area error is out of reach, see `continuation_rules.is_out_of_reach`, once it promises less than foreseen;
+    shear : of a map, with which it ends where that settles, see `continuation_rules.is_settled`
     """
 
     area_error: float
@@ -232,6 +241,8 @@ class StageLimits:
     loose_tolerance: float = LOOSE
     relaxed: float = 0.0
     foreseeing: bool = False
+    foreseen: float = 0.0
+    shear: Callable[[np.ndarray], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -274,7 +285,8 @@ def minimise(
     stage ends "crossed".
     """
     value = problem.energy(w)
-    steps, residual, status, pressure, error = 0, np.inf, "steps", FIRST_PRESSURE, np.inf
+    steps, residual, status, pressure = 0, np.inf, "steps", FIRST_PRESSURE
+    error, figures = np.inf, (np.inf, np.inf)
     while steps < max(limits.max_steps, 1):
         step, used = problem.step(w, value, pressure), pressure
         if forbidden is not None and forbidden(step.w):
@@ -287,9 +299,12 @@ def minimise(
         met = value < limits.relaxed or (
             residual < limits.loose_tolerance and problem.area_error(w) <= limits.area_error
         )
-        if limits.foreseeing and not met and residual < limits.loose_tolerance:
+        if limits.foreseeing and not met and residual < max(limits.foreseen, limits.loose_tolerance):
             before, error = error, problem.area_error(w)
             met = bool(is_out_of_reach(error, before, limits.area_error))
+        if limits.shear is not None and not met:
+            last, figures = figures, (limits.shear(w), problem.area_error(w))
+            met = bool(is_settled(step.share, figures, last, limits.area_error))
         verdict = judge_step(step.share, used, residual, met, limits.tolerance)
         if verdict.stalled or verdict.converged:
             status = "stalled" if verdict.stalled else "converged"

@@ -5,13 +5,14 @@ Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entr
 
     start a stage            `planned_weights`, `is_squeezed`, `next_weight`
     within a stage           `next_pressure`
-    end a stage              `stage_tolerances`, `judge_step`, `is_out_of_reach`
+    end a stage              `stage_tolerances`, `judge_step`, `is_out_of_reach`, `is_settled`
     end the refinement       `is_enough`, `is_futile`
 
-A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, since its steps are those of
-all charts. It does not tell `is_futile` of regions: a chart with a region that has no exact areas uses up its steps,
-is given back, and says alone what it did not reach. It knows no barrier and no sweeps, and gives a chart back that
-would need them. It relaxes a squeezed start to the end, not to UNSQUEEZED. And it starts cold.
+A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, nor one that `is_settled` or
+`is_out_of_reach`, since its steps are those of all charts. It does not tell `is_futile` of regions: a chart with a
+region that has no exact areas uses up its steps, is given back, and says alone what it did not reach. It knows no
+barrier and no sweeps, and gives a chart back that would need them. It relaxes a squeezed start to the end, not to
+UNSQUEEZED. And it starts cold.
 """
 
 from __future__ import annotations
@@ -30,7 +31,13 @@ Truth = bool | np.ndarray
 # A stage that reaches the goal ends when Newton promises less than this share of the energy.
 LOOSE = 3e-2
 # One on the way ends sooner where the boundary is free; vertices on a circle or on sides do not make up for it later.
-ON_THE_WAY = 0.05
+ON_THE_WAY = 0.1
+# One that has missed its goal is told by the steps before it promises less than this: see `is_out_of_reach`.
+FORESEEN = 0.1
+# One that has reached it ends, too, where a whole step changes the shear by less than this share, and the area error by
+# less than this share of the goal.
+SETTLED = 0.02
+SETTLED_AREAS = 0.1
 # The same where sweeps follow every step: what Newton promises then is in few faces, and sweeps do it for less. Share
 # of the energy where the goal is not reached, where it is, and on the way.
 SWEPT_TOLERANCE = 0.1
@@ -220,6 +227,14 @@ def is_out_of_reach(error: Number, before: Number, goal: Number) -> Truth:
     """Whether a stage that is nearly through, with these area errors after its last step and before, will not reach
     its goal: a greater weight takes it on from here."""
     return (goal < WITHIN_REACH * error) & (before - error < error - goal)
+
+
+def is_settled(share: Number, now: tuple[Number, Number], before: tuple[Number, Number], goal: Number) -> Truth:
+    """Whether a step taken to this share left shear and area error about as they were, and the latter at its goal:
+    what further ones change, nobody sees."""
+    (shear, error), (last_shear, last_error) = now, before
+    same = (np.abs(shear - last_shear) <= SETTLED * last_shear) & (np.abs(error - last_error) <= SETTLED_AREAS * goal)
+    return (share == 1) & (error <= goal) & same
 
 
 def is_enough(quality: Quality, balance: float, error: Number, weight: Number) -> Truth:

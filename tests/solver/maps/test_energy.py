@@ -6,6 +6,7 @@ import pytest
 
 from omt_uv.solver.maps.energy import (
     area_error,
+    eager_bend,
     elements,
     energies,
     energy,
@@ -109,3 +110,12 @@ def test_a_tilt_keeps_the_sum_and_is_what_is_missing():
     assert np.ptp(logarithm) < 1e-12
     assert missing_tilt(faces, w) == pytest.approx(0, abs=1e-12)
     assert missing_tilt(changed, w) == pytest.approx(0.01, rel=0.05)
+
+
+def test_an_eager_bend_takes_the_step_of_the_logarithm():
+    r = np.array([1e-3, 0.1, 0.9, 1.0, 1.00001, 5.0, 100.0])
+    slope = (1 - r**-2) / 2
+    np.testing.assert_allclose(slope / eager_bend(r, 1.0), r * np.log(r), rtol=1e-3, atol=1e-12)
+    np.testing.assert_allclose(eager_bend(r, 0.0), r**-3)
+    between = np.sqrt(eager_bend(r, 0.0) * eager_bend(r, 1.0))
+    np.testing.assert_allclose(eager_bend(r, 0.5), between)

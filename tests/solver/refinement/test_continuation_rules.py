@@ -91,3 +91,11 @@ def test_a_goal_is_out_of_reach_where_steps_gain_less_than_is_missing():
     # Nearly there, there already, or after the first step that says anything: the stage goes on.
     assert not rules.is_out_of_reach(0.0082, 0.0083, 0.008) and not rules.is_out_of_reach(0.007, 0.0071, 0.008)
     assert not rules.is_out_of_reach(0.5, np.inf, 0.008)
+
+
+def test_a_map_is_settled_where_a_whole_step_changes_neither_shear_nor_areas():
+    goal = 0.008
+    assert rules.is_settled(1.0, (0.300, 0.0051), (0.302, 0.0053), goal)
+    for share, now in ((0.5, (0.300, 0.0051)), (1.0, (0.280, 0.0051)), (1.0, (0.300, 0.0030)), (1.0, (0.300, 0.0081))):
+        assert not rules.is_settled(share, now, (0.302, 0.0053 if now[1] < goal else 0.0082), goal)
+    assert not rules.is_settled(1.0, (0.300, 0.0051), (np.inf, np.inf), goal)
