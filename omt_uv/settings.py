@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+# Context of our words where Blender's own dictionary has another meaning of the same one.
+CONTEXT = "OMT UV"
 # identifier, label, description; the solver and the command line use the identifier in lower case.
 BOUNDARIES = (
     ("FREE", "Free", "The outline follows from the surface: the least shear"),

@@ -113,7 +113,7 @@ ARROWS: dict[str, str] = {
     "operators.volumes": "solver solver.flows pipelines pipelines.volumes blender blender.volumes session operators",
     "operators.regions": "settings solver display pipelines blender session operators",
     "operators.arranging": "solver pipelines pipelines.arranging blender session operators",
-    "panels.translations": "solver",
+    "panels.translations": "settings solver",
     "panels": "links errors remedies settings solver blender display session operators operators.inspection "
     "operators.arranging operators.volumes panels.translations",
 }

@@ -13,6 +13,7 @@ from ..session.region_list import RegionListError, pairs_of, rows_of
 from ..settings import (
     AUTO_SOURCE,
     BOUNDARIES,
+    CONTEXT,
     DEFAULT_BALANCE,
     DEFAULT_FACTOR,
     DEFAULT_MAGNIFIED_SHEAR,
@@ -282,8 +283,17 @@ def _active_group(context: bpy.types.Context) -> str:
 
 
 def draw_settings(layout: bpy.types.UILayout, properties, listed: bool = True) -> None:
-    """The settings of the operator that count as others stand, for the redo panel and the sidebar; further regions as
-    the list that the object keeps, or as text."""
+    """The settings of the operator that count as others stand; further regions as the list that the object keeps, or
+    as text."""
+    draw_main(layout, properties)
+    layout.separator()
+    draw_more(layout, properties, listed)
+    layout.separator()
+    draw_image(layout, properties)
+
+
+def draw_main(layout: bpy.types.UILayout, properties) -> None:
+    """Which region, how large, and in which UVs."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(properties, "factor")
@@ -292,29 +302,27 @@ def draw_settings(layout: bpy.types.UILayout, properties, listed: bool = True) -
         choose_attribute(layout, properties, "attribute")
     else:
         choose_group(layout, properties, "weight_group")
+    layout.prop(properties, "exact")
+    layout.prop(properties, "source")
+    layout.prop(properties, "quality")
+
+
+def draw_more(layout: bpy.types.UILayout, properties, listed: bool = True) -> None:
+    """Other regions at the same time, and how islands are made and packed."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
     if listed:
         _draw_list(layout, bpy.context.object)
     else:
-        layout.prop(properties, "further")
-    layout.prop(properties, "exact")
-    layout.prop(properties, "source")
+        # Its whole name is cut off in a narrow sidebar.
+        layout.prop(properties, "further", text="More Regions")
+    layout.prop(properties, "cascade")
+    layout.prop(properties, "boundary", text="Boundary", text_ctxt=CONTEXT)
     column = layout.column()
     column.active = properties.source != "UV"
     column.prop(properties, "balance", text="Area - Angle", slider=True)
-    column.use_property_split = True
     column.prop(properties, "max_shear")
     column.prop(properties, "use_subdivision", text="Subdivision")
-    layout.prop(properties, "boundary")
-    layout.prop(properties, "cascade")
-    layout.prop(properties, "quality")
-    if properties.source != "MESH":
-        layout.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
-        column = layout.column()
-        column.active = bool(properties.image)
-        column.prop(properties, "use_image")
-        column.prop(properties, "image_size")
-        column.prop_search(properties, "detail", bpy.data, "images", icon="IMAGE_DATA")
-        column.prop(properties, "detail_box")
     draw_margin(layout, properties)
 
 
@@ -330,3 +338,18 @@ def _draw_list(layout: bpy.types.UILayout, obj: bpy.types.Object | None) -> None
     column = row.column(align=True)
     column.operator("uv.omt_region_add", text="", icon="ADD")
     column.operator("uv.omt_region_remove", text="", icon="REMOVE")
+
+
+def draw_image(layout: bpy.types.UILayout, properties) -> None:
+    """The image that follows UVs that exist."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    if properties.source == "MESH":
+        return
+    layout.prop_search(properties, "image", bpy.data, "images", icon="IMAGE_DATA")
+    column = layout.column()
+    column.active = bool(properties.image)
+    column.prop(properties, "use_image", text="Show Warped")
+    column.prop(properties, "image_size")
+    column.prop_search(properties, "detail", bpy.data, "images", icon="IMAGE_DATA")
+    column.prop(properties, "detail_box")

@@ -5,7 +5,15 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ..settings import DEFAULT_BALANCE, DEFAULT_MARGIN, DEFAULT_QUALITY, DEFAULT_TEXTURE_SIZE, FIRST_TILE, QUALITIES
+from ..settings import (
+    CONTEXT,
+    DEFAULT_BALANCE,
+    DEFAULT_MARGIN,
+    DEFAULT_QUALITY,
+    DEFAULT_TEXTURE_SIZE,
+    FIRST_TILE,
+    QUALITIES,
+)
 
 
 class AreaSettings:
@@ -83,8 +91,9 @@ def draw_balance(layout: bpy.types.UILayout, properties) -> None:
 
 
 def draw_margin(layout: bpy.types.UILayout, properties) -> None:
-    for name in ("margin", "texture_size", "tile"):
-        layout.prop(properties, name)
+    layout.prop(properties, "margin", text="Margin", text_ctxt=CONTEXT)
+    layout.prop(properties, "texture_size")
+    layout.prop(properties, "tile")
 
 
 def choose_group(layout: bpy.types.UILayout, properties, name: str) -> None:

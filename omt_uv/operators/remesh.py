@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..session import run
-from ..settings import COUNTS, DEFAULT_STRATEGY, DENSITIES, STRATEGIES, RemeshSettings
+from ..settings import CONTEXT, COUNTS, DEFAULT_STRATEGY, DENSITIES, STRATEGIES, RemeshSettings
 from .base import Complaint, SolverOperator, complaints, mesh_objects, ready, select_alone, warn
 from .properties import choose_attribute, choose_group
 
@@ -249,7 +249,7 @@ def _draw_density(layout: bpy.types.UILayout, properties) -> None:
 
 
 def _draw_preserved(column: bpy.types.UILayout, properties) -> None:
-    column.prop(properties, "use_preserve_boundary", text="Boundary")
+    column.prop(properties, "use_preserve_boundary", text="Boundary", text_ctxt=CONTEXT)
     column.prop(properties, "use_preserve_seams", text="Seams")
     column.prop(properties, "use_preserve_materials", text="Materials")
     column.prop(properties, "use_preserve_sharp", text="Sharp Edges")

@@ -8,6 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from ..session import run
 from ..settings import (
     BOUNDARIES,
+    CONTEXT,
     DEFAULT_BOUNDARY,
     DEFAULT_MAP,
     DEFAULT_MAX_SHEAR,
@@ -38,7 +39,10 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
     makes_uvs = True
 
     boundary: EnumProperty(
-        name="Boundary", description="Outline of every island", items=BOUNDARIES, default=DEFAULT_BOUNDARY
+        name="Boundary",
+        description="Outline of every island",
+        items=BOUNDARIES,
+        default=DEFAULT_BOUNDARY,
     )
     kind: EnumProperty(name="Map", description="Which map", items=MAPS, default=DEFAULT_MAP)
     aspect: FloatProperty(
@@ -175,7 +179,7 @@ def draw_main(layout: bpy.types.UILayout, properties) -> None:
     """What everybody looks at, below the slider."""
     layout.use_property_split = True
     layout.use_property_decorate = False
-    layout.prop(properties, "boundary")
+    layout.prop(properties, "boundary", text="Boundary", text_ctxt=CONTEXT)
     layout.prop(properties, "quality")
 
 

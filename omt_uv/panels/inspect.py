@@ -7,6 +7,7 @@ import bpy
 from ..display import colour_bar, overlay
 from ..operators.distortion import HISTOGRAM, KINDS
 from ..operators.inspection.worst import FIGURES
+from ..settings import CONTEXT
 from .section import Section, settings_of, split
 
 SHOW = "uv.omt_overlay"
@@ -16,7 +17,7 @@ SET_DENSITY = "uv.omt_density_set"
 def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     row = layout.row(align=True)
     for name, title, _, _, _ in KINDS:
-        row.operator(SHOW, text=title, depress=overlay.kind() == name).show = name
+        row.operator(SHOW, text=title, text_ctxt=CONTEXT, depress=overlay.kind() == name).show = name
     draw_bar(layout, overlay.kind())
     row = layout.row(align=True)
     row.operator("uv.omt_checker", text="Checker", icon="TEXTURE")
@@ -28,7 +29,7 @@ def draw(layout: bpy.types.UILayout, _context: bpy.types.Context) -> None:
     column.label(text="Select Worst Faces")
     row = column.row(align=True)
     for name, title, _ in FIGURES:
-        row.operator("uv.omt_worst", text=title).figure = name
+        row.operator("uv.omt_worst", text=title, text_ctxt=CONTEXT).figure = name
     row = layout.row(align=True)
     row.operator("object.omt_distance", text="Compare", icon="MOD_MESHDEFORM")
     row.operator("uv.omt_regions", text="Copy Table", icon="COPYDOWN")

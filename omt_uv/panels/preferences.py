@@ -17,7 +17,7 @@ from ..settings import (
     DEFAULT_TEXTURE_SIZE,
     QUALITIES,
 )
-from . import keymap
+from . import keymap, welcome
 
 # The package that Blender knows as the add-on contains this one.
 PACKAGE = __package__.rpartition(".")[0]
@@ -27,6 +27,11 @@ OPERATORS = (
     *("UV_OT_omt_unwrap", "UV_OT_omt_refine", "UV_OT_omt_magnify", "UV_OT_omt_sphere", "UV_OT_omt_seams"),
     "UV_OT_omt_density_set",
 )
+
+
+# How often, and after how many seconds, the tab is looked for where it does not exist yet.
+LOOKS = 300
+LOOK_AGAIN = 0.2
 
 
 def _changed(self, context: bpy.types.Context) -> None:
@@ -98,6 +103,13 @@ class OMTUVPreferences(bpy.types.AddonPreferences):
         update=_changed,
     )
 
+    tab_was_shown: BoolProperty(
+        name="Tab Was Shown",
+        description="The sidebar was opened at the tab once, after the installation",
+        default=False,
+        options={"HIDDEN"},
+    )
+
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
@@ -146,3 +158,18 @@ def _apply() -> None:
     preferences = get(bpy.context)
     if preferences is not None:
         apply(preferences, bpy.context)
+        if not preferences.tab_was_shown:
+            looks = iter(range(LOOKS))
+            bpy.app.timers.register(lambda: show_once(looks), first_interval=LOOK_AGAIN)
+
+
+def show_once(looks) -> float | None:
+    """Open the tab, as soon as it exists, and never again; seconds until the next look."""
+    preferences = get(bpy.context)
+    if preferences is None or next(looks, None) is None:
+        return None
+    if not welcome.show_tab():
+        return LOOK_AGAIN
+    preferences.tab_was_shown = True
+    bpy.context.preferences.is_dirty = True
+    return None

@@ -7,7 +7,8 @@ import bpy
 from ..operators.inspection.remedy import UV_OT_omt_notices
 from ..remedies import ACTIONS
 from ..session import last_run
-from .section import Section, words
+from ..session.language import words
+from .section import Section
 
 # Lines of figures, and of a warning; what does not fit is left out, and in the report.
 ROWS = 7

@@ -74,11 +74,6 @@ def draw_settings(layout: bpy.types.UILayout, operator: str, properties) -> None
             layout.prop(properties, prop.identifier)
 
 
-def words(text: str, *values) -> str:
-    """A text in the language of the interface, with values in the place of its braces."""
-    return bpy.app.translations.pgettext_iface(text).format(*values)
-
-
 def split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     """Names of settings to the left of their values; the layout itself."""
     layout.use_property_split = True

@@ -9,10 +9,11 @@ from __future__ import annotations
 import bpy
 
 from .. import links
+from ..settings import CONTEXT
 from . import arrange, inspect, match, partition, result, tools, unwrap, volumes
 from .section import Section, class_of
+from .welcome import TAB
 
-TAB = "OMT"
 WITH_PRESETS = ("uv.omt_unwrap", "uv.omt_sphere", "uv.omt_magnify", "object.omt_remesh")
 EDITORS = {"VIEW3D": "VIEW_3D", "IMAGE": "IMAGE_EDITOR"}
 
@@ -29,6 +30,8 @@ SECTIONS = (
     arrange.SECTION,
     tools.MAGNIFY,
     tools.WEIGHTS,
+    tools.MAGNIFY_MORE,
+    tools.MAGNIFY_IMAGE,
     tools.REMESH,
     partition.SECTION,
     tools.SPHERE,
@@ -97,6 +100,7 @@ def _panel(prefix: str, space: str, place: int) -> type:
         "bl_idname": name,
         "bl_space_type": space,
         "bl_label": section.title,
+        "bl_translation_context": CONTEXT,
         "bl_options": set() if section.is_open else {"DEFAULT_CLOSED"},
         "bl_order": place,
         "section": section,

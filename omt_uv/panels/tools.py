@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import bpy
 
+from ..operators import magnify
 from .section import Section, big_button, draw_settings, operator_section, settings_of
 
+MAGNIFY_NAME = "uv.omt_magnify"
 REMESH_NAME = "object.omt_remesh"
 
 
@@ -33,7 +35,25 @@ class UV_UL_omt_regions(bpy.types.UIList):
         part.prop(item, "factor", text="")
 
 
-MAGNIFY = operator_section("magnify", "Magnify", "uv.omt_magnify", "VIEWZOOM")
+def draw_magnify(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    magnify.draw_main(layout.column(), settings_of(context, MAGNIFY_NAME))
+    big_button(layout, MAGNIFY_NAME, "VIEWZOOM")
+
+
+def draw_magnify_more(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    magnify.draw_more(layout.column(), settings_of(context, MAGNIFY_NAME))
+
+
+def draw_magnify_image(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    properties = settings_of(context, MAGNIFY_NAME)
+    if properties.source == "MESH":
+        layout.label(text="Existing UVs alone take an image along")
+    magnify.draw_image(layout.column(), properties)
+
+
+MAGNIFY = Section("magnify", "Magnify", draw_magnify, (MAGNIFY_NAME,))
+MAGNIFY_MORE = Section("magnify_more", "Seams and Packing", draw_magnify_more, (MAGNIFY_NAME,), parent="magnify")
+MAGNIFY_IMAGE = Section("magnify_image", "Image", draw_magnify_image, (MAGNIFY_NAME,), parent="magnify")
 WEIGHTS = operator_section("weights", "Weights", "object.omt_weights", "MOD_VERTEX_WEIGHT", parent="magnify")
 REMESH = Section("remesh", "Remesh", draw_remesh, (REMESH_NAME, "object.omt_compare"))
 SPHERE = operator_section("sphere", "Sphere", "uv.omt_sphere", "WORLD")

@@ -7,6 +7,8 @@ import bpy
 from ..blender.versions import progress_bar
 from ..operators.unwrap import draw_main, draw_more
 from ..session import following, run
+from ..session.language import stage_words
+from ..settings import CONTEXT
 from .section import Section, big_button, operator_section, settings_of
 
 UNWRAP = "uv.omt_unwrap"
@@ -44,14 +46,14 @@ def draw_end(layout: bpy.types.UILayout) -> None:
     """What ends a live session, in place of the button."""
     row = layout.row(align=True)
     row.scale_y = HEIGHT
-    row.operator("uv.omt_live_end", text="Accept", icon="CHECKMARK").end = "KEEP"
+    row.operator("uv.omt_live_end", text="Accept", text_ctxt=CONTEXT, icon="CHECKMARK").end = "KEEP"
     row.operator("uv.omt_live_end", text="Cancel", icon="X").end = "BACK"
 
 
 def draw_run(layout: bpy.types.UILayout, current: run.Run) -> None:
     row = layout.row(align=True)
     row.scale_y = HEIGHT
-    progress_bar(row, current.fraction, f"{current.stage}, {current.seconds:.1f} s")
+    progress_bar(row, current.fraction, f"{stage_words(current.stage)}, {current.seconds:.1f} s")
 
 
 def draw_options(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from .language import stage_words, words
+
 if TYPE_CHECKING:
     from ..solver.progress import EarlyEnd
 
@@ -74,8 +76,8 @@ class Run:
 
     def text(self) -> str:
         """One line for the status bar: what it does, and the keys that end it."""
-        line = f"{self.label}: {self.stage}   {100 * self.fraction:.0f} %   {self.seconds:.1f} s"
-        return f"{line}      {self.keys()}"
+        line = f"{words(self.label)}: {stage_words(self.stage)}   {100 * self.fraction:.0f} %   {self.seconds:.1f} s"
+        return f"{line}      {words(self.keys())}"
 
     def keys(self) -> str:
         """The keys that end it, as things are."""

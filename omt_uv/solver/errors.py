@@ -280,7 +280,7 @@ MERGING = "merging vertices that coincide"
 DISSOLVE = "dissolve faces without area"
 TURN_OUTSIDE = OrientationError.remedy
 CUT_FURTHER = "cut further for less shear, or allow for more"
-ENDED_EARLY = "its seams were not searched to the end; unwrap again for less shear"
+ENDED_EARLY = "kept before its seams were done; unwrap again"
 MORE_SEAMS = "no seams were found that would pay; allow for more shear, or mark some yourself"
 
 

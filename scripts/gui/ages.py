@@ -76,11 +76,16 @@ def _chroot(age: Age, script: str) -> str:
     return f"exec chroot {age.root} sh -c '{script}'"
 
 
-def install(age: Age, archive: Path) -> Path:
-    """A folder of a user in the root, with the extension installed from the zip; the folder as the root names it."""
+def stay(age: Age, archive: Path) -> Path:
+    """A folder of a new user in the root, with the zip in it; the folder as the root names it."""
     folder = Path(tempfile.mkdtemp(prefix="omt_uv_user_", dir=age.root / "tmp"))
     shutil.copy2(archive, folder / archive.name)
-    user = Path("/") / folder.relative_to(age.root)
+    return Path("/") / folder.relative_to(age.root)
+
+
+def install(age: Age, archive: Path) -> Path:
+    """A folder of a user in the root, with the extension installed from the zip; the folder as the root names it."""
+    user = stay(age, archive)
     done = enter(
         age,
         f"HOME={user} BLENDER_USER_RESOURCES={user} blender --command extension install-file -r user_default -e "
@@ -88,7 +93,7 @@ def install(age: Age, archive: Path) -> Path:
     )
     if "Installed" not in done.stdout + done.stderr:
         raise RuntimeError(f"{age.name}: the zip was not installed\n{done.stdout}{done.stderr}")
-    (folder / archive.name).unlink()
+    (age.root / user.relative_to("/") / archive.name).unlink()
     return user
 
 

@@ -106,13 +106,30 @@ class Story:
         yield from self.x("key", name)
         yield from self.pause()
 
-    def shoot(self, name):
-        """A screenshot of the whole window, mouse pointer aside."""
+    def drop(self, path, x, y):
+        """Drop a file there, as from a file manager."""
+        drop = Path(__file__).resolve().parent / "drop.py"
+        process = subprocess.Popen(["python3", str(drop), str(path), str(x), str(y)])
+        while process.poll() is None:
+            yield
+        if process.returncode:
+            raise OSError("the file was not taken")
+
+    def theme(self, word):
+        """The theme whose file has a word in its name; Blender's own dark one without."""
+        if not word:
+            bpy.ops.preferences.reset_default_theme()
+        elif not choose_theme(word):
+            raise LookupError(f"no theme is {word}")
+
+    def shoot(self, name, region=None):
+        """A screenshot of the whole window, or of a region of it, mouse pointer aside."""
         self.log("SHOOT", name)
         yield from self.pause(0.4)
         if shutil.which("import"):
             # What the screen shows, whatever Blender thinks of it: 5.2 draws nothing into screenshots of its own here.
-            process = subprocess.Popen(["import", "-window", "root", str(self.out / f"{name}.png")])
+            part = [] if region is None else ["-crop", self._crop(region), "+repage"]
+            process = subprocess.Popen(["import", "-window", "root", *part, str(self.out / f"{name}.png")])
             while process.poll() is None:
                 yield
             return
@@ -120,6 +137,12 @@ class Story:
         with bpy.context.temp_override(window=window, screen=window.screen, area=window.screen.areas[0]):
             bpy.ops.screen.screenshot(filepath=str(self.out / f"{name}.png"))
         yield from self.pause(0.1)
+
+    def _crop(self, region):
+        """A region as ImageMagick names it."""
+        window = bpy.context.window_manager.windows[0]
+        top = window.height - region.y - region.height
+        return f"{region.width}x{region.height}+{region.x}+{top}"
 
     def package(self, name):
         """A module of the package, such as "session.run"."""
@@ -226,12 +249,13 @@ def _head(count):
     return points, faces
 
 
-def light_theme():
-    """Blender's own light theme, to look at the panels in it."""
+def choose_theme(word):
+    """One of Blender's own themes, by a word of its name; whether there is one."""
     for folder in bpy.utils.preset_paths("interface_theme"):
-        for path in Path(folder).glob("*[Ll]ight*.xml"):
+        for path in Path(folder).glob(f"*{word}*.xml"):
             bpy.ops.script.execute_preset(filepath=str(path), menu_idname="USERPREF_MT_interface_theme_presets")
-            return
+            return True
+    return False
 
 
 def main():
@@ -244,7 +268,7 @@ def main():
         sys.path.append(os.environ["OMT_UV_SITE"])
         bpy.ops.preferences.addon_enable(module=ADDON)
     if os.environ.get("OMT_UV_THEME"):
-        light_theme()
+        choose_theme("Light")
     spec = importlib.util.spec_from_file_location("story", story_path)
     story_module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(story_module)
@@ -265,4 +289,10 @@ def main():
     bpy.app.timers.register(go_on, first_interval=1.5)
 
 
-main()
+try:
+    main()
+except Exception:  # noqa: BLE001, it is told, where Blender would stay open with nothing to play
+    out = Path(sys.argv[-1])
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "facts.json").write_text(json.dumps({"error": traceback.format_exc()}))
+    os._exit(1)

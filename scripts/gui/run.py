@@ -16,11 +16,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent))
-from ages import AGES, Age, enter, install
+from ages import AGES, Age, enter, install, stay
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
@@ -104,28 +105,45 @@ def _here(story: Path, out: Path, _age: Age, variables: dict, log) -> None:
 @functools.cache
 def _user(age: Age) -> Path:
     """A user of a root with the extension, installed once for all stories."""
+    return install(age, _archive())
+
+
+# Stories of two windows at once build and install one zip.
+ONE_AT_A_TIME = threading.Lock()
+
+
+@functools.cache
+def _archive() -> Path:
+    """The extension's zip for this machine, built once for all stories."""
     sys.path.append(str(ROOT / "scripts" / "release"))
     from build_extension import build, this_platform
 
     (archive,) = build([this_platform()])
-    return install(age, archive)
+    return archive
+
+
+def is_fresh(story: Path) -> bool:
+    """Whether a story begins without the extension, to install it by itself."""
+    return "\nFRESH = True\n" in story.read_text()
 
 
 def _in_root(story: Path, out: Path, age: Age, variables: dict, log) -> None:
-    """With the Blender of a root, and the extension as it was installed from the zip."""
-    user = _user(age)
+    """With the Blender of a root, and the extension as it was installed from the zip, or its zip alone."""
+    with ONE_AT_A_TIME:
+        user = stay(age, _archive()) if is_fresh(story) else _user(age)
     inside = age.root / user.relative_to("/")
     for path in (*HERE.glob("*.py"), story):
         shutil.copy2(path, inside / path.name)
-    target = user / "out"
-    shutil.rmtree(inside / "out", ignore_errors=True)
+    target = user / f"out_{story.stem}"
+    shutil.rmtree(inside / target.name, ignore_errors=True)
     command = _command(user / "drive.py", user / story.name, target)
     words = {"HOME": str(user), "LIBGL_ALWAYS_SOFTWARE": "1", "BLENDER_USER_RESOURCES": str(user)} | variables
+    words["OMT_UV_ZIP"] = str(user)
     words["OMT_UV_ADDON"] = "bl_ext.user_default.omt_uv"
     shell = " ".join([*(f"{k}={v}" for k, v in words.items()), "timeout", str(TIME_LIMIT), *command])
     done = enter(age, shell)
     log.write(done.stdout + done.stderr)
-    for path in (inside / "out").glob("*"):
+    for path in (inside / target.name).glob("*"):
         shutil.copy2(path, out / path.name)
 
 

@@ -141,15 +141,39 @@ class Finder:
 
         The header has a button for its page, wm.omt_help, by which it is found.
         """
-        self.story.log("OPEN", section)
-        found = yield from self.seek((f'section="{section}"',), HEADER)
+        y = yield from self.header(section)
+        yield from self.story.x("keydown", "ctrl")
+        yield from self.click_at(self.region.width // 4, y)
+        yield from self.story.x("keyup", "ctrl")
+        self.forget_below(y)
+        yield from self.story.pause(0.5)
+
+    def toggle(self, section):
+        """Open or close a section, and leave others as they are; the place of its header in the region."""
+        y = yield from self.header(section)
+        yield from self.click_at(self.region.width // 4, y)
+        self.forget_below(y)
+        yield from self.story.pause(0.5)
+        return self.region.width // 4, y
+
+    def header(self, section):
+        """The height in the region of a section's header."""
+        self.story.log("HEADER", section)
+        # The first section has no name, and is the first one of its operator.
+        words = (f'section="{section}"',) if section else ("omt_help(", '"uv.omt_unwrap"')
+        found = yield from self.seek(words, HEADER)
         if found is None:
             raise LookupError(f"no section of {self.kind} is {section}")
-        yield from self.story.x("keydown", "ctrl")
-        yield from self.click_at(self.region.width // 4, found[1])
-        yield from self.story.x("keyup", "ctrl")
-        self.known.clear()
-        yield from self.story.pause(0.5)
+        return found[1]
+
+    def find_sections(self):
+        """Look once at all headers that are in sight, to know where they are."""
+        yield from self.look(("no button has this call",), HEADER[:1])
+
+    def forget_below(self, y):
+        """What stands below a header moves when it is clicked."""
+        height = self.region.view2d.region_to_view(0, y)[1]
+        self.known = {call: place for call, place in self.known.items() if place[1] >= height}
 
 
 def matches(call: str, words) -> bool:

@@ -107,6 +107,31 @@ def test_a_warped_image_follows():
     assert pixels[..., 3].min() > 0.99
 
 
+@pytest.mark.parametrize("shown", [True, False])
+def test_the_material_shows_the_warped_image_if_it_shall(shown):
+    obj = painted()
+    image = bpy.data.images.new("map", 16, 16)
+    material = bpy.data.materials.new("Skin")
+    material.use_nodes = True
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    obj.data.materials.append(material)
+    magnify(factor=2.0, source="UV", image="map", use_image=shown)
+    assert node.image.name.startswith("map warped") == shown
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.4])
+def test_uvs_that_leave_their_tile_are_told(shift, package):
+    obj = painted()
+    scenes.set_uv(obj, scenes.uv_of(obj) + np.float32(shift))
+    magnify(factor=2.0, source="UV")
+    uv = scenes.uv_of(obj)
+    texts = [notice.text for notice in package("session.last_run").state.summary.notices]
+    outside = uv.min() < 0 or uv.max() > 1
+    assert any("beyond their tile" in text for text in texts) == outside
+    assert outside or not shift
+
+
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
 @pytest.mark.parametrize(
     ("arguments", "message"),

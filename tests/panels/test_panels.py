@@ -14,6 +14,10 @@ import scenes
 ROOT = Path(__file__).resolve().parents[2]
 
 
+# Sections without a button of their own: settings of the one that they stand in.
+SETTINGS_ALONE = {"more", "magnify_more", "magnify_image"}
+
+
 class Layout:
     """Takes every call that the panels make, and checks names against the operators."""
 
@@ -110,8 +114,10 @@ def test_the_tab_shows_every_setting_of_every_operator(package, prefix, mode):
         if panel is None:
             assert not any(map(package("panels.section").class_of, section.operators))
         else:
-            assert section.name == "more" or set(section.operators) <= set(panel)
+            assert section.name in SETTINGS_ALONE or set(section.operators) <= set(panel)
             assert panel
+    magnify = {entry for name in ("magnify", "magnify_more", "magnify_image") for entry in drawn[f"_{name}"] or ()}
+    assert not drawn["_magnify"] or magnify >= settings_of("uv.omt_magnify") - {"attribute", "further"}
     assert {"density", "scope", "uv.omt_density_get"} <= set(drawn["_density"])
 
 
@@ -180,6 +186,41 @@ def test_the_list_of_further_regions_is_that_of_the_object(package):
     draw_settings(Layout(record), properties)
     assert "further" not in record and {"uv.omt_region_add", "uv.omt_region_remove"} < set(record)
     assert record.count("group") == 2 and record.count("factor") == 3
+
+
+def test_a_group_about_to_be_made_is_no_search_that_finds_nothing(package):
+    """Blender shows that in red, as if it were wrong; a group that is there can be chosen from a list."""
+    obj = scenes.bump()
+    drawn = []
+
+    class Recorder(Layout):
+        def prop(self, data, name, **_):
+            drawn.append(("field", name))
+
+        def prop_search(self, data, name, owner, collection, **_):
+            drawn.append(("search", name))
+
+    properties = bpy.context.window_manager.operator_properties_last("object.omt_weights")
+    package("operators.regions.weights").draw_settings(Recorder([]), properties)
+    assert properties.weight_group and ("field", "weight_group") in drawn
+    obj.vertex_groups.new(name=properties.weight_group)
+    package("operators.regions.weights").draw_settings(Recorder([]), properties)
+    assert ("search", "weight_group") in drawn
+
+
+def test_strategies_have_plain_words(package):
+    for operator, name in (("object.omt_remesh", "strategy"), ("uv.omt_unwrap", "kind")):
+        properties = bpy.context.window_manager.operator_properties_last(operator).bl_rna.properties
+        assert not any(item.name.isupper() or "-" in item.name for item in properties[name].enum_items)
+
+
+def test_the_bar_of_colours_says_what_they_mean(package, monkeypatch):
+    overlay, inspect = package("display.overlay"), package("panels.inspect")
+    for kind, ends in package("display.colour_bar").ENDS.items():
+        monkeypatch.setattr(overlay, "kind", lambda kind=kind: kind)
+        record = []
+        inspect.draw(Layout(record), bpy.context)
+        assert {f"label {end}" for end in ends} <= set(record)
 
 
 def test_the_result_of_the_last_run_is_shown(package):

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from pathlib import Path
 
 import bpy
 
 import pytest
+import scenes
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize("language", ["de_DE", "ja_JP"])
@@ -44,7 +49,7 @@ def test_labels_settings_and_choices_have_words(package, name):
 
 def test_blender_speaks_them(package):
     view = bpy.context.preferences.view
-    words = package("panels.section").words
+    words = package("session.language").words
     available = [item.identifier for item in view.bl_rna.properties["language"].enum_items]
     if "de_DE" not in available:
         pytest.skip("this Blender was built without languages")
@@ -55,3 +60,67 @@ def test_blender_speaks_them(package):
     finally:
         view.language = before
     assert words("{} objects", 5) == "5 objects"
+
+
+def classes(package):
+    bases = (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.AddonPreferences)
+    return [cls for cls in package("registration").CLASSES if issubclass(cls, bases)]
+
+
+def of_classes(package):
+    """What Blender shows of operators, panels and preferences: labels, names of settings and of their choices."""
+    for cls in classes(package):
+        yield getattr(cls, "bl_label", "")
+        rna = cls.bl_rna
+        inherited = {p.identifier for p in rna.base.properties} | {"rna_type"}
+        if issubclass(cls, bpy.types.Operator):
+            rna = bpy.context.window_manager.operator_properties_last(scenes.name_of(cls)).bl_rna
+        for prop in rna.properties:
+            if prop.identifier not in inherited and not prop.is_hidden:
+                yield prop.name
+                yield from (item.name for item in prop.enum_items) if prop.type == "ENUM" else ()
+
+
+def trees(*patterns):
+    for pattern in patterns:
+        for path in sorted((ROOT / "omt_uv").glob(pattern)):
+            yield from ast.walk(ast.parse(path.read_text()))
+
+
+def constant(node):
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+
+
+def of_code():
+    """What panels draw as text, and what they say through `words`; stages of solvers; names of the figures of runs."""
+    for node in trees("panels/*.py", "operators/**/*.py", "session/*.py"):
+        if isinstance(node, ast.Call):
+            yield from (constant(k.value) for k in node.keywords if k.arg == "text")
+            if getattr(node.func, "id", "") == "words":
+                yield constant(node.args[0])
+    for node in trees("**/*.py"):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Progress":
+            yield constant(node.args[0])
+    for node in trees("operators/**/*.py", "session/last_run.py", "pipelines/magnify.py"):
+        if isinstance(node, ast.Tuple) and len(node.elts) == 2 and isinstance(node.elts[1], ast.JoinedStr):
+            yield constant(node.elts[0])
+
+
+# What is the same in every language.
+CODE = {"python -m pip install tetgen", ""}
+
+
+@pytest.mark.parametrize("language", ["de_DE", "ja_JP"])
+def test_everything_that_is_shown_has_its_words(package, language):
+    """Labels, settings, choices, buttons, stages, figures and keys. Who adds one adds its words."""
+    table = package("panels.translations.registered").LANGUAGES[language]
+    keys = {f"{keep}Esc: Cancel" for keep in ("", "Enter: Keep Best So Far      ", "Keeping the Best So Far      ")}
+    shown = {*of_classes(package), *of_code(), *keys} - CODE
+    missing = sorted(text for text in shown if any(c.isalpha() for c in text) and text not in table)
+    assert not missing, f"{language} has no words for {missing}"
+
+
+def test_a_number_at_the_end_of_a_stage_is_a_value(package):
+    stage_words = package("session.language").stage_words
+    assert stage_words("Seams, cut 3") == "Seams, cut 3" and stage_words("") == ""
+    assert "Seams, cut {}" in package("panels.translations.registered").LANGUAGES["de_DE"]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from ...settings import CONTEXT
 from .german import GERMAN
 from .japanese import JAPANESE
 
-# Of labels and settings, and of names of operators.
-CONTEXTS = ("*", "Operator")
+# Of labels and settings, of names of operators, and of words that Blender's dictionary has in another meaning.
+CONTEXTS = ("*", "Operator", CONTEXT)
 LANGUAGES = {"de_DE": GERMAN, "ja_JP": JAPANESE}
 
 
