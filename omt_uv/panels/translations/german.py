@@ -368,4 +368,5 @@ GERMAN: dict[str, str] = {
     "Show Warped": "Verzerrtes zeigen",
     "Add Region": "Bereich hinzufügen",
     "Remove Region": "Bereich entfernen",
+    "greatest distance": "größter Abstand",
 }

@@ -368,4 +368,5 @@ JAPANESE: dict[str, str] = {
     "Show Warped": "変形を表示",
     "Add Region": "領域を追加",
     "Remove Region": "領域を削除",
+    "greatest distance": "最大距離",
 }
