@@ -369,4 +369,5 @@ GERMAN: dict[str, str] = {
     "Add Region": "Bereich hinzufügen",
     "Remove Region": "Bereich entfernen",
     "greatest distance": "größter Abstand",
+    "Wrapping": "Umhüllen",
 }

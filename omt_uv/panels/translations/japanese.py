@@ -369,4 +369,5 @@ JAPANESE: dict[str, str] = {
     "Add Region": "領域を追加",
     "Remove Region": "領域を削除",
     "greatest distance": "最大距離",
+    "Wrapping": "ラップ中",
 }
