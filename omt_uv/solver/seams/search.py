@@ -45,6 +45,8 @@ BARRED = 0.3
 FINER = 1.5
 # A cut grows on where this share of its spread is asked for, at least.
 NEARLY_THERE = 0.6
+# The least spread that is asked for: what is flat once it is cut has none but by rounding.
+FLAT = 1e-9
 # A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
 GROUND = 1e-6
 # Where the time of a search goes, roughly: growth ends at this share of it.
@@ -179,7 +181,7 @@ class SeamSearch:
         setting = _Setting.of(component, coarse, found.base, found.mirror, model, self._tip_factor(component))
         task = setting.task(0.0, found.root)
         cut = cut_along(task, found.steps)
-        task = replace(task, bound=share * cut.spread)
+        task = replace(task, bound=max(share * cut.spread, FLAT))
         cuts = []
         for k, begin in enumerate((cut, None)):
             grown = yield from part_of(self._grown(task, begin), k / 2, 0.5)
@@ -194,7 +196,7 @@ class SeamSearch:
             coarse, model = self._modelled(component, found.mirror, k, FINER)
             cut = np.unique(cKDTree(coarse.positions).query(before)[1])
             cut = cut[~coarse.boundary[cut]]
-            bound = share * model.cut(cut[:1]).spread_cut(cut[1:])
+            bound = max(share * model.cut(cut[:1]).spread_cut(cut[1:]), FLAT)
             growing = self._grown_on(component, found.base, bound, found.mirror, coarse, model)
             other = yield from part_of(growing, k / trials, 1 / trials)
             if other is not None and (best is None or other.score < best.score):

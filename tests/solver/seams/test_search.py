@@ -106,3 +106,15 @@ def test_a_search_that_goes_on_leaves_a_share_of_the_spread():
     first = cut_to_disks(surface, search=search).cuts
     again = cut_to_disks(surface, search=replace(search, share=np.full(len(F), 0.4))).cuts
     assert 0 < first.length < again.length
+
+
+def test_what_is_flat_once_it_is_cut_is_searched_again():
+    # A cone that is cut to its tip has no spread left, of which a share is asked for.
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    V = np.concatenate([[[0, 0, 1.0]], np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])])
+    F = np.column_stack([np.zeros(24, np.int64), 1 + np.arange(24), 1 + (np.arange(24) + 1) % 24])
+    surface = triangle_surface(V, F)
+    search = SeamSearch(np.full(len(F), 1e-4), surface, lambda: seam_costs(surface))
+    first = cut_to_disks(surface, search=search).cuts.edges
+    again = cut_to_disks(surface, search=replace(search, share=np.full(len(F), 0.5))).cuts.edges
+    assert len(first) and np.array_equal(first, again)
