@@ -88,14 +88,17 @@ class SeamSearch:
         or such as are symmetric where the component is."""
         yield Progress("Seams", 0.0)
         name, polygons = fingerprint(component), component.polygons[component.polygons >= 0]
+        share = 1.0 if self.share is None else float(self.share[polygons].min())
         if self.share is not None and name in self.memory:
-            costly, share = self._with_costs(component), float(self.share[polygons].min())
-            self.memory[name] = yield from self._again(costly, self.memory[name], share)
+            self.memory[name] = yield from self._again(self._with_costs(component), self.memory[name], share)
             return self.memory[name].edges
         bound = float(self.spread[polygons].min())
         bounded = bool(component.on_boundary().any())
         if bounded:
             coarse, model = self._modelled(component)
+            if self.share is not None:
+                # Nothing was cut of it before, since it was predicted to shear less than it does.
+                bound = min(bound, share * model.spread)
             if model.spread <= bound and not base.any():
                 return base
         component = self._with_costs(component)

@@ -118,3 +118,11 @@ def test_what_is_flat_once_it_is_cut_is_searched_again():
     first = cut_to_disks(surface, search=search).cuts.edges
     again = cut_to_disks(surface, search=replace(search, share=np.full(len(F), 0.5))).cuts.edges
     assert len(first) and np.array_equal(first, again)
+
+
+def test_what_shears_more_than_was_predicted_is_cut_though_nothing_was_before():
+    V, F = meshes.cap(20, 40, 0.5)
+    surface = triangle_surface(V, F)
+    search = SeamSearch(np.full(len(F), 10.0), surface, lambda: seam_costs(surface))
+    assert not len(cut_to_disks(surface, search=search).cuts.edges)
+    assert len(cut_to_disks(surface, search=replace(search, share=np.full(len(F), 0.5))).cuts.edges)
