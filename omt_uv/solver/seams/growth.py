@@ -18,6 +18,8 @@ LEAST_WORTH = 0.015
 MOST_COST = 14.0
 # A cut ends where it is worth more than this share of what it takes, rather than in what is to be kept free.
 BARRED = 0.05
+# Relative difference up to which two are worth the same.
+EVEN = 1e-6
 # Shares of the way to an extremity at which a path may end.
 STOPS = (1.0, 0.8, 0.6)
 
@@ -65,7 +67,7 @@ def _best_arc(task: Task, cut: Cut, model: ScaleModel) -> _Arc | None:
                 continue
             fall = cut.spread - model.spread_cut(new)
             worth = task.tip_factor[part[0]] * fall / cost[part[0]]
-            if worth > 0 and (best is None or worth > best.worth):
+            if worth > 0 and (best is None or worth > best.worth * (1 + EVEN)):
                 best = _Arc(part, worth)
     return best
 
@@ -76,10 +78,14 @@ def _tips(task: Task, model: ScaleModel, cost: np.ndarray) -> np.ndarray:
     graph, gain = task.graph, model.gain(np.arange(len(cost)))
     peak = np.zeros(len(gain), dtype=bool)
     for height in (gain, np.abs(model.scale)):
+        # What is cut has nothing to save, but by rounding, and holds the rest.
+        height = np.where(cost > 0, height, 0.0)
         around = np.zeros(len(gain))
         np.maximum.at(around, graph.ends[:, 0], height[graph.ends[:, 1]])
         np.maximum.at(around, graph.ends[:, 1], height[graph.ends[:, 0]])
         peak |= (height >= around) & (height > 0)
     peaks = np.flatnonzero(peak & np.isfinite(cost) & (cost > 0))
     worth = gain[peaks] * task.tip_factor[peaks] / cost[peaks]
+    # Where two are worth the same, rounding does not choose between them.
+    worth = np.round(np.log(np.maximum(worth, 1e-300)) / EVEN)
     return peaks[np.argsort(-worth, kind="stable")[:MOST_TIPS]]

@@ -23,7 +23,7 @@ from ..progress import Progress, Steps, part_of
 from .coarse_surface import CoarseSurface, coarse_surface
 from .cut_tree import EXCHANGE, Cut, Task, cut_along
 from .fine_paths import FineMirror, carried, with_line
-from .growth import grow
+from .growth import EVEN, grow
 from .improvement import improved, rerouted, trimmed
 from .options import SearchOptions
 from .path_graph import Mirrored, PathGraph, path_graph
@@ -152,14 +152,15 @@ class SeamSearch:
 
         plain : the first of the surfaces, where it is known
         """
-        best, trials = None, self.options.trials
+        # What is small has one coarse surface, itself.
+        best, trials = None, self.options.trials if component.vertex_count > self.options.vertices else 1
         # Where a search ends hangs on the coarse surface: of several, the one on which most has grown is improved.
         for k in range(trials):
             known = plain if k == 0 else None
             coarse, model = self._modelled(component, mirror, k) if known is None else known
             growing = self._grown_on(component, base, bound, mirror, coarse, model)
             found = yield from part_of(growing, GROWN * k / trials, GROWN / trials)
-            if found is not None and (best is None or found.score < best.score):
+            if found is not None and (best is None or found.score < best.score * (1 - EVEN)):
                 best = found
         if best is None:
             return None
@@ -202,7 +203,7 @@ class SeamSearch:
             bound = max(share * model.cut(cut[:1]).spread_cut(cut[1:]), FLAT)
             growing = self._grown_on(component, found.base, bound, found.mirror, coarse, model)
             other = yield from part_of(growing, k / trials, 1 / trials)
-            if other is not None and (best is None or other.score < best.score):
+            if other is not None and (best is None or other.score < best.score * (1 - EVEN)):
                 best = other
         if best is None:
             return (yield from self._grown_finer(component, replace(found, mirror=None), share))
@@ -403,7 +404,7 @@ class _Setting:
         worth = np.abs(scale) * self.tip_factor / self.factor
         if self.mirrored is not None:
             worth[self.mirrored.image != np.arange(len(worth))] = -1
-        return int(np.argmax(worth))
+        return int(np.argmax(worth >= worth.max() * (1 - EVEN)))
 
     def task(self, bound: float, root: int) -> Task:
         """The search for a spread within a bound; root: where cuts of a closed surface begin."""
