@@ -13,10 +13,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from common import BUILD, ROOT
 from heads import write_heads
 
-ROOT = Path(__file__).resolve().parents[2]
-FOLDER = ROOT / "build" / "papers" / "gu_2018"
+FOLDER = BUILD / "gu_2018"
 MODELS = ("max_planck.obj", "lion.off", "bunny.obj")
 # Faces that B. Gu remeshed.
 ALL = 70_000

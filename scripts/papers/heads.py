@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import common  # noqa: F401
 import numpy as np
 
 from omt_uv.solver.mesh.topology import boundary_loops, graph_components, halfedges

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +17,7 @@ SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 def script(path):
     spec = importlib.util.spec_from_file_location(Path(path).stem, SCRIPTS / path)
     module = importlib.util.module_from_spec(spec)
-    # As when it is run: what is beside it can be imported.
-    beside = str((SCRIPTS / path).parent)
-    sys.path.insert(0, beside)
-    try:
-        spec.loader.exec_module(module)
-    finally:
-        sys.path.remove(beside)
+    spec.loader.exec_module(module)
     return module
 
 
