@@ -10,23 +10,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
-from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ..analysis.seam_costs import SeamCosts
 from ..analysis.symmetry_plane import NEAR
 from ..cutting.component import CutComponent, fingerprint
-from ..linalg.sparse import solve_spd
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
+from .coarse_cut import CoarseCut, Found, Setting, best_of, hub
 from .coarse_surface import CoarseSurface, coarse_surface
-from .cut_tree import EXCHANGE, Cut, Task, cut_along
-from .fine_paths import FineMirror, carried, with_line
-from .growth import EVEN, grow
+from .cut_tree import Cut, Task, cut_along
+from .fine_paths import FineMirror, with_line
+from .growth import grow
 from .improvement import improved, rerouted, trimmed
 from .options import SearchOptions
-from .path_graph import Mirrored, PathGraph, path_graph
 from .predicted_scale import ScaleModel
 from .symmetric_base import symmetric_base
 
@@ -47,8 +44,6 @@ FINER = 1.5
 NEARLY_THERE = 0.6
 # The least spread that is asked for: what is flat once it is cut has none but by rounding.
 FLAT = 1e-9
-# A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
-GROUND = 1e-6
 # Where the time of a search goes, roughly: growth ends at this share of it.
 GROWN = 0.5
 
@@ -110,8 +105,6 @@ class SeamSearch:
             return base
         plain = (coarse, model) if bounded else None
         best = yield from part_of(self._best(component, base, bound, mirror, plain), 0.0, 0.9)
-        if best is None:
-            return base
         self.memory[name] = best.carried(component)
         return self.memory[name].edges
 
@@ -122,50 +115,71 @@ class SeamSearch:
         bound: float,
         mirror: FineMirror | None,
         plain: tuple[CoarseSurface, ScaleModel] | None,
-    ) -> Steps[_CoarseCut | None]:
-        """The best cut, a symmetric one where that is not much dearer; the other arguments are those of `_searched`."""
+    ) -> Steps[CoarseCut]:
+        """The best cut, a symmetric one where that is not much dearer.
+
+        plain : the first of the coarse surfaces that know no mirror, where it is known
+        """
         line = mirror
         if mirror is not None and mirror.exact:
-            best = yield from part_of(self._searched(component, base, bound, mirror, None), 0.0, 0.4)
+            best = yield from part_of(self._symmetric(component, base, bound, mirror), 0.0, 0.4)
             if best is not None:
                 return best
             # Where the plane runs between the vertices, there is hardly a symmetric cut without a line along it.
             line = with_line(component, mirror)
+        coarse, model = self._modelled(component) if plain is None else plain
+        setting = self._setting(component, base, None, coarse, model)
+        task = setting.task(bound, setting.extremity())
+        first = yield from part_of(self._grown_on(setting, task, base, None), 0.4, 0.1)
+        shorter = None
         if line is not None:
-            best = yield from part_of(self._searched(component, base, bound, line, None), 0.4, 0.2)
-            # One trial says what others cost, about.
-            once = replace(self, options=replace(self.options, trials=1))
-            other = yield from part_of(once._searched(component, base, bound, None, plain), 0.6, 0.1)
-            if best is not None and (other is None or best.score <= self._worth_of_symmetry() * other.score):
+            best = yield from part_of(self._symmetric(component, base, bound, line), 0.5, 0.2)
+            # One of the coarse surfaces says what other cuts cost, about.
+            shorter = yield from part_of(self._shortened(first), 0.7, 0.1)
+            if best is not None and best.score <= self._worth_of_symmetry() * shorter.score:
                 return best
-        return (yield from part_of(self._searched(component, base, bound, None, plain), 0.7, 0.3))
+        more = range(1, self._trials(component))
+        others = yield from part_of(self._several_grown(component, base, None, bound, more), 0.8, 0.1)
+        found = best_of([first, *others])
+        if found is first and shorter is not None:
+            return shorter
+        return (yield from part_of(self._shortened(found), 0.9, 0.1))
 
-    def _searched(
+    def _symmetric(
+        self, component: CutComponent, base: np.ndarray, bound: float, mirror: FineMirror
+    ) -> Steps[CoarseCut | None]:
+        """The best symmetric cut; None where there is hardly one."""
+        trials = range(self._trials(component))
+        cuts = yield from part_of(self._several_grown(component, base, mirror, bound, trials), 0.0, GROWN)
+        return (yield from part_of(self._shortened(best_of(cuts)), GROWN, 1 - GROWN)) if cuts else None
+
+    def _trials(self, component: CutComponent) -> int:
+        """Coarse surfaces to be tried; what is small has one, itself."""
+        return self.options.trials if component.vertex_count > self.options.vertices else 1
+
+    def _several_grown(
         self,
         component: CutComponent,
         base: np.ndarray,
-        bound: float,
         mirror: FineMirror | None,
-        plain: tuple[CoarseSurface, ScaleModel] | None,
-    ) -> Steps[_CoarseCut | None]:
-        """The best cut on several coarse surfaces, where there is a mirror a symmetric one, None if that cannot be.
+        bound: float | Callable[[CoarseSurface, ScaleModel], float],
+        trials: range,
+        finer: float = 1.0,
+    ) -> Steps[list[CoarseCut]]:
+        """Cuts grown on several coarse surfaces, since where a search ends hangs on them; without those on which
+        symmetric ones cannot get along the plane of the mirror.
 
-        plain : the first of the surfaces, where it is known
+        bound : of the spread, or what gives it for a surface
         """
-        # What is small has one coarse surface, itself.
-        best, trials = None, self.options.trials if component.vertex_count > self.options.vertices else 1
-        # Where a search ends hangs on the coarse surface: of several, the one on which most has grown is improved.
-        for k in range(trials):
-            known = plain if k == 0 else None
-            coarse, model = self._modelled(component, mirror, k) if known is None else known
-            growing = self._grown_on(component, base, bound, mirror, coarse, model)
-            found = yield from part_of(growing, GROWN * k / trials, GROWN / trials)
-            if found is not None and (best is None or found.score < best.score * (1 - EVEN)):
-                best = found
-        if best is None:
-            return None
-        cut = yield from self._improved(best.task, best.cut)
-        return replace(best, cut=cut)
+        found = []
+        for k, trial in enumerate(trials):
+            coarse, model = self._modelled(component, mirror, trial, finer)
+            setting = self._setting(component, base, mirror, coarse, model)
+            task = setting.task(bound(coarse, model) if callable(bound) else bound, setting.extremity())
+            if mirror is None or task.graph.is_whole():
+                growing = self._grown_on(setting, task, base, mirror)
+                found.append((yield from part_of(growing, k / len(trials), 1 / len(trials))))
+        return found
 
     def _again(self, component: CutComponent, found: Found, share: float) -> Steps[Found]:
         """A cut that leaves a share of the spread that another has left: that one grown on, or where much is missing or
@@ -175,67 +189,58 @@ class SeamSearch:
             best = yield from part_of(self._grown_further(component, found, share), 0.0, GROWN / 2)
         if best is None or best.cut.spread > best.task.bound:
             best = yield from part_of(self._grown_finer(component, found, share), GROWN / 2, GROWN / 2)
-        cut = yield from self._improved(best.task, best.cut)
-        return replace(best, cut=cut).carried(component)
+        best = yield from part_of(self._shortened(best), GROWN, 1 - GROWN)
+        return best.carried(component)
 
-    def _grown_further(self, component: CutComponent, found: Found, share: float) -> Steps[_CoarseCut]:
+    def _grown_further(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut grown on from where it was, or anew on the same surface where that is better."""
         coarse = found.coarse
         model = ScaleModel.of(coarse, self._log_density(component, coarse))
-        setting = _Setting.of(component, coarse, found.base, found.mirror, model, self._tip_factor(component))
+        setting = self._setting(component, found.base, found.mirror, coarse, model)
         task = setting.task(0.0, found.root)
         cut = cut_along(task, found.steps)
         task = replace(task, bound=max(share * cut.spread, FLAT))
         cuts = []
         for k, begin in enumerate((cut, None)):
             grown = yield from part_of(self._grown(task, begin), k / 2, 0.5)
-            cuts.append(_CoarseCut(setting, task, trimmed(task, rerouted(task, grown)), found.base, found.mirror))
-        return min(cuts, key=lambda one: one.score)
+            cuts.append(CoarseCut(setting, task, trimmed(task, rerouted(task, grown)), found.base, found.mirror))
+        return best_of(cuts)
 
-    def _grown_finer(self, component: CutComponent, found: Found, share: float) -> Steps[_CoarseCut]:
+    def _grown_finer(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut grown anew on finer surfaces, the best of several."""
-        best, trials = None, max(self.options.trials - 1, 1)
+        trials = range(max(self.options.trials - 1, 1))
         before = component.positions[np.unique(component.ends[found.edges])]
-        for k in range(trials):
-            coarse, model = self._modelled(component, found.mirror, k, FINER)
+
+        def bound(coarse: CoarseSurface, model: ScaleModel) -> float:
             cut = np.unique(cKDTree(coarse.positions).query(before)[1])
             cut = cut[~coarse.boundary[cut]]
-            bound = max(share * model.cut(cut[:1]).spread_cut(cut[1:]), FLAT)
-            growing = self._grown_on(component, found.base, bound, found.mirror, coarse, model)
-            other = yield from part_of(growing, k / trials, 1 / trials)
-            if other is not None and (best is None or other.score < best.score * (1 - EVEN)):
-                best = other
-        if best is None:
-            return (yield from self._grown_finer(component, replace(found, mirror=None), share))
-        return best
+            return max(share * model.cut(cut[:1]).spread_cut(cut[1:]), FLAT)
 
-    def _grown_on(
-        self,
-        component: CutComponent,
-        base: np.ndarray,
-        bound: float,
-        mirror: FineMirror | None,
-        coarse: CoarseSurface,
-        model: ScaleModel,
-    ) -> Steps[_CoarseCut | None]:
-        """A cut grown on a coarse surface; None where symmetric ones cannot get along the plane of the mirror."""
-        setting = _Setting.of(component, coarse, base, mirror, model, self._tip_factor(component))
-        task = setting.task(bound, setting.extremity())
-        if mirror is not None and not task.graph.is_whole():
-            return None
+        cuts = yield from self._several_grown(component, found.base, found.mirror, bound, trials, FINER)
+        if not cuts:
+            return (yield from self._grown_finer(component, replace(found, mirror=None), share))
+        return best_of(cuts)
+
+    def _grown_on(self, setting: Setting, task: Task, base: np.ndarray, mirror: FineMirror | None) -> Steps[CoarseCut]:
+        """A cut grown on a coarse surface from nothing."""
         cut = yield from self._grown(task)
         if setting.is_closed:
-            task = setting.task(bound, _hub(task.graph, cut.steps))
+            task = setting.task(task.bound, hub(task.graph, cut.steps))
             cut = cut_along(task, cut.steps)
-        return _CoarseCut(setting, task, trimmed(task, rerouted(task, cut)), base, mirror)
+        return CoarseCut(setting, task, trimmed(task, rerouted(task, cut)), base, mirror)
 
-    def _improved(self, task: Task, cut: Cut) -> Steps[Cut]:
-        """The cut made shorter."""
-        cut = trimmed(task, rerouted(task, cut))
+    def _setting(self, component: CutComponent, base, mirror, coarse: CoarseSurface, model: ScaleModel) -> Setting:
+        return Setting.of(component, coarse, base, mirror, model, self._tip_factor(component))
+
+    def _shortened(self, found: CoarseCut) -> Steps[CoarseCut]:
+        """The same, made shorter."""
+        task = found.task
+        # Again: what was trimmed leaves room for other ways.
+        cut = trimmed(task, rerouted(task, found.cut))
         for k, better in enumerate(improved(task, cut, self.options.rounds)):
             cut = better
-            yield Progress("Seams", GROWN + (0.9 - GROWN) * (k + 1) / self.options.rounds)
-        return cut
+            yield Progress("Seams", (k + 1) / self.options.rounds)
+        return replace(found, cut=cut)
 
     def _worth_of_symmetry(self) -> float:
         """How many times as much symmetric seams may cost."""
@@ -306,136 +311,3 @@ class SeamSearch:
         vertices, n = component.triangles[real].ravel(), component.vertex_count
         total = np.bincount(vertices, value, n) / np.maximum(np.bincount(vertices, minlength=n), 1)
         return (total - total.mean())[coarse.kept]
-
-
-@dataclass(frozen=True)
-class Found:
-    """What was cut of a part.
-
-    Attributes
-    ----------
-    edges (e,) bool : that were cut; base (e,) bool : those of them that made a disk of it first
-    mirror : if the others are symmetric
-    coarse, steps (k,), root : where and along what they were found, and where on a closed surface they begin
-    """
-
-    edges: np.ndarray
-    base: np.ndarray
-    mirror: FineMirror | None
-    coarse: CoarseSurface
-    steps: np.ndarray
-    root: int
-
-
-@dataclass(frozen=True)
-class _CoarseCut:
-    """A cut that was found for a task, beside edges `base` (e,) bool."""
-
-    setting: _Setting
-    task: Task
-    cut: Cut
-    base: np.ndarray
-    mirror: FineMirror | None
-
-    @property
-    def score(self) -> float:
-        """What it costs; less is better. One that misses the bound costs what reaching it would."""
-        return self.cut.cost * max(self.cut.spread / self.task.bound, 1.0) ** EXCHANGE
-
-    def carried(self, component: CutComponent) -> Found:
-        """The same, led along the edges of the component."""
-        start, coarse = component.on_boundary(), self.setting.coarse
-        start[component.ends[self.base].ravel()] = True
-        if self.setting.is_closed:
-            start[coarse.kept[self.task.graph.boundary]] = True
-        edges = carried(component, coarse, self.task.graph, self.cut.steps, start, self.mirror)
-        root = int(np.argmax(self.task.graph.boundary))
-        return Found(self.base | edges, self.base, self.mirror, coarse, self.cut.steps, root)
-
-
-@dataclass(frozen=True)
-class _Setting:
-    """A coarse surface to be cut, from the vertices `start` (n,) bool on: its boundary, or what is cut already."""
-
-    coarse: CoarseSurface
-    model: ScaleModel
-    factor: np.ndarray
-    tip_factor: np.ndarray
-    start: np.ndarray
-    mirrored: Mirrored | None
-
-    @staticmethod
-    def of(component: CutComponent, coarse: CoarseSurface, base, mirror, model, tip_factor) -> _Setting:
-        tree = cKDTree(coarse.positions)
-        mirrored = None
-        if mirror is not None:
-            plane, side = mirror.plane[coarse.kept], mirror.side[coarse.kept]
-            image = np.arange(len(plane))
-            # Images are on the other side, or a cut would meet them where nothing but they are cut.
-            for here, there in ((side & ~plane, ~side & ~plane), (~side & ~plane, side & ~plane)):
-                if there.any():
-                    at = component.positions[mirror.image[coarse.kept[here]]]
-                    image[here] = np.flatnonzero(there)[cKDTree(coarse.positions[there]).query(at)[1]]
-            # Nothing else is its own image, or a path there would count once and have none.
-            other = ~plane & (image == np.arange(len(image)))
-            mirrored = Mirrored(image, (side & ~other) | plane)
-        start = coarse.boundary.copy()
-        if base.any():
-            start[tree.query(component.positions[np.unique(component.ends[base])])[1]] = True
-        return _Setting(
-            coarse=coarse,
-            model=model,
-            factor=_cost_factor(component)[coarse.kept],
-            tip_factor=tip_factor[coarse.kept],
-            start=start,
-            mirrored=mirrored,
-        )
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether there is nowhere for cuts to begin, so that they need a root."""
-        return not self.start.any()
-
-    def extremity(self) -> int:
-        """The vertex at which a closed surface is opened: a sharp one, in the mirror plane if there is one."""
-        model, area = self.model, self.coarse.area
-        load = self.coarse.curvature - self.coarse.curvature.sum() * area
-        scale = solve_spd(model.laplacian + GROUND * diags(area), load)
-        worth = np.abs(scale) * self.tip_factor / self.factor
-        if self.mirrored is not None:
-            worth[self.mirrored.image != np.arange(len(worth))] = -1
-        return int(np.argmax(worth >= worth.max() * (1 - EVEN)))
-
-    def task(self, bound: float, root: int) -> Task:
-        """The search for a spread within a bound; root: where cuts of a closed surface begin."""
-        start = self.start.copy()
-        if self.is_closed:
-            start[root] = True
-        more = np.flatnonzero(start & ~self.coarse.boundary)
-        graph = path_graph(self.coarse, self.factor, start, self.mirrored)
-        # One alone first: before it, a closed surface is held nowhere.
-        return Task(graph, self.model.cut(more[:1]).cut(more[1:]), bound, self.tip_factor)
-
-
-def _hub(graph: PathGraph, steps: np.ndarray) -> int:
-    """The vertex of a cut where most of it meets, and of those in its middle: a root that is no tip."""
-    vertices, degree = np.unique(graph.ends[steps], return_counts=True)
-    if len(vertices) == 0:
-        return int(np.flatnonzero(graph.boundary)[0])
-    n = len(graph.boundary)
-    tree = csr_matrix((graph.cost[steps], graph.ends[steps].T), shape=(n, n))
-    reach = dijkstra(tree, directed=False, indices=vertices)[:, vertices].max(axis=1)
-    if graph.in_plane.any():
-        degree = np.where(graph.in_plane[vertices], degree, 0)
-    return int(vertices[np.lexsort((reach, -degree))[0]])
-
-
-def _cost_factor(component: CutComponent) -> np.ndarray:
-    """Cost of a cut per length (n,) at every vertex, along the cheapest of its edges rather than the others."""
-    inner = np.isfinite(component.cost)
-    n = component.vertex_count
-    ends = component.ends[inner]
-    length = np.repeat(component.length[inner], 2)
-    ease = np.repeat(component.length[inner] ** 2 / np.maximum(component.cost[inner], 1e-300), 2)
-    total = np.bincount(ends.ravel(), length, n)
-    return np.where(total > 0, total / np.maximum(np.bincount(ends.ravel(), ease, n), 1e-300), 1.0)

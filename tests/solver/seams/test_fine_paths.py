@@ -8,7 +8,7 @@ from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, graph_components
-from omt_uv.solver.seams import search
+from omt_uv.solver.seams import coarse_cut
 from omt_uv.solver.seams.fine_paths import carried
 from omt_uv.solver.seams.search import SeamSearch
 
@@ -22,7 +22,7 @@ def test_what_is_carried_is_a_forest_that_hangs_on_the_boundary(monkeypatch, spr
         seen.append((component, start, carried(component, coarse, graph, steps, start, mirror)))
         return seen[-1][-1]
 
-    monkeypatch.setattr(search, "carried", watched)
+    monkeypatch.setattr(coarse_cut, "carried", watched)
     surface = triangle_surface(V, F)
     edges = cut(surface, search=SeamSearch(np.full(len(F), spread), surface, lambda: seam_costs(surface))).edges
     ((component, start, chosen),) = seen

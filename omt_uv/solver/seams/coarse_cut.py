@@ -1,0 +1,163 @@
+"""What a search cuts: a coarse surface with what cuts on it cost and are worth, a cut that was found on it, and the
+edges of the component that it was carried to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from ..cutting.component import CutComponent
+from ..linalg.sparse import solve_spd
+from .coarse_surface import CoarseSurface
+from .cut_tree import EXCHANGE, Cut, Task
+from .fine_paths import FineMirror, carried
+from .growth import EVEN
+from .path_graph import Mirrored, PathGraph, path_graph
+from .predicted_scale import ScaleModel
+
+# A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
+GROUND = 1e-6
+
+
+@dataclass(frozen=True)
+class Found:
+    """What was cut of a part.
+
+    Attributes
+    ----------
+    edges (e,) bool : that were cut; base (e,) bool : those of them that made a disk of it first
+    mirror : if the others are symmetric
+    coarse, steps (k,), root : where and along what they were found, and where on a closed surface they begin
+    """
+
+    edges: np.ndarray
+    base: np.ndarray
+    mirror: FineMirror | None
+    coarse: CoarseSurface
+    steps: np.ndarray
+    root: int
+
+
+@dataclass(frozen=True)
+class CoarseCut:
+    """A cut that was found for a task, beside edges `base` (e,) bool."""
+
+    setting: Setting
+    task: Task
+    cut: Cut
+    base: np.ndarray
+    mirror: FineMirror | None
+
+    @property
+    def score(self) -> float:
+        """What it costs; less is better. One that misses the bound costs what reaching it would."""
+        return self.cut.cost * max(self.cut.spread / self.task.bound, 1.0) ** EXCHANGE
+
+    def carried(self, component: CutComponent) -> Found:
+        """The same, led along the edges of the component."""
+        start, coarse = component.on_boundary(), self.setting.coarse
+        start[component.ends[self.base].ravel()] = True
+        if self.setting.is_closed:
+            start[coarse.kept[self.task.graph.boundary]] = True
+        edges = carried(component, coarse, self.task.graph, self.cut.steps, start, self.mirror)
+        root = int(np.argmax(self.task.graph.boundary))
+        return Found(self.base | edges, self.base, self.mirror, coarse, self.cut.steps, root)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A coarse surface to be cut, from the vertices `start` (n,) bool on: its boundary, or what is cut already."""
+
+    coarse: CoarseSurface
+    model: ScaleModel
+    factor: np.ndarray
+    tip_factor: np.ndarray
+    start: np.ndarray
+    mirrored: Mirrored | None
+
+    @staticmethod
+    def of(component: CutComponent, coarse: CoarseSurface, base, mirror, model, tip_factor) -> Setting:
+        tree = cKDTree(coarse.positions)
+        mirrored = None
+        if mirror is not None:
+            plane, side = mirror.plane[coarse.kept], mirror.side[coarse.kept]
+            image = np.arange(len(plane))
+            # Images are on the other side, or a cut would meet them where nothing but they are cut.
+            for here, there in ((side & ~plane, ~side & ~plane), (~side & ~plane, side & ~plane)):
+                if there.any():
+                    at = component.positions[mirror.image[coarse.kept[here]]]
+                    image[here] = np.flatnonzero(there)[cKDTree(coarse.positions[there]).query(at)[1]]
+            # Nothing else is its own image, or a path there would count once and have none.
+            other = ~plane & (image == np.arange(len(image)))
+            mirrored = Mirrored(image, (side & ~other) | plane)
+        start = coarse.boundary.copy()
+        if base.any():
+            start[tree.query(component.positions[np.unique(component.ends[base])])[1]] = True
+        return Setting(
+            coarse=coarse,
+            model=model,
+            factor=_cost_factor(component)[coarse.kept],
+            tip_factor=tip_factor[coarse.kept],
+            start=start,
+            mirrored=mirrored,
+        )
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether there is nowhere for cuts to begin, so that they need a root."""
+        return not self.start.any()
+
+    def extremity(self) -> int:
+        """The vertex at which a closed surface is opened: a sharp one, in the mirror plane if there is one."""
+        model, area = self.model, self.coarse.area
+        load = self.coarse.curvature - self.coarse.curvature.sum() * area
+        scale = solve_spd(model.laplacian + GROUND * diags(area), load)
+        worth = np.abs(scale) * self.tip_factor / self.factor
+        if self.mirrored is not None:
+            worth[self.mirrored.image != np.arange(len(worth))] = -1
+        return int(np.argmax(worth >= worth.max() * (1 - EVEN)))
+
+    def task(self, bound: float, root: int) -> Task:
+        """The search for a spread within a bound; root: where cuts of a closed surface begin."""
+        start = self.start.copy()
+        if self.is_closed:
+            start[root] = True
+        more = np.flatnonzero(start & ~self.coarse.boundary)
+        graph = path_graph(self.coarse, self.factor, start, self.mirrored)
+        # One alone first: before it, a closed surface is held nowhere.
+        return Task(graph, self.model.cut(more[:1]).cut(more[1:]), bound, self.tip_factor)
+
+
+def best_of(cuts: Sequence[CoarseCut]) -> CoarseCut:
+    """The cut of the least score, the first of those that are even."""
+    least = min(cut.score for cut in cuts)
+    return next(cut for cut in cuts if cut.score <= least * (1 + EVEN))
+
+
+def hub(graph: PathGraph, steps: np.ndarray) -> int:
+    """The vertex of a cut where most of it meets, and of those in its middle: a root that is no tip."""
+    vertices, degree = np.unique(graph.ends[steps], return_counts=True)
+    if len(vertices) == 0:
+        return int(np.flatnonzero(graph.boundary)[0])
+    n = len(graph.boundary)
+    tree = csr_matrix((graph.cost[steps], graph.ends[steps].T), shape=(n, n))
+    reach = dijkstra(tree, directed=False, indices=vertices)[:, vertices].max(axis=1)
+    if graph.in_plane.any():
+        degree = np.where(graph.in_plane[vertices], degree, 0)
+    return int(vertices[np.lexsort((reach, -degree))[0]])
+
+
+def _cost_factor(component: CutComponent) -> np.ndarray:
+    """Cost of a cut per length (n,) at every vertex, along the cheapest of its edges rather than the others."""
+    inner = np.isfinite(component.cost)
+    n = component.vertex_count
+    ends = component.ends[inner]
+    length = np.repeat(component.length[inner], 2)
+    ease = np.repeat(component.length[inner] ** 2 / np.maximum(component.cost[inner], 1e-300), 2)
+    total = np.bincount(ends.ravel(), length, n)
+    return np.where(total > 0, total / np.maximum(np.bincount(ends.ravel(), ease, n), 1e-300), 1.0)
