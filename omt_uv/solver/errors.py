@@ -8,6 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
+# Elements that a message names at most.
+FEW = 5
+
+
+def first_of(elements: np.ndarray) -> str:
+    """The first few of elements (k,) or (k,2), for a message."""
+    return ", ".join(map(str, elements[:FEW].tolist())) + (", ..." if len(elements) > FEW else "")
+
 
 class MeshError(ValueError):
     """Input that has no valid map.
@@ -34,9 +42,8 @@ class MeshError(ValueError):
         text = self.cause
         count = len(self.elements)
         if self.kind and count:
-            first = ", ".join(str(e.tolist()) for e in self.elements[:5])
             plural = {"vertex": "vertices"}.get(self.kind, self.kind + "s")
-            text += f" ({count} {self.kind if count == 1 else plural}: {first}{', ...' if count > 5 else ''})"
+            text += f" ({count} {self.kind if count == 1 else plural}: {first_of(self.elements)})"
         return f"{text}. {remedy}." if remedy else f"{text}."
 
 

@@ -17,6 +17,7 @@ from ...pipelines.volumes.choices import (
     FLOW_WALLS,
 )
 from ...session import run
+from ...solver.errors import first_of
 from ..base import Complaint, SolverOperator, complaints, mesh_objects, tell, warn
 from ..properties import choose_group
 
@@ -129,10 +130,7 @@ class OBJECT_OT_omt_flow(SolverOperator, bpy.types.Operator):
         for k, (obj, faces) in enumerate(zip(objects, crossing, strict=True)):
             if not len(faces):
                 continue
-            first = ", ".join(map(str, faces[:5].tolist()))
-            text = (
-                f"Faces that newly pass through one another ({len(faces)}): {first}{', ...' if len(faces) > 5 else ''}"
-            )
+            text = f"Faces that newly pass through one another ({len(faces)}): {first_of(faces)}"
             warn(self, objects, [(k, text)])
             # In Edit Mode the selection is what moves, also in the redo panel.
             if obj.mode != "EDIT":

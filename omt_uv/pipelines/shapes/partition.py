@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...settings import MOST_MATERIALS, PartitionSettings
-from ...solver.errors import CountError
+from ...solver.errors import CountError, first_of
 from ...solver.mesh.geometry import face_areas, face_normals
 from ...solver.mesh.surface import Surface, chosen_triangles
 from ...solver.mesh.topology import pair_keys, pair_up
@@ -167,5 +167,4 @@ def _warnings(division: Division, whole: FaceCells, torn: np.ndarray, settings: 
 
 def _cells(numbers: np.ndarray) -> str:
     """Some cells in words, with a verb."""
-    first = ", ".join(map(str, numbers[:5])) + (", ..." if len(numbers) > 5 else "")
-    return f"{len(numbers)} cell{' is' if len(numbers) == 1 else 's are'} ({first})"
+    return f"{len(numbers)} cell{' is' if len(numbers) == 1 else 's are'} ({first_of(numbers)})"

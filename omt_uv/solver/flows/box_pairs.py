@@ -111,13 +111,16 @@ class _BoxCells:
             place = place // here
         return key, owner
 
+    def _sorted_entries(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        key, owner = self._entries(rows)
+        order = np.argsort(key, kind="stable")
+        return key[order], owner[order]
+
     def within(self, rows: np.ndarray) -> list[np.ndarray]:
         """Pairs among some boxes."""
         if not len(rows):
             return []
-        key, owner = self._entries(rows)
-        order = np.argsort(key, kind="stable")
-        key, owner = key[order], owner[order]
+        key, owner = self._sorted_entries(rows)
         end = _run_ends(key)
         place = np.arange(len(key))
         return self._looked_at(key, owner, place + 1, end - place - 1, owner)
@@ -128,9 +131,7 @@ class _BoxCells:
             return []
         for low, high in zip(self.low, self.high, strict=True):
             others = others[(low[others] <= high[rows].max()) & (high[others] >= low[rows].min())]
-        key, owner = self._entries(rows)
-        order = np.argsort(key, kind="stable")
-        key, owner = key[order], owner[order]
+        key, owner = self._sorted_entries(rows)
         far, other = self._entries(others)
         begin, end = np.searchsorted(key, far), np.searchsorted(key, far, side="right")
         return self._looked_at(far, other, begin, end - begin, owner)

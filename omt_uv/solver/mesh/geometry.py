@@ -45,6 +45,11 @@ def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray
     return np.linalg.norm(p[:, [1, 2, 0]] - p, axis=2).ravel()
 
 
+def edge_lengths(positions: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Length (k,) of every edge (k,2) between positions (n,2) or (n,3)."""
+    return np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
+
+
 def face_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unsigned area of every triangle, (m,), of positions (n,3)."""
     x, y, z = _double_areas(positions, triangles)

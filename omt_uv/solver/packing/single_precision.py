@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..mesh.geometry import signed_areas
 from ..mesh.topology import expand
 
 # Steps of single precision that a vertex may move along either axis, and rounds in which vertices do.
@@ -27,7 +28,7 @@ def without_rounded_folds(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     >>> bool(rounded[2, 1] < 0.5 or rounded[:2, 1].max() > 0.5)
     True
     """
-    side = np.sign(_areas(uv, triangles))
+    side = np.sign(signed_areas(uv, triangles))
     near = _rounded(uv)
     if not _folded(near, triangles, side).any():
         return uv
@@ -80,13 +81,8 @@ def _apart(vertices: np.ndarray, triangles: np.ndarray, n: int, rng: np.random.G
 
 
 def _folded(uv: np.ndarray, triangles: np.ndarray, side: np.ndarray) -> np.ndarray:
-    return _areas(uv, triangles) * side < np.where(side == 0, 0, np.finfo(float).tiny)
-
-
-def _areas(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Twice the areas (m,), from differences, which are exact between places of single precision."""
-    p, q, r = uv[triangles].transpose(1, 0, 2)
-    return (q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0])
+    # Of differences, which are exact between places of single precision.
+    return signed_areas(uv, triangles) * side < np.where(side == 0, 0, np.finfo(float).tiny)
 
 
 def _rounded(uv: np.ndarray) -> np.ndarray:

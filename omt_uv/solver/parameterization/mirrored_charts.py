@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from ..analysis.density import Target
 from ..cutting.cuts import Cuts
 from ..mesh.charts import Chart
-from ..mesh.geometry import signed_areas
+from ..mesh.geometry import edge_lengths, signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
@@ -94,7 +94,7 @@ def images_of_cuts(surface: Surface, faces: np.ndarray | None, cuts: np.ndarray)
     images = images[~np.isin(pair_keys(*images.T), pair_keys(*every.T))]
     if not _are_slits(images, compact.reshape(-1, 3), every):
         return none
-    length, more = (np.linalg.norm(np.diff(surface.positions[used][e], axis=1), axis=2).sum() for e in (cuts, images))
+    length, more = (edge_lengths(surface.positions, used[edges]).sum() for edges in (cuts, images))
     return used[images] if length + more <= LONGER * length else none
 
 
@@ -103,7 +103,7 @@ def with_images(surface: Surface, faces: np.ndarray | None, cuts: Cuts) -> Cuts:
     more = images_of_cuts(surface, faces, cuts.edges)
     if not len(more):
         return cuts
-    length = float(np.linalg.norm(np.diff(surface.positions[more], axis=1), axis=2).sum())
+    length = float(edge_lengths(surface.positions, more).sum())
     return replace(cuts, edges=np.concatenate([cuts.edges, more]), length=cuts.length + length)
 
 

@@ -16,6 +16,7 @@ from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
 from ..maps.distortion import face_distortion
 from ..mesh.charts import Chart
+from ..mesh.geometry import edge_lengths
 from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
@@ -169,7 +170,7 @@ def bound_shear(
         mapped = yield from unless_ended(further, early)
         if mapped is None:
             break
-        cuts = replace(last.cuts, edges=edges, length=_length(search.surface, edges))
+        cuts = replace(last.cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
         last = _Round.of(search, again.charts, mapped, cuts)
     best = last if last.worst <= best.worst else best
     warnings = tuple(best.warnings(bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
@@ -221,11 +222,6 @@ def _cuts(prepared: DiskCharts) -> Cuts:
 def _outline(chart: Chart) -> np.ndarray:
     """Keys (e,) of the edges around a chart."""
     return pair_keys(*chart.vertex_ids[boundary_edges(chart.triangles)].T)
-
-
-def _length(surface: Surface, edges: np.ndarray) -> float:
-    """Length of edges (k,2)."""
-    return float(np.linalg.norm(surface.positions[edges[:, 0]] - surface.positions[edges[:, 1]], axis=1).sum())
 
 
 def _is_marked(surface: Surface, chart: Chart) -> bool:

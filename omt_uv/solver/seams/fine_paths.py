@@ -9,6 +9,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from ..cutting.component import CutComponent
+from ..mesh.geometry import edge_lengths
 from ..mesh.topology import graph_components, halfedges, pair_keys
 from .coarse_surface import CoarseSurface
 from .cut_tree import stretches
@@ -141,7 +142,7 @@ class FineGraph:
         tail, head = halfedges(component.triangles)
         boundary = component.boundary
         ends = np.concatenate([component.ends[inner], np.column_stack([tail[boundary], head[boundary]])])
-        length = np.linalg.norm(component.positions[ends[:, 0]] - component.positions[ends[:, 1]], axis=1)
+        length = edge_lengths(component.positions, ends)
         length = length + 1e-9 * max(float(length.mean()), 1e-30)
         cost = np.concatenate([component.cost[inner], length[inner.sum() :]])
         rows, columns = np.concatenate([ends, ends[:, ::-1]]).T

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from ..mesh.geometry import edge_lengths
 from ..mesh.topology import halfedges, next_halfedge, twins
 from .coarse_surface import CoarseSurface
 
@@ -93,7 +94,7 @@ def path_graph(
     twin = twins(surface.triangles)
     once = np.flatnonzero(twin < np.arange(len(twin)))
     ends = np.column_stack([tail[once], head[once]])
-    length = np.linalg.norm(surface.positions[ends[:, 0]] - surface.positions[ends[:, 1]], axis=1)
+    length = edge_lengths(surface.positions, ends)
     across, straight = _across(surface.positions, tail, head, twin)
     along_edges = len(ends)
     ends, length = np.concatenate([ends, across]), np.concatenate([length, straight])
