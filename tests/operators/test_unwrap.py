@@ -258,7 +258,7 @@ def test_several_objects_share_one_density_and_one_square(mode):
     corners = np.concatenate([scenes.triangles_of(obj)[1] for obj in (a, b, c)])
     owner = np.repeat([0, 1, 2], [len(scenes.areas(obj)[0]) for obj in (a, b, c)])
     assert nearest_of_different_owner(corners, owner) >= 8 / 1024 - 1e-6
-    assert corners.min() >= 8 / 1024 - 1e-6 and corners.max() <= 1 - 8 / 1024 + 1e-6
+    assert corners.min() >= 4 / 1024 - 1e-6 and corners.max() <= 1 - 4 / 1024 + 1e-6
 
 
 def nearest_of_different_owner(corners, owner, samples=60):

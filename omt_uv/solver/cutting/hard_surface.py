@@ -23,6 +23,8 @@ SMALL = 0.06
 MOST_CORNERS = 256
 # ... and each holds at least so much curvature in sum, in radians; what holds less is hardly sheared uncut.
 CURVED = 0.2
+# A vertex is in the middle of a patch, too, that is so many times as far from it as the nearest: around a face there.
+AS_NEAR = 1.25
 # Corners of sides with a larger angle, in radians, are reflex.
 REFLEX = np.pi + 0.1
 # An edge beside such a corner counts this share of its length.
@@ -34,7 +36,8 @@ FRONT = 0.004
 
 
 def rounded_corners(component: CutComponent, curvature: np.ndarray, area: np.ndarray) -> np.ndarray | None:
-    """One vertex (k,) in the middle of each small patch with curvature (n,), where the surface is flat elsewhere.
+    """The vertices (k,) in the middle of each small patch with curvature (n,), where the surface is flat elsewhere: one,
+    or those around a face.
 
     None if the curved patches, of triangles with areas (m,), are not small.
     """
@@ -58,10 +61,10 @@ def rounded_corners(component: CutComponent, curvature: np.ndarray, area: np.nda
     moments = [np.bincount(patch[curved], (weight * x)[curved], component.vertex_count) for x in component.positions.T]
     middle = np.stack(moments, axis=1) / amount[:, None]
     off = np.where(curved, np.linalg.norm(component.positions - middle[patch], axis=1), np.inf)
-    order = np.lexsort((off, patch))
-    _, first = np.unique(patch[order], return_index=True)
-    nearest = order[first]
-    return nearest[np.isin(patch[nearest], kept)]
+    least = np.full(component.vertex_count, np.inf)
+    np.minimum.at(least, patch[curved], off[curved])
+    nearest = curved & (off <= AS_NEAR * least[patch]) & np.isin(patch, kept)
+    return np.flatnonzero(nearest)
 
 
 def net_factors(component: CutComponent, folded: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Pack islands into the unit square, as large as a search for the scale and the order finds them to fit.
 
-One scale for all, a margin in pixels that is kept exactly, no island mirrored, and none turned but by quarters.
+One scale for all, a margin in pixels that is kept exactly, no island mirrored, and none turned but by quarters. Half of
+the margin lies between islands and the border: tiles side by side have it whole.
 """
 
 from __future__ import annotations
@@ -80,8 +81,8 @@ class _PackTask:
 
     @property
     def cells_per_pixel(self) -> float:
-        """Cells of the raster per pixel: half of the margin around the square is the islands' own growth."""
-        return self.raster / (self.texture_size - self.margin)
+        """Cells of the raster per pixel."""
+        return self.raster / self.texture_size
 
     @property
     def tries(self) -> tuple[int, int]:
@@ -130,7 +131,7 @@ def pack(
     ----------
     islands : (n_i,2) positions in one common unit of length
     triangles : (m_i,3) vertex indices; vertices that none uses come to lie in the middle of their island
-    margin : least distance between islands and to the border, in pixels
+    margin : least distance between islands, in pixels, half of which is left to the border
     texture_size : pixels along a side of the unit square
     around : points (n,2) and triangles (m,3), of islands that stay in the unit square as they are
 
@@ -138,14 +139,14 @@ def pack(
     ------
     MarginError : the margins alone fill the texture
     """
-    if 2 * margin >= texture_size:
+    if margin >= texture_size:
         raise MarginError(f"A margin of {margin:g} pixels fills a texture of {texture_size} pixels")
     # What no triangle uses, as the centres of filled holes, is not placed.
     used = list(map(np.unique, triangles))
     points = [p[u] for p, u in zip(islands, used, strict=True)]
     faces = [np.searchsorted(u, t) for u, t in zip(used, triangles, strict=True)]
     if len(points) == 1 and not len(around):
-        placed, scale = _alone(points[0], (texture_size - 2 * margin) / texture_size)
+        placed, scale = _alone(points[0], (texture_size - margin) / texture_size)
     else:
         task = _task(points, faces, margin, texture_size, around)
         found = yield from _search(task)
@@ -191,10 +192,7 @@ def _alone(points: np.ndarray, width: float) -> tuple[list[np.ndarray], float]:
 
 def _task(points, faces, margin: float, texture_size: int, around) -> _PackTask:
     low = np.array([p.min(axis=0) for p in points])
-    pixels = texture_size / (texture_size - margin)
-    # The square is the raster, and half of the margin around it belongs to the growth of the islands.
-    there = [(p * texture_size - 0.5 * margin) * (COARSE / texture_size) * pixels for p, _ in around]
-    staying = outlines_of(there, [t for _, t in around])
+    staying = outlines_of([p * COARSE for p, _ in around], [t for _, t in around])
     return _PackTask(
         outlines=outlines_of(points, faces),
         areas=_areas(points, faces),
@@ -316,10 +314,9 @@ def _placed(points: list[np.ndarray], found: _Found) -> list[np.ndarray]:
     """Islands (n_i,2) in the unit square, where the items were placed."""
     placed, task = list(points), found.task
     raster, unit = found.raster, 1 / (task.cells_per_pixel * task.texture_size)
-    origin = 0.5 * task.margin / task.texture_size
 
     def put(number: int, corner: np.ndarray) -> None:
-        placed[number] = corner * unit + origin
+        placed[number] = corner * unit
 
     for k, number in enumerate(raster.single.tolist()):
         where = found.places[k]
@@ -343,12 +340,12 @@ def _turned(points: np.ndarray, size: Sequence[int], quarters: int) -> np.ndarra
 
 
 def _filled(placed: list[np.ndarray], task: _PackTask, scale: float) -> tuple[list[np.ndarray], float]:
-    """Islands enlarged together until they reach the margin at the border, unless others stay, and their scale."""
+    """Islands enlarged together until half of the margin is left to the border, unless others stay, and their scale."""
     unit = 1 / (task.cells_per_pixel * task.texture_size)
     if task.staying:
         return placed, scale * unit
     low = np.min([p.min(axis=0) for p in placed], axis=0)
     high = np.max([p.max(axis=0) for p in placed], axis=0)
-    border = task.margin / task.texture_size
+    border = 0.5 * task.margin / task.texture_size
     more = (1 - 2 * border) / float((high - low).max())
     return [(p - low) * more + border for p in placed], scale * unit * more

@@ -3,6 +3,7 @@
 import meshes
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from short_cuts import component_of
 
 from omt_uv.solver.cutting.cuts import cut
@@ -74,6 +75,24 @@ def test_flat_sides_between_bevels_stay_as_they_are(radius, segments, most):
     figures = shear_of(rounded_cube(radius, segments))
     assert figures.angle_mean < most
     assert figures.area_l1 < 1e-3 and figures.folds == 0 and figures.overlap == 0
+
+
+def chamfered_cube(width):
+    """A cube with flat bevels in one segment: triangles at its corners, which have no vertex in their middle."""
+    a = 1 - width
+    signs = cube()[0]
+    points = np.concatenate([signs * np.roll([1, a, a], axis) for axis in range(3)])
+    hull = ConvexHull(points)
+    sides = np.diff(points[hull.simplices], axis=1)
+    outwards = np.einsum("fd,fd->f", np.cross(sides[:, 0], sides[:, 1]), hull.equations[:, :3]) > 0
+    return points, [tuple(t if o else t[::-1]) for t, o in zip(hull.simplices.tolist(), outwards, strict=True)]
+
+
+@pytest.mark.parametrize("width", [0.05, 0.1])
+def test_a_net_goes_around_corners_that_are_cut_off(width):
+    figures = shear_of(chamfered_cube(width))
+    assert figures.angle_mean == pytest.approx(1, abs=1e-6)
+    assert figures.folds == 0 and figures.overlap == 0
 
 
 @pytest.mark.parametrize("height", [1, 1.3])
