@@ -14,7 +14,7 @@ from ..canonical.markers import ChartMarkers
 from ..canonical.named_maps import NamedProblem, conformal_map, polar_map
 from ..canonical.rectangles import natural_aspect, rectangle_corners
 from ..conformal.disk_map import sharpest_corners
-from ..errors import FoldedUVError, MeshError, PinError, positive_density
+from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, positive_density
 from ..maps.distortion import Distortion, distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
@@ -47,6 +47,8 @@ REFINEMENT = (0.4, 0.6)
 # Boundaries with four corners.
 RECTANGLES = ("square", "rectangle")
 # What is said, after their number, of faces of a map that is returned all the same.
+# Share of its area below which a face is nothing in single precision: a disk, a square or a rectangle has no room then.
+NO_ROOM = 1e-7
 FOLDED = "faces are folded or without area in the map"
 
 
@@ -306,13 +308,17 @@ def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: 
 
     given : target, region and pins of `refine`
     """
+    domain = options.boundary
     try:
-        return (yield from refine(disk.vertices, disk.triangles, uv, options, **given))
-    except FoldedUVError as error:
-        domain = options.boundary
+        refined = yield from refine(disk.vertices, disk.triangles, uv, options, **given)
+        if domain == "free" or (signed_areas(refined.uv, disk.triangles) > NO_ROOM * disk.target).all():
+            return refined
+        cause = "faces stay squeezed to nothing"
+    except (FoldedUVError, PrecisionError) as error:
         if domain == "free":
             raise
-        log.warnings.append(f"The {domain} has no room for this chart ({error.cause}); its boundary is free instead")
+        cause = error.cause
+    log.warnings.append(f"The {domain} has no room for this chart ({cause}); its boundary is free instead")
     uv = mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk())
     free = RefinementOptions(balance=options.balance, quality=options.quality)
     return (yield from refine(disk.vertices, disk.triangles, uv, free, **given))

@@ -35,6 +35,8 @@ RINGS = 4
 ROOM = 50
 # Most vertices of one patch: a large one goes as far as the worst of its corners lets it.
 LARGEST = 800
+# Share of a chart's area in the map below which that of a triangle has lost its sign.
+ROUNDING = 1e-15
 # Tries with more and more of the outlines fixed where they would come to cross themselves.
 ATTEMPTS = 5
 
@@ -69,7 +71,7 @@ def keep_convex(
     if not corners.reflex(w).any():
         return {}
     mesh = _union(charts, first, density, area_weights, spare, w)
-    immobile = np.concatenate(fixed)
+    immobile = np.concatenate(fixed) | _squeezed(mesh, w)
     for attempt in range(ATTEMPTS):
         moved = _relaxed(mesh, w, corners, immobile, spare is None)
         changed = np.unique(np.searchsorted(first, np.flatnonzero(moved != w), side="right") - 1)
@@ -94,6 +96,16 @@ def reflex_triangles(surface: Surface, charts: Sequence[Chart], maps: Sequence[n
     corners = _mapped_corners(surface, charts, triangles, w)
     folded = corners.triangles[corners.areas(w) <= 0, 0]
     return np.bincount(np.searchsorted(first, folded, side="right") - 1, minlength=len(charts))
+
+
+def _squeezed(mesh: CornerMesh, w: np.ndarray) -> np.ndarray:
+    """Vertices (n,) bool of charts with triangles whose areas in the map w (n,) are rounding: they have no energy."""
+    area = signed_areas(np.column_stack([w.real, w.imag]), mesh.triangles)
+    whole = np.bincount(mesh.chart, area)
+    bad = np.bincount(mesh.chart, area <= ROUNDING * whole[mesh.chart]) > 0
+    immobile = np.zeros(len(w), bool)
+    immobile[mesh.triangles[bad[mesh.chart]]] = True
+    return immobile
 
 
 def _union(charts, first, density, area_weights, spare, w) -> CornerMesh:

@@ -42,6 +42,7 @@ FAR = 0.5
 BEYOND_REPAIR = 0.05
 # The same of an outline that is no outline.
 USELESS = 1e-3
+NO_QUADS = np.zeros((0, 4), np.int64)
 
 
 @dataclass(frozen=True)
@@ -131,21 +132,23 @@ def _middle(outline: np.ndarray) -> np.ndarray:
     return outline[0] + (twice @ (a + b)) / (3 * twice.sum())
 
 
-def square_initial_map(vertices, triangles, uv, loop) -> InitialMap:
+def square_initial_map(vertices, triangles, uv, loop, quads=NO_QUADS) -> InitialMap:
     """Boundary on the square about 0 that has the area of the surface; the vertices nearest to its corners take them.
 
-    Where that squeezes faces beyond use, the corners are spread by the boundary's length instead.
+    Where that squeezes faces beyond use, the corners are spread by the boundary's length instead. No quad (q,4) has
+    three of its vertices on one side.
     """
-    return _rectangle_map(vertices, triangles, uv, loop, np.ones(2))
+    return _rectangle_map(vertices, triangles, uv, loop, np.ones(2), quads)
 
 
-def rectangle_initial_map(vertices, triangles, uv, loop) -> InitialMap:
+def rectangle_initial_map(vertices, triangles, uv, loop, quads=NO_QUADS) -> InitialMap:
     """As `square_initial_map`, on the rectangle about 0 that has the aspect of the given map."""
     size = np.ptp(uv[loop], axis=0)
-    return _rectangle_map(vertices, triangles, uv, loop, size / np.sqrt(max(size.prod(), np.finfo(float).tiny)))
+    shape = size / np.sqrt(max(size.prod(), np.finfo(float).tiny))
+    return _rectangle_map(vertices, triangles, uv, loop, shape, quads)
 
 
-def _rectangle_map(vertices, triangles, uv, loop, shape: np.ndarray) -> InitialMap:
+def _rectangle_map(vertices, triangles, uv, loop, shape: np.ndarray, quads: np.ndarray) -> InitialMap:
     """A start on the rectangle whose sides have the ratio of shape (2,), of product 1."""
     low, high = uv[loop].min(0), uv[loop].max(0)
     if not (high > low).all():
@@ -155,36 +158,39 @@ def _rectangle_map(vertices, triangles, uv, loop, shape: np.ndarray) -> InitialM
     given = _perimeter(uv[loop] / half)
     turn = (np.roll(given, -1) - given) % 4
     ordered = (turn > 0).all() and abs(turn.sum() - 4) < 1e-9
-    tries = [_attempt(vertices, triangles, uv, loop, given, half, [])] if ordered else []
+    mesh = (vertices, triangles, uv, loop, quads)
+    tries = [_attempt(mesh, given, half, [])] if ordered else []
     if not tries or tries[0][1] > USABLE:
         even = 4 * arc_length_parameters(vertices, loop)
         reasons = [SQUEEZED if ordered else SPREAD]
-        tries += [_attempt(vertices, triangles, uv, loop, (even + k / 8) % 4, half, reasons) for k in range(8)]
+        tries += [_attempt(mesh, (even + k / 8) % 4, half, reasons) for k in range(8)]
     best, _ = min(tries, key=lambda found: found[1])
     if isinstance(best, FoldedUVError):
         raise best
     return best
 
 
-def _attempt(vertices, triangles, uv, loop, s, half, reasons) -> tuple[InitialMap | FoldedUVError, float]:
+def _attempt(mesh, s, half, reasons) -> tuple[InitialMap | FoldedUVError, float]:
     """A start with these positions along the square, or why there is none, and its energy."""
     try:
-        start = _on_sides(vertices, triangles, uv, loop, s, half, reasons)
+        start = _on_sides(mesh, s, half, reasons)
     except FoldedUVError as error:
         return error, np.inf
-    return start, map_energy(start.uv, vertices, triangles)
+    return start, map_energy(start.uv, *mesh[:2])
 
 
-def _on_sides(vertices, triangles, uv, loop, s, half, reasons) -> InitialMap:
-    """A start with the boundary loop (b,) at the positions s (b,) in [0, 4) along the square.
+def _on_sides(mesh, s, half, reasons) -> InitialMap:
+    """A start of a mesh (vertices, triangles, map, loop (b,), quads) with the loop at the positions s (b,) in [0, 4)
+    along the square.
 
-    Where a face would have all its corners on one side, one of its vertices is released from the side.
+    Where a face would have three of its corners on one side, one of its vertices is released from the side.
     """
+    vertices, triangles, uv, loop, quads = mesh
     warnings = list(reasons)
     s, corner = _snap_corners(s)
     places = _on_square(s) * half
     side = np.floor(s).astype(int)
-    released = _released(triangles, loop, side, corner, len(vertices))
+    released = _released(triangles, loop, side, corner, len(vertices), quads)
     if released.any():
         warnings.append(f"{released.sum()} boundary vertices leave the square, where a face would lie along a side")
     straight = _straighten(uv, vertices, triangles, loop[~released], places[~released], warnings)
@@ -314,19 +320,21 @@ def _snap_corners(s):
     return snapped, corner
 
 
-def _released(triangles, loop, side, corner, n):
-    """Boundary vertices (b,) bool to take off the square's sides, so that no inner edge runs along a side.
+def _released(triangles, loop, side, corner, n, quads=NO_QUADS):
+    """Boundary vertices (b,) bool to take off the square's sides, so that no inner edge runs along a side, nor any
+    diagonal of the quads (q,4): whichever way a quad is drawn, it has three corners on that side then.
 
     A cover of these edges: the vertices with most of them first.
     """
     position = np.full(n, -1)
     position[loop] = np.arange(len(loop))
     tail, head = halfedges(triangles)
-    inner = (twins(triangles) >= 0) & (tail < head) & (position[tail] >= 0) & (position[head] >= 0)
-    i, j = position[tail[inner]], position[head[inner]]
+    inner = (twins(triangles) >= 0) & (tail < head)
+    ends = np.concatenate([np.column_stack([tail[inner], head[inner]]), quads[:, ::2], quads[:, 1::2]])
+    i, j = (position[np.unique(np.sort(ends, axis=1), axis=0)]).T
     # A corner belongs to the side it starts and to the one before.
     sides = np.stack([side, np.where(corner, (side - 1) % 4, side)])
-    same = (sides[:, None, i] == sides[None, :, j]).any((0, 1))
+    same = (i >= 0) & (j >= 0) & (sides[:, None, i] == sides[None, :, j]).any((0, 1))
     i, j = i[same], j[same]
     released = np.zeros(len(loop), bool)
     while len(i):

@@ -21,7 +21,7 @@ from ..progress import Progress, Steps, part_of
 from .continuation import ContinuationResult, MapProblem, minimise_in_stages
 from .continuation_rules import QUALITIES, planned_weights
 from .elimination_order import Renumbered, renumbered
-from .hessian_blocks import Assembly, assembly_of
+from .hessian_blocks import Assembly, assembly_of, corners_of_quads
 from .initial_maps import (
     InitialMap,
     disk_initial_map,
@@ -208,7 +208,7 @@ def _refined(
     # A map to areas far from the surface's is sheared by right.
     far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
     given = (mesh.vertices, mesh.triangles, mesh.uv, loop)
-    initial = INITIAL_MAPS[boundary](*given, **({"relaxed": np.inf} if far else {}))
+    initial = INITIAL_MAPS[boundary](*given, **_start_options(boundary, faces, far))
     w = initial.uv @ [1, 1j]
     symmetric = None if symmetry is None else symmetric_start(symmetry, w, by_triangle, boundary, loop)
     # What a mean with its image leaves next to nothing may be a fold by rounding.
@@ -239,6 +239,13 @@ def _refined(
         area = faces.area @ faces.ratio if pins is None else None
         found = replace(found, w=placed_like(found.w, mesh.uv @ [1, 1j], faces, pins, area))
     return found, initial.warnings
+
+
+def _start_options(boundary: str, faces: Elements, far: bool) -> dict:
+    """What the initial map with this boundary is told besides."""
+    if boundary in ("square", "rectangle"):
+        return {} if faces.quads is None else {"quads": corners_of_quads(faces)}
+    return {"relaxed": np.inf} if far else {}
 
 
 def _smoothed_if_tense(

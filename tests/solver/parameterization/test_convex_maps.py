@@ -12,6 +12,7 @@ from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.chart_pins import ChartPins
 from omt_uv.solver.parameterization.convex_maps import with_convex_polygons
+from omt_uv.solver.parameterization.convexity import keep_convex
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.polygon_corners import convex_corners
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -74,3 +75,23 @@ def test_folds_that_were_mended_are_not_warned_of():
     folded = (signed_areas(chart_map.uv, chart.triangles) <= 0).sum()
     assert folded == chart_map.folds == 0
     assert not chart_map.warnings
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_sieves_fold_nothing_on_squares(seed):
+    """They have room there, or their boundary is free: dozens of folds and shear above 100 were the rule."""
+    surface = hard_meshes.surface(*hard_meshes.percolation(14, 0.2, seed))
+    found = drain(unwrap(surface, options=UnwrapOptions(boundary="square")))
+    for chart, chart_map in zip(found.charts, found.maps, strict=True):
+        assert (signed_areas(chart_map.uv, chart.triangles) > 0).all() and chart_map.angle_mean < 20
+
+
+def test_maps_that_are_squeezed_to_rounding_stay_as_they_are():
+    """Newton's steps have no energy to lower there: a singular system ended the run."""
+    surface = hard_meshes.surface(*hard_meshes.terrain(4))
+    charts = strict_charts(surface)
+    uv = charts[0].vertices[:, :2].copy()
+    corner = surface.corner_vertex[:4]
+    first = np.flatnonzero(np.isin(charts[0].vertex_ids, corner))
+    uv[first] *= [1, 1e-17]
+    assert keep_convex(surface, charts, [uv], [np.zeros(len(uv), bool)], [None], [1.0], [1.0]) == {}

@@ -1,11 +1,15 @@
 """Initial maps: no folds, the boundary where it shall be, and nothing replaced without a warning."""
 
+import hard_meshes
 import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.cutting import cut_to_disks
 from omt_uv.solver.errors import FoldedUVError
-from omt_uv.solver.maps.untangle import count_folds
+from omt_uv.solver.maps.polygon_elements import polygon_mesh
+from omt_uv.solver.maps.tutte import tutte
+from omt_uv.solver.maps.untangle import arc_length_boundary, count_folds
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.refinement.initial_maps import (
@@ -51,6 +55,19 @@ def test_a_square_has_its_boundary_on_the_square_of_the_surfaces_area():
     np.testing.assert_allclose(np.abs(initial.uv[loop]).max(axis=1), half, rtol=1e-12)
     assert (np.abs(initial.uv[loop]) > half * (1 - 1e-12)).all(axis=1).sum() == 4
     assert not initial.motion.free[loop].all() and initial.motion.free[loop].any(axis=1).sum() == len(loop) - 4
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_quad_has_three_corners_on_one_side_whichever_way_it_is_cut(seed):
+    """Patches with teeth have quads of three and four boundary vertices all along their outlines."""
+    (chart, *_) = cut_to_disks(hard_meshes.surface(*hard_meshes.percolation(6, 0.1, seed))).charts
+    V, F = chart.vertices, chart.triangles
+    quads, loop = polygon_mesh(F, chart.faces).quads, boundary_loops(F)[0]
+    flat = tutte(V, F, loop, arc_length_boundary(V, loop, 1.0))
+    half = np.sqrt(face_areas(V, F).sum()) / 2
+    start = square_initial_map(V, F, flat, loop, quads)
+    on_side = np.abs(start.uv[:, :, None] - half * np.array([-1, 1])) < 1e-9 * half
+    assert on_side[quads].sum(axis=1).max() == 2 and count_folds(start.uv, F) == 0
 
 
 def test_a_map_that_will_do_is_kept():
