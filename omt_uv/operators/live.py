@@ -24,6 +24,8 @@ HINT = "Live Balance: drag the slider, or pins      Enter: Accept      Esc: Back
 LOOK_EVERY = 0.4
 # What an artist does during a session: its steps of undo end nothing.
 BELONGS = ("TRANSFORM_OT_", "VIEW", "UV_OT_pin", "UV_OT_select", "MESH_OT_select", "UV_OT_omt_live", "SCREEN_OT_")
+# Keys that do nothing by themselves.
+MODIFIERS = {"LEFT_CTRL", "RIGHT_CTRL", "LEFT_SHIFT", "RIGHT_SHIFT", "LEFT_ALT", "RIGHT_ALT", "OSKEY"}
 PINS = (
     ("HARD", "Hard", "Pins stay exactly where they are put; the island stretches between them", "PINNED", 0),
     ("SOFT", "Soft", "The island follows its pins as a whole, and they give way to its shape", "UNPINNED", 1),
@@ -51,7 +53,11 @@ class UV_OT_omt_live(bpy.types.Operator):
 
     _timer: bpy.types.Timer | None = None
     _looked = 0.0
-    _steps = 0
+    # The last operator that was run, as Blender lists them: its list is cut at the front, and does not grow for ever.
+    _last = 0
+    # Whether UVs have moved since the last step of undo.
+    _unmarked = False
+    _marks = 0
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -87,7 +93,8 @@ class UV_OT_omt_live(bpy.types.Operator):
                 session = Session(context, pairs, self.pins == "SOFT", last.use_subdivision)
         except Complaint as complaint:
             return tell(self, context, complaint)
-        self._steps, self._looked = len(context.window_manager.operators), 0.0
+        self._last, self._looked = _last_of(context), 0.0
+        self._unmarked, self._marks = False, 0
         following.begin(session, self._keep)
         last_run.redraw(context)
         return {"RUNNING_MODAL"}
@@ -98,23 +105,33 @@ class UV_OT_omt_live(bpy.types.Operator):
             # Whoever ended it made its step of undo.
             return self._end(context, {"CANCELLED"})
         if event.type == "ESC" and event.value == "PRESS":
-            session.restore()
-            return self._end(context, {"CANCELLED"})
+            return self._back(context)
         if event.type in {"RET", "NUMPAD_ENTER"} and event.value == "PRESS":
             return self._accept(context)
         if event.type != "TIMER":
+            self._mark_before(event)
             return {"PASS_THROUGH"}
+        if self._others_began(context):
+            # Before another step of ours: the UVs stay as the other one left them, and its step of undo has them.
+            return self._end(context, {"CANCELLED"})
         try:
             self._tick(context)
         except Disturbed as reason:
             self.report({"INFO"}, f"Live Balance ended: {reason}. What is there is kept")
             return self._end(context, {"FINISHED"})
-        if self._others_began(context):
-            return self._end(context, {"FINISHED"})
-        return {"PASS_THROUGH"} if session.is_on else self._accept(context)
+        if session.is_on:
+            return {"PASS_THROUGH"}
+        return self._back(context) if session.goes_back else self._accept(context)
 
     def cancel(self, context: bpy.types.Context) -> None:
         self._end(context, {"CANCELLED"})
+
+    def _back(self, context: bpy.types.Context) -> set[str]:
+        """Have the UVs back as they were."""
+        if following.current is not None:
+            following.current.restore()
+        # What was marked on the way is in the history: what is back belongs behind it.
+        return self._end(context, {"FINISHED"} if self._marks else {"CANCELLED"})
 
     def _accept(self, context: bpy.types.Context) -> set[str]:
         """Keep what is there, packed."""
@@ -134,17 +151,28 @@ class UV_OT_omt_live(bpy.types.Operator):
         if not bpy.app.background:
             bpy.ops.ed.undo_push(message=self.bl_label)
 
+    def _mark_before(self, event: bpy.types.Event) -> None:
+        """A step of undo before a key or button does something: what has followed until then is not undone with it."""
+        if event.value == "PRESS" and event.type not in MODIFIERS and self._unmarked:
+            bpy.ops.ed.undo_push(message=self.bl_label)
+            self._unmarked, self._marks = False, self._marks + 1
+
     def _others_began(self, context: bpy.types.Context) -> bool:
         """Whether an operator has been run that is no part of this."""
         done = context.window_manager.operators
-        new = [done[k].bl_idname for k in range(min(self._steps, len(done)), len(done))]
-        self._steps = len(done)
+        new = []
+        for k in range(len(done) - 1, -1, -1):
+            if done[k].as_pointer() == self._last:
+                break
+            new.append(done[k].bl_idname)
+        self._last = _last_of(context)
         return any(not name.startswith(BELONGS) for name in new)
 
     def _tick(self, context: bpy.types.Context) -> bool:
         balance = context.window_manager.operator_properties_last(UNWRAP).balance
         session = following.current
         moved = session is not None and session.follow(balance)
+        self._unmarked |= moved
         if session is not None and time.monotonic() - self._looked > LOOK_EVERY:
             self._looked = time.monotonic()
             if moved or last_run.state.summary is None or last_run.state.summary.title != self.bl_label:
@@ -196,13 +224,15 @@ class UV_OT_omt_live_end(bpy.types.Operator):
     def execute(self, _context: bpy.types.Context) -> set[str]:
         session = following.current
         if session is not None:
-            if self.end == "BACK":
-                session.restore()
-                following.end()
-            else:
-                # The session sees it at its next tick, packs, and ends.
-                session.is_on = False
+            # The session sees it at its next tick, packs or gives back, and ends.
+            session.is_on, session.goes_back = False, self.end == "BACK"
         return {"FINISHED"}
+
+
+def _last_of(context: bpy.types.Context) -> int:
+    """The operator that was run last, by its address; 0 if there was none."""
+    done = context.window_manager.operators
+    return done[-1].as_pointer() if len(done) else 0
 
 
 def _read_touched(context: bpy.types.Context) -> list:

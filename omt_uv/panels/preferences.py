@@ -144,8 +144,14 @@ def apply(preferences, context: bpy.types.Context) -> None:
         group, _, verb = name.partition("_OT_")
         chosen = context.window_manager.operator_properties_last(f"{group.lower()}.{verb}")
         for setting in DEFAULTS:
-            if setting in chosen.bl_rna.properties:
+            if setting in chosen.bl_rna.properties and _is_same(chosen, preferences, setting):
                 setattr(chosen, setting, getattr(preferences, setting))
+
+
+def _is_same(chosen, preferences, setting: str) -> bool:
+    """Whether a setting comes with one default in both: Magnify has a bound of the shear of its own."""
+    mine, theirs = (each.bl_rna.properties[setting].default for each in (preferences, chosen))
+    return mine == theirs
 
 
 def apply_soon() -> None:

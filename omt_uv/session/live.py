@@ -60,8 +60,8 @@ class Session:
     """
 
     def __init__(self, context: bpy.types.Context, pairs: list, soft: bool = False, subdivided: bool = False):
-        # Until the artist ends it.
-        self.is_on = True
+        # Until the artist ends it, with its UVs as they are or as they were.
+        self.is_on, self.goes_back = True, False
         self.soft = soft
         self._mode = context.mode
         self.objects = [obj for obj, _ in pairs]

@@ -164,6 +164,41 @@ def test_uvs_that_somebody_else_writes_stay(patch, slider):
     assert (scenes.uv_of(patch) == uv).all()
 
 
+def test_blenders_operators_end_it_however_long_the_list_of_those_that_were_run(patch, slider, package):
+    """The list is cut at the front: one more is not seen by its length."""
+    operator, done = begin(), bpy.context.window_manager.operators
+    followed = tick(operator, 20) and scenes.uv_of(patch)
+    assert not operator._others_began(bpy.context)
+    made = [types.SimpleNamespace(bl_idname="OBJECT_OT_shade_smooth", as_pointer=lambda k=k: k + 1) for k in range(32)]
+    lists = types.SimpleNamespace(window_manager=types.SimpleNamespace(operators=made))
+    operator._last = 31
+    assert operator._others_began(lists) and not operator._others_began(lists)
+    made.append(types.SimpleNamespace(bl_idname="TRANSFORM_OT_translate", as_pointer=lambda: 99))
+    assert not operator._others_began(lists) and len(done) == len(bpy.context.window_manager.operators)
+    operator._others_began = lambda _context: True
+    slider.balance = 0.9
+    assert tick(operator) == {"CANCELLED"} and (scenes.uv_of(patch) == followed).all()
+
+
+def test_undo_goes_back_by_one_drag_and_ends_it(patch, slider, package):
+    """To undo while it runs took the unwrap before it, too."""
+    name, operator = patch.name, begin()
+    seen = []
+    for balance in (0.4, 0.9):
+        slider.balance = balance
+        tick(operator, 40)
+        seen.append(scenes.uv_of(patch))
+        assert operator.modal(bpy.context, event("LEFT_CTRL", "PRESS")) == {"PASS_THROUGH"}
+        assert operator._unmarked
+        assert operator.modal(bpy.context, event("LEFTMOUSE", "PRESS")) == {"PASS_THROUGH"}
+        assert not operator._unmarked
+    assert operator._marks == 2
+    bpy.ops.ed.undo()
+    assert tick(operator) == {"FINISHED"}
+    assert (scenes.uv_of(bpy.data.objects[name]) == seen[0]).all()
+    assert "undone" in operator.reports[0][1]
+
+
 def test_figures_follow(patch, slider, package):
     operator, state, seen = begin(), package("session.last_run").state, []
     for balance in (0.0, 1.0):
@@ -194,6 +229,7 @@ def test_buttons_end_it(patch, slider, end):
     tick(operator, 10)
     moved = scenes.uv_of(patch)
     assert bpy.ops.uv.omt_live_end(end=end) == {"FINISHED"}
+    slider.balance = 0.1
     assert tick(operator) == ({"FINISHED"} if end == "KEEP" else {"CANCELLED"})
     after = scenes.uv_of(patch)
     assert (after == before).all() if end == "BACK" else not (after == before).all()
