@@ -36,8 +36,8 @@ FRONT = 0.004
 
 
 def rounded_corners(component: CutComponent, curvature: np.ndarray, area: np.ndarray) -> np.ndarray | None:
-    """The vertices (k,) in the middle of each small patch with curvature (n,), where the surface is flat elsewhere: one,
-    or those around a face.
+    """The vertices (k,) in the middle of each small patch with curvature (n,), where the surface is flat elsewhere: one
+    vertex, or those around a face.
 
     None if the curved patches, of triangles with areas (m,), are not small.
     """

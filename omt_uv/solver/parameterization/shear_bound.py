@@ -79,16 +79,16 @@ class ShearSearch:
 
     def search(self, spread: np.ndarray) -> SeamSearch:
         """The search for a spread (f,)."""
-        further, memory = self.shear.further, self._memory
+        further, memory = self.shear.further, self.memory
         return SeamSearch(spread, self.surface, self.costs, density=self._density, further=further, memory=memory)
 
-    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, share: np.ndarray) -> Steps[DiskCharts]:
+    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, changes: dict) -> Steps[DiskCharts]:
         """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
-        the share (f,) of what was left; the edges that others were cut along (k,2) stay."""
+        what changes in the search; the edges that others were cut along (k,2) stay."""
         target = np.full(self.count, np.inf)
         for chart in missed:
             target[chart.faces] = spread[chart.faces]
-        search = replace(self.search(target), further=True, share=share)
+        search = replace(self.search(target), further=True, **changes)
         surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
         return disk_charts(surface, self.faces, search=search, **self.cutting)
 
@@ -97,7 +97,8 @@ class ShearSearch:
         return self._costs
 
     @cached_property
-    def _memory(self) -> dict:
+    def memory(self) -> dict:
+        """What a first search has found."""
         return {}
 
     @cached_property
@@ -139,10 +140,14 @@ def bound_shear(
     `map_charts`.
     """
     bound, early = search.shear.bound, EarlyEnd()
-    best = last = _Round.of(search, first.charts, maps, _cuts(first))
-    spread, promised = search.first_spread(), np.full(search.count, np.inf)
+    best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
+    spread, promised, adding = search.first_spread(), np.full(search.count, np.inf), False
     for rounds in range(1, MOST_ROUNDS):
-        if not last.searched or last.worst > best.worst:
+        if last.worst > best.worst:
+            # What was cut for the best is added to, instead of another draw.
+            last, adding = best, True
+            promised[:] = np.inf
+        if not last.searched:
             break
         best, share = last, np.ones(search.count)
         for k in last.searched:
@@ -157,7 +162,9 @@ def bound_shear(
         missing = [last.charts[k] for k in last.searched]
         outlines = np.concatenate([_outline(chart) for chart in missing])
         kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), outlines)]
-        searching = part_of(search.again(kept, missing, spread, share), begin, width * SEARCHING)
+        memory = dict(last.memory)
+        changes = {"share": share, "adding": adding, "memory": memory}
+        searching = part_of(search.again(kept, missing, spread, changes), begin, width * SEARCHING)
         again = yield from unless_ended(searching, early)
         if again is None:
             break
@@ -171,7 +178,7 @@ def bound_shear(
         if mapped is None:
             break
         cuts = replace(last.cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
-        last = _Round.of(search, again.charts, mapped, cuts)
+        last = _Round.of(search, again.charts, mapped, cuts, memory)
     best = last if last.worst <= best.worst else best
     warnings = tuple(best.warnings(bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
     return BoundedShear(DiskCharts(best.charts, best.cuts, first.warnings), best.maps, warnings)
@@ -179,22 +186,23 @@ def bound_shear(
 
 @dataclass(frozen=True)
 class _Round:
-    """Charts, their maps and cuts, their mean shear (k,), and the numbers of those that miss the bound and may be cut
-    for that."""
+    """Charts, their maps and cuts, what the search for these has found, their mean shear (k,), and the numbers of those
+    that miss the bound and may be cut for that."""
 
     charts: list[Chart]
     maps: list[ChartMap]
     cuts: Cuts
+    memory: dict
     mean: np.ndarray
     searched: list[int]
 
     @staticmethod
-    def of(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: Cuts) -> _Round:
+    def of(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: Cuts, memory: dict) -> _Round:
         shear = [_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
         mean = np.array([area @ local / area.sum() for local, area in shear])
         missed = np.flatnonzero(mean > search.shear.bound)
         searched = [int(k) for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
-        return _Round(charts, maps, cuts, mean, searched)
+        return _Round(charts, maps, cuts, memory, mean, searched)
 
     @property
     def worst(self) -> float:

@@ -42,6 +42,8 @@ BARRED = 0.3
 FINER = 1.5
 # A cut grows on where this share of its spread is asked for, at least.
 NEARLY_THERE = 0.6
+# Where this share is, it is reached by a little more of the same: another cut can miss the bound by as much.
+CLOSE = 0.85
 # The least spread that is asked for: what is flat once it is cut has none but by rounding.
 FLAT = 1e-9
 # Where the time of a search goes, roughly: growth ends at this share of it.
@@ -61,7 +63,8 @@ class SeamSearch:
     further : components whose seams were marked by hand are searched, too
     options : see `SearchOptions`
     share (f,) : of the spread that cuts left which were found before, that is asked for now; None for a first search
-    memory : what was found for parts, by their fingerprints; shared by the searches of a surface
+    adding : what was found for a part stays, and more is cut
+    memory : what was found for parts, by their fingerprints, to which this search adds
     """
 
     spread: np.ndarray
@@ -71,6 +74,7 @@ class SeamSearch:
     further: bool = False
     options: SearchOptions = field(default_factory=SearchOptions)
     share: np.ndarray | None = None
+    adding: bool = False
     memory: dict[tuple[bytes, ...], Found] = field(default_factory=dict)
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
@@ -185,26 +189,40 @@ class SeamSearch:
         """A cut that leaves a share of the spread that another has left: that one grown on, or where much is missing or
         its coarse surface is too coarse for that, one on finer surfaces."""
         best = None
-        if share >= NEARLY_THERE:
+        if self.adding or share >= CLOSE:
+            best = yield from self._added(component, found, share)
+            if best.cut.spread <= best.task.bound:
+                return best.carried(component)
+        elif share >= NEARLY_THERE:
             best = yield from part_of(self._grown_further(component, found, share), 0.0, GROWN / 2)
         if best is None or best.cut.spread > best.task.bound:
             best = yield from part_of(self._grown_finer(component, found, share), GROWN / 2, GROWN / 2)
         best = yield from part_of(self._shortened(best), GROWN, 1 - GROWN)
         return best.carried(component)
 
+    def _added(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
+        """A cut and arcs added to it: where it was tried by a map, that shears less with any more of them."""
+        before = self._recalled(component, found, share)
+        return replace(before, cut=(yield from self._grown(before.task, before.cut)))
+
     def _grown_further(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut grown on from where it was, or anew on the same surface where that is better."""
+        before, cuts = self._recalled(component, found, share), []
+        task = before.task
+        for k, begin in enumerate((before.cut, None)):
+            grown = yield from part_of(self._grown(task, begin), k / 2, 0.5)
+            cuts.append(replace(before, cut=trimmed(task, rerouted(task, grown))))
+        return best_of(cuts)
+
+    def _recalled(self, component: CutComponent, found: Found, share: float) -> CoarseCut:
+        """A cut as it was found, with the task to leave a share of what it does."""
         coarse = found.coarse
         model = ScaleModel.of(coarse, self._log_density(component, coarse))
         setting = self._setting(component, found.base, found.mirror, coarse, model)
         task = setting.task(0.0, found.root)
         cut = cut_along(task, found.steps)
         task = replace(task, bound=max(share * cut.spread, FLAT))
-        cuts = []
-        for k, begin in enumerate((cut, None)):
-            grown = yield from part_of(self._grown(task, begin), k / 2, 0.5)
-            cuts.append(CoarseCut(setting, task, trimmed(task, rerouted(task, grown)), found.base, found.mirror))
-        return best_of(cuts)
+        return CoarseCut(setting, task, cut, found.base, found.mirror)
 
     def _grown_finer(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut grown anew on finer surfaces, the best of several."""

@@ -108,6 +108,20 @@ def test_a_search_that_goes_on_leaves_a_share_of_the_spread():
     assert 0 < first.length < again.length
 
 
+@pytest.mark.parametrize("how", [{"share": 0.9}, {"share": 0.4, "adding": True}])
+def test_what_nearly_keeps_the_bound_stays_and_more_is_cut(how):
+    V, F = meshes.cap(20, 40, 0.9)
+    surface = triangle_surface(V, F)
+    search = SeamSearch(np.full(len(F), 0.02), surface, lambda: seam_costs(surface))
+    first = cut_to_disks(surface, search=search).cuts
+    (found,) = search.memory.values()
+    more = replace(search, **how | {"share": np.full(len(F), how["share"])})
+    again = cut_to_disks(surface, search=more).cuts
+    (grown,) = search.memory.values()
+    assert again.length > first.length
+    assert grown.coarse is found.coarse and {*found.steps.tolist()} < {*grown.steps.tolist()}
+
+
 def test_what_is_flat_once_it_is_cut_is_searched_again():
     # A cone that is cut to its tip has no spread left, of which a share is asked for.
     angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
