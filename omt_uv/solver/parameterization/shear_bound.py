@@ -27,11 +27,11 @@ from .mirrored_charts import with_images
 from .options import ShearBound
 
 # Maps that are made at most.
-MOST_ROUNDS = 4
+MOST_ROUNDS = 5
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
 SPREAD_OF_SHEAR = 0.19
-# What a search that is made again aims below the bound, so that it need not be the last but one.
+# What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
 MARGIN = 0.95
 # Shear of what has no area to speak of.
 VANISHED = 50.0
@@ -141,11 +141,10 @@ def bound_shear(
     """
     bound, early = search.shear.bound, EarlyEnd()
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
-    spread, promised, adding = search.first_spread(), np.full(search.count, np.inf), False
+    spread, promised = search.first_spread(), np.full(search.count, np.inf)
     for rounds in range(1, MOST_ROUNDS):
         if last.worst > best.worst:
-            # What was cut for the best is added to, instead of another draw.
-            last, adding = best, True
+            last = best
             promised[:] = np.inf
         if not last.searched:
             break
@@ -154,7 +153,7 @@ def bound_shear(
             faces, reached = last.charts[k].faces, np.log(last.mean[k]) ** 2
             # What the last search has promised and its map has not kept is asked for on top.
             kept_part = min(float(promised[faces].min()) / reached, 1.0)
-            share[faces] = MARGIN * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
+            share[faces] = MARGIN ** (1 / rounds) * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
             promised[faces] = share[faces] * reached
         spread = spread * share
         begin = 1 - 0.5 ** (rounds - 1)
@@ -163,7 +162,8 @@ def bound_shear(
         outlines = np.concatenate([_outline(chart) for chart in missing])
         kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), outlines)]
         memory = dict(last.memory)
-        changes = {"share": share, "adding": adding, "memory": memory}
+        # One other draw may be shorter than a longer cut, or worse; what is added to shears less for sure.
+        changes = {"share": share, "adding": rounds > 1, "memory": memory}
         searching = part_of(search.again(kept, missing, spread, changes), begin, width * SEARCHING)
         again = yield from unless_ended(searching, early)
         if again is None:
