@@ -29,6 +29,14 @@ def test_attributes_above_one_are_divided_by_the_largest(package, mode):
     assert len(warnings) == 1 and "divided" in warnings[0][1]
 
 
+@pytest.mark.parametrize("most", [0.3, 1.0, 1.25, 2.0, 7.0])
+def test_weights_are_divided_where_they_exceed_one_and_only_there(package, most):
+    obj = with_attribute(lambda obj: most * weights_of(obj))
+    (found,), warnings = package("blender.weights").attribute_weights(pairs_of(package, obj), "heat")
+    np.testing.assert_allclose(found.values, min(most, 1.0) * weights_of(obj), atol=1e-6)
+    assert len(warnings) == (most > 1) and all(index == -1 and f"{most:.4g}" in text for index, text in warnings)
+
+
 def test_computed_weights_are_those_of_the_name_unless_a_group_has_it(package):
     weights, obj = package("blender.weights"), painted()
     pairs = pairs_of(package, obj)

@@ -8,6 +8,7 @@ from work import counted_work
 from omt_uv.pipelines.layout import Refusal, UnwrapJob
 from omt_uv.pipelines.unwrap import lay_out
 from omt_uv.settings import Settings
+from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
@@ -52,3 +53,19 @@ def test_the_object_that_cannot_be_unwrapped_is_named_by_its_number():
     with pytest.raises(Refusal) as refused:
         drain(lay_out(jobs, Settings()))
     assert refused.value.index == 2
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_what_is_unwrapped_lies_beside_the_polygons_that_keep_their_uvs(mirrored):
+    V, F = meshes.bumpy(6, 6)
+    surface = triangle_surface(V, F)
+    chosen = V[F].mean(axis=1)[:, 0] > np.median(V[:, 0])
+    uv = 0.2 + 0.5 * (V[:, :2] - V[:, :2].min(axis=0)) / np.ptp(V[:, :2], axis=0).max()
+    uv = (uv * [-1, 1] + [1, 0] if mirrored else uv)[surface.corner_vertex]
+    job = UnwrapJob(surface, chosen, uv=uv)
+    layout = drain(lay_out([job], Settings(pack_around=True)))
+    kept, new = uv[surface.triangles[~chosen]], uv.copy()
+    new[layout.corners[0]] = layout.uv[0]
+    moved = new[surface.triangles[chosen]]
+    assert moved.min() >= 0 and moved.max() <= 1
+    assert overlap_share(np.concatenate([kept, moved])) == 0

@@ -73,11 +73,12 @@ class AdditiveSchwarz:
         takes too long, x is the solution. w (n,) complex: the map; axes (n,2) complex: the direction that each unknown
         of a vertex stands for, 0 for one that stays 0. Raises PrecisionError.
         """
-        matrix = sp.csr_matrix(matrix)
+        # Its transpose is itself, by rows.
+        matrix = matrix.T if sp.issparse(matrix) and matrix.format == "csc" else sp.csr_matrix(matrix)
         place = np.full(len(b), -1, np.int64)
         factors = [Factor(_block(matrix, d, place), "natural") for d in self._unknowns]
         spread = self._affine(w, axes)
-        gather = spread.T.tocsr()
+        gather = spread.T
         coarse = (gather @ (matrix @ spread)).tocsc()
         coarse = Factor(coarse + SHIFT * coarse.diagonal().max() * sp.identity(coarse.shape[0]))
 
@@ -97,10 +98,12 @@ class AdditiveSchwarz:
         middle = (np.bincount(part, w.real, count) + 1j * np.bincount(part, w.imag, count)) / size
         z = w - middle[part]
         z /= np.sqrt(np.bincount(part, np.abs(z) ** 2, count) / size)[part]
-        motions = np.stack([np.ones(len(z)), z, z.conj()], axis=1)
-        motions = np.concatenate([motions, 1j * motions], axis=1)[:, None, :]
-        entries = (axes.conj()[:, :, None] * motions).real
-        columns = 6 * np.repeat(part, 2)[:, None] + np.arange(6)
+        # Column by column: all of them as complex numbers take more memory than the matrix.
+        entries, along = np.empty((len(z), 2, 6)), axes.conj()
+        for k, motion in enumerate((np.ones(len(z)), z, z.conj())):
+            for turn in range(2):
+                entries[:, :, k + 3 * turn] = (along * (1j**turn * motion)[:, None]).real
+        columns = (6 * np.repeat(part, 2)[:, None] + np.arange(6)).astype(np.int32)
         n = len(columns)
         return sp.csr_matrix((entries.ravel(), columns.ravel(), 6 * np.arange(n + 1)), shape=(n, 6 * count))
 

@@ -16,6 +16,7 @@ from ..linalg.nested_dissection import LARGE, vertex_graph
 from ..linalg.sparse import minimum_degree
 from ..maps.energy import Elements, area_forms, face_derivatives, sum_at_vertices
 from ..maps.mirror_symmetry import MirrorSymmetry
+from ..maps.polygon_elements import restricted
 from ..mesh.polygon_areas import BOTH
 
 # Quads whose rows are dense at a time: 17 rows of 8 numbers each.
@@ -23,6 +24,11 @@ CHUNK = 20_000
 # How far the second derivative of the area term goes from its own to the one that leads to the areas at once, see
 # `energy.eager_bend`, where no pressure is kept: a quarter fewer steps, most on the long way of limbs.
 EAGERNESS = 0.75
+
+# Polygons whose blocks are found at once, in large meshes: what is found on the way takes four times their memory.
+AT_ONCE = 100_000
+# Axes of row and column within the block of two vertices.
+AXES = ((0, 0), (1, 0), (0, 1), (1, 1))
 
 
 class Assembly:
@@ -39,37 +45,55 @@ class Assembly:
     ):
         self.parts = parts
         cells = [triangles] if quads is None or not len(quads) else [triangles, quads]
-        keys = [np.tile(c, (1, c.shape[1])).astype(np.int64) * n + np.repeat(c, c.shape[1], axis=1) for c in cells]
         # The diagonal, too: a vertex may follow another, and be in no cell.
-        keys.append(np.arange(n, dtype=np.int64) * (n + 1))
-        key, block = np.unique(np.concatenate([k.ravel() for k in keys]), return_inverse=True)
-        column, row = key // n, key % n
+        pairs = [_pairs(c, n) for c in cells]
+        key = np.unique(np.concatenate([*pairs, np.arange(n, dtype=np.int64) * (n + 1)]))
+        self._block = np.concatenate([np.searchsorted(key, k) for k in pairs])
+        column, row = np.divmod(key, n)
         degree = np.bincount(column, minlength=n)
         start = np.cumsum(degree) - degree
-        place = np.arange(len(key)) - start[column]
-        # Within column 2 j + q the rows 2 i + p follow each other.
-        axis = np.arange(2)
-        slot = 4 * start[column][:, None, None] + 2 * place[:, None, None] + axis[:, None]
-        slot = slot + (2 * degree[column])[:, None, None] * axis
-        blocks = np.split(block, np.cumsum([k.size for k in keys])[:-1])
-        local = [
-            slot[b.reshape(-1, c.shape[1], c.shape[1])].transpose(0, 1, 3, 2, 4).reshape(-1)
-            for b, c in zip(blocks, cells, strict=False)
-        ]
-        self._slot = np.ascontiguousarray(np.concatenate(local), dtype=np.int64)
+        # Within column 2 j + q the rows 2 i + p follow each other; `stride` is from one of these columns to the next.
+        self._stride = (2 * degree[column]).astype(np.int32)
+        self._slot = 4 * start[column] + 2 * (np.arange(len(key)) - start[column])
         self._indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))])
         self._indices = np.empty(4 * len(key), np.int32)
-        self._indices[slot.ravel()] = np.broadcast_to(2 * row[:, None, None] + axis[:, None], slot.shape).ravel()
-        self._diagonal = np.empty(2 * n, np.int64)
-        self._diagonal[:] = slot[row == column][:, axis, axis].ravel()
+        for p, q in AXES:
+            self._indices[self._slot + p + q * self._stride] = 2 * row + p
+        self._every = self._every_slot(cells) if len(triangles) <= 2 * AT_ONCE else None
+        own = np.flatnonzero(row == column)
+        self._diagonal = np.column_stack([self._slot[own], self._slot[own] + 1 + self._stride[own]]).ravel()
         self._size = 2 * n
 
     def matrix(self, blocks: np.ndarray, diagonal: np.ndarray, quads: np.ndarray | None = None) -> sp.csc_matrix:
         """Sum of the blocks (t,6,6) of triangles and (q,8,8) of quads, plus a diagonal (2n,)."""
-        values = blocks.ravel() if quads is None else np.concatenate([blocks.ravel(), quads.ravel()])
-        data = np.bincount(self._slot, values, len(self._indices))
+        given = [blocks] if quads is None else [blocks, quads]
+        if self._every is not None:
+            data: np.ndarray = np.bincount(self._every, np.concatenate([b.ravel() for b in given]), len(self._indices))
+            return self._with_diagonal(data, diagonal)
+        cells = [b.reshape(len(b), b.shape[1] // 2, 2, b.shape[1] // 2, 2) for b in given]
+        data = np.empty(len(self._indices))
+        for p, q in AXES:
+            values = np.concatenate([c[:, :, p, :, q].ravel() for c in cells])
+            data[self._slot + p + q * self._stride] = np.bincount(self._block, values, len(self._slot))
+        return self._with_diagonal(data, diagonal)
+
+    def _every_slot(self, cells: list[np.ndarray]) -> np.ndarray:
+        """Where each entry of all blocks belongs: four times the memory of `_block`, and a third of the time."""
+        axis, parts = np.arange(2), np.split(self._block, np.cumsum([c.shape[1] * c.size for c in cells])[:-1])
+        of_cells = [b.reshape(-1, c.shape[1], 1, c.shape[1], 1) for b, c in zip(parts, cells, strict=True)]
+        return np.concatenate(
+            [(self._slot[b] + axis[:, None, None] + self._stride[b] * axis).ravel() for b in of_cells]
+        )
+
+    def _with_diagonal(self, data: np.ndarray, diagonal: np.ndarray) -> sp.csc_matrix:
         data[self._diagonal] += diagonal
         return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
+
+
+def _pairs(cells: np.ndarray, n: int) -> np.ndarray:
+    """Keys (c k k,) of the pairs of corners of cells (c,k), row by row: column times n plus row of their block."""
+    k = cells.shape[1]
+    return (np.tile(cells, (1, k)).astype(np.int64) * n + np.repeat(cells, k, axis=1)).ravel()
 
 
 def assembly_of(
@@ -121,6 +145,30 @@ def hessian_blocks(
 
     weight : of the area term, one or (p,) of the polygons; pressure : see `energy.face_derivatives`
     """
+    count = len(faces.area)
+    if count <= 2 * AT_ONCE:
+        return _blocks_at_once(faces, w, weight, pressure, axes, symmetry)
+    first = lone_triangles(faces)
+    four = (len(faces.triangles) - first) // 4
+    triangles, quads = np.empty((first, 6, 6)), np.empty((four, 8, 8))
+    gradient, scale, rest = np.zeros(len(w), complex), 0.0, None
+    place = np.arange(len(w))
+    for begin in range(0, count, AT_ONCE):
+        some = np.zeros(count, bool)
+        some[begin : begin + AT_ONCE] = True
+        of, kept = (x if np.ndim(x) == 0 else x[some] for x in (weight, pressure))
+        found = _blocks_at_once(restricted(faces, some, place), w, of, kept, axes, symmetry)
+        here = some if faces.polygon is None else some[faces.polygon]
+        triangles[here[:first]] = found.triangles
+        if found.quads is not None:
+            quads[some[count - four :]] = found.quads
+        gradient, scale = gradient + found.gradient, scale + found.scale
+        rest = found.rest if rest is None else rest if found.rest is None else rest + found.rest
+    return Blocks(gradient, triangles, None if faces.polygon is None else quads, rest, scale)
+
+
+def _blocks_at_once(faces: Elements, w: np.ndarray, weight, pressure, axes, symmetry: MirrorSymmetry | None) -> Blocks:
+    """As `hessian_blocks`, of all faces at once."""
     n, first, (frame, free) = len(w), lone_triangles(faces), axes
     eagerness = EAGERNESS * (1 - pressure)
     local = face_derivatives(faces, w, weight, pressure, eagerness)

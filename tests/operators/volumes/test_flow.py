@@ -78,17 +78,18 @@ def test_undo_takes_it_back():
     np.testing.assert_array_equal(positions(bpy.data.objects[name]), before)
 
 
-def test_frames_are_keyed_one_after_the_other():
+@pytest.mark.parametrize("count", [2, 3])
+def test_frames_are_keyed_one_after_the_other(count):
     obj = ball()
     select_vertices(obj, [top(obj)])
     bpy.context.scene.frame_set(10)
-    bpy.ops.object.omt_flow(move=(0, 0, 0.4), frames=3)
-    names = [f"Flow {k}" for k in (1, 2, 3)]
+    bpy.ops.object.omt_flow(move=(0, 0, 0.4), frames=count)
+    names = [f"Flow {k + 1}" for k in range(count)]
     assert list(obj.data.shape_keys.key_blocks.keys()) == ["Basis", *names]
-    for k, frame in enumerate((11, 12, 13)):
-        bpy.context.scene.frame_set(frame)
+    for k in range(count):
+        bpy.context.scene.frame_set(11 + k)
         values = [obj.data.shape_keys.key_blocks[name].value for name in names]
-        np.testing.assert_allclose(values, np.eye(3)[k], atol=1e-6)
+        np.testing.assert_allclose(values, np.eye(count)[k], atol=1e-6)
     bpy.context.scene.frame_set(10)
     assert not any(obj.data.shape_keys.key_blocks[name].value for name in names)
 

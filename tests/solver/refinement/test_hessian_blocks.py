@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from omt_uv.solver.maps.energy import area_forms, face_derivatives
 from omt_uv.solver.maps.polygon_elements import polygon_elements, with_convex_quads
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.refinement import hessian_blocks as hessian_blocks_module
 from omt_uv.solver.refinement.hessian_blocks import EAGERNESS, assembly_of, corners_of_quads, hessian_blocks
 
 
@@ -52,3 +53,21 @@ def test_corners_of_quads_go_around():
     faces = polygon_elements(V, T, face_areas(V, T), polygons)
     a, b, c, d = V[corners_of_quads(faces)][:, :, :2].transpose(1, 0, 2) @ np.array([1, 1j])
     assert (((c - a).conj() * (d - b)).imag > 0).all()
+
+
+@pytest.mark.parametrize("polygons", [False, True])
+def test_large_meshes_have_the_same_matrix_in_less_memory(polygons, monkeypatch):
+    """Blocks some polygons at a time, and no list of where each number of a block belongs."""
+    V, T, owner = patch(7)
+    w, n = V[:, :2] @ [1, 1j] * (1 + 0.05 * V[:, 0]), len(V)
+    faces = polygon_elements(V, T, face_areas(V, T), owner if polygons else None)
+    axes, weight = (np.exp(1j * np.arange(n)), np.ones((n, 2))), np.linspace(1, 20, len(faces.area))
+    results = []
+    for at_once in (hessian_blocks_module.AT_ONCE, 5):
+        monkeypatch.setattr(hessian_blocks_module, "AT_ONCE", at_once)
+        found = hessian_blocks(faces, w, weight, 0.5, axes)
+        matrix = assembly_of(faces, n).matrix(found.triangles, np.arange(2.0 * n), found.quads)
+        matrix = matrix if found.rest is None else matrix + found.rest
+        results.append((matrix.toarray(), found.gradient, found.scale))
+    for whole, parts in zip(*results, strict=True):
+        np.testing.assert_allclose(parts, whole, rtol=1e-12, atol=1e-12 * np.abs(whole).max())

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshes import bumpy, icosphere
+from meshes import bumpy, icosphere, torus
 from scipy.spatial import cKDTree
 from sphere_shapes import blob, random_rotation
 
-from omt_uv.solver.errors import LandmarkError
+from omt_uv.solver.errors import (
+    EmptyMeshError,
+    LandmarkError,
+    NonManifoldEdgeError,
+    OrientationError,
+    PinchedVertexError,
+    SeveralComponentsError,
+    TopologyMismatchError,
+)
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.geometry import face_areas, vertex_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes
@@ -95,6 +103,63 @@ def test_landmarks_split_triangles_and_keep_the_surface():
     assert split.landmarks[0] == len(V) and split.landmarks[1] == F[3, 0] and split.landmarks[2] == F[7, 0]
     with pytest.raises(LandmarkError, match="without faces"):
         vertex_landmarks((np.array([99]), F), (np.array([0]), F))
+
+
+def turned_face():
+    V, F = bumpy(4, 4)
+    F = F.copy()
+    F[5] = F[5][::-1]
+    return V, F, OrientationError, "edge"
+
+
+def third_face():
+    V, F = bumpy(4, 4)
+    a, b = F[9][:2]
+    return (
+        np.vstack([V, [[0, 0, 5.0], [0, 1, 5.0]]]),
+        np.vstack([F, [[a, b, len(V)], [b, a, len(V) + 1]]]),
+        (NonManifoldEdgeError),
+        "edge",
+    )
+
+
+def two_parts():
+    V, F = bumpy(4, 4)
+    return np.vstack([V, V[:3] + 9]), np.vstack([F, [[len(V), len(V) + 1, len(V) + 2]]]), SeveralComponentsError, "face"
+
+
+def one_vertex_in_common():
+    V, F = bumpy(4, 4)
+    return np.vstack([V, V[:2] + 9]), np.vstack([F, [[0, len(V), len(V) + 1]]]), PinchedVertexError, "vertex"
+
+
+def no_faces():
+    return np.zeros((3, 3)), np.zeros((0, 3), np.int64), EmptyMeshError, None
+
+
+def a_handle():
+    return *torus(), TopologyMismatchError, None
+
+
+@pytest.mark.parametrize("case", [turned_face, third_face, two_parts, one_vertex_in_common, no_faces, a_handle])
+@pytest.mark.parametrize("name", ["source", "target"])
+def test_what_cannot_be_matched_is_refused_by_name_and_place(case, name):
+    """Their elements are those that a loop over all faces finds."""
+    V, F, kind, elements_of = case()
+    with pytest.raises(kind, match=name) as caught:
+        checked(V, F, name)
+    edges = [tuple(int(f[k - i]) for i in (1, 0)) for f in F for k in range(3)]
+    found = {tuple(np.atleast_1d(e).tolist()) for e in caught.value.elements}
+    if kind is OrientationError:
+        assert found == {e for e in edges if edges.count(e) > 1}
+    elif kind is NonManifoldEdgeError:
+        assert {tuple(sorted(e)) for e in found} == {
+            tuple(sorted(e)) for e in edges if edges.count(e) + edges.count(e[::-1]) > 2
+        }
+    elif elements_of == "face":
+        assert found == {(len(F) - 1,)}
+    elif elements_of == "vertex":
+        assert found == {(0,)}
 
 
 def test_holes_are_filled_but_for_the_boundary_of_a_disk():
