@@ -56,7 +56,7 @@ def keep_convex(
 
     Parameters
     ----------
-    maps : (n_i,2) of the charts, without folds
+    maps : (n_i,2) of the charts; where triangles are folded their vertices stay
     fixed : (n_i,) bool, vertices that stay
     density : (m_i,) of the triangles, None where they get their own areas
     area_weights : of the area term, one for each chart
@@ -71,7 +71,10 @@ def keep_convex(
     if not corners.reflex(w).any():
         return {}
     mesh = _union(charts, first, density, area_weights, spare, w)
-    immobile = np.concatenate(fixed) | _squeezed(mesh, w)
+    squeezed = _squeezed(mesh, w)
+    immobile = np.concatenate(fixed)
+    immobile[mesh.triangles[squeezed]] = True
+    mesh = mesh.of(np.arange(len(w)), ~squeezed, np.arange(len(w)))
     for attempt in range(ATTEMPTS):
         moved = _relaxed(mesh, w, corners, immobile, spare is None)
         changed = np.unique(np.searchsorted(first, np.flatnonzero(moved != w), side="right") - 1)
@@ -99,13 +102,9 @@ def reflex_triangles(surface: Surface, charts: Sequence[Chart], maps: Sequence[n
 
 
 def _squeezed(mesh: CornerMesh, w: np.ndarray) -> np.ndarray:
-    """Vertices (n,) bool of charts with triangles whose areas in the map w (n,) are rounding: they have no energy."""
+    """Triangles (m,) bool that are folded in the map w (n,), or whose areas are rounding: they have no energy."""
     area = signed_areas(np.column_stack([w.real, w.imag]), mesh.triangles)
-    whole = np.bincount(mesh.chart, area)
-    bad = np.bincount(mesh.chart, area <= ROUNDING * whole[mesh.chart]) > 0
-    immobile = np.zeros(len(w), bool)
-    immobile[mesh.triangles[bad[mesh.chart]]] = True
-    return immobile
+    return area <= ROUNDING * np.bincount(mesh.chart, area)[mesh.chart]
 
 
 def _union(charts, first, density, area_weights, spare, w) -> CornerMesh:

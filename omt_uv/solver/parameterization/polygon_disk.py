@@ -13,8 +13,14 @@ import numpy as np
 from ..maps.polygon_elements import polygon_mesh
 from ..mesh.charts import Chart
 from ..mesh.edge_flips import shorter_diagonals
-from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.geometry import cross2, face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_fans
+from ..mesh.topology import boundary_loops
+
+# Triangles of a polygon that is cut by its ears, at most: that takes the square of them.
+MOST_TRIANGLES = 500
+# Area over the sum of the squares of the sides, of an ear that is flat.
+FLAT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -69,23 +75,73 @@ def with_centres(uv: np.ndarray, triangles: np.ndarray, count: int) -> np.ndarra
 
 
 def cut_as_mapped(chart: Chart, uv: np.ndarray) -> Chart:
-    """The chart with quads that are folded in the map uv (n,2) cut along the other diagonal, where that is not."""
+    """The chart with polygons that are folded in the map uv (n,2) cut otherwise, where they are not folded then.
+
+    Quads along the other diagonal, polygons of more sides by their ears.
+    """
     folded = signed_areas(uv, chart.triangles) <= 0
     if not folded.any():
         return chart
     rows = np.flatnonzero(np.isin(chart.faces, chart.faces[folded]))
-    cut = polygon_mesh(chart.triangles[rows], chart.faces[rows])
+    cut = polygon_mesh(chart.triangles[rows], chart.faces[rows], most=MOST_TRIANGLES)
     pairs = rows[cut.rows[len(cut.triangles) :]].reshape(-1, 2)
     other = cut.quads[:, [[0, 1, 3], [1, 2, 3]]]
     better = (signed_areas(uv, other.reshape(-1, 3)).reshape(-1, 2) > 0).all(axis=1)
-    triangles, corners = chart.triangles.copy(), chart.corners.copy()
-    pairs, other = pairs[better], other[better]
-    # Each vertex of a quad, and its corner, from the two triangles that it had.
-    vertex, corner = (x[pairs].reshape(-1, 1, 6) for x in (chart.triangles, chart.corners))
-    place = (vertex[:, :, None, :] == other[:, :, :, None]).argmax(axis=3)
-    triangles[pairs] = other
-    corners[pairs] = np.take_along_axis(corner, place.reshape(-1, 1, 6), axis=2).reshape(-1, 2, 3)
-    return replace(chart, triangles=triangles, corners=corners)
+    triangles = chart.triangles.copy()
+    triangles[pairs[better]] = other[better]
+    several = rows[cut.rows[: len(cut.triangles)]]
+    for mine in np.split(several, np.flatnonzero(np.diff(cut.polygon)) + 1):
+        if len(mine) > 2:
+            triangles[mine] = _by_ears(chart.triangles[mine], uv, chart.vertices)
+    return replace(chart, triangles=triangles, corners=_corners_of(chart, triangles, rows))
+
+
+def _corners_of(chart: Chart, triangles: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Corners (m,3) of new triangles (m,3) of a chart's polygons, of which those of `rows` (r,) alone are new."""
+    corners, n = chart.corners.copy(), np.int64(len(chart.vertices))
+    face = np.repeat(_numbered(chart.faces[rows]), 3) * n
+    key, first = np.unique(face + chart.triangles[rows].ravel(), return_index=True)
+    found = first[np.searchsorted(key, face + triangles[rows].ravel())]
+    corners[rows] = chart.corners[rows].ravel()[found].reshape(-1, 3)
+    return corners
+
+
+def _by_ears(triangles: np.ndarray, uv: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Triangles (t,3) of a polygon that have an area in the map uv (n,2) and at (n,3); as they are if none are found.
+
+    An ear is a corner whose triangle is inside of the polygon. All polygons have two (Meisters, Polygons have ears,
+    American Mathematical Monthly 82, 1975); the roundest one is cut off first.
+    """
+    vertices, place = np.unique(triangles, return_inverse=True)
+    loops = boundary_loops(place.reshape(-1, 3))
+    if len(loops) != 1 or len(loops[0]) != len(triangles) + 2:
+        return triangles
+    left, found = vertices[loops[0]], []
+    p = positions[left]
+    normal = np.cross(p - p[0], np.roll(p, -1, axis=0) - p[0]).sum(axis=0)
+    while len(left) > 2:
+        ears = np.column_stack([np.roll(left, 1), left, np.roll(left, -1)])
+        flat, solid = uv[ears], positions[ears]
+        area = cross2(flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0])
+        height = np.cross(solid[:, 1] - solid[:, 0], solid[:, 2] - solid[:, 0]) @ normal / np.linalg.norm(normal)
+        value = np.minimum(_roundness(flat, area), _roundness(solid, height))
+        # What is inside of a triangle of neighbours has a reflex corner among it.
+        reflex = left[area <= 0]
+        sides = [cross2(flat[:, k - 2] - flat[:, k], uv[reflex][:, None] - flat[:, k]) >= 0 for k in range(3)]
+        inside = np.logical_and.reduce(sides) & (reflex[:, None, None] != ears).all(axis=2)
+        value[inside.any(axis=0)] = 0
+        best = value.argmax()
+        if not value[best] > FLAT:
+            return triangles
+        found.append(ears[best])
+        left = np.delete(left, best) if len(left) > 3 else left[:0]
+    return np.array(found)
+
+
+def _roundness(corners: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Areas (k,) of triangles with corners (k,3,d) over the sums of the squares of their sides."""
+    squares = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=(1, 2))
+    return area / np.maximum(squares, np.finfo(float).tiny)
 
 
 def _numbered(faces: np.ndarray) -> np.ndarray:

@@ -43,6 +43,19 @@ def darts():
     return surface, chart, uv
 
 
+def test_darts_open_beside_a_fold_that_stays():
+    surface, chart, uv = darts()
+    far = int(np.flatnonzero(chart.vertex_ids == 40)[0])
+    uv[far] += 0.25
+    folded = signed_areas(uv, chart.triangles) <= 0
+    assert folded.any()
+    (moved,) = keep_convex(surface, [chart], [uv], [np.zeros(len(uv), bool)], [None], [10.0], [1.0]).values()
+    changed = (moved != uv).any(axis=1)
+    assert changed[chart.vertex_ids == 0].all() and not changed[chart.triangles[folded]].any()
+    still = signed_areas(moved, chart.triangles) <= 0
+    np.testing.assert_array_equal(still, folded)
+
+
 def test_darts_open_and_what_is_fixed_stays():
     surface, chart, uv = darts()
     corner, _, share = convex_corners(surface)

@@ -78,6 +78,28 @@ def test_charts_that_are_mirror_images_have_mirrored_maps():
     assert (signed_areas(found.maps[second].uv, found.charts[second].triangles) > 0).all()
 
 
+def test_polygons_that_fold_are_cut_by_their_ears():
+    """Whichever corners of a convex polygon came to be reflex, its own triangles cover the image once."""
+    random = np.random.default_rng(0)
+    for sides in (5, 6, 9, 40):
+        angle = 2 * np.pi * np.arange(sides) / sides
+        V = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+        V = np.concatenate([V, V + [3, 0, 0]])
+        (chart, other) = strict_charts(meshes.polygon_surface(V, [list(range(sides)), list(range(sides, 2 * sides))]))
+        for _ in range(5):
+            uv = chart.vertices[:, :2] * random.uniform(0.2, 1.0, sides)[:, None]
+            cut = cut_as_mapped(chart, uv)
+            star = 0.5 * np.sum(np.cross(np.c_[uv, 0 * angle], np.c_[np.roll(uv, -1, axis=0), 0 * angle])[:, 2])
+            area = signed_areas(uv, cut.triangles)
+            assert (area > 0).all()
+            np.testing.assert_allclose(area.sum(), abs(star))
+            solid = face_areas(chart.vertices, cut.triangles)
+            np.testing.assert_allclose(solid.sum(), face_areas(chart.vertices, chart.triangles).sum())
+            # Corners are numbered as the vertices here, and go with them.
+            np.testing.assert_array_equal(chart.vertex_ids[cut.triangles], cut.corners)
+    assert len(other.triangles) == sides - 2
+
+
 def test_diagonals_alone_do_not_break_a_symmetry():
     x, y = np.meshgrid(np.linspace(-1, 1, 13), np.linspace(-1, 1, 13), indexing="ij")
     V = np.stack([x, y, 0.6 * np.exp(-3 * (x**2 + 2 * (y - 0.2) ** 2))], axis=-1).reshape(-1, 3)
