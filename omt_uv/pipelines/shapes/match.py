@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -42,20 +43,26 @@ class MatchResult:
     """A match of two surfaces.
 
     wrapped (n,3): the source's vertices on the target; source_faces (k,) and source_barycentric (k,3): triangle of the
-    source's surface and coordinates of every vertex of the target; found: of the matched parts
-    landmarks: names; figures: see `strain.figures`; fit: see `distance_from`; intersections: pairs of faces of a
-    wrapped source that pass through one another and did not before, None where nothing was wrapped; warnings
+    source's surface and coordinates of every vertex of the target; parts: of source and target that were matched;
+    found: of these; landmarks: names; figures: see `strain.figures`; intersections: pairs of faces of a wrapped source
+    that pass through one another and did not before, None where nothing was wrapped; warnings
     """
 
     wrapped: np.ndarray
     source_faces: np.ndarray
     source_barycentric: np.ndarray
+    parts: tuple[MatchedPart, MatchedPart]
     found: Registration
     landmarks: Landmarks
     figures: MatchFigures
-    fit: float
     warnings: tuple[str, ...]
     intersections: int | None = None
+
+    @cached_property
+    def fit(self) -> float:
+        """Distance of the wrapped part from the target, see `distance_from`."""
+        source, target = self.parts
+        return distance_from((target.vertices, target.triangles), self.wrapped[source.used], source.triangles)
 
     def report(self) -> dict:
         """Figures for a JSON file."""
@@ -125,10 +132,10 @@ def match_surfaces(job: MatchJob) -> Steps[MatchResult]:
         wrapped=wrapped,
         source_faces=faces,
         source_barycentric=barycentric,
+        parts=(source, target),
         found=found,
         landmarks=landmarks,
         figures=match_figures(own, other, image, wrapped[source.used]),
-        fit=distance_from(other, wrapped[source.used], source.triangles),
         warnings=tuple(warnings),
     )
 

@@ -29,8 +29,7 @@ from ..parameterization.unwrap import unwrap
 from ..progress import Steps
 from ..sphere.sphere_map import sphere_map
 from .carriers import DiskCarrier, InPlace, SphereCarrier, TargetCarrier
-from .descriptors import descriptors
-from .functional_maps import eigenfunctions
+from .functional_maps import descriptors, eigenfunctions
 from .landmarks import Landmarks, SplitSurface, check_landmarks, points_of, split_at
 from .surface_newton import Features, flat
 

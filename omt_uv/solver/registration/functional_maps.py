@@ -4,6 +4,10 @@ A map of points is a small matrix C between the first eigenfunctions of the Lapl
 Butscher, Guibas 2012). Points to matrix and matrix to points in turn, with a few functions more each time, make a rough
 correspondence an exact one (Melzi, Ren, Rodola, Sharma, Wonka, Ovsjanikov 2019), wherever it started, as nothing stands
 in its way: it need not be without folds in between.
+
+Descriptors are functions, too: Gaussian means of the mean curvature at several scales along the surface, as saliency
+has them (Lee, Varshney, Jacobs 2005), and the distance from the centroid, each scaled to a spread of one. They do not
+change when a surface is turned or meshed otherwise.
 """
 
 from __future__ import annotations
@@ -12,6 +16,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from ..analysis.curvature import mean_curvature
+from ..analysis.heat_means import HeatMeans
+from ..analysis.saliency import unit_size
 from ..linalg.sparse import Factor
 from ..mesh.geometry import halfedge_lengths, laplacian_from_lengths, vertex_areas
 
@@ -25,6 +32,23 @@ SHIFT = 1e-2
 LANDMARK_WEIGHT = 0.2
 # Points whose distances from all others are in memory at once.
 CHUNK = 250
+# Standard deviations of the descriptors' means over the diagonal.
+SCALES = np.array([0.02, 0.04, 0.08])
+# Values beyond this many spreads are no more telling.
+MOST_SPREADS = 3.0
+
+
+def descriptors(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Functions (n,4) of the vertices of a surface (n,3), (m,3)."""
+    positions = unit_size(vertices, triangles)
+    heat = HeatMeans(positions, triangles, float(SCALES[1]))
+    means = heat.means(mean_curvature(positions, triangles), SCALES)
+    values = np.column_stack([*means, np.linalg.norm(positions, axis=1)])
+    area = vertex_areas(positions, triangles)
+    share = area / area.sum()
+    values = values - share @ values
+    spread = np.sqrt(share @ values**2)
+    return np.clip(values / np.maximum(spread, 1e-12), -MOST_SPREADS, MOST_SPREADS)
 
 
 def eigenfunctions(vertices: np.ndarray, triangles: np.ndarray, count: int = MOST) -> np.ndarray:

@@ -21,6 +21,7 @@ from .alignment import moebius_of_pairs, rotation_by_search, rotation_of_pairs, 
 from .carriers import InPlace, TargetCarrier
 from .coarse_start import coarse_start
 from .domains import CHARTS, SPHERE, Case, FilledSurface, Pair, checked, domain_map, prepared
+from .gathering import gathered
 from .landmark_flow import Drawn, put_landmarks
 from .landmarks import Landmarks, check_handedness, no_landmarks, reflected
 from .results import MET, OnSurface, Registration, RegistrationOptions, stretches, with_missed
@@ -34,7 +35,8 @@ AGAIN_STEPS = 10
 SOURCE_MAP = (0.0, 0.25)
 TARGET_MAP = (0.25, 0.25)
 STARTING = (0.5, 0.25)
-POLISHING = (0.75, 0.25)
+POLISHING = (0.75, 0.2)
+GATHERING = (0.95, 0.05)
 
 
 def register(
@@ -79,6 +81,8 @@ def register(
     case = Case(pair, aligned, carrier, _features(pair, options.features))
     drawn = yield from part_of(coarse_start(case), *STARTING)
     placed, steps = yield from part_of(_polished(case, drawn, options.polish), *POLISHING)
+    if options.closeness is not None:
+        placed = yield from part_of(gathered(case, placed, options.closeness), *GATHERING)
     found = _registration(case, placed, (drawn.steps, steps), error)
     if options.mirrored:
         backward = found.backward

@@ -27,10 +27,12 @@ class RegistrationOptions:
     polish : whether the map is optimised on the surfaces, too
     features : weight of the shape's features in the polish, next to the distortion; 0 for none
     strict : refuse where a landmark cannot be met, instead of naming it
+    closeness : share of the target's diagonal; where flat faces of the source are farther from the target than that,
+        vertices gather there, as a wrap wants it; None: nowhere. Charts gather nothing
 
     Raises
     ------
-    ValueError : a domain that is none of these, a balance outside of [0, 1]
+    ValueError : a domain that is none of these, a balance outside of [0, 1], a closeness that is not positive
     """
 
     domain: str = AUTO
@@ -39,12 +41,15 @@ class RegistrationOptions:
     polish: bool = True
     strict: bool = False
     features: float = FEATURE_WEIGHT
+    closeness: float | None = None
 
     def __post_init__(self):
         if self.domain not in DOMAINS:
             raise ValueError(f"domain must be one of {', '.join(DOMAINS)}, not {self.domain!r}")
         if not 0 <= self.balance <= 1:
             raise ValueError(f"balance must lie in [0, 1], not {self.balance}")
+        if self.closeness is not None and not self.closeness > 0:
+            raise ValueError(f"closeness must be positive, not {self.closeness}")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from ..analysis.saliency import saliency, unit_size
 from ..mesh.geometry import vertex_normals
 from ..mesh.topology import halfedges
-from .descriptors import descriptors
+from .functional_maps import descriptors
 
 # Peaks of a surface that are compared, the strongest first, and how far apart they are at least, over the diagonal.
 PEAKS = 40

@@ -26,9 +26,8 @@ from omt_uv.solver.registration import alignment
 from omt_uv.solver.registration.carriers import DiskCarrier, SphereCarrier, TargetCarrier
 from omt_uv.solver.registration.coarse_meshes import coarse_mesh, far_vertices, laid_out, straightened
 from omt_uv.solver.registration.coarse_start import coarse_start
-from omt_uv.solver.registration.descriptors import descriptors
 from omt_uv.solver.registration.domains import Case, checked, filled, kind_of, prepared
-from omt_uv.solver.registration.functional_maps import eigenfunctions, refined_correspondence
+from omt_uv.solver.registration.functional_maps import descriptors, eigenfunctions, refined_correspondence
 from omt_uv.solver.registration.landmark_flow import draw_landmarks
 from omt_uv.solver.registration.landmarks import split_at, vertex_landmarks
 from omt_uv.solver.registration.straight_walks import StraightWalks

@@ -1,0 +1,62 @@
+"""Vertices gather where flat faces would cut off a part of the target, and nothing folds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bodies import icosphere
+
+from omt_uv.solver.mesh.closest_point import ClosestPoint
+from omt_uv.solver.progress import drain
+from omt_uv.solver.registration.carriers import TargetCarrier
+from omt_uv.solver.registration.domains import Case, prepared
+from omt_uv.solver.registration.gathering import gathered
+from omt_uv.solver.registration.landmarks import vertex_landmarks
+from omt_uv.solver.registration.register import register
+from omt_uv.solver.registration.results import RegistrationOptions
+
+CLOSE = 0.01
+
+
+def two_balls(level: int, cap: float):
+    """Unit vectors and triangles of a ball, and a body of two balls, the upper one where a cap of the ball was."""
+    V, F = icosphere(level)
+    angle = np.arccos(np.clip(V[:, 2], -1, 1))
+    aside = V[:, :2] / np.maximum(np.linalg.norm(V[:, :2], axis=1, keepdims=True), 1e-12)
+    steep = 0.85 * np.pi * angle / cap
+    upper = np.column_stack([np.sin(steep)[:, None] * aside, 2 + np.cos(steep)]) * 0.8
+    return V, F, np.where((angle < cap)[:, None], upper, V)
+
+
+def missed(found, F, target):
+    """Root mean square distance of points (k,3) from a surface (n,3), (m,3), over the diagonal."""
+    closest = ClosestPoint(found, F, 0.05)
+    normals = np.zeros_like(target)
+    square = ((closest.closer(target, normals, closest(target, normals)).points - target) ** 2).sum(axis=1)
+    return np.sqrt(square.mean()) / np.linalg.norm(np.ptp(target, axis=0))
+
+
+def test_a_ball_that_few_faces_cover_gets_more():
+    P, F = icosphere(3)
+    Q, G, target = two_balls(5, 0.2)
+    pairs = ([int(P[:, k].argmin()) for k in range(3)], [int(Q[:, k].argmin()) for k in range(3)])
+    pair = prepared((P, F), (target, G), vertex_landmarks((pairs[0], F), (pairs[1], G)), "auto")
+    carrier = TargetCarrier(pair.target.vertices, pair.target.triangles, Q, pair.loop)
+    before = carrier.place(P[pair.order])
+    after = drain(gathered(Case(pair, P[pair.order], carrier, None), before, CLOSE))
+    beside = [missed(placed.positions, pair.triangles, pair.target.vertices) for placed in (before, after)]
+    assert beside[1] < 0.6 * beside[0]
+    assert not carrier.folded(after, pair.triangles).any()
+    np.testing.assert_array_equal(after.positions[pair.landmarks], before.positions[pair.landmarks])
+    far = P[pair.order][:, 2] < 0
+    np.testing.assert_array_equal(after.domain[far], before.domain[far])
+
+
+def test_what_is_close_stays_as_it_is():
+    P, F = icosphere(3)
+    maps = (P, P)
+    plain = drain(register((P, F), (P, F), maps=maps))
+    close = drain(register((P, F), (P, F), options=RegistrationOptions(closeness=CLOSE), maps=maps))
+    np.testing.assert_array_equal(close.forward.barycentric, plain.forward.barycentric)
+    with pytest.raises(ValueError, match="closeness"):
+        RegistrationOptions(closeness=0.0)
