@@ -31,6 +31,28 @@ def test_every_float_refuses_nan_and_what_blender_makes_of_infinity(package):
     assert tried >= 12
 
 
+def enums(package):
+    """Every enum property of operators, groups of properties, and what the extension adds to Blender's own types."""
+    owners = [getattr(getattr(bpy.ops, m), n).get_rna_type() for m, n, _ in operators(package)]
+    owners += [c.bl_rna for c in package("registration").CLASSES if issubclass(c, bpy.types.PropertyGroup)]
+    own = [(o, p) for o in owners for p in o.properties]
+    for kind in ("Scene", "Object", "Mesh", "WindowManager", "Image", "Window", "Screen"):
+        rna = getattr(bpy.types, kind).bl_rna
+        own += [(rna, p) for p in rna.properties if p.is_runtime]
+    return [(o, p) for o, p in own if p.type == "ENUM" and len(p.enum_items)]
+
+
+def test_every_choice_has_a_number_a_word_and_a_default_of_its_own(package):
+    """Two items of one number are one choice: the second could never be made."""
+    found = enums(package)
+    assert len(found) > 20
+    for owner, prop in found:
+        items, name = list(prop.enum_items), f"{owner.identifier}.{prop.identifier}"
+        assert len({i.value for i in items}) == len(items) == len({i.identifier for i in items}), name
+        assert len({i.name for i in items}) == len(items), name
+        assert prop.is_enum_flag or prop.default in {i.identifier for i in items}, name
+
+
 # What reads meshes, or looks at none.
 READ_ONLY = {
     "uv.omt_measure",

@@ -8,7 +8,7 @@ from omt_uv.solver import errors
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.partition.cut_mesh import cut_along_cells
 from omt_uv.solver.partition.division import DivisionOptions, divide
-from omt_uv.solver.partition.face_labels import follow_faces
+from omt_uv.solver.partition.face_labels import _joined, follow_faces
 from omt_uv.solver.partition.polar_coordinates import WindowMesh
 from omt_uv.solver.partition.relaxation import sights
 from omt_uv.solver.partition.sites import allot, parts
@@ -140,3 +140,13 @@ def test_what_cannot_be_divided_is_named():
     V[3] = np.nan
     with pytest.raises(errors.NonFiniteError, match="1 vertex: 3"):
         drain(divide(V, F, 3))
+
+
+def test_ring_by_ring_every_face_gets_the_label_beside_it():
+    """All labels spread alike: a numbering turned around gives the same cells."""
+    corner_vertex = np.array([[k, k + 1, k + 32, k + 31] for k in range(30)]).ravel()
+    label = np.repeat([0, 1, 0, 2, 1, 0], [9, 1, 1, 9, 1, 9])
+    mass, start = np.linspace(1, 2, 30), 4 * np.arange(31)
+    one = _joined(label, mass, corner_vertex, start)
+    for turned in np.array([[2, 0, 1], [1, 2, 0], [1, 0, 2]]):
+        assert np.array_equal(turned[one], _joined(turned[label], mass, corner_vertex, start))

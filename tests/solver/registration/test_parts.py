@@ -20,6 +20,7 @@ from omt_uv.solver.errors import (
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.geometry import face_areas, vertex_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes
+from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.registration import alignment
@@ -302,3 +303,17 @@ def test_far_vertices_hold_the_first_ones_some_of_the_boundary_and_each_time_the
         assert distance[found[k]] == pytest.approx(distance.max())
     np.testing.assert_array_equal(far_vertices(V[:6], first[:0], loop[:0], 20)[:1], [0])
     assert len(far_vertices(V[:6], first[:0], loop[:0], 20)) == 6
+
+
+def test_means_of_a_domain_are_in_it_again_on_every_carrier():
+    """Unit vectors on a sphere; in the plane a mean stays what it is."""
+    V, F = icosphere(1)
+    rng = np.random.default_rng(1)
+    inside = rng.normal(size=(5, 3)) * 0.4
+    for carrier in (SphereCarrier(), TargetCarrier(V, F, V)):
+        np.testing.assert_allclose(carrier.within(inside), normalized(inside), atol=1e-12)
+    W, G = bumpy(4, 4)
+    loop = boundary_loops(G)[0]
+    flat = rng.uniform(-0.5, 0.5, (5, 2))
+    for plane in (DiskCarrier(loop), TargetCarrier(W, G, W[:, :2], loop)):
+        np.testing.assert_array_equal(plane.within(flat), flat)

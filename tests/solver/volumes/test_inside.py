@@ -85,6 +85,7 @@ def test_landmarks_are_led_to_their_goals_without_a_change_of_volume(body):
     goals = (landmarks + 0.06 * rng.normal(size=(6, 3))) @ turn.T
     found = drain(registered(body.positions, landmarks, goals))
     assert found.after < 1e-6 < found.before and np.linalg.norm(found.positions, axis=1).max() < 1 + 1e-9
+    assert found.before == pytest.approx(np.linalg.norm(landmarks @ found.rotation.T - goals, axis=1).mean(), rel=1e-6)
     before, after = (tet_volumes(p, body.tets) for p in (body.positions, found.positions))
     # Of coarse tetrahedra; it falls with their size.
     assert np.abs(after / after.sum() - before / before.sum()).sum() < 0.12
