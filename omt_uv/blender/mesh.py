@@ -304,6 +304,9 @@ def _select_bmesh(mesh: bpy.types.Mesh, kind: str, elements: np.ndarray) -> None
     for element in chosen:
         element.select_set(True)
     edit.select_flush_mode()
+    if hasattr(edit, "uv_select_sync_valid"):
+        # Since Blender 5.0 corners keep a selection of their own, and G in the UV editor would move that of before.
+        edit.uv_select_sync_valid = False
     bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
 
 

@@ -14,12 +14,22 @@ ROOT = Path(__file__).resolve().parents[2]
 # Width of the column of tabs, and a difference that is seen.
 TABS = 34
 VISIBLE = 24
+# Pictures whose names say too little outside of their story.
+NAMED = {
+    "file": "from_disk",
+    "search_area_preserving": "search",
+    "object_mode": "live_object_mode",
+    "one_pin": "live_pin",
+}
 KEPT = {
     "tour": ("tab", "unwrapped", "area", "shear", "histogram", "checker", "outdated", "redo"),
     "escape": ("progress", "keep"),
     "sections": ("magnify", "sphere", "remesh"),
     "shapes": ("distance",),
     "install": ("drop", "first_minute"),
+    "disk": ("file",),
+    "menus": ("search_area_preserving", "preferences"),
+    "live": ("object_mode", "one_pin"),
     "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear"),
 }
 
@@ -36,7 +46,7 @@ def main() -> None:
             if not (args.source / story / f"{name}.png").exists():
                 print(f"{story}/{name}.png is missing: the picture of before stays")
                 continue
-            save(Image.open(args.source / story / f"{name}.png"), args.target / f"{name}.png")
+            save(Image.open(args.source / story / f"{name}.png"), args.target / f"{NAMED.get(name, name)}.png")
     for dark in sorted((args.source / "panels").glob("*_dark.png")):
         name = dark.stem.removesuffix("_dark")
         save(side_by_side(dark, dark.with_name(f"{name}_light.png")), args.target / f"section_{name}.png")

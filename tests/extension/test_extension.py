@@ -90,6 +90,21 @@ def test_installs_runs_and_unregisters(archive, tmp_path):
         assert Path(result["xatlas"]).is_relative_to(tmp_path)
 
 
+def test_blender_can_subscribe_to_a_repository_of_it(archive, tmp_path):
+    """The index names the zip, and the page has it to be dragged."""
+    program = ROOT / "scripts" / "release" / "repository.py"
+    done = subprocess.run(
+        [sys.executable, str(program), "--to", str(tmp_path / "web"), str(archive)], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    (entry,) = json.loads((tmp_path / "web" / "index.json").read_text())["data"]
+    page = (tmp_path / "web" / "index.html").read_text()
+    assert entry["id"] == "omt_uv" and entry["archive_url"] == f"./{archive.name}"
+    assert entry["archive_size"] == (tmp_path / "web" / archive.name).stat().st_size
+    for name in entry["platforms"]:
+        assert f"./{archive.name}?repository=./index.json&blender_version_min=4.2.13&platforms={name}" in page
+
+
 def test_everything_is_registered_from_one_list(package):
     registration = package("registration")
     for cls in registration.CLASSES:

@@ -37,7 +37,7 @@ def load():
     return module
 
 
-NAMES = ("tour", "escape", "uv_editor", "sections", "shapes", "panels", "install", "drag")
+NAMES = ("tour", "escape", "uv_editor", "sections", "shapes", "panels", "install", "drag", "live", "disk", "menus")
 AGES = os.environ.get("OMT_UV_GUI_AGES", "here trixie sid").split()
 
 
@@ -141,6 +141,32 @@ def test_a_live_session_is_kept_and_another_unwrap_ends_it(play):
     assert not facts["session after another unwrap"] and facts["the other unwrap stays"]
 
 
+def test_live_follows_in_the_3d_view_with_figures_and_a_hint_that_stays(play):
+    facts = play("live")
+    assert len(set(facts["figures while dragged"]) - {facts["figures before"]}) >= 1
+    assert facts["hint stays"] and facts["hint goes"]
+    low, high = facts["extent on accept"]
+    assert 0 <= low < 0.02 and 0.98 < high <= 1
+
+
+def test_live_is_kept_whatever_begins_and_undo_takes_back_one_thing(play):
+    facts = play("live")
+    assert facts["undone to the first"] < 1e-6 < facts["second drag"]
+    assert facts["location cleared"] and facts["location is back"] and facts["session ended by Unwrap"]
+    for what in ("when Blender's began", "when Blender's is undone", "when Unwrap is undone"):
+        assert facts[f"kept {what}"] < 1e-6, what
+    assert facts["moved by the slider after Unwrap"] == 0
+    assert facts["moved after Cancel"] == 0 < facts["moved before Cancel"]
+
+
+def test_a_pin_takes_its_island_along_and_soft_ones_give_way(play):
+    facts = play("live")
+    least, most = facts["one pin moves its island"]
+    assert least > 0.1 and most - least < 0.01
+    (held, put), (along, given) = facts["hard pins moved by"], facts["soft pins moved by"]
+    assert held == 0 and along > 0.01 and given < put
+
+
 def test_the_sections_work(play):
     facts = play("sections")
     (_, *magnified), (_, *sphere), (_, *remeshed) = (facts[name] for name in ("magnified", "sphere", "remeshed"))
@@ -183,6 +209,18 @@ def test_the_zip_is_dropped_and_a_few_clicks_lead_to_a_checker(play):
     assert facts["checker"][0].startswith("OMT UV Checker")
 
 
+def test_the_zip_is_installed_from_disk(play):
+    facts = play("disk")
+    assert not facts["there before"] and facts["clicks to install"] <= 3 and good(facts["unwrapped"])
+
+
+def test_the_search_finds_what_is_asked_for_and_keys_are_off(play):
+    facts = play("menus")
+    assert facts["found and run"]["folds"] == 0
+    count, some_are_on = facts["keys, all off"]
+    assert count >= 6 and not some_are_on
+
+
 def test_every_section_was_looked_at(play):
     """In both themes, in a sidebar narrower than Blender makes it."""
     facts = play("panels")
@@ -201,6 +239,9 @@ STORIES = [
     ("panels", 30),
     ("install", 3),
     ("drag", 2),
+    ("live", 8),
+    ("disk", 4),
+    ("menus", 5),
 ]
 
 

@@ -258,6 +258,12 @@ def test_the_result_is_as_high_whatever_it_says(package):
     assert lines() == high and "uv.omt_measure" in draw(main)
 
 
+def test_the_result_names_its_object_or_how_many(package):
+    about, summary = package("panels.result").about, package("session.last_run").Summary
+    assert about(summary("Unwrap", objects=("Head",))) == "Head"
+    assert about(summary("Unwrap", objects=tuple("ABCDE"))) == "5 objects" and about(summary("Unwrap")) == ""
+
+
 def test_a_run_shows_its_progress(package):
     scenes.bump(20, 20)
     operator = scenes.stand_in("uv.omt_unwrap")

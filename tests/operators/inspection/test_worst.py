@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+import bmesh
 import numpy as np
 import pytest
 import scenes
@@ -29,6 +30,29 @@ def test_the_one_bad_face_is_selected(figure, mode):
         scenes.edit(obj, faces=[0])
     assert bpy.ops.uv.omt_worst(figure=figure, share=1.0) == {"FINISHED"}
     assert selected(obj) == {20}
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_the_uv_editor_shows_the_same_selection(mode):
+    """Where corners have a selection of their own, that of before is not left there."""
+    obj = scenes.bump(8, 6, height=0.0)
+    uv = scenes.seen_from_above(obj)
+    uv[list(obj.data.polygons[20].loop_indices)] *= 3
+    scenes.set_uv(obj, uv)
+    scenes.edit(obj, faces=[0])
+    edit = bmesh.from_edit_mesh(obj.data)
+    if not hasattr(edit, "uv_select_sync_valid"):
+        pytest.skip("corners have no selection of their own before Blender 5.0")
+    edit.uv_select_sync_from_mesh()
+    assert edit.uv_select_sync_valid
+    if mode == "OBJECT":
+        scenes.leave_edit()
+    assert bpy.ops.uv.omt_worst(figure="AREA", share=1.0) == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="EDIT")
+    edit = bmesh.from_edit_mesh(obj.data)
+    if not edit.uv_select_sync_valid:
+        edit.uv_select_sync_from_mesh()
+    assert [face.index for face in edit.faces if face.uv_select] == [20]
 
 
 def test_folded_faces_are_selected_all_of_them():

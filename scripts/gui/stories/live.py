@@ -1,0 +1,290 @@
+"""Live Balance as an artist has it: both modes, both editors, pins, other operators, undo; its hint, its two ends."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import bpy
+
+import bmesh
+
+# Where the buttons are, as shares of the width: the one beside the slider, and the two ends.
+LIVE = (0.72, 0.63, 0.77)
+ENDS = (0.25, 0.5, 0.75, 0.65)
+UNWRAP = "uv.omt_unwrap"
+# The part of the status bar that has the hint.
+HINT = SimpleNamespace(x=0, y=0, width=700, height=20)
+# Pixels that a pin is moved by.
+FAR = 60
+
+
+def tell(story):
+    """Object Mode in the 3D View; both modes in the UV editor."""
+    obj = story.head(24)
+    slider(0.0)
+    bpy.context.window_manager.operator_properties_last(UNWRAP).max_shear = 0
+    story.look_at_it(story.area("VIEW_3D"))
+    tab = yield from story.tab("VIEW_3D")
+    yield from tab.click("omt_unwrap(")
+    yield from story.until(lambda: not story.running() and obj.data.uv_layers)
+    # So that undo has a step to stop at.
+    yield from story.pause(0.5)
+    yield from accepted(story, tab, obj)
+    yield from undone(story, tab, obj)
+    yield from blenders_own(story, tab, obj)
+    yield from ours(story, tab, obj)
+    window = bpy.context.window_manager.windows[0]
+    window.workspace = bpy.data.workspaces["UV Editing"]
+    yield from story.pause(2)
+    tab = yield from story.tab("IMAGE_EDITOR")
+    if bpy.context.object.mode == "EDIT":
+        set_mode(story, "OBJECT")
+    yield from cancelled(story, tab, bpy.context.object)
+    set_mode(story, "EDIT")
+    yield from one_pin(story, tab, bpy.context.object)
+    yield from soft_pins(story, tab, bpy.context.object)
+
+
+def accepted(story, tab, obj):
+    """The slider dragged in the 3D View; figures, hint and looks while it runs; packed on Accept."""
+    before = figures(story)
+    place = yield from begun(story, tab)
+    yield from story.shoot("hint", HINT)
+    seen = []
+    yield from dragged(story, place, lambda: seen.append(figures(story)))
+    yield from story.pause(1)
+    yield from story.shoot("hint_after_drag", HINT)
+    yield from story.shoot("object_mode")
+    story.facts["figures before"], story.facts["figures while dragged"] = before, seen
+    yield from tab.click("omt_live_end", "'KEEP'", places=ENDS)
+    yield from story.until(lambda: not story.following())
+    yield from story.pause(0.5)
+    yield from story.shoot("hint_at_the_end", HINT)
+    shots = [picture(story.out / f"{name}.png") for name in ("hint", "hint_after_drag", "hint_at_the_end")]
+    story.facts["hint stays"], story.facts["hint goes"] = shots[0] == shots[1], shots[0] != shots[2]
+    uv = uvs(obj)
+    story.facts["extent on accept"] = [min(uv), max(uv)]
+    story.facts["accepted"] = story.figures(obj)
+
+
+def undone(story, tab, obj):
+    """Two drags, and Ctrl Z: the second one is undone, the session ends, and the unwrap before it stays."""
+    name = obj.name
+    slider(0.0)
+    place = yield from begun(story, tab)
+    yield from at_rest(story, obj)
+    yield from dragged(story, place)
+    yield from at_rest(story, obj)
+    first = uvs(obj)
+    yield from dragged(story, place)
+    yield from at_rest(story, obj)
+    second = uvs(obj)
+    yield from over(story, "VIEW_3D")
+    yield from story.key("ctrl+z")
+    yield from story.until(lambda: not story.following(), 20)
+    now = uvs(bpy.data.objects[name])
+    story.facts["second drag"], story.facts["undone to the first"] = farthest(first, second), farthest(first, now)
+
+
+def blenders_own(story, tab, obj):
+    """A key of Blender's: the session ends, kept; to undo what the key did leaves the session's UVs."""
+    obj = bpy.data.objects["Head"]
+    slider(0.6)
+    yield from begun(story, tab)
+    yield from at_rest(story, obj)
+    followed = uvs(obj)
+    obj.location.x = 0.5
+    yield from over(story, "VIEW_3D")
+    yield from story.key("alt+g")
+    yield from story.until(lambda: not story.following(), 20)
+    story.facts["location cleared"] = obj.location.x == 0
+    story.facts["kept when Blender's began"] = farthest(followed, uvs(obj))
+    slider(0.0)
+    yield from story.pause(1)
+    yield from story.key("ctrl+z")
+    yield from story.pause(1)
+    obj = bpy.data.objects["Head"]
+    story.facts["location is back"] = obj.location.x == 0.5
+    story.facts["kept when Blender's is undone"] = farthest(followed, uvs(obj))
+
+
+def ours(story, tab, obj):
+    """Unwrap as a disk meanwhile, move the slider, undo: neither of the two is lost."""
+    obj = bpy.data.objects["Head"]
+    slider(0.4)
+    yield from begun(story, tab)
+    yield from at_rest(story, obj)
+    followed = uvs(obj)
+    window, view = bpy.context.window_manager.windows[0], story.area("VIEW_3D")
+    bpy.context.window_manager.operator_properties_last(UNWRAP).boundary = "DISK"
+    with bpy.context.temp_override(window=window, area=view, region=story.window_region(view)):
+        bpy.ops.uv.omt_unwrap("INVOKE_DEFAULT", True)
+    yield from story.until(lambda: not story.running() and uvs(obj) != followed)
+    yield from story.pause(0.5)
+    story.facts["session ended by Unwrap"] = story.following() is None
+    disk = uvs(obj)
+    slider(0.9)
+    yield from story.pause(1)
+    story.facts["moved by the slider after Unwrap"] = farthest(disk, uvs(obj))
+    yield from story.shoot("unwrapped_meanwhile")
+    yield from over(story, "VIEW_3D")
+    yield from story.key("ctrl+z")
+    yield from story.pause(1)
+    story.facts["kept when Unwrap is undone"] = farthest(followed, uvs(bpy.data.objects["Head"]))
+    # A run brings properties of its own: those of before are gone.
+    bpy.context.window_manager.operator_properties_last(UNWRAP).boundary = "FREE"
+
+
+def cancelled(story, tab, obj):
+    """Object Mode in the UV editor: dragged, and every bit is back."""
+    slider(0.0)
+    before = uvs(obj)
+    place = yield from begun(story, tab)
+    yield from dragged(story, place)
+    moved = uvs(obj)
+    yield from story.shoot("uv_editor_object_mode")
+    yield from tab.click("omt_live_end", "'BACK'", places=ENDS)
+    yield from story.until(lambda: not story.following())
+    story.facts["moved before Cancel"] = farthest(before, moved)
+    story.facts["moved after Cancel"] = farthest(before, uvs(obj))
+
+
+def one_pin(story, tab, obj):
+    """Nothing is selected but a pinned vertex: it is moved, and its island comes along."""
+    pin(obj, [100])
+    slider(0.0)
+    yield from begun(story, tab)
+    yield from at_rest(story, obj)
+    before = uvs(obj)
+    yield from grabbed(story)
+    yield from story.pause(2)
+    yield from at_rest(story, obj)
+    story.facts["one pin"] = [before[:2], place_of(obj, 100), story.following() is not None]
+    steps = [b - a for a, b in zip(before, uvs(obj), strict=True)][::2]
+    story.facts["one pin moves its island"] = [min(steps), max(steps)]
+    yield from story.shoot("one_pin")
+    yield from tab.click("omt_live_end", "'KEEP'", places=ENDS)
+    yield from story.until(lambda: not story.following())
+
+
+def soft_pins(story, tab, obj):
+    """Two pins, one of them moved: hard ones stay where they are put, soft ones give way."""
+    for kind in ("HARD", "SOFT"):
+        pin(obj, [100, 300], selected=[300])
+        bpy.context.window_manager.operator_properties_last("uv.omt_live").pins = kind
+        yield from begun(story, tab)
+        yield from at_rest(story, obj)
+        before = [place_of(obj, vertex) for vertex in (100, 300)]
+        yield from grabbed(story)
+        yield from story.pause(2)
+        yield from at_rest(story, obj)
+        after = [place_of(obj, vertex) for vertex in (100, 300)]
+        story.facts[f"{kind.lower()} pins moved by"] = [farthest(a, b) for a, b in zip(before, after, strict=True)]
+        story.facts[f"{kind.lower()} pins"] = story.said()
+        yield from story.shoot(f"{kind.lower()}_pins")
+        yield from tab.click("omt_live_end", "'BACK'", places=ENDS)
+        yield from story.until(lambda: not story.following())
+    bpy.context.window_manager.operator_properties_last("uv.omt_live").pins = "HARD"
+
+
+def begun(story, tab):
+    """The session, by a click; where that was."""
+    place = yield from tab.click("omt_live(", places=LIVE)
+    yield from story.until(story.following)
+    yield from story.pause(0.6)
+    return place
+
+
+def dragged(story, place, keep=None):
+    """The slider, from its left end to about two thirds."""
+    yield from story.drag((place[0] - 115, place[1]), (place[0] - 40, place[1]), steps=6, keep=keep)
+
+
+def at_rest(story, obj):
+    """Until the UVs move no more."""
+    before = None
+    while before != (before := uvs(obj)):
+        yield from story.pause(0.6)
+
+
+def over(story, kind):
+    """The mouse in the middle of an editor."""
+    region, window = story.window_region(story.area(kind)), bpy.context.window_manager.windows[0]
+    place = region.x + region.width // 2, window.height - (region.y + region.height // 2)
+    yield from story.move(*place)
+    return place
+
+
+def grabbed(story):
+    """G in the UV editor, to the right, and a click."""
+    x, y = yield from over(story, "IMAGE_EDITOR")
+    yield from story.key("g")
+    for k in range(1, 5):
+        yield from story.move(x + FAR * k // 4, y)
+    yield from story.click(x + FAR, y)
+
+
+def slider(balance):
+    """Put the slider somewhere."""
+    bpy.context.window_manager.operator_properties_last(UNWRAP).balance = balance
+
+
+def set_mode(story, mode):
+    """Edit Mode with one selection for both editors, or Object Mode."""
+    window, view = bpy.context.window_manager.windows[0], story.area("VIEW_3D")
+    with bpy.context.temp_override(window=window, area=view, region=story.window_region(view)):
+        bpy.ops.object.mode_set(mode=mode)
+    bpy.context.scene.tool_settings.use_uv_select_sync = True
+    bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
+
+
+def pin(obj, vertices, selected=None):
+    """These vertices alone are pinned and selected."""
+    edit = bmesh.from_edit_mesh(obj.data)
+    layer = edit.loops.layers.uv.active
+    for element in (*edit.faces, *edit.edges, *edit.verts):
+        element.select = False
+    for vertex in edit.verts:
+        vertex.select = vertex.index in (vertices if selected is None else selected)
+        for loop in vertex.link_loops:
+            loop[layer].pin_uv = vertex.index in vertices
+    edit.select_flush_mode()
+    if hasattr(edit, "uv_select_sync_valid"):
+        # Corners keep the selection of before otherwise.
+        edit.uv_select_sync_valid = False
+    bmesh.update_edit_mesh(obj.data)
+
+
+def place_of(obj, vertex):
+    """Where one of the corners of a vertex is."""
+    edit = bmesh.from_edit_mesh(obj.data)
+    edit.verts.ensure_lookup_table()
+    return list(edit.verts[vertex].link_loops[0][edit.loops.layers.uv.active].uv)
+
+
+def uvs(obj):
+    """All UVs as they are now."""
+    if obj.mode == "EDIT":
+        edit = bmesh.from_edit_mesh(obj.data)
+        layer = edit.loops.layers.uv.active
+        return [x for face in edit.faces for loop in face.loops for x in loop[layer].uv]
+    return [x for each in obj.data.uv_layers.active.uv for x in each.vector]
+
+
+def figures(story):
+    """The area error that the panel shows."""
+    said = story.said()
+    return dict(said[1:]).get("Area error", "") if said else ""
+
+
+def farthest(one, other):
+    """The greatest difference of two lists of numbers."""
+    return max(abs(a - b) for a, b in zip(one, other, strict=True))
+
+
+def picture(path):
+    """The pixels of a file."""
+    image = bpy.data.images.load(str(path))
+    pixels = list(image.pixels)
+    bpy.data.images.remove(image)
+    return pixels
