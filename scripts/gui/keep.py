@@ -19,7 +19,6 @@ NAMED = {
     "file": "from_disk",
     "search_area_preserving": "search",
     "object_mode": "live_object_mode",
-    "one_pin": "live_pin",
 }
 KEPT = {
     "tour": ("tab", "unwrapped", "area", "shear", "histogram", "checker", "outdated", "redo"),
@@ -29,7 +28,7 @@ KEPT = {
     "install": ("drop", "first_minute"),
     "disk": ("file",),
     "menus": ("search_area_preserving", "preferences"),
-    "live": ("object_mode", "one_pin"),
+    "live": ("object_mode",),
     "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear"),
 }
 

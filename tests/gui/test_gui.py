@@ -159,14 +159,6 @@ def test_live_is_kept_whatever_begins_and_undo_takes_back_one_thing(play):
     assert facts["moved after Cancel"] == 0 < facts["moved before Cancel"]
 
 
-def test_a_pin_takes_its_island_along_and_soft_ones_give_way(play):
-    facts = play("live")
-    least, most = facts["one pin moves its island"]
-    assert least > 0.1 and most - least < 0.01
-    (held, put), (along, given) = facts["hard pins moved by"], facts["soft pins moved by"]
-    assert held == 0 and along > 0.01 and given < put
-
-
 def test_the_sections_work(play):
     facts = play("sections")
     (_, *magnified), (_, *sphere), (_, *remeshed) = (facts[name] for name in ("magnified", "sphere", "remeshed"))
@@ -239,7 +231,7 @@ STORIES = [
     ("panels", 30),
     ("install", 3),
     ("drag", 2),
-    ("live", 8),
+    ("live", 6),
     ("disk", 4),
     ("menus", 5),
 ]

@@ -1,4 +1,4 @@
-"""Live Balance as an artist has it: both modes, both editors, pins, other operators, undo; its hint, its two ends."""
+"""Live Balance as an artist has it: in both editors, other operators and undo meanwhile, its hint, its two ends."""
 
 from __future__ import annotations
 
@@ -6,20 +6,16 @@ from types import SimpleNamespace
 
 import bpy
 
-import bmesh
-
 # Where the buttons are, as shares of the width: the one beside the slider, and the two ends.
 LIVE = (0.72, 0.63, 0.77)
 ENDS = (0.25, 0.5, 0.75, 0.65)
 UNWRAP = "uv.omt_unwrap"
 # The part of the status bar that has the hint.
 HINT = SimpleNamespace(x=0, y=0, width=700, height=20)
-# Pixels that a pin is moved by.
-FAR = 60
 
 
 def tell(story):
-    """Object Mode in the 3D View; both modes in the UV editor."""
+    """In the 3D View, then in the UV editor; story `uv_editor` has Edit Mode."""
     obj = story.head(24)
     slider(0.0)
     bpy.context.window_manager.operator_properties_last(UNWRAP).max_shear = 0
@@ -40,9 +36,6 @@ def tell(story):
     if bpy.context.object.mode == "EDIT":
         set_mode(story, "OBJECT")
     yield from cancelled(story, tab, bpy.context.object)
-    set_mode(story, "EDIT")
-    yield from one_pin(story, tab, bpy.context.object)
-    yield from soft_pins(story, tab, bpy.context.object)
 
 
 def accepted(story, tab, obj):
@@ -149,44 +142,6 @@ def cancelled(story, tab, obj):
     story.facts["moved after Cancel"] = farthest(before, uvs(obj))
 
 
-def one_pin(story, tab, obj):
-    """Nothing is selected but a pinned vertex: it is moved, and its island comes along."""
-    pin(obj, [100])
-    slider(0.0)
-    yield from begun(story, tab)
-    yield from at_rest(story, obj)
-    before = uvs(obj)
-    yield from grabbed(story)
-    yield from story.pause(2)
-    yield from at_rest(story, obj)
-    story.facts["one pin"] = [before[:2], place_of(obj, 100), story.following() is not None]
-    steps = [b - a for a, b in zip(before, uvs(obj), strict=True)][::2]
-    story.facts["one pin moves its island"] = [min(steps), max(steps)]
-    yield from story.shoot("one_pin")
-    yield from tab.click("omt_live_end", "'KEEP'", places=ENDS)
-    yield from story.until(lambda: not story.following())
-
-
-def soft_pins(story, tab, obj):
-    """Two pins, one of them moved: hard ones stay where they are put, soft ones give way."""
-    for kind in ("HARD", "SOFT"):
-        pin(obj, [100, 300], selected=[300])
-        bpy.context.window_manager.operator_properties_last("uv.omt_live").pins = kind
-        yield from begun(story, tab)
-        yield from at_rest(story, obj)
-        before = [place_of(obj, vertex) for vertex in (100, 300)]
-        yield from grabbed(story)
-        yield from story.pause(2)
-        yield from at_rest(story, obj)
-        after = [place_of(obj, vertex) for vertex in (100, 300)]
-        story.facts[f"{kind.lower()} pins moved by"] = [farthest(a, b) for a, b in zip(before, after, strict=True)]
-        story.facts[f"{kind.lower()} pins"] = story.said()
-        yield from story.shoot(f"{kind.lower()}_pins")
-        yield from tab.click("omt_live_end", "'BACK'", places=ENDS)
-        yield from story.until(lambda: not story.following())
-    bpy.context.window_manager.operator_properties_last("uv.omt_live").pins = "HARD"
-
-
 def begun(story, tab):
     """The session, by a click; where that was."""
     place = yield from tab.click("omt_live(", places=LIVE)
@@ -215,59 +170,20 @@ def over(story, kind):
     return place
 
 
-def grabbed(story):
-    """G in the UV editor, to the right, and a click."""
-    x, y = yield from over(story, "IMAGE_EDITOR")
-    yield from story.key("g")
-    for k in range(1, 5):
-        yield from story.move(x + FAR * k // 4, y)
-    yield from story.click(x + FAR, y)
-
-
 def slider(balance):
     """Put the slider somewhere."""
     bpy.context.window_manager.operator_properties_last(UNWRAP).balance = balance
 
 
 def set_mode(story, mode):
-    """Edit Mode with one selection for both editors, or Object Mode."""
+    """Edit Mode or Object Mode."""
     window, view = bpy.context.window_manager.windows[0], story.area("VIEW_3D")
     with bpy.context.temp_override(window=window, area=view, region=story.window_region(view)):
         bpy.ops.object.mode_set(mode=mode)
-    bpy.context.scene.tool_settings.use_uv_select_sync = True
-    bpy.context.scene.tool_settings.mesh_select_mode = (True, False, False)
-
-
-def pin(obj, vertices, selected=None):
-    """These vertices alone are pinned and selected."""
-    edit = bmesh.from_edit_mesh(obj.data)
-    layer = edit.loops.layers.uv.active
-    for element in (*edit.faces, *edit.edges, *edit.verts):
-        element.select = False
-    for vertex in edit.verts:
-        vertex.select = vertex.index in (vertices if selected is None else selected)
-        for loop in vertex.link_loops:
-            loop[layer].pin_uv = vertex.index in vertices
-    edit.select_flush_mode()
-    if hasattr(edit, "uv_select_sync_valid"):
-        # Corners keep the selection of before otherwise.
-        edit.uv_select_sync_valid = False
-    bmesh.update_edit_mesh(obj.data)
-
-
-def place_of(obj, vertex):
-    """Where one of the corners of a vertex is."""
-    edit = bmesh.from_edit_mesh(obj.data)
-    edit.verts.ensure_lookup_table()
-    return list(edit.verts[vertex].link_loops[0][edit.loops.layers.uv.active].uv)
 
 
 def uvs(obj):
     """All UVs as they are now."""
-    if obj.mode == "EDIT":
-        edit = bmesh.from_edit_mesh(obj.data)
-        layer = edit.loops.layers.uv.active
-        return [x for face in edit.faces for loop in face.loops for x in loop[layer].uv]
     return [x for each in obj.data.uv_layers.active.uv for x in each.vector]
 
 
