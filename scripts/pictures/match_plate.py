@@ -1,4 +1,4 @@
-"""Draw docs/pictures/match.png: a head matched with another and wrapped onto it; a rig on a mesh of other topology.
+"""Draw docs/pictures/match.png: heads wrapped onto others, a ring onto a knot, and a rig on a mesh of other topology.
 
 python scripts/pictures/match_plate.py [OUT.png]
 """
@@ -23,7 +23,7 @@ from scipy.spatial import cKDTree
 
 from omt_uv.display.raster import cover
 from omt_uv.pipelines.shapes.landmark_pairs import LandmarkPoint, Pairs
-from omt_uv.pipelines.shapes.match import MatchJob
+from omt_uv.pipelines.shapes.match import MatchJob, largest_part
 from omt_uv.pipelines.shapes.wrap import wrap_surfaces
 from omt_uv.solver.mesh.geometry import vertex_normals
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -36,17 +36,29 @@ SAMPLES = 2
 # Directions to the right, up and towards the camera.
 VIEWS = {
     "max_planck": np.array([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]]),
+    "suzanne": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
     "david": np.array([[-0.77, -0.64, 0], [0, 0, 1], [-0.64, 0.77, 0]]),
+    "tube": np.array([[1.0, 0, 0], [0, 0.8, 0.6], [0, -0.6, 0.8]]),
     "body": np.array([[0.85, 0.53, 0], [0, 0, 1], [0.53, -0.85, 0]]),
 }
-# Eyes, tip of the nose, mouth, chin, forehead, ears, back of the head.
+# Of each pair: eyes, tip of the nose, mouth, chin, forehead, ears, back of the head; of Suzanne both corners of an eye.
 LANDMARKS = {
     "max_planck": [(57, 30, 11), (-2, 30, 8), (31, -17, -38), (34, -47, -14), (31, -91, -12), (32, 88, 8),
                    (-58, 0, 107), (113, -2, 102), (42, 68, 198)],
     "david": [(-0.23, 0.34, -0.06), (-0.36, 0.16, -0.05), (-0.41, 0.31, -0.31), (-0.34, 0.27, -0.41),
               (-0.31, 0.24, -0.59), (-0.32, 0.34, 0.13), (-0.22, -0.39, -0.14), (0.36, 0.19, -0.13),
               (0.31, -0.47, 0.12)],
+    "suzanne": [
+        (-0.58, -0.68, 0.26), (-0.16, -0.77, 0.26), (0.17, -0.77, 0.26), (0.58, -0.68, 0.26),
+        (-0.0, -0.82, -0.22), (-0.0, -0.65, -0.83), (0.0, -0.65, -0.93), (-0.0, -0.4, 0.72), (1.07, 0.4, 0.18),
+        (-1.07, 0.4, 0.18), (0.0, 0.75, 0.51)],
+    "planck, as suzanne": [
+        (70, 30, 10), (45, 24, 5), (14, 24, 8), (-15, 29, 9), (31, -17, -38), (34, -47, -14), (31, -91, -12),
+        (31, 94, 11), (-58, 0, 107), (113, -2, 102), (42, 68, 198)],
 }  # fmt: skip
+PAIRS = ((("suzanne", "suzanne"), ("max_planck", "planck, as suzanne")), (("max_planck",) * 2, ("david",) * 2))
+# Levels of the subdivision surface of Suzanne.
+LEVELS = 2
 SQUARES = 16
 CLAY = np.array([0.8, 0.8, 0.8])
 LIGHT = np.array([0.3, 0.4, 0.86])
@@ -86,12 +98,25 @@ def smooth(colours, F):
     return lambda found: np.einsum("kc,kcd->kd", found.weights, colours[F[found.triangles]])
 
 
-def heads() -> list[np.ndarray]:
+def head(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n,3) and triangles (m,3) of a model, or of Blender's Suzanne, subdivided, without her eyes."""
+    if name != "suzanne":
+        return meshes.load_model(name)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_monkey_add()
+    monkey = bpy.context.object
+    monkey.modifiers.new("smooth", "SUBSURF").levels = LEVELS
+    vertices, triangles = poses.shape_of(monkey)
+    part = largest_part(triangle_surface(vertices, triangles, np.zeros((0, 2), np.int64)), name)
+    return part.vertices, part.triangles
+
+
+def heads(pair) -> list[np.ndarray]:
     """A checker on one head, the same on the other, and the one in the shape of the other."""
     sides, points, edges, options = [], [], np.zeros((0, 2), np.int64), RegistrationOptions()
-    for name in ("max_planck", "david"):
-        V, F = meshes.load_model(name)
-        at = cKDTree(V).query(np.array(LANDMARKS[name]))[1].tolist()
+    for name, key in pair:
+        V, F = head(name)
+        at = cKDTree(V).query(np.array(LANDMARKS[key]))[1].tolist()
         sides.append((V, F))
         points.append(tuple(LandmarkPoint(str(k), vertex=v) for k, v in enumerate(at)))
     (V, F), (W, G) = sides
@@ -100,11 +125,49 @@ def heads() -> list[np.ndarray]:
     found = drain(wrap_surfaces(job))
     print(f"fit {100 * found.fit:.3f} %, faces that meet {found.intersections}, flipped {found.found.flipped}")
     places = (V - V.min(0)) / np.ptp(V, axis=0).max()
+    (first, _), (second, _) = pair
     back = np.einsum("kc,kcd->kd", found.source_barycentric, places[F[found.source_faces]])
     return [
-        drawn(V, F, VIEWS["max_planck"], checker(places, F)),
-        drawn(W, G, VIEWS["david"], checker(back, G)),
-        drawn(found.wrapped, F, VIEWS["david"]),
+        drawn(V, F, VIEWS[first], checker(places, F)),
+        drawn(W, G, VIEWS[second], checker(back, G)),
+        drawn(found.wrapped, F, VIEWS[second]),
+    ]
+
+
+def tube(major: int, minor: int, knotted: bool):
+    """A tube that closes, vertices (n,3), triangles (m,3), and seams (s,2) once along it and twice around it; knotted:
+    a trefoil instead of a ring."""
+    t, angle = 2 * np.pi * np.arange(major) / major, 2 * np.pi * np.arange(minor) / minor
+    turns, waves = (2, 3) if knotted else (1, 0)
+    ring = np.column_stack([np.cos(turns * t), np.sin(turns * t), 0 * t])
+    axis = (2 + np.cos(waves * t) * knotted)[:, None] * ring + np.sin(waves * t)[:, None] * [0, 0, 1]
+    out = np.cos(waves * t)[:, None] * ring + np.sin(waves * t)[:, None] * [0, 0, 1]
+    along = np.roll(axis, -1, axis=0) - np.roll(axis, 1, axis=0)
+    aside = np.cross(out, along / np.linalg.norm(along, axis=1, keepdims=True))
+    radius = 0.45 if knotted else 0.8
+    V = axis[:, None] + radius * (np.cos(angle)[:, None] * out[:, None] - np.sin(angle)[:, None] * aside[:, None])
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(major), np.arange(minor), indexing="ij"))
+    a, b, c, d = (((i + p) % major) * minor + (j + q) % minor for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    seams = [np.column_stack([a, b])[j == 0], *(np.column_stack([a, d])[i == k] for k in (0, major // 2))]
+    F = np.concatenate([np.column_stack([a, c, b]), np.column_stack([a, d, c])])
+    return V.reshape(-1, 3), F, np.concatenate(seams)
+
+
+def charts() -> list[np.ndarray]:
+    """A ring and a knot of other topology, cut alike, with one checker, and the ring in the shape of the knot."""
+    (V, F, seams), (W, G, others) = tube(60, 24, False), tube(181, 20, True)
+    surfaces = (triangle_surface(V, F, seams), triangle_surface(W, G, others))
+    job = MatchJob(*surfaces, Pairs((), ()), RegistrationOptions(domain="charts"), np.zeros((0, 2), np.int64))
+    found = drain(wrap_surfaces(job))
+    print(f"ring and knot: fit {100 * found.fit:.3f} %, faces that meet {found.intersections}, "
+          f"flipped {found.found.flipped}")  # fmt: skip
+    places = (V - V.min(0)) / np.ptp(V, axis=0).max()
+    back = np.einsum("kc,kcd->kd", found.source_barycentric, places[F[found.source_faces]])
+    view = VIEWS["tube"]
+    return [
+        drawn(V, F, view, checker(places, F)),
+        drawn(W, G, view, checker(back, G)),
+        drawn(found.wrapped, F, view),
     ]
 
 
@@ -151,13 +214,13 @@ def _weights(obj, armature) -> np.ndarray:
 
 
 def main(out: Path) -> None:
-    """Both rows, one above the other."""
+    """All rows, one above the other."""
     from omt_uv.registration import register, unregister
 
     register()
-    rows = [np.concatenate(row(), axis=1) for row in (rig, heads)]
+    rows = [np.concatenate(row, axis=1) for row in (*(heads(pair) for pair in PAIRS), charts(), rig())]
     unregister()
-    whole = np.rint(255 * np.clip(np.concatenate(rows[::-1]), 0, 1)).astype(np.uint8)
+    whole = np.rint(255 * np.clip(np.concatenate(rows), 0, 1)).astype(np.uint8)
     Image.fromarray(whole).quantize(128).save(out, optimize=True)
 
 
