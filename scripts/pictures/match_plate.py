@@ -121,7 +121,7 @@ def heads(pair) -> list[np.ndarray]:
         points.append(tuple(LandmarkPoint(str(k), vertex=v) for k, v in enumerate(at)))
     (V, F), (W, G) = sides
     surfaces = [triangle_surface(*side, edges) for side in sides]
-    job = MatchJob(*surfaces, Pairs(*points), options, edges)
+    job = MatchJob(surfaces[0], surfaces[1], Pairs(points[0], points[1]), options, edges)
     found = drain(wrap_surfaces(job))
     print(f"fit {100 * found.fit:.3f} %, faces that meet {found.intersections}, flipped {found.found.flipped}")
     places = (V - V.min(0)) / np.ptp(V, axis=0).max()
