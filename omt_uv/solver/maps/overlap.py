@@ -34,6 +34,20 @@ def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> f
     return float((np.concatenate(covered) > 1).mean())
 
 
+def cover_pairs(uv: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which points (k,2) lie in which triangles `uv` (m,3,2): their numbers (c,) each, a pair for every time."""
+    grid = _Grid(uv)
+    pairs = np.cumsum(grid.candidates(points))
+    chunks = np.searchsorted(pairs, np.arange(CHUNK, pairs[-1], CHUNK))
+    begin, found = 0, []
+    for chunk in np.split(points, np.unique(chunks)):
+        point, triangle = grid.inside(chunk)
+        found.append((point + begin, triangle))
+        begin += len(chunk)
+    point, triangle = (np.concatenate(x) for x in zip(*found, strict=True))
+    return point, triangle
+
+
 def _draw(tri: np.ndarray, area: np.ndarray, samples: int, seed: int) -> np.ndarray:
     """Points (samples,2) distributed uniformly over the triangles."""
     rng = np.random.default_rng(seed)
@@ -85,12 +99,17 @@ class _Grid:
 
     def cover(self, points):
         """In how many triangles each point (k,2) lies."""
+        return np.bincount(self.inside(points)[0], minlength=len(points))
+
+    def inside(self, points):
+        """Points (c,) of these (k,2) and the triangle (c,) that each lies in, a pair for every time."""
         cell = self._cell(points)
         begin = self.start[cell]
         query, k = expand(self.start[cell + 1] - begin)
-        t = self.tri[self.owner[begin[query] + k]]
+        triangle = self.owner[begin[query] + k]
+        t = self.tri[triangle]
         x = points[query]
         sides = np.stack([cross2(t[:, (i + 1) % 3] - t[:, i], x - t[:, i]) for i in range(3)])
         limit = INSIDE * self.extent**2
         inside = (sides.min(0) > limit) | (sides.max(0) < -limit)
-        return np.bincount(query[inside], minlength=len(points))
+        return query[inside], triangle[inside]

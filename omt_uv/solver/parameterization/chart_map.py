@@ -160,12 +160,23 @@ def _refuse_pins(pins: ChartPins | None, options: MapOptions) -> None:
         raise PinError("Pins are kept by area preserving maps alone", "Unpin these vertices, or map by areas")
 
 
-def refined_again(chart: Chart, uv: np.ndarray, options: MapOptions, target: Target | None = None) -> Steps[np.ndarray]:
-    """A map uv (n,2) of a chart without pins, refined further from where it is; errors are those of `map_chart`."""
+def refined_again(
+    chart: Chart, uv: np.ndarray, options: MapOptions, target: Target | None = None, crossing: bool = False
+) -> Steps[np.ndarray]:
+    """A map uv (n,2) of a chart without pins, refined further from where it is; errors are those of `map_chart`.
+
+    crossing: a free boundary may come to cross itself
+    """
     vertices, unit = in_unit_box(chart.vertices)
     disk = _disk_mesh(vertices, chart, options, target, RunLog(), ChartMarkers())
     start = with_centres(uv / unit, disk.triangles, len(disk.vertices))
-    again = RefinementOptions(boundary=disk.boundary, balance=options.balance, quality=options.quality, warm_start=True)
+    again = RefinementOptions(
+        boundary=disk.boundary,
+        balance=options.balance,
+        quality=options.quality,
+        warm_start=True,
+        crossing=crossing,
+    )
     asked = None if target is None else disk.target
     refined = yield from refine(
         disk.vertices, disk.triangles, start, again, target=asked, region=disk.region, polygons=disk.polygons

@@ -21,6 +21,7 @@ from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
+from ..seams.parting import parted
 from ..seams.search import SeamSearch
 from .chart_map import ChartMap
 from .mirrored_charts import with_images
@@ -33,10 +34,14 @@ MOST_ROUNDS = 5
 SPREAD_OF_SHEAR = 0.19
 # What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
 MARGIN = 0.95
+# What misses the bound by less stays in one piece: it has so many times the square of log(shear).
+CROWDED = 1.15
 # Shear of what has no area to speak of.
 VANISHED = 50.0
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
+# Where charts lie on themselves that may, before that.
+PARTING = 0.3
 
 
 @dataclass(frozen=True)
@@ -132,10 +137,12 @@ def bound_shear(
     first: DiskCharts,
     maps: list[ChartMap],
     map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
+    crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None = None,
 ) -> Steps[BoundedShear]:
     """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or the worst stays.
 
-    first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts.
+    first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts;
+    crossing : refines a map so that it may lie on itself; charts that then keep the bound are parted where they do.
     Progress offers an early end: with the maps of the last round. Errors are those of `disk_charts.disk_charts` and of
     `map_charts`.
     """
@@ -144,23 +151,27 @@ def bound_shear(
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     for rounds in range(1, MOST_ROUNDS):
         if last.worst > best.worst:
-            last = best
+            last, crossing = best, None
             promised[:] = np.inf
         if not last.searched:
             break
         best, share = last, np.ones(search.count)
-        for k in last.searched:
+        begin = 1 - 0.5 ** (rounds - 1)
+        width = (1 - begin) / 2
+        apart = yield from part_of(_apart(search, last, crossing), begin, width * PARTING)
+        missed = [k for k in last.searched if k not in apart]
+        for k in missed:
             faces, reached = last.charts[k].faces, np.log(last.mean[k]) ** 2
             # What the last search has promised and its map has not kept is asked for on top.
             kept_part = min(float(promised[faces].min()) / reached, 1.0)
             share[faces] = MARGIN ** (1 / rounds) * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
             promised[faces] = share[faces] * reached
         spread = spread * share
-        begin = 1 - 0.5 ** (rounds - 1)
-        width = (1 - begin) / 2
-        missing = [last.charts[k] for k in last.searched]
-        outlines = np.concatenate([_outline(chart) for chart in missing])
-        kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), outlines)]
+        begin, width = begin + width * PARTING, width * (1 - PARTING)
+        missing = [last.charts[k] for k in missed]
+        within = np.concatenate([np.zeros(0, np.int64), *map(_within, missing)])
+        kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), within)]
+        kept = np.concatenate([kept, *apart.values()])
         memory = dict(last.memory)
         # One other draw may be shorter than a longer cut, or worse; what is added to shears less for sure.
         changes = {"share": share, "adding": rounds > 1, "memory": memory}
@@ -177,8 +188,7 @@ def bound_shear(
         mapped = yield from unless_ended(further, early)
         if mapped is None:
             break
-        cuts = replace(last.cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
-        last = _Round.of(search, again.charts, mapped, cuts, memory)
+        last = _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
     best = last if last.worst <= best.worst else best
     warnings = tuple(best.warnings(bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
     return BoundedShear(DiskCharts(best.charts, best.cuts, first.warnings), best.maps, warnings)
@@ -220,6 +230,26 @@ class _Round:
                 yield f"{who} {mean[chosen].max():.3g} in the mean, above {bound:.3g}: {what}"
 
 
+def _apart(
+    search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None
+) -> Steps[dict[int, np.ndarray]]:
+    """Edges (e,2), by the number of a chart that keeps the bound but for lying in its own way, that part it there."""
+    found: dict[int, np.ndarray] = {}
+    least = np.sqrt(CROWDED) * np.log(search.shear.bound)
+    if crossing is None:
+        return found
+    for k in last.searched:
+        if np.log(last.mean[k]) < least:
+            continue
+        chart = last.charts[k]
+        uv = yield from crossing(chart, last.maps[k])
+        shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
+        if area @ shear <= search.shear.bound * area.sum():
+            edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids])
+            found |= {k: edges} if len(edges) else {}
+    return found
+
+
 def _cuts(prepared: DiskCharts) -> Cuts:
     """The cuts of charts that were searched."""
     if prepared.cuts is None:
@@ -227,9 +257,20 @@ def _cuts(prepared: DiskCharts) -> Cuts:
     return prepared.cuts
 
 
+def _joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
+    """The same cuts, but along the edges (e,2)."""
+    return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
+
+
 def _outline(chart: Chart) -> np.ndarray:
     """Keys (e,) of the edges around a chart."""
     return pair_keys(*chart.vertex_ids[boundary_edges(chart.triangles)].T)
+
+
+def _within(chart: Chart) -> np.ndarray:
+    """Keys (e,) of the edges that a chart lies on both sides of, cut all the same."""
+    keys, count = np.unique(_outline(chart), return_counts=True)
+    return keys[count > 1]
 
 
 def _is_marked(surface: Surface, chart: Chart) -> bool:

@@ -19,7 +19,7 @@ from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import chart_target, cut_as_given, in_order_of_places, located
-from .chart_map import ChartMap, map_chart
+from .chart_map import ChartMap, map_chart, refined_again
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons, with_folds_counted
 from .mirrored_charts import (
@@ -124,7 +124,8 @@ def unwrap(
     maps = yield from part_of(task.map_symmetric(cut), begin, width)
     # A draft leaves shear that Standard takes away: it shows the seams that are predicted, and no others.
     if cut.search is not None and task.options.quality != "draft":
-        further = bound_shear(cut.search, prepared, maps, task.map_charts)
+        crossing = task.crossing if pins is None and task.options.boundary == "free" else None
+        further = bound_shear(cut.search, prepared, maps, task.map_charts, crossing)
         found = yield from part_of(further, begin + width, 1 - begin - width)
         prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps
     charts, chart_pins = prepared.charts, [pins_of_chart(pins, chart) for chart in prepared.charts]
@@ -230,6 +231,11 @@ class _Task:
         found = yield from self.map_symmetric(_to_be_mapped(self.surface, _only(charts), self.pins, self.target))
         places = [np.argsort(in_order_of_places(chart)[1]) for chart in charts]
         return [replace(one, uv=one.uv[place]) for one, place in zip(found, places, strict=True)]
+
+    def crossing(self, chart: Chart, chart_map: ChartMap) -> Steps[np.ndarray]:
+        """A map (n,2) from another one on that may come to lie on itself."""
+        target = chart_target(self.target, self.surface, chart)
+        return (yield from refined_again(chart, chart_map.uv, self.options, target, crossing=True))
 
     def map_symmetric(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, symmetric ones also where their mirror images are cut along other diagonals."""

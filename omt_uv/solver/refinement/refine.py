@@ -69,6 +69,7 @@ class RefinementOptions:
     quality : "draft", "standard" or "exact"; "relaxed" or "rough" for the initial map of a finer mesh
     warm_start : the initial map is nearly the one that is looked for, and needs no detour through small area weights
     multiplier : of a coarser mesh, see `Refinement`
+    crossing : a free boundary may come to cross itself, which shears less
 
     Raises
     ------
@@ -80,6 +81,7 @@ class RefinementOptions:
     quality: str = "standard"
     warm_start: bool = False
     multiplier: float = 0.0
+    crossing: bool = False
 
     def __post_init__(self):
         if self.boundary not in BOUNDARIES:
@@ -218,6 +220,8 @@ def _refined(
     swept = faces.polygon is None and faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
     smoother = Smoother(mesh.triangles, n) if swept else None
     problem = _mirrored(_map_problem(faces, assembly, initial, loop, boundary, smoother), symmetry, w)
+    if options.crossing:
+        problem = replace(problem, loop=None, with_barrier=False)
     several_pins = pins is not None and len(pins.vertices) > 1
     if pins is not None and several_pins:
         problem, w = yield from move_pins(problem, w, pins)

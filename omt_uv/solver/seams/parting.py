@@ -1,0 +1,133 @@
+"""Part a chart where its map would lie on itself: what is in each other's way becomes islands of their own.
+
+A map that may cross itself says what the seams alone are worth. Where it keeps a bound that its like without overlap
+misses, further seams help little, since room is missing; the shortest cut between the parts that cover each other, by
+its cost, is a minimum cut of the polygons (Boykov, Kolmogorov 2004).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
+
+from ..maps.overlap import cover_pairs
+from ..mesh.charts import Chart
+from ..mesh.geometry import edge_lengths, face_areas
+from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up
+
+# Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
+POINTS = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
+# Parts that cover less than this share of the chart between them are left to lie beside each other.
+LEAST_COVER = 3e-3
+# What is taken off has this share of the chart at least.
+LEAST_PART = 0.03
+# Pairs of parts that are cut from one another at most.
+MOST_CUTS = 12
+# Capacities are whole numbers: that of an edge of mean cost, the greatest, and that of what may not be cut.
+MEAN_CAPACITY = 10_000
+MOST_CAPACITY = 10_000_000
+WHOLE = 2_000_000_000
+
+
+@dataclass(frozen=True)
+class _Dual:
+    """Polygons of a chart: of each triangle (m,), their areas (p,), and the edges between two of them (e,2), with the
+    vertices (e,2) of these."""
+
+    polygon: np.ndarray
+    area: np.ndarray
+    joined: np.ndarray
+    ends: np.ndarray
+
+    @staticmethod
+    def of(chart: Chart) -> _Dual:
+        _, polygon = np.unique(chart.faces, return_inverse=True)
+        polygon = polygon.ravel()
+        tail, head = halfedges(chart.triangles)
+        one, other = pair_up(pair_keys(tail, head))
+        joined = polygon[np.stack([one, other], axis=1) // 3]
+        between = joined[:, 0] != joined[:, 1]
+        area = np.bincount(polygon, face_areas(chart.vertices, chart.triangles))
+        return _Dual(polygon, area, joined[between], np.stack([tail[one], head[one]], axis=1)[between])
+
+    def pieces(self, kept: np.ndarray) -> np.ndarray:
+        """The piece (p,) that each polygon is in, joined by the edges that are kept (e,) bool."""
+        return graph_components(self.joined[kept, 0], self.joined[kept, 1], len(self.area))[1]
+
+    def graph(self, weight: np.ndarray) -> csr_matrix:
+        """The graph (p,p) of the polygons, with a weight (e,) > 0 for each edge; the sum where two share several."""
+        rows, columns = np.concatenate([self.joined, self.joined[:, ::-1]]).T
+        return csr_matrix((np.tile(weight, 2), (rows, columns)), shape=(len(self.area),) * 2)
+
+
+def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray) -> np.ndarray:
+    """Edges (k,2) of the surface along which a chart comes apart where its map uv (n,2) lies on itself.
+
+    cost (n,): of a cut through its vertices, per length. No edges where it does not, or is in one piece all the same.
+    """
+    dual = _Dual.of(chart)
+    pairs = _covering(chart, uv, dual)
+    price = cost[dual.ends].mean(axis=1) * edge_lengths(chart.vertices, dual.ends)
+    capacity = np.clip(np.round(MEAN_CAPACITY * price / max(price.mean(), 1e-300)), 1, MOST_CAPACITY).astype(np.int32)
+    steps = dual.graph(edge_lengths(chart.vertices, dual.ends) + 1e-300)
+    cut = np.zeros(len(dual.joined), dtype=bool)
+    for one, other in pairs[:MOST_CUTS]:
+        part = dual.pieces(~cut)
+        if part[one[0]] == part[other[0]]:
+            side = _minimum_cut(dual, capacity, *_enlarged(dual, steps, one, other))
+            cut |= side[dual.joined[:, 0]] != side[dual.joined[:, 1]]
+    return chart.vertex_ids[dual.ends[cut]]
+
+
+def _covering(chart: Chart, uv: np.ndarray, dual: _Dual) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Polygons (a,) and (b,) of pieces that cover each other, those first that do so most."""
+    corners = uv[chart.triangles]
+    point, over = cover_pairs(corners, np.einsum("kc,mcd->mkd", POINTS, corners).reshape(-1, 2))
+    below = dual.polygon[point // len(POINTS)]
+    above = dual.polygon[over]
+    share = face_areas(chart.vertices, chart.triangles)[point // len(POINTS)] / (len(POINTS) * dual.area.sum())
+    share, below, above = (x[below != above] for x in (share, below, above))
+    covered = np.zeros(len(dual.area), dtype=bool)
+    covered[below] = covered[above] = True
+    piece = dual.pieces(covered[dual.joined].all(axis=1))
+    a, b = np.sort(np.stack([piece[below], piece[above]]), axis=0)
+    key, index = np.unique(pair_keys(a, b), return_inverse=True)
+    # Every pair is seen from both sides.
+    total = np.bincount(index.ravel(), share, len(key)) / 2
+    found = np.stack([key >> 32, key & 0xFFFFFFFF], axis=1)
+    large = (total > LEAST_COVER) & (found[:, 0] != found[:, 1])
+    order = np.argsort(-total[large], kind="stable")
+    members = [np.flatnonzero(covered & (piece == k)) for k in found[large][order].ravel()]
+    return list(zip(members[::2], members[1::2], strict=True))
+
+
+def _enlarged(dual: _Dual, steps: csr_matrix, one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both pieces with what lies around them, as large as an island should be at least."""
+    far = np.stack([dijkstra(steps, indices=piece, min_only=True) for piece in (one, other)])
+    nearer = np.argmin(far, axis=0)
+    grown = []
+    for k, piece in enumerate((one, other)):
+        around = np.flatnonzero((nearer == k) & np.isfinite(far[k]))
+        around = around[np.argsort(far[k][around], kind="stable")]
+        enough = np.cumsum(dual.area[around]) <= LEAST_PART * dual.area.sum()
+        grown.append(np.union1d(piece, around[enough]))
+    return grown[0], np.setdiff1d(grown[1], grown[0])
+
+
+def _minimum_cut(dual: _Dual, capacity: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Which polygons (p,) bool are on the side of `one` (a,) of the cheapest cut between these and `other` (b,)."""
+    count = len(dual.area)
+    source, sink = count, count + 1
+    tail = np.concatenate([dual.joined[:, 0], dual.joined[:, 1], np.full(len(one), source), other])
+    head = np.concatenate([dual.joined[:, 1], dual.joined[:, 0], one, np.full(len(other), sink)])
+    room = np.concatenate([capacity, capacity, np.full(len(one) + len(other), WHOLE, np.int32)])
+    graph = csr_matrix((room, (tail, head)), shape=(count + 2,) * 2, dtype=np.int32)
+    left = graph - maximum_flow(graph, source, sink).flow
+    left.data = np.maximum(left.data, 0)
+    left.eliminate_zeros()
+    side = np.zeros(count + 2, dtype=bool)
+    side[breadth_first_order(left, source, return_predecessors=False)] = True
+    return side[:count]

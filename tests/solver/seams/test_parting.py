@@ -1,0 +1,85 @@
+"""A ramp of more than a turn lies on itself in the plane: it comes apart there, and nowhere else."""
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.maps.distortion import distortion
+from omt_uv.solver.maps.overlap import cover_pairs, overlap_share
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
+from omt_uv.solver.seams.parting import LEAST_PART, parted
+
+
+def ramp(turns, steps=60, rings=6, rise=0.2):
+    """A flat ring of more than a turn that rises, and its place in the plane, where it lies on itself."""
+    angle, radius = np.meshgrid(2 * np.pi * turns * np.linspace(0, 1, steps), np.linspace(1, 2, rings), indexing="ij")
+    flat = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=2).reshape(-1, 2)
+    i = (np.arange(steps - 1)[:, None] * rings + np.arange(rings - 1)).ravel()
+    triangles = np.concatenate([np.stack([i, i + 1, i + rings], 1), np.stack([i + 1, i + rings + 1, i + rings], 1)])
+    return np.column_stack([flat, rise * angle.ravel() / (2 * np.pi)]), triangles[:, ::-1], flat
+
+
+def test_what_lies_on_itself_comes_apart_along_a_short_cut():
+    V, F, flat = ramp(1.3)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    uv = flat[chart.vertex_ids]
+    assert overlap_share(uv[chart.triangles]) > 0.1
+    edges = parted(chart, uv, np.ones(len(uv)))
+    parts = strict_charts(triangle_surface(V, F, edges))
+    whole = face_areas(V, F).sum()
+    assert len(parts) == 2
+    for part in parts:
+        assert overlap_share(flat[part.vertex_ids][part.triangles]) < 1e-3
+        assert face_areas(part.vertices, part.triangles).sum() > LEAST_PART * whole / 2
+    # Straight across is 1.
+    assert np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1).sum() < 1.05
+
+
+def test_cuts_avoid_what_is_dear():
+    V, F, flat = ramp(1.5)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    uv = flat[chart.vertex_ids]
+    # Somewhere between the parts that cover each other.
+    turn = chart.vertices[:, 2] / 0.2
+    cheap = np.abs(turn - 0.8) < 0.03
+    edges = parted(chart, uv, np.where(cheap, 0.1, 1.0))
+    assert len(edges) and (np.abs(V[edges, 2] / 0.2 - 0.8) < 0.06).all()
+
+
+def test_what_lies_beside_itself_stays_whole():
+    V, F, flat = ramp(0.9)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    assert len(parted(chart, flat[chart.vertex_ids], np.ones(len(chart.vertices)))) == 0
+
+
+def test_a_ramp_of_more_than_a_turn_becomes_islands_without_shear():
+    V, F, _ = ramp(1.3)
+    whole = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(max_shear=0.0)))
+    found = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(max_shear=1.1)))
+    assert max(one.angle_mean for one in whole.maps) > 1.1
+    assert len(found.charts) == 2 and not found.warnings
+    for chart, one in zip(found.charts, found.maps, strict=True):
+        figures = distortion(chart.vertices, chart.triangles, one.uv[chart.triangles])
+        assert figures.angle_mean < 1.05 and figures.folds == 0 and figures.overlap == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pairs_of_points_and_what_they_lie_in_are_all_found(seed):
+    random = np.random.default_rng(seed)
+    uv, points = random.random((40, 3, 2)), random.random((200, 2))
+    point, triangle = cover_pairs(uv, points)
+    a, b, c = uv.transpose(1, 0, 2)
+
+    def side(p, q):
+        d = q - p
+        return d[None, :, 0] * (points[:, None, 1] - p[None, :, 1]) - d[None, :, 1] * (
+            points[:, None, 0] - p[None, :, 0]
+        )
+
+    sides = np.stack([side(a, b), side(b, c), side(c, a)])
+    inside = (sides > 1e-9).all(axis=0) | (sides < -1e-9).all(axis=0)
+    assert {*zip(point.tolist(), triangle.tolist(), strict=True)} == {*map(tuple, np.argwhere(inside).tolist())}
