@@ -4,18 +4,31 @@ A flow takes no two points to one, but flat faces between vertices may meet wher
 within an edge. Pairs of faces are taken apart again along the planes that were between them (`separation`). Where that
 does not suffice, the flow is replaced by its best affine map, which takes faces apart to faces apart, and blended with
 the flow over a few rings of vertices.
+
+On a coarse mesh, or where handles shear what is around them, finer steps of time change nothing about that. What the
+whole way folds over is taken apart on the way (`march`): within a piece of it, planes between two faces hardly turn,
+and vertices that have been put back behind them flow on from there.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..mesh.geometry import nearest_rotations
 from ..mesh.topology import graph_components, halfedges
+from ..progress import Progress, Steps
+from .domain import FlowDomain
+from .integration import FlowStep, carried
 from .self_intersections import FaceCrossings
 from .separation import separated
 
+# Pieces of the way, of which each is followed in its single steps where its faces do not come apart at once.
+PIECES = 12
+# A region reaches so many edges around what meets, before the flow and after it.
+REACH = 5
 # Rings of vertices around faces that intersect, in the rounds of mending; beyond them the blend takes as many again.
 RINGS = (1, 2, 3, 4, 6, 8)
 # Times that pairs which others have been moved into are taken apart with those.
@@ -27,21 +40,39 @@ MOST_FACES = 0.05
 FEW_FACES = 1000
 
 
-def new_intersections(
-    before: np.ndarray, after: np.ndarray, faces: FaceCrossings, concerned: np.ndarray | None = None
-) -> np.ndarray:
-    """Pairs (k,2) of triangles (m,3) that intersect at positions `after` (n,3), and neither did at `before` (n,3) nor
-    had neighbours that did: a line along which parts meet moves on from face to face. Only pairs with a triangle that
-    is `concerned` (m,) bool where this is given."""
-    triangles = faces.triangles
-    pairs = faces.pairs(after, concerned)
-    if not len(pairs):
-        return pairs
-    near = np.zeros(len(before), bool)
-    near[triangles[pairs]] = True
-    old = faces.pairs(before, near[triangles].any(axis=1))
-    old = np.concatenate([old, old[:, ::-1]])
-    return pairs[~np.isin(_vertex_pairs(triangles, pairs), _vertex_pairs(triangles, old)).any(axis=1)]
+class NewCrossings:
+    """Tells pairs of triangles that newly intersect from those that did at `before` (n,3), of which it looks for no
+    more than it is asked about."""
+
+    def __init__(self, before: np.ndarray, faces: FaceCrossings) -> None:
+        """Nothing is known yet about which triangles intersect at positions `before` (n,3)."""
+        self.before, self.faces = before, faces
+        self._asked = np.zeros(len(before), bool)
+        self._old = np.zeros(0, np.int64)
+
+    def pairs(self, after: np.ndarray, concerned: np.ndarray | None = None) -> np.ndarray:
+        """Pairs (k,2) that intersect at positions `after` (n,3), and neither did before nor had neighbours that did: a
+        line along which parts meet moves on from face to face. Only pairs with a triangle that is `concerned` (m,) bool
+        where this is given."""
+        triangles = self.faces.triangles
+        found = self.faces.pairs(after, concerned)
+        if not len(found):
+            return found
+        near = np.zeros(len(self.before), bool)
+        near[triangles[found]] = True
+        near &= ~self._asked
+        if near.any():
+            old = self.faces.pairs(self.before, near[triangles].any(axis=1))
+            old = np.concatenate([old, old[:, ::-1]])
+            self._old = np.union1d(self._old, _vertex_pairs(triangles, old))
+            self._asked |= near
+        return found[~np.isin(_vertex_pairs(triangles, found), self._old).any(axis=1)]
+
+
+def new_intersections(before: np.ndarray, after: np.ndarray, faces: FaceCrossings) -> np.ndarray:
+    """Pairs (k,2) of triangles (m,3) that intersect at positions `after` (n,3) and did not at `before` (n,3); see
+    `NewCrossings`."""
+    return NewCrossings(before, faces).pairs(after)
 
 
 def _vertex_pairs(triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
@@ -56,46 +87,39 @@ def without_new_intersections(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n,3) close to `after` (n,3), and the pairs (k,2) of triangles (m,3) that still intersect and did not
     at `before` (n,3). Only vertices `free` (n,) bool move."""
-    triangles = faces.triangles
-    pairs = new_intersections(before, after, faces, _touched(before, after, triangles))
-    if not len(pairs) or _too_many(pairs, triangles):
-        return after, pairs
-    best, fewest = _separated_all(before, after, faces, free, pairs)
-    if len(fewest):
-        best, fewest = _blended_all(before, after, faces, free, (best, fewest))
+    crossings = NewCrossings(before, faces)
+    farthest = farthest_mended(before, faces.triangles)
+    concerned = touched(before, after, faces.triangles)
+    best, fewest = taken_apart((before, after), crossings, free, farthest, concerned)
+    if len(fewest) and not _too_many(fewest, faces.triangles):
+        best, fewest = _blended_all(after, crossings, free, (best, fewest))
     return best, fewest
 
 
-def _touched(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Which triangles (m,) bool have a vertex that is elsewhere."""
-    return (before != after).any(axis=1)[triangles].any(axis=1)
-
-
-def _too_many(pairs: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether pairs (k,2) have more of the triangles (m,3) than are mended."""
-    return len(np.unique(pairs)) > max(MOST_FACES * len(triangles), FEW_FACES)
-
-
-def _farthest(before: np.ndarray, triangles: np.ndarray) -> float:
-    """How far mending may move a vertex of triangles (m,3)."""
-    tail, head = halfedges(triangles)
-    edge = float(np.linalg.norm(before[tail] - before[head], axis=1).mean())
-    return max(FARTHEST * float(np.linalg.norm(np.ptp(before, axis=0))), edge)
-
-
-def _separated_all(before, after, faces: FaceCrossings, free, pairs) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (n,3) and pairs that are left, with pairs (k,2) moved behind the planes that were between them, and
-    those that come to intersect by that, too."""
-    triangles = faces.triangles
-    farthest = _farthest(before, triangles)
+def taken_apart(
+    move: tuple[np.ndarray, np.ndarray],
+    crossings: NewCrossings,
+    free: np.ndarray,
+    farthest: float = np.inf,
+    concerned: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n,3) close to those after a move (before and after it, (n,3) each), and the pairs (k,2) that still
+    newly intersect, with those that do behind planes that were between them before the move, and those that come to
+    intersect by that, too. Only vertices `free` (n,) bool move, no farther than `farthest`; pairs without a triangle
+    that is `concerned` (m,) bool are known not to intersect."""
+    before, after = move
+    triangles = crossings.faces.triangles
+    pairs = crossings.pairs(after, concerned)
     best, fewest = after, pairs
+    if not len(pairs) or _too_many(pairs, triangles):
+        return best, fewest
     for _ in range(SEPARATIONS):
         position = separated(before, after, triangles, pairs, free)
         if np.abs(position - after).max() > farthest:
             break
-        near = _touched(after, position, triangles)
+        near = touched(after, position, triangles)
         near[fewest] = True
-        left = new_intersections(before, position, faces, near)
+        left = crossings.pairs(position, near)
         if len(left) < len(fewest):
             best, fewest = position, left
         both = np.unique(np.concatenate([pairs, left]), axis=0)
@@ -105,12 +129,30 @@ def _separated_all(before, after, faces: FaceCrossings, free, pairs) -> tuple[np
     return best, fewest
 
 
-def _blended_all(before, after, faces: FaceCrossings, free, found) -> tuple[np.ndarray, np.ndarray]:
+def touched(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Which triangles (m,) bool have a vertex that is elsewhere."""
+    return (before != after).any(axis=1)[triangles].any(axis=1)
+
+
+def _too_many(pairs: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether pairs (k,2) have more of the triangles (m,3) than are mended."""
+    return len(np.unique(pairs)) > max(MOST_FACES * len(triangles), FEW_FACES)
+
+
+def farthest_mended(before: np.ndarray, triangles: np.ndarray) -> float:
+    """How far mending may move a vertex of triangles (m,3)."""
+    tail, head = halfedges(triangles)
+    edge = float(np.linalg.norm(before[tail] - before[head], axis=1).mean())
+    return max(FARTHEST * float(np.linalg.norm(np.ptp(before, axis=0))), edge)
+
+
+def _blended_all(after, crossings: NewCrossings, free, found) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n,3) and pairs that are left, of those `found`, with affine maps of more and more rings around."""
-    triangles, n = faces.triangles, len(before)
+    before, triangles = crossings.before, crossings.faces.triangles
+    n = len(before)
     best, fewest = found
     position, pairs = found
-    farthest = _farthest(before, triangles)
+    farthest = farthest_mended(before, triangles)
     tail, head = halfedges(triangles)
     graph = sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
     graph = graph + sp.identity(n, format="csr")
@@ -120,9 +162,9 @@ def _blended_all(before, after, faces: FaceCrossings, free, found) -> tuple[np.n
         position = _blended(before, after, position, graph, triangles[pairs].reshape(len(pairs), -1), free, rings)
         if np.abs(position - after).max() > farthest:
             break
-        near = _touched(best, position, triangles)
+        near = touched(best, position, triangles)
         near[fewest] = True
-        pairs = new_intersections(before, position, faces, near)
+        pairs = crossings.pairs(position, near)
         if len(pairs) < len(fewest):
             best, fewest = position, pairs
     return best, fewest
@@ -181,3 +223,68 @@ def _affine_images(before: np.ndarray, after: np.ndarray, owner: np.ndarray, wei
     rotation = nearest_rotations(cross)
     matrix = (cross + soft @ rotation) @ np.linalg.inv(square + soft)
     return high[owner] + np.einsum("kij,kj->ki", matrix[owner], x)
+
+
+@dataclass(frozen=True)
+class FlowRegion:
+    """What is looked at on the way: rows (r,) of vertices, which of them (r,) bool may move, and their triangles, with
+    what intersects of these before the flow."""
+
+    rows: np.ndarray
+    free: np.ndarray
+    crossings: NewCrossings
+
+
+def region_around(
+    move: tuple[np.ndarray, np.ndarray], triangles: np.ndarray, pairs: np.ndarray, mended: np.ndarray, free: np.ndarray
+) -> FlowRegion:
+    """The region around pairs (k,2) of triangles (m,3) and what was `mended` (n,) bool near them; positions before and
+    after the move (n,3), `free` (n,) bool."""
+    seeds = np.zeros(len(free), bool)
+    seeds[triangles[pairs]] = True
+    seeds |= mended & _near(move, triangles, seeds)
+    inside = _near(move, triangles, seeds)
+    rows = np.flatnonzero(inside)
+    number = np.cumsum(inside) - 1
+    faces = FaceCrossings(number[triangles[inside[triangles].all(axis=1)]])
+    return FlowRegion(rows, free[rows], NewCrossings(move[0][rows], faces))
+
+
+def _near(move: tuple[np.ndarray, np.ndarray], triangles: np.ndarray, seeds: np.ndarray) -> np.ndarray:
+    """Which vertices (n,) bool are near to `seeds` (n,) bool before or after the move."""
+    from scipy.spatial import cKDTree
+
+    around = triangles[seeds[triangles].any(axis=1)]
+    corner = move[0][around]
+    edge = float(np.linalg.norm(corner - corner[:, [1, 2, 0]], axis=2).mean())
+    near = seeds.copy()
+    near[around] = True
+    for at in move:
+        distance, _ = cKDTree(at[seeds]).query(at, distance_upper_bound=REACH * edge)
+        near |= np.isfinite(distance)
+    return near
+
+
+def march(region: FlowRegion, plan: list[list[FlowStep]], domain: FlowDomain | None) -> Steps[list[np.ndarray]]:
+    """Positions (r,3) of the vertices of a region after every entry of a plan, faces apart as they were before."""
+    position, found = region.crossings.before, []
+    left = np.zeros((0, 2), np.int64)
+    for k, steps in enumerate(plan):
+        yield Progress("Flow", k / len(plan))
+        position, left = _advanced(region, (position, left), steps, domain)
+        found.append(position)
+    return found
+
+
+def _advanced(region: FlowRegion, state, steps: list[FlowStep], domain) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (r,3) and pairs (k,2) of triangles that newly intersect after steps; `state`: those before."""
+    target = carried(state[0], steps)
+    if domain is not None:
+        target = domain.held(target)
+    best, left = taken_apart((state[0], target), region.crossings, region.free)
+    if len(left) <= len(state[1]) or len(steps) == 1:
+        return best, left
+    single = state
+    for step in steps:
+        single = _advanced(region, single, [step], domain)
+    return single if len(single[1]) < len(left) else (best, left)

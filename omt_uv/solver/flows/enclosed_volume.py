@@ -17,6 +17,8 @@ ROUNDS = 16
 SAME_NORMALS = 4
 # A relative change of volume that needs no further step.
 EXACT = 1e-13
+# What is missing is less than this share of what was missing before a step, or steps do not help any more.
+LESS = 0.5
 
 
 def corner_volumes(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -85,9 +87,12 @@ def restore_volumes(
     target = parts.volumes(before)
     closed = parts.closed & (np.abs(target) > 0)
     position = after.copy()
+    missing = np.full(len(target), np.inf)
     for left in range(ROUNDS, -1, -1):
-        missing = np.where(closed, target - parts.volumes(position), 0.0)
-        if not left or (np.abs(missing) <= EXACT * np.abs(target)).all():
+        before_that, missing = missing, np.where(closed, target - parts.volumes(position), 0.0)
+        wrong = np.abs(missing) > EXACT * np.abs(target)
+        # Rounding leaves what no step makes less.
+        if not left or not (wrong & (np.abs(missing) < LESS * np.abs(before_that))).any():
             break
         if (ROUNDS - left) % SAME_NORMALS == 0:
             normal = vertex_normals(position, parts.triangles)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import EmptyMeshError, HandleError, NonFiniteError
 from ..progress import Progress, Steps
-from .creases import new_intersections, without_new_intersections
+from .creases import PIECES, NewCrossings, farthest_mended, march, region_around, taken_apart, touched
 from .domain import FlowDomain
 from .enclosed_volume import EnclosedParts, restore_volumes
 from .handles import FlowHandle, check_handles, farthest_points, joined, sampled_handles
@@ -24,6 +24,8 @@ from .passing import Passing, closest_passing, greatest_surge
 from .paths import handle_paths
 from .self_intersections import FaceCrossings
 
+# Rounds of giving volumes back after faces were taken apart on the way.
+SETTLINGS = 4
 # Points on which steps are planned, besides those next to the handles.
 PROBES = 300
 # Samples of walls are this share of the radius apart: closer, and they make the equations ill-conditioned.
@@ -126,7 +128,8 @@ def flow(
     way = _way(points / size, handles, options, domain, size)
     yield Progress("Paths", 0.0)
     everything = np.concatenate([points, *(h.start for h in handles)]) / size
-    plan, surge = _plan(way, everything, options, len(points), frames)
+    journey = _Journey(way, everything, options, len(points), size)
+    plan, surge = journey.plan(frames)
     reached = _reached(everything, way, UNMOVED * options.tolerance)
     merged = yield from _carry_all(everything, plan, way.domain, reached)
     ends = np.concatenate([h.end for h in handles]) / size
@@ -134,7 +137,7 @@ def flow(
     moved = np.isin(np.arange(len(points)), reached)[:, None]
     positions = [np.where(moved, at[: len(points)] * size, points) for at in merged]
     _set_handles(positions[-1], points, handles)
-    rough = yield from _sound(positions, _shape(points, triangles, handles), options.mend)
+    rough = yield from _sound(positions, _shape(points, triangles, handles), journey)
     crossing = way.passing.warning([h.name or f"number {k}" for k, h in enumerate(handles)], surge, rough.intersecting)
     warnings = _warnings(missed, rough.volumes, len(rough.intersecting)) + crossing
     return replace(rough, steps=sum(map(len, plan)), missed=missed, surge=surge, warnings=warnings)
@@ -146,24 +149,71 @@ def _shape(points: np.ndarray, triangles: np.ndarray | None, handles: tuple[Flow
     return _Shape(points, np.zeros((0, 3), np.int64) if flat else np.asarray(triangles), _free(len(points), handles))
 
 
-def _sound(positions: list[np.ndarray], shape: _Shape, mend: bool) -> Steps[Flow]:
-    """Positions (n,3) at every frame with their volumes given back, and figures of these; the others are to come."""
-    drift = shape.changes(positions[-1])
-    for k, at in enumerate(list(positions)):
-        yield Progress("Volumes", k / len(positions))
-        positions[k], intersecting = shape.sound(at, mend)
-    volumes = shape.changes(positions[-1])
+@dataclass(frozen=True)
+class _Journey:
+    """What flows, points (n + h,d) and then those of handles in units of the diagonal `size`, and how."""
+
+    way: _Way
+    everything: np.ndarray
+    options: FlowOptions
+    count: int
+    size: float
+
+    def plan(self, frames: int) -> tuple[list[list[FlowStep]], float]:
+        """Steps of every frame, and the greatest surge in them."""
+        return _plan(self.way, self.everything, self.options, self.count, frames)
+
+
+def _sound(frames: list[np.ndarray], shape: _Shape, journey: _Journey) -> Steps[Flow]:
+    """Frames, positions (n,3) each, with their volumes given back, and figures of these; the others are to come."""
+    drift = shape.changes(frames[-1])
+    found = []
+    for k, at in enumerate(frames):
+        yield Progress("Volumes", k / len(frames))
+        found.append(shape.sound(at, journey.options.mend))
+    if journey.options.mend and any(len(one.pairs) for one in found):
+        found = yield from _apart_on_the_way(found, shape, journey)
     return Flow(
-        positions=positions[-1],
-        frames=tuple(positions),
+        positions=found[-1].positions,
+        frames=tuple(one.positions for one in found),
         steps=0,
         missed=0.0,
         surge=0.0,
         drift=drift,
-        volumes=volumes,
-        intersecting=intersecting,
+        volumes=shape.changes(found[-1].positions),
+        intersecting=found[-1].pairs,
         warnings=(),
     )
+
+
+def _apart_on_the_way(found: list[_Sound], shape: _Shape, journey: _Journey) -> Steps[list[_Sound]]:
+    """Frames, from the first with faces that newly intersect on with those taken apart piece by piece of the way."""
+    first = next(k for k, one in enumerate(found) if len(one.pairs))
+    pairs = np.concatenate([one.pairs for one in found[first:]])
+    mended = np.any([one.mended for one in found[first:]], axis=0)
+    move = (journey.everything[: journey.count], found[-1].positions / journey.size)
+    region = region_around(move, shape.triangles, pairs, mended, shape.free)
+    pieces = -(-PIECES // len(found))
+    plan, _ = journey.plan(pieces * len(found))
+    through = yield from march(region, plan, journey.way.domain)
+    result = list(found)
+    for k in range(first, len(found)):
+        position = found[k].positions.copy()
+        mine = region.rows[region.free]
+        position[mine] = through[(k + 1) * pieces - 1][region.free] * journey.size
+        settled = shape.settled(position, region.rows)
+        if len(settled.pairs) < len(found[k].pairs):
+            result[k] = settled
+    return result
+
+
+@dataclass(frozen=True)
+class _Sound:
+    """Positions (n,3) of a frame, pairs (k,2) of triangles that newly intersect, and what was mended (n,) bool."""
+
+    positions: np.ndarray
+    pairs: np.ndarray
+    mended: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -180,9 +230,9 @@ class _Shape:
         return EnclosedParts.of(self.triangles, len(self.points))
 
     @cached_property
-    def faces(self) -> FaceCrossings:
-        """The triangles, to be asked which of them intersect."""
-        return FaceCrossings(self.triangles)
+    def crossings(self) -> NewCrossings:
+        """What is asked which triangles newly intersect."""
+        return NewCrossings(self.points, FaceCrossings(self.triangles))
 
     def changes(self, after: np.ndarray) -> np.ndarray:
         """Relative changes (c,) of the volumes of closed parts."""
@@ -192,26 +242,46 @@ class _Shape:
         closed = self.parts.closed & (old != 0)
         return (new[closed] - old[closed]) / np.abs(old[closed])
 
-    def sound(self, after: np.ndarray, mend: bool) -> tuple[np.ndarray, np.ndarray]:
+    def sound(self, after: np.ndarray, mend: bool) -> _Sound:
         """Positions with the volumes of before and, with `mend`, no faces that newly intersect; pairs that still do."""
-        none = np.zeros((0, 2), np.int64)
+        none, nothing = np.zeros((0, 2), np.int64), np.zeros(len(after), bool)
         if not len(self.triangles):
-            return after, none
+            return _Sound(after, none, nothing)
         restored, _ = restore_volumes(self.points, after, self.parts, self.free)
         if not mend:
-            return restored, none
-        mended, pairs = without_new_intersections(self.points, restored, self.faces, self.free)
+            return _Sound(restored, none, nothing)
+        concerned = touched(self.points, restored, self.triangles)
+        move, farthest = (self.points, restored), farthest_mended(self.points, self.triangles)
+        mended, pairs = taken_apart(move, self.crossings, self.free, farthest, concerned)
         if mended is restored:
-            return restored, pairs
+            return _Sound(restored, pairs, nothing)
         # What has not been mended keeps its place, and needs no further look.
         moved = (mended != restored).any(axis=1)
-        near = moved[self.triangles].any(axis=1)
         around = np.zeros(len(moved), bool)
-        around[self.triangles[near]] = True
+        around[self.triangles[moved[self.triangles].any(axis=1)]] = True
         result, _ = restore_volumes(self.points, mended, self.parts, self.free & around)
         concerned = around[self.triangles].any(axis=1)
         concerned[pairs] = True
-        return result, new_intersections(self.points, result, self.faces, concerned)
+        return _Sound(result, self.crossings.pairs(result, concerned), moved)
+
+    def settled(self, apart: np.ndarray, rows: np.ndarray) -> _Sound:
+        """The same of positions `apart` (n,3) with faces apart; of these, vertices (r,) may move."""
+        inside = np.zeros(len(apart), bool)
+        inside[rows] = True
+        concerned, movable = inside[self.triangles].any(axis=1), self.free & inside
+        for _ in range(SETTLINGS):
+            restored, _ = restore_volumes(self.points, apart, self.parts, movable)
+            mine, farthest = self.free & inside, farthest_mended(self.points, self.triangles)
+            mended, pairs = taken_apart((apart, restored), self.crossings, mine, farthest, concerned)
+            if mended is restored:
+                break
+            # What had to go back does not take part in the next round.
+            movable = movable & (mended == restored).all(axis=1)
+            apart = mended
+        else:
+            restored, _ = restore_volumes(self.points, apart, self.parts, movable)
+            pairs = self.crossings.pairs(restored, concerned)
+        return _Sound(restored, pairs, inside)
 
 
 def _checked(points: np.ndarray, handles: tuple[FlowHandle, ...], options: FlowOptions) -> float:

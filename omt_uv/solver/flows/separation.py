@@ -2,8 +2,9 @@
 follow what is between their vertices.
 
 Two triangles that did not intersect had a plane between them. The flow takes that plane along, nearly to the plane that
-the best affine map of the six corners makes of it, and the corners that are beyond it go back, just so far; again and
-again, for all pairs at once, until none is beyond. What moves is less than a face is off the flow.
+the best affine map of the six corners makes of it. The corners that are beyond it go back, and the plane turns towards
+where they are, just so far; again and again, for all pairs at once, until none is beyond. Planes have to turn where
+corners are held: two handles that pass one another are on both sides of none that keeps its direction.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from ..mesh.geometry import nearest_rotations
 ROUNDS = 60
 # Triangles are held apart by this share of the size of a pair, or by what was between them, if that was less.
 GAP = 0.02
+# How easily planes turn, beside corners that move.
+TURNING = 0.5
 # Weight of the rotation beside what six corners say of the affine map, for what is flat.
 SOFT = 1e-3
 
@@ -33,7 +36,8 @@ def separated(
     movable = free[corner]
     position = after.copy()
     for _ in range(ROUNDS):
-        height = np.einsum("kci,ki->kc", position[corner], normal)
+        place = position[corner]
+        height = np.einsum("kci,ki->kc", place, normal)
         top, low = height[:, :3].max(axis=1), height[:, 3:].min(axis=1)
         beyond = top + gap > low
         if not beyond.any():
@@ -41,14 +45,30 @@ def separated(
         middle = _middles(height, movable, gap)
         back = np.minimum((middle - gap / 2)[:, None] - height[:, :3], 0.0)
         ahead = np.maximum((middle + gap / 2)[:, None] - height[:, 3:], 0.0)
-        shift = np.concatenate([back, ahead], axis=1) * movable * beyond[:, None]
+        missing = np.concatenate([back, ahead], axis=1) * beyond[:, None]
+        shift, turn = _shared(missing, place, normal, movable)
         moved = shift[:, :, None] * normal[:, None, :]
         # Corners of several pairs go by the mean of what those ask for that ask for something.
         flat = corner.ravel()
         asked = np.bincount(flat, (shift != 0).ravel(), len(position))
         total = np.stack([np.bincount(flat, moved[..., i].ravel(), len(position)) for i in range(3)], axis=1)
         position += total / np.maximum(asked, 1)[:, None]
+        normal = normal + turn
+        normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     return position
+
+
+def _shared(missing, place, normal, movable) -> tuple[np.ndarray, np.ndarray]:
+    """Of what corners at `place` (k,6,3) are beyond their planes (k,6): what they go back along the normals (k,3), and
+    how these turn instead (k,3); all of it where corners cannot move (k,6) bool."""
+    arm = place - place.mean(axis=1, keepdims=True)
+    arm = arm - np.einsum("kci,ki->kc", arm, normal)[:, :, None] * normal[:, None]
+    square = np.square(arm).sum(axis=2)
+    size = np.maximum(square.max(axis=1), np.finfo(float).tiny)
+    ease = TURNING * square / size[:, None]
+    part = missing / np.where(movable | (ease > 0), movable + ease, 1.0)
+    asked = np.maximum((missing != 0).sum(axis=1), 1)
+    return part * movable, np.einsum("kc,kci->ki", part, arm) * (TURNING / size / asked)[:, None]
 
 
 def _middles(height: np.ndarray, movable: np.ndarray, gap: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..mesh.topology import halfedges, vertices_around
-from .creases import new_intersections
+from .creases import NewCrossings
 from .self_intersections import FaceCrossings
 
 # Times that what meets is looked for and smoothed; rings of vertices around it, one more every few rounds.
@@ -26,7 +26,8 @@ def smoothed_apart(
     """Positions (n,3) close to `after` (n,3), and the pairs (k,2) of triangles (m,3) that still intersect there and did
     not at `before` (n,3). Only vertices `free` (n,) bool move."""
     triangles, n = faces.triangles, len(before)
-    pairs = new_intersections(before, after, faces)
+    crossings = NewCrossings(before, faces)
+    pairs = crossings.pairs(after)
     best, fewest, position = after, pairs, after.copy()
     if not len(pairs):
         return best, fewest
@@ -37,7 +38,7 @@ def smoothed_apart(
         chosen = vertices_around(triangles, met, n, RINGS + k // WIDER_EVERY) & free
         position[chosen] = (mean @ position)[chosen]
         # What meets does so with something that has moved, or has met before.
-        pairs = new_intersections(before, position, faces, (position != after).any(axis=1)[triangles].any(axis=1) | met)
+        pairs = crossings.pairs(position, (position != after).any(axis=1)[triangles].any(axis=1) | met)
         if len(pairs) < len(fewest):
             best, fewest = position.copy(), pairs
         if not len(pairs):

@@ -35,13 +35,15 @@ def test_what_is_inside_flows_along():
 
 
 def test_faces_that_newly_meet_are_told_of_their_body():
-    """A spike through the other side: no mending is that bold."""
+    """A spike through the other side, which is held."""
     V, F = icosphere(2)
     ball = FlowBody("ball", V, F, polygons=np.arange(len(F)) // 2)
     tip = V[:, 2].argmax(keepdims=True)
     handle = FlowHandle(V[tip], np.array([[0.07, 0.05, -2.0]]), tip)
+    rest = np.setdiff1d(np.arange(len(V)), tip)
+    held = FlowHandle(V[rest], V[rest], rest)
     plain = FlowBody("far", V + [3, 0, 0], F)
-    found = drain(flow_bodies(FlowJob((plain, ball), ((1, handle),), FlowOptions(radius=0.003))))
+    found = drain(flow_bodies(FlowJob((plain, ball), ((1, handle), (1, held)), FlowOptions(radius=0.003))))
     assert found.intersecting and len(found.crossing[1]) and not len(found.crossing[0])
     assert found.crossing[1].max() < len(F) // 2
     assert found.report()["new_intersections_faces"][1] == found.crossing[1].tolist()

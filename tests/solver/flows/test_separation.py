@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from bodies import icosphere
 
+from omt_uv.solver.flows import separation
 from omt_uv.solver.flows.creases import without_new_intersections
 from omt_uv.solver.flows.self_intersections import FaceCrossings, intersecting_pairs
 from omt_uv.solver.flows.separation import separated
@@ -39,6 +40,25 @@ def test_what_is_held_stays_and_the_other_gives_way():
     mended = separated(V, after, F, pairs, free)
     np.testing.assert_array_equal(mended[:half], after[:half])
     assert not set(map(tuple, pairs)) & set(map(tuple, intersecting_pairs(mended, F)))
+
+
+def test_planes_turn_where_both_sides_are_held(monkeypatch):
+    """Two corners that pass one another are on both sides of no plane that keeps its direction."""
+    rng, n = np.random.default_rng(0), 300
+    V = rng.normal(size=(n, 6, 3))
+    V[:, :3, 2] = np.abs(V[:, :3, 2]) + 0.02
+    V[:, 3:, 2] = -np.abs(V[:, 3:, 2]) - 0.02
+    V[:, :, 0] += 20.0 * np.arange(n)[:, None]
+    after = V.copy()
+    after[:, [0, 3]] += 1.2 * rng.normal(size=(n, 2, 3))
+    before, after, F = V.reshape(-1, 3), after.reshape(-1, 3), np.arange(6 * n).reshape(-1, 3)
+    pairs, free = intersecting_pairs(after, F), np.arange(6 * n) % 3 > 0
+    assert len(pairs) > 10
+    mended = separated(before, after, F, pairs, free)
+    np.testing.assert_array_equal(mended[~free], after[~free])
+    left = len(intersecting_pairs(mended, F))
+    monkeypatch.setattr(separation, "TURNING", 0.0)
+    assert left <= 1 < len(intersecting_pairs(separated(before, after, F, pairs, free), F))
 
 
 def test_faces_with_a_common_vertex_part_too():

@@ -1,0 +1,57 @@
+"""Faces that a flow brings into one another are taken apart on the way, piece by piece."""
+
+from __future__ import annotations
+
+import numpy as np
+from bodies import icosphere
+
+from omt_uv.solver.flows.creases import FlowRegion, NewCrossings, march, new_intersections, region_around
+from omt_uv.solver.flows.flow_map import flow
+from omt_uv.solver.flows.handles import FlowHandle
+from omt_uv.solver.flows.integration import FlowStep
+from omt_uv.solver.flows.options import FlowOptions
+from omt_uv.solver.flows.self_intersections import FaceCrossings
+from omt_uv.solver.progress import drain
+
+
+def passing():
+    """A coarse ball, and two of its vertices that pass closely by one another: flat faces fold, whatever the steps."""
+    V, F = icosphere(3)
+    V = V * [1.0, 0.6, 0.15]
+    one = np.square(V - [0.05, 0, 0.15]).sum(axis=1).argmin(keepdims=True)
+    other = np.square(V - [-0.05, 0.1, -0.15]).sum(axis=1).argmin(keepdims=True)
+    return V, F, (FlowHandle(V[one], V[one] - [0, 0, 0.6], one), FlowHandle(V[other], V[other] + [0.3, 0, 0.3], other))
+
+
+def test_what_folds_on_a_coarse_mesh_is_taken_apart():
+    V, F, handles = passing()
+    faces = FaceCrossings(F)
+    for tolerance in (5e-5, 1e-7):
+        plain = drain(flow(V, handles, FlowOptions(mend=False, tolerance=tolerance), F)).positions
+        assert len(new_intersections(V, plain, faces)) > 5
+    found = drain(flow(V, handles, None, F, frames=2))
+    assert not len(found.intersecting) and not len(new_intersections(V, found.positions, faces))
+    assert not len(new_intersections(V, found.frames[0], faces))
+    for handle in handles:
+        np.testing.assert_array_equal(found.positions[handle.vertices], handle.end)
+    assert np.abs(found.volumes).max() < 1e-9
+
+
+def test_a_region_is_around_what_meets_and_near_to_it():
+    V, F = icosphere(4)
+    pairs, mended = np.array([[0, 1]]), np.zeros(len(V), bool)
+    mended[V[:, 2].argmax()] = mended[V[:, 2].argmin()] = True
+    region = region_around((V, V), F, pairs, mended, np.ones(len(V), bool))
+    assert np.isin(F[:2], region.rows).all() and len(region.rows) < len(V) / 2
+    assert region.crossings.faces.triangles.max() < len(region.rows)
+    still = drain(march(region, [[FlowStep(0.5, (np.zeros_like,) * 3)]] * 2, None))
+    np.testing.assert_array_equal(still[-1], V[region.rows])
+    assert isinstance(region, FlowRegion)
+
+
+def test_what_met_before_is_looked_for_once():
+    V, F = icosphere(3)
+    before, faces = np.concatenate([V, 0.9 * V + [1.2, 0.1, 0]]), FaceCrossings(np.concatenate([F, F + len(V)]))
+    known = NewCrossings(before, faces)
+    for _ in range(2):
+        assert not len(known.pairs(before))
