@@ -27,7 +27,7 @@ from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops, row_labels
 from ..refinement.boundary_barrier import crossings
 from .corner_solver import CornerMesh, CornerPatches
-from .polygon_corners import CONVEX, DENTED, STRAIGHT, PolygonCorners, convex_corners
+from .polygon_corners import CONVEX, DENTED, PolygonCorners, convex_corners, straight_share
 
 # Rings of faces around a reflex corner that may move, at most.
 RINGS = 4
@@ -147,12 +147,13 @@ def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.nda
     kept[kept] &= _possible(ears[kept], corner[kept], surface)
     ears, polygon = ears[kept], polygon[kept]
     share, whole = share[kept], area[polygon]
-    kept_share = np.maximum(share, STRAIGHT)
+    straight = straight_share(np.diff(surface.face_start)[polygon])
+    kept_share = np.maximum(share, straight)
     found = PolygonCorners(
         triangles=ears,
         target=kept_share * whole,
         whole=whole,
-        least=np.where(share < STRAIGHT, share - DENTED, CONVEX * kept_share) * whole,
+        least=np.where(share < straight, share - DENTED * straight, CONVEX * kept_share) * whole,
     )
     # Polygons may have been turned over for the map.
     turned = np.bincount(polygon, found.areas(w), len(area))[polygon] < 0

@@ -14,8 +14,11 @@ SHARP = 1e-3
 CONVEX = 0.02
 # Straight ones, and slightly reflex ones, of less than this share of the polygon, shall be convex as if they had it.
 STRAIGHT = 0.02
-# They are reflex only where they have lost this share of the area: straight lines may stay so.
-DENTED = 0.01
+# Corners of polygons with many sides have less than that, and are straight below this part of what those of a regular
+# one have.
+FLATTER = 0.3
+# Straight ones are reflex only where they have lost this part of that share: straight lines may stay so.
+DENTED = 0.5
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,11 @@ class CornerBarrier:
         return (self.corners.areas(w) + self.slack) / (self.corners.target + self.slack)
 
 
+def straight_share(sides: np.ndarray) -> np.ndarray:
+    """The share (k,) of its polygon's area below which a corner is straight, by the number of sides (k,)."""
+    return np.minimum(STRAIGHT, FLATTER * 4 * np.sin(np.pi / sides) ** 2 / sides)
+
+
 def convex_corners(surface: Surface, straight: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """PolygonCorners of the polygons, of four and more, that have no reflex corner; the straight ones left out.
 
@@ -118,6 +126,6 @@ def convex_corners(surface: Surface, straight: bool = False) -> tuple[np.ndarray
     normal = np.column_stack([np.bincount(polygon, twice[:, k], len(size)) for k in range(3)])[polygon]
     ear = np.cross(after, before)
     share = (ear * normal).sum(1) / np.maximum((normal**2).sum(1), np.finfo(float).tiny)
-    reflex = np.bincount(polygon, share < (-STRAIGHT if straight else -SHARP), len(size)) > 0
+    reflex = np.bincount(polygon, share < (-straight_share(size[polygon]) if straight else -SHARP), len(size)) > 0
     kept = ~reflex[polygon] & (straight | (share > SHARP))
     return corner[kept], polygon[kept], share[kept]

@@ -4,7 +4,13 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.parameterization.polygon_corners import CONVEX, CornerBarrier, PolygonCorners, convex_corners
+from omt_uv.solver.parameterization.polygon_corners import (
+    CONVEX,
+    CornerBarrier,
+    PolygonCorners,
+    convex_corners,
+    straight_share,
+)
 
 
 def test_only_corners_of_convex_polygons_count_and_no_straight_ones():
@@ -59,3 +65,18 @@ def test_the_barrier_is_least_at_the_target_and_infinite_without_area():
     right = np.array([0, 1, 1j])
     assert barrier.energy(right) == 0 and np.abs(barrier.derivatives(right)[0]).max() == 0
     assert barrier.energy(right.conj()) == np.inf and barrier.energy(2 * right) > 0
+
+
+def test_no_corner_of_a_regular_polygon_is_straight():
+    for sides in (4, 5, 8, 13, 40, 1000):
+        angle = 2 * np.pi * np.arange(sides) / sides
+        V = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+        _, _, share = convex_corners(meshes.polygon_surface(V, [list(range(sides))]), straight=True)
+        assert len(share) == sides and (share > 2 * straight_share(np.full(sides, sides))).all()
+
+
+def test_a_polygon_of_many_sides_with_a_deep_notch_is_not_convex():
+    angle = 2 * np.pi * np.arange(40) / 40
+    V = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    V[0] *= 0.9
+    assert not len(convex_corners(meshes.polygon_surface(V, [list(range(40))]), straight=True)[0])
