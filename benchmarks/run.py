@@ -19,10 +19,12 @@ from benchmarks.parts import (
     cascade,
     cuts,
     hard,
+    invariance,
     latency,
     magnify,
     match,
     memory,
+    partition,
     polygons,
     profile,
     remesh,
@@ -47,7 +49,9 @@ MODULES = (
     remesh,
     cuts,
     hard,
+    invariance,
     match,
+    partition,
     polygons,
 )
 PARTS: dict[str, Part] = {part.name: part for module in MODULES for part in module.PARTS}

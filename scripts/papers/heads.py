@@ -89,6 +89,12 @@ def nose(V: np.ndarray) -> int:
     return int(np.argmax(np.where(middle, V[:, 2], -np.inf)))
 
 
+def hairline(V: np.ndarray) -> int:
+    """The vertex in the middle of the hairline."""
+    way = V / np.linalg.norm(V, axis=1, keepdims=True)
+    return int((way @ [0.0, 0.62, 0.78]).argmax())
+
+
 def scan(V: np.ndarray, F: np.ndarray) -> tuple[np.ndarray, np.ndarray, int, int]:
     """The front of a head, as a scanner sees it: positions (n,3), triangles (m,3), the tip of the nose, and the vertex
     of the boundary that is lowest in front."""

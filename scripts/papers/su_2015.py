@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 
 from common import BUILD, models, saved, told
-from heads import EXPRESSIONS, head, scan, with_expression
+from heads import EXPRESSIONS, hairline, head, nose, scan, with_expression
 
 FOLDER = BUILD / "su_2015"
 MODELS = ("lion", "snail")
@@ -45,37 +45,58 @@ def sweeps() -> tuple[list[dict], dict[str, list[tuple[float, float]]]]:
 
 
 def expressions(first: int) -> None:
-    """Scans of ten people with three expressions each: how often neighbours tell the expression, of all scans and of
-    those of others; the matrix and the map."""
+    """Scans, and whole heads, of ten people with three expressions each: how often neighbours tell the expression, of
+    all and of those of others; the matrix and the map of the scans."""
     import numpy as np
 
     from omt_uv.display.distance_plots import map_picture, matrix_picture
-    from omt_uv.solver.progress import drain
-    from omt_uv.solver.signatures.embedding import classes_of_nearest, classical_scaling
-    from omt_uv.solver.signatures.marked import marked_signature
-    from omt_uv.solver.signatures.wasserstein import distance_of, prepared
+    from omt_uv.solver.signatures.embedding import classical_scaling
 
     of = [(person, kind) for person in range(first, first + PEOPLE) for kind in EXPRESSIONS]
-    found = []
+    faces = []
     for person, kind in of:
         V, F = head(person)
         strength = np.random.default_rng(person).uniform(*STRENGTHS)
-        found.append(prepared(drain(marked_signature(*scan(with_expression(V, kind, strength), F)))))
+        faces.append((with_expression(V, kind, strength), F))
+    people, kinds = (np.array(column) for column in zip(*of, strict=True))
+    whole = _distances([(V, F, nose(V), hairline(V)) for V, F in faces])
+    away = _distances([scan(V, F) for V, F in faces])
+    rows = [*_told_by(whole, "whole heads", people, kinds), *_told_by(away, "scans", people, kinds)]
+    told(FOLDER, f"expressions {first}", rows)
+    pictures = [matrix_picture(away, list(kinds)), map_picture(classical_scaling(away), people.tolist(), list(kinds))]
+    saved(FOLDER / "faces.png", pictures, 600, colours=0)
+
+
+def _distances(marked: list):
+    """Distances (n,n) of meshes with markers."""
+    import numpy as np
+
+    from omt_uv.solver.progress import drain
+    from omt_uv.solver.signatures.marked import marked_signature
+    from omt_uv.solver.signatures.wasserstein import distance_of, prepared
+
+    found = [prepared(drain(marked_signature(*one))) for one in marked]
     away = np.zeros((len(found), len(found)))
     for i, a in enumerate(found):
         for j in range(i):
             away[i, j] = away[j, i] = distance_of(a, found[j]).raw
-    people, kinds = (np.array(column) for column in zip(*of, strict=True))
+    return away
+
+
+def _told_by(away, what: str, people, kinds) -> list[dict]:
+    """How often neighbours tell the class, of distances (n,n) and of those of others."""
+    import numpy as np
+
+    from omt_uv.solver.signatures.embedding import classes_of_nearest
+
     others = np.where(people[:, None] == people, np.inf, away)
     rows = []
-    for name, matrix in (("all", away), ("others", others)):
+    for name, matrix in ((what, away), (f"{what}, of others", others)):
         shares = {
             f"{k} nearest": float(np.mean(np.array(classes_of_nearest(matrix, kinds, k)) == kinds)) for k in NEIGHBOURS
         }
         rows.append({"of": name, **shares})
-    told(FOLDER, f"expressions {first}", rows)
-    pictures = [matrix_picture(away, list(kinds)), map_picture(classical_scaling(away), people.tolist(), list(kinds))]
-    saved(FOLDER / "faces.png", pictures, 600, colours=0)
+    return rows
 
 
 def main() -> None:

@@ -23,7 +23,8 @@ def test_an_option_is_one_option_wherever_it_is_taken():
 
 def test_without_names_all_parts_run_but_those_that_say_otherwise():
     _, parts = run.parse([])
-    assert {p.name for p in run.PARTS.values()} - {p.name for p in parts} == {"hard", "match", "polygons", "profile"}
+    named = {"hard", "invariance", "match", "partition", "polygons", "profile"}
+    assert {p.name for p in run.PARTS.values()} - {p.name for p in parts} == named
 
 
 def test_options_that_are_not_given_have_their_defaults():

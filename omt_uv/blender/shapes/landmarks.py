@@ -11,6 +11,7 @@ import numpy as np
 
 from ...pipelines.shapes.landmark_pairs import LandmarkPoint
 from ..mesh import stretch
+from ..vertex_groups import GroupError
 
 # Size of an empty over the extent of its object.
 SIZE = 0.02
@@ -27,6 +28,34 @@ def read_landmarks(obj: bpy.types.Object, prefix: str) -> list[LandmarkPoint]:
         x, y, z = (stretch(obj) @ place[:3]).tolist()
         found.append(LandmarkPoint(_name_of(empty, prefix), position=(x, y, z)))
     return found
+
+
+def disk_markers(objects: list, positions: list, names: tuple[str, str]) -> list:
+    """What landmarks of two names mark on each object, as its positions (n,3) are read: the centre of a disk and the
+    start of its circle, as MapMarkers. The vertex nearest to an empty, or in the middle of a vertex group; None where
+    it has neither.
+
+    Raises
+    ------
+    GroupError : no object has a landmark of a name
+    """
+    from ...pipelines.shapes.distance import markers_of
+
+    found = [[_vertex_of(obj, at, name) for name in names] for obj, at in zip(objects, positions, strict=True)]
+    for name, vertices in zip(names, zip(*found, strict=True), strict=True):
+        if not any(vertices):
+            every = ", ".join(obj.name for obj in objects)
+            raise GroupError(f"{every}: There is no vertex group {name!r}, and no landmark. Name one that is there.")
+    return [markers_of(centre, start) if centre or start else None for centre, start in found]
+
+
+def _vertex_of(obj: bpy.types.Object, positions: np.ndarray, name: str) -> list[int]:
+    """The vertex of the landmark of a name; none, or several of them."""
+    points = [point for point in read_landmarks(obj, name) if point.name == name]
+    return [
+        point.vertex if point.position is None else int(((positions - point.position) ** 2).sum(axis=1).argmin())
+        for point in points
+    ]
 
 
 def empties(obj: bpy.types.Object, prefix: str) -> Iterator[bpy.types.Object]:

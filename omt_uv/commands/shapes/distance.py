@@ -40,7 +40,8 @@ def add_markers(command: argparse.ArgumentParser) -> None:
         type=pair_of_markers,
         default=None,
         metavar="P,Q",
-        help="vertex groups, or numbers of vertices: P goes to the middle of a disk, Q of the boundary to its right",
+        help="vertex groups, empties, or numbers of vertices: compare what is around P, as far as Q or the boundary "
+        "with Q",
     )
 
 
@@ -70,24 +71,25 @@ def signature_of_file(options: argparse.Namespace, path: Path, points: int = 0):
 
     pairs = read_file(of_file(options, path))
     with refusals(name=path.name):
-        markers = _markers(options, path, [obj for obj, _ in pairs])
+        markers = _markers(options, path, pairs)
         surfaces = [reading.surface for _, reading in pairs]
         return drain_shown(signature_of(surfaces, points or options.points, markers))
 
 
-def _markers(options: argparse.Namespace, path: Path, objects: list) -> list | None:
+def _markers(options: argparse.Namespace, path: Path, pairs: list) -> list | None:
     """The markers of each object, None without any. Raises CommandError, GroupError."""
     if options.markers is None:
         return None
-    from ...blender.vertex_groups import map_markers
+    from ...blender.shapes.landmarks import disk_markers
     from ...pipelines.shapes.distance import markers_of
 
+    objects = [obj for obj, _ in pairs]
     if not all(name.isdecimal() for name in options.markers):
-        return map_markers(objects, dict(zip(("centre", "start", "corners"), (*options.markers, ""), strict=True)))
+        return disk_markers(objects, [reading.surface.positions for _, reading in pairs], options.markers)
     if len(objects) > 1:
         raise CommandError(f"{path}: numbers of vertices are those of one mesh. Choose it by --object.")
     centre, start = map(int, options.markers)
     count = len(objects[0].data.vertices)
     if max(centre, start) >= count:
         raise CommandError(f"{path}: there is no vertex {max(centre, start)}. It has {count}, from 0.")
-    return [markers_of(centre, start)]
+    return [markers_of([centre], [start])]

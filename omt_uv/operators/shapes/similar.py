@@ -10,6 +10,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...session import run
 from ..base import Complaint, SolverOperator, complaints, select_alone
+from ..properties import choose_group
 
 SELECT = (
     ("DUPLICATES", "Duplicates", "The active object, and all that are the same but for triangles, size and place"),
@@ -34,6 +35,16 @@ class OBJECT_OT_omt_similar(SolverOperator, bpy.types.Operator):
         subtype="FILE_PATH",
     )
     top: IntProperty(name="Count", description="How many are listed", default=5, min=1, max=100)
+    centre_group: StringProperty(
+        name="Centre",
+        description="Vertex group or landmark, of the same name on all objects, in the middle of what is compared, as "
+        "the tip of a nose. Empty: whole bodies are",
+    )
+    start_group: StringProperty(
+        name="Start",
+        description="Vertex group or landmark, of the same name on all objects, as far from the centre as what is "
+        "compared, or on the boundary around it",
+    )
     select: EnumProperty(name="Select", description="What is selected in the end", items=SELECT, default="DUPLICATES")
     bound: FloatProperty(
         name="Duplicates Within",
@@ -58,14 +69,16 @@ class OBJECT_OT_omt_similar(SolverOperator, bpy.types.Operator):
         others = [obj for obj in context.view_layer.objects if obj.type == "MESH" and obj != active]
         if not others:
             raise Complaint("There is no other mesh in the scene. Name a library, or add objects.")
-        own, surfaces, reasons = _surface(active), [], []
+        own, surfaces, reasons, compared = _surface(active), [], [], [active]
         for obj in others:
             try:
                 surfaces.append((obj.name, _surface(obj)))
+                compared.append(obj)
             except Complaint as complaint:
                 reasons.append(str(complaint))
         with complaints(active):
-            found, more = yield from run.aside(alike(own, surfaces))
+            markers = self._markers(compared, [own, *(surface for _, surface in surfaces)])
+            found, more = yield from run.aside(alike(own, surfaces, markers))
         return found, reasons + more
 
     def _in_library(self, active: bpy.types.Object):
@@ -75,8 +88,24 @@ class OBJECT_OT_omt_similar(SolverOperator, bpy.types.Operator):
 
         with complaints(active):
             index = read_index(Path(bpy.path.abspath(self.index)))
-            found = yield from run.aside(nearest_of(_surface(active), index, self.top))
+            own = _surface(active)
+            markers = self._markers([active], [own])
+            if index.marked != (markers is not None):
+                given = "with markers. Name them" if index.marked else "without markers. Empty the fields"
+                raise Complaint(f"{self.index}: The library was made {given} Centre and Start.")
+            found = yield from run.aside(nearest_of(own, index, self.top, markers[0] if markers else None))
         return found, []
+
+    def _markers(self, objects: list, surfaces: list) -> list | None:
+        """What is marked on each object, None without any names."""
+        from ...blender.shapes.landmarks import disk_markers
+
+        names = (self.centre_group, self.start_group)
+        if not any(names):
+            return None
+        if not all(names):
+            raise Complaint("One marker is named, the other is not. Name both, Centre and Start, or none.")
+        return disk_markers(objects, [surface.positions for surface in surfaces], names)
 
     def finish(self, context: bpy.types.Context, result) -> None:
         found, reasons = result
@@ -96,6 +125,9 @@ class OBJECT_OT_omt_similar(SolverOperator, bpy.types.Operator):
         layout.use_property_split = True
         for name in ("index", "top", "select", "bound"):
             layout.prop(self, name)
+        column = layout.column(align=True)
+        choose_group(column, self, "centre_group")
+        choose_group(column, self, "start_group")
 
 
 def _surface(obj: bpy.types.Object):

@@ -41,33 +41,39 @@ def signature_of(
     return (yield from signature(np.concatenate(positions), np.concatenate(triangles), count))
 
 
-def markers_of(centre: int, start: int) -> MapMarkers:
-    """The markers that two vertices are."""
-    return MapMarkers(np.array([centre]), np.array([start]), np.zeros(0, int))
+def markers_of(centre: Sequence[int], start: Sequence[int]) -> MapMarkers:
+    """The markers that vertices (k,) are, one each where all is well."""
+    return MapMarkers(np.array(centre, int), np.array(start, int), np.zeros(0, int))
 
 
 def _single(found: list, name: str) -> int:
     if len(found) != 1:
         cause = f"{len(found) or 'No'} vertices are marked as the {name}"
-        raise LandmarkError(cause, "Mark one vertex inside, and one of the boundary around it", "vertex", found)
+        remedy = "Mark one vertex in the middle, and one of the boundary, or as far from it as what is compared"
+        raise LandmarkError(cause, remedy, "vertex", found)
     return int(found[0])
 
 
 def alike(
-    own: Surface, others: Sequence[tuple[str, Surface]], count: int = POINTS
+    own: Surface,
+    others: Sequence[tuple[str, Surface]],
+    markers: Sequence[MapMarkers | None] | None = None,
+    count: int = POINTS,
 ) -> Steps[tuple[list[tuple[str, ShapeDistance]], list[str]]]:
-    """Distances of surfaces from one, by name, nearest first; and why some have none.
+    """Distances of surfaces from one, by name, nearest first; and why some have none. With markers, of that one and of
+    all others, by what these mark.
 
     Raises
     ------
     MeshError : the one has no signature
     """
     share = 1 / (1 + len(others))
-    mine = prepared((yield from part_of(signature_of([own], count), 0, share)))
+    marked = [None] * (1 + len(others)) if markers is None else [[found] for found in markers]
+    mine = prepared((yield from part_of(signature_of([own], count, marked[0]), 0, share)))
     found, reasons = [], []
     for k, (name, surface) in enumerate(others):
         try:
-            its = yield from part_of(signature_of([surface], count), (1 + k) * share, share)
+            its = yield from part_of(signature_of([surface], count, marked[1 + k]), (1 + k) * share, share)
         except MeshError as error:
             reasons.append(f"{name}: {error}")
             continue
@@ -75,12 +81,14 @@ def alike(
     return sorted(found, key=lambda pair: pair[1].raw ** 2 - pair[1].floor ** 2), reasons
 
 
-def nearest_of(own: Surface, index: SignatureIndex, top: int) -> Steps[list[tuple[str, ShapeDistance]]]:
-    """The nearest of an index, by name, nearest first.
+def nearest_of(
+    own: Surface, index: SignatureIndex, top: int, markers: MapMarkers | None = None
+) -> Steps[list[tuple[str, ShapeDistance]]]:
+    """The nearest of an index, by name, nearest first; with markers where its shapes were compared by such.
 
     Raises
     ------
-    MeshError : the surface has no signature
+    MeshError : the surface has no signature, or no markers
     """
-    mine = yield from signature_of([own], index.packed.shape[1])
+    mine = yield from signature_of([own], index.packed.shape[1], [markers] if index.marked else None)
     return [(index.names[k], found) for k, found in nearest(mine, index, top, index.coefficients)]

@@ -133,6 +133,31 @@ def boundary_loops(triangles: np.ndarray) -> list[np.ndarray]:
     return sorted(np.split(vertices, np.cumsum(size)[:-1]), key=len, reverse=True) if len(size) else []
 
 
+def split_fans(triangles: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (m,3) of n vertices with a vertex of its own for every fan: those that only touch at a vertex no longer
+    do. And which vertex (k,) each one was, the first n themselves.
+
+    >>> import numpy as np
+    >>> split_fans(np.array([[0, 1, 2], [0, 3, 4]]), 5)[0].tolist()
+    [[0, 1, 2], [5, 3, 4]]
+    """
+    tail, head = halfedges(triangles)
+    order = np.argsort(pair_keys(tail, head), kind="stable")
+    key = pair_keys(tail, head)[order]
+    i, j = (side[key[1:] == key[:-1]] for side in (order[:-1], order[1:]))
+    ahead = np.arange(len(tail)) // 3 * 3 + (np.arange(len(tail)) + 1) % 3
+    # Across an edge of any number of faces, corners at the same end are of one fan.
+    along = tail[i] == tail[j]
+    at_tail, at_head = np.where(along, j, ahead[j]), np.where(along, ahead[j], j)
+    label = graph_components(np.r_[i, ahead[i]], np.r_[at_tail, at_head], len(tail))[1]
+    _, first, fan = np.unique(label, return_index=True, return_inverse=True)
+    vertex = tail[first]
+    again = np.ones(len(first), bool)
+    again[np.unique(vertex, return_index=True)[1]] = False
+    number = np.where(again, n + np.cumsum(again) - 1, vertex)
+    return number[fan.ravel()].reshape(-1, 3), np.r_[np.arange(n), vertex[again]]
+
+
 def with_fans(vertices: np.ndarray, triangles: np.ndarray, loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n,3) and triangles (m,3) with these boundary loops (k,) closed, each by a fan around its mean."""
     if not loops:

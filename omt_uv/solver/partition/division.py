@@ -94,7 +94,7 @@ def divide(
     yield Progress("Sites", 0.0)
     scale = float(np.ptp(positions[np.unique(triangles)], axis=0).max()) or 1.0
     problem, counts = _problem(positions / scale, triangles, count, density)
-    sites = spread(problem.mesh.positions, triangles, problem.mass, problem.part, counts, options.seed)
+    sites = spread(problem.mesh.positions, problem.mesh.triangles, problem.mass, problem.part, counts, options.seed)
     steps = 0
     for k in range(options.relax + 1):
         dual = _dual(problem, sites, even=k > 0 and k == options.relax)
@@ -121,11 +121,12 @@ def _problem(
     mass = mass if density is None else mass * positive_density(density)
     if not mass.sum() > 0:
         raise EmptyMeshError("The faces have no area to divide", "Give at least one face with area")
-    part = _with_mass(parts(triangles, len(positions)), mass)
+    mesh = WindowMesh(positions, triangles)
+    part = _with_mass(parts(mesh.triangles, len(mesh.positions)), mass)
     of_part = np.bincount(part, mass)
     counts = allot(of_part, count)
     asked = np.repeat(of_part / counts, counts)
-    return DivisionProblem(WindowMesh(positions, triangles), mass, part, asked), counts
+    return DivisionProblem(mesh, mass, part, asked), counts
 
 
 def _scaled(dual: GeodesicDual, found: DualSolution, steps: int, square: float) -> Division:

@@ -14,7 +14,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from ..mesh.geometry import face_areas, halfedge_lengths
-from ..mesh.topology import expand
+from ..mesh.topology import expand, graph_components, halfedges, split_fans
 from .sites import Sites
 
 # A distance is new when it is shorter by more than this share.
@@ -56,12 +56,16 @@ class PolarCoordinates:
 
 
 class WindowMesh:
-    """What the windows of a mesh (n,3), (m,3) share: sides, layouts of the triangles, and faces around vertices."""
+    """What the windows of a mesh (n,3), (m,3) share: parts, sides, layouts of the triangles, faces around vertices."""
 
     def __init__(self, positions: np.ndarray, triangles: np.ndarray):
+        # No way leads through a single vertex: cells that passed there would fall into pieces.
+        triangles, vertex = split_fans(triangles, len(positions))
+        positions = positions[vertex]
         self.positions, self.triangles = positions, triangles
         n, m = len(positions), len(triangles)
         self.tree = cKDTree(positions)
+        self.part = graph_components(*halfedges(triangles), n)[1]
         incidence = csr_matrix((np.ones(3 * m, bool), (triangles.ravel(), np.repeat(np.arange(m), 3))), shape=(n, m))
         self.first, self.around = incidence.indptr.astype(np.int64), incidence.indices.astype(np.int64)
         self.degree = np.diff(self.first)
@@ -134,9 +138,13 @@ def _window(mesh: WindowMesh, sites: Sites, radius: np.ndarray, chosen: np.ndarr
     balls = mesh.tree.query_ball_point(centre, radius, return_sorted=False)
     size = np.array([len(ball) for ball in balls], dtype=np.int64)
     vertex = np.concatenate([np.asarray(ball, dtype=np.int64) for ball in balls])
+    holder = np.repeat(np.arange(len(chosen)), size)
+    # What lies near in space may be another part, of any number of triangles, which no way leads to.
+    same = mesh.part[vertex] == mesh.part[mesh.triangles[own, 0]][holder]
+    vertex, holder = vertex[same], holder[same]
     row, place = expand(mesh.degree[vertex])
     face = mesh.around[mesh.first[vertex][row] + place]
-    key = np.repeat(np.arange(len(chosen)), size)[row] * m + face
+    key = holder[row] * m + face
     key = np.unique(np.concatenate([key, np.arange(len(chosen)) * m + own]))
     site, face = key // m, key % m
     entries, where = np.unique(site[:, None] * n + mesh.triangles[face], return_inverse=True)
@@ -146,40 +154,65 @@ def _window(mesh: WindowMesh, sites: Sites, radius: np.ndarray, chosen: np.ndarr
 def _propagate(mesh: WindowMesh, window: Window, distance: np.ndarray, log: np.ndarray, limit: np.ndarray) -> None:
     """Shorten distances (e,) and turn their directions (e,2) until no triangle of any window shortens one.
 
-    What is nearest goes first, in bands of one edge's length; beyond its limit (e,) nothing goes on.
+    What is nearest goes first, in bands of one edge's length, of every window by itself: fine triangles of one hold up
+    no other. Beyond its limit (e,) nothing goes on.
     """
     where = window.where
     order = np.argsort(where.ravel(), kind="stable")
     first = np.searchsorted(where.ravel()[order], np.arange(len(distance) + 1))
     count = np.diff(first)
     side = np.bincount(window.site, mesh.to_a[window.face].mean(axis=1)) / np.bincount(window.site)
-    width = BAND * np.repeat(side, np.bincount(window.site[order[first[:-1]] // 3], minlength=len(side)))
-    new = np.isfinite(distance)
+    row = window.entries // len(mesh.positions)
+    width = BAND * side[row]
+    new = np.isfinite(distance) & (distance <= limit)
+    # What waits to go on: all of `new`, and nothing else, as rounds are many and each is small.
+    waiting = np.flatnonzero(new)
     for _ in range(MOST_ROUNDS):
-        ready = np.flatnonzero(new & (distance <= limit))
-        if not len(ready):
+        if not len(waiting):
             return
-        level = distance[ready] / width[ready]
-        ready = ready[level <= level.min() + 1]
+        level, site = distance[waiting] / width[waiting], row[waiting]
+        least = np.full(len(side), np.inf)
+        np.minimum.at(least, site, level)
+        ahead = level <= least[site] + 1
+        ready, waiting = waiting[ahead], waiting[~ahead]
         new[ready] = False
-        row, place = expand(count[ready])
-        halfedge = order[first[ready][row] + place]
-        # Seen from its triangle, the corner that is ready is the first end for one of the others, and the second one.
-        found = [_unfolded(mesh, window, halfedge, turn, distance, log) for turn in (1, 2)]
-        at, values, places = (np.concatenate(k) for k in zip(*found, strict=True))
-        np.minimum.at(distance, at, values)
-        least = values == distance[at]
-        log[at[least]] = places[least]
+        at = _spread_from(mesh, window, ready, (order, first, count), distance, log)
+        at = np.unique(at[~new[at] & (distance[at] <= limit[at])])
         new[at] = True
+        waiting = np.concatenate([waiting, at])
+
+
+def _spread_from(
+    mesh: WindowMesh,
+    window: Window,
+    ready: np.ndarray,
+    corners: tuple[np.ndarray, np.ndarray, np.ndarray],
+    distance: np.ndarray,
+    log: np.ndarray,
+) -> np.ndarray:
+    """Entries (k,) that come nearer, seen from those that are ready (r,).
+
+    corners : those of each entry, ordered by entry (3 p,), where its own begin (e + 1,), and how many they are (e,)
+    """
+    order, first, count = corners
+    row, place = expand(count[ready])
+    halfedge = order[first[ready][row] + place]
+    # Seen from its triangle, the corner that is ready is the first end for one of the others, and the second one.
+    turn = np.repeat([1, 2], len(halfedge))
+    at, values, places = _unfolded(mesh, window, np.tile(halfedge, 2), turn, distance, log)
+    np.minimum.at(distance, at, values)
+    least = values == distance[at]
+    log[at[least]] = places[least]
+    return at
 
 
 def _unfolded(
-    mesh: WindowMesh, window: Window, halfedge: np.ndarray, turn: int, distance: np.ndarray, log: np.ndarray
+    mesh: WindowMesh, window: Window, halfedge: np.ndarray, turn: np.ndarray, distance: np.ndarray, log: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What corners of triangles get nearer by: entries (k,), their distances (k,) and places (k,2).
 
-    halfedge : corners that are known, 3 p + k of the pair p; the corner `turn` after them is looked for, and the third
-    one helps. With a = (0, 0), b = (c, 0) and the corner at (x, y), y > 0, the source lies at (u, -v).
+    halfedge : corners that are known (h,), 3 p + k of the pair p; the corner `turn` (h,) after them is looked for, and
+    the third one helps. With a = (0, 0), b = (c, 0) and the corner at (x, y), y > 0, the source lies at (u, -v).
     """
     pair, known = halfedge // 3, halfedge % 3
     corner = (known + turn) % 3

@@ -1,7 +1,8 @@
 """Quantise a surface with a boundary for comparison, where markers leave nothing open: points of the conformal disk.
 
 A marker p inside goes to 0 and one q of the boundary to 1 (Su 2015, section 2.6.3), so that no rotation is looked for:
-faces are compared as faces, nose upon nose.
+faces are compared as faces, nose upon nose. On a closed body, or away from the boundary, the boundary is the circle
+around p through q: a whole head is compared by its face.
 """
 
 from __future__ import annotations
@@ -20,21 +21,25 @@ from ..mesh.geometry import cotangent_laplacian, face_areas, vertex_areas
 from ..mesh.topology import boundary_loops, with_fans
 from ..progress import Steps
 from .signature import FINE, POINTS, SMOOTHING, SQUASH, Signature, pair_costs, sound_parts
+from .surroundings import surroundings
 
 # Triangles are cut into as many squared at most.
 FINEST = 8
+REMEDY = "Mark one vertex inside, and one of the boundary around it, or one as far from it as what is compared"
 
 
 def marked_signature(
     positions: np.ndarray, triangles: np.ndarray, centre: int, start: int, count: int = POINTS
 ) -> Steps[Signature]:
     """The signature of a mesh (n,3), (m,3) with markers: of the part with the vertex `centre`, whose boundary with the
-    vertex `start` becomes the circle; other holes are filled.
+    vertex `start` becomes the circle; other holes are filled. Of a start on no boundary, of what is as near to the
+    centre, along the surface, as the start is.
 
     Raises
     ------
     EmptyMeshError, NonFiniteError : nothing, or coordinates that are no numbers
-    LandmarkError : a centre on the boundary or of no face, a start that is not on a boundary of the same part
+    LandmarkError : a centre on the boundary or of no face, a start on another part, at the same place, or beyond which
+        nothing is
     NotADiskError : handles
     PrecisionError : the map leaves double precision
 
@@ -70,28 +75,40 @@ def marked_signature(
 def _outlined(
     positions: np.ndarray, triangles: np.ndarray, centre: int, start: int
 ) -> tuple[np.ndarray, np.ndarray, int, int]:
-    """The part of the centre, with all its holes filled but that of the start; and both markers in it."""
-    remedy = "Mark one vertex inside, and one of the boundary around it"
-    part = next((part for part in sound_parts(positions, triangles) if (part.vertex_ids == centre).any()), None)
-    if part is None:
-        raise LandmarkError("The marker of the centre is on no face", remedy, "vertex", [centre])
-    vertices, faces = part.vertices, part.triangles
+    """What markers mark, with all its holes filled but that of the start, or what lies around the centre as far as the
+    start where this is on no boundary; and both markers in it."""
+    vertices, faces, inner, outer = _part_of(positions, triangles, centre, start)
     loops = boundary_loops(faces)
-    # A vertex where the boundary meets itself is several ones by now: the first counts.
-    places = [np.flatnonzero(part.vertex_ids == vertex) for vertex in (centre, start)]
-    if not len(places[1]):
-        raise LandmarkError("The marker of the start is on another part than the centre", remedy, "vertex", [start])
-    inner, outer = (int(found[0]) for found in places)
+    if any(inner in loop for loop in loops):
+        raise LandmarkError("The marker of the centre lies on the boundary", REMEDY, "vertex", [centre])
+    if not any(outer in loop for loop in loops):
+        places, around, old = surroundings(vertices, faces, inner, outer)
+        inner, outer = (int(np.flatnonzero(old == k)[0]) for k in (inner, outer))
+        vertices, faces, inner, outer = _part_of(places, around, inner, outer)
+        loops = boundary_loops(faces)
     own = [loop for loop in loops if outer in loop]
     if not own:
-        raise LandmarkError("The marker of the start is on no boundary", remedy, "vertex", [start])
-    if inner in own[0]:
-        raise LandmarkError("The marker of the centre lies on the boundary", remedy, "vertex", [centre])
+        cause = "Nothing is farther from the marker of the centre than that of the start"
+        raise LandmarkError(cause, REMEDY, "vertex", [start])
     vertices, faces = with_fans(vertices, faces, [loop for loop in loops if loop is not own[0]])
     edges = (3 * len(faces) + len(own[0])) // 2
     if len(vertices) - edges + len(faces) != 1:
         raise NotADiskError("The surface has handles", "Only what is a disk without its other holes has markers")
     return vertices, faces, inner, outer
+
+
+def _part_of(
+    positions: np.ndarray, triangles: np.ndarray, centre: int, start: int
+) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """The part of a mesh that the markers are on, and both in it. Raises LandmarkError."""
+    part = next((part for part in sound_parts(positions, triangles) if (part.vertex_ids == centre).any()), None)
+    if part is None:
+        raise LandmarkError("The marker of the centre is on no face", REMEDY, "vertex", [centre])
+    # A vertex where the boundary meets itself is several ones by now: the first counts.
+    places = [np.flatnonzero(part.vertex_ids == vertex) for vertex in (centre, start)]
+    if not len(places[1]):
+        raise LandmarkError("The marker of the start is on another part than the centre", REMEDY, "vertex", [start])
+    return part.vertices, part.triangles, int(places[0][0]), int(places[1][0])
 
 
 def _pieces(values: np.ndarray, faces: np.ndarray, area: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

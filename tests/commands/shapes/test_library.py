@@ -91,7 +91,9 @@ def test_markers_compare_faces_as_they_lie(run, tmp_path):
     assert told[0]["raw"] == told[1]["raw"] > 0.1
     assert "no vertex group 'X'" in run("distance", one, other, "--markers", "X,Q")[2]
     assert "no vertex 999" in run("distance", one, other, "--markers", "84,999")[2]
-    assert "on no boundary" in run("distance", one, other, "--markers", "84,85")[2]
+    around = run("distance", one, other, "--points", 100, "--markers", "84,86", "--json")[1]
+    assert json.loads(around)["raw"] > 0.05 and json.loads(around)["raw"] != told[0]["raw"]
+    assert "lies on the boundary" in run("distance", one, other, "--markers", "90,84")[2]
     assert run("distance", one, other, "--markers", "P")[0] == 2
     (tmp_path / "labels.csv").write_text(
         "".join(f"{who}_{kind}.blend,{kind},{who}\n" for who in ("anna", "bert") for kind in ("flat", "deep"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 import scenes
+from mathutils import Vector
 
 
 def body(name, scale, subdivisions=3, turned=0.0):
@@ -56,3 +57,45 @@ def test_one_object_alone_has_nothing_like_it():
     assert "no other mesh" in scenes.error_of(bpy.ops.object.omt_similar)
     bpy.context.view_layer.objects.active = None
     assert "No mesh" in scenes.error_of(bpy.ops.object.omt_similar)
+
+
+def marked(obj, centre, start):
+    """Landmarks of an object: a vertex group of the vertex that is highest along one way, an empty along another."""
+    places = [v.co.copy() for v in obj.data.vertices]
+    top = max(range(len(places)), key=lambda k: places[k].dot(centre))
+    obj.vertex_groups.new(name="LM_1").add([top], 1.0, "REPLACE")
+    empty = bpy.data.objects.new("LM_2", None)
+    empty["omt_landmark"] = "LM_2"
+    bpy.context.collection.objects.link(empty)
+    empty.parent = obj
+    empty.location = max(places, key=lambda place: place.dot(start))
+
+
+def test_markers_compare_what_is_around_them_alone(package, tmp_path):
+    """The far side of a body plays no part, and whoever has no markers is named."""
+    bodies = [body("Own", 1), body("Tailed", 1), body("Bare", 1), body("Flat", 1)]
+    for vertex in bodies[1].data.vertices:
+        vertex.co.x *= 3 if vertex.co.x < -0.3 else 1
+    for vertex in bodies[3].data.vertices:
+        vertex.co.x *= 0.4 if vertex.co.x > 0 else 1
+    for obj in (bodies[0], bodies[1], bodies[3]):
+        marked(obj, Vector((1, 0, 0)), Vector((0.2, 1, 0)))
+    bpy.context.view_layer.objects.active = bodies[0]
+    names = {"centre_group": "LM_1", "start_group": "LM_2"}
+    assert bpy.ops.object.omt_similar(**names) == {"FINISHED"}
+    assert selected() == {"Own", "Tailed"}
+    rows = package("session.last_run").state.summary.rows
+    assert [name for name, _ in rows[:2]] == ["Tailed", "Flat"]
+    assert bpy.ops.object.omt_similar(select="NOTHING") == {"FINISHED"}
+    assert "Name both" in scenes.error_of(bpy.ops.object.omt_similar, centre_group="LM_1")
+    assert "LM_9" in scenes.error_of(bpy.ops.object.omt_similar, centre_group="LM_9", start_group="LM_2")
+    module = package("pipelines.shapes.signature_index")
+    from omt_uv.solver.progress import drain
+
+    own = package("blender.mesh").read(bodies[0]).surface
+    markers = package("blender.shapes.landmarks").disk_markers([bodies[0]], [own.positions], ("LM_1", "LM_2"))
+    made = drain(package("pipelines.shapes.distance").signature_of([own], 100, markers))
+    (tmp_path / "i.npz").write_bytes(module.index_of({"own.obj": ("", made)}).bytes())
+    assert bpy.ops.object.omt_similar(index=str(tmp_path / "i.npz"), **names) == {"FINISHED"}
+    assert package("session.last_run").state.summary.rows[0] == ("own.obj", "0.000")
+    assert "with markers" in scenes.error_of(bpy.ops.object.omt_similar, index=str(tmp_path / "i.npz"))

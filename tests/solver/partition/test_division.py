@@ -150,3 +150,17 @@ def test_ring_by_ring_every_face_gets_the_label_beside_it():
     one = _joined(label, mass, corner_vertex, start)
     for turned in np.array([[2, 0, 1], [1, 2, 0], [1, 0, 2]]):
         assert np.array_equal(turned[one], _joined(turned[label], mass, corner_vertex, start))
+
+
+def test_no_cell_passes_through_a_single_vertex():
+    V, F = meshes.grid(8, 8)
+    V = np.concatenate([V, V + [1, 1, 0]])
+    corner = int(np.flatnonzero((V[:81] == [1, 1, 0]).all(axis=1))[0])
+    F = np.concatenate([F, F + 81])
+    again = 81 + int(np.flatnonzero((V[81:] == [1, 1, 0]).all(axis=1))[0])
+    F = np.where(again == F, corner, F)
+    division = drain(divide(V, F, 6, options=DivisionOptions(relax=2)))
+    assert division.asked.tolist() == pytest.approx([1 / 3] * 6) and division.residual < 1e-3
+    assert not len(cut_along_cells(V, F, division).torn())
+    with pytest.raises(errors.CountError, match="2 separate parts"):
+        drain(divide(V, F, 1))
