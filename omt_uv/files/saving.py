@@ -6,6 +6,7 @@ format holds, and warnings name the rest.
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,25 +17,14 @@ import bpy
 import numpy as np
 
 from ..blender.mesh import read_uv
-from .export import export, exported_meshes
-from .fbx_nodes import count
-from .in_place import glb, glb_data, gltf, ply
-from .in_place import obj as obj_file
 from .in_place.imported import Imported, InPlaceError
-from .losses import losses
 from .meshes import check_suffix, last_line
-from .obj_materials import place_materials
-from .read_back import check, check_blend
 from .silence import silence
 from .verified import FileError, check_bytes, check_writable, staged
 
 WRITABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx")
-# What can be changed in place; glTF of text needs to know the folder as well.
-IN_PLACE: dict[str, Callable[[bytes, Sequence[Imported]], tuple[bytes, list[str]]]] = {
-    ".obj": obj_file.put,
-    ".ply": ply.put,
-    ".glb": glb.put,
-}
+# What can be changed in place, and the module of `in_place` that does it.
+IN_PLACE = {".obj": "obj", ".ply": "ply", ".glb": "glb", ".gltf": "gltf"}
 COMPRESSED = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 Objects = Sequence[bpy.types.Object]
 
@@ -72,13 +62,13 @@ def save_uvs(path: Path, objects: Objects, source: Path) -> list[str]:
     if suffix == ".blend":
         return _save_blend(path, objects, source)
     told = []
-    if suffix == source.suffix.lower() and suffix in (*IN_PLACE, ".gltf"):
+    if suffix == source.suffix.lower() and suffix in IN_PLACE:
         try:
             data, meshes = source.read_bytes(), [_imported(obj) for obj in objects]
-            if suffix == ".gltf":
-                new, warnings = gltf.put(data, meshes, source.resolve().parent, path.resolve().parent)
-            else:
-                new, warnings = IN_PLACE[suffix](data, meshes)
+            # Formats that a file is not of are not read.
+            put = importlib.import_module(f"{__package__}.in_place.{IN_PLACE[suffix]}").put
+            folders = (source.resolve().parent, path.resolve().parent) if suffix == ".gltf" else ()
+            new, warnings = put(data, meshes, *folders)
         except InPlaceError as error:
             told = [
                 f"{source.name}: its UVs could not be changed in place: {error}. It was written anew, "
@@ -120,6 +110,8 @@ def _left_behind(data: bytes, suffix: str, source: Path, path: Path) -> list[str
         lines = [line.split(None, 1) for line in data.splitlines() if line.lstrip().startswith(b"mtllib ")]
         names = [line[1].strip().decode(errors="replace") for line in lines if len(line) > 1]
     else:
+        from .in_place import glb_data
+
         doc = json.loads(data) if suffix == ".gltf" else glb_data.read(data).doc
         images = doc.get("images", [])
         names = [unquote(image["uri"]) for image in images if not image.get("uri", "data:").startswith("data:")]
@@ -131,6 +123,8 @@ def _left_behind(data: bytes, suffix: str, source: Path, path: Path) -> list[str
 
 def _save_blend(path: Path, objects: Objects, source: Path | None) -> list[str]:
     """Save the session as a .blend, compressed if its source was."""
+    from .read_back import check_blend
+
     with staged(path) as made:
         try:
             with silence():
@@ -157,6 +151,11 @@ def _is_compressed(path: Path) -> bool:
 
 def _save_anew(path: Path, objects: Objects, everything: bool, source: Path | None = None) -> list[str]:
     """Write a file by Blender's exporter, and read it again."""
+    from .export import export, exported_meshes
+    from .losses import losses
+    from .obj_materials import place_materials
+    from .read_back import check
+
     suffix = path.suffix.lower()
     companions: dict[Path, Path] = {}
     meshes = exported_meshes(objects, everything)
@@ -193,6 +192,8 @@ def _named(path: Path, check: Callable, *arguments) -> None:
 
 def _lost_kinds(source: Path, made: Path) -> list[str]:
     """A warning that counts what an FBX file had and has no more."""
+    from .fbx_nodes import count
+
     try:
         before = count(source.read_bytes()).kinds
     except FileError:  # a text

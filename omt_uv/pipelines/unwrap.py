@@ -31,7 +31,6 @@ from .layout import (
     in_single_precision,
     pack_islands,
 )
-from .subdivision import refinable, refined_on_subdivision, subdivided_target
 
 # Share of the time that the cage's own maps take where those of its subdivided surface follow.
 CAGE_SHARE = 0.5
@@ -144,6 +143,8 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
     target, modifier = job.target, job.subdivision
     share = 1.0
     if modifier is not None:
+        from .subdivision import refinable, subdivided_target
+
         share = CAGE_SHARE
         if options.boundary != "free" or not refinable(job.surface):
             target = subdivided_target(job.surface, modifier, job.target)
@@ -158,6 +159,8 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
     found = yield from part_of(steps, 0.0, share)
     if modifier is None or options.kind != "authalic":
         return found
+    from .subdivision import refined_on_subdivision
+
     density = None if job.target is None else job.target.density
     rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary, density)
     return (yield from part_of(rest, share, 1 - share))

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from ..mesh.topology import boundary_edges, expand
 
@@ -63,6 +62,8 @@ def grown_cells(outline: IslandOutline, growth: float) -> tuple[np.ndarray, np.n
     if growth < FAR:
         _mark_near(cells, moved, growth)
     else:
+        from scipy.ndimage import distance_transform_edt
+
         _mark_near(cells, moved, 0.0)
         # Two points are farther apart than the centres of their cells by a diagonal at most.
         cells = distance_transform_edt(~cells) <= growth + np.sqrt(2)

@@ -11,9 +11,6 @@ import numpy as np
 
 from ..analysis.density import Target, area_error_warnings
 from ..canonical.markers import ChartMarkers
-from ..canonical.named_maps import NamedProblem, conformal_map, polar_map
-from ..canonical.rectangles import natural_aspect, rectangle_corners
-from ..conformal.disk_map import sharpest_corners
 from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, positive_density
 from ..maps.distortion import Distortion, distortion
 from ..mesh.charts import Chart
@@ -237,6 +234,8 @@ def _named_map(
     chart: Chart, disk: DiskMesh, unit: float, options: MapOptions, markers: ChartMarkers, log: RunLog
 ) -> Steps[ChartMap]:
     """A map by name: see `canonical.named_maps`."""
+    from ..canonical.named_maps import NamedProblem, conformal_map, polar_map
+
     aspect = 1.0 if disk.boundary == "square" and options.kind == "polar" else options.aspect
     problem = NamedProblem(disk.vertices, disk.triangles, disk.target, disk.boundary, disk.corners, aspect, markers)
     if disk.boundary == "square" and options.kind == "conformal":
@@ -274,12 +273,15 @@ def _disk_mesh(
         boundary = "free"
     corners, aspect = None, 1.0
     if boundary in RECTANGLES:
+        from ..canonical.rectangles import natural_aspect, rectangle_corners
+        from ..conformal.disk_map import sharpest_corners
+
         corners = np.array(markers.corners, np.int64)
         if len(corners) != 4:
             find = sharpest_corners if boundary == "square" else rectangle_corners
             corners = find(disk.vertices, disk.triangles, loop)
-    if boundary == "rectangle" and corners is not None:
-        aspect = options.aspect or natural_aspect(disk.vertices, disk.triangles, corners)
+        if boundary == "rectangle":
+            aspect = options.aspect or natural_aspect(disk.vertices, disk.triangles, corners)
     return DiskMesh(
         vertices=disk.vertices,
         triangles=disk.triangles,

@@ -20,7 +20,6 @@ from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import chart_target
 from .chart_map import FOLDED, ChartMap, in_unit_box, measured_chart, refined_again
 from .chart_pins import ChartPins
-from .convexity import keep_convex, reflex_triangles
 from .options import MapOptions
 from .polygon_disk import cut_as_mapped
 
@@ -47,6 +46,8 @@ def with_convex_polygons(
     drawn = surface if drawn is None else drawn
     if not (np.diff(surface.face_start) > 3).any():
         return maps
+    from .convexity import keep_convex
+
     targets = [chart_target(target, surface, c) for c in charts]
     maps = yield from _opened(drawn, charts, maps, pins, options, targets)
     given, charts = charts, [cut_as_mapped(c, m.uv) for c, m in zip(charts, maps, strict=True)]
@@ -76,6 +77,8 @@ def _opened(
     targets: Sequence[Target | None],
 ) -> Steps[list[ChartMap]]:
     """The maps, those in which corners are folded refined again from where they are open, if that keeps them so."""
+    from .convexity import keep_convex, reflex_triangles
+
     folded = reflex_triangles(surface, charts, [m.uv for m in maps])
     some = [k for k in np.flatnonzero(folded) if pins[k] is None]
     # Corners of squares and rectangles, and drafts, stay as they were chosen.

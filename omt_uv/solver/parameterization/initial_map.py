@@ -7,13 +7,12 @@ do. Coarsening goes on until the chart is small.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..analysis.density import graded_density
 from ..conformal.boundary_first import boundary_first
-from ..conformal.disk_map import ConformalMap, conformal_disk, conformal_rectangle
-from ..conformal.rectangle_to_disk import centre_in_disk
 from ..errors import PrecisionError, TransportError
 from ..maps.energy import area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
@@ -29,8 +28,10 @@ from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..refinement.vertex_sweeps import smoothed
 from ..transport.convex_domain import Disk, Domain, Rectangle
-from ..transport.inverse_map import centroid_map, corner_parameters
-from ..transport.semidiscrete import Transport, transport
+
+if TYPE_CHECKING:
+    from ..conformal.disk_map import ConformalMap
+    from ..transport.semidiscrete import Transport
 
 # Where the time of a chart goes, roughly, as start and width: a bar that moves evenly needs no more.
 CONFORMAL = (0.0, 0.4)
@@ -67,7 +68,7 @@ ISOMETRY = 1e-8
 DRAFT_ABOVE = 600
 DRAFT_COARSE_ABOVE = 2000
 DRAFT_SPREAD = 0.03
-DRAFT_SWEEPS = 6
+DRAFT_SWEEPS = 4
 # Their edges grow by at most the root of this over the number of vertices for a length: as they do around a disk that
 # gets most of the map, and meets its ring with as many edges as the ring has around it.
 AROUND = 4.0
@@ -282,6 +283,8 @@ def initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
 
     Where rounding decides where the points of the conformal map lie, a mean value map is moved instead.
     """
+    from ..transport.inverse_map import centroid_map
+
     vertices, triangles, loop, corners, domain = disk.vertices, disk.triangles, disk.loop, disk.corners, disk.domain
     mass = np.bincount(triangles.ravel(), np.repeat(disk.target / 3, 3), len(vertices))
     conformal, sites, trouble = yield from _conformal_sites(disk, log)
@@ -303,6 +306,8 @@ def initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
 
 def _conformal_sites(disk: DiskMesh, log: RunLog):
     """Conformal map, its coordinates (n,2) in the domain, and why they cannot be used or an empty text."""
+    from ..conformal.disk_map import conformal_disk, conformal_rectangle
+
     vertices, triangles, corners = disk.vertices, disk.triangles, disk.corners
     with log.timed("conformal"):
         try:
@@ -328,6 +333,8 @@ def _centred(sites: np.ndarray, mass: np.ndarray, triangles: np.ndarray, loop: n
     """
     if np.linalg.norm(mass @ sites) < CENTRED * mass.sum():
         return sites
+    from ..conformal.rectangle_to_disk import centre_in_disk
+
     centred = centre_in_disk(sites, mass)
     centred[loop] /= np.linalg.norm(centred[loop], axis=1)[:, None]
     return centred if halfedge_lengths(centred, triangles).min() >= SITE_RESOLUTION else sites
@@ -335,6 +342,8 @@ def _centred(sites: np.ndarray, mass: np.ndarray, triangles: np.ndarray, loop: n
 
 def _transport(sites, mass, domain: Domain, log: RunLog):
     """The transport, or None and why there is none."""
+    from ..transport.semidiscrete import transport
+
     with log.timed("transport"):
         try:
             return (yield from part_of(transport(sites, mass, domain), *TRANSPORT)), ""
@@ -345,6 +354,8 @@ def _transport(sites, mass, domain: Domain, log: RunLog):
 def mean_value_sites(vertices, triangles, loop, corners, domain: Domain) -> np.ndarray:
     """A milder embedding (n,2) with the boundary spread by its length (Floater 2003)."""
     if corners is not None:
+        from ..transport.inverse_map import corner_parameters
+
         # Each side of the rectangle takes the boundary between two corners.
         loop = np.roll(loop, -int(np.flatnonzero(loop == corners[0])[0]))
     share = arc_length_parameters(vertices, loop)

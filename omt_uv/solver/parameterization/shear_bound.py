@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,10 +22,12 @@ from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.parting import parted
-from ..seams.search import SeamSearch
 from .chart_map import ChartMap
 from .mirrored_charts import with_images
 from .options import ShearBound
+
+if TYPE_CHECKING:
+    from ..seams.search import SeamSearch
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
@@ -84,6 +86,8 @@ class ShearSearch:
 
     def search(self, spread: np.ndarray) -> SeamSearch:
         """The search for a spread (f,)."""
+        from ..seams.search import SeamSearch
+
         further, memory = self.shear.further, self.memory
         return SeamSearch(spread, self.surface, self.costs, density=self._density, further=further, memory=memory)
 

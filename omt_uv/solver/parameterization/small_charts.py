@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from ..mesh.charts import Chart
 from ..mesh.geometry import signed_areas
 from ..mesh.polygon_areas import polygon_areas
 from ..progress import Steps, part_of
-from ..refinement.batch_refine import BatchMaps, refine_batch
 from .chart_map import ChartMap, in_unit_box
 from .options import MapOptions
+
+if TYPE_CHECKING:
+    from ..refinement.batch_refine import BatchMaps
 
 # Most triangles of a chart that is solved together with others.
 SMALL = 1000
@@ -51,6 +54,8 @@ def map_together(
 
 def _map_batch(charts: list[Chart], targets: list[Target | None], options: MapOptions) -> Steps[list[ChartMap | None]]:
     """BatchMaps of the charts of one batch; None where one has to go alone."""
+    from ..refinement.batch_refine import refine_batch
+
     begin = time.perf_counter()
     try:
         boxes = [in_unit_box(c.vertices) for c in charts]

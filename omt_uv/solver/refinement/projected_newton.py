@@ -198,21 +198,22 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
     n = len(w)
     found = hessian_blocks(problem.faces, w, problem.area_weight, pressure, (frame, free), problem.symmetry)
     gradient = found.gradient
-    extra = sp.csr_matrix((2 * n, 2 * n))
+    squares = None
     for part in problem.terms:
         slope, vertices, forms = part.derivatives(w)
         if problem.symmetry is not None:
             slope = problem.symmetry.folded(slope)
             vertices, forms = problem.symmetry.carried(vertices, forms)
         gradient = gradient + slope
-        linear = linear_forms(vertices, forms * frame[vertices], n) @ sp.diags(free.ravel())
-        extra = extra + linear.T @ linear
+        linear = linear_forms(vertices, forms * frame[vertices], n, free)
+        square = linear.T @ linear
+        squares = square if squares is None else squares + square
     axes = (gradient * frame.conj()).view(float).reshape(n, 2) * free
     diagonal = 1 - free
     diagonal[:, 0] += np.maximum(problem.motion.bend(w, gradient), 0) * free[:, 0]
     matrix = problem.assembly.matrix(found.triangles, diagonal.ravel() + SHIFT * found.scale, found.quads)
     matrix = matrix if found.rest is None else matrix + found.rest
-    return matrix + extra if problem.terms else matrix, axes.ravel(), found.scale
+    return matrix if squares is None else matrix + squares, axes.ravel(), found.scale
 
 
 def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | None, w, axes, order) -> np.ndarray:
@@ -267,9 +268,13 @@ def fold_shares(a: np.ndarray, b: np.ndarray, da: np.ndarray, db: np.ndarray) ->
     return np.where(hit, c / np.where(hit, denominator, 1), np.inf)
 
 
-def linear_forms(vertices: np.ndarray, rows: np.ndarray, n: int) -> sp.csr_matrix:
-    """Sparse (k, 2n) of the forms dw -> Re(sum rows dw[vertices]), vertices and rows (k,q)."""
+def linear_forms(vertices: np.ndarray, rows: np.ndarray, n: int, free: np.ndarray | None = None) -> sp.csr_matrix:
+    """Sparse (k, 2n) of the forms dw -> Re(sum rows dw[vertices]), vertices and rows (k,q).
+
+    free (n,2) : factors of the columns
+    """
     k, q = vertices.shape
     columns = np.stack([2 * vertices, 2 * vertices + 1], axis=2).reshape(k, 2 * q)
-    data = np.stack([rows.real, -rows.imag], axis=2).reshape(k, 2 * q)
+    data = np.stack([rows.real, -rows.imag], axis=2)
+    data = data if free is None else data * free[vertices]
     return sp.csr_matrix((data.ravel(), columns.ravel(), np.arange(k + 1) * 2 * q), shape=(k, 2 * n))

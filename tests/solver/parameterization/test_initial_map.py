@@ -14,13 +14,13 @@ from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import initial_map as initial_maps
 from omt_uv.solver.parameterization.initial_map import (
     DiskMesh,
-    centroid_map,
     coarse_initial_map,
     initial_map,
     mean_value_sites,
 )
 from omt_uv.solver.progress import RunLog, drain
 from omt_uv.solver.transport.convex_domain import Disk, Rectangle
+from omt_uv.solver.transport.inverse_map import centroid_map
 from omt_uv.solver.transport.semidiscrete import transport
 
 
