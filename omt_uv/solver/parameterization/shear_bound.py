@@ -159,17 +159,15 @@ def bound_shear(
             promised[:] = np.inf
         if not last.searched:
             break
-        best, share = last, np.ones(search.count)
+        best = last
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        apart = yield from part_of(_apart(search, last, crossing), begin, width * PARTING)
+        parting = part_of(_apart(search, last, crossing), begin, width * PARTING)
+        apart = yield from unless_ended(parting, early)
+        if apart is None:
+            break
         missed = [k for k in last.searched if k not in apart]
-        for k in missed:
-            faces, reached = last.charts[k].faces, np.log(last.mean[k]) ** 2
-            # What the last search has promised and its map has not kept is asked for on top.
-            kept_part = min(float(promised[faces].min()) / reached, 1.0)
-            share[faces] = MARGIN ** (1 / rounds) * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
-            promised[faces] = share[faces] * reached
+        share, promised = _shares(last, missed, promised, bound, MARGIN ** (1 / rounds))
         spread = spread * share
         begin, width = begin + width * PARTING, width * (1 - PARTING)
         missing = [last.charts[k] for k in missed]
@@ -177,7 +175,7 @@ def bound_shear(
         kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), within)]
         kept = np.concatenate([kept, *apart.values()])
         memory = dict(last.memory)
-        # One other draw may be shorter than a longer cut, or worse; what is added to shears less for sure.
+        # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
         changes = {"share": share, "adding": rounds > 1, "memory": memory}
         searching = part_of(search.again(kept, missing, spread, changes), begin, width * SEARCHING)
         again = yield from unless_ended(searching, early)
@@ -232,6 +230,23 @@ class _Round:
                 who = "An island shears" if chosen.sum() == 1 else f"{chosen.sum()} islands shear"
                 what = what if chosen.sum() == 1 else what.replace("its seams", "their seams")
                 yield f"{who} {mean[chosen].max():.3g} in the mean, above {bound:.3g}: {what}"
+
+
+def _shares(
+    last: _Round, missed: list[int], promised: np.ndarray, bound: float, margin: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (f,) of what cuts have left that are asked of the next, and squares (f,) of log(shear) that these promise.
+
+    promised (f,) : by the last search
+    """
+    share, promised = np.ones(len(promised)), promised.copy()
+    for k in missed:
+        faces, reached = last.charts[k].faces, np.log(last.mean[k]) ** 2
+        # What the last search has promised and its map has not kept is asked for on top.
+        kept_part = min(float(promised[faces].min()) / reached, 1.0)
+        share[faces] = margin * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
+        promised[faces] = share[faces] * reached
+    return share, promised
 
 
 def _apart(
