@@ -21,7 +21,6 @@ from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
-from ..seams.parting import parted
 from .chart_map import ChartMap
 from .mirrored_charts import with_images
 from .options import ShearBound
@@ -255,8 +254,11 @@ def _apart(
     """Edges (e,2), by the number of a chart that keeps the bound but for lying in its own way, that part it there."""
     found: dict[int, np.ndarray] = {}
     least = np.sqrt(CROWDED) * np.log(search.shear.bound)
-    if crossing is None:
+    if crossing is None or not last.searched:
         return found
+    # Hardly any chart misses its bound.
+    from ..seams.parting import parted
+
     for k in last.searched:
         if np.log(last.mean[k]) < least:
             continue
