@@ -37,6 +37,10 @@ SPREAD_OF_SHEAR = 0.19
 MARGIN = 0.95
 # What misses the bound by less stays in one piece: it has so many times the square of log(shear).
 CROWDED = 1.15
+# Charts of less than this share of the area count for nothing.
+LEAST_AREA = 1e-4
+# A mean excess of the shear up to this is not worse than none: what was parted is cut further.
+NO_EXCESS = 0.005
 # Shear of what has no area to speak of.
 VANISHED = 50.0
 # Where the time goes, roughly: seams take this share of every round.
@@ -153,7 +157,7 @@ def bound_shear(
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     for rounds in range(1, MOST_ROUNDS):
-        if last.worst > best.worst:
+        if last.excess > max(best.excess, NO_EXCESS):
             last, crossing = best, None
             promised[:] = np.inf
         if not last.searched:
@@ -162,15 +166,16 @@ def bound_shear(
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
         parting = part_of(_apart(search, last, crossing), begin, width * PARTING)
-        apart = yield from unless_ended(parting, early)
-        if apart is None:
+        parts = yield from unless_ended(parting, early)
+        if parts is None:
             break
+        apart, flat = parts
         missed = [k for k in last.searched if k not in apart]
         share, promised = _shares(last, missed, promised, bound, MARGIN ** (1 / rounds))
         spread = spread * share
         begin, width = begin + width * PARTING, width * (1 - PARTING)
         missing = [last.charts[k] for k in missed]
-        within = np.concatenate([np.zeros(0, np.int64), *map(_within, missing)])
+        within = np.concatenate([np.zeros(0, np.int64), *(_within(last.charts[k]) for k in (*missed, *flat))])
         kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), within)]
         kept = np.concatenate([kept, *apart.values()])
         memory = dict(last.memory)
@@ -190,35 +195,40 @@ def bound_shear(
         if mapped is None:
             break
         last = _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
-    best = last if last.worst <= best.worst else best
+    best = last if last.excess <= best.excess else best
     warnings = tuple(best.warnings(bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
     return BoundedShear(DiskCharts(best.charts, best.cuts, first.warnings), best.maps, warnings)
 
 
 @dataclass(frozen=True)
 class _Round:
-    """Charts, their maps and cuts, what the search for these has found, their mean shear (k,), and the numbers of those
-    that miss the bound and may be cut for that."""
+    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), and the
+    numbers of those that miss the bound and may be cut for that."""
 
     charts: list[Chart]
     maps: list[ChartMap]
     cuts: Cuts
     memory: dict
+    area: np.ndarray
     mean: np.ndarray
+    bound: float
     searched: list[int]
 
     @staticmethod
     def of(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: Cuts, memory: dict) -> _Round:
         shear = [_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
         mean = np.array([area @ local / area.sum() for local, area in shear])
-        missed = np.flatnonzero(mean > search.shear.bound)
+        area, bound = np.array([area.sum() for _, area in shear]), search.shear.bound
+        # Slivers between sides have a shear, and nobody sees it.
+        mean = np.where(area > LEAST_AREA * area.sum(), mean, 1.0)
+        missed = np.flatnonzero(mean > bound)
         searched = [int(k) for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
-        return _Round(charts, maps, cuts, memory, mean, searched)
+        return _Round(charts, maps, cuts, memory, area, mean, bound, searched)
 
     @property
-    def worst(self) -> float:
-        """The most mean shear of what is searched, 1 for nothing."""
-        return float(self.mean[self.searched].max()) if self.searched else 1.0
+    def excess(self) -> float:
+        """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
+        return float(self.area[self.searched] @ (self.mean[self.searched] - self.bound) / self.area.sum())
 
     def warnings(self, bound: float, why: str) -> Iterator[str]:
         """Warnings of charts that shear more than a bound, those with seams marked by hand apart; why others do."""
@@ -250,25 +260,31 @@ def _shares(
 
 def _apart(
     search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None
-) -> Steps[dict[int, np.ndarray]]:
-    """Edges (e,2), by the number of a chart that keeps the bound but for lying in its own way, that part it there."""
+) -> Steps[tuple[dict[int, np.ndarray], list[int]]]:
+    """Edges (e,2), by the number of a chart, that part it where it keeps the bound but for lying in its own way, or
+    around its flat sides; and the numbers of the latter, whose other cuts are not needed any more."""
     found: dict[int, np.ndarray] = {}
+    flat: list[int] = []
     least = np.sqrt(CROWDED) * np.log(search.shear.bound)
     if crossing is None or not last.searched:
-        return found
+        return found, flat
     # Hardly any chart misses its bound.
-    from ..seams.parting import parted
+    from ..seams.parting import flat_sides, parted
 
     for k in last.searched:
-        if np.log(last.mean[k]) < least:
-            continue
         chart = last.charts[k]
+        edges = flat_sides(chart)
+        if len(edges):
+            found[k] = edges
+            flat.append(k)
+        if len(edges) or np.log(last.mean[k]) < least:
+            continue
         uv = yield from crossing(chart, last.maps[k])
         shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
         if area @ shear <= search.shear.bound * area.sum():
             edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids])
             found |= {k: edges} if len(edges) else {}
-    return found
+    return found, flat
 
 
 def _cuts(prepared: DiskCharts) -> Cuts:

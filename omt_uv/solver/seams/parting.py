@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
 from ..maps.overlap import cover_pairs
 from ..mesh.charts import Chart
-from ..mesh.geometry import edge_lengths, face_areas
+from ..mesh.geometry import edge_lengths, face_areas, unit
 from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up
 
 # Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
@@ -26,6 +26,15 @@ LEAST_COVER = 3e-3
 LEAST_PART = 0.03
 # Pairs of parts that are cut from one another at most.
 MOST_CUTS = 12
+# Polygons whose normals turn by less, in radians, are of one side, which is flat if they all do about.
+TURNED = np.radians(5)
+FLAT = 0.999
+# Sides of fewer edges unroll with what is beside them; bodies of few polygons have no others.
+LEAST_OUTLINE = 6
+# Flat sides of less than this share of the chart stay with what is beside them; where the others have less than this
+# share of it, it is no body of flat sides.
+LEAST_SIDE = 0.05
+MOSTLY = 0.4
 # Capacities are whole numbers: that of an edge of mean cost, the greatest, and that of what may not be cut.
 MEAN_CAPACITY = 10_000
 MOST_CAPACITY = 10_000_000
@@ -43,10 +52,11 @@ class _Dual:
     ends: np.ndarray
 
     @staticmethod
-    def of(chart: Chart) -> _Dual:
+    def of(chart: Chart, glued: bool = False) -> _Dual:
+        """The polygons of a chart; glued: joined across its seams, too, the ends being vertices of the surface."""
         _, polygon = np.unique(chart.faces, return_inverse=True)
         polygon = polygon.ravel()
-        tail, head = halfedges(chart.triangles)
+        tail, head = halfedges(chart.vertex_ids[chart.triangles] if glued else chart.triangles)
         one, other = pair_up(pair_keys(tail, head))
         joined = polygon[np.stack([one, other], axis=1) // 3]
         between = joined[:, 0] != joined[:, 1]
@@ -80,6 +90,30 @@ def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray) -> np.ndarray:
             side = _minimum_cut(dual, capacity, *_enlarged(dual, steps, one, other))
             cut |= side[dual.joined[:, 0]] != side[dual.joined[:, 1]]
     return chart.vertex_ids[dual.ends[cut]]
+
+
+def flat_sides(chart: Chart) -> np.ndarray:
+    """Edges (k,2) of the surface around the large flat sides of a chart; none where these are not most of it.
+
+    What is between them are bands, as the teeth of a gear, that unroll: only flat sides with much of an outline hold
+    them back.
+    """
+    dual = _Dual.of(chart, glued=True)
+    corners = chart.vertices[chart.triangles]
+    vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    count = len(dual.area)
+    whole = np.stack([np.bincount(dual.polygon, x, count) for x in vector.T], axis=1)
+    normal = unit(whole)
+    near = np.einsum("ed,ed->e", *normal[dual.joined.T]) > np.cos(TURNED)
+    side = dual.pieces(near)
+    area = np.bincount(side, dual.area)
+    size = np.linalg.norm(np.stack([np.bincount(side, x) for x in whole.T], axis=1), axis=1)
+    one, other = side[dual.joined.T]
+    outline = np.bincount(np.concatenate([one[one != other], other[one != other]]), minlength=len(area))
+    flat = (size >= FLAT * area) & (area >= LEAST_SIDE * dual.area.sum()) & (outline >= LEAST_OUTLINE)
+    if area[flat].sum() < MOSTLY * dual.area.sum():
+        return np.zeros((0, 2), np.int64)
+    return dual.ends[(one != other) & (flat[one] | flat[other])]
 
 
 def _covering(chart: Chart, uv: np.ndarray, dual: _Dual) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -1,5 +1,8 @@
-"""A ramp of more than a turn lies on itself in the plane: it comes apart there, and nowhere else."""
+"""What lies on itself in the plane comes apart there, and bodies of flat sides around these; nothing else does."""
 
+from dataclasses import replace
+
+import meshes
 import numpy as np
 import pytest
 
@@ -11,7 +14,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.seams.parting import LEAST_PART, parted
+from omt_uv.solver.seams.parting import LEAST_PART, flat_sides, parted
 
 
 def ramp(turns, steps=60, rings=6, rise=0.2):
@@ -83,3 +86,44 @@ def test_pairs_of_points_and_what_they_lie_in_are_all_found(seed):
     sides = np.stack([side(a, b), side(b, c), side(c, a)])
     inside = (sides > 1e-9).all(axis=0) | (sides < -1e-9).all(axis=0)
     assert {*zip(point.tolist(), triangle.tolist(), strict=True)} == {*map(tuple, np.argwhere(inside).tolist())}
+
+
+def gear(teeth, width=0.4):
+    """A disk with teeth, drawn out: two flat sides with long outlines, and a band of walls between."""
+    angle = np.linspace(0, 2 * np.pi, 4 * teeth, endpoint=False)
+    radius = np.where(np.arange(4 * teeth) % 4 < 2, 1.0, 0.75)
+    outline = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    n = len(outline)
+    points = [np.column_stack([outline, np.full(n, z)]) for z in (0.0, width)]
+    walls = [(k, (k + 1) % n, (k + 1) % n + n, k + n) for k in range(n)]
+    below = [((k + 1) % n, k, 2 * n) for k in range(n)]
+    above = [(k + n, (k + 1) % n + n, 2 * n + 1) for k in range(n)]
+    return np.concatenate([*points, [[0, 0, 0], [0, 0, width]]]), [*walls, *below, *above]
+
+
+def test_the_flat_sides_of_a_gear_are_islands_without_shear():
+    surface = meshes.polygon_surface(*gear(20))
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.2)))
+    assert len(found.charts) == 3 and not found.warnings
+    for chart, one in zip(found.charts, found.maps, strict=True):
+        figures = distortion(chart.vertices, chart.triangles, one.uv[chart.triangles], polygons=chart.faces)
+        assert figures.angle_mean == pytest.approx(1, abs=1e-3) and figures.folds == 0 and figures.overlap == 0
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+def test_flat_sides_are_cut_around_and_nothing_else(turn):
+    points, polygons = gear(8)
+    c, s = np.cos(turn), np.sin(turn)
+    surface = meshes.polygon_surface(points @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), polygons)
+    # Along the outline below and one wall: a disk, whose own seams tell no sides apart.
+    n = len(points) // 2 - 1
+    outline = np.column_stack([np.arange(n - 1), np.arange(1, n)])
+    (chart,) = strict_charts(replace(surface, seams=np.concatenate([outline, [[0, n]]])))
+    edges = flat_sides(chart)
+    both = np.concatenate([np.column_stack([np.arange(n), np.roll(np.arange(n), -1)]) + k * n for k in range(2)])
+    assert {*map(tuple, np.sort(edges, axis=1).tolist())} == {*map(tuple, np.sort(both, axis=1).tolist())}
+
+
+def test_a_round_body_has_no_flat_sides():
+    (chart,) = strict_charts(triangle_surface(*meshes.cap(12, 24, 0.9)))
+    assert len(flat_sides(chart)) == 0
