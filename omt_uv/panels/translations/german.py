@@ -339,6 +339,7 @@ GERMAN: dict[str, str] = {
     "Sites": "Orte",
     "Small charts": "Kleine Karten",
     "Smoothing": "Glätten",
+    "Gathering": "Verdichten",
     "Untangling": "Entfalten",
     "Volumes": "Volumina",
     "Volumes of tetrahedra": "Volumen der Tetraeder",

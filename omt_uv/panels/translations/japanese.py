@@ -339,6 +339,7 @@ JAPANESE: dict[str, str] = {
     "Sites": "母点",
     "Small charts": "小チャート",
     "Smoothing": "平滑化",
+    "Gathering": "集約",
     "Untangling": "折り返し解消",
     "Volumes": "体積",
     "Volumes of tetrahedra": "四面体の体積",
