@@ -153,7 +153,7 @@ def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.nda
         triangles=ears,
         target=kept_share * whole,
         whole=whole,
-        least=np.where(share < straight, share - DENTED * straight, CONVEX * kept_share) * whole,
+        least=np.where(share < straight, share - DENTED, CONVEX * kept_share) * whole,
     )
     # Polygons may have been turned over for the map.
     turned = np.bincount(polygon, found.areas(w), len(area))[polygon] < 0

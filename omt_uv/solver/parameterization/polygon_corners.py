@@ -17,8 +17,8 @@ STRAIGHT = 0.02
 # Corners of polygons with many sides have less than that, and are straight below this part of what those of a regular
 # one have.
 FLATTER = 0.3
-# Straight ones are reflex only where they have lost this part of that share: straight lines may stay so.
-DENTED = 0.5
+# Straight ones are reflex only where they have lost this share of the area: straight lines may stay so.
+DENTED = 0.01
 
 
 @dataclass(frozen=True)
