@@ -129,6 +129,12 @@ def taken_apart(
     return best, fewest
 
 
+def neighbours(triangles: np.ndarray, n: int) -> sp.csr_matrix:
+    """Which of n vertices an edge of the triangles (m,3) joins: (n,n), entries positive."""
+    tail, head = halfedges(triangles)
+    return sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
+
+
 def touched(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Which triangles (m,) bool have a vertex that is elsewhere."""
     return (before != after).any(axis=1)[triangles].any(axis=1)
@@ -153,9 +159,7 @@ def _blended_all(after, crossings: NewCrossings, free, found) -> tuple[np.ndarra
     best, fewest = found
     position, pairs = found
     farthest = farthest_mended(before, triangles)
-    tail, head = halfedges(triangles)
-    graph = sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
-    graph = graph + sp.identity(n, format="csr")
+    graph = neighbours(triangles, n) + sp.identity(n, format="csr")
     for rings in RINGS:
         if not len(pairs) or _too_many(pairs, triangles):
             break

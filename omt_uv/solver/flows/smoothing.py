@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from ..mesh.topology import halfedges, vertices_around
-from .creases import NewCrossings
+from ..mesh.topology import vertices_around
+from .creases import NewCrossings, neighbours, touched
 from .self_intersections import FaceCrossings
 
 # Times that what meets is looked for and smoothed; rings of vertices around it, one more every few rounds.
@@ -38,7 +38,7 @@ def smoothed_apart(
         chosen = vertices_around(triangles, met, n, RINGS + k // WIDER_EVERY) & free
         position[chosen] = (mean @ position)[chosen]
         # What meets does so with something that has moved, or has met before.
-        pairs = crossings.pairs(position, (position != after).any(axis=1)[triangles].any(axis=1) | met)
+        pairs = crossings.pairs(position, touched(after, position, triangles) | met)
         if len(pairs) < len(fewest):
             best, fewest = position.copy(), pairs
         if not len(pairs):
@@ -48,8 +48,7 @@ def smoothed_apart(
 
 def _means(triangles: np.ndarray, n: int) -> sp.csr_matrix:
     """Rows (n,n) that make means of the neighbours of each vertex."""
-    tail, head = halfedges(triangles)
-    graph = sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
+    graph = neighbours(triangles, n)
     graph.data[:] = 1.0
     count = np.maximum(np.diff(graph.indptr), 1)
     return sp.csr_matrix(sp.diags(1.0 / count) @ graph)

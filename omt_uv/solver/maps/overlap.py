@@ -29,23 +29,25 @@ def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> f
     points = _draw(tri, area, samples, seed)
     pairs = np.cumsum(grid.candidates(points))
     points = points[: max(1, int(np.searchsorted(pairs, MOST_PAIRS)))]
-    chunks = np.searchsorted(pairs[: len(points)], np.arange(CHUNK, pairs[len(points) - 1], CHUNK))
-    covered = [grid.cover(chunk) for chunk in np.split(points, np.unique(chunks)) if len(chunk)]
+    covered = [grid.cover(chunk) for chunk in _chunks(points, pairs[: len(points)]) if len(chunk)]
     return float((np.concatenate(covered) > 1).mean())
 
 
 def cover_pairs(uv: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which points (k,2) lie in which triangles `uv` (m,3,2): their numbers (c,) each, a pair for every time."""
     grid = _Grid(uv)
-    pairs = np.cumsum(grid.candidates(points))
-    chunks = np.searchsorted(pairs, np.arange(CHUNK, pairs[-1], CHUNK))
     begin, found = 0, []
-    for chunk in np.split(points, np.unique(chunks)):
+    for chunk in _chunks(points, np.cumsum(grid.candidates(points))):
         point, triangle = grid.inside(chunk)
         found.append((point + begin, triangle))
         begin += len(chunk)
     point, triangle = (np.concatenate(x) for x in zip(*found, strict=True))
     return point, triangle
+
+
+def _chunks(points: np.ndarray, pairs: np.ndarray) -> list[np.ndarray]:
+    """Points (k,2) in parts of about CHUNK pairs with triangles, of which there are so many (k,) up to each."""
+    return np.split(points, np.unique(np.searchsorted(pairs, np.arange(CHUNK, pairs[-1], CHUNK))))
 
 
 def _draw(tri: np.ndarray, area: np.ndarray, samples: int, seed: int) -> np.ndarray:

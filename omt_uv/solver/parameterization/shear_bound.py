@@ -153,7 +153,7 @@ def bound_shear(
     Progress offers an early end: with the maps of the last round. Errors are those of `disk_charts.disk_charts` and of
     `map_charts`.
     """
-    bound, early = search.shear.bound, EarlyEnd()
+    early = EarlyEnd()
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     for rounds in range(1, MOST_ROUNDS):
@@ -171,7 +171,7 @@ def bound_shear(
             break
         apart, flat = parts
         missed = [k for k in last.searched if k not in apart]
-        share, promised = _shares(last, missed, promised, bound, MARGIN ** (1 / rounds))
+        share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share
         begin, width = begin + width * PARTING, width * (1 - PARTING)
         missing = [last.charts[k] for k in missed]
@@ -196,7 +196,7 @@ def bound_shear(
             break
         last = _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
     best = last if last.excess <= best.excess else best
-    warnings = tuple(best.warnings(bound, ENDED_EARLY if early.is_asked else MORE_SEAMS))
+    warnings = tuple(best.warnings(ENDED_EARLY if early.is_asked else MORE_SEAMS))
     return BoundedShear(DiskCharts(best.charts, best.cuts, first.warnings), best.maps, warnings)
 
 
@@ -230,20 +230,18 @@ class _Round:
         """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
         return float(self.area[self.searched] @ (self.mean[self.searched] - self.bound) / self.area.sum())
 
-    def warnings(self, bound: float, why: str) -> Iterator[str]:
-        """Warnings of charts that shear more than a bound, those with seams marked by hand apart; why others do."""
-        missed = np.flatnonzero(self.mean > bound)
+    def warnings(self, why: str) -> Iterator[str]:
+        """Warnings of charts that shear more than the bound, those with seams marked by hand apart; why others do."""
+        missed = np.flatnonzero(self.mean > self.bound)
         mean, by_hand = self.mean[missed], ~np.isin(missed, self.searched)
         for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, why)):
             if chosen.any():
                 who = "An island shears" if chosen.sum() == 1 else f"{chosen.sum()} islands shear"
                 what = what if chosen.sum() == 1 else what.replace("its seams", "their seams")
-                yield f"{who} {mean[chosen].max():.3g} in the mean, above {bound:.3g}: {what}"
+                yield f"{who} {mean[chosen].max():.3g} in the mean, above {self.bound:.3g}: {what}"
 
 
-def _shares(
-    last: _Round, missed: list[int], promised: np.ndarray, bound: float, margin: float
-) -> tuple[np.ndarray, np.ndarray]:
+def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
     """Shares (f,) of what cuts have left that are asked of the next, and squares (f,) of log(shear) that these promise.
 
     promised (f,) : by the last search
@@ -253,7 +251,7 @@ def _shares(
         faces, reached = last.charts[k].faces, np.log(last.mean[k]) ** 2
         # What the last search has promised and its map has not kept is asked for on top.
         kept_part = min(float(promised[faces].min()) / reached, 1.0)
-        share[faces] = margin * kept_part * (np.log(bound) ** 2 / reached) ** 1.5
+        share[faces] = margin * kept_part * (np.log(last.bound) ** 2 / reached) ** 1.5
         promised[faces] = share[faces] * reached
     return share, promised
 
