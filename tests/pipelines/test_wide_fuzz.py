@@ -35,14 +35,19 @@ SEEN = 1e-3
 FLAT = 1e-12
 
 
-@pytest.fixture(scope="module")
-def judge():
+def load_judge():
+    """The module of the judge; None where there is none."""
     if not JUDGE.exists():
         return None
     spec = importlib.util.spec_from_file_location("judge_uv", JUDGE)
     found = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(found)
     return found
+
+
+@pytest.fixture(scope="module")
+def judge():
+    return load_judge()
 
 
 def judged(judge, surface, faces, uv):

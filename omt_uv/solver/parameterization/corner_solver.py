@@ -25,7 +25,7 @@ from .polygon_corners import CONVEX, CornerBarrier, PolygonCorners
 # Strength of the barrier of a corner, per share that its polygon has of the target's area.
 STRENGTH = 30.0
 # Rounds that make corners convex, and rounds in which the barrier then weakens.
-CONVEXIFYING = 6
+CONVEXIFYING = 12
 SETTLING = 4
 # Newton steps of a round.
 STEPS = 3

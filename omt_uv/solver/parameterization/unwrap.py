@@ -128,13 +128,35 @@ def unwrap(
         further = bound_shear(cut.search, prepared, maps, task.map_charts, crossing)
         found = yield from part_of(further, begin + width, 1 - begin - width)
         prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps
-    charts, chart_pins = prepared.charts, [pins_of_chart(pins, chart) for chart in prepared.charts]
-    if task.options.kind == "authalic":
-        maps = yield from with_convex_polygons(surface, charts, maps, chart_pins, task.options, target, given)
-    charts = [cut_as_given(chart, surface, given) for chart in charts]
-    maps = [with_folds_counted(chart, chart_map) for chart, chart_map in zip(charts, maps, strict=True)]
+    maps = yield from task.finished(prepared.charts, maps, given)
+    if task.options.boundary != "free" and task.options.kind == "authalic":
+        maps = yield from _with_room(task, prepared.charts, maps, given)
+    charts = [cut_as_given(chart, surface, given) for chart in prepared.charts]
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
+
+
+def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[list[ChartMap]]:
+    """The maps, with a free boundary where faces stay folded in the shape asked for, and that folds fewer."""
+    folded = [k for k, chart_map in enumerate(maps) if chart_map.folds]
+    if not folded:
+        return maps
+    free, again = replace(task, options=replace(task.options, boundary="free")), [charts[k] for k in folded]
+    try:
+        found = yield from free.map_charts(again)
+        found = yield from free.finished(again, found, given)
+    except MeshError:
+        # The maps that there are have no error.
+        return maps
+    new = list(maps)
+    for k, chart_map in zip(folded, found, strict=True):
+        if chart_map.folds < maps[k].folds:
+            stay = "1 face stays" if maps[k].folds == 1 else f"{maps[k].folds} faces stay"
+            text = (
+                f"The {task.options.boundary} has no room for this chart ({stay} folded); its boundary is free instead"
+            )
+            new[k] = replace(chart_map, warnings=(*chart_map.warnings, text))
+    return new
 
 
 def cut_charts(
@@ -231,6 +253,14 @@ class _Task:
         found = yield from self.map_symmetric(_to_be_mapped(self.surface, _only(charts), self.pins, self.target))
         places = [np.argsort(in_order_of_places(chart)[1]) for chart in charts]
         return [replace(one, uv=one.uv[place]) for one, place in zip(found, places, strict=True)]
+
+    def finished(self, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[list[ChartMap]]:
+        """The maps with convex polygons, and the folds of triangles as the surface has them as it was given."""
+        if self.options.kind == "authalic":
+            pins = [pins_of_chart(self.pins, chart) for chart in charts]
+            maps = yield from with_convex_polygons(self.surface, charts, maps, pins, self.options, self.target, given)
+        drawn = [cut_as_given(chart, self.surface, given) for chart in charts]
+        return [with_folds_counted(chart, chart_map) for chart, chart_map in zip(drawn, maps, strict=True)]
 
     def crossing(self, chart: Chart, chart_map: ChartMap) -> Steps[np.ndarray]:
         """A map (n,2) from another one on that may come to lie on itself."""

@@ -9,7 +9,7 @@ import pytest
 
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
-from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.chart_map import FOLDED, map_chart
 from omt_uv.solver.parameterization.chart_pins import ChartPins
 from omt_uv.solver.parameterization.convex_maps import with_convex_polygons
 from omt_uv.solver.parameterization.convexity import keep_convex
@@ -77,13 +77,16 @@ def test_folds_that_were_mended_are_not_warned_of():
     assert not chart_map.warnings
 
 
-@pytest.mark.parametrize("seed", [0, 2, 3])
-def test_sieves_fold_nothing_on_squares(seed):
+@pytest.mark.parametrize("boundary", ["square", "disk", "rectangle"])
+@pytest.mark.parametrize("seed", range(4))
+def test_sieves_fold_nothing_in_any_shape(seed, boundary):
     """They have room there, or their boundary is free: dozens of folds and shear above 100 were the rule."""
     surface = hard_meshes.surface(*hard_meshes.percolation(14, 0.2, seed))
-    found = drain(unwrap(surface, options=UnwrapOptions(boundary="square")))
+    found = drain(unwrap(surface, options=UnwrapOptions(boundary=boundary)))
     for chart, chart_map in zip(found.charts, found.maps, strict=True):
-        assert (signed_areas(chart_map.uv, chart.triangles) > 0).all() and chart_map.angle_mean < 20
+        assert chart_map.folds == 0 and (signed_areas(chart_map.uv, chart.triangles) > 0).all()
+        assert chart_map.angle_mean < (30 if boundary == "disk" else 20)
+        assert not any(text.endswith(FOLDED) for text in chart_map.warnings)
 
 
 def test_maps_that_are_squeezed_to_rounding_stay_as_they_are():
