@@ -241,6 +241,21 @@ def uvs_at(obj: bpy.types.Object, layer: str, corners: np.ndarray, face_start: n
     return corner_uvs(obj, layer, corners, face_start) if obj.mode == "EDIT" else read_uv(obj.data, layer)[corners]
 
 
+def hold(obj: bpy.types.Object) -> bmesh.types.BMesh | None:
+    """Keep the corners of an object in Edit Mode in their place as long as somebody has the result; else None.
+
+    The first element that Python sees gives a mesh a layer for it, and the last one takes that away again: both move
+    all corners in memory, and whoever drags UVs meanwhile goes on writing to where they were, which is others by then.
+    """
+    if obj.mode != "EDIT":
+        return None
+    edit = bmesh.from_edit_mesh(obj.data)
+    # A face brings its corners, these its edges and vertices: each kind has a layer of its own.
+    for loop in (loop for face in edit.faces[:1] for loop in face.loops):
+        _ = loop.vert, loop.edge
+    return edit
+
+
 def touched_faces(obj: bpy.types.Object) -> np.ndarray:
     """Polygons (f,) bool of an object in Edit Mode with a selected vertex, that are not hidden."""
     edit = bmesh.from_edit_mesh(obj.data)

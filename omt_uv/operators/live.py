@@ -58,6 +58,8 @@ class UV_OT_omt_live(bpy.types.Operator):
     # Whether UVs have moved since the last step of undo.
     _unmarked = False
     _marks = 0
+    # Whether UVs have moved since the figures were looked at: the last ones that move are those that stay.
+    _unseen = False
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -94,7 +96,7 @@ class UV_OT_omt_live(bpy.types.Operator):
         except Complaint as complaint:
             return tell(self, context, complaint)
         self._last, self._looked = _last_of(context), 0.0
-        self._unmarked, self._marks = False, 0
+        self._unmarked, self._marks, self._unseen = False, 0, False
         following.begin(session, self._keep)
         last_run.redraw(context)
         return {"RUNNING_MODAL"}
@@ -173,9 +175,11 @@ class UV_OT_omt_live(bpy.types.Operator):
         session = following.current
         moved = session is not None and session.follow(balance)
         self._unmarked |= moved
+        self._unseen |= moved
         if session is not None and time.monotonic() - self._looked > LOOK_EVERY:
             self._looked = time.monotonic()
-            if moved or last_run.state.summary is None or last_run.state.summary.title != self.bl_label:
+            if self._unseen or last_run.state.summary is None or last_run.state.summary.title != self.bl_label:
+                self._unseen = False
                 self._show_now(context, session)
             if not bpy.app.background and context.workspace is not None:
                 # Other hints take its place after a drag.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import bpy
 
@@ -35,6 +36,7 @@ class _LiveIsland:
 
     density : (m,) of the area that its triangles ask for, if that is not their own
     targets : where soft pins were dragged to, (p,2); written : UVs (k,2) as this session wrote them last
+    pulled : whether a soft pin is not where it was written
     """
 
     owner: int
@@ -46,6 +48,7 @@ class _LiveIsland:
     density: np.ndarray | None = None
     targets: np.ndarray | None = None
     written: np.ndarray | None = None
+    pulled: bool = False
 
 
 class Session:
@@ -75,6 +78,8 @@ class Session:
         self._surfaces = [reading.surface for _, reading in pairs]
         self._islands = [self._live(*found) for found in _islands(pairs)]
         self._whole = all(self._covers(k, reading) for k, (_, reading) in enumerate(pairs))
+        # Blender's G knows corners by their addresses.
+        self._held = [blender_mesh.hold(obj) for obj in self.objects]
         self._handlers = [bpy.app.handlers.undo_post, bpy.app.handlers.redo_post, bpy.app.handlers.load_pre]
         for kind in self._handlers:
             kind.append(self._on_exchange)
@@ -117,7 +122,8 @@ class Session:
             places = self._places(island)
             before = island.live_map.uv
             uv = island.live_map.follow(balance, places, max(end - time.monotonic(), 0.0))
-            if not np.array_equal(before, uv):
+            # A soft pin that is put to the same place once more, as at the end of a drag, gives way once more.
+            if island.pulled or not np.array_equal(before, uv):
                 moved = True
                 self._write(island, uv)
             if time.monotonic() > end:
@@ -140,7 +146,7 @@ class Session:
         else:
             # Where a pin is not as it was left, the artist has moved it.
             moved = np.abs(now - island.written[place]).max(axis=1) > MOVED * np.ptp(island.written)
-            island.targets = np.where(moved[:, None], now, island.targets)
+            island.targets, island.pulled = np.where(moved[:, None], now, island.targets), bool(moved.any())
         return island.targets
 
     def _write(self, island: _LiveIsland, uv: np.ndarray) -> None:
@@ -201,6 +207,8 @@ class Session:
         for kind in self._handlers:
             if self._on_exchange in kind:
                 kind.remove(self._on_exchange)
+        if (wait := _let_go(self._held)) is not None:
+            bpy.app.timers.register(partial(_let_go, self._held), first_interval=wait)
 
     def _check(self) -> None:
         if self._lost:
@@ -225,6 +233,16 @@ class Session:
 
     def _on_exchange(self, *_) -> None:
         self._lost = True
+
+
+def _let_go(held: list) -> float | None:
+    """Let meshes go that were held, once nothing of theirs is dragged any more; seconds until the next look."""
+    windows = bpy.context.window_manager.windows
+    modal = [each for window in windows for each in getattr(window, "modal_operators", ())]
+    if any(each.bl_idname.startswith("TRANSFORM_OT_") for each in modal):
+        return SLICE
+    held.clear()
+    return None
 
 
 def _islands(pairs: list) -> list:

@@ -19,6 +19,7 @@ NAMED = {
     "file": "from_disk",
     "search_area_preserving": "search",
     "object_mode": "live_object_mode",
+    "one_pin": "live_pin",
 }
 KEPT = {
     "tour": ("tab", "unwrapped", "area", "shear", "histogram", "checker", "outdated", "redo"),
@@ -29,6 +30,7 @@ KEPT = {
     "disk": ("file",),
     "menus": ("search_area_preserving", "preferences"),
     "live": ("object_mode",),
+    "pins": ("one_pin",),
     "uv_editor": ("uv_unwrapped", "live", "uv_area", "uv_shear"),
 }
 

@@ -25,7 +25,7 @@ TRIES = 3
 UNRELIABLE: dict[str, str] = {}
 # What each age plays. This machine's Blender, 3.4 on Debian, is older than any that the extension installs on, and
 # draws so slowly that a search for buttons takes minutes; the oldest that it installs on shows that it works there.
-PLAYED = {"here": ("tour", "escape"), "trixie": ("install", "sections")}
+PLAYED = {"here": ("tour", "escape"), "trixie": ("install", "sections", "live", "pins")}
 # Windows at once: most of a story is one process that waits or draws.
 WINDOWS = min(2, os.cpu_count() or 1)
 
@@ -37,7 +37,10 @@ def load():
     return module
 
 
-NAMES = ("tour", "escape", "uv_editor", "sections", "shapes", "panels", "install", "drag", "live", "disk", "menus")
+NAMES = (
+    *("tour", "escape", "uv_editor", "sections", "shapes", "panels"),
+    *("install", "drag", "live", "pins", "disk", "menus"),
+)
 AGES = os.environ.get("OMT_UV_GUI_AGES", "here trixie sid").split()
 
 
@@ -159,6 +162,24 @@ def test_live_is_kept_whatever_begins_and_undo_takes_back_one_thing(play):
     assert facts["moved after Cancel"] == 0 < facts["moved before Cancel"]
 
 
+def test_live_follows_in_edit_mode(play):
+    facts = play("pins")
+    figures = [float(text.split()[0]) for text in facts["figures in Edit Mode"]]
+    assert figures[-1] == max(figures) > 5 and len(set(figures)) >= 3
+    assert facts["moved in Edit Mode"] > 0.01 and facts["moved after Cancel"] == 0
+
+
+def test_a_pin_that_blender_drags_takes_its_island_along(play):
+    """Blender wrote to corners that had gone elsewhere, while nobody but the session had the mesh."""
+    facts = play("pins")
+    low, high = facts["its island moved by"]
+    assert facts["pin moved by"] > 0.1 and abs(low - facts["pin moved by"]) < 0.02 > abs(high - facts["pin moved by"])
+    assert facts["hard pins moved by"][0] == 0 < 0.1 < facts["hard pins moved by"][1]
+    one, other = facts["soft pins moved by"]
+    assert one > 0.01 and 0.1 < other < facts["hard pins moved by"][1] - 0.01
+    assert facts["folds with hard pins"] == facts["folds with soft pins"] == "0"
+
+
 def test_the_sections_work(play):
     facts = play("sections")
     (_, *magnified), (_, *sphere), (_, *remeshed) = (facts[name] for name in ("magnified", "sphere", "remeshed"))
@@ -232,6 +253,7 @@ STORIES = [
     ("install", 3),
     ("drag", 2),
     ("live", 6),
+    ("pins", 4),
     ("disk", 4),
     ("menus", 5),
 ]

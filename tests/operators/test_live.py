@@ -212,6 +212,18 @@ def test_figures_follow(patch, slider, package):
     assert dict(state.summary.rows)["Area error"] == seen[1]["Area error"]
 
 
+def test_the_figures_are_those_of_the_last_move(patch, slider, package):
+    """Where all of it was over before the next look at the figures, too."""
+    operator, state = begin(), package("session.last_run").state
+    tick(operator, 30)
+    slider.balance, operator._looked = 1.0, float("inf")
+    tick(operator, 30)
+    before, operator._looked = dict(state.summary.rows)["Area error"], 0.0
+    tick(operator)
+    assert dict(state.summary.rows)["Area error"] != before
+    operator.modal(bpy.context, event("ESC", "PRESS"))
+
+
 def test_it_is_packed_on_accept_and_not_on_cancel(patch, slider):
     operator = begin(pack=True)
     slider.balance = 0.3
@@ -270,6 +282,25 @@ def test_a_selected_vertex_takes_its_island_and_a_single_pin_moves_it(slider):
     np.testing.assert_allclose(scenes.uv_of(obj) - before, [[0.3, 0.2]] * len(before), atol=2e-3)
 
 
+def test_corners_stay_where_blender_drags_them(slider):
+    """G in the UV editor keeps the addresses of what it drags, as a vector of UVs does that Python has."""
+    obj, edit = pinned_in_edit_mode([70])
+    operator = begin()
+    tick(operator, 20)
+    address = edit.verts[70].link_loops[0][edit.loops.layers.uv.active].uv
+    before = address[:]
+    # Nobody else has the mesh, and it is Blender that changes the UVs.
+    del edit
+    tick(operator, 3)
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.uvs_rotate()
+    seen = address[:]
+    edit = bmesh.from_edit_mesh(obj.data)
+    edit.verts.ensure_lookup_table()
+    assert seen == edit.verts[70].link_loops[0][edit.loops.layers.uv.active].uv[:] != before
+    operator.modal(bpy.context, event("ESC", "PRESS"))
+
+
 @pytest.mark.parametrize("pins", ["HARD", "SOFT"])
 def test_soft_pins_give_way_and_hard_ones_hold(slider, pins):
     obj, edit = pinned_in_edit_mode([0, 12])
@@ -277,7 +308,13 @@ def test_soft_pins_give_way_and_hard_ones_hold(slider, pins):
     tick(operator, 20)
     before = scenes.uv_of(obj)
     drag(edit, 12, (0.4, 0.0))
+    place = edit.verts[12].link_loops[0][edit.loops.layers.uv.active].uv[:]
     tick(operator, 60)
+    # As Blender's drag does at its end, for the last time.
+    layer = edit.loops.layers.uv.active
+    for loop in edit.verts[12].link_loops:
+        loop[layer].uv = place
+    tick(operator, 5)
     operator.modal(bpy.context, event("RET", "PRESS"))
     after = scenes.uv_of(obj)
     scenes.leave_edit()

@@ -6,16 +6,14 @@ from types import SimpleNamespace
 
 import bpy
 
-# Where the buttons are, as shares of the width: the one beside the slider, and the two ends.
-LIVE = (0.72, 0.63, 0.77)
-ENDS = (0.25, 0.5, 0.75, 0.65)
-UNWRAP = "uv.omt_unwrap"
+from following import UNWRAP, at_rest, begun, dragged, ended, farthest, figures, over, set_mode, slider, uvs
+
 # The part of the status bar that has the hint.
 HINT = SimpleNamespace(x=0, y=0, width=700, height=20)
 
 
 def tell(story):
-    """In the 3D View, then in the UV editor; story `uv_editor` has Edit Mode."""
+    """In the 3D View, then in the UV editor; stories `pins` and `uv_editor` have Edit Mode."""
     obj = story.head(24)
     slider(0.0)
     bpy.context.window_manager.operator_properties_last(UNWRAP).max_shear = 0
@@ -49,8 +47,7 @@ def accepted(story, tab, obj):
     yield from story.shoot("hint_after_drag", HINT)
     yield from story.shoot("object_mode")
     story.facts["figures before"], story.facts["figures while dragged"] = before, seen
-    yield from tab.click("omt_live_end", "'KEEP'", places=ENDS)
-    yield from story.until(lambda: not story.following())
+    yield from ended(story, tab, "KEEP")
     yield from story.pause(0.5)
     yield from story.shoot("hint_at_the_end", HINT)
     shots = [picture(story.out / f"{name}.png") for name in ("hint", "hint_after_drag", "hint_at_the_end")]
@@ -136,66 +133,9 @@ def cancelled(story, tab, obj):
     yield from dragged(story, place)
     moved = uvs(obj)
     yield from story.shoot("uv_editor_object_mode")
-    yield from tab.click("omt_live_end", "'BACK'", places=ENDS)
-    yield from story.until(lambda: not story.following())
+    yield from ended(story, tab, "BACK")
     story.facts["moved before Cancel"] = farthest(before, moved)
     story.facts["moved after Cancel"] = farthest(before, uvs(obj))
-
-
-def begun(story, tab):
-    """The session, by a click; where that was."""
-    place = yield from tab.click("omt_live(", places=LIVE)
-    yield from story.until(story.following)
-    yield from story.pause(0.6)
-    return place
-
-
-def dragged(story, place, keep=None):
-    """The slider, from its left end to about two thirds."""
-    yield from story.drag((place[0] - 115, place[1]), (place[0] - 40, place[1]), steps=6, keep=keep)
-
-
-def at_rest(story, obj):
-    """Until the UVs move no more."""
-    before = None
-    while before != (before := uvs(obj)):
-        yield from story.pause(0.6)
-
-
-def over(story, kind):
-    """The mouse in the middle of an editor."""
-    region, window = story.window_region(story.area(kind)), bpy.context.window_manager.windows[0]
-    place = region.x + region.width // 2, window.height - (region.y + region.height // 2)
-    yield from story.move(*place)
-    return place
-
-
-def slider(balance):
-    """Put the slider somewhere."""
-    bpy.context.window_manager.operator_properties_last(UNWRAP).balance = balance
-
-
-def set_mode(story, mode):
-    """Edit Mode or Object Mode."""
-    window, view = bpy.context.window_manager.windows[0], story.area("VIEW_3D")
-    with bpy.context.temp_override(window=window, area=view, region=story.window_region(view)):
-        bpy.ops.object.mode_set(mode=mode)
-
-
-def uvs(obj):
-    """All UVs as they are now."""
-    return [x for each in obj.data.uv_layers.active.uv for x in each.vector]
-
-
-def figures(story):
-    """The area error that the panel shows."""
-    said = story.said()
-    return dict(said[1:]).get("Area error", "") if said else ""
-
-
-def farthest(one, other):
-    """The greatest difference of two lists of numbers."""
-    return max(abs(a - b) for a, b in zip(one, other, strict=True))
 
 
 def picture(path):
