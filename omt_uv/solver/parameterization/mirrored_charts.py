@@ -87,15 +87,19 @@ def images_of_cuts(surface: Surface, faces: np.ndarray | None, cuts: np.ndarray)
     def accepted(image: np.ndarray) -> bool:
         return bool(np.isin(pair_keys(*image[seams].T), pair_keys(*seams.T)).all())
 
-    mirror = find_mirror(surface.positions[used], compact.reshape(-1, 3), owner, accepted=accepted)
-    if mirror is None:
-        return none
-    images = mirror.image[cuts]
-    images = images[~np.isin(pair_keys(*images.T), pair_keys(*every.T))]
-    if not _are_slits(images, compact.reshape(-1, 3), every):
-        return none
-    length, more = (edge_lengths(surface.positions, used[edges]).sum() for edges in (cuts, images))
-    return used[images] if length + more <= LONGER * length else none
+    triangles, mirror, found = compact.reshape(-1, 3), None, none
+    length = edge_lengths(surface.positions, used[cuts]).sum()
+    # A body may have two mirrors across one another.
+    for _ in range(2):
+        mirror = find_mirror(surface.positions[used], triangles, owner, mirror, accepted)
+        if mirror is None:
+            break
+        more = mirror.image[np.concatenate([cuts, found])]
+        more = more[~np.isin(pair_keys(*more.T), pair_keys(*every.T))]
+        further = edge_lengths(surface.positions, used[np.concatenate([found, more])]).sum()
+        if _are_slits(more, triangles, every) and length + further <= LONGER * length:
+            found, every = np.concatenate([found, more]), np.concatenate([every, more])
+    return used[found]
 
 
 def with_images(surface: Surface, faces: np.ndarray | None, cuts: Cuts) -> Cuts:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 
 from ..maps.energy import Elements, has_folds, squared
@@ -67,12 +69,18 @@ def find_symmetry(
 
 
 def symmetric_start(
-    symmetry: MirrorSymmetry, w: np.ndarray, faces: Elements, boundary: str, loop: np.ndarray
+    symmetry: MirrorSymmetry,
+    w: np.ndarray,
+    faces: Elements,
+    boundary: str,
+    loop: np.ndarray,
+    crosses: Callable[[np.ndarray], bool] | None = None,
 ) -> tuple[MirrorSymmetry, np.ndarray] | None:
-    """The symmetry with the axis of a map w (n,) complex, and the symmetric map next to it.
+    """The symmetry with the axis of a map w (n,) complex, and a symmetric map next to it: its mean with its image, or
+    one half with its image, which is sound but along the axis.
 
-    None where that is far, has folds, or leaves the square; `faces` say what a fold is. loop (b,): vertices of the
-    boundary, which stay on their circle or square.
+    None where all are far, have folds, cross themselves though w does not, or leave the square; `faces` say what a fold
+    is. loop (b,): vertices of the boundary, which stay on their circle or square.
     """
     centred = w - w.mean() if boundary == "free" else w
     turn = (centred[symmetry.images[0]] * centred).sum()
@@ -85,19 +93,42 @@ def symmetric_start(
     if boundary == "rectangle":
         phase = 1.0 if turn.real > 0 else -1.0
     found = mirror_symmetry(symmetry.images, phase)
-    start = found.averaged(centred)
-    if np.abs(start - centred).max() > FAR * np.abs(centred).max():
+    mean = found.averaged(centred)
+    if np.abs(mean - centred).max() > FAR * np.abs(centred).max():
         return None
+    watched = crosses is not None and not crosses(w)
+    for candidate in _next_to(found, centred, mean, boundary):
+        start = _on_outline(found, candidate, w, boundary, loop)
+        start = None if start is None else _straightened(found, start, faces)
+        if start is None or has_folds(faces, start):
+            continue
+        if crosses is None or not watched or not crosses(start):
+            return found, start
+    return None
+
+
+def _next_to(symmetry: MirrorSymmetry, w: np.ndarray, mean: np.ndarray, boundary: str) -> Iterator[np.ndarray]:
+    """Symmetric maps (n,) complex next to w, whose mean with its image is known: that, and both halves."""
+    yield mean
+    if boundary == "free" and len(symmetry.images) == 1:
+        side = (mean * np.sqrt(np.conj(symmetry.phase))).imag
+        image = symmetry.phase * w[symmetry.images[0]].conj()
+        for sign in (1, -1):
+            yield symmetry.spread(np.where(sign * side > 0, w, np.where(side == 0, mean, image)))
+
+
+def _on_outline(
+    symmetry: MirrorSymmetry, start: np.ndarray, w: np.ndarray, boundary: str, loop: np.ndarray
+) -> np.ndarray | None:
+    """A symmetric map (n,) with its boundary on the circle of w (n,); None where it leaves the square of that."""
     if boundary == "disk":
+        start = start.copy()
         start[loop] *= np.abs(w[loop]) / np.abs(start[loop])
-        start = found.spread(start)
-    if (
-        boundary in ("square", "rectangle")
-        and np.abs(_from_sides(start[loop], w[loop]) - _from_sides(w[loop], w[loop])).max() > ALONG
-    ):
-        return None
-    start = _straightened(found, start, faces)
-    return None if has_folds(faces, start) else (found, start)
+        return symmetry.spread(start)
+    if boundary == "free":
+        return start
+    off = np.abs(_from_sides(start[loop], w[loop]) - _from_sides(w[loop], w[loop])).max()
+    return start if off <= ALONG else None
 
 
 def _straightened(symmetry: MirrorSymmetry, w: np.ndarray, faces: Elements) -> np.ndarray:

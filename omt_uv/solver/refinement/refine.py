@@ -212,13 +212,18 @@ def _refined(
     given = (mesh.vertices, mesh.triangles, mesh.uv, loop)
     initial = INITIAL_MAPS[boundary](*given, **_start_options(boundary, faces, far))
     w = initial.uv @ [1, 1j]
-    symmetric = None if symmetry is None else symmetric_start(symmetry, w, by_triangle, boundary, loop)
-    # What a mean with its image leaves next to nothing may be a fold by rounding.
-    symmetry, w = (None, w) if symmetric is None or has_folds(faces, symmetric[1]) else symmetric
-    assembly = assembly_of(faces, n, schwarz_solver(mesh.vertices, mesh.triangles), symmetry)
+    parts = schwarz_solver(mesh.vertices, mesh.triangles)
     # Sweeps know of triangles alone, of no pins, and of no balance.
     swept = faces.polygon is None and faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
     smoother = Smoother(mesh.triangles, n) if swept else None
+    assembly = assembly_of(faces, n, parts)
+    free = _map_problem(faces, assembly, initial, loop, boundary, smoother)
+    warm, wanted = options.warm_start, symmetry
+    symmetry, w = _next_to_image(free, wanted, w, by_triangle, boundary)
+    if wanted is not None and symmetry is None:
+        symmetry, w = yield from part_of(_relaxed_to_image(free, wanted, w, by_triangle, options), *SMOOTHING)
+        warm = warm or symmetry is not None
+    assembly = assembly if symmetry is None else assembly_of(faces, n, parts, symmetry)
     problem = _mirrored(_map_problem(faces, assembly, initial, loop, boundary, smoother), symmetry, w)
     if options.crossing:
         problem = replace(problem, loop=None, with_barrier=False)
@@ -229,7 +234,7 @@ def _refined(
         w = yield from part_of(
             _smoothed_if_tense(problem, by_triangle, w, planned_weights(balance, quality)[0]), *SMOOTHING
         )
-    way = minimise_in_stages(problem, w, balance, quality, options.warm_start, options.multiplier)
+    way = minimise_in_stages(problem, w, balance, quality, warm, options.multiplier)
     found = yield from part_of(way, *STAGES)
     error = area_error(faces, found.w)
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):
@@ -243,6 +248,28 @@ def _refined(
         area = faces.area @ faces.ratio if pins is None else None
         found = replace(found, w=placed_like(found.w, mesh.uv @ [1, 1j], faces, pins, area))
     return found, initial.warnings
+
+
+def _next_to_image(
+    problem: MapProblem, symmetry: MirrorSymmetry | None, w: np.ndarray, by_triangle: Elements, boundary: str
+) -> tuple[MirrorSymmetry | None, np.ndarray]:
+    """The symmetry with its axis, and a symmetric map next to w (n,) complex; None, and w, where there is none."""
+    if symmetry is None:
+        return None, w
+    loop = boundary_loops(by_triangle.triangles)[0]
+    found = symmetric_start(symmetry, w, by_triangle, boundary, loop, problem.boundary_crosses)
+    # What a mean with its image leaves next to nothing may be a fold by rounding.
+    return (None, w) if found is None or has_folds(problem.faces, found[1]) else found
+
+
+def _relaxed_to_image(
+    problem: MapProblem, symmetry: MirrorSymmetry, w: np.ndarray, by_triangle: Elements, options: RefinementOptions
+) -> Steps[tuple[MirrorSymmetry | None, np.ndarray]]:
+    """The same by way of a map that was relaxed first: scales of an initial map vary so much from face to face that
+    its mean with its image has folds."""
+    relaxed = yield from minimise_in_stages(problem, w, options.balance, QUALITIES["relaxed"])
+    found, mean = _next_to_image(problem, symmetry, relaxed.w, by_triangle, options.boundary)
+    return (None, w) if found is None else (found, mean)
 
 
 def _start_options(boundary: str, faces: Elements, far: bool) -> dict:

@@ -121,6 +121,21 @@ def test_a_slit_on_one_side_has_an_image_on_the_other():
     assert len(images_of_cuts(surface, None, both)) == 0
 
 
+def test_a_cut_has_images_in_both_mirrors_of_a_body():
+    """A box of 6 by 8 squares open above and below: its own image across all axes, marked across none."""
+    n, m = 8, 6
+    k = np.arange(n)
+    ring = np.column_stack([2 * np.cos(2 * np.pi * k / n), np.sin(2 * np.pi * k / n)])
+    height = np.linspace(-1.5, 1.5, m + 1)
+    V = np.column_stack([np.tile(ring, (m + 1, 1)), np.repeat(height, n)])
+    P = [[r * n + j, r * n + (j + 1) % n, (r + 1) * n + (j + 1) % n, (r + 1) * n + j] for r in range(m) for j in k]
+    surface = meshes.polygon_surface(V, P)
+    # All along one side, in the plane of y, and a slit up from below on the other side.
+    cuts = np.array([[r * n, r * n + n] for r in range(m)] + [[n // 2, n // 2 + n]])
+    images = np.sort(images_of_cuts(surface, None, cuts), axis=1)
+    assert images.tolist() == [[(m - 1) * n + n // 2, m * n + n // 2]]
+
+
 def test_what_is_not_symmetric_or_would_be_much_longer_has_no_image():
     V, P, at = bent_grid()
     surface = meshes.polygon_surface(V, P)

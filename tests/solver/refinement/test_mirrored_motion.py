@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.maps.energy import has_folds
+from omt_uv.solver.maps.mirror_symmetry import mirror_symmetry
 from omt_uv.solver.maps.polygon_elements import polygon_elements
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.mirror import find_mirror
@@ -98,3 +100,23 @@ def test_moves_of_representatives_keep_a_map_symmetric():
     np.testing.assert_allclose(symmetry.spread(moved), moved, atol=1e-12)
     # Both mirrors: a quarter of the vertices and their axes are all that is free.
     assert motion.free.sum() == 2 * 9 + 2 * 3
+
+
+def test_one_half_makes_a_symmetric_start_where_the_mean_of_both_folds():
+    """Both halves are turned within the same way, so that images are turned the other way: the mean has folds."""
+    V, Q = hill(24, 0.0)
+    V = V * [1.0, 0.9, 1.0] + [0.0, 0.0, 1.0] * (0.3 * V[:, 1:2] ** 2 + 0.2 * V[:, 1:2] + 0.5 * V[:, :1] ** 2)
+    T, faces = Q[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), np.repeat(np.arange(len(Q)), 2)
+    elements = polygon_elements(V, T, face_areas(V, T), faces)
+    found = find_symmetry(V, T, faces, elements)
+    w = V[:, :2] @ [1, 1j]
+    away = w - np.where(w.real > 0, 0.5, -0.5)
+    w = w - away + away * np.exp(2j * np.maximum(1 - np.abs(away) / 0.45, 0))
+    assert len(found.images) == 1 and not has_folds(elements, w)
+    assert has_folds(elements, mirror_symmetry(found.images, -1.0).averaged(w))
+    symmetry, start = symmetric_start(found, w, elements, "free", np.arange(0))
+    assert not has_folds(elements, start)
+    np.testing.assert_allclose(symmetry.spread(start), start, atol=1e-12)
+    # Not where it would cross itself, and the map given does not.
+    asked = symmetric_start(found, w, elements, "free", np.arange(0), lambda z: not np.array_equal(z, w))
+    assert asked is None
