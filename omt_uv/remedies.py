@@ -48,6 +48,11 @@ ACTIONS = (
     ("NORMALS", "Recalculate Normals", "Turn faces over until all of them look outside"),
     ("MERGE", "Merge by Distance", "Join vertices that lie on one another"),
     ("DISSOLVE", "Degenerate Dissolve", "Dissolve faces without area and edges without length"),
+    (
+        "APPLY_LEVEL",
+        "Apply One Level",
+        "Apply one level of the Subdivision Surface modifier, so that its UVs follow it",
+    ),
 )
 _ACTION_FOR: dict[type[errors.MeshError], str] = {
     errors.OrientationError: "NORMALS",
@@ -61,6 +66,7 @@ _ACTION_ADVISED: dict[str, str] = {
     errors.MERGING: "MERGE",
     errors.CUT_FURTHER: "CUT_FURTHER",
     errors.DISSOLVE: "DISSOLVE",
+    errors.APPLY_LEVEL: "APPLY_LEVEL",
     errors.TURN_OUTSIDE: "NORMALS",
 }
 

@@ -26,17 +26,62 @@ def modifier_of(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> SubdivisionModif
 
     mesh : that of the object, or a copy of it, in no Edit Mode; its creases count where the modifier uses them
     """
-    for modifier in obj.modifiers:
-        if modifier.type == "SUBSURF" and (levels := _levels(modifier)):
-            found = SubdivisionModifier(
-                levels=levels,
-                uv_smooth=modifier.uv_smooth,
-                keep_corners=modifier.boundary_smooth == "PRESERVE_CORNERS",
-                simple=modifier.subdivision_type == "SIMPLE",
-                limit=modifier.use_limit_surface,
-            )
-            return _with_creases(found, mesh) if modifier.use_creases else found
-    return None
+    modifier = _first_of(obj)
+    if modifier is None:
+        return None
+    found = SubdivisionModifier(
+        levels=_levels(modifier),
+        uv_smooth=modifier.uv_smooth,
+        keep_corners=modifier.boundary_smooth == "PRESERVE_CORNERS",
+        simple=modifier.subdivision_type == "SIMPLE",
+        limit=modifier.use_limit_surface,
+    )
+    return _with_creases(found, mesh) if modifier.use_creases else found
+
+
+def why_not_applied(objects: Sequence[bpy.types.Object]) -> str:
+    """Why a level of the modifiers of objects cannot be applied, in a sentence; empty where it can."""
+    for obj in objects:
+        modifier = _first_of(obj)
+        if modifier is None:
+            continue
+        if obj.data.shape_keys is not None:
+            return f"{obj.name}: a mesh with shape keys takes no level of its modifier. Apply or remove the shape keys."
+        if obj.data.users > 1:
+            return f"{obj.name}: other objects share its mesh. Make it a single user (Object > Relations) first."
+        if obj.modifiers[0] != modifier:
+            return f"{obj.name}: modifiers come before {modifier.name}. Apply those first."
+    return ""
+
+
+def apply_level(obj: bpy.types.Object) -> int:
+    """Apply one level of the Subdivision Surface modifier of an object, where `why_not_applied` is empty, with its UVs,
+    seams and groups; how many modifiers lost a level."""
+    modifier = _first_of(obj)
+    if modifier is None:
+        return 0
+    mode = obj.mode
+    if mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    level = obj.modifiers.new("OMT Level", "SUBSURF")
+    for name in ("subdivision_type", "uv_smooth", "boundary_smooth", "use_creases"):
+        setattr(level, name, getattr(modifier, name))
+    # Vertices at their limits would be smoothed again by the levels that are left.
+    level.use_limit_surface = False
+    level.levels = level.render_levels = 1
+    obj.modifiers.move(len(obj.modifiers) - 1, 0)
+    with bpy.context.temp_override(object=obj, active_object=obj):
+        bpy.ops.object.modifier_apply(modifier=level.name)
+    modifier = _first_of(obj)
+    modifier.levels, modifier.render_levels = (max(0, n - 1) for n in (modifier.levels, modifier.render_levels))
+    if mode != "OBJECT":
+        bpy.ops.object.mode_set(mode=mode)
+    return 1
+
+
+def _first_of(obj: bpy.types.Object):
+    """The first Subdivision Surface modifier of an object that is shown or rendered; None without one."""
+    return next((m for m in obj.modifiers if m.type == "SUBSURF" and _levels(m)), None)
 
 
 def with_levels(reading: Reading, levels: int) -> Reading:

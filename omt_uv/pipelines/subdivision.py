@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..solver.analysis.density import Target
+from ..solver.errors import APPLY_LEVEL
 from ..solver.maps.distortion import distortion
 from ..solver.maps.mirror_symmetry import MirrorSymmetry
 from ..solver.mesh.geometry import face_areas, signed_areas
@@ -43,10 +44,9 @@ GROWTH = 4.0
 GOAL = 0.01
 WORTHWHILE = 0.75
 # Area error on the subdivided surface that is worth a warning.
-INEXACT = 0.05
+INEXACT = 0.02
 COARSE = (
-    "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface; "
-    "apply one level of the modifier before"
+    "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface; {}"
 )
 # How warnings about the areas of a cage begin.
 AREA_WARNING = "Areas are"
@@ -227,7 +227,7 @@ def refined_on_subdivision(
         new = refined[part.first[k] : part.first[k + 1]]
         maps.append(_with_figures(old, new, part.corners[mine], fine_uv[part.mapping.quads[mine]]))
     error = part.area_error(refined)
-    more = (COARSE.format(100 * error),) if asked >= AREA_WEIGHT and error > INEXACT else ()
+    more = (COARSE.format(100 * error, APPLY_LEVEL),) if asked >= AREA_WEIGHT and error > INEXACT else ()
     return replace(found, maps=maps, warnings=(*found.warnings, *more))
 
 

@@ -288,6 +288,7 @@ DISSOLVE = "dissolve faces without area"
 TURN_OUTSIDE = OrientationError.remedy
 CUT_FURTHER = "cut further for less shear, or allow for more"
 ENDED_EARLY = "kept before its seams were done; unwrap again"
+APPLY_LEVEL = "apply one level of the modifier before"
 MORE_SEAMS = "no seams were found that would pay; allow for more shear, or mark some yourself"
 
 

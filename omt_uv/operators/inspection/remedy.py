@@ -33,19 +33,27 @@ class UV_OT_omt_remedy(QuickOperator, bpy.types.Operator):
         return {"CANCELLED"}
 
     def act(self, context: bpy.types.Context) -> None:
-        from ...blender import clean
+        from ...blender import clean, subdivision
 
         if self.action == "CUT_FURTHER":
             bpy.ops.uv.omt_unwrap("EXEC_DEFAULT", cut_further=True)
             return
-        mend = {"NORMALS": clean.turn_outside, "MERGE": clean.merge, "DISSOLVE": clean.dissolve}[self.action]
+        mend = {
+            "NORMALS": clean.turn_outside,
+            "MERGE": clean.merge,
+            "DISSOLVE": clean.dissolve,
+            "APPLY_LEVEL": subdivision.apply_level,
+        }[self.action]
         objects = _objects(context)
         check_all_local([(obj, None) for obj in objects])
+        if self.action == "APPLY_LEVEL" and (reason := subdivision.why_not_applied(objects)):
+            raise Complaint(reason)
         count = sum(mend(obj) for obj in objects)
         said = {
             "NORMALS": f"Turned {count} face{'' if count == 1 else 's'} over",
             "MERGE": f"Merged {count} vert{'ex' if count == 1 else 'ices'}",
             "DISSOLVE": f"Dissolved {count} element{'' if count == 1 else 's'}",
+            "APPLY_LEVEL": f"Applied a level of {count} modifier{'' if count == 1 else 's'}",
         }
         self.report({"INFO"}, f"{said[self.action]}. Run it again now")
 

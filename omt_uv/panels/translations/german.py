@@ -46,6 +46,7 @@ GERMAN: dict[str, str] = {
     "Cut Further": "Weiter aufschneiden",
     "Recalculate Normals": "Normalen neu berechnen",
     "Degenerate Dissolve": "Entartetes auflösen",
+    "Apply One Level": "Eine Stufe anwenden",
     "Off": "Aus",
     "Area": "Fläche",
     "Checker": "Schachbrett",

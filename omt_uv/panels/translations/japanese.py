@@ -46,6 +46,7 @@ JAPANESE: dict[str, str] = {
     "Cut Further": "さらに切る",
     "Recalculate Normals": "法線を再計算",
     "Degenerate Dissolve": "縮退を溶解",
+    "Apply One Level": "1 段階を適用",
     "Off": "オフ",
     "Area": "面積",
     "Checker": "チェッカー",

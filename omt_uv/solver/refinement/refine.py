@@ -218,10 +218,10 @@ def _refined(
     smoother = Smoother(mesh.triangles, n) if swept else None
     assembly = assembly_of(faces, n, parts)
     free = _map_problem(faces, assembly, initial, loop, boundary, smoother)
-    warm, wanted = options.warm_start, symmetry
-    symmetry, w = _next_to_image(free, wanted, w, by_triangle, boundary)
-    if wanted is not None and symmetry is None:
-        symmetry, w = yield from part_of(_relaxed_to_image(free, wanted, w, by_triangle, options), *SMOOTHING)
+    warm, known = options.warm_start, symmetry
+    symmetry, w = _next_to_image(free, known, w, by_triangle, boundary)
+    if known is not None and symmetry is None:
+        symmetry, w = yield from part_of(_relaxed_to_image(free, known, w, by_triangle, options), *SMOOTHING)
         warm = warm or symmetry is not None
     assembly = assembly if symmetry is None else assembly_of(faces, n, parts, symmetry)
     problem = _mirrored(_map_problem(faces, assembly, initial, loop, boundary, smoother), symmetry, w)

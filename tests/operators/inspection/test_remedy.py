@@ -92,3 +92,42 @@ def test_the_notices_are_paged(package):
         assert last_run.state.shown == shown
     assert bpy.ops.uv.omt_notices() == {"FINISHED"}
     last_run.forget()
+
+
+def test_one_level_of_a_modifier_is_applied_and_areas_become_right(package):
+    bpy.ops.mesh.primitive_cube_add()
+    obj = bpy.context.object
+    modifier = obj.modifiers.new("Smooth", "SUBSURF")
+    modifier.levels = modifier.render_levels = 2
+
+    def evaluated():
+        mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+        return np.sort([v.co[:] for v in mesh.vertices], axis=0)
+
+    def area_error():
+        text = dict(package("session.last_run").state.summary.rows)["Area error"]
+        return float(text.split()[0])
+
+    bpy.ops.uv.omt_unwrap()
+    before, places = area_error(), evaluated()
+    assert [n.action for n in package("session.last_run").state.summary.notices] == ["APPLY_LEVEL"]
+    assert bpy.ops.uv.omt_remedy(action="APPLY_LEVEL") == {"FINISHED"}
+    assert len(obj.data.polygons) == 24 and [m.levels for m in obj.modifiers] == [1]
+    np.testing.assert_allclose(evaluated(), places, atol=1e-5)
+    bpy.ops.uv.omt_unwrap()
+    assert area_error() < 0.5 * before
+
+
+@pytest.mark.parametrize("why", ["shape keys", "share", "come before"])
+def test_a_level_that_cannot_be_applied_is_refused(why):
+    obj = scenes.cube()
+    if why == "come before":
+        obj.modifiers.new("Mirror", "MIRROR")
+    obj.modifiers.new("Smooth", "SUBSURF")
+    if why == "shape keys":
+        obj.shape_key_add(name="Basis")
+    if why == "share":
+        bpy.data.objects.new("Twin", obj.data)
+    with pytest.raises(RuntimeError, match=why):
+        bpy.ops.uv.omt_remedy(action="APPLY_LEVEL")
+    assert len(obj.data.polygons) == 6 and obj.modifiers[-1].levels == 1
