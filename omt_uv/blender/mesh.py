@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import UserError
 from ..pipelines.reading import Reading
+from ..solver.analysis.facing import SceneAxes
 from ..solver.errors import MeshError, NonFiniteError
 from ..solver.mesh.surface import Surface
 from .subdivision import modifier_of
@@ -70,8 +71,8 @@ def read_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, layer: str = "", edit
         faces = _get(mesh.polygons, "select", f, bool) & ~_get(mesh.polygons, "hide", f, bool)
     source, modifier = mesh.uv_layers.get(layer) or mesh.uv_layers.active, modifier_of(obj, mesh)
     if source is None:
-        return Reading(surface, faces, None, None, modifier, up_of(obj))
-    return Reading(surface, faces, read_uv(mesh, source.name), read_pinned(mesh, source.name), modifier, up_of(obj))
+        return Reading(surface, faces, None, None, modifier, axes_of(obj))
+    return Reading(surface, faces, read_uv(mesh, source.name), read_pinned(mesh, source.name), modifier, axes_of(obj))
 
 
 def _get(collection, name: str, count: int, dtype=np.int32) -> np.ndarray:
@@ -125,10 +126,15 @@ def place_of(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     return left @ axes, matrix[:3, 3]
 
 
-def up_of(obj: bpy.types.Object) -> tuple[float, float, float]:
-    """The direction (3,) of positions that are stretched, and not rotated, which is up in the world."""
+def axes_of(obj: bpy.types.Object) -> SceneAxes:
+    """How positions that are stretched, and not rotated, stand in the world."""
     left, _, axes = np.linalg.svd(np.array(obj.matrix_world, dtype=float)[:3, :3])
-    x, y, z = (left @ axes)[2].tolist()
+    rotation = left @ axes
+    return SceneAxes(_three(rotation[2]), _three(-rotation[1]))
+
+
+def _three(vector: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
     return x, y, z
 
 

@@ -49,7 +49,8 @@ def run(options: argparse.Namespace) -> None:
         with refusals(name=obj.name):
             avoid = clear_of_pins(reading.surface, reading.pins, avoid)
             surface = on_subdivided_surface(reading.surface, reading.subdivision)
-            cuts = predicted_cuts(surface, reading.faces, options.max_shear, avoid=avoid, fill=options.fill_holes)
+            given = {"avoid": avoid, "fill": options.fill_holes}
+            cuts = predicted_cuts(surface, reading.faces, options.max_shear, reading.axes, **given)
         told += [(k, text) for text in cuts.warnings]
         mark_seams(obj, cuts.edges)
         lines.append(f"{obj.name}: {len(cuts.edges)} edges of seam, {cuts.length:.4g} long")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .common import CommandError, refusals, warn_of
+from .common import Y_IS_UP, CommandError, refusals, warn_of
 
 if TYPE_CHECKING:
     from ..files.loaded import Loaded
@@ -17,6 +18,7 @@ def read_file(options: argparse.Namespace, layer: str = "") -> list:
     from ..blender.mesh import read, weld_split_vertices
     from ..files.loaded import compare
     from ..files.meshes import load
+    from ..pipelines.reading import Y_UP
 
     path = options.input
     objects = load(path)
@@ -26,6 +28,8 @@ def read_file(options: argparse.Namespace, layer: str = "") -> list:
     for obj in reversed(unique.values()):
         with refusals(name=obj.name):
             reading = read(obj, layer)
+        if path.suffix.lower() in Y_IS_UP:
+            reading = replace(reading, axes=Y_UP)
         if path.suffix.lower() in (".glb", ".gltf"):
             reading = weld_split_vertices(reading)
         if reading.faces.any():

@@ -166,7 +166,7 @@ class UV_OT_omt_magnify(SubdivisionSettings, MarginSettings, SolverOperator, bpy
             pairs = list(zip(objects, readings, strict=True))
             weights, warnings = self._weights(context, pairs)
             regions = [
-                Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.up, modifier)
+                Region(r.surface, r.faces, w.values, r.all_pins, w.kind, r.axes, modifier)
                 for r, w, modifier in zip(readings, weights, self.subdivisions(readings), strict=True)
             ]
             several = self._further(pairs, regions, self._factors(context))

@@ -84,7 +84,7 @@ def _cut(reading, avoid, modifier, bound: float, options: dict):
     yield Progress("Seams", 0.0)
     clear = clear_of_pins(reading.surface, reading.pins, avoid)
     surface = on_subdivided_surface(reading.surface, modifier)
-    return predicted_cuts(surface, reading.faces, bound, avoid=clear, **options)
+    return predicted_cuts(surface, reading.faces, bound, reading.axes, avoid=clear, **options)
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:

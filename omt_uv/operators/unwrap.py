@@ -146,7 +146,7 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
                     r.pins,
                     avoid,
                     subdivision=modifier,
-                    up=r.up,
+                    axes=r.axes,
                     uv=r.uv,
                     markers=marks,
                 )

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import UserError
 from ..settings import Settings
 from ..solver.analysis.density import Target
+from ..solver.analysis.facing import Z_UP, SceneAxes
 from ..solver.canonical.markers import MapMarkers
 from ..solver.errors import MeshError
 from ..solver.maps.overlap import overlap_share
@@ -34,7 +35,6 @@ OVERLAP = 1e-4
 # Share of the time of a run after which its islands are packed.
 PACKING_FROM = 0.8
 # Where up is, unless a surface says otherwise.
-UP = (0.0, 0.0, 1.0)
 
 
 class Refusal(UserError):
@@ -68,7 +68,7 @@ class UnwrapJob:
     faces : its polygons (f,) bool to unwrap, all by default; pins : corners that stay; avoid : vertices (n,) in [0,1]
         to keep free of cuts; target : density and region of its triangles, their own areas by default. Targets of
         several surfaces are relative to each other; subdivision : the modifier on whose surface areas shall be right
-    up : the direction (3,) of the surface that is up in the world; uv : UVs (c,2) that its corners have, if any
+    axes : how the surface stands in the scene; uv : UVs (c,2) that its corners have, if any
     markers : vertices that fix the turn and the corners of its maps
     """
 
@@ -78,7 +78,7 @@ class UnwrapJob:
     avoid: np.ndarray | None = None
     target: Target | None = None
     subdivision: SubdivisionModifier | None = None
-    up: tuple[float, float, float] = UP
+    axes: SceneAxes = Z_UP
     uv: np.ndarray | None = None
     markers: MapMarkers | None = None
 

@@ -22,6 +22,7 @@ from ..solver.analysis.density import (
     normalised_density,
     region_share,
 )
+from ..solver.analysis.facing import Z_UP, SceneAxes
 from ..solver.analysis.region_density import RegionDensity, target_density
 from ..solver.editing.image_warp import warp_image
 from ..solver.editing.magnify import OUTLINES, RegionMagnification, magnify_region, placed_like_outside, refuse_folds
@@ -37,7 +38,7 @@ from ..solver.parameterization.chart_map import map_chart
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.options import MapOptions
 from ..solver.progress import Steps, part_of
-from .layout import UP, PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
+from .layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
 from .reading import SubdivisionModifier
 from .subdivision import polygon_uv_areas, subdivided_target
 from .unwrap import lay_out
@@ -49,7 +50,7 @@ MISSED = 5e-3
 @dataclass(frozen=True)
 class Region:
     """A surface, the polygons (f,) bool to work on, weights of its vertices (n,), or of its polygons (f,) where
-    `kind` is "face", UVs and pins if it has any, what is up, and the modifier on whose surface shares are asked for.
+    `kind` is "face", UVs and pins if it has any, how it stands, and the modifier on whose surface shares are asked for.
 
     Regions of existing UVs are magnified in the plane: there is no surface in it.
     """
@@ -59,7 +60,7 @@ class Region:
     weights: np.ndarray
     pins: CornerPins | None = None
     kind: str = "vertex"
-    up: tuple[float, float, float] = UP
+    axes: SceneAxes = Z_UP
     subdivision: SubdivisionModifier | None = None
 
     def of_triangles(self, rows: np.ndarray) -> np.ndarray:
@@ -187,7 +188,7 @@ def _from_mesh(regions, settings: MagnifySettings) -> Steps[Magnified]:
                 pins,
                 target=Target(full, inside),
                 subdivision=region.subdivision,
-                up=region.up,
+                axes=region.axes,
             )
         )
     if settings.boundary == "own":

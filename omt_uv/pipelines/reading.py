@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..solver.analysis.facing import Z_UP, SceneAxes
 from ..solver.mesh.surface import Surface
 from ..solver.parameterization.chart_pins import CornerPins
 
@@ -29,18 +30,22 @@ class SubdivisionModifier:
     corner_sharpness: np.ndarray | None = None
 
 
+# Of files whose coordinates are taken as they are, in formats in which Y is up by custom.
+Y_UP = SceneAxes(up=(0.0, 1.0, 0.0), viewer=(0.0, 0.0, 1.0))
+
+
 @dataclass(frozen=True)
 class Reading:
     """A surface, the polygons to work on (f,) bool, and of a UV layer, if there is one, the UVs (c,2) float32 and
-    which of them are pinned (c,) bool; the Subdivision Surface modifier of the object, if it has one; and the direction
-    (3,) of its positions that is up in the world."""
+    which of them are pinned (c,) bool; the Subdivision Surface modifier of the object, if it has one; and how it
+    stands in the scene."""
 
     surface: Surface
     faces: np.ndarray
     uv: np.ndarray | None
     pinned: np.ndarray | None
     subdivision: SubdivisionModifier | None = None
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    axes: SceneAxes = Z_UP
 
     @property
     def all_pins(self) -> CornerPins | None:

@@ -63,7 +63,7 @@ def lay_out(
     cuts = yield from _cut_together(jobs, options)
     for index, job in enumerate(jobs):
         try:
-            unwrapping = _unwrapped(job, options, cuts.get(index))
+            unwrapping = _unwrapped(job, _standing(options, job), cuts.get(index))
             maps.append((yield from part_of(unwrapping, index * share, share)))
         except MeshError as error:
             raise Refusal(index, error) from error
@@ -96,7 +96,7 @@ def lay_out(
 def _upright(islands: Sequence[PlacedIsland], jobs: Sequence[UnwrapJob]) -> list[np.ndarray]:
     """UVs (n,2) of islands turned upright, but for those whose markers say how they lie."""
     turned = [k for k, island in enumerate(islands) if jobs[island.owner].markers is None]
-    charts, ups = [islands[k].chart for k in turned], [jobs[islands[k].owner].up for k in turned]
+    charts, ups = [islands[k].chart for k in turned], [jobs[islands[k].owner].axes.up for k in turned]
     upright = turn_upright(charts, [islands[k].uv for k in turned], ups)
     found = dict(zip(turned, upright, strict=True))
     return [found.get(k, island.uv) for k, island in enumerate(islands)]
@@ -126,7 +126,7 @@ def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[di
         job = jobs[k]
         try:
             given: dict[str, Any] = {
-                "options": options,
+                "options": _standing(options, job),
                 "pins": job.pins,
                 "target": job.target,
                 "avoid": job.avoid,
@@ -136,6 +136,11 @@ def _cut_together(jobs: Sequence[UnwrapJob], options: UnwrapOptions) -> Steps[di
             raise Refusal(k, error) from error
     cuts = yield from part_of(map_small_charts(cuts, options), 0.0, 0.0)
     return dict(zip(small, cuts, strict=True))
+
+
+def _standing(options: UnwrapOptions, job: UnwrapJob) -> UnwrapOptions:
+    """The options of a surface that stands in the scene: cuts are hidden from where it is looked at."""
+    return replace(options, preferences=replace(options.preferences, axes=job.axes))
 
 
 def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = None) -> Steps[SurfaceMap]:

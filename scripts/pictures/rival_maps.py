@@ -45,7 +45,7 @@ class DrawnMap:
 def ours(obj, **settings) -> DrawnMap:
     """One click on the object in Object Mode, with its seams, and settings other than the defaults."""
     reading = read(obj)
-    job = UnwrapJob(reading.surface, reading.faces, up=reading.up)
+    job = UnwrapJob(reading.surface, reading.faces, axes=reading.axes)
     chosen = Settings(**{"max_shear": DEFAULT_MAX_SHEAR} | settings)
     layout, seconds = timed(lambda: drain(lay_out([job], chosen)))
     uv = np.zeros((len(reading.surface.corner_vertex), 2))

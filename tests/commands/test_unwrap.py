@@ -6,6 +6,7 @@ import json
 
 import bpy
 
+import numpy as np
 import scenes
 
 
@@ -20,6 +21,20 @@ def test_report(run, tmp_path):
     expected = {"newton_conformal", "newton_transport", "residual_conformal", "residual_transport", "seconds"}
     assert expected | {"area_l1", "area_sd", "angle_mean", "folds", "faces", "warnings"} <= set(charts[0])
     assert all(seconds >= 0 for seconds in charts[0]["seconds"].values())
+
+
+def test_objects_of_files_in_which_y_is_up_stand_upright_in_the_map(run, tmp_path):
+    x, y = (v.ravel() for v in np.meshgrid(np.linspace(0, 2, 9), np.linspace(0, 1, 7)))
+    lines = [f"v {a} {b} {0.3 * np.sin(a + 1.3 * b * b)}" for a, b in zip(x, y, strict=True)]
+    lines += [f"f {k + 1} {k + 2} {k + 11} {k + 10}" for k in range(53) if k % 9 < 8]
+    (tmp_path / "in.obj").write_text("\n".join(lines) + "\n")
+    assert run("unwrap", tmp_path / "in.obj", "-o", tmp_path / "out.obj")[0] == 0
+    text = (tmp_path / "out.obj").read_text().splitlines()
+    uv = np.array([line.split()[1:3] for line in text if line.startswith("vt ")], float)
+    corners = [c.split("/") for line in text if line.startswith("f ") for c in line.split()[1:]]
+    vertex, at = (np.array([int(c[k]) - 1 for c in corners]) for k in (0, 1))
+    up = np.polyfit(y[vertex], uv[at][:, 1], 1)[0]
+    assert up > 5 * abs(np.polyfit(y[vertex], uv[at][:, 0], 1)[0])
 
 
 def test_subdivision(run, tmp_path):

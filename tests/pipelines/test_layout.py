@@ -8,6 +8,7 @@ from omt_uv.errors import UserError
 from omt_uv.pipelines.layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together, pack_islands
 from omt_uv.pipelines.unwrap import lay_out
 from omt_uv.settings import FIRST_TILE, Settings
+from omt_uv.solver.analysis.facing import SceneAxes
 from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import EmptyMeshError
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
@@ -100,7 +101,9 @@ def test_islands_stand_upright_in_the_layout():
     V, F = meshes.grid(6, 3)
     for up, height in (((0.0, 0.0, 1.0), 2), ((1.0, 0.0, 0.0), 0)):
         wall = V[:, [0, 2, 1]]
-        layout = drain(lay_out([UnwrapJob(triangle_surface(wall, F), up=up)], Settings(quality="draft")))
+        layout = drain(
+            lay_out([UnwrapJob(triangle_surface(wall, F), axes=SceneAxes(up=up))], Settings(quality="draft"))
+        )
         rise = np.polyfit(wall[F.ravel(), height], layout.uv[0][:, 1], 1)[0]
         side = np.polyfit(wall[F.ravel(), height], layout.uv[0][:, 0], 1)[0]
         assert rise > 0 and side == pytest.approx(0, abs=1e-6 * rise)

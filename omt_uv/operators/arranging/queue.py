@@ -111,7 +111,13 @@ class UV_OT_omt_queue(bpy.types.Operator):
             reading = read(obj)
         subdivision = reading.subdivision if chosen.use_subdivision else None
         job = UnwrapJob(
-            reading.surface, reading.faces, reading.pins, None, subdivision=subdivision, up=reading.up, uv=reading.uv
+            reading.surface,
+            reading.faces,
+            reading.pins,
+            None,
+            subdivision=subdivision,
+            axes=reading.axes,
+            uv=reading.uv,
         )
         with complaints(objects=[obj]):
             return (yield from lay_out([job], UV_OT_omt_unwrap.settings(chosen)))

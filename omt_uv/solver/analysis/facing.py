@@ -1,7 +1,8 @@
 """Tell the front of a body from its back: the front is where a face has its eyes, nose and mouth.
 
 The most salient parts near the mirror plane of a head or a body lie to its front. Ears, on the sides, count little, and
-what lies to both sides of the plane cancels out.
+what lies to both sides of the plane cancels out. Where that says little, the front is where the scene is seen from:
+artists model what looks at them in the front view.
 """
 
 from __future__ import annotations
@@ -20,8 +21,29 @@ SALIENT = (0.9, 0.99)
 # How far off the middle, over the size, salient parts lie of a body that clearly has a front, and of one that has none.
 CLEAR = 0.06
 NONE = 0.02
+# How far off the middle, over the size, salient parts would have to lie to speak against the front view.
+FRONT_VIEW = 0.03
+# Certainty that a body without a mirror plane has at most.
+UNSURE = 0.5
 # A mirror plane whose normal rises more than this sine is no upright one: what was told to be up is not.
 LEANING = 0.3
+
+
+@dataclass(frozen=True)
+class SceneAxes:
+    """How a surface stands in the scene.
+
+    Attributes
+    ----------
+    up (3,) : the direction of its positions that is up
+    viewer (3,) : the one from which the front view is seen
+    """
+
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    viewer: tuple[float, float, float] = (0.0, -1.0, 0.0)
+
+
+Z_UP = SceneAxes()
 
 
 @dataclass(frozen=True)
@@ -45,28 +67,30 @@ def facing(
     triangles: np.ndarray,
     saliency: np.ndarray,
     plane: SymmetryPlane | None,
-    up: np.ndarray | None = None,
+    axes: SceneAxes | None = None,
 ) -> Facing:
     """Where a body of unit size (n,3), (m,3) with saliency (n,) looks to; of the plane the normal alone counts.
 
-    up (3,): the direction that is up in the scene, if any is. A mirror plane that is not upright speaks against it.
+    axes : how it stands in the scene, if that is known. A mirror plane that is not upright speaks against it.
     """
-    up = np.zeros(3) if up is None else unit(np.asarray(up, float))
-    if plane is None:
+    up, viewer = (np.zeros(3),) * 2 if axes is None else (unit(np.array(v, float)) for v in (axes.up, axes.viewer))
+    if plane is None and axes is None:
         return Facing(np.zeros(3), up, 0.0)
-    if abs(plane.normal @ up) > LEANING:
-        up = np.zeros(3)
-    area = vertex_areas(positions, triangles)
-    depth = (positions - area @ positions / area.sum()) @ plane.normal
-    near = area * np.exp(-0.5 * depth**2 * area.sum() / (area @ depth**2))
+    if plane is not None and abs(plane.normal @ up) > LEANING:
+        up = viewer = np.zeros(3)
+    near = area = vertex_areas(positions, triangles)
+    if plane is not None:
+        depth = (positions - area @ positions / area.sum()) @ plane.normal
+        near = area * np.exp(-0.5 * depth**2 * area.sum() / (area @ depth**2))
     eyes = near * salient_weights(saliency, area, SALIENT)
-    if not eyes.sum() > 0:
-        return Facing(np.zeros(3), up, 0.0)
-    off = eyes @ positions / eyes.sum() - near @ positions / near.sum()
-    off -= (off @ plane.normal) * plane.normal
+    off = FRONT_VIEW * viewer
+    if eyes.sum() > 0:
+        off = off + eyes @ positions / eyes.sum() - near @ positions / near.sum()
+    if plane is not None:
+        off -= (off @ plane.normal) * plane.normal
     if up.any():
         off -= (off @ up) * up
-    certainty = float(np.clip((np.linalg.norm(off) - NONE) / (CLEAR - NONE), 0, 1))
+    certainty = float(np.clip((np.linalg.norm(off) - NONE) / (CLEAR - NONE), 0, 1 if plane is not None else UNSURE))
     return Facing(unit(off) if certainty else np.zeros(3), up, certainty)
 
 

@@ -15,7 +15,7 @@ from ..mesh.geometry import halfedge_lengths, vertex_areas
 from ..mesh.gluing import polygon_sides
 from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
 from ..mesh.topology import halfedges, pair_keys, pair_up
-from .facing import Facing, ahead, facing, salient_weights, towards
+from .facing import Facing, SceneAxes, ahead, facing, salient_weights, towards
 from .feature_edges import fold_angles
 from .occlusion import vertex_occlusion
 from .order_of_places import order_of_places
@@ -57,7 +57,7 @@ class SeamPreferences:
     front, salient : it looks to where the body does; it stands out, and is not hidden
     mirror : it lies in the mirror plane, but on no front
     loops : it is a side of quads on both sides
-    up (3,) : what is up in the scene; None where nothing is
+    axes : how the surface stands in the scene; None where nobody knows
     """
 
     hidden: float = 0.5
@@ -69,7 +69,7 @@ class SeamPreferences:
     salient: float = 2.0
     mirror: float = 0.7
     loops: float = 0.85
-    up: tuple[float, float, float] | None = None
+    axes: SceneAxes | None = None
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def seam_costs(
     edges = np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
     positions = unit_size(space, triangles)
     plane = symmetry_plane(positions, triangles, owner)
-    seen, at_vertices = _vertex_reasons(positions, triangles, plane, preferences.up)
+    seen, at_vertices = _vertex_reasons(positions, triangles, plane, preferences.axes)
     if plane is not None:
         _symmetrise(positions, triangles, plane, at_vertices)
         plane = _among_all(plane.carried(positions, space), used, len(surface.positions))
@@ -166,13 +166,13 @@ def _among_all(plane: SymmetryPlane, used: np.ndarray, n: int) -> SymmetryPlane:
 
 
 def _vertex_reasons(
-    positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane | None, up: tuple[float, float, float] | None
+    positions: np.ndarray, triangles: np.ndarray, plane: SymmetryPlane | None, axes: SceneAxes | None
 ) -> tuple[Facing, dict[str, np.ndarray]]:
     """Where a surface of unit size looks to, and what speaks for and against its vertices, (n,) each in [0, 1]."""
     n, area = len(positions), vertex_areas(positions, triangles)
     means = curvature_means(positions, triangles)
     saliency = saliency_of(means, triangles)
-    seen = facing(positions, triangles, saliency, plane, None if up is None else np.array(up))
+    seen = facing(positions, triangles, saliency, plane, axes)
     occlusion = vertex_occlusion(positions, triangles)
     forwards = seen.certainty * towards(positions, triangles, seen.front)
     below = towards(positions, triangles, -seen.up)

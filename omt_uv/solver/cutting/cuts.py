@@ -57,6 +57,9 @@ class SeamFinder(Protocol):
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
 
+    def priced(self, component: CutComponent) -> CutComponent:
+        """The component with what it costs to cut its edges, also for a disk."""
+
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
         """Edges (e,) bool to cut, of a component that is a disk, or a disk once the edges `base` (e,) bool are cut:
         with these, or others in their place."""
@@ -314,7 +317,7 @@ class _Cutter:
         base = np.zeros(len(component.pair), dtype=bool)
         closed = topology.boundaries[k] == 0 and topology.handles[k] == 0
         if not (closed or topology.is_disk[k]):
-            base = cut_component(component, topology, k, 0)[0]
+            base = cut_component(search.priced(component), topology, k, 0)[0]
         chosen = yield from search(component, base)
         # A slit of a single edge would not open anything.
         if closed and chosen.sum() < 2:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.density import Target
-from ..analysis.seam_costs import SeamCosts, seam_costs
+from ..analysis.facing import SceneAxes
+from ..analysis.seam_costs import SeamCosts, SeamPreferences, seam_costs
 from ..cutting.cuts import Cuts, cut
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
@@ -127,13 +128,16 @@ class ShearSearch:
         return len(self.surface.face_start) - 1
 
 
-def predicted_cuts(surface: Surface, faces: np.ndarray, bound: float, **options: Any) -> Cuts:
+def predicted_cuts(
+    surface: Surface, faces: np.ndarray, bound: float, axes: SceneAxes | None = None, **options: Any
+) -> Cuts:
     """What `unwrap` cuts for a bound of the shear before its first map; with 0 for none, what it cuts without one.
 
-    faces (f,) bool : polygons of the surface; options and errors are those of `cuts.cut`
+    faces (f,) bool : polygons of the surface; axes : how it stands in the scene; options and errors: see `cuts.cut`
     """
     if bound:
-        search = ShearSearch(surface, faces, ShearBound(bound), None, {})
+        shear = ShearBound(bound, preferences=SeamPreferences(axes=axes))
+        search = ShearSearch(surface, faces, shear, None, {})
         options |= {"search": search.search(search.first_spread())}
     cuts = cut(surface, faces, **options)
     return cuts if options.get("fill") else with_images(surface, faces, cuts)

@@ -82,6 +82,15 @@ class SeamSearch:
         polygons = polygons[polygons >= 0]
         return (self.further or not marked) and bool(np.isfinite(self.spread[polygons]).any())
 
+    def priced(self, component: CutComponent) -> CutComponent:
+        """The component with the costs of where an artist would cut; what fills holes costs as before."""
+        known = len(self.surface.positions)
+        ends = component.vertex_ids[component.ends]
+        real = (ends < known).all(axis=1)
+        cost = component.cost.copy()
+        cost[real] *= self.costs().of(*ends[real].T)
+        return replace(component, cost=cost)
+
     def __call__(self, component: CutComponent, base: np.ndarray) -> Steps[np.ndarray]:
         """Seams of a component that is a disk, a sphere, or a disk once the edges `base` (e,) bool are cut: with these,
         or such as are symmetric where the component is."""
@@ -89,7 +98,7 @@ class SeamSearch:
         name, polygons = fingerprint(component), component.polygons[component.polygons >= 0]
         share = 1.0 if self.share is None else float(self.share[polygons].min())
         if self.share is not None and name in self.memory:
-            self.memory[name] = yield from self._again(self._with_costs(component), self.memory[name], share)
+            self.memory[name] = yield from self._again(self.priced(component), self.memory[name], share)
             return self.memory[name].edges
         bound = float(self.spread[polygons].min())
         bounded = bool(component.on_boundary().any())
@@ -100,7 +109,7 @@ class SeamSearch:
                 bound = min(bound, share * model.spread)
             if model.spread <= bound and not base.any():
                 return base
-        component = self._with_costs(component)
+        component = self.priced(component)
         mirror = self._mirror(component)
         if mirror is not None and base.any():
             symmetric = symmetric_base(component, mirror)
@@ -286,15 +295,6 @@ class SeamSearch:
         line, count = None if mirror is None else mirror.plane, round(finer * self.options.vertices)
         coarse = coarse_surface(component.positions, component.triangles, count, line, trial)
         return coarse, ScaleModel.of(coarse, self._log_density(component, coarse))
-
-    def _with_costs(self, component: CutComponent) -> CutComponent:
-        """The component with the costs of where an artist would cut; what fills holes costs as before."""
-        known = len(self.surface.positions)
-        ends = component.vertex_ids[component.ends]
-        real = (ends < known).all(axis=1)
-        cost = component.cost.copy()
-        cost[real] *= self.costs().of(*ends[real].T)
-        return replace(component, cost=cost)
 
     def _mirror(self, component: CutComponent) -> FineMirror | None:
         """The mirror image of the component in itself, if its vertices have one, and some are in the plane."""

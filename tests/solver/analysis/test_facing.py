@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from omt_uv.solver.analysis.facing import facing, towards
+from omt_uv.solver.analysis.facing import UNSURE, SceneAxes, facing, towards
 from omt_uv.solver.analysis.saliency import saliency, unit_size
 from omt_uv.solver.analysis.symmetry_plane import symmetry_plane
 
 
-def looks_to(V, F, up=None):
+def looks_to(V, F, axes=None):
     P = unit_size(V, F)
-    return facing(P, F, saliency(V, F), symmetry_plane(V, F), up)
+    return facing(P, F, saliency(V, F), symmetry_plane(V, F), axes)
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), *Rotation.random(1, random_state=1).as_matrix()])
@@ -20,9 +20,9 @@ def test_a_head_looks_where_its_nose_is(turn):
     V, F = meshes.head(30)
     unknown = looks_to(V @ turn.T, F)
     assert unknown.front @ turn[:, 0] > np.cos(np.pi / 4) and unknown.certainty == 1 and not unknown.up.any()
-    known = looks_to(V @ turn.T, F, up=turn[:, 2])
+    known = looks_to(V @ turn.T, F, SceneAxes(up=turn[:, 2], viewer=turn[:, 0]))
     assert known.front @ turn[:, 0] > 0.99
-    wrong = looks_to(V @ turn.T, F, up=turn[:, 1])
+    wrong = looks_to(V @ turn.T, F, SceneAxes(up=turn[:, 1], viewer=turn[:, 0]))
     np.testing.assert_allclose(wrong.front, unknown.front)
     assert not wrong.up.any()
 
@@ -33,6 +33,16 @@ def test_what_is_round_or_has_no_mirror_looks_nowhere():
         assert nowhere.certainty == 0 and not nowhere.front.any()
     V, F = meshes.random_disk(300, height=2)
     assert not looks_to(V, F).front.any()
+
+
+def test_what_says_little_looks_at_the_viewer_and_a_head_where_its_nose_is():
+    axes = SceneAxes(up=(0.0, 0.0, 1.0), viewer=(-1.0, 0.0, 0.0))
+    # Its plane may be any, so of a round body there is no telling before it has another one.
+    V, F = meshes.icosphere(3)
+    seen = facing(unit_size(V, F), F, saliency(V, F), None, axes)
+    assert seen.front @ axes.viewer > 0.99 and 0 < seen.certainty <= UNSURE
+    V, F = meshes.head(30)
+    assert looks_to(V, F, axes).front @ axes.viewer < -0.99
 
 
 def test_towards_is_one_at_the_nearest_end_and_minus_one_at_the_other():

@@ -7,6 +7,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.analysis.facing import SceneAxes
 from omt_uv.solver.analysis.seam_costs import LEAST, MOST, SeamPreferences, seam_costs
 from omt_uv.solver.errors import ZeroAreaFaceError
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -70,7 +71,7 @@ def test_what_looks_down_is_cheap_only_if_down_is_known():
     V, F = meshes.icosphere(3)
     surface = triangle_surface(V, F)
     assert not seam_costs(surface).reasons["underside"].any()
-    costs = seam_costs(surface, SeamPreferences(up=(0.0, 0.0, 2.0)))
+    costs = seam_costs(surface, SeamPreferences(axes=SceneAxes(up=(0.0, 0.0, 2.0))))
     height = V[costs.edges].mean(axis=1)[:, 2]
     assert (costs.reasons["underside"][height < -0.7] > 0.9).all()
     assert not costs.reasons["underside"][height > 0].any()

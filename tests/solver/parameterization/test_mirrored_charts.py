@@ -9,9 +9,11 @@ from polygons import wavy_quads
 from sphere_shapes import random_rotation
 
 from omt_uv.solver.analysis.density import Target
+from omt_uv.solver.analysis.facing import SceneAxes
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.mirror import find_mirror
+from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.mirrored_charts import images_of_cuts, motion_between
 from omt_uv.solver.parameterization.options import UnwrapOptions
@@ -147,6 +149,15 @@ def test_what_is_not_symmetric_or_would_be_much_longer_has_no_image():
     faces = np.ones(len(P), bool)
     faces[0] = False
     assert len(images_of_cuts(surface, faces, slit)) == 0
+
+
+@pytest.mark.parametrize("viewer", [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+def test_handles_are_opened_where_nobody_looks(viewer):
+    V, F = meshes.torus()
+    cuts = predicted_cuts(triangle_surface(V, F), np.ones(len(F), bool), 3.0, SceneAxes(viewer=viewer))
+    angle = np.arctan2(V[:, 1], V[:, 0])[cuts.edges]
+    across = cuts.edges[np.isclose(angle[:, 0], angle[:, 1])]
+    assert (V[across].mean(axis=(0, 1)) @ viewer) < -0.5
 
 
 def test_suzanne_is_cut_and_mapped_symmetrically():
