@@ -41,13 +41,23 @@ def smoothed(faces: Elements, w: np.ndarray, area_weight: float, sweeps: int, lo
     w = w.copy()
     sets = list(_sets(faces, len(w), loop is not None))
     for k in range(sweeps):
-        for vertex, row, star in sets:
-            before = None if loop is None else w.copy()
-            relax(vertex, row, star, w, area_weight, 1)
-            if before is not None:
-                _uncross(w, before, loop)
+        start = w.copy()
+        _sweep(sets, w, area_weight)
+        # Most sweeps let no edges cross. Those that do are done again, and looked at set by set.
+        if loop is not None and len(crossings_on_the_way(start, w - start, loop, (1.0, ROOM))):
+            w = start
+            _sweep(sets, w, area_weight, loop)
         yield Progress("Smoothing", (k + 1) / sweeps)
     return w
+
+
+def _sweep(sets: list, w: np.ndarray, area_weight: float, loop=None) -> None:
+    """Move the vertices of all sets within their stars, in place, and take back what lets edges of a loop cross."""
+    for vertex, row, star in sets:
+        before = None if loop is None else w.copy()
+        relax(vertex, row, star, w, area_weight, 1)
+        if before is not None:
+            _uncross(w, before, loop)
 
 
 def _uncross(w: np.ndarray, before: np.ndarray, loop: np.ndarray) -> None:
