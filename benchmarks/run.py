@@ -16,6 +16,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.part import Option, Part
 from benchmarks.parts import (
+    alike,
     cascade,
     cuts,
     hard,
@@ -53,6 +54,7 @@ MODULES = (
     match,
     partition,
     polygons,
+    alike,
 )
 PARTS: dict[str, Part] = {part.name: part for module in MODULES for part in module.PARTS}
 OPTIONS: dict[str, Option] = {option.name: option for part in PARTS.values() for option in part.options}

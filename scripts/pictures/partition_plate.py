@@ -1,4 +1,4 @@
-"""Draw docs/pictures/partition.png: a head in panels, the same head stippled by its shading, an armadillo with scales.
+"""Draw docs/pictures/partition.png: a head in panels, a portrait stippled, an armadillo with scales.
 
 python scripts/pictures/partition_plate.py [OUT.png]
 """
@@ -16,17 +16,31 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests/support")]
 
 import meshes
 from PIL import Image
-from renders import VIEWS, render_colours
+from renders import VIEWS, render_colours, towards_camera
 
 from omt_uv.solver.mesh.geometry import face_normals, vertex_normals
+from omt_uv.solver.mesh.spherical_geometry import fibonacci_sphere
 from omt_uv.solver.partition.cut_mesh import CellMesh, cut_along_cells
 from omt_uv.solver.partition.division import Division, DivisionOptions, divide
 from omt_uv.solver.progress import drain
 
 PIXELS = 620
-LIGHT = np.array([0.62, 0.45, 0.64])
+# To the light, rightwards, upwards and to who looks; how many ways to the sky are tried, and its share of the light.
+LIGHT = np.array([-0.6, 0.55, 0.6])
+SKY = 48
+SKY_LIGHT = 0.4
+# The light is as wide as this over its distance, and so many points of it are tried.
+LAMP = 0.15
+LAMPS = 10
+BRIGHTNESS = 1.1
+CONTRAST = 1.2
 PANELS = 200
-DOTS = 6000
+DOTS = 7000
+# Density where it is white; the cosine below which faces are seen edge on; the radius of dots over the width of the
+# smallest cells.
+FAINTEST = 0.03
+EDGE_ON = 0.1
+CLOSENESS = 0.5
 SCALES = 900
 TONES = np.array([[0.93, 0.89, 0.80], [0.80, 0.62, 0.42], [0.56, 0.67, 0.70], [0.86, 0.78, 0.62], [0.70, 0.76, 0.68]])
 
@@ -67,13 +81,49 @@ def panels(path):
     )
 
 
+def portrait_darkness(V, F, view):
+    """How dark (m,) each face is in a portrait, from 0 to 1: lit from the upper left, in its own shadow, and by what it
+    sees of a sky; nothing behind."""
+    from mathutils.bvhtree import BVHTree
+
+    up, towards = towards_camera(view)
+    right = np.cross(up, towards)
+    tree = BVHTree.FromPolygons(V.tolist(), F.tolist())
+    normal, size = face_normals(V, F), np.ptp(V, axis=0).max()
+    smooth = vertex_normals(V, F)[F].mean(axis=1)
+    start = V[F].mean(axis=1) + 1e-3 * size * normal
+    key = LIGHT @ np.stack([right, up, towards]) / np.linalg.norm(LIGHT)
+    lamp = key + LAMP * fibonacci_sphere(LAMPS)
+
+    def seen(origin, way):
+        return np.array([tree.ray_cast(o, w)[0] is None for o, w in zip(origin.tolist(), way.tolist(), strict=True)])
+
+    open_share, whole = np.zeros(len(F)), np.zeros(len(F))
+    for way in fibonacci_sphere(SKY):
+        cosine = np.clip(normal @ way, 0, 1)
+        ahead = np.flatnonzero(cosine > 0)
+        open_share[ahead] += cosine[ahead] * seen(start[ahead], np.tile(way, (len(ahead), 1)))
+        whole += cosine
+    reached = np.mean([seen(start, np.tile(way, (len(F), 1))) for way in lamp], axis=0)
+    lit = np.clip(smooth @ key, 0, 1) * reached
+    tone = SKY_LIGHT * (open_share / np.maximum(whole, 1e-9)) ** 2 + (1 - SKY_LIGHT) * lit
+    return (1 - np.clip(BRIGHTNESS * tone, 0, 1)) ** CONTRAST
+
+
 def stipples(path):
-    """Dots by darkness."""
-    V, F = meshes.load_model("max_planck")
-    lit = np.clip(face_normals(V, F) @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
-    division = drain(divide(V, F, DOTS, 0.03 + (1 - lit) ** 2, DivisionOptions(relax=6)))
+    """Dots of one size by the darkness of a portrait, on white."""
+    V, F = meshes.load_model("david")
+    view = VIEWS["david"]
+    facing = face_normals(V, F) @ towards_camera(view)[1]
+    # Dots on slopes come closer in the picture; behind there are none.
+    density = (FAINTEST + portrait_darkness(V, F, view)) * np.maximum(facing, 0)
+    front, density, whole = F[facing > EDGE_ON], density[facing > EDGE_ON], F
+    used, front = np.unique(front, return_inverse=True)
+    V, F, body = V[used], front.reshape(-1, 3), V
+    division = drain(divide(V, F, DOTS, density, DivisionOptions(relax=6)))
     at, normal = division.sites.positions(V, F), face_normals(V, F)[division.sites.triangle]
-    size = 0.0032 * np.ptp(V, axis=0).max()
+    # Where it is darkest dots nearly touch.
+    size = CLOSENESS * np.sqrt(np.quantile(division.asked / density[division.sites.triangle], 0.01))
     side = np.cross(normal, [0.3, 0.5, 0.8])
     side /= np.linalg.norm(side, axis=1)[:, None]
     angle = 2 * np.pi * np.arange(8) / 8
@@ -81,9 +131,9 @@ def stipples(path):
     corners = (at + 0.5 * size * normal + size * ring).transpose(1, 0, 2).reshape(-1, 3)
     fan = np.array([[0, k, k + 1] for k in range(1, 7)])
     dots = (8 * np.arange(len(at))[:, None, None] + fan).reshape(-1, 3)
-    colours = np.concatenate([np.full((len(F), 3), 0.96), np.full((len(dots), 3), 0.02)])
-    both = np.concatenate([V, corners]), np.concatenate([F, dots + len(V)])
-    render_colours(*both, colours, VIEWS["max_planck"], path, PIXELS)
+    colours = np.concatenate([np.full((len(whole), 3), 1.0), np.full((len(dots), 3), 0.05)])
+    both = np.concatenate([body, corners]), np.concatenate([whole, dots + len(body)])
+    render_colours(*both, colours, view, path, PIXELS, unlit=True)
 
 
 def scales(path):

@@ -116,15 +116,15 @@ def _tubes(ends, radius):
     return obj
 
 
-def render_colours(V, F, rgb, view, path, pixels=480):
-    """Render the mesh with one colour (m,3) per face to `path`."""
+def render_colours(V, F, rgb, view, path, pixels=480, unlit=False):
+    """Render the mesh with one colour (m,3) per face to `path`; unlit, with these colours as they are."""
     obj = make_object(V, F)
     layer = obj.data.color_attributes.new("distortion", "BYTE_COLOR", "CORNER")
     rgba = np.ones((len(F), 3, 4), np.float32)
     rgba[..., :3] = rgb[:, None]
     layer.data.foreach_set("color_srgb", rgba.ravel())
     obj.data.color_attributes.active_color = layer
-    _render(obj, V[np.unique(F)], view, path, "VERTEX", pixels)
+    _render(obj, V[np.unique(F)], view, path, "VERTEX", pixels, unlit=unlit)
     remove_object(obj)
 
 
@@ -141,7 +141,7 @@ def render_wires(V, F, view, path, pixels=480):
     remove_object(clay)
 
 
-def _render(obj, points, view, path, color_type, pixels, also=()):
+def _render(obj, points, view, path, color_type, pixels, also=(), unlit=False):
     if color_type != "TEXTURE" or not obj.data.attributes.get("sharp_edge"):
         obj.data.shade_smooth()
     scene = bpy.context.scene
@@ -152,8 +152,10 @@ def _render(obj, points, view, path, color_type, pixels, also=()):
     scene.view_settings.view_transform = "Standard"
     scene.display.render_aa = "16"
     shading = scene.display.shading
-    shading.light, shading.studio_light, shading.color_type = "STUDIO", "paint.sl", color_type
-    shading.show_cavity, shading.cavity_type = True, "WORLD"
+    shading.light, shading.color_type = "FLAT" if unlit else "STUDIO", color_type
+    if not unlit:
+        shading.studio_light = "paint.sl"
+    shading.show_cavity, shading.cavity_type = not unlit, "WORLD"
     shading.show_shadows = False
     camera = _camera(points, view)
     scene.camera = camera
@@ -168,6 +170,13 @@ def _render(obj, points, view, path, color_type, pixels, also=()):
     data = camera.data
     bpy.data.objects.remove(camera)
     bpy.data.cameras.remove(data)
+
+
+def towards_camera(view):
+    """Up in the picture, and the direction to the camera of a view, (3,) each."""
+    up, towards = _axes(view, view.elevation)
+    right = up.cross(towards).normalized()
+    return np.array(towards.cross(right)), np.array(towards)
 
 
 def _axes(view, elevation):

@@ -18,8 +18,9 @@ from ..errors import LandmarkError, NotADiskError
 from ..linalg.sparse import solve_spd
 from ..mesh.closest_point import subdivision_centroids
 from ..mesh.geometry import cotangent_laplacian, face_areas, vertex_areas
-from ..mesh.topology import boundary_loops, with_fans
+from ..mesh.topology import boundary_loops
 from ..progress import Steps
+from .membrane import with_membranes
 from .signature import FINE, POINTS, SMOOTHING, SQUASH, Signature, pair_costs, sound_parts
 from .surroundings import surroundings
 
@@ -90,7 +91,7 @@ def _outlined(
     if not own:
         cause = "Nothing is farther from the marker of the centre than that of the start"
         raise LandmarkError(cause, REMEDY, "vertex", [start])
-    vertices, faces = with_fans(vertices, faces, [loop for loop in loops if loop is not own[0]])
+    vertices, faces = with_membranes(vertices, faces, [loop for loop in loops if loop is not own[0]])
     edges = (3 * len(faces) + len(own[0])) // 2
     if len(vertices) - edges + len(faces) != 1:
         raise NotADiskError("The surface has handles", "Only what is a disk without its other holes has markers")

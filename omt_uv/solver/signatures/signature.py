@@ -22,9 +22,10 @@ from ..mesh.point_location import locate
 from ..mesh.repair import repaired_gluing
 from ..mesh.spherical_geometry import fibonacci_sphere, normalized, signed_volumes
 from ..mesh.surface import check_finite, triangle_surface
-from ..mesh.topology import boundary_loops, with_fans
+from ..mesh.topology import boundary_loops
 from ..progress import Steps
 from ..sphere.sphere_map import sphere_map
+from .membrane import with_membranes
 
 POINTS = 400
 # Every point is the mean of so many places of its cell.
@@ -119,7 +120,7 @@ def _quantised(fine: np.ndarray, values: np.ndarray, lattice: np.ndarray) -> Sig
 
 
 def closed_part(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The part of greatest area of a mesh (n,3), (m,3), with its holes filled by fans about their centres.
+    """The part of greatest area of a mesh (n,3), (m,3), with its holes filled by membranes.
 
     Raises
     ------
@@ -130,7 +131,7 @@ def closed_part(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarra
     if not max(area) > 0:
         raise ZeroAreaFaceError("The surface has no area", "Give a mesh whose faces are no lines and no points")
     part = parts[int(np.argmax(area))]
-    vertices, faces = with_fans(part.vertices, part.triangles, boundary_loops(part.triangles))
+    vertices, faces = with_membranes(part.vertices, part.triangles, boundary_loops(part.triangles))
     # A mirror image with the faces of before is inside out.
     inside_out = signed_volumes(vertices - vertices.mean(axis=0), faces).sum() < 0
     return vertices, faces[:, ::-1] if inside_out else faces
