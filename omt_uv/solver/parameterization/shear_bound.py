@@ -38,6 +38,8 @@ SPREAD_OF_SHEAR = 0.19
 MARGIN = 0.95
 # What misses the bound by less stays in one piece: it has so many times the square of log(shear).
 CROWDED = 1.15
+# Vertices this close to where images of others belong, over the extent, are these images.
+SAME_PLACE = 1e-3
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
 # A mean excess of the shear up to this is not worse than none: what was parted is cut further.
@@ -113,6 +115,16 @@ class ShearSearch:
     def memory(self) -> dict:
         """What a first search has found."""
         return {}
+
+    @cached_property
+    def images(self) -> np.ndarray | None:
+        """The mirror image of every vertex of the surface, -1 where none lies there; None without a mirror."""
+        plane, positions = self.costs().plane, self.surface.positions
+        if plane is None:
+            return None
+        image, far = plane.nearest_images(positions, self.surface.corner_vertex[self.surface.triangles])
+        extent = float(np.ptp(positions[self.surface.corner_vertex], axis=0).max())
+        return np.where(far <= SAME_PLACE * extent, image, -1)
 
     @cached_property
     def _costs(self) -> SeamCosts:
@@ -284,7 +296,7 @@ def _apart(
         uv = yield from crossing(chart, last.maps[k])
         shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
         if area @ shear <= search.shear.bound * area.sum():
-            edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids])
+            edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
             found |= {k: edges} if len(edges) else {}
     return found, flat
 

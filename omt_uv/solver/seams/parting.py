@@ -26,6 +26,8 @@ LEAST_COVER = 3e-3
 LEAST_PART = 0.03
 # Pairs of parts that are cut from one another at most.
 MOST_CUTS = 12
+# Rounds in which crumbs between a cut and its mirror image join what is beside them.
+MOST_CRUMBS = 3
 # Polygons whose normals turn by less, in radians, are of one side, which is flat if they all do about.
 TURNED = np.radians(5)
 FLAT = 0.999
@@ -73,10 +75,11 @@ class _Dual:
         return csr_matrix((np.tile(weight, 2), (rows, columns)), shape=(len(self.area),) * 2)
 
 
-def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray) -> np.ndarray:
+def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray, image: np.ndarray | None = None) -> np.ndarray:
     """Edges (k,2) of the surface along which a chart comes apart where its map uv (n,2) lies on itself.
 
-    cost (n,): of a cut through its vertices, per length. No edges where it does not, or is in one piece all the same.
+    cost (n,): of a cut through its vertices, per length; image: mirror image of every vertex of the surface, which the
+    cuts then have, too, -1 where there is none. No edges where it does not, or is in one piece all the same.
     """
     dual = _Dual.of(chart)
     pairs = _covering(chart, uv, dual)
@@ -89,7 +92,34 @@ def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray) -> np.ndarray:
         if part[one[0]] == part[other[0]]:
             side = _minimum_cut(dual, capacity, *_enlarged(dual, steps, one, other))
             cut |= side[dual.joined[:, 0]] != side[dual.joined[:, 1]]
-    return chart.vertex_ids[dual.ends[cut]]
+    return chart.vertex_ids[dual.ends[cut if image is None else _with_images(chart, dual, cut, image)]]
+
+
+def _with_images(chart: Chart, dual: _Dual, cut: np.ndarray, image: np.ndarray) -> np.ndarray:
+    """The cut (e,) bool with its mirror image, if that is one, and crumbs between both can be left out; else as it
+    is."""
+    ends = chart.vertex_ids[dual.ends]
+    images = image[ends[cut]]
+    if not len(images) or (images < 0).any():
+        return cut
+    mine, theirs = pair_keys(*ends.T), pair_keys(*images.T)
+    both = cut | np.isin(mine, theirs)
+    length = edge_lengths(chart.vertices, dual.ends)
+    if not np.isin(theirs, mine).all():
+        return cut
+    for _ in range(MOST_CRUMBS):
+        piece = dual.pieces(~both)
+        crumb = np.bincount(piece, dual.area) < LEAST_PART / 2 * dual.area.sum()
+        if not crumb.any():
+            return both
+        # Each joins the piece that it has most of an outline with.
+        one, other = np.concatenate([piece[dual.joined[both]], piece[dual.joined[both]][:, ::-1]]).T
+        shared = csr_matrix((np.tile(length[both], 2), (one, other)), shape=(len(crumb),) * 2)
+        shared.sum_duplicates()
+        joins = np.asarray(shared.argmax(axis=1)).ravel()
+        one, other = piece[dual.joined].T
+        both &= ~((crumb[one] & (joins[one] == other)) | (crumb[other] & (joins[other] == one)))
+    return cut
 
 
 def flat_sides(chart: Chart) -> np.ndarray:

@@ -53,6 +53,23 @@ def test_cuts_avoid_what_is_dear():
     assert len(edges) and (np.abs(V[edges, 2] / 0.2 - 0.8) < 0.06).all()
 
 
+@pytest.mark.parametrize(("row", "pieces"), [(36, 3), (44, 2)])
+def test_cuts_have_images_and_leave_no_crumbs_between(row, pieces):
+    V, F, flat = ramp(1.5, steps=90)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    step, ring = np.divmod(np.arange(len(V)), 6)
+    image = (89 - step) * 6 + ring
+    cost = np.where(step[chart.vertex_ids] == row, 0.01, 1.0)
+    uv = flat[chart.vertex_ids]
+    alone = parted(chart, uv, cost)
+    assert (step[alone] == row).all()
+    both = parted(chart, uv, cost, image)
+    assert set(np.unique(step[both])) <= {row, 89 - row}
+    assert len(strict_charts(triangle_surface(V, F, both))) == pieces
+    # Where there is no image, a cut stays as it is.
+    assert np.array_equal(parted(chart, uv, cost, np.full(len(V), -1)), alone)
+
+
 def test_what_lies_beside_itself_stays_whole():
     V, F, flat = ramp(0.9)
     (chart,) = strict_charts(triangle_surface(V, F))
