@@ -17,6 +17,7 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.part import Option, Part
 from benchmarks.parts import (
     alike,
+    bodies,
     cascade,
     cuts,
     hard,
@@ -55,6 +56,7 @@ MODULES = (
     partition,
     polygons,
     alike,
+    bodies,
 )
 PARTS: dict[str, Part] = {part.name: part for module in MODULES for part in module.PARTS}
 OPTIONS: dict[str, Option] = {option.name: option for part in PARTS.values() for option in part.options}

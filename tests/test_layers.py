@@ -28,7 +28,8 @@ ARROWS: dict[str, str] = {
     "solver.linalg": "solver solver.mesh",
     "solver.transfer": "solver solver.mesh",
     "solver.analysis": "solver solver.mesh solver.linalg",
-    "solver.flows": "solver solver.mesh",
+    "solver.contact": "solver solver.mesh solver.linalg",
+    "solver.flows": "solver solver.mesh solver.contact",
     "solver.comparison": "solver solver.mesh solver.analysis",
     "solver.maps": "solver solver.mesh solver.linalg",
     "solver.packing": "solver solver.mesh",
@@ -44,7 +45,7 @@ ARROWS: dict[str, str] = {
     "solver.editing": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement",
     "solver.arranging": "solver solver.mesh",
     "solver.sphere": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal solver.refinement",
-    "solver.volumes": "solver solver.mesh solver.linalg solver.flows solver.sphere",
+    "solver.volumes": "solver solver.mesh solver.linalg solver.contact solver.flows solver.sphere",
     "solver.globe": "solver solver.mesh solver.linalg solver.sphere",
     "solver.strain": "solver solver.mesh solver.analysis",
     "solver.registration": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement "
@@ -71,7 +72,7 @@ ARROWS: dict[str, str] = {
     "xatlas_charts",
     "pipelines.shapes": "settings errors solver solver.mesh solver.transfer solver.registration "
     "solver.registration.charts "
-    "solver.strain solver.canonical solver.partition solver.signatures solver.flows pipelines",
+    "solver.strain solver.canonical solver.partition solver.signatures solver.contact solver.flows pipelines",
     "pipelines.volumes": "errors solver solver.mesh solver.flows solver.volumes",
     "pipelines.measuring": "solver solver.mesh solver.maps solver.canonical solver.conformal solver.cutting "
     "solver.sphere solver.transport pipelines",

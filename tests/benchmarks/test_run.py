@@ -23,7 +23,7 @@ def test_an_option_is_one_option_wherever_it_is_taken():
 
 def test_without_names_all_parts_run_but_those_that_say_otherwise():
     _, parts = run.parse([])
-    named = {"hard", "invariance", "match", "metric", "nearest", "partition", "polygons", "profile"}
+    named = {"hard", "invariance", "match", "metric", "nearest", "partition", "polygons", "profile", "flows", "volumes"}
     assert {p.name for p in run.PARTS.values()} - {p.name for p in parts} == named
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...solver.contact.self_intersections import FaceCrossings
 from ...solver.flows.creases import without_new_intersections
-from ...solver.flows.self_intersections import FaceCrossings
 from ...solver.flows.smoothing import smoothed_apart
 from ...solver.mesh.geometry import face_areas
 from ...solver.progress import Progress, Steps, part_of

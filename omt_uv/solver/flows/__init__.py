@@ -1,7 +1,7 @@
 """Divergence-free flows: points that are moved take everything else along, and enclosed volumes stay as they are.
 
-Imports solver.errors, solver.progress and solver.mesh.
-Main names: flow, Flow, FlowOptions, FlowHandle, FlowField, ball_domain, mesh_domain, intersecting_pairs.
+Imports solver.errors, solver.progress, solver.mesh and solver.contact.
+Main names: flow, Flow, FlowOptions, FlowHandle, FlowField, ball_domain, mesh_domain.
 """
 
 from ..lazy import lazy
@@ -15,5 +15,4 @@ __getattr__, __all__ = lazy(
     kernel="FlowField interpolated_field",
     options="FlowOptions",
     paths="handle_paths",
-    self_intersections="FaceCrossings intersecting_pairs",
 )

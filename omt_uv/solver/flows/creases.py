@@ -17,18 +17,22 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from ..contact.barrier import brought
+from ..contact.new_crossings import NewCrossings, touched
+from ..contact.self_intersections import FaceCrossings
+from ..contact.separation import separated
 from ..mesh.geometry import nearest_rotations
 from ..mesh.topology import graph_components, halfedges
 from ..progress import Progress, Steps
 from .domain import FlowDomain
 from .integration import FlowStep, carried
-from .self_intersections import FaceCrossings
-from .separation import separated
 
 # Pieces of the way, of which each is followed in its single steps where its faces do not come apart at once.
 PIECES = 12
 # A region reaches so many edges around what meets, before the flow and after it.
 REACH = 5
+# Vertices of a region at most for which distances of all that is close are kept.
+MOST_HELD = 20_000
 # Rings of vertices around faces that intersect, in the rounds of mending; beyond them the blend takes as many again.
 RINGS = (1, 2, 3, 4, 6, 8)
 # Times that pairs which others have been moved into are taken apart with those.
@@ -38,48 +42,6 @@ SEPARATIONS = 8
 FARTHEST = 0.02
 MOST_FACES = 0.05
 FEW_FACES = 1000
-
-
-class NewCrossings:
-    """Tells pairs of triangles that newly intersect from those that did at `before` (n,3), of which it looks for no
-    more than it is asked about."""
-
-    def __init__(self, before: np.ndarray, faces: FaceCrossings) -> None:
-        """Nothing is known yet about which triangles intersect at positions `before` (n,3)."""
-        self.before, self.faces = before, faces
-        self._asked = np.zeros(len(before), bool)
-        self._old = np.zeros(0, np.int64)
-
-    def pairs(self, after: np.ndarray, concerned: np.ndarray | None = None) -> np.ndarray:
-        """Pairs (k,2) that intersect at positions `after` (n,3), and neither did before nor had neighbours that did: a
-        line along which parts meet moves on from face to face. Only pairs with a triangle that is `concerned` (m,) bool
-        where this is given."""
-        triangles = self.faces.triangles
-        found = self.faces.pairs(after, concerned)
-        if not len(found):
-            return found
-        near = np.zeros(len(self.before), bool)
-        near[triangles[found]] = True
-        near &= ~self._asked
-        if near.any():
-            old = self.faces.pairs(self.before, near[triangles].any(axis=1))
-            old = np.concatenate([old, old[:, ::-1]])
-            self._old = np.union1d(self._old, _vertex_pairs(triangles, old))
-            self._asked |= near
-        return found[~np.isin(_vertex_pairs(triangles, found), self._old).any(axis=1)]
-
-
-def new_intersections(before: np.ndarray, after: np.ndarray, faces: FaceCrossings) -> np.ndarray:
-    """Pairs (k,2) of triangles (m,3) that intersect at positions `after` (n,3) and did not at `before` (n,3); see
-    `NewCrossings`."""
-    return NewCrossings(before, faces).pairs(after)
-
-
-def _vertex_pairs(triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Keys (k,9) of a vertex of one and a vertex of the other of pairs (k,2) of triangles (m,3)."""
-    count = np.int64(triangles.max(initial=0) + 1)
-    one, other = triangles[pairs[:, 0]].astype(np.int64), triangles[pairs[:, 1]]
-    return (one[:, :, None] * count + other[:, None, :]).reshape(len(pairs), 9)
 
 
 def without_new_intersections(
@@ -133,11 +95,6 @@ def neighbours(triangles: np.ndarray, n: int) -> sp.csr_matrix:
     """Which of n vertices an edge of the triangles (m,3) joins: (n,n), entries positive."""
     tail, head = halfedges(triangles)
     return sp.csr_matrix((np.ones(2 * len(tail)), (np.r_[tail, head], np.r_[head, tail])), shape=(n, n))
-
-
-def touched(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Which triangles (m,) bool have a vertex that is elsewhere."""
-    return (before != after).any(axis=1)[triangles].any(axis=1)
 
 
 def _too_many(pairs: np.ndarray, triangles: np.ndarray) -> bool:
@@ -286,9 +243,20 @@ def _advanced(region: FlowRegion, state, steps: list[FlowStep], domain) -> tuple
     if domain is not None:
         target = domain.held(target)
     best, left = taken_apart((state[0], target), region.crossings, region.free)
-    if len(left) <= len(state[1]) or len(steps) == 1:
+    if len(left) <= len(state[1]):
         return best, left
+    if len(steps) == 1:
+        # From where faces meet, no barrier leads to where they do not.
+        nearer = best if len(state[1]) else closer(region, state[0], target)
+        meeting = region.crossings.pairs(nearer)
+        return (nearer, meeting) if len(meeting) < len(left) else (best, left)
     single = state
     for step in steps:
         single = _advanced(region, single, [step], domain)
     return single if len(single[1]) < len(left) else (best, left)
+
+
+def closer(region: FlowRegion, start: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Positions (r,3) of a region as near to a target (r,3) as faces let them come from a start (r,3) in which none
+    newly intersect; the target itself where the region is too large for that."""
+    return target if len(region.rows) > MOST_HELD else brought(start, target, region.crossings, region.free)

@@ -7,25 +7,23 @@ moment has a field of its own, of as many unknowns as there are handles then.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from ..errors import EmptyMeshError, HandleError, NonFiniteError
 from ..progress import Progress, Steps
-from .creases import PIECES, NewCrossings, farthest_mended, march, region_around, taken_apart, touched
+from .creases import PIECES, march, region_around
 from .domain import FlowDomain
-from .enclosed_volume import EnclosedParts, restore_volumes
 from .handles import FlowHandle, check_handles, farthest_points, joined, sampled_handles
 from .integration import BLOCK, FlowStep, carried, planned_steps
 from .kernel import FlowField, conditions, interpolated_field
 from .options import STRAIGHT, FlowOptions
 from .passing import Passing, closest_passing, greatest_surge
 from .paths import handle_paths
-from .self_intersections import FaceCrossings
+from .shape import FlowShape, SoundFrame
 
-# Rounds of giving volumes back after faces were taken apart on the way.
-SETTLINGS = 4
+# Times that what is looked at on the way is widened by what that brings into it.
+REGIONS = 3
 # Points on which steps are planned, besides those next to the handles.
 PROBES = 300
 # Samples of walls are this share of the radius apart: closer, and they make the equations ill-conditioned.
@@ -143,10 +141,10 @@ def flow(
     return replace(rough, steps=sum(map(len, plan)), missed=missed, surge=surge, warnings=warnings)
 
 
-def _shape(points: np.ndarray, triangles: np.ndarray | None, handles: tuple[FlowHandle, ...]) -> _Shape:
+def _shape(points: np.ndarray, triangles: np.ndarray | None, handles: tuple[FlowHandle, ...]) -> FlowShape:
     """Points (n,3) with their triangles (m,3), none in the plane."""
     flat = triangles is None or points.shape[1] == 2
-    return _Shape(points, np.zeros((0, 3), np.int64) if flat else np.asarray(triangles), _free(len(points), handles))
+    return FlowShape(points, np.zeros((0, 3), np.int64) if flat else np.asarray(triangles), _free(len(points), handles))
 
 
 @dataclass(frozen=True)
@@ -164,7 +162,7 @@ class _Journey:
         return _plan(self.way, self.everything, self.options, self.count, frames)
 
 
-def _sound(frames: list[np.ndarray], shape: _Shape, journey: _Journey) -> Steps[Flow]:
+def _sound(frames: list[np.ndarray], shape: FlowShape, journey: _Journey) -> Steps[Flow]:
     """Frames, positions (n,3) each, with their volumes given back, and figures of these; the others are to come."""
     drift = shape.changes(frames[-1])
     found = []
@@ -186,102 +184,33 @@ def _sound(frames: list[np.ndarray], shape: _Shape, journey: _Journey) -> Steps[
     )
 
 
-def _apart_on_the_way(found: list[_Sound], shape: _Shape, journey: _Journey) -> Steps[list[_Sound]]:
+def _apart_on_the_way(found: list[SoundFrame], shape: FlowShape, journey: _Journey) -> Steps[list[SoundFrame]]:
     """Frames, from the first with faces that newly intersect on with those taken apart piece by piece of the way."""
     first = next(k for k, one in enumerate(found) if len(one.pairs))
     pairs = np.concatenate([one.pairs for one in found[first:]])
     mended = np.any([one.mended for one in found[first:]], axis=0)
     move = (journey.everything[: journey.count], found[-1].positions / journey.size)
-    region = region_around(move, shape.triangles, pairs, mended, shape.free)
     pieces = -(-PIECES // len(found))
     plan, _ = journey.plan(pieces * len(found))
-    through = yield from march(region, plan, journey.way.domain)
     result = list(found)
-    for k in range(first, len(found)):
-        position = found[k].positions.copy()
-        mine = region.rows[region.free]
-        position[mine] = through[(k + 1) * pieces - 1][region.free] * journey.size
-        settled = shape.settled(position, region.rows)
-        if len(settled.pairs) < len(found[k].pairs):
-            result[k] = settled
+    for _ in range(REGIONS):
+        region = region_around(move, shape.triangles, pairs, mended, shape.free)
+        through = yield from march(region, plan, journey.way.domain)
+        mine, left = region.rows[region.free], [pairs[:0]]
+        for k in range(first, len(found)):
+            position = found[k].positions.copy()
+            position[mine] = through[(k + 1) * pieces - 1][region.free] * journey.size
+            settled = shape.settled(position, region)
+            left.append(settled.pairs)
+            if len(settled.pairs) < len(result[k].pairs):
+                result[k] = settled
+        # What comes into faces beyond the region needs these in it.
+        beyond = np.concatenate(left)
+        beyond = beyond[~np.isin(shape.triangles[beyond], region.rows).all(axis=(1, 2))]
+        if not len(beyond):
+            break
+        pairs = np.concatenate([pairs, beyond])
     return result
-
-
-@dataclass(frozen=True)
-class _Sound:
-    """Positions (n,3) of a frame, pairs (k,2) of triangles that newly intersect, and what was mended (n,) bool."""
-
-    positions: np.ndarray
-    pairs: np.ndarray
-    mended: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """Points (n,3) before the flow, triangles (m,3), none in the plane, and which points (n,) bool may be put right."""
-
-    points: np.ndarray
-    triangles: np.ndarray
-    free: np.ndarray
-
-    @cached_property
-    def parts(self) -> EnclosedParts:
-        """Connected parts of the triangles."""
-        return EnclosedParts.of(self.triangles, len(self.points))
-
-    @cached_property
-    def crossings(self) -> NewCrossings:
-        """What is asked which triangles newly intersect."""
-        return NewCrossings(self.points, FaceCrossings(self.triangles))
-
-    def changes(self, after: np.ndarray) -> np.ndarray:
-        """Relative changes (c,) of the volumes of closed parts."""
-        if not len(self.triangles):
-            return np.zeros(0)
-        old, new = self.parts.volumes(self.points), self.parts.volumes(after)
-        closed = self.parts.closed & (old != 0)
-        return (new[closed] - old[closed]) / np.abs(old[closed])
-
-    def sound(self, after: np.ndarray, mend: bool) -> _Sound:
-        """Positions with the volumes of before and, with `mend`, no faces that newly intersect; pairs that still do."""
-        none, nothing = np.zeros((0, 2), np.int64), np.zeros(len(after), bool)
-        if not len(self.triangles):
-            return _Sound(after, none, nothing)
-        restored, _ = restore_volumes(self.points, after, self.parts, self.free)
-        if not mend:
-            return _Sound(restored, none, nothing)
-        concerned = touched(self.points, restored, self.triangles)
-        move, farthest = (self.points, restored), farthest_mended(self.points, self.triangles)
-        mended, pairs = taken_apart(move, self.crossings, self.free, farthest, concerned)
-        if mended is restored:
-            return _Sound(restored, pairs, nothing)
-        # What has not been mended keeps its place, and needs no further look.
-        moved = (mended != restored).any(axis=1)
-        around = np.zeros(len(moved), bool)
-        around[self.triangles[moved[self.triangles].any(axis=1)]] = True
-        result, _ = restore_volumes(self.points, mended, self.parts, self.free & around)
-        concerned = around[self.triangles].any(axis=1)
-        concerned[pairs] = True
-        return _Sound(result, self.crossings.pairs(result, concerned), moved)
-
-    def settled(self, apart: np.ndarray, rows: np.ndarray) -> _Sound:
-        """The same of positions `apart` (n,3) with faces apart; of these, vertices (r,) may move."""
-        inside = np.zeros(len(apart), bool)
-        inside[rows] = True
-        concerned, movable = inside[self.triangles].any(axis=1), self.free & inside
-        for _ in range(SETTLINGS):
-            restored, _ = restore_volumes(self.points, apart, self.parts, movable)
-            mine, farthest = self.free & inside, farthest_mended(self.points, self.triangles)
-            mended, pairs = taken_apart((apart, restored), self.crossings, mine, farthest, concerned)
-            if mended is restored:
-                break
-            # What had to go back does not take part in the next round.
-            movable = movable & (mended == restored).all(axis=1)
-            apart = mended
-        else:
-            restored, _ = restore_volumes(self.points, apart, self.parts, movable)
-            pairs = self.crossings.pairs(restored, concerned)
-        return _Sound(restored, pairs, inside)
 
 
 def _checked(points: np.ndarray, handles: tuple[FlowHandle, ...], options: FlowOptions) -> float:

@@ -34,7 +34,7 @@ class FlowOptions:
     radius: float = 0.2
     path: str = RIGID
     samples: int = 32
-    tolerance: float = 5e-5
+    tolerance: float = 1e-5
     diagonal: float = 0.0
     spacing: float = SPACING
     most_samples: int = MOST_SAMPLES

@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from ..contact.new_crossings import NewCrossings, touched
+from ..contact.self_intersections import FaceCrossings
 from ..mesh.topology import vertices_around
-from .creases import NewCrossings, neighbours, touched
-from .self_intersections import FaceCrossings
+from .creases import neighbours
 
 # Times that what meets is looked for and smoothed; rings of vertices around it, one more every few rounds.
 ROUNDS = 60

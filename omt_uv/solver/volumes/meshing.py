@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..contact.self_intersections import intersecting_pairs
 from ..errors import LibraryError, SelfIntersectionError, TetrahedraError
 from ..flows.enclosed_volume import corner_volumes
-from ..flows.self_intersections import intersecting_pairs
 from ..mesh.topology import halfedges
 from .tet_mesh import EDGES, tet_volumes
 

@@ -10,7 +10,7 @@ from sphere_shapes import blob
 from omt_uv.pipelines.shapes import wrap
 from omt_uv.pipelines.shapes.landmark_pairs import LandmarkPoint, Pairs
 from omt_uv.pipelines.shapes.match import MatchJob, match_surfaces
-from omt_uv.solver.flows.self_intersections import intersecting_pairs
+from omt_uv.solver.contact.self_intersections import intersecting_pairs
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.progress import drain
 from omt_uv.solver.registration.results import RegistrationOptions

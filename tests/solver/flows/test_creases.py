@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from bodies import icosphere
 
-from omt_uv.solver.flows.creases import FlowRegion, NewCrossings, march, new_intersections, region_around
+from omt_uv.solver.contact.new_crossings import NewCrossings, new_intersections
+from omt_uv.solver.contact.self_intersections import FaceCrossings
+from omt_uv.solver.flows.creases import FlowRegion, march, region_around
 from omt_uv.solver.flows.flow_map import flow
 from omt_uv.solver.flows.handles import FlowHandle
 from omt_uv.solver.flows.integration import FlowStep
 from omt_uv.solver.flows.options import FlowOptions
-from omt_uv.solver.flows.self_intersections import FaceCrossings
 from omt_uv.solver.progress import drain
 
 

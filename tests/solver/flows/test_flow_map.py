@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from bodies import icosphere, limbed
 
+from omt_uv.solver.contact.new_crossings import new_intersections
+from omt_uv.solver.contact.self_intersections import FaceCrossings, intersecting_pairs
 from omt_uv.solver.errors import EmptyMeshError, HandleError, NonFiniteError
-from omt_uv.solver.flows.creases import new_intersections, without_new_intersections
+from omt_uv.solver.flows.creases import without_new_intersections
 from omt_uv.solver.flows.domain import ball_domain, mesh_domain
 from omt_uv.solver.flows.enclosed_volume import EnclosedParts, component_volumes, restore_volumes, vertex_normals
 from omt_uv.solver.flows.flow_map import flow
 from omt_uv.solver.flows.handles import FlowHandle
 from omt_uv.solver.flows.integration import carried, planned_steps
 from omt_uv.solver.flows.options import PATHS, FlowOptions
-from omt_uv.solver.flows.self_intersections import FaceCrossings, intersecting_pairs
 from omt_uv.solver.progress import Progress, drain
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from bodies import icosphere
 
-from omt_uv.solver.flows.self_intersections import FaceCrossings, intersecting_pairs
+from omt_uv.solver.contact.self_intersections import FaceCrossings, intersecting_pairs
 from omt_uv.solver.flows.smoothing import smoothed_apart
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from bodies import icosphere
 
-from omt_uv.solver.flows import separation
+from omt_uv.solver.contact import separation
+from omt_uv.solver.contact.self_intersections import FaceCrossings, intersecting_pairs
+from omt_uv.solver.contact.separation import separated
 from omt_uv.solver.flows.creases import without_new_intersections
-from omt_uv.solver.flows.self_intersections import FaceCrossings, intersecting_pairs
-from omt_uv.solver.flows.separation import separated
 
 
 def two_balls(gap):

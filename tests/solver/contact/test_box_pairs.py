@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from omt_uv.solver.flows.box_pairs import box_pairs
+from omt_uv.solver.contact.box_pairs import box_pairs
 
 
 def by_comparison(low, high, concerned=None):
