@@ -29,7 +29,7 @@ REMEDIES: dict[type[errors.MeshError], str] = {
     errors.NoRegionError: "Paint the region first",
     errors.UniformWeightsError: "Paint a part only",
     errors.EmptyRegionError: "Paint a region with area",
-    errors.SoftRegionError: "Paint the region with weight 1 and the rest with 0",
+    errors.SoftRegionError: "Choose a factor nearer to 1, or paint the region with weight 1 and the rest with 0",
 }
 
 # What warnings advise in the middle of a sentence.

@@ -212,7 +212,7 @@ class EmptyRegionError(ShareError):
 class SoftRegionError(ShareError):
     """Weights in between 0 and 1 do not let a region have its share."""
 
-    remedy = "Mark the region with weight 1 and the rest with 0"
+    remedy = "Choose a factor nearer to 1, or mark the region with weight 1 and the rest with 0"
 
 
 class PinError(MeshError):

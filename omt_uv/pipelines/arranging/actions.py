@@ -57,7 +57,7 @@ def symmetrize_islands(readings: Sequence[Reading], axis: int, on_one_another: b
         changed += int((done.partner >= 0).sum())
         alone += int((done.partner < 0).sum())
     warnings = [(-1, f"{alone} islands have no image on the other side, and stay as they are")] if alone else []
-    return arranged(len(readings), found, uv, changed, warnings)
+    return arranged(len(readings), found, uv, changed, warnings, apart=not on_one_another)
 
 
 def rectify_islands(readings: Sequence[Reading]) -> Arranged:
@@ -80,7 +80,7 @@ def rectify_islands(readings: Sequence[Reading]) -> Arranged:
         raise Refusal(0, last)
     left = len(found) - changed
     warnings = [(-1, f"{left} islands are no grids of quads, and stay as they are")] if left else []
-    return arranged(len(readings), found, uv, changed, warnings)
+    return arranged(len(readings), found, uv, changed, warnings, apart=True)
 
 
 def _rectified(reading: Reading, island: Island) -> np.ndarray:

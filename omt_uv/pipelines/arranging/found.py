@@ -9,7 +9,7 @@ import numpy as np
 
 from ...solver.editing.uv_islands import Island, uv_islands
 from ...solver.errors import EmptyMeshError, MeshError
-from ..layout import PlacedIsland, Refusal, corner_uvs
+from ..layout import PlacedIsland, Refusal, corner_uvs, grown_together
 from ..reading import Reading
 
 
@@ -49,10 +49,17 @@ def islands_of(readings: Sequence[Reading]) -> list[PlacedUV]:
     return found
 
 
-def arranged(count: int, found: Sequence[PlacedUV], uv: Sequence[np.ndarray], changed: int, warnings=()) -> Arranged:
-    """What is written to `count` readings, of new UVs (n_i,2) of their islands."""
+def arranged(
+    count: int, found: Sequence[PlacedUV], uv: Sequence[np.ndarray], changed: int, warnings=(), apart: bool = False
+) -> Arranged:
+    """What is written to `count` readings, of new UVs (n_i,2) of their islands.
+
+    apart : islands are to lie beside one another; a warning says where they do not any more
+    """
     placed = [
-        PlacedIsland(owner=each.owner, chart=each.island.chart, uv=new) for each, new in zip(found, uv, strict=True)
+        PlacedIsland(owner=each.owner, chart=each.island.chart, uv=new, before=each.island.uv)
+        for each, new in zip(found, uv, strict=True)
     ]
     corners, values = corner_uvs(count, placed)
-    return Arranged(corners, values, changed, list(warnings))
+    warning = grown_together(placed) if apart else ""
+    return Arranged(corners, values, changed, [*warnings, *([(-1, warning)] if warning else [])])

@@ -15,6 +15,8 @@ FEWEST = 12
 WIDEST = 2 * np.pi / 3
 # A vertex where the outline turns by less than this, in radians, lies on a side.
 STRAIGHT = 0.02
+# Greatest distance of a vertex from the side it lies on, over the size of the outline.
+BENT = 5e-3
 # Of the outline's vertices at least this share has to lie on sides, where it has more than four corners.
 MOSTLY = 0.6
 
@@ -47,7 +49,10 @@ def recognise_outline(w: np.ndarray, loop: np.ndarray) -> Outline:
         return Outline(kind="circle", motion=CircleMotion(loop, radius, len(w)), w=moved, centre=centre)
     corner = np.abs(_turns(polygon)) >= STRAIGHT
     if corner.sum() >= 3 and (corner.sum() <= 4 or corner.mean() <= 1 - MOSTLY):
-        return _on_sides(w, loop, corner)
+        found = _on_sides(w, loop, corner)
+        # A long curve turns by little at each vertex, and is no side all the same.
+        if np.abs(found.w - w)[loop].max() <= BENT * np.abs(polygon - polygon.mean()).max():
+            return found
     return Outline(kind="free", motion=free_motion(len(w)), w=w, centre=0j)
 
 

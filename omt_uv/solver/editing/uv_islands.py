@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import FoldedUVError, NonManifoldEdgeError, OrientationError
+from ..errors import DISSOLVE, FoldedUVError, NonManifoldEdgeError, OrientationError, ZeroAreaFaceError
 from ..maps.distortion import WELD
 from ..mesh.charts import Chart, charts_of
 from ..mesh.geometry import face_areas
@@ -17,6 +17,9 @@ from ..mesh.gluing import orientations, turn_over
 from ..mesh.repair import repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import graph_components, pair_keys
+
+# Share of its box, in space and in the map, below which an island has no area.
+NOTHING = 1e-14
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,7 @@ def uv_islands(surface: Surface, uv: np.ndarray, faces: np.ndarray | None = None
     """Whole islands of UVs (c,2) that contain one of the polygons `faces` (f,) bool; all islands by default.
 
     Two corners of a vertex are one UV vertex where they are nearer than `distortion.WELD` of the extent of the UVs.
+    Islands without area in space and in the map are left out, with a warning.
 
     Raises
     ------
@@ -72,13 +76,20 @@ def uv_islands(surface: Surface, uv: np.ndarray, faces: np.ndarray | None = None
             elements=np.unique(owner[one_sided]),
         )
     extent = float(np.ptp(surface.positions, axis=0).max())
-    islands = []
+    islands, nothing = list[Island](), 0
     for chart in charts_of(welded, turn_over(gluing, turned)):
-        sound, _ = with_area(replace(chart, vertex_ids=origin[chart.vertex_ids]), extent)
         place = np.empty((len(chart.vertices), 2))
         place[chart.triangles] = uv[chart.corners]
+        flat = (face_areas(chart.vertices, chart.triangles).sum() / extent**2, np.ptp(place, axis=0).prod())
+        if max(flat) <= NOTHING:
+            nothing += len(np.unique(chart.faces))
+            continue
+        sound, _ = with_area(replace(chart, vertex_ids=origin[chart.vertex_ids]), extent)
         islands.append(Island(sound, place))
-    return Islands(islands, repaired.warnings)
+    if nothing and not islands:
+        raise ZeroAreaFaceError("No face of the UVs has an area", kind="face", elements=np.unique(owner))
+    more = (f"{nothing} faces have no area, neither in space nor in the UVs, and stay; {DISSOLVE}",) if nothing else ()
+    return Islands(islands, (*repaired.warnings, *more))
 
 
 def _welded(surface: Surface, uv: np.ndarray) -> tuple[Surface, np.ndarray]:

@@ -69,3 +69,22 @@ def test_what_cannot_be_arranged_is_said_and_changes_nothing():
     scenes.select([bare])
     for operator in (bpy.ops.uv.omt_stack, bpy.ops.uv.omt_symmetrize, bpy.ops.uv.omt_rectify):
         assert "Unwrap the mesh first" in scenes.error_of(operator)
+
+
+def test_rectangles_that_cover_each_other_are_said(capfd):
+    """Two bent strips lie within each other's bends; their rectangles do not fit there."""
+    turn = np.pi * np.linspace(0, 1, 13)
+    points, faces = [], []
+    for radius, thick in ((1.0, 0.2), (0.7, 0.2)):
+        first = len(points)
+        for t in turn:
+            points += [(r * np.cos(t), r * np.sin(t), 0.0) for r in (radius, radius - thick)]
+        faces += [
+            (first + 2 * k, first + 2 * k + 1, first + 2 * k + 3, first + 2 * k + 2) for k in range(len(turn) - 1)
+        ]
+    obj = scenes.add(points, faces)
+    layer = obj.data.uv_layers.new()
+    for loop in obj.data.loops:
+        layer.data[loop.index].uv = obj.data.vertices[loop.vertex_index].co[:2]
+    assert bpy.ops.uv.omt_rectify() == {"FINISHED"}
+    assert "grew into each other" in capfd.readouterr().out

@@ -69,3 +69,11 @@ def test_a_circle_is_found_from_points_that_lie_on_it_unevenly():
 def test_half_a_disk_is_no_circle():
     half = np.exp(1j * np.linspace(0, np.pi, 30))
     assert recognise_outline(half, np.arange(30)).kind != "circle"
+
+
+def test_a_long_curve_that_turns_by_little_at_every_vertex_is_no_side():
+    """A strip bent into half a ring, as that of a knotted tube: four corners, and no straight line between two."""
+    t = np.pi * np.linspace(0, 1, 400)
+    outline = np.concatenate([1.1 * np.exp(1j * t), np.exp(1j * t[::-1])])
+    found = recognise_outline(outline, np.arange(len(outline)))
+    assert found.kind == "free" and np.array_equal(found.w, outline)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.editing.uv_islands import uv_islands
-from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError
+from omt_uv.solver.errors import FoldedUVError, NonManifoldEdgeError, ZeroAreaFaceError
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 
@@ -74,3 +74,17 @@ def test_islands_do_not_depend_on_where_the_uvs_lie(change):
     for a, b in zip(own, other, strict=True):
         np.testing.assert_array_equal(a.chart.triangles, b.chart.triangles)
         assert abs(signed_areas(b.uv, b.chart.triangles).sum()) > 0
+
+
+def test_islands_without_any_area_are_left_out_and_said():
+    """Letters of a text have such faces: nothing is to be refined of them, and they stop nothing."""
+    V, F, uv = bump()
+    V = np.concatenate([V, [[2, 0, 0], [3, 0, 0], [4, 0, 0]]])
+    surface = triangle_surface(V, np.concatenate([F, len(V) - 3 + np.arange(3)[None]]))
+    corners = np.concatenate([corner_uv(F, uv), [[0.5, 2], [0.5, 2.5], [0.5, 3]]])
+    found = uv_islands(surface, corners)
+    assert len(found.islands) == 1 and len(found.islands[0].chart.faces) == len(F)
+    assert [w.split()[0] for w in found.warnings] == ["1"] and "no area" in found.warnings[0]
+    faces = np.arange(len(F) + 1) == len(F)
+    with pytest.raises(ZeroAreaFaceError):
+        uv_islands(surface, corners, faces)
