@@ -145,9 +145,12 @@ class _AreaProblem:
         return np.argsort(place[self.free])
 
     def residual(self, uv: np.ndarray) -> np.ndarray:
-        """Share of the area less the target share, times `scale`, (m,), with the points at uv (k,2)."""
+        """Share of the area less the target share, times `scale`, (m,), with the points at uv (k,2); infinite without
+        area."""
         areas = signed_areas(self.unfolded.with_points(uv).corners(), self.triangles)
-        return (areas / areas.sum() - self.shares) * self.scale
+        total = areas.sum()
+        # A step that goes too far may press all of a small globe onto one edge.
+        return (areas / total - self.shares) * self.scale if total > 0 else np.full(len(areas), np.inf)
 
     def emphasise_folds(self, uv: np.ndarray) -> bool:
         """Let faces that are folded at uv (k,2) count more from now on; whether there are any."""

@@ -95,3 +95,16 @@ def test_lengths_on_the_sphere_are_those_of_the_projection():
             inside = slice(2, -2)
             np.testing.assert_allclose(found[inside, axis], true[inside], rtol=1e-5)
     np.testing.assert_allclose(exact_areas._sphere_metric(unfolded, OCTAHEDRAL), 4 * np.pi)
+
+
+def test_a_step_that_presses_a_globe_flat_is_none():
+    """As small globes have them: without an error, and never taken."""
+    P, F = random_sphere(20)
+    polygons = triangle_polygons(F)
+    unfolded, _ = unfold(P, polygons, LAMBERT)
+    shares = spherical_areas(P, F) / (4 * np.pi)
+    metric = exact_areas._sphere_metric(unfolded, LAMBERT)
+    problem = exact_areas._AreaProblem(unfolded, polygons, shares, metric, True)
+    with np.errstate(all="raise"):
+        assert problem.energy(0 * unfolded.uv) == np.inf
+        assert problem.energy(unfolded.uv) < np.inf
