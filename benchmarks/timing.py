@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 import time
+from pathlib import Path
 
 
 def timed(work):
@@ -27,4 +28,9 @@ def fastest_of(runs, work):
 
 def peak_mib() -> int:
     """Peak memory of this process so far, in MiB."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        # What the system counts for a process begins with the peak of the one that started it.
+        (line,) = (line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
+        return int(line.split()[1]) // 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024

@@ -50,3 +50,27 @@ def test_objects_without_uvs_are_refused_by_their_index(package, session):
     with pytest.raises(package("pipelines.layout").Refusal) as caught:
         session(plain("A"), scenes.bump(name="B"))
     assert caught.value.index == 1
+
+
+def test_figures_of_several_islands_are_those_of_all_their_faces(package, session):
+    """Polygons of different objects have the same numbers, and are not the same."""
+    first, second = plain("A"), plain("B")
+    second.scale = 1.5, 0.7, 1.0
+    bpy.context.view_layer.update()
+    live = session(first, second)
+    found = live.figures()
+    single = [session(obj).figures() for obj in (first, second)]
+    assert found.area_l1 >= min(f.area_l1 for f in single) - 1e-9 and found.folds == sum(f.folds for f in single)
+    V, F, uv, polygons = [], [], [], []
+    for island in live._islands:
+        begin = sum(map(len, V))
+        V.append(island.chart.vertices)
+        F.append(island.chart.triangles + begin)
+        uv.append(island.live_map.uv[island.chart.triangles])
+        polygons += [(len(V), face) for face in island.chart.faces]
+    label = np.unique(polygons, axis=0, return_inverse=True)[1].ravel()
+    asked = package("solver.maps.distortion").distortion(
+        *map(np.concatenate, (V, F, uv)), overlap=False, polygons=label
+    )
+    for name in ("area_l1", "area_sd", "angle_mean", "folds"):
+        assert getattr(found, name) == pytest.approx(getattr(asked, name)), name

@@ -46,7 +46,10 @@ def _in_own_frame(points: np.ndarray) -> np.ndarray:
     extent = float(np.ptp(points / 2, axis=0).max())
     if not extent > 0:
         return points
-    p = (points - points.mean(axis=0)) / (2 * extent)
+    # By a power of two, which rounds nothing: sums of huge coordinates are infinite.
+    power = np.frexp(extent)[1]
+    p = np.ldexp(points, -power)
+    p = (p - p.mean(axis=0)) / (2 * np.ldexp(extent, -power))
     values, axes = np.linalg.eigh(p.T @ p / len(p))
     skew = ((p @ axes) ** 3).mean(axis=0)
     if np.diff(values).min() < DISTINCT * values[-1] or np.sort(np.abs(skew))[1] < DISTINCT * values[-1] ** 1.5:

@@ -126,9 +126,19 @@ def triangle_rows(surface: Surface, chart: Chart) -> np.ndarray:
         ordered = np.sort(triangles, axis=1)
         return pair_keys(ordered[:, 0], ordered[:, 1])
 
-    keys = key(surface.triangles)
-    order = np.argsort(keys)
-    return order[np.searchsorted(keys[order], key(chart.corners))]
+    def found_among(rows: np.ndarray) -> tuple[np.ndarray, bool]:
+        keys = key(surface.triangles[rows])
+        order = np.argsort(keys)
+        at = order[np.minimum(np.searchsorted(keys[order], asked), len(rows) - 1)] if len(rows) else rows
+        return rows[at], len(at) == len(asked) and bool((keys[at] == asked).all())
+
+    # Triangles nearly always come in the order of their polygons: a small chart then takes no look at the others.
+    asked, polygons = key(chart.corners), np.unique(chart.faces)
+    first = np.searchsorted(surface.triangle_face, polygons)
+    count = np.searchsorted(surface.triangle_face, polygons, side="right") - first
+    begin = np.cumsum(count) - count
+    found, right = found_among(np.repeat(first - begin, count) + np.arange(count.sum()))
+    return found if right else found_among(np.arange(len(surface.triangles)))[0]
 
 
 def check_edges(chart: Chart) -> None:

@@ -34,6 +34,8 @@ def in_order_of_places(chart: Chart) -> tuple[Chart, np.ndarray]:
 
     Vertex k is the given chart's order[k].
     """
+    if len(chart.vertices) == 3 == chart.corners.size:
+        return _lone_triangle(chart)
     order = order_of_places(chart.vertices, chart.disk)
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
@@ -50,6 +52,26 @@ def in_order_of_places(chart: Chart) -> tuple[Chart, np.ndarray]:
         faces=chart.faces[rows],
         vertex_ids=chart.vertex_ids[order],
         patches=patches[np.lexsort(patches.T[::-1])],
+    )
+    return found, order
+
+
+def _lone_triangle(chart: Chart) -> tuple[Chart, np.ndarray]:
+    """`in_order_of_places` of a triangle: thousands of them would wait for principal axes. The longest side is last."""
+    p = chart.vertices / (np.abs(chart.vertices).max() or 1.0)
+    side = ((p[[1, 2, 0]] - p[[2, 0, 1]]) ** 2).sum(axis=1)
+    order = np.lexsort((*p.T, side))
+    corner = np.argsort(chart.triangles[0])[order]
+    # Counter-clockwise as it was, from the first vertex on.
+    even = (corner[1] - corner[0]) % 3 == 1
+    turn = corner if even else corner[[0, 2, 1]]
+    triangles = np.array([[0, 1, 2]] if even else [[0, 2, 1]])
+    found = replace(
+        chart,
+        vertices=chart.vertices[order],
+        triangles=triangles,
+        corners=chart.corners[:, turn],
+        vertex_ids=chart.vertex_ids[order],
     )
     return found, order
 
@@ -72,12 +94,12 @@ def cut_as_given(chart: Chart, cut: Surface, given: Surface) -> Chart:
     changed = np.flatnonzero((cut.triangles[rows] != given.triangles[rows]).any(axis=1))
     if not len(changed):
         return chart
-    vertex = np.full(len(given.corner_vertex), -1)
-    vertex[chart.corners.ravel()] = chart.triangles.ravel()
+    known = np.argsort(chart.corners, axis=None)
     before, now = (lowest_first(x)[0] for x in (cut.triangles[rows[changed]], chart.corners[changed]))
     corners = given.triangles[rows[changed]]
     # Faces may have been turned over for the map.
     corners = np.where((before[:, 1] != now[:, 1])[:, None], corners[:, [0, 2, 1]], corners)
     triangles, every = chart.triangles.copy(), chart.corners.copy()
-    triangles[changed], every[changed] = vertex[corners], corners
+    at = known[np.searchsorted(chart.corners.ravel()[known], corners)]
+    triangles[changed], every[changed] = chart.triangles.ravel()[at], corners
     return replace(chart, triangles=triangles, corners=every)

@@ -38,6 +38,9 @@ from .small_charts import is_small, map_together
 CUTTING = 0.15
 MAPPING = 0.7
 
+# Charts and their maps.
+_Drawn = tuple[list[Chart], list[ChartMap]]
+
 
 @dataclass(frozen=True)
 class SurfaceMap:
@@ -128,10 +131,9 @@ def unwrap(
         further = bound_shear(cut.search, prepared, maps, task.map_charts, crossing)
         found = yield from part_of(further, begin + width, 1 - begin - width)
         prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps
-    maps = yield from task.finished(prepared.charts, maps, given)
+    charts, maps = yield from task.finished(prepared.charts, maps, given)
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, prepared.charts, maps, given)
-    charts = [cut_as_given(chart, surface, given) for chart in prepared.charts]
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
@@ -144,7 +146,7 @@ def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Su
     free, again = replace(task, options=replace(task.options, boundary="free")), [charts[k] for k in folded]
     try:
         found = yield from free.map_charts(again)
-        found = yield from free.finished(again, found, given)
+        _, found = yield from free.finished(again, found, given)
     except MeshError:
         # The maps that there are have no error.
         return maps
@@ -254,13 +256,13 @@ class _Task:
         places = [np.argsort(in_order_of_places(chart)[1]) for chart in charts]
         return [replace(one, uv=one.uv[place]) for one, place in zip(found, places, strict=True)]
 
-    def finished(self, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[list[ChartMap]]:
-        """The maps with convex polygons, and the folds of triangles as the surface has them as it was given."""
+    def finished(self, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[_Drawn]:
+        """Charts with the triangles of the surface as it was given; maps with convex polygons, and their folds counted."""
         if self.options.kind == "authalic":
             pins = [pins_of_chart(self.pins, chart) for chart in charts]
             maps = yield from with_convex_polygons(self.surface, charts, maps, pins, self.options, self.target, given)
         drawn = [cut_as_given(chart, self.surface, given) for chart in charts]
-        return [with_folds_counted(chart, chart_map) for chart, chart_map in zip(drawn, maps, strict=True)]
+        return drawn, [with_folds_counted(chart, chart_map) for chart, chart_map in zip(drawn, maps, strict=True)]
 
     def crossing(self, chart: Chart, chart_map: ChartMap) -> Steps[np.ndarray]:
         """A map (n,2) from another one on that may come to lie on itself."""

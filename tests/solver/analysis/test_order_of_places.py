@@ -2,6 +2,7 @@
 
 import meshes
 import numpy as np
+import pytest
 
 from omt_uv.solver.analysis.order_of_places import lowest_first, order_of_places
 
@@ -14,6 +15,14 @@ def test_the_order_of_a_file_plays_no_part():
     order = order_of_places(V[shuffle], other)
     assert np.array_equal(np.sort(order), np.arange(len(V)))
     assert np.array_equal(V[order_of_places(V, F)], V[shuffle][order])
+
+
+@pytest.mark.parametrize("power", [-1000, -40, 40, 1021])
+def test_the_unit_plays_no_part(power):
+    """Sums of coordinates near the largest number are infinite: a mesh there ended in an error of linear algebra."""
+    V, F = meshes.head()
+    V = V / np.abs(V).max()
+    assert np.array_equal(order_of_places(np.ldexp(V, power), F), order_of_places(V, F))
 
 
 def test_vertices_in_one_place_go_by_their_triangles():

@@ -24,6 +24,7 @@ from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.registration import alignment
+from omt_uv.solver.registration import coarse_start as coarse_start_module
 from omt_uv.solver.registration.carriers import DiskCarrier, SphereCarrier, TargetCarrier
 from omt_uv.solver.registration.coarse_meshes import coarse_mesh, far_vertices, laid_out, straightened
 from omt_uv.solver.registration.coarse_start import coarse_start
@@ -237,6 +238,25 @@ def test_of_two_starts_the_better_one_is_taken():
     found = drain(coarse_start(case))
     assert found.met.all() and (signed_volumes(found.placed.domain, pair.triangles) > 0).all()
     assert np.linalg.norm(found.placed.domain - aligned, axis=1).mean() < 0.05
+
+
+def test_landmarks_that_are_met_stay_so_in_every_stage_of_a_coarse_start():
+    V, F = blob(3, seed=4)
+    chosen = np.arange(0, len(V), 130)
+    pair = prepared((V, F), (V, F), vertex_landmarks((chosen, F), (chosen, F)), "sphere")
+    aligned = normalized(pair.vertices)
+    case = Case(pair, aligned, TargetCarrier(pair.target.vertices, F, aligned[np.argsort(pair.order)]), None)
+    mesh = coarse_start_module._whole(case)
+    start = normalized(aligned + 0.02 * np.sin(5 * aligned[:, [2, 0, 1]]))
+    start[mesh.landmarks] = case.targets.domain
+    relaxed = drain(coarse_start_module._relaxed(case, mesh, start))
+    guide = case.carrier.place(aligned).positions
+    met = np.ones(len(mesh.landmarks), bool)
+    guided = drain(coarse_start_module._guided(case, mesh, (start, met), guide, coarse_start_module.NEAR))
+    for found in (relaxed, guided):
+        others = np.setdiff1d(np.arange(len(V)), mesh.landmarks)
+        assert np.abs(found[others] - start[others]).max() > 1e-4
+        assert np.allclose(found[mesh.landmarks], start[mesh.landmarks], atol=1e-12)
 
 
 def problem_on(carrier, positions, triangles):

@@ -5,8 +5,11 @@ from dataclasses import replace
 import meshes
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
+from sphere_shapes import blob
 
 from omt_uv.solver.analysis.seam_costs import seam_costs
+from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.seams.coarse_surface import coarse_surface
@@ -14,7 +17,7 @@ from omt_uv.solver.seams.cut_tree import Task, cut_along, leaves, stretches
 from omt_uv.solver.seams.growth import grow
 from omt_uv.solver.seams.improvement import improved, trimmed
 from omt_uv.solver.seams.options import SearchOptions
-from omt_uv.solver.seams.path_graph import path_graph
+from omt_uv.solver.seams.path_graph import PathGraph, path_graph
 from omt_uv.solver.seams.predicted_scale import ScaleModel
 from omt_uv.solver.seams.search import SeamSearch
 
@@ -140,3 +143,32 @@ def test_what_shears_more_than_was_predicted_is_cut_though_nothing_was_before():
     search = SeamSearch(np.full(len(F), 10.0), surface, lambda: seam_costs(surface))
     assert not len(cut_to_disks(surface, search=search).cuts.edges)
     assert len(cut_to_disks(surface, search=replace(search, share=np.full(len(F), 0.5))).cuts.edges)
+
+
+def test_a_path_may_leave_the_mirror_plane_and_not_come_back():
+    """One step that comes back is enough, whatever the others do; a path within the plane never left it."""
+    ends = np.array([[0, 1], [1, 2], [2, 3], [1, 4], [4, 5]])
+    n, count = 6, np.arange(1, 6)
+    both = np.concatenate([ends, ends[:, ::-1]])
+    square = {
+        k: csr_matrix((np.tile(v, 2), both.T), shape=(n, n)) for k, v in (("matrix", count * 1.0), ("number", count))
+    }
+    # 0 is on the boundary, 1 and 2 are in the plane, and so is 5, behind 4, which is not.
+    boundary, in_plane = np.arange(n) == 0, np.isin(np.arange(n), [0, 1, 2, 5])
+    graph = PathGraph(ends, count * 1.0, boundary, np.arange(n), **square, in_plane=in_plane)
+    assert graph.is_open(np.array([0, 1, 2])) and graph.is_open(np.array([0, 3]))
+    assert not graph.is_open(np.array([0, 3, 4])) and not graph.is_open(np.arange(5))
+    assert replace(graph, in_plane=np.zeros(n, bool)).is_open(np.arange(5))
+
+
+def test_a_density_counts_by_its_ratios_alone():
+    V, F = blob(3, seed=2)
+    surface = triangle_surface(V, F)
+    density = np.exp(1.5 * V[F].mean(axis=1)[:, 0])
+    cuts = [
+        cut(
+            surface, search=SeamSearch(np.full(len(F), 0.1), surface, lambda: seam_costs(surface), density=c * density)
+        ).edges
+        for c in (1.0, 1e3)
+    ]
+    assert len(cuts[0]) and np.array_equal(*cuts)

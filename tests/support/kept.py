@@ -1,0 +1,51 @@
+"""Tables of what is an interface, kept in files: a change is seen, and made on purpose.
+
+OMT_UV_ACCEPT=1 writes the files anew; what changed in them is then a line in CHANGELOG.md.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+def check(path: Path, lines: list[str]) -> None:
+    """Compare lines with those of a file, which is written where that is asked for."""
+    if os.environ.get("OMT_UV_ACCEPT"):
+        path.write_text("\n".join(lines) + "\n")
+    kept, now = path.read_text().splitlines(), list(lines)
+    gone, new = [x for x in kept if x not in now], [x for x in now if x not in kept]
+    assert kept == now, "\n".join([*(f"- {x}" for x in gone), *(f"+ {x}" for x in new), "OMT_UV_ACCEPT=1 accepts this"])
+
+
+class Recorder:
+    """A layout that writes down what is drawn, and where that counts or can be chosen."""
+
+    def __init__(self, record: list[str], state: str = "") -> None:
+        self.__dict__.update(record=record, state=state, kept={})
+
+    def __setattr__(self, name, value) -> None:
+        if name in ("active", "enabled", "alert"):
+            self.__dict__["state"] = f"{self.state}{name[0]}{int(value)}"
+
+    def __getattr__(self, name):
+        if name in ("column", "row", "split", "box", "grid_flow", "column_flow"):
+            return lambda *_, **__: Recorder(self.record, self.state)
+        if name in ("emboss", "operator_context", "ui_units_x"):
+            return ""
+        return lambda *given, **named: self._written(name, given, named)
+
+    def _written(self, kind, given, named):
+        words = [x for x in given if isinstance(x, str)] + [f"{k}={v}" for k, v in named.items() if k != "icon_value"]
+        if kind not in ("separator", "context_pointer_set"):
+            self.record.append(f"{kind}({','.join(map(str, words))}){self.state}")
+        return type("Properties", (), {})()
+
+
+def plain(value) -> str:
+    """A value in few digits: those of single precision that Blender keeps."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, (list, tuple, set)) or (hasattr(value, "__len__") and not isinstance(value, str)):
+        return " ".join(map(plain, value))
+    return str(value)
