@@ -16,7 +16,7 @@ def rows(name, command):
         if isinstance(action, argparse._HelpAction):
             continue
         kind = type(action).__name__.strip("_").removesuffix("Action")
-        cells = [name, " ".join(action.option_strings) or action.dest, kind, plain(action.default)]
+        cells = [name, " ".join(action.option_strings) or action.dest, "", kind, plain(action.default)]
         cells += [plain(action.choices or ""), str(action.nargs), action.metavar or "", str(int(action.required))]
         yield "\t".join(" ".join(cell.split()) if isinstance(cell, str) else plain(cell) for cell in cells)
 

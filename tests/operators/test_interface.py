@@ -43,8 +43,8 @@ def row(prop) -> list[str]:
 def test_properties_are_those_of_the_table(package):
     lines = []
     for name, cls in operators(package):
-        lines.append("\t".join([name, cls.bl_label, " ".join(sorted(cls.bl_options))]))
-        lines += ["\t".join([name, p.identifier, *row(p), "hidden" if p.is_hidden else ""]) for p in own(name)]
+        lines.append("\t".join([name, "", "", cls.bl_label, " ".join(sorted(cls.bl_options))]))
+        lines += ["\t".join([name, p.identifier, "", *row(p), "hidden" if p.is_hidden else ""]) for p in own(name)]
     check(PROPERTIES, lines)
 
 
@@ -66,7 +66,7 @@ def values(prop):
 def drawn(draw, properties):
     record: list[str] = []
     draw(Recorder(record), properties)
-    return "; ".join(record)
+    return record
 
 
 def test_what_is_drawn_for_which_choice_is_that_of_the_table(package):
@@ -84,11 +84,13 @@ def test_what_is_drawn_for_which_choice_is_that_of_the_table(package):
         except (AttributeError, TypeError):
             # The module draws the settings of another one of its operators.
             continue
-        lines.append(f"{name}\t\t\t{before}")
+        lines += [f"{name}\t\t{entry}" for entry in before]
         for prop in own(name):
             for value in values(prop):
                 setattr(properties, prop.identifier, value)
                 now = drawn(draw, properties)
-                lines.append("\t".join([name, prop.identifier, plain(value), "" if now == before else now]))
+                other = [f"-{entry}" for entry in before if entry not in now]
+                other += [f"+{entry}" for entry in now if entry not in before]
+                lines.append("\t".join([name, prop.identifier, plain(value), *other]))
             properties.property_unset(prop.identifier)
     check(DRAWN, lines)

@@ -257,7 +257,7 @@ class _Task:
         return [replace(one, uv=one.uv[place]) for one, place in zip(found, places, strict=True)]
 
     def finished(self, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[_Drawn]:
-        """Charts with the triangles of the surface as it was given; maps with convex polygons, and their folds counted."""
+        """Charts with the triangles of the surface as it was given; maps with convex polygons, their folds counted."""
         if self.options.kind == "authalic":
             pins = [pins_of_chart(self.pins, chart) for chart in charts]
             maps = yield from with_convex_polygons(self.surface, charts, maps, pins, self.options, self.target, given)
