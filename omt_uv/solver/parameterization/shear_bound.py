@@ -172,6 +172,7 @@ def bound_shear(
     early = EarlyEnd()
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
+    tried = {_as_a_set(last.cuts.edges)}
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
             last, crossing = best, None
@@ -202,9 +203,9 @@ def bound_shear(
         if again is None:
             break
         edges = np.concatenate([kept, _cuts(again).edges])
-        known = last.cuts.edges
-        if len(edges) == len(known) and np.isin(pair_keys(*edges.T), pair_keys(*known.T)).all():
+        if _as_a_set(edges) in tried:
             break
+        tried.add(_as_a_set(edges))
         mapping = _mapped(again.charts, last.charts, last.maps, map_charts)
         further = part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
         mapped = yield from unless_ended(further, early)
@@ -306,6 +307,11 @@ def _cuts(prepared: DiskCharts) -> Cuts:
     if prepared.cuts is None:
         raise ValueError("charts along existing seams alone have no cuts to add to")
     return prepared.cuts
+
+
+def _as_a_set(edges: np.ndarray) -> bytes:
+    """Equal for the same edges (e,2): searched again from the same cut, these may come out, whose map is known."""
+    return np.unique(pair_keys(*edges.T)).tobytes()
 
 
 def _joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:

@@ -6,7 +6,7 @@ curvature and area to the one it collapses into, so that both keep their sums ex
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,8 @@ BENT_COST = 15.0
 LEAST_SHAPE = 1e-4
 # Sum of two degrees beyond which every edge more adds the length of the collapsed edge once more to its price.
 HIGH_DEGREE = 13
+# Coarse surfaces of one fine one are the same until they have so many times their vertices.
+COMMON = 4
 # Rounds end when one removes a smaller share of the vertices.
 LEAST_PROGRESS = 0.01
 
@@ -60,6 +62,65 @@ def coarse_surface(
     line (n,) bool: vertices that collapse only among themselves, as those of a boundary do, so that lines stay lines;
     trial: which of several coarse surfaces
     """
+    return coarsening(positions, triangles, count, line).ended(count, trial)
+
+
+@dataclass(frozen=True)
+class Coarsening:
+    """A surface on its way to several coarse ones, which differ by how they end.
+
+    Attributes
+    ----------
+    positions (n,3) : of the fine surface; on_boundary (n,) bool : of its vertices
+    kind (k,) : of vertices and of cones over boundaries, see `_ShrinkingMesh`
+    faces (f,3), curvature (n,), area (n,), left : what is left of it, and of how many vertices that is
+    """
+
+    positions: np.ndarray
+    on_boundary: np.ndarray
+    kind: np.ndarray
+    faces: np.ndarray
+    curvature: np.ndarray
+    area: np.ndarray
+    left: int
+
+    def towards(self, count: int, trial: int) -> Coarsening:
+        """The same with about `count` vertices, where it has more."""
+        n, curvature, area, left = len(self.positions), self.curvature.copy(), self.area.copy(), self.left
+        mesh = _ShrinkingMesh(
+            np.concatenate([self.positions, np.zeros((len(self.kind) - n, 3))]), self.faces, self.kind, n, trial
+        )
+        while left > count:
+            vertex, parent = mesh.collapse(left - count)
+            np.add.at(curvature, parent, curvature[vertex])
+            np.add.at(area, parent, area[vertex])
+            left -= len(vertex)
+            if len(vertex) < LEAST_PROGRESS * left:
+                break
+        return replace(self, faces=mesh.faces, curvature=curvature, area=area, left=left)
+
+    def ended(self, count: int, trial: int) -> CoarseSurface:
+        """A coarse surface of about `count` vertices, one of several by the number of the trial."""
+        end, n = self.towards(count, trial), len(self.positions)
+        real = end.faces[(end.faces < n).all(axis=1)]
+        kept = np.unique(real)
+        place = np.full(n, -1)
+        place[kept] = np.arange(len(kept))
+        whole = end.area[kept].sum()
+        return CoarseSurface(
+            kept=kept,
+            positions=self.positions[kept],
+            triangles=place[real],
+            curvature=end.curvature[kept],
+            area=end.area[kept] / whole,
+            boundary=self.on_boundary[kept],
+            size=float(np.sqrt(whole)),
+        )
+
+
+def coarsening(positions: np.ndarray, triangles: np.ndarray, count: int, line: np.ndarray | None = None) -> Coarsening:
+    """A surface (n,3), (m,3) with COMMON times as many vertices as coarse ones of `count` have, from which these go on:
+    most of the time is gone by then, and where cuts may lie is not decided yet."""
     n = len(positions)
     tail, head = halfedges(triangles)
     border = np.flatnonzero(twins(triangles) < 0)
@@ -67,42 +128,17 @@ def coarse_surface(
     on_boundary[tail[border]] = True
     lengths = halfedge_lengths(positions, triangles).reshape(-1, 3)
     curvature = angle_defects(triangles, angles_from_lengths(lengths), np.flatnonzero(on_boundary), n)
-    area = vertex_areas(positions, triangles)
     # A boundary is closed by a cone, so that every vertex is surrounded by faces.
     _, label = graph_components(tail[border], head[border], n)
     _, loop = np.unique(label[tail[border]], return_inverse=True)
     faces = np.concatenate([triangles, np.column_stack([head[border], tail[border], n + loop.ravel()])])
-    total = int(faces.max()) + 1 if len(border) else n
-    kind = np.zeros(total, dtype=np.int64)
+    kind = np.zeros(int(faces.max()) + 1 if len(border) else n, dtype=np.int64)
     if line is not None:
         kind[:n][line] = 1
     kind[:n][on_boundary] += 2
     kind[n:] = -1
-    mesh = _ShrinkingMesh(np.concatenate([positions, np.zeros((total - n, 3))]), faces, kind, n, trial)
-    into = np.arange(n)
-    left = n
-    while left > count:
-        vertex, parent = mesh.collapse(left - count)
-        np.add.at(curvature, parent, curvature[vertex])
-        np.add.at(area, parent, area[vertex])
-        into[vertex] = parent
-        left -= len(vertex)
-        if len(vertex) < LEAST_PROGRESS * left:
-            break
-    real = mesh.faces[(mesh.faces < n).all(axis=1)]
-    kept = np.unique(real)
-    place = np.full(n, -1)
-    place[kept] = np.arange(len(kept))
-    whole = area[kept].sum()
-    return CoarseSurface(
-        kept=kept,
-        positions=positions[kept],
-        triangles=place[real],
-        curvature=curvature[kept],
-        area=area[kept] / whole,
-        boundary=on_boundary[kept],
-        size=float(np.sqrt(whole)),
-    )
+    begun = Coarsening(positions, on_boundary, kind, faces, curvature, vertex_areas(positions, triangles), n)
+    return begun.towards(COMMON * count, 0)
 
 
 class _ShrinkingMesh:

@@ -18,7 +18,7 @@ from ..cutting.component import CutComponent, fingerprint
 from ..mesh.surface import Surface
 from ..progress import Progress, Steps, part_of
 from .coarse_cut import CoarseCut, Found, Setting, best_of, hub
-from .coarse_surface import CoarseSurface, coarse_surface
+from .coarse_surface import Coarsening, CoarseSurface, coarsening
 from .cut_tree import Cut, Task, cut_along
 from .fine_paths import FineMirror, with_line
 from .growth import grow
@@ -65,6 +65,7 @@ class SeamSearch:
     share (f,) : of the spread that cuts left which were found before, that is asked for now; None for a first search
     adding : what was found for a part stays, and more is cut
     memory : what was found for parts, by their fingerprints, to which this search adds
+    begun : surfaces of components on their way to coarse ones, and their triangles
     """
 
     spread: np.ndarray
@@ -76,6 +77,7 @@ class SeamSearch:
     share: np.ndarray | None = None
     adding: bool = False
     memory: dict[tuple[bytes, ...], Found] = field(default_factory=dict)
+    begun: dict[tuple[int, bytes], tuple[np.ndarray, Coarsening]] = field(default_factory=dict)
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether a component of these polygons (m,) is searched, some of whose boundary is marked as a seam or not."""
@@ -189,9 +191,11 @@ class SeamSearch:
             coarse, model = self._modelled(component, mirror, trial, finer)
             setting = self._setting(component, base, mirror, coarse, model)
             task = setting.task(bound(coarse, model) if callable(bound) else bound, setting.extremity())
-            if mirror is None or task.graph.is_whole():
-                growing = self._grown_on(setting, task, base, mirror)
-                found.append((yield from part_of(growing, k / len(trials), 1 / len(trials))))
+            if mirror is not None and not task.graph.is_whole():
+                # Where one cannot, hardly another can: the plane is the same.
+                break
+            growing = self._grown_on(setting, task, base, mirror)
+            found.append((yield from part_of(growing, k / len(trials), 1 / len(trials))))
         return found
 
     def _again(self, component: CutComponent, found: Found, share: float) -> Steps[Found]:
@@ -293,7 +297,12 @@ class SeamSearch:
     ) -> tuple[CoarseSurface, ScaleModel]:
         """One of the coarse surfaces of a component, whose mirror plane stays a line, and its model."""
         line, count = None if mirror is None else mirror.plane, round(finer * self.options.vertices)
-        coarse = coarse_surface(component.positions, component.triangles, count, line, trial)
+        name = (id(component.triangles), b"" if line is None else line.tobytes())
+        if name not in self.begun:
+            # With the array: as long as it is here, no other one has its name.
+            begun = coarsening(component.positions, component.triangles, self.options.vertices, line)
+            self.begun[name] = component.triangles, begun
+        coarse = self.begun[name][1].ended(count, trial)
         return coarse, ScaleModel.of(coarse, self._log_density(component, coarse))
 
     def _mirror(self, component: CutComponent) -> FineMirror | None:
