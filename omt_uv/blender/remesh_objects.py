@@ -18,7 +18,7 @@ from ..pipelines.remesh import LevelOfDetail, RemeshJob, Series, oriented
 from ..settings import RemeshSettings
 from ..solver.analysis.density import from_polygons, from_vertices
 from ..solver.analysis.feature_edges import edge_union, sharp_edges
-from ..solver.errors import EmptyMeshError
+from ..solver.errors import EmptyMeshError, plural
 from ..solver.mesh.surface import Surface
 from . import mesh as blender_mesh
 from .read_attributes import read_attributes
@@ -241,7 +241,8 @@ def lost(obj: bpy.types.Object, request: Request, carried: list[Attributes], by_
     texts = []
     folded = sum(attributes.folded for attributes in carried)
     if folded:
-        texts.append(f"{folded} faces of the new mesh are folded in a UV map")
+        who = plural(folded, "A face of the new mesh is", "{} faces of the new mesh are")
+        texts.append(f"{who} folded in a UV map")
     if request.attributes.left:
         names = ", ".join(request.attributes.left)
         texts.append(f"Attributes of text, and those of edges that the new mesh does not follow, are left out: {names}")

@@ -15,6 +15,7 @@ import bpy
 
 import numpy as np
 
+from ..solver.errors import plural
 from .formats.headers import check_header
 from .formats.off import read_off
 from .in_place import obj_text, ply
@@ -71,7 +72,7 @@ def _faces(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:
     if declared is None or there >= declared:
         return []
     why = "they name vertices that do not exist, or one twice, or the file ends before them"
-    return [f"{declared - there} of {declared} faces were not read: {why}"]
+    return [f"{declared - there} of {declared} faces {plural(declared - there, 'was', 'were')} not read: {why}"]
 
 
 def _coordinates(path: Path, objects: Sequence[bpy.types.Object]) -> list[str]:

@@ -15,6 +15,7 @@ import bpy
 from ..display import overlay
 from ..errors import UserError
 from ..session import following, last_run, run
+from ..session.language import counted
 from ..settings import DEFAULT_MAX_SHEAR, DEFAULT_TEXTURE_SIZE
 
 # What Blender makes of infinity is above, and nothing that is meant.
@@ -173,7 +174,7 @@ def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, 
 
     for (index, raw), count in Counter(warnings).items():
         name = f"{objects[index].name}: " if index >= 0 else ""
-        several = f" ({count} islands)" if count > 1 else ""
+        several = f" ({counted(count, '{} island', '{} islands')})" if count > 1 else ""
         text = advise(raw) + several
         last_run.state.notices.append(last_run.Notice(text, action_advised(raw)))
         operator.report({"WARNING"}, name + text)

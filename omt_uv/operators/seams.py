@@ -6,6 +6,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ..session import run
+from ..session.language import counted
 from ..settings import DEFAULT_MAX_SHEAR
 from .base import SolverOperator, check_all_local, complaints, read_objects, warn
 from .properties import SubdivisionSettings, choose_group, shear_bound
@@ -69,7 +70,9 @@ class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
         warn(self, [obj for obj, _ in result], [(k, text) for k, (_, c) in enumerate(result) for text in c.warnings])
         opened = sum(len(cuts.components) for _, cuts in result)
         if sum(new):
-            self.report({"INFO"}, f"Opened {opened} part{'' if opened == 1 else 's'} along {sum(new)} edges")
+            edges = counted(sum(new), "{} edge", "{} edges")
+            text = counted(opened, "Opened {} part along {}", "Opened {} parts along {}", opened, edges)
+            self.report({"INFO"}, text)
         else:
             self.report({"INFO"}, "Every part is an island already; no seam is needed")
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..solver.errors import EmptyMeshError
+from ..solver.errors import EmptyMeshError, plural
 from ..solver.maps.distortion import NEGLIGIBLE_AREA
 from ..solver.maps.embedding import check_layout
 from ..solver.mesh.geometry import face_areas
@@ -33,7 +33,7 @@ class Gate:
         told = []
         if self.folds:
             same = before is not None and self.folds <= before.folds
-            count = "1 face is" if self.folds == 1 else f"{self.folds} faces are"
+            count = plural(self.folds, "1 face is", "{} faces are")
             told.append(f"{count} folded in the UVs{', as before' if same else ''}")
         if self.overlap > OVERLAP:
             same = before is not None and self.overlap <= before.overlap + OVERLAP

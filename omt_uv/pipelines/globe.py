@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..settings import GlobeSettings
-from ..solver.errors import MeshError
+from ..solver.errors import MeshError, plural
 from ..solver.globe.exact_areas import correct_areas, equirectangular_areas
 from ..solver.globe.projections import EQUIRECT
 from ..solver.globe.rotation import MarkerError, along_axes, by_markers
@@ -286,10 +286,10 @@ def _pole_warnings(missed: int, folded: int) -> list[str]:
     """Warnings of poles of the projection within faces, and of faces folded over near them."""
     texts = []
     if missed:
-        where = "A pole of the projection lies" if missed == 1 else f"{missed} poles of the projection lie"
+        where = plural(missed, "A pole of the projection lies", "{} poles of the projection lie")
         texts.append(f"{where} within a face, which is stretched there; subdivide the mesh, or turn the globe")
     if folded:
-        who = "A face is" if folded == 1 else f"{folded} faces are"
+        who = plural(folded, "A face is", "{} faces are")
         texts.append(f"{who} folded over near a pole of the projection; subdivide the mesh, or turn the globe")
     return texts
 

@@ -27,7 +27,7 @@ from ..solver.analysis.region_density import RegionDensity, target_density
 from ..solver.editing.image_warp import warp_image
 from ..solver.editing.magnify import OUTLINES, RegionMagnification, magnify_region, placed_like_outside, refuse_folds
 from ..solver.editing.uv_islands import Island, Islands, uv_islands
-from ..solver.errors import EmptyMeshError, MeshError, WeightError
+from ..solver.errors import EmptyMeshError, MeshError, WeightError, plural
 from ..solver.maps.distortion import distortion
 from ..solver.mesh.charts import check_disk, triangle_rows
 from ..solver.mesh.geometry import signed_areas
@@ -310,7 +310,8 @@ def _islands(regions) -> tuple[list[tuple[int, Island]], list[tuple[int, str]]]:
         except MeshError as error:
             raise Refusal(0, error) from error
     if constant:
-        warnings.append((-1, f"{constant} islands are painted all over; they stay as they are"))
+        text = plural(constant, "An island is painted all over, and stays", "{} islands are painted all over, and stay")
+        warnings.append((-1, f"{text} as before"))
     return found, warnings
 
 

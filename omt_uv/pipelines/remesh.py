@@ -19,7 +19,7 @@ from ..solver.analysis.density import (
 )
 from ..solver.analysis.feature_edges import edge_union, resolved_features
 from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
-from ..solver.errors import CountError, DensityError, MeshError
+from ..solver.errors import CountError, DensityError, MeshError, plural, reaching
 from ..solver.mesh.geometry import face_areas
 from ..solver.mesh.gluing import orientations
 from ..solver.mesh.repair import repaired_gluing
@@ -102,7 +102,7 @@ def remesh_series(job: RemeshJob, settings: RemeshSettings) -> Steps[Series]:
         levels.append(level)
         warnings += [name + text for text in (*joined, *level.found.warnings)]
         if level.correspondence.extended:
-            warnings.append(f"{name}{level.correspondence.extended} faces reach across a seam; UVs are continued there")
+            warnings.append(f"{name}{reaching(level.correspondence.extended)}")
     return Series(levels, warnings)
 
 
@@ -151,7 +151,7 @@ def _features(
     # Every vertex has the area of two equilateral triangles.
     size = np.sqrt(area @ sample_density / (max(vertex_count, 1) * np.sqrt(3) / 2) / sample_density)
     features, joined = resolved_features(job.surface.positions, triangles, job.features, size)
-    text = "1 region is" if joined == 1 else f"{joined} regions between features are"
+    text = plural(joined, "1 region is", "{} regions between features are")
     return features, (f"{text} too small for triangles of this size and not kept apart",) if joined else ()
 
 
@@ -191,7 +191,7 @@ def oriented(surface: Surface) -> tuple[Surface, tuple[str, ...]]:
         return surface, ()
     triangles = np.where(turned[:, None], surface.triangles[:, [0, 2, 1]], surface.triangles)
     count = len(np.unique(surface.triangle_face[turned]))
-    text = "A face looks to another side than its neighbours" if count == 1 else f"{count} faces look to another side"
+    text = plural(count, "A face looks to another side than its neighbours", "{} faces look to another side")
     return replace(surface, triangles=triangles), (f"{text}; turned over in the new mesh",)
 
 

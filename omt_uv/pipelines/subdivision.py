@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..solver.analysis.density import Target
-from ..solver.errors import APPLY_LEVEL
+from ..solver.errors import APPLY_LEVEL, plural
 from ..solver.maps.distortion import distortion
 from ..solver.maps.mirror_symmetry import MirrorSymmetry
 from ..solver.mesh.geometry import face_areas, signed_areas
@@ -359,7 +359,8 @@ def _with_figures(old: ChartMap, uv: np.ndarray, corners: np.ndarray, mapped: np
     # What was said about the target of the cage is said about the subdivided surface instead.
     warnings = tuple(text for text in old.warnings if not text.startswith(AREA_WARNING))
     if found.folds:
-        warnings += (f"{found.folds} faces of the subdivided surface are folded",)
+        who = plural(found.folds, "A face of the subdivided surface is", "{} faces of the subdivided surface are")
+        warnings += (f"{who} folded",)
     figures = {name: getattr(found, name) for name in ("area_l1", "area_sd", "angle_mean", "folds")}
     return replace(old, uv=uv, warnings=warnings, **figures)
 

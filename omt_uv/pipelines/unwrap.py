@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..settings import Settings
-from ..solver.errors import MeshError
+from ..solver.errors import MeshError, plural
 from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import signed_areas
@@ -197,5 +197,5 @@ def _connected_triangles(chart: Chart) -> np.ndarray:
 
 def _in_place(pinned: int, others: int) -> str:
     """A warning that islands with pins are not packed."""
-    text = "An island with pins stays" if pinned == 1 else f"{pinned} islands with pins stay"
+    text = plural(pinned, "An island with pins stays", "{} islands with pins stay")
     return f"{text} in place" + ("; the others were packed as if there were none" if others else "")

@@ -281,6 +281,22 @@ class HandednessError(LandmarkError):
     remedy = "Exchange left and right on one side, or match mirrored"
 
 
+def plural(count: int, one: str, many: str) -> str:
+    """What is said of one, or of several, whose number takes the place of the braces.
+
+    Examples
+    --------
+    >>> plural(1, "a face is", "{} faces are"), plural(0, "a face is", "{} faces are")
+    ('a face is', '0 faces are')
+    """
+    return one if count == 1 else many.format(count)
+
+
+def reaching(faces: int) -> str:
+    """What is said of faces of a new mesh that reach across a seam."""
+    return f"{plural(faces, 'A face reaches', '{} faces reach')} across a seam; UVs are continued there"
+
+
 # What warnings advise, in the solver's words: front ends replace these by where their users find it.
 MERGE = "merge vertices that coincide"
 MERGING = "merging vertices that coincide"

@@ -54,7 +54,7 @@ POINTS, FACES = patch()
 OUTSIDE = np.concatenate([FACES, [[1, 2, 99_999]]])
 INCOMPLETE = {
     "in.obj": (obj_text(POINTS, FACES, "f 1 2 9999\nf 1 2\n"), "2 of 164 faces were not read"),
-    "in.ply": (ply_binary(POINTS, OUTSIDE), "1 of 163 faces were not read"),
+    "in.ply": (ply_binary(POINTS, OUTSIDE), "1 of 163 faces was not read"),
     "huge.obj": (obj_text(POINTS, FACES, "v 1e39 0 0\nv 0 nan 0\n"), "2 of its vertices have coordinates beyond"),
     "nan.ply": (ply_text(np.concatenate([POINTS, [[np.nan, 0, 0]]]), FACES), "1 of its vertices"),
 }

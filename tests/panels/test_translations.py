@@ -98,6 +98,8 @@ def of_code():
             yield from (constant(k.value) for k in node.keywords if k.arg == "text")
             if getattr(node.func, "id", "") == "words":
                 yield constant(node.args[0])
+            if getattr(node.func, "id", "") == "counted":
+                yield from map(constant, node.args[1:3])
     for node in trees("**/*.py"):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Progress":
             yield constant(node.args[0])
@@ -118,6 +120,17 @@ def test_everything_that_is_shown_has_its_words(package, language):
     shown = {*of_classes(package), *of_code(), *keys} - CODE
     missing = sorted(text for text in shown if any(c.isalpha() for c in text) and text not in table)
     assert not missing, f"{language} has no words for {missing}"
+
+
+def test_one_and_several_have_words_of_their_own(package):
+    counted = package("session.language").counted
+    texts = ("Opened {} part along {}", "Opened {} parts along {}")
+    assert [counted(k, "Selected {} face", "Selected {} faces") for k in (0, 1, 2)] == [
+        "Selected 0 faces",
+        "Selected 1 face",
+        "Selected 2 faces",
+    ]
+    assert counted(1, *texts, 1, "7 edges") == "Opened 1 part along 7 edges"
 
 
 def test_a_number_at_the_end_of_a_stage_is_a_value(package):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ... import __version__
 from ...pipelines.shapes.choices import DEFAULT_PREFIX, DEFAULT_TRANSFERS, MATCH_DOMAINS, TRANSFERS
+from ...solver.errors import reaching
 from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn
 from ..options import FORMATS, add_input, names, number, share
 from ..selection import of_file, read_file
@@ -88,7 +89,7 @@ def run(options: argparse.Namespace) -> None:
             check_room(second[0], source[1].attributes, kinds)
         carried, across = attributes
         write_onto(second[0], source[1], carried, kinds, _prefix(options))
-        told += [f"{across} faces reach across a seam; UVs are continued there"] if across else []
+        told += [reaching(across)] if across else []
     told = warn([], [(-1, text) for text in told], save(options.output, [second[0]], path))
     if options.report is not None:
         _report(options, result, told)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import UserError
+from ...solver.errors import plural
 
 
 class InPlaceError(UserError):
@@ -116,5 +117,5 @@ def dropped_warning(count: int) -> list[str]:
     """What is said of faces that Blender does not read."""
     if not count:
         return []
-    faces = "face that Blender drops keeps its" if count == 1 else "faces that Blender drops keep their"
-    return [f"{count} {faces} place in the file, and the UVs it had: invalid ones, or there twice"]
+    faces = plural(count, "1 face that Blender drops keeps its", "{} faces that Blender drops keep their")
+    return [f"{faces} place in the file, and the UVs it had: invalid ones, or there twice"]

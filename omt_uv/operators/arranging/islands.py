@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
+from ...session.language import counted
 from ..base import QuickOperator, complaints, read_writable, warn, write_layers
 
 AXES = (
@@ -21,7 +22,7 @@ HALVES = (
 class _Arranging(QuickOperator):
     """What the three have in common: subclasses give `arranged(readings)`."""
 
-    verb = "Arranged"
+    said = ("Arranged {} island", "Arranged {} islands")
 
     def arranged(self, readings: list):
         raise NotImplementedError
@@ -32,7 +33,7 @@ class _Arranging(QuickOperator):
             done = self.arranged(readings)
         write_layers(objects, "", done)
         warn(self, objects, done.warnings)
-        self.report({"INFO"}, f"{self.verb} {done.changed} island{'' if done.changed == 1 else 's'}")  # type: ignore[attr-defined]
+        self.report({"INFO"}, counted(done.changed, *self.said))  # type: ignore[attr-defined]
 
 
 class UV_OT_omt_stack(_Arranging, bpy.types.Operator):
@@ -41,7 +42,7 @@ class UV_OT_omt_stack(_Arranging, bpy.types.Operator):
     bl_idname = "uv.omt_stack"
     bl_label = "Stack Equal UV Islands"
     bl_options = {"REGISTER", "UNDO"}
-    verb = "Stacked"
+    said = ("Stacked {} island", "Stacked {} islands")
 
     mirrored: BoolProperty(
         name="Mirrored Too", description="Stack islands on those that they are mirror images of, too", default=True
@@ -59,7 +60,7 @@ class UV_OT_omt_symmetrize(_Arranging, bpy.types.Operator):
     bl_idname = "uv.omt_symmetrize"
     bl_label = "Symmetrize UV Islands"
     bl_options = {"REGISTER", "UNDO"}
-    verb = "Symmetrized"
+    said = ("Symmetrized {} island", "Symmetrized {} islands")
 
     axis: EnumProperty(name="Axis", description="Axis that the halves face each other along", items=AXES, default="X")
     halves: EnumProperty(name="Halves", description="Where the second half goes", items=HALVES, default="APART")
@@ -76,7 +77,7 @@ class UV_OT_omt_rectify(_Arranging, bpy.types.Operator):
     bl_idname = "uv.omt_rectify"
     bl_label = "Rectify UV Strips"
     bl_options = {"REGISTER", "UNDO"}
-    verb = "Rectified"
+    said = ("Rectified {} island", "Rectified {} islands")
 
     def arranged(self, readings: list):
         from ...pipelines.arranging.actions import rectify_islands

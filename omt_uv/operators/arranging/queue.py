@@ -8,6 +8,7 @@ import bpy
 from bpy.props import FloatProperty
 
 from ...session import following, last_run, queue, run
+from ...session.language import counted, words
 from ..base import Complaint, check_all_local, check_numbers, complaints, mesh_objects, ready, tell, write_layers
 
 UNWRAP = "uv.omt_unwrap"
@@ -137,14 +138,15 @@ class UV_OT_omt_queue(bpy.types.Operator):
             if failed:
                 obj.select_set(obj.name in {job.name for job in failed})
         notices = tuple(last_run.Notice(f"{job.name}: {job.reason}") for job in failed)
-        rows = (("Done", f"{len(done)} of {len(jobs.jobs)}"), ("Failed, selected", f"{len(failed)}"))
+        rows = (("Done", words("{} of {}", len(done), len(jobs.jobs))), ("Failed, selected", f"{len(failed)}"))
         names = tuple(obj.name for obj in last_run.chosen_objects(context))
         last_run.keep(last_run.Summary(self.bl_label, rows, notices, names))
         for notice in notices:
             self.report({"WARNING"}, notice.text)
         jobs.is_over = True
         last_run.redraw(context)
-        self.report({"INFO"}, f"Unwrapped {len(done)} of {len(jobs.jobs)} objects")
+        one, many = "Unwrapped {} of {} object", "Unwrapped {} of {} objects"
+        self.report({"INFO"}, counted(len(jobs.jobs), one, many, len(done), len(jobs.jobs)))
         return {"FINISHED"} if done else {"CANCELLED"}
 
 

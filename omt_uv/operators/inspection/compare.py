@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...session.language import counted
 from ..base import Complaint, QuickOperator, mesh_objects
 
 
@@ -33,4 +34,4 @@ class OBJECT_OT_omt_compare(QuickOperator, bpy.types.Operator):
             each.hide_set(each != following)
             each.select_set(each == following)
         layer.active = following
-        self.report({"INFO"}, f"{following.name}: {len(following.data.vertices)} vertices")
+        self.report({"INFO"}, f"{following.name}: {counted(len(following.data.vertices), '{} vertex', '{} vertices')}")

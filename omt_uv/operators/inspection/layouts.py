@@ -6,6 +6,7 @@ import bpy
 from bpy.props import EnumProperty, IntProperty
 
 from ...session import run
+from ...session.language import counted
 from ...settings import DOMAINS
 from ..base import Complaint, QuickOperator, SolverOperator, complaints, read_objects
 
@@ -72,4 +73,4 @@ class OBJECT_OT_omt_diagram(SolverOperator, bpy.types.Operator):
         new = bpy.data.objects.new(mesh.name, mesh)
         link_beside(new, obj)
         self.said = (("Cells", str(len(polygons))), ("Area error", f"{100 * found.residual:.2g} %"))
-        self.report({"INFO"}, f"Made {new.name}: {len(polygons)} cells")
+        self.report({"INFO"}, f"{new.name}: {counted(len(polygons), 'Made {} cell', 'Made {} cells')}")

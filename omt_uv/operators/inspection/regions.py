@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
+from ...session.language import counted, words
 from ...settings import DEFAULT_TEXTURE_SIZE
 from ..base import Complaint, QuickOperator, check_all_local, complaints, read_objects
 
@@ -44,7 +45,8 @@ class UV_OT_omt_regions(QuickOperator, bpy.types.Operator):
         with complaints():
             rows = figures_by_region([r for _, r in pairs], regions_of(pairs, kind), self.texture_size)
         context.window_manager.clipboard = table_text(rows, "\t")
-        self.report({"INFO"}, f"{len(rows) - 1} regions measured; the table is in the clipboard")
+        text = counted(len(rows) - 1, "{} region measured", "{} regions measured")
+        self.report({"INFO"}, f"{text}; {words('the table is in the clipboard')}")
 
 
 class UV_OT_omt_attributes(QuickOperator, bpy.types.Operator):

@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ...remedies import ACTIONS
 from ...session import last_run
+from ...session.language import counted, words
 from ..base import Complaint, QuickOperator, check_all_local
 
 UNWRAP = "uv.omt_unwrap"
@@ -50,12 +51,12 @@ class UV_OT_omt_remedy(QuickOperator, bpy.types.Operator):
             raise Complaint(reason)
         count = sum(mend(obj) for obj in objects)
         said = {
-            "NORMALS": f"Turned {count} face{'' if count == 1 else 's'} over",
-            "MERGE": f"Merged {count} vert{'ex' if count == 1 else 'ices'}",
-            "DISSOLVE": f"Dissolved {count} element{'' if count == 1 else 's'}",
-            "APPLY_LEVEL": f"Applied a level of {count} modifier{'' if count == 1 else 's'}",
+            "NORMALS": ("Turned {} face over", "Turned {} faces over"),
+            "MERGE": ("Merged {} vertex", "Merged {} vertices"),
+            "DISSOLVE": ("Dissolved {} element", "Dissolved {} elements"),
+            "APPLY_LEVEL": ("Applied a level of {} modifier", "Applied a level of {} modifiers"),
         }
-        self.report({"INFO"}, f"{said[self.action]}. Run it again now")
+        self.report({"INFO"}, f"{counted(count, *said[self.action])}. {words('Run it again now')}")
 
 
 def _objects(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
+from ...session.language import counted
 from ..base import Complaint, QuickOperator, check_all_local, read_objects
 
 FIGURES = (
@@ -49,7 +50,7 @@ class UV_OT_omt_worst(QuickOperator, bpy.types.Operator):
         context.tool_settings.mesh_select_mode = select_mode("face")
         for (obj, _), faces in zip(pairs, found, strict=True):
             select_elements(obj, "face", faces)
-        self.report({"INFO"}, f"Selected {count} face{'' if count == 1 else 's'}")
+        self.report({"INFO"}, counted(count, "Selected {} face", "Selected {} faces"))
 
 
 def _whole(context: bpy.types.Context) -> list:

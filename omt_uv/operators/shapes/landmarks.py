@@ -8,6 +8,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ...pipelines.shapes.choices import DEFAULT_PREFIX
+from ...session.language import counted, words
 from ..base import NAVIGATION, Complaint, QuickOperator, complaints, tell
 from .match import source_and_target
 
@@ -184,7 +185,8 @@ class OBJECT_OT_omt_landmarks_suggest(_OnPair, bpy.types.Operator):
             for obj, vertex in zip(objects, rows, strict=True):
                 put_landmark(obj, name, obj.matrix_world @ obj.data.vertices[vertex].co)
             context.view_layer.update()
-        self.report({"INFO"}, f"{len(found.source)} landmarks; delete those that are wrong")
+        count = counted(len(found.source), "{} landmark", "{} landmarks")
+        self.report({"INFO"}, f"{count}; {words('delete what is wrong')}")
 
 
 class OBJECT_OT_omt_landmarks_clear(_OnPair, bpy.types.Operator):
@@ -198,4 +200,4 @@ class OBJECT_OT_omt_landmarks_clear(_OnPair, bpy.types.Operator):
         from ...blender.shapes.landmarks import remove_landmarks
 
         count = sum(remove_landmarks(obj, self.prefix) for obj in source_and_target(context))
-        self.report({"INFO"}, f"{count} landmarks deleted")
+        self.report({"INFO"}, counted(count, "{} landmark deleted", "{} landmarks deleted"))

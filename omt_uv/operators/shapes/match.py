@@ -13,6 +13,7 @@ from ...pipelines.shapes.choices import (
     TRANSFERS,
 )
 from ...session import run
+from ...session.language import counted
 from ..base import Complaint, SolverOperator, complaints, warn
 
 KEY = "OMT Match"
@@ -135,6 +136,7 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
 
     def finish(self, context: bpy.types.Context, result) -> None:
         from ...blender.shapes.match_objects import write_colours, write_onto, write_wrap
+        from ...solver.errors import reaching
 
         source, target, first, job, match, attributes, warnings = result
         told = [(0, text) for text in first.warnings] + [(1, text) for text in warnings]
@@ -143,7 +145,7 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
             carried, across = attributes
             names = write_onto(target, first, carried, self.kinds(), self.landmark_prefix)
             if across:
-                told.append((1, f"{across} faces reach across a seam; UVs are continued there"))
+                told.append((1, reaching(across)))
             text = f"Transferred {', '.join(names) or 'nothing'}"
         elif self.mode == "CHECKER":
             write_colours(source, target, job, match)
@@ -153,7 +155,7 @@ class OBJECT_OT_omt_match(SolverOperator, bpy.types.Operator):
             text = f"Shape key {self.shape_key!r} of {source.name}"
         self.said = _figures(match)
         warn(self, [source, target], told)
-        self.report({"INFO"}, f"{text}; {len(match.found.met)} landmarks")
+        self.report({"INFO"}, f"{text}; {counted(len(match.found.met), '{} landmark', '{} landmarks')}")
 
 
 def _figures(match) -> tuple[tuple[str, str], ...]:

@@ -6,6 +6,7 @@ import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from ...session import run
+from ...session.language import counted
 from ...settings import CELL_WRITES, DEFAULT_CELL_WRITE, DEFAULT_CELLS, DEFAULT_RELAX, PartitionSettings
 from ..base import SolverOperator, check_all_local, complaints, read_objects, select_alone, warn
 from ..properties import choose_group
@@ -100,7 +101,7 @@ class MESH_OT_omt_partition(SolverOperator, bpy.types.Operator):
         warn(self, objects, [(k, text) for k, partition in enumerate(found) for text in partition.warnings])
         total = sum(partition.figures["cells"] for partition in found)
         what = f": {', '.join(obj.name for obj in made)}" if made else ""
-        self.report({"INFO"}, f"Made {total} cell{'' if total == 1 else 's'}{what}")
+        self.report({"INFO"}, counted(total, "Made {} cell", "Made {} cells") + what)
 
 
 def _figures(figures: list[dict], write: str) -> tuple[tuple[str, str], ...]:

@@ -10,7 +10,7 @@ from ...solver.arranging.halves import halves
 from ...solver.arranging.quad_grid import rectangle
 from ...solver.arranging.stacks import stacks
 from ...solver.editing.uv_islands import Island
-from ...solver.errors import GridError, MeshError
+from ...solver.errors import GridError, MeshError, plural
 from ...solver.mesh.geometry import signed_areas
 from ...solver.mesh.polygon_areas import polygon_areas
 from ..layout import Refusal
@@ -56,7 +56,8 @@ def symmetrize_islands(readings: Sequence[Reading], axis: int, on_one_another: b
             uv[i] = new
         changed += int((done.partner >= 0).sum())
         alone += int((done.partner < 0).sum())
-    warnings = [(-1, f"{alone} islands have no image on the other side, and stay as they are")] if alone else []
+    who = plural(alone, "An island has no image on the other side, and stays", "{} islands have none there, and stay")
+    warnings = [(-1, f"{who} as before")] if alone else []
     return arranged(len(readings), found, uv, changed, warnings, apart=not on_one_another)
 
 
@@ -79,7 +80,8 @@ def rectify_islands(readings: Sequence[Reading]) -> Arranged:
     if not changed:
         raise Refusal(0, last)
     left = len(found) - changed
-    warnings = [(-1, f"{left} islands are no grids of quads, and stay as they are")] if left else []
+    who = plural(left, "An island is no grid of quads, and stays", "{} islands are no grids of quads, and stay")
+    warnings = [(-1, f"{who} as before")] if left else []
     return arranged(len(readings), found, uv, changed, warnings, apart=True)
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...solver.errors import EmptyMeshError, MeshError
+from ...solver.errors import EmptyMeshError, MeshError, plural
 from ...solver.mesh.geometry import face_areas, halfedge_lengths
 from ...solver.mesh.surface import Surface
 from ...solver.mesh.topology import graph_components, halfedges
@@ -126,7 +126,7 @@ def match_surfaces(job: MatchJob) -> Steps[MatchResult]:
         if len(part.rest):
             count = _count_parts(surface) - 1
             warnings.append(
-                f"{count} smaller {'part' if count == 1 else 'parts'} of the {name} went along with the largest"
+                f"{plural(count, '1 smaller part', '{} smaller parts')} of the {name} went along with the largest"
             )
     return MatchResult(
         wrapped=wrapped,

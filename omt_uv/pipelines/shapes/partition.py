@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...settings import MOST_MATERIALS, PartitionSettings
-from ...solver.errors import CountError, first_of
+from ...solver.errors import CountError, first_of, plural
 from ...solver.mesh.geometry import face_areas, face_normals
 from ...solver.mesh.surface import Surface, chosen_triangles
 from ...solver.mesh.topology import pair_keys, pair_up
@@ -167,4 +167,4 @@ def _warnings(division: Division, whole: FaceCells, torn: np.ndarray, settings: 
 
 def _cells(numbers: np.ndarray) -> str:
     """Some cells in words, with a verb."""
-    return f"{len(numbers)} cell{' is' if len(numbers) == 1 else 's are'} ({first_of(numbers)})"
+    return f"{plural(len(numbers), '1 cell is', '{} cells are')} ({first_of(numbers)})"

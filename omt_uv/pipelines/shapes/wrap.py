@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...solver.contact.self_intersections import FaceCrossings
+from ...solver.errors import plural
 from ...solver.flows.creases import without_new_intersections
 from ...solver.flows.smoothing import smoothed_apart
 from ...solver.mesh.geometry import face_areas
@@ -45,5 +46,8 @@ def wrap_surfaces(job: MatchJob) -> Steps[MatchResult]:
     wrapped, warnings = result.wrapped.copy(), result.warnings
     wrapped[source.used] = positions
     if len(pairs):
-        warnings = (*warnings, f"{len(pairs)} pairs of faces of the wrapped source pass through one another")
+        who = plural(
+            len(pairs), "A pair of faces of the wrapped source passes", "{} pairs of faces of the wrapped source pass"
+        )
+        warnings = (*warnings, f"{who} through one another")
     return replace(result, wrapped=wrapped, intersections=len(pairs), warnings=warnings)

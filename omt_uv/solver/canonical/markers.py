@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import LandmarkError
+from ..errors import LandmarkError, plural
 from ..mesh.charts import Chart
 from ..mesh.geometry import as_complex, as_points
 from ..mesh.topology import boundary_loops
@@ -93,7 +93,7 @@ def markers_of_chart(markers: MapMarkers | None, chart: Chart) -> ChartMarkers:
     place = _firsts(outer, markers.corners)
     inside = np.isin(chart.vertex_ids, markers.corners).any()
     if (inside or len(place)) and len(place) not in (3, 4):
-        cause = f"Markers of corners stand at {len(place)} vertices of a boundary"
+        cause = f"Markers of corners stand at {plural(len(place), 'one vertex', '{} vertices')} of a boundary"
         raise _misplaced(cause, chart.vertex_ids[loop[place]])
     corners = loop[place]
     if first in corners:
@@ -109,7 +109,10 @@ def _firsts(outer: np.ndarray, marked: np.ndarray) -> np.ndarray:
 
 def _single(found: np.ndarray, name: str, chart: Chart) -> int:
     if len(found) > 1:
-        raise _misplaced(f"An island has {len(found)} vertices marked as its {name}", chart.vertex_ids[found])
+        raise _misplaced(
+            f"An island has {plural(len(found), 'one vertex', '{} vertices')} marked as its {name}",
+            chart.vertex_ids[found],
+        )
     return int(found[0]) if len(found) else -1
 
 

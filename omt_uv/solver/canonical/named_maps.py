@@ -14,7 +14,7 @@ import numpy as np
 
 from ..conformal.boundary_first import boundary_first
 from ..conformal.disk_map import ConformalMap, conformal_disk, conformal_rectangle
-from ..errors import BoundaryError
+from ..errors import BoundaryError, plural
 from ..maps.untangle import count_folds, untangle
 from ..mesh.topology import boundary_loops
 from ..progress import Steps, part_of
@@ -80,7 +80,11 @@ def conformal_map(disk: NamedProblem) -> Steps[NamedMap]:
     if disk.boundary == "free":
         uv = boundary_first(vertices, triangles, disk.loop).uv
         folds = count_folds(uv, triangles)
-        texts = (f"The conformal map with a free boundary turns {folds} faces over; choose a disk",) if folds else ()
+        texts = (
+            (f"The conformal map with a free boundary turns {plural(folds, 'a face', '{} faces')} over; choose a disk",)
+            if folds
+            else ()
+        )
         return NamedMap(disk.markers.turned(uv), warnings=texts)
     if disk.corners is None:
         conformal = yield from conformal_disk(vertices, triangles)

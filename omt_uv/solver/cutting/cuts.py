@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ..errors import MERGING, TURN_OUTSIDE
+from ..errors import MERGING, TURN_OUTSIDE, plural
 from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups, orientations, turn_over
@@ -208,7 +208,8 @@ def _uncut(surface: Surface, gluing: Gluing, repaired: Repaired, component_of: n
 
 def sieved(holes: int) -> str:
     """The warning that so many holes of sieves are filled."""
-    return f"{holes} holes are filled for the map: cuts to them would leave it no shape"
+    who = plural(holes, "A hole is", "{} holes are")
+    return f"{who} filled for the map: cuts to them would leave it no shape"
 
 
 def _warnings(parting: int, backwards: int, mirrored: int, holes: int, touching: int) -> Iterator[str]:
@@ -219,7 +220,7 @@ def _warnings(parting: int, backwards: int, mirrored: int, holes: int, touching:
     if backwards:
         yield _turned_warning(backwards)
     if mirrored:
-        who = "a face looks" if mirrored == 1 else f"{mirrored} faces look"
+        who = plural(mirrored, "a face looks", "{} faces look")
         yield f"Where a surface has one side only, {who} to the other side of the map; the texture is mirrored there"
     if holes:
         yield sieved(holes)
@@ -332,7 +333,7 @@ def _tips(component: CutComponent, chosen: np.ndarray) -> np.ndarray:
 
 
 def _turned_warning(count: int) -> str:
-    who = "A face looks" if count == 1 else f"{count} faces look"
+    who = plural(count, "A face looks", "{} faces look")
     return (
         f"{who} to the other side than the faces around; mapped with them, so that the texture is mirrored there. "
         f"{TURN_OUTSIDE}"

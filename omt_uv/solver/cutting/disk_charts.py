@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DISSOLVE, ZeroAreaFaceError
+from ..errors import DISSOLVE, ZeroAreaFaceError, plural
 from ..mesh.charts import Chart, charts_of, check_disks, strict_charts
 from ..mesh.repair import charts_without_area, repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
@@ -81,7 +81,7 @@ def disk_charts(
     charts, flat = _sound(charts_of(found.surface, found.gluing), found.extent)
     warnings = list(found.cuts.warnings)
     if flat:
-        who = "A triangle has" if flat == 1 else f"{flat} triangles have"
+        who = plural(flat, "A face has", "{} faces have")
         warnings.append(f"{who} no area and got a little for the map; {DISSOLVE}")
     return DiskCharts(charts, found.cuts, tuple(warnings))
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import EmptyMeshError, HandleError, NonFiniteError
+from ..errors import EmptyMeshError, HandleError, NonFiniteError, plural
 from ..progress import Progress, Steps
 from .creases import PIECES, march, region_around
 from .domain import FlowDomain
@@ -343,7 +343,8 @@ def _warnings(missed: float, volumes: np.ndarray, intersecting: int) -> tuple[st
         told.append(f"An enclosed volume changes by {100 * worst:.2g} %; a finer mesh near the handles helps")
     if intersecting:
         told.append(
-            f"{intersecting} pairs of faces pass through one another that did not before; a finer mesh, "
+            f"{plural(intersecting, 'A pair of faces passes', '{} pairs of faces pass')} through one another "
+            "that did not before; a finer mesh, "
             "a greater radius or a shorter way helps"
         )
     return tuple(told)

@@ -16,6 +16,7 @@ from ..errors import (
     NotADiskError,
     SeveralBoundariesError,
     TouchingBoundariesError,
+    plural,
 )
 from .gluing import Gluing, components, corner_classes
 from .surface import Surface, strict_gluing
@@ -196,8 +197,8 @@ def check_disk(chart: Chart) -> None:
         error = TouchingBoundariesError if _touch(chart, np.concatenate(loops)) else SeveralBoundariesError
         raise error(f"A chart has {len(loops)} boundaries instead of one", kind="edge", elements=chart.vertex_ids[rest])
     if handles:
-        plural = "a handle" if handles == 1 else f"{handles} handles"
-        raise NotADiskError(f"A chart has {plural}", kind="face", elements=faces)
+        found = plural(handles, "a handle", "{} handles")
+        raise NotADiskError(f"A chart has {found}", kind="face", elements=faces)
 
 
 def _touch(chart: Chart, boundary: np.ndarray) -> bool:

@@ -19,8 +19,9 @@ from ..errors import (
     PinchedVertexError,
     RepeatedVertexError,
     SeveralComponentsError,
+    plural,
 )
-from .repair import perturbed
+from .repair import faces_without_area, perturbed
 from .topology import graph_components, halfedges, next_halfedge, pair_keys
 
 
@@ -34,8 +35,10 @@ class ClosedSurface:
     warnings: tuple[str, ...]
 
 
-def closed_surface(vertices: np.ndarray, triangles: np.ndarray) -> ClosedSurface:
+def closed_surface(vertices: np.ndarray, triangles: np.ndarray, polygons: np.ndarray | None = None) -> ClosedSurface:
     """Check that a mesh (n,3), (m,3) is one topological sphere, and repair triangles without area.
+
+    polygons (m,): polygon of every triangle, of which those that have no area are warned of; by default each is its own
 
     Raises
     ------
@@ -56,10 +59,12 @@ def closed_surface(vertices: np.ndarray, triangles: np.ndarray) -> ClosedSurface
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     # Halves first: the difference of two huge numbers may be infinite.
     extent = 2 * float((high / 2 - low / 2).max()) or 1.0
-    sound, count = perturbed((vertices - (low / 2 + high / 2)) / extent, triangles, 1.0)
+    given = (vertices - (low / 2 + high / 2)) / extent
+    sound, moved = perturbed(given, triangles, 1.0)
     warnings: tuple[str, ...] = ()
-    if count:
-        who = "A triangle has" if count == 1 else f"{count} triangles have"
+    faces = np.arange(len(triangles)) if polygons is None else polygons
+    if moved and (count := faces_without_area(given, triangles, faces)):
+        who = plural(count, "A face has", "{} faces have")
         warnings = (f"{who} no area and got a little for the map; {DISSOLVE}",)
     return ClosedSurface(vertices=sound, triangles=triangles, extent=extent, warnings=warnings)
 
@@ -125,7 +130,7 @@ def _check_genus(triangles: np.ndarray) -> None:
     # Every edge has two faces: V - E + F = n - m / 2 = 2 - 2 genus.
     genus = (2 - (n - m // 2)) // 2
     if genus > 0:
-        plural = "a handle" if genus == 1 else f"{genus} handles"
+        handles = plural(genus, "a handle", "{} handles")
         raise NotASphereError(
-            f"The surface has {plural}", "Only closed surfaces without handles map to a sphere; unwrap it with cuts"
+            f"The surface has {handles}", "Only closed surfaces without handles map to a sphere; unwrap it with cuts"
         )

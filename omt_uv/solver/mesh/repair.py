@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError
+from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError, plural
 from .charts import Chart
 from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam
@@ -51,11 +51,11 @@ def repaired_gluing(surface: Surface, faces: np.ndarray, triangles: np.ndarray, 
         layer[folded] = -1
         joined, torn = _pair_sides(surface, gluing, layer)
         warnings.append(
-            f"{_count(len(folded), 'face')} sharing several edges in a row with another, mapped apart; "
+            f"{plural(len(folded), '1 face', '{} faces')} sharing several edges in a row with another, mapped apart; "
             "dissolve the vertex that only the two share"
         )
     if len(torn):
-        edges = "an edge" if len(torn) == 1 else f"{len(torn)} edges"
+        edges = plural(len(torn), "an edge", "{} edges")
         warnings.append(f"More than two faces meet at {edges}; cut open there for the map")
     return Repaired(_healed(joined), torn, tuple(warnings))
 
@@ -74,7 +74,7 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
     copies = int((rows[:, 1] > 0).sum())
     if copies:
         warnings.append(
-            f"{_count(copies, 'face')} with the same vertices as another, mapped apart; "
+            f"{plural(copies, '1 face', '{} faces')} with the same vertices as another, mapped apart; "
             f"delete what is double, or {MERGE}"
         )
     polygon = np.repeat(np.arange(f), np.diff(surface.face_start))
@@ -83,7 +83,9 @@ def _layers(surface: Surface, faces: np.ndarray) -> tuple[np.ndarray, list[str]]
     layer[repeating] = -1
     repeating = repeating[faces[repeating]]
     if len(repeating):
-        warnings.append(f"{_count(len(repeating), 'face')} with a vertex used twice, mapped apart; {DISSOLVE}")
+        warnings.append(
+            f"{plural(len(repeating), '1 face', '{} faces')} with a vertex used twice, mapped apart; {DISSOLVE}"
+        )
     return layer, warnings
 
 
@@ -152,7 +154,7 @@ def charts_without_area(charts: Sequence[Chart]) -> np.ndarray:
 
 
 def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
-    """The chart with the vertices of triangles without area moved a little, and how many triangles these are.
+    """The chart with the vertices of triangles without area moved a little, and how many of its faces have no area.
 
     See `perturbed`. `extent` is that of the whole mesh, for charts without any size.
 
@@ -164,7 +166,13 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     if not count:
         return chart, 0
     # What fills a hole is no triangle of anybody's.
-    return replace(chart, vertices=vertices), int(degenerate_triangles(chart.vertices, chart.triangles, NEEDLE).sum())
+    return replace(chart, vertices=vertices), faces_without_area(chart.vertices, chart.triangles, chart.faces)
+
+
+def faces_without_area(vertices: np.ndarray, triangles: np.ndarray, faces: np.ndarray) -> int:
+    """How many faces (m,) of triangles (m,3) have no area: one with corners in line has some, however it is cut."""
+    flat = degenerate_triangles(vertices, triangles, NEEDLE)
+    return len(np.setdiff1d(faces[flat], faces[~flat]))
 
 
 def perturbed(
@@ -240,8 +248,3 @@ def _more_than_one(group: np.ndarray, value: np.ndarray) -> np.ndarray:
 def _keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """One integer (k,) for each pair of integers from 0 to 2^31 - 1."""
     return (a.astype(np.int64) << 32) | b.astype(np.int64)
-
-
-def _count(number: int, what: str) -> str:
-    """A number of things in words, one or several."""
-    return f"{number} {what}{'' if number == 1 else 's'}"

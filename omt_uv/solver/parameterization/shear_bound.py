@@ -14,7 +14,7 @@ from ..analysis.facing import SceneAxes
 from ..analysis.seam_costs import SeamCosts, SeamPreferences, seam_costs
 from ..cutting.cuts import Cuts, cut
 from ..cutting.disk_charts import DiskCharts, disk_charts
-from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
+from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, plural
 from ..maps.distortion import face_distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
@@ -42,6 +42,8 @@ CROWDED = 1.15
 SAME_PLACE = 1e-3
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
+# The least share of a surface that a warning names as a number.
+LEAST_TOLD = 0.01
 # A mean excess of the shear up to this is not worse than none: what was parted is cut further.
 NO_EXCESS = 0.005
 # Shear of what has no area to speak of.
@@ -253,9 +255,17 @@ class _Round:
         mean, by_hand = self.mean[missed], ~np.isin(missed, self.searched)
         for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, why)):
             if chosen.any():
-                who = "An island shears" if chosen.sum() == 1 else f"{chosen.sum()} islands shear"
-                what = what if chosen.sum() == 1 else what.replace("its seams", "their seams")
+                count, share = int(chosen.sum()), self.area[missed[chosen]].sum() / self.area.sum()
+                # Of a whole surface there is no share to tell.
+                part = "" if share == 1 else f", {_percent(share)} of the surface,"
+                who = plural(count, f"An island{part} shears", f"{{}} islands{part} shear")
+                what = what if count == 1 else what.replace("its seams", "their seams")
                 yield f"{who} {mean[chosen].max():.3g} in the mean, above {self.bound:.3g}: {what}"
+
+
+def _percent(share: float) -> str:
+    """A share in words: what is hardly seen shall not read as all."""
+    return f"{100 * share:.0f} %" if share >= LEAST_TOLD else f"less than {100 * LEAST_TOLD:.0f} %"
 
 
 def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from ..analysis.density import Target
 from ..canonical.markers import MapMarkers, markers_of_chart
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
-from ..errors import MeshError
+from ..errors import MeshError, plural
 from ..mesh.charts import Chart
 from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.surface import Surface
@@ -153,7 +153,7 @@ def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Su
     new = list(maps)
     for k, chart_map in zip(folded, found, strict=True):
         if chart_map.folds < maps[k].folds:
-            stay = "1 face stays" if maps[k].folds == 1 else f"{maps[k].folds} faces stay"
+            stay = plural(maps[k].folds, "1 face stays", "{} faces stay")
             text = (
                 f"The {task.options.boundary} has no room for this chart ({stay} folded); its boundary is free instead"
             )

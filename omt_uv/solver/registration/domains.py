@@ -19,6 +19,7 @@ from ..errors import (
     SeveralComponentsError,
     TopologyMismatchError,
     ZeroAreaFaceError,
+    plural,
 )
 from ..linalg.nested_dissection import mesh_order
 from ..mesh.geometry import face_areas
@@ -92,7 +93,7 @@ def checked(vertices: np.ndarray, triangles: np.ndarray, name: str) -> None:
     if euler != 2:
         handles = (2 - euler) // 2
         raise TopologyMismatchError(
-            f"The {name} has {'a handle' if handles == 1 else f'{handles} handles'}",
+            f"The {name} has {plural(handles, 'a handle', '{} handles')}",
             "Match surfaces without handles; or mark the same seams on both, and match charts cut alike",
         )
 

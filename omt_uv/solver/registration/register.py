@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import plural
 from ..mesh.closest_point import ClosestPoint
 from ..mesh.geometry import face_areas, halfedge_lengths, vertex_areas, vertex_normals
 from ..mesh.point_location import locate
@@ -185,7 +186,8 @@ def _registration(case: Case, placed: InPlace, steps: tuple[int, int], error: fl
     warnings = []
     for surface, found, name in ((pair.target, forward, "source"), (pair.source, backward, "target")):
         if surface.holes and found.beside.any():
-            warnings.append(f"{int(found.beside.sum())} vertices of the {name} fall into closed holes")
+            who = plural(int(found.beside.sum()), f"A vertex of the {name} falls", f"{{}} vertices of the {name} fall")
+            warnings.append(f"{who} into closed holes")
     return Registration(
         forward=forward,
         backward=backward,

@@ -97,7 +97,7 @@ def sphere_map(
     Springborn, Schroeder, Pinkall 2008 (conformal map); Dominitz, Tannenbaum 2010 (flow); Praun, Hoppe 2003 (otherwise)
     """
     _check_method(method)
-    surface = closed_surface(vertices, triangles)
+    surface = closed_surface(vertices, triangles, polygons)
     given = PolygonSurface(surface, polygons, _target(surface, density))
     fanned, options = with_polygon_fans(given), {"balance": balance, "quality": quality}
     if fanned is not None:

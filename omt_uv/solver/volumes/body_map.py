@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..errors import TetrahedraError
+from ..errors import TetrahedraError, plural
 from ..flows.enclosed_volume import corner_volumes
 from ..flows.paths import rotation_between
 from ..linalg.sparse import Factor
@@ -99,7 +99,10 @@ def volume_map(
     points[: len(vertices)] = vertices
     warnings = [*surface.warnings, *sphere.warnings]
     if count_inverted:
-        warnings.append(f"{count_inverted} tetrahedra are inverted in the map; the method newton has none")
+        warnings.append(
+            plural(count_inverted, "A tetrahedron is", "{} tetrahedra are")
+            + " inverted in the map; the method newton has none"
+        )
     return VolumeMap(
         points=points,
         tets=mesh.tets,
@@ -179,7 +182,10 @@ def into_body(first: VolumeMap, other: VolumeMap, placed: np.ndarray | None = No
         points, positions = found.points, found.positions
     except TetrahedraError:
         count = inverted(through, first.tets)
-        told = (f"{count} of {len(first.tets)} tetrahedra are inverted where they lie between those of the other body",)
+        verb = plural(count, "is", "are")
+        told = (
+            f"{count} of {len(first.tets)} tetrahedra {verb} inverted where they lie between those of the other body",
+        )
     target = tet_volumes(points, first.tets)
     return replace(
         first,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..contact.self_intersections import intersecting_pairs
-from ..errors import LibraryError, SelfIntersectionError, TetrahedraError
+from ..errors import LibraryError, SelfIntersectionError, TetrahedraError, plural
 from ..flows.enclosed_volume import corner_volumes
 from ..mesh.topology import halfedges
 from .tet_mesh import EDGES, tet_volumes
@@ -69,7 +69,7 @@ def tetrahedra(vertices: np.ndarray, triangles: np.ndarray, count: int = 40_000)
     points[: len(vertices)] = vertices
     flat = np.flatnonzero(~(tet_volumes(points, tets) > 0))
     if len(flat):
-        raise TetrahedraError(f"{len(flat)} of {len(tets)} tetrahedra have no volume")
+        raise TetrahedraError(f"{len(flat)} of {len(tets)} tetrahedra {plural(len(flat), 'has', 'have')} no volume")
     return TetMesh(points, tets)
 
 

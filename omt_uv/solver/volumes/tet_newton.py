@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import cg
 
-from ..errors import TetrahedraError
+from ..errors import TetrahedraError, plural
 from ..progress import Progress, Steps
 from .domains import Domain
 from .tet_energy import RestShape, TetAssembly, rest_shape, tet_energy
@@ -99,7 +99,9 @@ def untangled(problem: TetProblem, points: np.ndarray) -> Steps[np.ndarray]:
         eps = max(eps * EPS_FACTOR, LEAST_EPS) if fall > 0 else min(eps * EPS_BACK, FIRST_EPS)
     count = inverted(points, problem.tets)
     if count:
-        raise TetrahedraError(f"{count} of {len(problem.tets)} tetrahedra stay inverted in the map")
+        raise TetrahedraError(
+            f"{count} of {len(problem.tets)} tetrahedra {plural(count, 'stays', 'stay')} inverted in the map"
+        )
     return points
 
 

@@ -36,6 +36,18 @@ def test_faces_without_area_get_some_and_it_is_said():
     assert (face_areas(found.vertices, F) > 0).all() and "no area" in found.warnings[0]
 
 
+def test_a_face_with_corners_in_line_has_an_area():
+    """However its polygon is cut: the second of its two triangles may be a line."""
+    V, F = SPHERE
+    V = V.copy()
+    V[F[0, 0]] = V[F[0, 1]]
+    polygons = np.arange(len(F))
+    flat = np.flatnonzero(face_areas(V, F) < 1e-12)
+    beside = [np.flatnonzero((np.isin(F, F[k]).sum(1) == 2) & (face_areas(V, F) > 1e-12))[0] for k in flat]
+    polygons[flat] = polygons[beside]
+    assert closed_surface(V, F, polygons).warnings == ()
+
+
 def two(a, b):
     return np.concatenate([a[0], b[0] + 5]), np.concatenate([a[1], b[1] + len(a[0])])
 

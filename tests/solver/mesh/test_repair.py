@@ -11,7 +11,7 @@ from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh import repair
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.gluing import corner_classes
-from omt_uv.solver.mesh.surface import degenerate_triangles, triangle_surface
+from omt_uv.solver.mesh.surface import Surface, degenerate_triangles, triangle_surface
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -192,6 +192,16 @@ def test_a_face_without_area_does_not_spoil_its_neighbours():
     kept = face_areas(chart.vertices, chart.triangles)[sound]
     np.testing.assert_allclose(kept, face_areas(W, G[chart.corners[:, 0] // 3])[sound], rtol=1e-2)
     assert mapped(chart).area_l1 < 0.05
+
+
+def test_a_polygon_with_corners_in_line_is_not_warned_of():
+    """A step of stairs: its side has corners in line, of which triangulation makes a triangle without area."""
+    V = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [1, -1, 0]], float)
+    corners = np.array([0, 1, 2, 3, 0, 4, 1, 1, 4, 2])
+    triangles, seams = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [7, 8, 9]]), np.zeros((0, 2), np.int64)
+    surface = Surface(V, corners, np.array([0, 4, 7, 10]), triangles, np.array([0, 0, 1, 2]), seams)
+    assert degenerate_triangles(V, corners[surface.triangles]).any()
+    assert not any("no area" in warning for warning in cut_to_disks(surface).warnings)
 
 
 def test_collapsed_vertices_are_told_apart():

@@ -7,6 +7,7 @@ import pytest
 
 from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
 from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import shear_bound
@@ -97,6 +98,18 @@ def test_what_misses_the_bound_says_so(monkeypatch):
     result = unwrapped(triangle_surface(V, F), 1.3)
     (warning,) = result.warnings
     assert MORE_SEAMS in warning and "An island shears" in warning and "above 1.3" in warning
+
+
+def test_a_warning_tells_how_much_of_the_surface_it_is_about(monkeypatch):
+    """A cap of a hundredth of a wide flat grid shears, and nobody shall take it for the body."""
+    monkeypatch.setattr(shear_bound, "SPREAD_OF_SHEAR", 1e4)
+    monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
+    V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
+    size = np.sqrt(face_areas(V, F).sum() * 99)
+    square = np.array([[0, 0, 0], [size, 0, 0], [size, size, 0], [0, size, 0]]) + [5, 0, 0]
+    both = triangle_surface(np.concatenate([V, square]), np.concatenate([F, np.array([[0, 1, 2], [0, 2, 3]]) + len(V)]))
+    (warning,) = unwrapped(both, 1.3).warnings
+    assert "An island, 1 % of the surface, shears" in warning
 
 
 def test_charts_of_disks_and_squares_are_not_cut_for_shear():

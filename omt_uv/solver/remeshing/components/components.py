@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import MERGING, OrientationError, ZeroAreaFaceError
+from ...errors import MERGING, OrientationError, ZeroAreaFaceError, plural
 from ...mesh.charts import Chart, charts_of
 from ...mesh.geometry import face_areas
 from ...mesh.gluing import orientations, turn_over
@@ -122,7 +122,10 @@ def split_components(vertices: np.ndarray, triangles: np.ndarray, features: np.n
         )
     warnings = [w.replace(", mapped apart", ", remeshed apart").replace(" for the map", "") for w in repaired.warnings]
     if turned.any():
-        warnings.append(f"{int(turned.sum())} triangles looked to the wrong side and were turned over")
+        who = plural(
+            int(turned.sum()), "A triangle looked to the wrong side and was", "{} triangles looked there and were"
+        )
+        warnings.append(f"{who} turned over")
     if len(joined.to_reopen):
         touching = int(np.isin(joined.same, joined.to_reopen).sum())
         warnings.append(f"{touching} boundary vertices lie on one another and stay apart; {MERGING} joins them")
@@ -133,7 +136,8 @@ def split_components(vertices: np.ndarray, triangles: np.ndarray, features: np.n
     components = [_component(chart, boxed, kept, to_reopen) for chart in charts]
     sound = [p for p in components if p.area.sum() > 1e-12 * area.sum()]
     if len(sound) < len(components):
-        warnings.append(f"{len(components) - len(sound)} parts without area were left out")
+        who = plural(len(components) - len(sound), "A part without area was", "{} parts without area were")
+        warnings.append(f"{who} left out")
     return Components(components=sound, centre=centre, size=size, warnings=tuple(warnings))
 
 
