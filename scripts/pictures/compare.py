@@ -26,6 +26,7 @@ from rival_maps import DrawnMap
 
 from benchmarks.cases import meshes
 from omt_uv.files.meshes import load
+from omt_uv.pipelines.reading import Y_UP
 
 CELLS = 400  # checker cells on a model
 TITLES = {
@@ -41,7 +42,7 @@ ROWS = ("front", "back", "layout")
 def maps_of(name, methods, folder=None) -> dict[str, DrawnMap]:
     """The maps of a model by method; those that are not to be had are left out."""
     path = meshes.model_path(name)
-    found = {"ours": rival_maps.ours(load(path)[0])}
+    found = {"ours": rival_maps.ours(load(path)[0], Y_UP if view_of(name).up == "Y" else None)}
     given = folder / f"{name}.obj" if folder else None
     if given and given.is_file():
         found["given"] = rival_maps.from_file(given)
@@ -54,9 +55,14 @@ def maps_of(name, methods, folder=None) -> dict[str, DrawnMap]:
     return {method: found[method] for method in methods if method in found}
 
 
+def view_of(name):
+    """The camera of a model."""
+    return renders.VIEWS.get(name, renders.View())
+
+
 def draw(name, maps, rows, scratch, pixels):
     """Pictures of the rows by method, as `plates.plate` takes them: (title, paths, captions, scale) for every row."""
-    view = renders.VIEWS.get(name, renders.View())
+    view = view_of(name)
     views = {"front": view, "back": replace(view, azimuth=view.azimuth + 180)}
     texture = textures.checker(scratch / "checker.png")
     figures = [rival_maps.figures_of(found).caption() for found in maps.values()]

@@ -42,10 +42,11 @@ class DrawnMap:
     seconds: float
 
 
-def ours(obj, **settings) -> DrawnMap:
-    """One click on the object in Object Mode, with its seams, and settings other than the defaults."""
+def ours(obj, axes=None, **settings) -> DrawnMap:
+    """One click on the object in Object Mode, with its seams, and settings other than the defaults; axes: how it
+    stands, if not as it says."""
     reading = read(obj)
-    job = UnwrapJob(reading.surface, reading.faces, axes=reading.axes)
+    job = UnwrapJob(reading.surface, reading.faces, axes=axes or reading.axes)
     chosen = Settings(**{"max_shear": DEFAULT_MAX_SHEAR} | settings)
     layout, seconds = timed(lambda: drain(lay_out([job], chosen)))
     uv = np.zeros((len(reading.surface.corner_vertex), 2))
