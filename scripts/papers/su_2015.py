@@ -1,7 +1,8 @@
 """Zhengyu Su 2015, Optimal Mass Transport and Its Applications: maps between areas and angles, figures 11 and 12; and
 expressions of faces told apart by their distances, as in figure 23.
 
-usage: su_2015.py [SEED]      writes build/papers/su_2015; faces of ten people from SEED on, 100 unless it is said
+usage: su_2015.py [SEED] [bare]      writes build/papers/su_2015; faces of ten people from SEED on, 100 unless it is
+said; with `bare` whole heads without markers, too, which takes as long again
 """
 
 from __future__ import annotations
@@ -44,13 +45,15 @@ def sweeps() -> tuple[list[dict], dict[str, list[tuple[float, float]]]]:
     return rows, curves
 
 
-def expressions(first: int) -> None:
+def expressions(first: int, bare: bool) -> None:
     """Scans, and whole heads, of ten people with three expressions each: how often neighbours tell the expression, of
-    all and of those of others; the matrix and the map of the scans."""
+    all and of those of others; the matrix and the map of the scans. Bare: of whole heads without markers, too."""
     import numpy as np
 
     from omt_uv.display.distance_plots import map_picture, matrix_picture
     from omt_uv.solver.signatures.embedding import classical_scaling
+    from omt_uv.solver.signatures.marked import marked_signature
+    from omt_uv.solver.signatures.signature import signature
 
     of = [(person, kind) for person in range(first, first + PEOPLE) for kind in EXPRESSIONS]
     faces = []
@@ -59,23 +62,25 @@ def expressions(first: int) -> None:
         strength = np.random.default_rng(person).uniform(*STRENGTHS)
         faces.append((with_expression(V, kind, strength), F))
     people, kinds = (np.array(column) for column in zip(*of, strict=True))
-    whole = _distances([(V, F, nose(V), hairline(V)) for V, F in faces])
-    away = _distances([scan(V, F) for V, F in faces])
+    whole = _distances([marked_signature(V, F, nose(V), hairline(V)) for V, F in faces])
+    away = _distances([marked_signature(*scan(V, F)) for V, F in faces])
     rows = [*_told_by(whole, "whole heads", people, kinds), *_told_by(away, "scans", people, kinds)]
+    if bare:
+        free = _distances([signature(V, F) for V, F in faces])
+        rows += _told_by(free, "whole heads without markers", people, kinds)
     told(FOLDER, f"expressions {first}", rows)
     pictures = [matrix_picture(away, list(kinds)), map_picture(classical_scaling(away), people.tolist(), list(kinds))]
     saved(FOLDER / "faces.png", pictures, 600, colours=0)
 
 
-def _distances(marked: list):
-    """Distances (n,n) of meshes with markers."""
+def _distances(steps: list):
+    """Distances (n,n) of the signatures that these solvers make."""
     import numpy as np
 
     from omt_uv.solver.progress import drain
-    from omt_uv.solver.signatures.marked import marked_signature
     from omt_uv.solver.signatures.wasserstein import distance_of, prepared
 
-    found = [prepared(drain(marked_signature(*one))) for one in marked]
+    found = [prepared(drain(one)) for one in steps]
     away = np.zeros((len(found), len(found)))
     for i, a in enumerate(found):
         for j in range(i):
@@ -102,7 +107,9 @@ def _told_by(away, what: str, people, kinds) -> list[dict]:
 def main() -> None:
     from omt_uv.display.plots import plot
 
-    expressions(int(sys.argv[1]) if len(sys.argv) > 1 else 100)
+    words = sys.argv[1:]
+    seeds = [int(word) for word in words if word != "bare"]
+    expressions(seeds[0] if seeds else 100, "bare" in words)
     rows, curves = sweeps()
     told(FOLDER, "sweeps", rows)
     saved(FOLDER / "sweeps.png", [plot(curves, "mean shear", below="area error")], 480)

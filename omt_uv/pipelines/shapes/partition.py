@@ -147,8 +147,8 @@ def _warnings(division: Division, whole: FaceCells, torn: np.ndarray, settings: 
     told = []
     if division.unequal > division.residual + 1e-6:
         told.append(
-            f"Every separate part has whole cells, so that cells of different parts differ by up to "
-            f"{100 * division.unequal:.2g} %"
+            "Every separate part has whole cells, so that cells of different parts differ by up to "
+            + _percent(division.unequal)
         )
     if settings.write == "mesh":
         if len(torn):
@@ -167,4 +167,10 @@ def _warnings(division: Division, whole: FaceCells, torn: np.ndarray, settings: 
 
 def _cells(numbers: np.ndarray) -> str:
     """Some cells in words, with a verb."""
-    return f"{plural(len(numbers), '1 cell is', '{} cells are')} ({first_of(numbers)})"
+    count = len(numbers)
+    return f"{plural(count, '1 cell', '{} cells')} ({first_of(numbers)}) {'is' if count == 1 else 'are'}"
+
+
+def _percent(share: float) -> str:
+    """A share in two digits, or as a whole number."""
+    return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"

@@ -60,6 +60,15 @@ class ConformalSphere:
     flips: int
 
 
+@dataclass(frozen=True)
+class ConformalSites:
+    """Where a conformal map takes vertices, with faces folded that are too small: see `ConformalSphere`."""
+
+    sites: np.ndarray
+    infinite: int
+    flat: FlatPolygon
+
+
 def conformal_sphere(vertices: np.ndarray, triangles: np.ndarray) -> Steps[ConformalSphere]:
     """Map a closed surface (n,3), (m,3) conformally to the unit sphere.
 
@@ -73,12 +82,22 @@ def conformal_sphere(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Confo
     PrecisionError : the map leaves double precision
     """
     surface = closed_surface(vertices, triangles)
-    vertices, triangles = surface.vertices, surface.triangles
+    found = yield from conformal_sites(surface.vertices, surface.triangles)
+    return (yield from straightened(surface.vertices, surface.triangles, found))
+
+
+def conformal_sites(vertices: np.ndarray, triangles: np.ndarray) -> Steps[ConformalSites]:
+    """Where the vertices of a closed surface (n,3), (m,3) go. Raises PrecisionError: the plane cannot hold the map."""
     tri, _ = make_delaunay(from_mesh(vertices, triangles), euclidean_diagonal)
     infinite, flat = yield from _flatten(tri, magnified_vertices(vertices, triangles))
     z = plane_layout(flat, len(vertices))
     mass = vertex_areas(vertices, triangles)
-    sites = centre_on_sphere(_halved_by_equator(z, infinite, mass), mass)
+    return ConformalSites(centre_on_sphere(_halved_by_equator(z, infinite, mass), mass), infinite, flat)
+
+
+def straightened(vertices: np.ndarray, triangles: np.ndarray, found: ConformalSites) -> Steps[ConformalSphere]:
+    """A conformal map (n,3), (m,3) without folds. Raises PrecisionError: faces are too small on the sphere."""
+    sites, flat = found.sites, found.flat
     folds = int((~(signed_volumes(sites, triangles) > 0)).sum())
     positions = sites
     if folds:
@@ -90,7 +109,7 @@ def conformal_sphere(vertices: np.ndarray, triangles: np.ndarray) -> Steps[Confo
         positions=positions,
         sites=sites,
         straightened=folds,
-        infinite=infinite,
+        infinite=found.infinite,
         triangles=delaunay,
         residual=flat.residual,
         iterations=flat.iterations,

@@ -19,7 +19,7 @@ from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
 from ..transport.semidiscrete_sphere import sphere_transport
 from ..transport.spherical_power_diagram import Hull
-from .conformal import ConformalSphere, conformal_sphere
+from .conformal import ConformalSites, ConformalSphere, conformal_sites, straightened
 from .dominitz_tannenbaum import SphereFlow, flow_map
 from .multilevel import multilevel_start
 from .polygon_surface import PolygonSurface, with_polygon_fans
@@ -50,7 +50,8 @@ class SphereMap:
     """A map of a closed surface to the unit sphere.
 
     positions (n,3) unit vectors, faces counter-clockwise seen from outside; conformal (n,3): the Moebius-centred
-    conformal map it started from, or the map of least shear where that leaves double precision; status: see
+    conformal map it started from, or the map of least shear where that leaves double precision; sites (n,3): the
+    conformal map with folds, where faces are too small for double precision, or the same as conformal; status: see
     `refine.SphereRefinement`; iterations: Newton steps of the refinement; residual: last predicted decrease
     over energy; warnings: what was repaired or replaced, and why; flow: that of Dominitz and Tannenbaum, where it is
     the method.
@@ -58,6 +59,7 @@ class SphereMap:
 
     positions: np.ndarray
     conformal: np.ndarray
+    sites: np.ndarray
     status: str
     iterations: int
     residual: float
@@ -103,7 +105,8 @@ def sphere_map(
     if fanned is not None:
         found = yield from _mapped(fanned, method, options)
         n = len(surface.vertices)
-        found = replace(found, positions=found.positions[:n], conformal=found.conformal[:n])
+        parts = {name: getattr(found, name)[:n] for name in ("positions", "conformal", "sites")}
+        found = replace(found, **parts)
         # A cap that is no longer convex may fold the triangles that it came as.
         if method == MOSER or signed_volumes(found.positions, surface.triangles).min() > 0:
             return found
@@ -116,7 +119,7 @@ def _mapped(given: PolygonSurface, method: str, options: dict) -> Steps[SphereMa
     warnings = list(surface.warnings)
     joined = with_mirrored_quads(surface.vertices, surface.triangles, polygons)
     options = options | {"polygons": joined}
-    found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
+    sites, found = yield from part_of(_conformal(surface, warnings), *CONFORMAL)
     refined, flow = None, (yield from part_of(_flow(found, surface, target, method), *TRANSPORT))
     if found is not None and flow is not None and method == MOSER:
         return _unrefined(flow, found, warnings)
@@ -134,6 +137,7 @@ def _mapped(given: PolygonSurface, method: str, options: dict) -> Steps[SphereMa
     return SphereMap(
         positions=refined.positions,
         conformal=conformal,
+        sites=sites.sites if sites else conformal,
         status=refined.status,
         iterations=refined.iterations,
         residual=refined.residual,
@@ -161,6 +165,7 @@ def _unrefined(flow: SphereFlow, found: ConformalSphere, warnings: list[str]) ->
     return SphereMap(
         positions=flow.moser,
         conformal=found.positions,
+        sites=found.sites,
         status=MOSER,
         iterations=0,
         residual=0.0,
@@ -196,14 +201,17 @@ def _area_warning(positions: np.ndarray, triangles: np.ndarray, target: np.ndarr
     )
 
 
-def _conformal(surface: ClosedSurface, warnings: list[str]) -> Steps[ConformalSphere | None]:
-    """The conformal map; None, and a warning, where it leaves double precision."""
+def _conformal(
+    surface: ClosedSurface, warnings: list[str]
+) -> Steps[tuple[ConformalSites | None, ConformalSphere | None]]:
+    """The conformal map with its folds, and without; None, and a warning, where it leaves double precision."""
+    sites = None
     try:
-        found = yield from conformal_sphere(surface.vertices, surface.triangles)
+        sites = yield from conformal_sites(surface.vertices, surface.triangles)
+        return sites, (yield from straightened(surface.vertices, surface.triangles, sites))
     except PrecisionError as error:
         warnings.append(f"{error.cause}; the map was built from coarse to fine instead")
-        return None
-    return found
+    return sites, None
 
 
 def _refined_start(
