@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import types
+
 import meshes
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from mesh_checks import topology
 
 from omt_uv.solver.mesh.topology import halfedges, pair_keys
 from omt_uv.solver.progress import drain
+from omt_uv.solver.remeshing.initial import initial_mesh
 from omt_uv.solver.remeshing.initial.component_maps import RemeshSource
 from omt_uv.solver.remeshing.initial.initial_mesh import make_initial_mesh
 from omt_uv.solver.remeshing.initial.options import STRATEGIES, RemeshOptions
@@ -49,3 +52,19 @@ def test_limbs_go_by_their_own_triangles_unless_maps_are_asked_for(monkeypatch, 
     one, at_vertices = np.ones(len(maps.component.triangles)), np.ones(len(maps.component.vertices))
     found = drain(make_initial_mesh(maps, 200, one, at_vertices, RemeshOptions(strategy=strategy)))
     assert bool(asked) == by_sphere and topology(found.mesh.triangles) == topology(F)
+
+
+def test_samples_go_by_measure_and_what_boundaries_have_taken_counts():
+    """A chart whose boundary has more than its share gets none, and all together are as many as asked for."""
+    V, F = meshes.grid(2, 2)
+    chart = types.SimpleNamespace(
+        vertices=np.column_stack([V[:, :2], 0 * V[:, 0]]), triangles=F, faces=np.zeros(len(F), int)
+    )
+    small = types.SimpleNamespace(**{**vars(chart), "vertices": 1e-3 * chart.vertices, "faces": chart.faces + 1})
+    boundaries = [types.SimpleNamespace(samples=np.arange(k)) for k in (8, 8, 100)]
+    for density in (np.array([1.0, 1.0]), np.array([2.0, 1.0])):
+        counts = initial_mesh._inner_counts([chart, chart, small], boundaries, density, 50)
+        assert counts.tolist() == [25, 25, 0]
+    assert initial_mesh._inner_counts([chart, small], boundaries[:2], np.array([1.0, 1e6]), 40).tolist() == [20, 20]
+    assert initial_mesh._inner_counts([chart, small], boundaries[:2], np.array([1.0, 3e6]), 40).tolist() == [8, 32]
+    assert initial_mesh._inner_counts([chart], boundaries[:1], np.ones(1), 0).tolist() == [0]
