@@ -45,7 +45,23 @@ def test_properties_are_those_of_the_table(package):
     for name, cls in operators(package):
         lines.append("\t".join([name, "", "", cls.bl_label, " ".join(sorted(cls.bl_options))]))
         lines += ["\t".join([name, p.identifier, "", *row(p), "hidden" if p.is_hidden else ""]) for p in own(name)]
+        lines += list(descriptions(name, cls))
     check(PROPERTIES, lines)
+
+
+def descriptions(name, cls):
+    """What a button says for each choice, where that depends on choices; no two say the same."""
+    if "description" not in vars(cls):
+        return
+    properties = bpy.context.window_manager.operator_properties_last(name)
+    for prop in (p for p in own(name) if p.type in ("ENUM", "BOOLEAN")):
+        told = []
+        for value in values(prop):
+            setattr(properties, prop.identifier, value)
+            told.append(cls.description(bpy.context, properties))
+            yield "\t".join([name, f"description {prop.identifier}", plain(value), told[-1]])
+        properties.property_unset(prop.identifier)
+        assert prop.type != "ENUM" or len(set(told)) == len(told), (name, prop.identifier)
 
 
 def values(prop):

@@ -25,6 +25,15 @@ def test_the_unit_plays_no_part(power):
     assert np.array_equal(order_of_places(np.ldexp(V, power), F), order_of_places(V, F))
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_neither_pose_nor_place_plays_a_part(seed):
+    V, F = meshes.head()
+    V = V * [1.0, 1.6, 0.7] + 0.1 * V[:, [1, 2, 0]] ** 2
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    turn[0] *= np.linalg.det(turn)
+    assert np.array_equal(order_of_places(V @ turn + [3, -1, 2], F), order_of_places(V, F))
+
+
 def test_vertices_in_one_place_go_by_their_triangles():
     """As along a cut: two triangles that touch, each with vertices of its own."""
     V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)

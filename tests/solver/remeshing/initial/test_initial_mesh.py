@@ -68,3 +68,10 @@ def test_samples_go_by_measure_and_what_boundaries_have_taken_counts():
     assert initial_mesh._inner_counts([chart, small], boundaries[:2], np.array([1.0, 1e6]), 40).tolist() == [20, 20]
     assert initial_mesh._inner_counts([chart, small], boundaries[:2], np.array([1.0, 3e6]), 40).tolist() == [8, 32]
     assert initial_mesh._inner_counts([chart], boundaries[:1], np.ones(1), 0).tolist() == [0]
+
+
+def test_only_the_first_strategy_may_be_replaced_and_only_where_its_mesh_is_relaxed():
+    for strategy in STRATEGIES:
+        for rounds in (0, 1, 2):
+            options = RemeshOptions(strategy=strategy, rounds=rounds)
+            assert options.any_mesh_will_do == (strategy == STRATEGIES[0] and rounds > 0)
