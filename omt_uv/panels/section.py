@@ -31,12 +31,17 @@ class Section:
     is_open: bool = False
 
 
-def operator_section(name: str, title: str, operator: str, icon: str, parent: str | None = None) -> Section:
-    """A section of one operator: its settings, as its module draws them, and below them its button."""
+def operator_section(
+    name: str, title: str, operator: str, icon: str, parent: str | None = None, button: str = ""
+) -> Section:
+    """A section of one operator: its settings, as its module draws them, and below them its button.
+
+    button : what it says where the operator's name, by which the search finds it, would say more than is needed
+    """
 
     def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         draw_settings(layout.column(), operator, settings_of(context, operator))
-        big_button(layout, operator, icon)
+        big_button(layout, operator, icon, button)
 
     return Section(name, title, draw, (operator,), parent)
 

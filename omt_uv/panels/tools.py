@@ -54,6 +54,8 @@ def draw_magnify_image(layout: bpy.types.UILayout, context: bpy.types.Context) -
 MAGNIFY = Section("magnify", "Magnify", draw_magnify, (MAGNIFY_NAME,))
 MAGNIFY_MORE = Section("magnify_more", "Seams and Packing", draw_magnify_more, (MAGNIFY_NAME,), parent="magnify")
 MAGNIFY_IMAGE = Section("magnify_image", "Image", draw_magnify_image, (MAGNIFY_NAME,), parent="magnify")
-WEIGHTS = operator_section("weights", "Weights", "object.omt_weights", "MOD_VERTEX_WEIGHT", parent="magnify")
+WEIGHTS = operator_section(
+    "weights", "Weights", "object.omt_weights", "MOD_VERTEX_WEIGHT", "magnify", button="Make Weights"
+)
 REMESH = Section("remesh", "Remesh", draw_remesh, (REMESH_NAME, "object.omt_compare"))
-SPHERE = operator_section("sphere", "Sphere", "uv.omt_sphere", "WORLD")
+SPHERE = operator_section("sphere", "Sphere", "uv.omt_sphere", "WORLD", button="Project to Sphere")

@@ -63,4 +63,4 @@ def draw_options(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 SECTION = Section("", "OMT UV", draw, (UNWRAP,), is_open=True)
 OPTIONS = Section("more", "Seams and Packing", draw_options, (UNWRAP,), parent="")
 REFINE = operator_section("refine", "Refine Area", "uv.omt_refine", "MOD_SMOOTH", parent="")
-SEAMS = operator_section("seams", "Mark Seams", "uv.omt_seams", "EDGESEL", parent="")
+SEAMS = operator_section("seams", "Mark Seams", "uv.omt_seams", "EDGESEL", "", button="Mark Seams")

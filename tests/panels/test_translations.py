@@ -95,7 +95,7 @@ def of_code():
     """What panels draw as text, and what they say through `words`; stages of solvers; names of the figures of runs."""
     for node in trees("panels/*.py", "operators/**/*.py", "session/*.py"):
         if isinstance(node, ast.Call):
-            yield from (constant(k.value) for k in node.keywords if k.arg == "text")
+            yield from (constant(k.value) for k in node.keywords if k.arg in ("text", "button"))
             if getattr(node.func, "id", "") == "words":
                 yield constant(node.args[0])
             if getattr(node.func, "id", "") == "counted":

@@ -409,4 +409,6 @@ GERMAN: dict[str, str] = {
     "{} landmarks deleted": "{} Landmarken gelöscht",
     "Applied a level of {} modifier": "Eine Stufe von {} Modifikator angewendet",
     "Applied a level of {} modifiers": "Eine Stufe von {} Modifikatoren angewendet",
+    "Make Weights": "Gewichte erstellen",
+    "Project to Sphere": "Auf Kugel projizieren",
 }

@@ -409,4 +409,6 @@ JAPANESE: dict[str, str] = {
     "{} landmarks deleted": "{} 個のランドマークを削除しました",
     "Applied a level of {} modifier": "{} 個のモディファイアーのレベルを適用しました",
     "Applied a level of {} modifiers": "{} 個のモディファイアーのレベルを適用しました",
+    "Make Weights": "ウェイトを作成",
+    "Project to Sphere": "球に投影",
 }
