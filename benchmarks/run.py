@@ -26,6 +26,7 @@ from benchmarks.parts import (
     magnify,
     match,
     memory,
+    pace,
     partition,
     polygons,
     profile,
@@ -57,6 +58,7 @@ MODULES = (
     polygons,
     alike,
     bodies,
+    pace,
 )
 PARTS: dict[str, Part] = {part.name: part for module in MODULES for part in module.PARTS}
 OPTIONS: dict[str, Option] = {option.name: option for part in PARTS.values() for option in part.options}

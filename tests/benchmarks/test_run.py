@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import meshes
+import numpy as np
 import pytest
 
 from benchmarks import run
@@ -23,7 +24,8 @@ def test_an_option_is_one_option_wherever_it_is_taken():
 
 def test_without_names_all_parts_run_but_those_that_say_otherwise():
     _, parts = run.parse([])
-    named = {"hard", "invariance", "match", "metric", "nearest", "partition", "polygons", "profile", "flows", "volumes"}
+    named = {"flows", "hard", "invariance", "limbs", "live", "match", "metric", "million", "nearest", "pace", "partition"}
+    named |= {"polygons", "profile", "volumes"}
     assert {p.name for p in run.PARTS.values()} - {p.name for p in parts} == named
 
 
@@ -51,3 +53,13 @@ def test_counts_are_those_of_the_report_and_the_same_again(capsys):
     assert cells["model"] == "cone" and cells["faces"] == str(len(meshes.cone()[1]))
     assert int(cells["Newton conformal"]) > 0 and int(cells["factorisations"]) > 0
     assert "Counts of one unwrap" in capsys.readouterr().out
+
+
+def test_bodies_of_limbs_are_closed_but_for_holes_of_the_skin():
+    from benchmarks.parts import pace
+
+    for name in pace.LIMB_BODIES:
+        V, F = pace.limb_body(name, 2000)
+        assert len(F) >= 2000 and F.max() == len(V) - 1
+        edges, uses = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+        assert (uses <= 2).all() and (uses == 1).mean() < 0.02

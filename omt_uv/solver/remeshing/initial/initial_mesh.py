@@ -27,6 +27,8 @@ FEW = 50
 # Bodies whose sphericity is less have limbs, which a sphere shows as points: by their own triangles they come out as
 # even, nearer to the surface, and sooner.
 LIMBED = 0.65
+# So have disks that are less open: what lies far behind the opening is a point in any map to the disk.
+BAG = 0.05
 NO_MAPS = "A part has no maps to the disk in double precision and was remeshed without"
 
 
@@ -57,9 +59,9 @@ def make_initial_mesh(
 ) -> Steps[InitialMesh]:
     """Sample a component with density (m,), and at_vertices (n,), of mean 1, and triangulate by the options' strategy.
 
-    Closed components of genus 0 without features or limbs go by way of the sphere, disks without features by way of a
-    chart, and all others, or where that fails, by collapses of their own edges. On boundaries and features samples are
-    `line_spacing` edges apart, or more where there would be too many.
+    Closed components of genus 0 without features or limbs go by way of the sphere, open disks without features by way
+    of a chart, and all others, or where that fails, by collapses of their own edges. On boundaries and features samples
+    are `line_spacing` edges apart, or more where there would be too many.
 
     There may be more vertices than the count, where boundaries and features take as many. Raises PrecisionError where a
     chart cannot be triangulated.
@@ -131,7 +133,7 @@ def _by_charts(
     yield Progress("Charts", 0.0)
     plan = plan_samples(maps, count, density, at_vertices, options, line_spacing)
     network, component = plan.network, maps.component
-    if options.any_mesh_will_do and not component.is_disk:
+    if options.any_mesh_will_do and not (component.is_disk and component.openness > BAG):
         return _by_decimation_between_lines(maps, plan, density)
     boundaries = [chart_boundary(sides, plan.samples, network.arcs) for sides in network.sides]
     left = max(plan.vertex_count, plan.initial_vertex_count) - len(plan.samples.points)
