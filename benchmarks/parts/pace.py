@@ -39,7 +39,7 @@ MOST_LEVELS = 7
 MILLION = Option("million", 1_000_000, "faces of the part million, at least", {"type": int})
 MILLION_GOALS = {"time": 45.0, "peak MiB": 2560}
 LIVE_SIDES = {100: 0.1, 224: 0.3}  # vertices along a side of the head, and seconds a step may take
-LIVE_BALANCES = (0.0, 0.2, 0.4, 0.6, 0.5, 0.45)
+LIVE_STEPS = 11  # of a twentieth of the slider each
 
 
 def pace_table(args) -> Table:
@@ -72,7 +72,7 @@ def pace_table(args) -> Table:
 
 
 # Where limbs go, as points one after another, with the radius of each.
-LIMB_BODIES = {
+LIMB_BODIES: dict[str, list[list[tuple[float, ...]]]] = {
     "quadruped": [
         [(-1, 0, 0, 0.25), (1, 0, 0, 0.25), (1.5, 0, 0.5, 0.15)],
         [(-1, 0, 0, 0.25), (-1.6, 0, 0.3, 0.05)],
@@ -161,7 +161,7 @@ def live_table(args) -> Table:
         _, result = our_uv(Case("head", V, F, np.zeros((0, 2), np.int64)), "free", "draft")
         chart, uv = result.charts[0], result.maps[0].uv
         live, first = timed(lambda c=chart, u=uv: LiveMap(c.vertices, c.triangles, u))
-        steps = [timed(lambda b=balance, m=live: m.follow(b, seconds=0.0))[1] for balance in LIVE_BALANCES]
+        steps = [timed(lambda b=balance, m=live: m.follow(b, seconds=0.0))[1] for balance in np.arange(LIVE_STEPS) / 20]
         late = {"live": max(steps) > goal}
         table.add(faces=len(F), first=first, mean=float(np.mean(steps)), longest=max(steps), **missed(**late))
     return table

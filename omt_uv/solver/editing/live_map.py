@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..linalg.additive_schwarz import schwarz_solver
+from ..linalg.kept_factor import KeptFactor
 from ..maps.polygon_elements import with_convex_quads
 from ..mesh.topology import boundary_edges
 from ..refinement.continuation import MapProblem, rescaled
@@ -64,8 +65,10 @@ class LiveMap:
         start, self.warnings = island_start(mesh.vertices, mesh.triangles, given, boundary, mesh.pins is not None)
         guard = None if meets_itself(start, boundary) else boundary
         motion = FreeMotion(np.zeros(len(given), bool))
-        # Large islands by parts: a step that is nearly right, and there sooner, is what a slider wants.
-        assembly = assembly_of(faces, len(given), schwarz_solver(mesh.vertices, mesh.triangles))
+        # Large islands by parts, and all by factors of steps before: a step that is nearly right, and there sooner, is
+        # what a slider wants.
+        solver = schwarz_solver(mesh.vertices, mesh.triangles, keep=True) or KeptFactor()
+        assembly = assembly_of(faces, len(given), solver)
         self._task = MapProblem(faces, assembly, motion, guard, False)
         self._w, self._pins, self._guarded = start, mesh.pins, False
         self._balance = -1.0

@@ -1,7 +1,7 @@
 """Sparse linear systems of meshes: direct and iterative solvers, elimination orders, and L-BFGS.
 
 Imports solver.errors and solver.mesh.
-Main names: Factor, solve_spd, solve_general, LaplacianSolver, AdditiveSchwarz, Dissection, LBFGS.
+Main names: Factor, solve_spd, solve_general, LaplacianSolver, AdditiveSchwarz, KeptFactor, Dissection, LBFGS.
 """
 
 from ..lazy import lazy
@@ -9,6 +9,7 @@ from ..lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     additive_schwarz="AdditiveSchwarz schwarz_solver",
+    kept_factor="KeptFactor",
     lbfgs="LBFGS",
     multigrid="LaplacianSolver Multigrid",
     nested_dissection="Dissection kd_parts mesh_order vertex_graph",

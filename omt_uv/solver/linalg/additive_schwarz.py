@@ -9,13 +9,14 @@ know all of their equations.
 
 from __future__ import annotations
 
-from itertools import islice
+from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
 
+from .kept_factor import KEPT_ENOUGH, MOST_KEPT, by_gradients
 from .nested_dissection import kd_parts, vertex_graph
-from .sparse import Factor, fill, gradient_steps, minimum_degree
+from .sparse import Factor, fill, minimum_degree
 
 # Meshes of fewer vertices are factored at once.
 LARGE = 50_000
@@ -30,10 +31,6 @@ PART_SIZE = 1000
 OVERLAP = 2
 # Neighbours of a vertex beyond which it is no part of any overlap.
 MOST_NEIGHBOURS = 100
-# Iterations in which the quadratic model must fall
-WINDOW = 3
-# by more than this share of its fall so far, or they end: a step that is not the last needs no more.
-ENOUGH = 0.03
 # Iterations at most; the equations are factored where these are not enough.
 MOST = 100
 # Added to the diagonal of the coarse equations, relative to its greatest entry: a part may have hardly a free vertex.
@@ -43,11 +40,13 @@ SHIFT = 1e-12
 class AdditiveSchwarz:
     """Parts of a mesh (n,d), (m,3): where they overlap, and in which order their vertices are eliminated.
 
-    Unknown 2 i and 2 i + 1 are those of vertex i.
+    Unknown 2 i and 2 i + 1 are those of vertex i. keep: factors, for the next matrices, as long as they will do.
     """
 
-    def __init__(self, points: np.ndarray, triangles: np.ndarray, size: int = PART_SIZE):
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, size: int = PART_SIZE, keep: bool = False):
         n = len(points)
+        self._keep = keep
+        self._kept: Callable[[np.ndarray], np.ndarray] | None = None
         self._part = kd_parts(points, max(0, round(np.log2(n / size))))
         self._count = int(self._part.max()) + 1
         graph = vertex_graph(triangles, n).tocsr()
@@ -75,6 +74,10 @@ class AdditiveSchwarz:
         """
         # Its transpose is itself, by rows.
         matrix = matrix.T if sp.issparse(matrix) and matrix.format == "csc" else sp.csr_matrix(matrix)
+        if self._kept is not None:
+            x = by_gradients(matrix, b, self._kept, MOST_KEPT, KEPT_ENOUGH)
+            if x is not None:
+                return x
         place = np.full(len(b), -1, np.int64)
         factors = [Factor(_block(matrix, d, place), "natural") for d in self._unknowns]
         spread = self._affine(w, axes)
@@ -88,7 +91,8 @@ class AdditiveSchwarz:
                 x[d] += factor.solve(r[d])
             return x
 
-        x = _by_gradients(matrix, b, precondition)
+        self._kept = precondition if self._keep else None
+        x = by_gradients(matrix, b, precondition, MOST)
         return Factor(matrix, "natural").solve(b) if x is None else x
 
     def _affine(self, w, axes) -> sp.csr_matrix:
@@ -108,15 +112,15 @@ class AdditiveSchwarz:
         return sp.csr_matrix((entries.ravel(), columns.ravel(), 6 * np.arange(n + 1)), shape=(n, 6 * count))
 
 
-def schwarz_solver(points: np.ndarray, triangles: np.ndarray) -> AdditiveSchwarz | None:
-    """Parts of a mesh (n,d), (m,3) that is so large that it should be solved in parts.
+def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False) -> AdditiveSchwarz | None:
+    """Parts of a mesh (n,d), (m,3) that is so large that it should be solved in parts; keep: see there.
 
     The order of the vertices is that of their elimination.
     """
     n = len(points)
     if n < LARGE or (n < COUNTED and fill(vertex_graph(triangles, n)) < LITTLE_FILL * n):
         return None
-    return AdditiveSchwarz(points, triangles)
+    return AdditiveSchwarz(points, triangles, keep=keep)
 
 
 def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:
@@ -128,13 +132,3 @@ def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_ma
     start = np.concatenate([[0], np.cumsum(inside)])[rows.indptr]
     place[d] = -1
     return sp.csc_matrix((rows.data[inside], column[inside], start), shape=(len(d), len(d)))
-
-
-def _by_gradients(matrix, b, precondition) -> np.ndarray | None:
-    """Conjugate gradients until x.matrix.x / 2 - b.x hardly falls any more; None where that takes too long."""
-    falls: list[float] = []
-    for x, _, fallen in islice(gradient_steps(matrix, b, precondition), MOST + 1):
-        falls.append(fallen)
-        if len(falls) > WINDOW and fallen - falls[-1 - WINDOW] <= ENOUGH * fallen:
-            return x
-    return x if len(falls) <= MOST else None

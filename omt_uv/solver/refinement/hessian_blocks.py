@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..linalg.additive_schwarz import AdditiveSchwarz
+from ..linalg.kept_factor import KeptFactor
 from ..linalg.nested_dissection import LARGE, vertex_graph
 from ..linalg.sparse import minimum_degree
 from ..maps.energy import Elements, area_forms, face_derivatives, sum_at_vertices
@@ -34,14 +35,18 @@ AXES = ((0, 0), (1, 0), (0, 1), (1, 1))
 class Assembly:
     """Scatters dense blocks of triangles, and of quads, into one sparse matrix whose pattern never changes.
 
-    Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: of a mesh that is solved in parts, or None; order: in which
-    unknowns are eliminated, see `sparse.Factor`.
+    Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: what solves for a step that is nearly right, or None;
+    order: in which unknowns are eliminated, see `sparse.Factor`.
     """
 
     order: str | np.ndarray = "natural"
 
     def __init__(
-        self, triangles: np.ndarray, n: int, parts: AdditiveSchwarz | None = None, quads: np.ndarray | None = None
+        self,
+        triangles: np.ndarray,
+        n: int,
+        parts: AdditiveSchwarz | KeptFactor | None = None,
+        quads: np.ndarray | None = None,
     ):
         self.parts = parts
         cells = [triangles] if quads is None or not len(quads) else [triangles, quads]
@@ -97,7 +102,7 @@ def _pairs(cells: np.ndarray, n: int) -> np.ndarray:
 
 
 def assembly_of(
-    faces: Elements, n: int, parts: AdditiveSchwarz | None = None, symmetry: MirrorSymmetry | None = None
+    faces: Elements, n: int, parts: AdditiveSchwarz | KeptFactor | None = None, symmetry: MirrorSymmetry | None = None
 ) -> Assembly:
     """The assembly of the elements of a mesh of n vertices, of which some may follow others."""
     first = lone_triangles(faces)

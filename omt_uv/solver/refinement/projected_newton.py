@@ -13,6 +13,7 @@ import scipy.sparse as sp
 
 from ..errors import PrecisionError
 from ..linalg.additive_schwarz import AdditiveSchwarz
+from ..linalg.kept_factor import KeptFactor
 from ..linalg.sparse import Factor
 from ..maps.energy import Elements, energies, squared, target_error
 from ..maps.mirror_symmetry import MirrorSymmetry
@@ -216,7 +217,9 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
     return matrix if squares is None else matrix + squares, axes.ravel(), found.scale
 
 
-def _solution(matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | None, w, axes, order) -> np.ndarray:
+def _solution(
+    matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | KeptFactor | None, w, axes, order
+) -> np.ndarray:
     """Solution x (n,) of matrix x = b, shifted where rounding makes it singular: the step is shorter, and goes down."""
     shift = SHIFT
     while True:

@@ -1,0 +1,81 @@
+"""Factors that are kept: nearly the solution of systems like the one before, and new ones for all others."""
+
+import meshes
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from work import counted_work
+
+from omt_uv.solver.errors import PrecisionError
+from omt_uv.solver.linalg.additive_schwarz import AdditiveSchwarz
+from omt_uv.solver.linalg.kept_factor import KEPT_ENOUGH, KeptFactor
+
+
+def stiff_matrix(triangles, n, weight):
+    """Two unknowns a vertex, symmetric positive definite, with random weights (m,) of the triangles."""
+    tail, head = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    rows = np.arange(len(tail))
+    ends = np.concatenate([tail, head])
+    difference = sp.csr_matrix((np.repeat([1.0, -1.0], len(tail)), (np.tile(rows, 2), ends)), (len(tail), n))
+    single = difference.T @ sp.diags(np.repeat(weight, 3)) @ difference + 1e-3 * sp.identity(n)
+    return sp.kron(single, sp.identity(2)).tocsc()
+
+
+@pytest.fixture
+def systems():
+    """Points, triangles, a matrix, one whose faces have changed by up to a fifth, one that is another, and a side."""
+    V, F = meshes.bumpy(24, 24)
+    rng = np.random.default_rng(0)
+    weight = np.exp(rng.normal(0, 1, len(F)))
+    matrices = [
+        stiff_matrix(F, len(V), w) for w in (weight, weight * rng.uniform(0.8, 1.2, len(F)), np.flip(weight) ** 4)
+    ]
+    return V, F, *matrices, rng.normal(0, 1, 2 * len(V))
+
+
+def fall(matrix, b, x):
+    """How far the quadratic model falls from 0 to x, times two."""
+    return 2 * b @ x - x @ (matrix @ x)
+
+
+def test_systems_like_the_one_before_need_no_new_factors(systems):
+    _, _, first, like, _, b = systems
+    solver = KeptFactor()
+    np.testing.assert_allclose(first @ solver.solve(first, b, b, b), b, atol=1e-9)
+    with counted_work() as work:
+        x = solver.solve(like, b, b, b)
+    assert work.factorisations == 0
+    exact = KeptFactor().solve(like, b, b, b)
+    assert (1 - KEPT_ENOUGH) * fall(like, b, exact) <= fall(like, b, x) <= (1 + 1e-9) * fall(like, b, exact)
+    assert b @ x > 0
+
+
+def test_others_are_factored_anew_and_serve_from_then_on(systems):
+    _, _, first, _, other, b = systems
+    solver = KeptFactor()
+    solver.solve(first, b, b, b)
+    np.testing.assert_allclose(other @ solver.solve(1e6 * other, b, b, b), 1e-6 * b, atol=1e-12)
+    with counted_work() as work:
+        solver.solve(1.01e6 * other, b, b, b)
+    assert work.factorisations == 0
+
+
+def test_a_singular_system_is_refused_by_name_and_leaves_the_factors(systems):
+    _, _, first, _, _, b = systems
+    solver = KeptFactor()
+    with pytest.raises(PrecisionError):
+        solver.solve(sp.csc_matrix(first.shape), b, b, b)
+    np.testing.assert_allclose(first @ solver.solve(first, b, b, b), b, atol=1e-9)
+
+
+def test_parts_keep_their_factors_where_they_are_told_to(systems):
+    V, F, first, like, _, b = systems
+    w, axes = V[:, 0] + 1j * V[:, 1], np.tile([1, 1j], (len(V), 1))
+    for keep in (True, False):
+        parts = AdditiveSchwarz(V, F, 200, keep)
+        parts.solve(first, b, w, axes)
+        with counted_work() as work:
+            x = parts.solve(like, b, w, axes)
+        assert (work.factorisations == 0) == keep
+        exact = KeptFactor().solve(like, b, b, b)
+        assert fall(like, b, x) >= 0.85 * fall(like, b, exact)
