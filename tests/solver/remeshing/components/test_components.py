@@ -72,9 +72,9 @@ def test_sphericity_is_that_of_known_bodies():
 
 def test_openness_is_that_of_known_disks():
     sector = 2 * np.pi / 256
-    rim = np.column_stack([np.cos(sector * np.arange(256)), np.sin(sector * np.arange(256)), np.zeros(256)])
+    outline = np.column_stack([np.cos(sector * np.arange(256)), np.sin(sector * np.arange(256)), np.zeros(256)])
     fan = np.column_stack([np.full(256, 256), np.arange(256), np.roll(np.arange(256), -1)])
-    flat = split_components(np.vstack([rim, np.zeros(3)]), fan, NONE).components[0]
+    flat = split_components(np.vstack([outline, np.zeros(3)]), fan, NONE).components[0]
     assert flat.openness == pytest.approx(1, abs=1e-3)
     V, F = meshes.hemisphere(24, 96)
     for moved in (V, 5 * V - [3, 0, 1]):
