@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import subprocess
 import sys
+from typing import Any
 
 import bpy
 
@@ -72,7 +73,7 @@ def pace_table(args) -> Table:
 
 
 # Where limbs go, as points one after another, with the radius of each.
-LIMB_BODIES: dict[str, list[list[tuple[float, ...]]]] = {
+LIMB_BODIES: dict[str, Any] = {
     "quadruped": [
         [(-1, 0, 0, 0.25), (1, 0, 0, 0.25), (1.5, 0, 0.5, 0.15)],
         [(-1, 0, 0, 0.25), (-1.6, 0, 0.3, 0.05)],
