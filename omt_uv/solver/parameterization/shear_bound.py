@@ -40,6 +40,9 @@ MARGIN = 0.95
 CROWDED = 1.15
 # Vertices this close to where images of others belong, over the extent, are these images.
 SAME_PLACE = 1e-3
+# What shears more than this is seen on any checker, and charts with more of it than that share are cut further.
+STEEP = 3.0
+MOST_STEEP = 0.01
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
 # The least share of a surface that a warning names as a number.
@@ -221,8 +224,8 @@ def bound_shear(
 
 @dataclass(frozen=True)
 class _Round:
-    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), and the
-    numbers of those that miss the bound and may be cut for that."""
+    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), the same
+    but above the bound where too much is steep (k,), and the numbers of those that miss it and may be cut for that."""
 
     charts: list[Chart]
     maps: list[ChartMap]
@@ -230,6 +233,7 @@ class _Round:
     memory: dict
     area: np.ndarray
     mean: np.ndarray
+    pressing: np.ndarray
     bound: float
     searched: list[int]
 
@@ -240,18 +244,21 @@ class _Round:
         area, bound = np.array([area.sum() for _, area in shear]), search.shear.bound
         # Slivers between sides have a shear, and nobody sees it.
         mean = np.where(area > LEAST_AREA * area.sum(), mean, 1.0)
-        missed = np.flatnonzero(mean > bound)
+        steep = np.array([area[local > STEEP].sum() / area.sum() for local, area in shear])
+        pressing = np.where((steep > MOST_STEEP) & (mean > 1), np.maximum(mean, bound * (1 + steep)), mean)
+        missed = np.flatnonzero(pressing > bound)
         searched = [int(k) for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
-        return _Round(charts, maps, cuts, memory, area, mean, bound, searched)
+        return _Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched)
 
     @property
     def excess(self) -> float:
         """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
-        return float(self.area[self.searched] @ (self.mean[self.searched] - self.bound) / self.area.sum())
+        return float(self.area[self.searched] @ (self.pressing[self.searched] - self.bound) / self.area.sum())
 
     def warnings(self, why: str) -> Iterator[str]:
         """Warnings of charts that shear more than the bound, those with seams marked by hand apart; why others do."""
-        missed = np.flatnonzero(self.mean > self.bound)
+        # "1.35, above 1.35" helps nobody.
+        missed = np.flatnonzero(np.round(self.mean, 2) > self.bound)
         mean, by_hand = self.mean[missed], ~np.isin(missed, self.searched)
         for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, why)):
             if chosen.any():
@@ -275,7 +282,7 @@ def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float
     """
     share, promised = np.ones(len(promised)), promised.copy()
     for k in missed:
-        faces, reached = last.charts[k].faces, np.log(last.mean[k]) ** 2
+        faces, reached = last.charts[k].faces, np.log(last.pressing[k]) ** 2
         # What the last search has promised and its map has not kept is asked for on top.
         kept_part = min(float(promised[faces].min()) / reached, 1.0)
         share[faces] = margin * kept_part * (np.log(last.bound) ** 2 / reached) ** 1.5

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
+from omt_uv.solver.maps.distortion import face_distortion
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -22,6 +23,13 @@ def unwrapped(surface, bound, **options):
 
 def mean_shear(result):
     return [chart_map.angle_mean for chart_map in result.maps]
+
+
+def steepness(result):
+    """The shear of all triangles."""
+    both = zip(result.charts, result.maps, strict=True)
+    each = [face_distortion(c.vertices, c.triangles, m.uv[c.triangles]) for c, m in both]
+    return np.concatenate([shear for _, shear in each])
 
 
 def test_seams_bring_the_shear_under_the_bound():
@@ -62,6 +70,16 @@ def test_a_draft_has_the_seams_that_are_predicted(monkeypatch):
 def test_a_chart_within_the_bound_is_left_alone():
     result = unwrapped(triangle_surface(*meshes.bumpy()), 3.0)
     assert len(result.seams) == 0 and not result.warnings
+
+
+def test_a_chart_with_much_that_is_steep_is_cut_though_its_mean_keeps_the_bound(monkeypatch):
+    surface = triangle_surface(*meshes.bumpy())
+    before = unwrapped(surface, 3.0)
+    monkeypatch.setattr(shear_bound, "STEEP", float(np.quantile(steepness(before), 0.9)))
+    after = unwrapped(surface, 3.0)
+    assert len(before.seams) == 0 < len(after.seams) and not after.warnings
+    share = [(steepness(found) > shear_bound.STEEP).mean() for found in (before, after)]
+    assert share[1] < 0.75 * share[0]
 
 
 def test_only_the_bad_chart_is_cut():
