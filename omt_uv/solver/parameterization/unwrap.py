@@ -283,8 +283,23 @@ class _Task:
                 pairs = mirror_partners(charts, targets)
                 as_it_was = replace(cut, joined=charts, targets=targets, pairs=pairs, maps={})
                 return (yield from self.map_all(as_it_was))
+            alone = k not in cut.pairs and all(k != partner for partner, _ in cut.pairs.values())
+            if alone and self.options.quality == "standard" and found.area_l1 > goal:
+                found = yield from self.map_closer(charts[k], cut.joined[k], cut.targets[k], maps[k], found)
             maps[k] = found
         return maps
+
+    def map_closer(
+        self, chart: Chart, joined: Chart, target: Target | None, chart_map: ChartMap, found: ChartMap
+    ) -> Steps[ChartMap]:
+        """What was found for a chart from the map of it with joined quads, whose halves are farther off than these are;
+        from one with quads less far off where that is better."""
+        options = replace(self.options, quality="closer")
+        uv = yield from refined_again(joined, chart_map.uv, options, target)
+        own = chart_target(self.target, self.surface, chart)
+        density = None if own is None else own.density
+        closer = as_given(chart, replace(chart_map, uv=uv), density, found.area_l1)
+        return found if closer is None or closer.area_l1 >= found.area_l1 else closer
 
     def map_all(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, small ones without pins together, one for two that are each other's mirror image."""

@@ -135,6 +135,8 @@ QUALITIES = {
     "standard": Quality(
         area_error=0.008, area_weights=(30.0, 500.0), greatest_weight=1e6, max_steps=150, tolerance=3e-2
     ),
+    # From a standard map on, where faces have less of their areas than the polygons that were solved for.
+    "closer": Quality(area_error=0.006, area_weights=(500.0, 600.0), greatest_weight=1e6, max_steps=60, tolerance=3e-2),
     "exact": Quality(
         area_error=0.0003, area_weights=(30.0, 1000.0, 3e4), greatest_weight=1e8, max_steps=300, tolerance=1e-2
     ),

@@ -8,11 +8,13 @@ import numpy as np
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.mirrored_charts import mirror_partners, mirrored_map, with_mirrored_quads
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped, of_polygon_disk, polygon_disk
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement.continuation_rules import QUALITIES
 
 
 def disk_of(V, P):
@@ -100,15 +102,36 @@ def test_polygons_that_fold_are_cut_by_their_ears():
     assert len(other.triangles) == sides - 2
 
 
-def test_diagonals_alone_do_not_break_a_symmetry():
+def hill_of_triangles(height, turned):
+    """A hill of 144 quads, its own image in x, cut into triangles symmetrically but for the quads `turned`."""
     x, y = np.meshgrid(np.linspace(-1, 1, 13), np.linspace(-1, 1, 13), indexing="ij")
-    V = np.stack([x, y, 0.6 * np.exp(-3 * (x**2 + 2 * (y - 0.2) ** 2))], axis=-1).reshape(-1, 3)
+    V = np.stack([x, y, height * np.exp(-3 * (x**2 + 2 * (y - 0.2) ** 2))], axis=-1).reshape(-1, 3)
     corner = (13 * np.arange(12)[:, None] + np.arange(12)).ravel()
     Q = np.column_stack([corner, corner + 13, corner + 14, corner + 1])
     other = x[:-1, :-1].ravel() > -0.01
-    other[[30, 100, 110]] ^= True
+    other[turned] ^= True
     cuts = np.where(other[:, None, None], Q[:, [[0, 1, 3], [1, 2, 3]]], Q[:, [[0, 1, 2], [0, 2, 3]]])
-    surface = triangle_surface(V, cuts.reshape(-1, 3))
+    return triangle_surface(V, cuts.reshape(-1, 3))
+
+
+def test_triangles_of_quads_that_are_solved_as_one_have_their_areas(monkeypatch):
+    """Halves of a quad are farther off than the quad is: it is asked for more where the goal is missed by them."""
+    surface = hill_of_triangles(1.5, [18, 30, 42, 66, 78, 79, 100, 102, 114])
+    found = drain(unwrap(surface, options=UnwrapOptions(seams="existing"))).maps[0]
+    assert found.area_l1 < QUALITIES["standard"].area_error and not found.folds
+    monkeypatch.setattr(unwrap_module, "refined_again", lambda _chart, uv, *_: ended(uv))
+    assert drain(unwrap(surface, options=UnwrapOptions(seams="existing"))).maps[0].area_l1 > found.area_l1
+
+
+def ended(result):
+    """Steps that end at once."""
+    return result
+    yield
+
+
+def test_diagonals_alone_do_not_break_a_symmetry():
+    surface = hill_of_triangles(0.6, [30, 100, 110])
+    V = surface.positions
     (chart,) = strict_charts(surface)
     joined = with_mirrored_quads(surface, [chart])[0]
     assert len(np.unique(joined.faces)) == 288 - 6
