@@ -124,10 +124,11 @@ def test_a_slit_on_one_side_has_an_image_on_the_other():
 
 
 def test_a_cut_has_images_in_both_mirrors_of_a_body():
-    """A box of 6 by 8 squares open above and below: its own image across all axes, marked across none."""
+    """A tube of 6 by 8 quads: its own image across y and z, and cut so across y alone."""
     n, m = 8, 6
     k = np.arange(n)
-    ring = np.column_stack([2 * np.cos(2 * np.pi * k / n), np.sin(2 * np.pi * k / n)])
+    turn = 2 * np.pi * k / n
+    ring = np.column_stack([2 * np.cos(turn) + 0.5 * np.cos(2 * turn), np.sin(turn)])
     height = np.linspace(-1.5, 1.5, m + 1)
     V = np.column_stack([np.tile(ring, (m + 1, 1)), np.repeat(height, n)])
     P = [[r * n + j, r * n + (j + 1) % n, (r + 1) * n + (j + 1) % n, (r + 1) * n + j] for r in range(m) for j in k]
