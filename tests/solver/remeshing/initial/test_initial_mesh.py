@@ -68,6 +68,8 @@ def test_samples_go_by_measure_and_what_boundaries_have_taken_counts():
     assert initial_mesh._inner_counts([chart, small], boundaries[:2], np.array([1.0, 1e6]), 40).tolist() == [20, 20]
     assert initial_mesh._inner_counts([chart, small], boundaries[:2], np.array([1.0, 3e6]), 40).tolist() == [8, 32]
     assert initial_mesh._inner_counts([chart], boundaries[:1], np.ones(1), 0).tolist() == [0]
+    many = initial_mesh._inner_counts([chart, *[small] * 12], [boundaries[0], *[boundaries[2]] * 12], np.ones(2), 50)
+    assert many.tolist() == [50] + [0] * 12
 
 
 def test_only_the_first_strategy_may_be_replaced_and_only_where_its_mesh_is_relaxed():
