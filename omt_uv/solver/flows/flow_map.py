@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import EmptyMeshError, HandleError, NonFiniteError, plural
 from ..progress import Progress, Steps
-from .creases import PIECES, march, region_around
+from .creases import MOST_HELD, PIECES, march, region_around
 from .domain import FlowDomain
 from .handles import FlowHandle, check_handles, farthest_points, joined, sampled_handles
 from .integration import BLOCK, FlowStep, carried, planned_steps
@@ -207,7 +207,7 @@ def _apart_on_the_way(found: list[SoundFrame], shape: FlowShape, journey: _Journ
         # What comes into faces beyond the region needs these in it.
         beyond = np.concatenate(left)
         beyond = beyond[~np.isin(shape.triangles[beyond], region.rows).all(axis=(1, 2))]
-        if not len(beyond):
+        if not len(beyond) or len(region.rows) > MOST_HELD:
             break
         pairs = np.concatenate([pairs, beyond])
     return result
@@ -336,7 +336,7 @@ def _warnings(missed: float, volumes: np.ndarray, intersecting: int) -> tuple[st
     if missed > MISSED:
         told.append(
             f"Vertices of a handle that the flow took elsewhere, by up to {100 * missed:.2g} % of the diagonal, "
-            "were set to their ends; a handle that only turns and shifts is followed"
+            "were set to their ends; a handle that keeps its shape, and a smaller radius, are followed more closely"
         )
     worst = float(np.abs(volumes).max(initial=0.0))
     if worst > CHANGED:

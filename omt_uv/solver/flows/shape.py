@@ -9,7 +9,7 @@ import numpy as np
 
 from ..contact.new_crossings import NewCrossings, touched
 from ..contact.self_intersections import FaceCrossings
-from .creases import FlowRegion, closer, farthest_mended, taken_apart
+from .creases import MOST_HELD, FlowRegion, closer, farthest_mended, taken_apart
 from .enclosed_volume import EnclosedParts, restore_volumes
 
 # Rounds of giving volumes back after faces were taken apart on the way.
@@ -86,7 +86,7 @@ class FlowShape:
         for _ in range(SETTLINGS):
             restored, _ = restore_volumes(self.points, apart, self.parts, movable)
             mended, pairs = taken_apart((apart, restored), self.crossings, mine, farthest, concerned)
-            if len(pairs):
+            if len(pairs) and len(region.rows) <= MOST_HELD:
                 mended, pairs = self._brought((apart, restored), region, (mended, pairs), concerned)
             if mended is restored:
                 break

@@ -1,4 +1,4 @@
-"""Fill a closed surface with tetrahedra, by TetGen or fTetWild where these are installed, the surface kept as it is.
+"""Fill a closed surface with tetrahedra, by TetGen where it is installed, the surface kept as it is.
 
 A tetrahedron with two faces on the boundary, or an edge through the inside from boundary to boundary, turns over on a
 ball unless the map of the boundary happens to be Delaunay there. So such edges are split, and what is inside can give
