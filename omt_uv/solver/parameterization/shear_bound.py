@@ -196,20 +196,20 @@ def bound_shear(
         share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share
         begin, width = begin + width * PARTING, width * (1 - PARTING)
-        missing = [last.charts[k] for k in missed]
         within = np.concatenate([np.zeros(0, np.int64), *(_within(last.charts[k]) for k in (*missed, *flat))])
         kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), within)]
         kept = np.concatenate([kept, *apart.values()])
         memory = dict(last.memory)
         # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
         changes = {"share": share, "adding": rounds > 1, "memory": memory}
-        searching = part_of(search.again(kept, missing, spread, changes), begin, width * SEARCHING)
-        again = yield from unless_ended(searching, early)
+        cutting = search.again(kept, [last.charts[k] for k in missed], spread, changes)
+        again = yield from unless_ended(part_of(cutting, begin, width * SEARCHING), early)
         if again is None:
             break
         edges = np.concatenate([kept, _cuts(again).edges])
         if _as_a_set(edges) in tried:
-            break
+            # It has not kept what it promised, and so more is asked for.
+            continue
         tried.add(_as_a_set(edges))
         mapping = _mapped(again.charts, last.charts, last.maps, map_charts)
         further = part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
@@ -327,7 +327,7 @@ def _cuts(prepared: DiskCharts) -> Cuts:
 
 
 def _as_a_set(edges: np.ndarray) -> bytes:
-    """Equal for the same edges (e,2): searched again from the same cut, these may come out, whose map is known."""
+    """Equal for the same edges (e,2): from the same cut, these may come out again, whose map is known."""
     return np.unique(pair_keys(*edges.T)).tobytes()
 
 
