@@ -116,8 +116,7 @@ def run(options: argparse.Namespace) -> None:
         )
         readings = chosen_subdivision(options, readings)
         jobs = [
-            UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision, axes=r.axes, uv=r.uv, markers=marks)
-            for r, avoid, marks in zip(readings, free, marked, strict=True)
+            UnwrapJob.of(r, r.subdivision, avoid, marks) for r, avoid, marks in zip(readings, free, marked, strict=True)
         ]
         layout = drain_shown(lay_out(jobs, chosen(options)))
         if options.subdivision != 0:

@@ -140,16 +140,7 @@ class UV_OT_omt_unwrap(AreaSettings, SubdivisionSettings, MarginSettings, Solver
                 objects, {"centre": self.centre_group, "start": self.start_group, "corners": self.corner_group}
             )
             jobs = [
-                UnwrapJob(
-                    r.surface,
-                    r.faces,
-                    r.pins,
-                    avoid,
-                    subdivision=modifier,
-                    axes=r.axes,
-                    uv=r.uv,
-                    markers=marks,
-                )
+                UnwrapJob.of(r, modifier, avoid, marks)
                 for r, avoid, marks, modifier in zip(readings, free, marked, self.subdivisions(readings), strict=True)
             ]
             layout = yield from run.aside(lay_out(jobs, self.settings()))

@@ -26,7 +26,7 @@ from ..solver.packing.single_precision import without_rounded_folds
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
-from .reading import SubdivisionModifier
+from .reading import Reading, SubdivisionModifier
 
 T = TypeVar("T")
 
@@ -81,6 +81,19 @@ class UnwrapJob:
     axes: SceneAxes = Z_UP
     uv: np.ndarray | None = None
     markers: MapMarkers | None = None
+
+    @staticmethod
+    def of(
+        reading: Reading,
+        subdivision: SubdivisionModifier | None,
+        avoid: np.ndarray | None = None,
+        markers: MapMarkers | None = None,
+    ) -> UnwrapJob:
+        """The job to unwrap what was read, for the areas of the surface of a modifier, or for its own."""
+        r = reading
+        return UnwrapJob(
+            r.surface, r.faces, r.pins, avoid, subdivision=subdivision, axes=r.axes, uv=r.uv, markers=markers
+        )
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ def _job(options: argparse.Namespace, reading, avoid, marks):
     from ...pipelines.layout import UnwrapJob
 
     r = reading if options.subdivision == "auto" else with_levels(reading, options.subdivision)
-    return UnwrapJob(r.surface, r.faces, r.pins, avoid, subdivision=r.subdivision, axes=r.axes, uv=r.uv, markers=marks)
+    return UnwrapJob.of(r, r.subdivision, avoid, marks)
 
 
 def _within(steps, options: argparse.Namespace):

@@ -111,15 +111,7 @@ class UV_OT_omt_queue(bpy.types.Operator):
             check_target(obj, chosen.uv_layer)
             reading = read(obj)
         subdivision = reading.subdivision if chosen.use_subdivision else None
-        job = UnwrapJob(
-            reading.surface,
-            reading.faces,
-            reading.pins,
-            None,
-            subdivision=subdivision,
-            axes=reading.axes,
-            uv=reading.uv,
-        )
+        job = UnwrapJob.of(reading, subdivision)
         with complaints(objects=[obj]):
             return (yield from lay_out([job], UV_OT_omt_unwrap.settings(chosen)))
 

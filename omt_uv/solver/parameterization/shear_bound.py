@@ -207,10 +207,10 @@ def bound_shear(
         if again is None:
             break
         edges = np.concatenate([kept, _cuts(again).edges])
-        if _as_a_set(edges) in tried:
+        if (name := _as_a_set(edges)) in tried:
             # It has not kept what it promised, and so more is asked for.
             continue
-        tried.add(_as_a_set(edges))
+        tried.add(name)
         mapping = _mapped(again.charts, last.charts, last.maps, map_charts)
         further = part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
         mapped = yield from unless_ended(further, early)

@@ -221,9 +221,9 @@ def _refined(
     assembly = assembly_of(faces, n, parts)
     free = _map_problem(faces, assembly, initial, loop, boundary, smoother)
     warm, known = options.warm_start, symmetry
-    symmetry, w = _next_to_image(free, known, w, by_triangle, boundary)
+    symmetry, w = _next_to_image(free, known, w, by_triangle, boundary, loop)
     if known is not None and symmetry is None:
-        symmetry, w = yield from part_of(_relaxed_to_image(free, known, w, by_triangle, options), *SMOOTHING)
+        symmetry, w = yield from part_of(_relaxed_to_image(free, known, w, by_triangle, options, loop), *SMOOTHING)
         warm = warm or symmetry is not None
     assembly = assembly if symmetry is None else assembly_of(faces, n, parts, symmetry)
     problem = _mirrored(_map_problem(faces, assembly, initial, loop, boundary, smoother), symmetry, w)
@@ -253,24 +253,33 @@ def _refined(
 
 
 def _next_to_image(
-    problem: MapProblem, symmetry: MirrorSymmetry | None, w: np.ndarray, by_triangle: Elements, boundary: str
+    problem: MapProblem,
+    symmetry: MirrorSymmetry | None,
+    w: np.ndarray,
+    by_triangle: Elements,
+    boundary: str,
+    loop: np.ndarray,
 ) -> tuple[MirrorSymmetry | None, np.ndarray]:
     """The symmetry with its axis, and a symmetric map next to w (n,) complex; None, and w, where there is none."""
     if symmetry is None:
         return None, w
-    loop = boundary_loops(by_triangle.triangles)[0]
     found = symmetric_start(symmetry, w, by_triangle, boundary, loop, problem.boundary_crosses)
     # What a mean with its image leaves next to nothing may be a fold by rounding.
     return (None, w) if found is None or has_folds(problem.faces, found[1]) else found
 
 
 def _relaxed_to_image(
-    problem: MapProblem, symmetry: MirrorSymmetry, w: np.ndarray, by_triangle: Elements, options: RefinementOptions
+    problem: MapProblem,
+    symmetry: MirrorSymmetry,
+    w: np.ndarray,
+    by_triangle: Elements,
+    options: RefinementOptions,
+    loop: np.ndarray,
 ) -> Steps[tuple[MirrorSymmetry | None, np.ndarray]]:
     """The same by way of a map that was relaxed first: scales of an initial map vary so much from face to face that
     its mean with its image has folds."""
     relaxed = yield from minimise_in_stages(problem, w, options.balance, QUALITIES["relaxed"])
-    found, mean = _next_to_image(problem, symmetry, relaxed.w, by_triangle, options.boundary)
+    found, mean = _next_to_image(problem, symmetry, relaxed.w, by_triangle, options.boundary, loop)
     return (None, w) if found is None else (found, mean)
 
 

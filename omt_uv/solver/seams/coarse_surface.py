@@ -54,17 +54,6 @@ class CoarseSurface:
     size: float
 
 
-def coarse_surface(
-    positions: np.ndarray, triangles: np.ndarray, count: int, line: np.ndarray | None = None, trial: int = 0
-) -> CoarseSurface:
-    """Coarsen a surface (n,3), (m,3) to about `count` vertices; one with fewer stays as it is.
-
-    line (n,) bool: vertices that collapse only among themselves, as those of a boundary do, so that lines stay lines;
-    trial: which of several coarse surfaces
-    """
-    return coarsening(positions, triangles, count, line).ended(count, trial)
-
-
 @dataclass(frozen=True)
 class Coarsening:
     """A surface on its way to several coarse ones, which differ by how they end.
@@ -99,8 +88,9 @@ class Coarsening:
                 break
         return replace(self, faces=mesh.faces, curvature=curvature, area=area, left=left)
 
-    def ended(self, count: int, trial: int) -> CoarseSurface:
-        """A coarse surface of about `count` vertices, one of several by the number of the trial."""
+    def ended(self, count: int, trial: int = 0) -> CoarseSurface:
+        """A coarse surface of about `count` vertices, one of several by the number of the trial; a surface with fewer
+        stays as it is."""
         end, n = self.towards(count, trial), len(self.positions)
         real = end.faces[(end.faces < n).all(axis=1)]
         kept = np.unique(real)
@@ -120,7 +110,10 @@ class Coarsening:
 
 def coarsening(positions: np.ndarray, triangles: np.ndarray, count: int, line: np.ndarray | None = None) -> Coarsening:
     """A surface (n,3), (m,3) with COMMON times as many vertices as coarse ones of `count` have, from which these go on:
-    most of the time is gone by then, and where cuts may lie is not decided yet."""
+    most of the time is gone by then, and where cuts may lie is not decided yet.
+
+    line (n,) bool: vertices that collapse only among themselves, as those of a boundary do, so that lines stay lines
+    """
     n = len(positions)
     tail, head = halfedges(triangles)
     border = np.flatnonzero(twins(triangles) < 0)

@@ -12,7 +12,7 @@ from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.seams.coarse_surface import coarse_surface
+from omt_uv.solver.seams.coarse_surface import coarsening
 from omt_uv.solver.seams.cut_tree import Task, cut_along, leaves, stretches
 from omt_uv.solver.seams.growth import grow
 from omt_uv.solver.seams.improvement import improved, trimmed
@@ -24,7 +24,7 @@ from omt_uv.solver.seams.search import SeamSearch
 
 @pytest.fixture(scope="module")
 def cap():
-    return coarse_surface(*meshes.cap(20, 40, 0.9), 300)
+    return coarsening(*meshes.cap(20, 40, 0.9), 300).ended(300)
 
 
 def task_of(coarse, bound):
@@ -47,7 +47,7 @@ def test_a_cut_by_green_functions_is_that_of_a_new_solve(cap):
 
 def test_a_flat_surface_has_no_scale():
     V, F = meshes.grid(12, 12)
-    assert np.abs(ScaleModel.of(coarse_surface(V * [1, 1, 0], F, 1000)).scale).max() < 1e-9
+    assert np.abs(ScaleModel.of(coarsening(V * [1, 1, 0], F, 1000).ended(1000)).scale).max() < 1e-9
 
 
 def test_growth_keeps_the_bound_and_lowers_the_spread_with_every_arc(cap):
