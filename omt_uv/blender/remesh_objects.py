@@ -70,15 +70,17 @@ def read_request(
             reading = blender_mesh.weld_split_vertices(replace(reading, uv=None))
         if not len(reading.surface.triangles):
             raise EmptyMeshError("The mesh has no faces", "Choose a mesh with faces")
-        surface, warnings = oriented(reading.surface)
+        sides = oriented(reading.surface)
+        surface = sides.surface
         names = tuple(group.name for group in obj.vertex_groups)
         attributes = read_attributes(mesh, names, settings.preserve_attributes)
         values = _density_values(obj, mesh, surface, settings)
     stretch = blender_mesh.check_stretch(obj)
     jumps = edge_union(uv_seams(attributes, surface), material_borders(attributes, surface))
-    features = _features(attributes, surface, settings)
+    features = edge_union(_features(attributes, surface, settings), sides.joints)
     kept = followed(attributes, edge_union(features, jumps))
-    return Request(RemeshJob(surface, features, jumps, values, warnings), kept, stretch, depsgraph is not None)
+    job = RemeshJob(surface, features, jumps, values, sides.warnings, sides.kept)
+    return Request(job, kept, stretch, depsgraph is not None)
 
 
 @contextmanager
@@ -164,6 +166,8 @@ def new_objects(
         mesh = _new_mesh(group[0], group[0].name + ending, request, level)
         new = [_new_object(obj, obj.name + ending, mesh, request.evaluated) for obj in group]
         write_attributes(new[0], attributes)
+        for face in np.flatnonzero(level.back).tolist():
+            mesh.polygons[face].flip()
         names += [obj.name for obj in new]
     # Objects that were linked but a moment ago cannot be selected, or left out of a selection.
     bpy.context.view_layer.update()

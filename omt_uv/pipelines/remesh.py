@@ -18,13 +18,14 @@ from ..solver.analysis.density import (
     painted_density,
 )
 from ..solver.analysis.feature_edges import edge_union, resolved_features
+from ..solver.analysis.occlusion import hidden_sides, looks_out
 from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
 from ..solver.errors import CountError, DensityError, MeshError, plural, reaching
 from ..solver.mesh.geometry import face_areas
-from ..solver.mesh.gluing import orientations
+from ..solver.mesh.gluing import Gluing, orientations
 from ..solver.mesh.repair import repaired_gluing
 from ..solver.mesh.surface import Surface, chosen_triangles
-from ..solver.mesh.topology import halfedges
+from ..solver.mesh.topology import graph_components, halfedges
 from ..solver.progress import Progress, Steps, part_of
 from ..solver.remeshing import Remesh, RemeshOptions, RemeshSource, remesh
 from ..solver.transfer.correspondence import Correspondence, correspond
@@ -33,6 +34,7 @@ from ..solver.transfer.correspondence import Correspondence, correspond
 BYTES_PER_VERTEX = 10_000
 # Share of the work on one level that its mesh takes; the rest is where it lies on the surface.
 REMESHING = 0.95
+NO_EDGES = np.zeros((0, 2), np.int64)
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,8 @@ class RemeshJob:
     """A surface and what the new mesh shall follow.
 
     features (e,2): vertex pairs of edges to keep; jumps (s,2): edges across which values jump, kept or not;
-    values (m,): weights of the vertex group, or the attribute, per triangle of the surface; warnings: what was mended
+    values (m,): weights of the vertex group, or the attribute, per triangle of the surface; warnings: what was mended;
+    kept (m,) bool: triangles whose sides the new mesh is to have turned back, see `Oriented`
     """
 
     surface: Surface
@@ -48,16 +51,21 @@ class RemeshJob:
     jumps: np.ndarray
     values: np.ndarray | None = None
     warnings: tuple[str, ...] = ()
+    kept: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class LevelOfDetail:
-    """A new mesh: positions (k,3), triangles (t,3), and where it lies on the old one."""
+    """A new mesh: positions (k,3), triangles (t,3), and where it lies on the old one.
+
+    back (t,) bool: triangles to be turned over once they carry what they carry, see `Oriented`
+    """
 
     positions: np.ndarray
     triangles: np.ndarray
     correspondence: Correspondence
     found: Remesh
+    back: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -164,7 +172,8 @@ def _level(
     yield Progress("Attributes", REMESHING)
     seams = edge_union(source.features, job.jumps)
     at = correspond(positions, triangles, seams, found.vertices, found.triangles, found.faces, found.barycentric)
-    return LevelOfDetail(positions=found.vertices, triangles=found.triangles, correspondence=at, found=found)
+    back = np.zeros(len(found.triangles), bool) if job.kept is None else job.kept[at.face_triangle]
+    return LevelOfDetail(found.vertices, found.triangles, at, found, back)
 
 
 @contextmanager
@@ -179,20 +188,60 @@ def _located(surface: Surface, name: str) -> Iterator[None]:
         raise type(error)(name + error.cause, error.remedy, error.kind, elements) from error
 
 
-def oriented(surface: Surface) -> tuple[Surface, tuple[str, ...]]:
-    """The surface with triangles turned over that look to another side than their neighbours, and warnings."""
-    tail, head = halfedges(surface.corner_vertex[surface.triangles])
+@dataclass(frozen=True)
+class Oriented:
+    """A surface whose triangles look to one side, and what was turned over for that.
+
+    kept (m,) bool : triangles that are turned back in the new mesh, since their part looks outwards then; joints (e,2) :
+    edges between these and their neighbours; warnings : what was turned
+    """
+
+    surface: Surface
+    kept: np.ndarray
+    joints: np.ndarray
+    warnings: tuple[str, ...] = ()
+
+
+def oriented(surface: Surface) -> Oriented:
+    """The surface with triangles turned over that look to another side than their neighbours.
+
+    Most were wound wrongly. But two parts may both look outwards where they are joined the wrong way round, as by
+    Blender's Skin modifier at the root of a finger: one of them is inside out as soon as all faces agree.
+    """
+    given = surface.corner_vertex[surface.triangles]
+    tail, head = halfedges(given)
+    none = np.zeros(len(given), bool)
     if len(np.unique(tail * len(surface.positions) + head)) == len(tail):
-        return surface, ()
+        return Oriented(surface, none, NO_EDGES)
     faces = np.ones(len(surface.face_start) - 1, dtype=bool)
     gluing = repaired_gluing(surface, faces, surface.triangles, surface.triangle_face).gluing
-    turned, _ = orientations(gluing, face_areas(surface.positions, surface.corner_vertex[surface.triangles]))
+    turned, _ = orientations(gluing, face_areas(surface.positions, given))
     if not turned.any():
-        return surface, ()
+        return Oriented(surface, none, NO_EDGES)
     triangles = np.where(turned[:, None], surface.triangles[:, [0, 2, 1]], surface.triangles)
-    count = len(np.unique(surface.triangle_face[turned]))
-    text = plural(count, "A face looks to another side than its neighbours", "{} faces look to another side")
-    return replace(surface, triangles=triangles), (f"{text}; turned over in the new mesh",)
+    kept = _sides_back(surface.positions, given, gluing, turned)
+    between = kept[gluing.first // 3] != kept[gluing.second // 3]
+    joints = np.stack([end[between] for end in gluing.ends(gluing.first)], axis=1)
+    wrong, odd = (len(np.unique(surface.triangle_face[those])) for those in (turned != kept, turned & kept))
+    said = plural(wrong, "A face looks to another side than its neighbours", "{} faces look to another side")
+    warnings = [f"{said}; turned over in the new mesh"] if wrong else []
+    if odd:
+        said = plural(odd, "A face is", "{} faces are")
+        warnings.append(f"{said} joined the wrong way round to others that look outwards, too; sides stay as they are")
+    return Oriented(replace(surface, triangles=triangles), kept, joints, tuple(warnings))
+
+
+def _sides_back(positions: np.ndarray, given: np.ndarray, gluing: Gluing, turned: np.ndarray) -> np.ndarray:
+    """Triangles (m,) bool that are to have another side than their neighbours once those `turned` (m,) of the given
+    ones (m,3) are: where parts on both sides of a joint look outwards as given."""
+    first, second = gluing.first // 3, gluing.second // 3
+    same = turned[first] == turned[second]
+    _, part = graph_components(first[same], second[same], len(given))
+    pieces, piece = graph_components(first, second, len(given))
+    hidden, area = hidden_sides(positions, given), face_areas(positions, given)
+    out, inside = (looks_out(sides, area, part)[part] for sides in (hidden, hidden[::-1]))
+    odd = np.bincount(piece[out & turned], minlength=pieces) * np.bincount(piece[out & ~turned], minlength=pieces) > 0
+    return odd[piece] & np.where(turned, out, inside)
 
 
 def density_of(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray | None:

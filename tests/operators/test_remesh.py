@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from bodies import hourglass
 from remesh_scenes import arrays, ball, dressed, fill, remesh, values
 
 
@@ -119,6 +120,24 @@ def test_faces_that_look_the_other_way_are_turned_in_the_new_mesh_alone(capfd):
     volume = np.einsum("fj,fj->f", co[faces[:, 0]], np.cross(co[faces[:, 1]], co[faces[:, 2]]))
     assert (volume > 0).all()
     assert np.abs(values(new.data, "at", "vector", 3) - co[faces.ravel()]).max() < 0.02
+
+
+def test_parts_that_are_joined_the_wrong_way_round_both_stay_outside(capfd):
+    V, F = hourglass(20, 32)
+    above = V[F][:, :, 2].mean(axis=1) > 0
+    F[above] = F[above][:, ::-1]
+    obj = scenes.add(V, F.tolist(), "Twisted")
+    corner = np.array([loop.vertex_index for loop in obj.data.loops])
+    fill(obj.data, "at", "FLOAT_VECTOR", "CORNER", V[corner].astype(np.float32), "vector")
+    before = scenes.state(obj)
+    (new,) = remesh(target_vertices=500)
+    assert scenes.state(obj) == before
+    assert "joined the wrong way round" in capfd.readouterr().out
+    co, faces = arrays(new)
+    middle = np.where(co[faces][:, :, 2].mean(axis=1) > 0, 0.5, -0.5)[:, None] * [0, 0, 1]
+    a, b, c = (co[faces[:, k]] - middle for k in range(3))
+    assert (np.einsum("fj,fj->f", a, np.cross(b, c)) > 0).mean() > 0.9
+    assert np.abs(values(new.data, "at", "vector", 3) - co[faces.ravel()]).max() < 0.05
 
 
 def test_attributes_can_be_left_out():

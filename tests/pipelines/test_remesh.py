@@ -3,6 +3,7 @@
 import meshes
 import numpy as np
 import pytest
+from bodies import hourglass
 
 from omt_uv.pipelines.remesh import RemeshJob, density_of, oriented, remesh_series
 from omt_uv.settings import DENSITIES, RemeshSettings
@@ -92,10 +93,45 @@ def test_weights_span_the_factor_and_attributes_are_taken_as_they_are():
 def test_triangles_that_look_away_are_turned_over_and_others_stay():
     V, F = meshes.icosphere(1)
     surface = triangle_surface(V, F)
-    assert oriented(surface) == (surface, ())
+    found = oriented(surface)
+    assert found.surface is surface and not found.kept.any() and not found.warnings
     wrong = F.copy()
     wrong[[3, 50]] = wrong[[3, 50]][:, ::-1]
-    turned, warnings = oriented(triangle_surface(V, wrong))
-    assert len(warnings) == 1 and "2 faces look to another side" in warnings[0]
-    after = turned.corner_vertex[turned.triangles]
-    assert {tuple(np.roll(t, -t.argmin())) for t in after} == {tuple(np.roll(t, -t.argmin())) for t in F}
+    found = oriented(triangle_surface(V, wrong))
+    assert len(found.warnings) == 1 and "2 faces look to another side" in found.warnings[0]
+    assert not found.kept.any() and not len(found.joints)
+    assert same_windings(found.surface.corner_vertex[found.surface.triangles], F)
+
+
+def same_windings(F, G) -> bool:
+    return {tuple(np.roll(t, -t.argmin())) for t in F} == {tuple(np.roll(t, -t.argmin())) for t in G}
+
+
+def test_what_looks_outwards_stays_outside_where_it_is_joined_the_wrong_way_round():
+    V, F = hourglass(10, 16)
+    above = V[F][:, :, 2].mean(axis=1) > 0
+    volume = np.einsum("md,md->m", V[F[:, 0]], np.cross(V[F[:, 1]], V[F[:, 2]]))
+    assert volume[above].sum() < 0 < volume[~above].sum()
+    given = F.copy()
+    given[above] = given[above][:, ::-1]
+    # Two faces of the other bulb are wound wrongly, besides.
+    wrong = np.flatnonzero(~above)[[40, 90]]
+    given[wrong] = given[wrong][:, ::-1]
+    found = oriented(triangle_surface(V, given))
+    assert len(found.warnings) == 2 and "2 faces look to another side" in found.warnings[0]
+    assert "joined the wrong way round" in found.warnings[1]
+    after = found.surface.corner_vertex[found.surface.triangles]
+    kept = found.kept
+    # Along the line between two rings the parts interlock.
+    assert kept.sum() == above.sum() and len(found.joints) == 32
+    after[kept] = after[kept][:, ::-1]
+    right = F.copy()
+    right[above] = right[above][:, ::-1]
+    assert same_windings(after, right)
+    made = RemeshJob(found.surface, found.joints, NONE, kept=kept)
+    level = drain(remesh_series(made, RemeshSettings(count=300))).levels[0]
+    new = np.where(level.back[:, None], level.triangles[:, ::-1], level.triangles)
+    P = level.positions[new]
+    side = np.where(P[:, :, 2].mean(axis=1) > 0, 0.5, -0.5)[:, None] * [0, 0, 1]
+    volume = np.einsum("md,md->m", P[:, 0] - side, np.cross(P[:, 1] - side, P[:, 2] - side))
+    assert (volume > 0).mean() > 0.9

@@ -1,4 +1,4 @@
-"""Closed bodies in space: a ball of triangles, and one with limbs."""
+"""Closed bodies in space: a ball of triangles, one with limbs, and one that is twisted."""
 
 from __future__ import annotations
 
@@ -40,3 +40,19 @@ def limbed(levels: int = 4) -> tuple[np.ndarray, np.ndarray]:
     x, y, z = points.T
     radius = 1 + 0.5 * (x**4 + y**4 + z**4 - 0.6) + 0.1 * x * y + 0.07 * z
     return points * radius[:, None], faces
+
+
+def hourglass(rings: int, sectors: int) -> tuple[np.ndarray, np.ndarray]:
+    """Two bulbs that a closed surface joins through a common line: with all faces wound alike, one is inside out."""
+    polar = np.pi * (np.arange(rings) + 1) / (rings + 1)
+    turn = 2 * np.pi * np.arange(sectors) / sectors
+    wide, thick = np.sin(polar)[:, None], np.sin(2 * polar)[:, None]
+    ring = np.stack([wide * np.cos(turn), thick * np.sin(turn), -np.cos(polar)[:, None] + 0 * wide * turn], axis=2)
+    V = np.concatenate([ring.reshape(-1, 3), [[0, 0, -1], [0, 0, 1]]])
+    k, after = np.arange(sectors), (np.arange(sectors) + 1) % sectors
+    F = [np.column_stack([after, k, 0 * k + rings * sectors])]
+    for low in sectors * np.arange(rings - 1):
+        up = low + sectors
+        F += [np.column_stack([low + k, low + after, up + k]), np.column_stack([low + after, up + after, up + k])]
+    top = (rings - 1) * sectors
+    return V, np.concatenate([*F, np.column_stack([top + k, top + after, 0 * k + len(V) - 1])])

@@ -51,15 +51,15 @@ def read_carrier(obj: bpy.types.Object) -> Carried:
     reading = blender_mesh.read_mesh(obj.data, obj)
     if not len(reading.surface.triangles):
         raise EmptyMeshError("The mesh has no faces", "Choose a mesh with faces")
-    surface, warnings = oriented(reading.surface)
+    sides = oriented(reading.surface)
     stretch = blender_mesh.stretch(obj)
     if blender_mesh.is_flattened(stretch):
         raise MatchError(f"{obj.name}: The scale of the object is zero along an axis. Clear or fix its scale.")
     names = tuple(group.name for group in obj.vertex_groups)
     attributes = read_attributes(obj.data, names)
     materials = tuple(slot.material.name if slot.material else "" for slot in obj.material_slots)
-    told = tuple(text.replace("; turned over in the new mesh", "; turned over for the match") for text in warnings)
-    return Carried(surface, attributes, stretch, materials, told)
+    told = tuple(f"{text.split(';')[0]}; turned over for the match" for text in sides.warnings)
+    return Carried(sides.surface, attributes, stretch, materials, told)
 
 
 def match_job(source: Carried, target: Carried, pairs: Pairs, options: RegistrationOptions) -> MatchJob:

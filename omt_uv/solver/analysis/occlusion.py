@@ -24,6 +24,8 @@ SLOPE = 1.5
 LEVEL = 0.25
 # Slopes of faces seen from their edges, as cosines, end here.
 LEAST_COSINE = 1e-3
+# By so much more of the directions are backs hidden than fronts of what clearly looks outwards.
+CLEARLY = 0.3
 
 
 def face_occlusion(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -32,6 +34,16 @@ def face_occlusion(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     positions (n,3), triangles (m,3): 0 on convex bodies, near 1 deep within a cave. The outside of a part that is open
     or turned inside out is the side from which more of it is seen. Independent of place, direction and size but for
     about 0.02 of noise.
+    """
+    hidden = hidden_sides(positions, triangles)
+    return _outer(hidden, face_areas(unit_size(positions, triangles), triangles), triangles, len(positions))
+
+
+def hidden_sides(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Shares (2,m) in [0, 1] of the directions, as of `face_occlusion`, in which something hides the front of a
+    triangle, and its back: 1 from inside of what is closed.
+
+    positions (n,3), triangles (m,3): the front is where the corners run counterclockwise.
     """
     points = unit_size(positions, triangles)
     used = points[triangles]
@@ -56,7 +68,14 @@ def face_occlusion(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         seen[0] += lit * np.where(towards, *shares)
         seen[1] += lit * np.where(towards, *shares[::-1])
     hidden = np.where(weight > 0, 1 - seen / np.maximum(weight, np.finfo(float).tiny), 0)
-    return np.clip(_outer(hidden, face_areas(points, triangles), triangles, len(points)), 0, 1)
+    return np.clip(hidden, 0, 1)
+
+
+def looks_out(hidden: np.ndarray, area: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Whether each part of a surface clearly looks outwards: of fronts and backs hidden (2,m), areas (m,) and the
+    part (m,) of every triangle, counted from 0."""
+    front, back = (np.bincount(part, area * side) for side in hidden)
+    return back - front > CLEARLY * np.bincount(part, area)
 
 
 def vertex_occlusion(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
