@@ -192,8 +192,9 @@ def _located(surface: Surface, name: str) -> Iterator[None]:
 class Oriented:
     """A surface whose triangles look to one side, and what was turned over for that.
 
-    kept (m,) bool : triangles that are turned back in the new mesh, since their part looks outwards then; joints (e,2) :
-    edges between these and their neighbours; warnings : what was turned
+    kept (m,) bool : triangles that are turned back in the new mesh, since their part looks outwards then
+    joints (e,2) : edges between these and their neighbours
+    warnings : what was turned
     """
 
     surface: Surface
