@@ -204,7 +204,7 @@ def derivatives_of(
     eagerness: float | np.ndarray = 0.0,
 ) -> FaceDerivatives:
     """As `face_derivatives`, from the derivatives a, b (m,) complex of the map."""
-    return face_derivatives_of(faces, a, b, *_by_squares(faces, a, b, area_weight, pressure, eagerness))
+    return face_derivatives_of(faces, a, b, *by_squares(faces, a, b, area_weight, pressure, eagerness))
 
 
 def face_derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, kept, block) -> FaceDerivatives:
@@ -213,12 +213,11 @@ def face_derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, ke
     first: its derivatives by both, (m,) each; kept: those that the Hessian along the phases sees; block: the Hessian's
     entries aa, ab, bb by |a| and |b|.
     """
-    (e_outer, e_inner), (h_outer, h_inner) = first, kept
-    g = faces.gradient
-    corner = (e_outer * a)[:, None] * g + (e_inner * b)[:, None] * g.conj()
+    h_outer, h_inner = kept
+    g, corner = faces.gradient, corner_slopes(faces, a, b, first)
     # Linear forms: change of |a|, of |b|, and of the two phases.
-    along_a = 0.5 * _unit(a).conj()[:, None] * g.conj()
-    along_b = 0.5 * _unit(b).conj()[:, None] * g
+    along_a = 0.5 * unit(a).conj()[:, None] * g.conj()
+    along_b = 0.5 * unit(b).conj()[:, None] * g
     turn_a = -1j * np.sqrt(np.maximum(2 * h_outer, 0))[:, None] * along_a
     turn_b = -1j * np.sqrt(np.maximum(2 * h_inner, 0))[:, None] * along_b
     (c1, s1, v1), (c2, s2, v2) = _split(*block)
@@ -227,7 +226,13 @@ def face_derivatives_of(faces: Elements, a: np.ndarray, b: np.ndarray, first, ke
     return FaceDerivatives(corner, np.stack([turn_a, turn_b, radial1, radial2], axis=1))
 
 
-def _by_squares(faces, a, b, area_weight, pressure, eagerness):
+def corner_slopes(faces: Elements, a: np.ndarray, b: np.ndarray, first) -> np.ndarray:
+    """Gradient (m,3) complex by the corners of an energy with these derivatives by |a|^2 and |b|^2, (m,) each."""
+    g = faces.gradient
+    return (first[0] * a)[:, None] * g + (first[1] * b)[:, None] * g.conj()
+
+
+def by_squares(faces, a, b, area_weight, pressure, eagerness):
     """Derivatives by |a|^2 and |b|^2, the same for the Hessian, and the Hessian's entries by |a| and |b|."""
     outer, inner = squared(a), squared(b)
     det = outer - inner
@@ -304,12 +309,21 @@ def _split(aa, ab, bb):
     return (c, s, np.maximum(mean + half, 0)), (-s, c, np.maximum(mean - half, 0))
 
 
+def without_negative(aa, ab, bb):
+    """Symmetric 2x2 matrices, entries (m,) each, with their negative eigenvalues set to 0."""
+    mean, half = (aa + bb) / 2, np.hypot((aa - bb) / 2, ab)
+    low = mean < half
+    scale = np.where(low, np.maximum(mean + half, 0) / np.where(half > 0, 2 * half, 1), 1)
+    apart = (aa - bb) / 2
+    return np.where(low, scale * (half + apart), aa), scale * ab, np.where(low, scale * (half - apart), bb)
+
+
 def squared(z: np.ndarray) -> np.ndarray:
     """|z|^2 of complex numbers, in their shape, without the root that `abs` takes."""
     return z.real**2 + z.imag**2
 
 
-def _unit(z: np.ndarray) -> np.ndarray:
+def unit(z: np.ndarray) -> np.ndarray:
     """Complex numbers (m,) of length one, 1 for 0."""
     size = np.abs(z)
     return np.where(size > 0, z, 1) / np.where(size > 0, size, 1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -83,9 +84,14 @@ class _Polygons:
         sums = [np.bincount(self.polygon, corner[:, k]) for k in range(3)]
         self.centres = np.stack(sums, axis=1) / self.sides[:, None]
         self.centre_tree = cKDTree(self.centres)
-        # A polygon's number, scaled beyond all distances, keeps its corners apart from those of others.
-        self.corner_tree = cKDTree(np.column_stack([corner, 2 * self.extent * self.polygon]))
+        self._corner = corner
         self.probes = np.random.default_rng(0).permutation(len(self.sides))[:PROBES]
+
+    @cached_property
+    def corner_tree(self) -> cKDTree:
+        """Of all corners: most meshes have no mirror, which their centres tell."""
+        # A polygon's number, scaled beyond all distances, keeps its corners apart from those of others.
+        return cKDTree(np.column_stack([self._corner, 2 * self.extent * self.polygon]))
 
     def image(self, normal: np.ndarray) -> np.ndarray | None:
         """The image (n,) of every vertex in the plane through the mean with this normal (3,); None if there is none."""

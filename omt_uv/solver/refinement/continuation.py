@@ -27,6 +27,7 @@ from .continuation_rules import (
     STAGE_STEPS,
     UNSQUEEZED,
     Quality,
+    first_pressure,
     is_enough,
     is_futile,
     is_out_of_reach,
@@ -217,6 +218,7 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         # Its share is what a stage with a region is for.
         foreseeing=balance == 0 and not on_the_way and problem.faces.region is None,
         foreseen=FORESEEN,
+        pressure=first_pressure(quality, balance, not problem.scale_free and problem.faces.region is None),
         shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
     )
 
@@ -232,7 +234,8 @@ class StageLimits:
     area_error : to reach; max_steps : of Newton's method; tolerance, loose_tolerance : as in
     `continuation_rules.Quality`; relaxed : an energy that is low enough in any case; foreseeing : it ends, too, where
     the area error is out of reach, see `continuation_rules.is_out_of_reach`, once it promises less than foreseen;
-    shear : of a map, with which it ends where that settles, see `continuation_rules.is_settled`
+    shear : of a map, with which it ends where that settles, see `continuation_rules.is_settled`; pressure : of the
+    first step, see `continuation_rules.FIRST_PRESSURE`
     """
 
     area_error: float
@@ -243,6 +246,7 @@ class StageLimits:
     foreseeing: bool = False
     foreseen: float = 0.0
     shear: Callable[[np.ndarray], float] | None = None
+    pressure: float = FIRST_PRESSURE
 
 
 @dataclass(frozen=True)
@@ -285,7 +289,7 @@ def minimise(
     stage ends "crossed".
     """
     value = problem.energy(w)
-    steps, residual, status, pressure = 0, np.inf, "steps", FIRST_PRESSURE
+    steps, residual, status, pressure = 0, np.inf, "steps", limits.pressure
     error, figures = np.inf, (np.inf, np.inf)
     while steps < max(limits.max_steps, 1):
         step, used = problem.step(w, value, pressure), pressure

@@ -4,7 +4,7 @@ A refinement minimises shear + area weight * area error, in stages of growing ar
 Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entry a chart:
 
     start a stage            `planned_weights`, `is_squeezed`, `next_weight`
-    within a stage           `next_pressure`
+    within a stage           `first_pressure`, `next_pressure`
     end a stage              `stage_tolerances`, `judge_step`, `is_out_of_reach`, `is_settled`
     end the refinement       `is_enough`, `is_futile`
 
@@ -31,7 +31,7 @@ Truth = bool | np.ndarray
 # A stage that reaches the goal ends when Newton promises less than this share of the energy.
 LOOSE = 3e-2
 # One on the way ends sooner where the boundary is free; vertices on a circle or on sides do not make up for it later.
-ON_THE_WAY = 0.1
+ON_THE_WAY = 0.3
 # One that has missed its goal is told by the steps before it promises less than this: see `is_out_of_reach`.
 FORESEEN = 0.1
 # One that has reached it ends, too, where a whole step changes the shear by less than this share, and the area error by
@@ -73,6 +73,9 @@ STAGE_STEPS = 40
 # dropped.
 FIRST_PRESSURE = 0.3
 LEAST_PRESSURE = 0.01
+# The former where the boundary is free and areas need not be exact: faces that give way at once save every tenth step,
+# while those in a circle would end their stages too soon.
+FREE_PRESSURE = 0.05
 # By how much it falls after a full step that has kept its promise, and after one that has gained what it promised.
 PRESSURE_FALLS = 3.0
 PRESSURE_DROPS = 10.0
@@ -174,6 +177,11 @@ def next_weight(weight: Number, error: Number, quality: Quality) -> Number:
 def promised(decrement: Number, energy: Number) -> Number:
     """Residual: the decrease that Newton's method promises, over the energy."""
     return decrement / np.maximum(energy, NO_ENERGY)
+
+
+def first_pressure(quality: Quality, balance: float, free: bool) -> float:
+    """Share of the Hessian's indefinite part to keep in the first step of a stage; free: see FREE_PRESSURE."""
+    return FREE_PRESSURE if free and balance == 0 and quality.tolerance >= LOOSE else FIRST_PRESSURE
 
 
 def next_pressure(pressure: Number, share: Number, gain: Number, decrement: Number) -> np.ndarray:

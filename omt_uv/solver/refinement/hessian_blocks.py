@@ -15,13 +15,21 @@ from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.kept_factor import KeptFactor
 from ..linalg.nested_dissection import LARGE, vertex_graph
 from ..linalg.sparse import minimum_degree
-from ..maps.energy import Elements, area_forms, face_derivatives, sum_at_vertices
+from ..maps.energy import (
+    Elements,
+    area_forms_of,
+    by_squares,
+    corner_slopes,
+    sum_at_vertices,
+    unit,
+    without_negative,
+)
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import restricted
 from ..mesh.polygon_areas import BOTH
 
-# Quads whose rows are dense at a time: 17 rows of 8 numbers each.
-CHUNK = 20_000
+# Triangles whose blocks are found at a time: what is found on the way stays in the processor's cache.
+CHUNK = 8192
 # How far the second derivative of the area term goes from its own to the one that leads to the areas at once, see
 # `energy.eager_bend`, where no pressure is kept: a quarter fewer steps, most on the long way of limbs.
 EAGERNESS = 0.75
@@ -73,7 +81,8 @@ class Assembly:
         """Sum of the blocks (t,6,6) of triangles and (q,8,8) of quads, plus a diagonal (2n,)."""
         given = [blocks] if quads is None else [blocks, quads]
         if self._every is not None:
-            data: np.ndarray = np.bincount(self._every, np.concatenate([b.ravel() for b in given]), len(self._indices))
+            every = np.concatenate([b.transpose(1, 2, 0).ravel() for b in given])
+            data: np.ndarray = np.bincount(self._every, every, len(self._indices))
             return self._with_diagonal(data, diagonal)
         cells = [b.reshape(len(b), b.shape[1] // 2, 2, b.shape[1] // 2, 2) for b in given]
         data = np.empty(len(self._indices))
@@ -87,7 +96,7 @@ class Assembly:
         axis, parts = np.arange(2), np.split(self._block, np.cumsum([c.shape[1] * c.size for c in cells])[:-1])
         of_cells = [b.reshape(-1, c.shape[1], 1, c.shape[1], 1) for b, c in zip(parts, cells, strict=True)]
         return np.concatenate(
-            [(self._slot[b] + axis[:, None, None] + self._stride[b] * axis).ravel() for b in of_cells]
+            [np.moveaxis(self._slot[b] + axis[:, None, None] + self._stride[b] * axis, 0, -1).ravel() for b in of_cells]
         )
 
     def _with_diagonal(self, data: np.ndarray, diagonal: np.ndarray) -> sp.csc_matrix:
@@ -176,43 +185,116 @@ def _blocks_at_once(faces: Elements, w: np.ndarray, weight, pressure, axes, symm
     """As `hessian_blocks`, of all faces at once."""
     n, first, (frame, free) = len(w), lone_triangles(faces), axes
     eagerness = EAGERNESS * (1 - pressure)
-    local = face_derivatives(faces, w, weight, pressure, eagerness)
-    gradient, vertex, forms = sum_at_vertices(faces, local.gradient, n), faces.triangles, local.rows
+    a, b = faces.derivatives(w)
+    slopes, kept, radial = by_squares(faces, a, b, weight, pressure, eagerness)
+    gradient = sum_at_vertices(faces, corner_slopes(faces, a, b, slopes), n)
     if symmetry is not None:
         gradient = symmetry.folded(gradient)
-        vertex, forms = symmetry.carried(vertex, forms)
-    rows = np.ascontiguousarray((forms * frame[vertex][:, None, :]).conj()).view(float)
-    rows *= free[vertex].reshape(-1, 1, 6)
-    blocks = np.matmul(rows[:first].transpose(0, 2, 1), rows[:first])
-    scale = np.einsum("mkd,mkd->", rows, rows) / (2 * n)
+    blocks = triangle_blocks(faces.gradient, a, b, kept, radial)
+    vertex = _in_axes(blocks, faces.triangles, frame, free, symmetry)
+    scale = float(np.einsum("iim->", blocks)) / (2 * n)
+    lone = blocks[:, :, :first].transpose(2, 0, 1)
     if faces.polygon is None:
-        return Blocks(gradient, blocks, None, None, scale)
-    forms = area_forms(faces, w, weight, eagerness)
+        return Blocks(gradient, lone, None, None, scale)
+    forms = area_forms_of(faces, a, b, weight, eagerness)
     if symmetry is not None:
         _, forms = symmetry.carried(faces.triangles, forms)
     area = np.ascontiguousarray((forms * frame[vertex]).conj()).view(float)
     area *= free[vertex].reshape(-1, 6)
     return Blocks(
         gradient=gradient,
-        triangles=blocks,
-        quads=quad_blocks(rows[first:].reshape(-1, 4, 4, 6), area[first:].reshape(-1, 4, 6)),
+        triangles=lone,
+        quads=_summed_in_quads(blocks[:, :, first:].transpose(2, 0, 1), area[first:].reshape(-1, 4, 6)),
         rest=long_forms(faces, vertex, area[:first], n),
         scale=scale,
     )
 
 
+def triangle_blocks(gradient: np.ndarray, a: np.ndarray, b: np.ndarray, kept, radial) -> np.ndarray:
+    """Blocks (6,6,m) of triangles with the hat gradients (m,3) and the derivatives a, b (m,) of the map, complex.
+
+    They are the sums of the squares of the rows of `energy.face_derivatives_of`, whose `kept` and `block` are kept and
+    radial here, in a quarter of the time: what two corners share takes a step z of the one to X z + Y conj(z), with X
+    and Y linear in the products of their gradients, and there are no rows.
+    """
+    blocks = np.empty((6, 6, len(a)))
+    for begin in range(0, len(a), CHUNK):
+        here = slice(begin, begin + CHUNK)
+        some = (tuple(x[here] for x in given) for given in (kept, radial))
+        _fill_blocks(blocks[:, :, here], gradient[here], a[here], b[here], *some)
+    return blocks
+
+
+def _fill_blocks(blocks: np.ndarray, gradient, a, b, kept, radial) -> None:
+    """`triangle_blocks` of some triangles, written to blocks (6,6,m)."""
+    unit_a, unit_b = unit(a), unit(b)
+    turn_a, turn_b = (np.maximum(2 * h, 0) for h in kept)
+    aa, ab, bb = without_negative(*radial)
+    even, odd = (aa + turn_a) / 8, (bb + turn_b) / 8
+    beta, delta = (aa - turn_a) / 8 * unit_a**2, ((bb - turn_b) / 8 * unit_b**2).conj()
+    mixed, crossed = ab / 4 * (unit_a * unit_b.conj()), ab / 4 * (unit_a * unit_b)
+    both, apart = beta + delta, beta - delta
+    # What the sum, the difference and the cross terms of the products of two gradients count in each entry.
+    first = even + odd + crossed.real, mixed.real + both.real, -mixed.imag - both.imag
+    second = even + odd - crossed.real, mixed.real - both.real, both.imag - mixed.imag
+    skew, turn = (crossed.imag, apart.imag, apart.real), even - odd
+    x, y = gradient.real.T.copy(), gradient.imag.T.copy()
+    for i in range(3):
+        for j in range(i, 3):
+            xx, yy, xy, yx = x[i] * x[j], y[i] * y[j], x[i] * y[j], y[i] * x[j]
+            products = xx + yy, xx - yy, xy + yx
+            uu, vv, mean = (
+                given[0] * products[0] + given[1] * products[1] + given[2] * products[2]
+                for given in (first, second, skew)
+            )
+            turned = turn * (yx - xy)
+            for p, q, entry in ((0, 0, uu), (1, 1, vv), (0, 1, mean - turned), (1, 0, mean + turned)):
+                blocks[2 * i + p, 2 * j + q] = entry
+                blocks[2 * j + q, 2 * i + p] = entry
+
+
+def _in_axes(blocks: np.ndarray, triangles: np.ndarray, frame, free, symmetry: MirrorSymmetry | None) -> np.ndarray:
+    """Bring blocks (6,6,m) of triangles (m,3), in place, into the axes of their vertices, or of those these follow;
+    these vertices (m,3)."""
+    found = triangles if symmetry is None else symmetry.representative[triangles]
+    plain = (frame == 1) & free.all(axis=1)
+    if symmetry is not None:
+        plain = plain[symmetry.representative] & ~symmetry.flip & (symmetry.factor == 1)
+    turned = np.flatnonzero(~plain[triangles].all(axis=1))
+    if not len(turned):
+        return found
+    # Rows of linear forms that say 1 and i, as forms of the steps along the axes.
+    corners = triangles[turned]
+    forms = np.tile(np.array([1, -1j])[:, None], (len(turned), 1, 3))
+    if symmetry is not None:
+        corners, forms = symmetry.carried(corners, forms)
+    forms = forms * frame[corners][:, None]
+    by_corner = (np.stack([forms.real, -forms.imag], axis=3) * free[corners][:, None]).transpose(2, 1, 3, 0)
+    here = blocks if len(turned) == len(triangles) else blocks[:, :, turned]
+    for k, (first, second) in enumerate(by_corner):
+        for part in (here[2 * k : 2 * k + 2], here[:, 2 * k : 2 * k + 2].swapaxes(0, 1)):
+            part[:] = [first[q] * part[0] + second[q] * part[1] for q in range(2)]
+    if here is not blocks:
+        blocks[:, :, turned] = here
+    return found
+
+
+def _summed_in_quads(blocks: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Blocks (q,8,8) of quads from those (4q,6,6) of their triangles, and their parts (q,4,6) of the area's row."""
+    columns = (2 * BOTH[:, :, None] + [0, 1]).reshape(4, 6)
+    row = np.zeros((len(area), 8))
+    for k in range(4):
+        row[:, columns[k]] += area[:, k]
+    found = row[:, :, None] * row[:, None]
+    for k in range(4):
+        found[:, columns[k][:, None], columns[k]] += blocks[k::4]
+    return found
+
+
 def quad_blocks(rows: np.ndarray, area: np.ndarray) -> np.ndarray:
     """Blocks (q,8,8) from the rows (q,4,4,6) of four triangles each, and their parts (q,4,6) of the area's row."""
-    columns = (2 * BOTH[:, :, None] + [0, 1]).reshape(4, 6)
-    blocks = np.empty((len(rows), 8, 8))
-    for begin in range(0, len(rows), CHUNK):
-        here = slice(begin, begin + CHUNK)
-        full = np.zeros((len(rows[here]), 17, 8))
-        for k in range(4):
-            full[:, 4 * k : 4 * k + 4, columns[k]] = rows[here, k]
-            full[:, 16, columns[k]] += area[here, k]
-        np.matmul(full.transpose(0, 2, 1), full, out=blocks[here])
-    return blocks
+    rows = rows.reshape(-1, 4, 6)
+    return _summed_in_quads(np.matmul(rows.transpose(0, 2, 1), rows), area)
 
 
 def long_forms(faces: Elements, vertex: np.ndarray, area: np.ndarray, n: int) -> sp.spmatrix | None:
