@@ -197,3 +197,56 @@ def test_areas_are_those_in_the_world_for_all_objects_together(scale):
         for obj in found:
             space, uv = scenes.polygon_areas(obj)
             assert np.abs(np.abs(uv) / np.abs(uv).sum() - space / space.sum()).sum() < 0.02, (name, obj.name)
+
+
+# What writes UVs of chosen faces in Edit Mode, with arguments; two of them need shapes of their own.
+CHOSEN = {name: arguments for name, (arguments, may) in RUNS.items() if "UV" in may} | {
+    "uv.omt_flow": {"start": (0.5, 0.5), "move": (0.1, 0.0), "radius": 0.5},
+    "uv.omt_stack": {},
+    "uv.omt_symmetrize": {},
+    "uv.omt_rectify": {},
+}
+
+
+def twice(name):
+    """An object of two equal parts, each a closed body or two patches, with UVs; and which faces are the first part."""
+    if name == "uv.omt_sphere":
+        one = body("One", 7, 5)
+        points, faces = [v.co[:] for v in one.data.vertices], [tuple(p.vertices) for p in one.data.polygons]
+        bpy.data.objects.remove(one)
+        n = len(points)
+        points += [(x + 4, y, z) for x, y, z in points]
+        faces += [tuple(v + n for v in face) for face in faces]
+    else:
+        y, x = np.mgrid[0:4, 0:4] / 3.0
+        flat = np.stack([x + 0.2, y + 0.3 * x * y, 0.4 * x * (1 - y)], axis=-1).reshape(-1, 3)
+        quads = np.array([[r + c, r + c + 1, r + c + 5, r + c + 4] for r in (0, 4, 8) for c in range(3)])
+        points = np.concatenate([flat + [0, 2 * k, 0] if side > 0 else flat * [-1, 1, 1] + [0, 2 * k, 0]
+                                 for k in (0, 1) for side in (1, -1)])  # fmt: skip
+        faces = [quad + 16 * k for k in range(4) for quad in (quads if k % 2 == 0 else quads[:, [0, 3, 2, 1]])]
+    obj, half = scenes.add(points, faces), len(points) // 2
+    obj.vertex_groups.new(name="painted here").add([*range(5), *range(half, half + 5)], 1.0, "REPLACE")
+    assert run("uv.omt_unwrap")(quality="DRAFT", max_shear=0.0, margin=30) == {"FINISHED"}
+    uv = scenes.uv_of(obj)
+    scenes.set_uv(obj, uv + 0.02 * np.sin(9 * uv[:, ::-1]), obj.data.uv_layers.active.name)
+    return obj, np.arange(len(faces)) < len(faces) // 2
+
+
+@pytest.mark.parametrize("name", CHOSEN)
+def test_in_edit_mode_chosen_faces_change_and_no_others_and_the_mode_stays(name):
+    obj, chosen = twice(name)
+    layer = obj.data.uv_layers.active.name
+    before = scenes.uv_of(obj)
+    corners = np.repeat(chosen, [p.loop_total for p in obj.data.polygons])
+    results = []
+    for faces in (chosen, ~chosen):
+        scenes.set_uv(obj, before, layer)
+        scenes.edit(obj, faces=faces)
+        assert run(name)(**CHOSEN[name]) == {"FINISHED"}
+        assert bpy.context.mode == "EDIT_MESH"
+        scenes.leave_edit()
+        assert [p.select for p in obj.data.polygons] == faces.tolist()
+        results.append((scenes.uv_of(obj) != before).any(axis=1))
+    first, second = results
+    assert first[corners].any() and not first[~corners].any()
+    assert second[~corners].any() and not second[corners].any()

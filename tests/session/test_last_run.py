@@ -94,3 +94,16 @@ def test_a_check_mark_is_for_what_is_within_all_bounds(last_run, package):
     bpy.ops.uv.omt_measure()
     assert last_run.state.summary.beyond >= {"Area error", "Shear"}
     assert icon_of(last_run.state.summary, "") != "CHECKMARK"
+
+
+def test_the_panel_is_drawn_anew_where_the_figures_stop_to_hold_and_only_then(last_run, monkeypatch):
+    obj, drawn = scenes.bump(), []
+    scenes.select([obj])
+    bpy.ops.uv.omt_unwrap()
+    monkeypatch.setattr(last_run, "redraw", drawn.append)
+    last_run._look()
+    assert not drawn
+    obj.data.vertices[0].co.z += 0.1
+    last_run._look()
+    last_run._look()
+    assert len(drawn) == 1 and last_run.state.outdated

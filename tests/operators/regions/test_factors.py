@@ -93,3 +93,17 @@ def test_the_list_is_saved_with_its_object(striped, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     assert rows(bpy.data.objects[name]) == [("middle", 4.0)]
+
+
+def test_a_region_may_be_painted_on_one_of_several_objects(striped):
+    """The others keep what they have; a region that is nowhere is refused."""
+    other = scenes.bump(8, 8, name="Other", offset=3.0)
+    scenes.set_uv(other, scenes.seen_from_above(other, 1.0, (2.0, 0.0)))
+    other.vertex_groups.new(name="left").add(list(range(20, 25)), 1.0, "REPLACE")
+    scenes.select([other, striped])
+    before = shares(striped)
+    assert bpy.ops.uv.omt_magnify(**GIVEN, further="middle=0.5") == {"FINISHED"}
+    assert shares(striped)[1] < 0.8 * before[1]
+    for obj in (other, striped):
+        obj.vertex_groups.new(name="nowhere")
+    assert "nowhere" in scenes.error_of(bpy.ops.uv.omt_magnify, **GIVEN, further="nowhere=2")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import meshes
 import numpy as np
 import pytest
@@ -67,3 +69,16 @@ def test_types_are_kept_and_boxes_have_area():
     assert warp_with_insets(picture, layout(), layout()).dtype == np.uint8
     with pytest.raises(ValueError, match="no area"):
         InsetImage(picture, (0.5, 0.5), (0.5, 0.9))
+
+
+@pytest.mark.parametrize("size", [(5, 4), (4, 7), (3, 3), (1, 6), (9, 1)])
+def test_every_level_of_an_odd_picture_is_half_of_the_one_before_and_keeps_its_values(size):
+    """The last row or column stands twice: what is constant along the other side stays what it was."""
+    ramp = np.linspace(0, 1, size[0])[:, None, None] * np.ones((1, size[1], 1))
+    for picture in (ramp, ramp.transpose(1, 0, 2)):
+        levels = pyramid(picture)
+        for a, b in pairwise(levels):
+            assert b.shape[:2] == tuple(-(-n // 2) for n in a.shape[:2])
+            rows, columns = (np.minimum(2 * np.arange(n)[:, None] + [0, 1], m - 1)
+                             for n, m in zip(b.shape, a.shape[:2], strict=False))  # fmt: skip
+            np.testing.assert_allclose(b, a[rows][:, :, columns].mean(axis=(1, 3)))

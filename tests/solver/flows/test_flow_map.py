@@ -9,13 +9,14 @@ from bodies import icosphere, limbed
 from omt_uv.solver.contact.new_crossings import new_intersections
 from omt_uv.solver.contact.self_intersections import FaceCrossings, intersecting_pairs
 from omt_uv.solver.errors import EmptyMeshError, HandleError, NonFiniteError
+from omt_uv.solver.flows import flow_map
 from omt_uv.solver.flows.creases import without_new_intersections
 from omt_uv.solver.flows.domain import ball_domain, mesh_domain
 from omt_uv.solver.flows.enclosed_volume import EnclosedParts, component_volumes, restore_volumes, vertex_normals
 from omt_uv.solver.flows.flow_map import flow
 from omt_uv.solver.flows.handles import FlowHandle
 from omt_uv.solver.flows.integration import carried, planned_steps
-from omt_uv.solver.flows.options import PATHS, FlowOptions
+from omt_uv.solver.flows.options import BLEND, PATHS, RADIUS, STRAIGHT, FlowOptions
 from omt_uv.solver.progress import Progress, drain
 
 
@@ -198,3 +199,22 @@ def test_steps_end_at_every_knot():
     np.testing.assert_allclose([sum(step.length for step in steps) for steps in plan], [0.3, 0.7])
     whole = carried(start, plan[0] + plan[1])
     np.testing.assert_allclose(carried(carried(start, plan[0]), plan[1]), whole)
+
+
+def test_blends_are_radius_paths_at_the_corners_of_the_box_and_straight_in_its_middle():
+    """Wherever the body stands and however large it is."""
+    V, _ = icosphere(2)
+    corners = np.array([[-1.0, -1, -1], [1, 1, 1]])
+    found = {}
+    for kind in (RADIUS, STRAIGHT, BLEND):
+        points = 3.0 * np.concatenate([V, corners]) + [5.0, 0, 0]
+        outer = FlowHandle(points[[-1]], 3.0 * np.array([[1.0, 1, -1]]) + [5.0, 0, 0], np.array([len(V) + 1]))
+        found[kind] = _way((outer,), points, kind)
+    np.testing.assert_allclose(found[BLEND], found[RADIUS], atol=1e-9)
+    assert len(found[STRAIGHT]) == 2 and len(found[RADIUS]) == 9
+
+
+def _way(handles, points, kind):
+    """The way of handles in the units of a flow."""
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    return flow_map._way(points / size, handles, FlowOptions(path=kind, samples=8), None, size).path

@@ -74,3 +74,19 @@ def test_handles_are_thinned_out_evenly_and_checked():
         check_handles((FlowHandle(cloud, cloud[:3]),), 3)
     with pytest.raises(NonFiniteError):
         check_handles((FlowHandle(cloud * np.nan, cloud),), 3)
+
+
+@pytest.mark.parametrize("kind", PATHS)
+def test_every_handle_goes_its_own_way_whatever_others_do(kind):
+    """Handles together, in any order of their points, go as each does alone."""
+    rng = np.random.default_rng(7)
+    start, owner = rng.normal(size=(12, 3)), np.repeat([0, 1, 2], 4)[rng.permutation(12)]
+    end = np.empty_like(start)
+    for k in range(3):
+        turn = rotation_between(np.eye(3), np.linalg.qr(rng.normal(size=(3, 3)))[0])
+        end[owner == k] = start[owner == k] @ turn.T + rng.normal(size=3)
+    together = handle_paths(start, end, owner, kind, 6, MIDDLE, 2.0)
+    for k in range(3):
+        mine = owner == k
+        alone = handle_paths(start[mine], end[mine], np.zeros(4, int), kind, 6, MIDDLE, 2.0)
+        np.testing.assert_allclose(together[:, mine], alone, atol=1e-12)

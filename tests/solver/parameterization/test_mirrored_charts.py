@@ -10,12 +10,13 @@ from sphere_shapes import random_rotation
 
 from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.analysis.facing import SceneAxes
+from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.mesh.charts import strict_charts
-from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.mesh.geometry import edge_lengths, signed_areas
 from omt_uv.solver.mesh.mirror import find_mirror
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import unwrap as unwrap_module
-from omt_uv.solver.parameterization.mirrored_charts import images_of_cuts, motion_between
+from omt_uv.solver.parameterization.mirrored_charts import images_of_cuts, motion_between, with_images
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.shear_bound import predicted_cuts
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -171,3 +172,12 @@ def test_suzanne_is_cut_and_mapped_symmetrically():
     assert all(m.folds == 0 for m in found.maps)
     predicted = predicted_cuts(surface, np.ones(len(P), bool), 0.0).edges
     assert cuts == {tuple(sorted(e)) for e in predicted.tolist()}
+
+
+def test_cuts_get_their_images_and_the_length_of_both():
+    V, P, at = bent_grid()
+    surface = meshes.polygon_surface(V, P)
+    slit = np.array([[at(4, 0), at(4, 1)], [at(4, 1), at(4, 2)], [at(4, 2), at(5, 2)]])
+    for edges, count in ((slit, 4), (np.concatenate([slit, [[at(4, 2), at(3, 2)]]]), 4)):
+        found = with_images(surface, None, Cuts(edges, float(edge_lengths(V, edges).sum()), (), edges[:0], ()))
+        assert len(found.edges) == count and found.length == pytest.approx(edge_lengths(V, found.edges).sum())

@@ -148,6 +148,8 @@ def test_ring_by_ring_every_face_gets_the_label_beside_it():
     label = np.repeat([0, 1, 0, 2, 1, 0], [9, 1, 1, 9, 1, 9])
     mass, start = np.linspace(1, 2, 30), 4 * np.arange(31)
     one = _joined(label, mass, corner_vertex, start)
+    # The heaviest piece of each stays, all others went to what they touch, and every cell is one piece.
+    assert (one[21:] == 0).all() and (one[11:20] == 2).all() and (np.diff(one) != 0).sum() == len(np.unique(one)) - 1
     for turned in np.array([[2, 0, 1], [1, 2, 0], [1, 0, 2]]):
         assert np.array_equal(turned[one], _joined(turned[label], mass, corner_vertex, start))
 
