@@ -31,7 +31,7 @@ from .component import (
     make_component,
 )
 from .cut_graph import greedy_arcs, path_to, shorten
-from .developable_nets import is_long, net
+from .developable_nets import net
 from .gluing_facts import TurningLines, cost_factors, marked_triangles, total_curvature, turning_lines
 from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes
@@ -47,7 +47,7 @@ BEARABLE = 0.5**2
 ROOT_TRIALS = 4
 # A component with less curvature than this within, in radians and summed without sign, is not searched for seams.
 CURVED = 0.2
-# A net may be so many times as long as another cut, and as long as `developable_nets.is_long` says anyway.
+# A net may be so many times as long as another cut, and as long as `developable_nets.Net.most` says anyway.
 LONGER = 1.5
 
 
@@ -302,14 +302,14 @@ class _Cutter:
     ) -> Steps[tuple[np.ndarray, np.ndarray]]:
         """The net of component k, if it has one that is not much longer than other cuts; else those."""
         unrolled = net(component) if (self.extremities or searched) and not filled else None
-        if unrolled is not None and not is_long(component, unrolled[0]):
-            return unrolled
+        found = None if unrolled is None else unrolled.up_to(unrolled.most)
+        if found is not None:
+            return found.cut, found.tips
         if searched and self.search is not None:
             return (yield from self._search_component(component, topology, k, self.search))
         other = cut_component(component, topology, k, self.extremities)
-        if unrolled is not None and component.length[unrolled[0]].sum() <= LONGER * component.length[other[0]].sum():
-            return unrolled
-        return other
+        found = None if unrolled is None else unrolled.up_to(LONGER * component.length[other[0]].sum())
+        return other if found is None else (found.cut, found.tips)
 
     def _search_component(
         self, component: CutComponent, topology: Topology, k: int, search: SeamFinder

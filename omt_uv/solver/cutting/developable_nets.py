@@ -6,7 +6,7 @@ along the hard edges where it can, leaves none. On smooth bodies no cut does tha
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,10 +47,49 @@ MUCH = 2e-2
 ACROSS = 1.5
 
 
-def net(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
-    """Edges (e,) bool whose cut unrolls the component, and the corners (k,) they pass through.
+@dataclass(frozen=True)
+class Net:
+    """A cut (e,) bool that unrolls a component through its corners tips (k,), the shortest by the cost (e,) of edges,
+    which may lay the component on itself."""
 
-    None if there are none, or if seams would pass through vertices to be kept free of them.
+    component: CutComponent
+    cut: np.ndarray
+    tips: np.ndarray
+    cost: np.ndarray
+
+    @property
+    def length(self) -> float:
+        """Of all edges of the cut."""
+        return float(self.component.length[self.cut].sum())
+
+    @property
+    def most(self) -> float:
+        """The length up to which a net is worth its seams."""
+        return LONGEST * float(np.sqrt(face_areas(self.component.positions, self.component.triangles).sum()))
+
+    def up_to(self, length: float) -> Net | None:
+        """This net, spread out, if it is at most so long; None otherwise."""
+        # Nets that do not lie on themselves are looked for where one of them may be taken.
+        found = self.spread_out() if self.length <= length else self
+        return found if found.length <= length else None
+
+    def spread_out(self) -> Net:
+        """This net or, where the component laid flat along it lies on itself, the shortest of some others along which
+        it does not."""
+        component, cost = self.component, self.cost
+        if len(component.triangles) > MOST_TRIANGLES or not _covers_itself(component, self.cut):
+            return self
+        random = np.random.default_rng(0)
+        varied = [cost * np.exp(VARIED * random.standard_normal(len(cost))) for _ in range(NETS)]
+        cuts = [greedy_arcs(replace(component, cost=one), self.tips) for one in varied]
+        cuts.sort(key=lambda cut: cost[cut].sum())
+        return replace(self, cut=next((cut for cut in cuts if not _covers_itself(component, cut)), self.cut))
+
+
+def net(component: CutComponent) -> Net | None:
+    """The shortest net of a component.
+
+    None if it has none, or if seams would pass through vertices to be kept free of them.
     """
     defects = _defects(component)
     curvature = np.abs(defects)
@@ -69,20 +108,7 @@ def net(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     if len(tips) < 3 or (component.avoid[tips] > 0).any():
         return None
     cost = np.where(folded, component.cost, ACROSS * component.cost) * net_factors(component, folded)
-    return _spread_out(component, cost, tips), tips
-
-
-def _spread_out(component: CutComponent, cost: np.ndarray, tips: np.ndarray) -> np.ndarray:
-    """The shortest cut (e,) bool through the tips (t,), by the cost (e,) of edges, or, where the component laid flat
-    along it lies on itself, the shortest of some others along which it does not."""
-    first = greedy_arcs(replace(component, cost=cost), tips)
-    if len(component.triangles) > MOST_TRIANGLES or not _covers_itself(component, first):
-        return first
-    random = np.random.default_rng(0)
-    varied = [cost * np.exp(VARIED * random.standard_normal(len(cost))) for _ in range(NETS)]
-    cuts = [greedy_arcs(replace(component, cost=one), tips) for one in varied]
-    cuts.sort(key=lambda cut: cost[cut].sum())
-    return next((cut for cut in cuts if not _covers_itself(component, cut)), first)
+    return Net(component, greedy_arcs(replace(component, cost=cost), tips), tips, cost)
 
 
 def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:
@@ -113,9 +139,3 @@ def _flat(curvature: np.ndarray) -> float:
     """The curvature below which a vertex of hard edges is flat, of all of theirs (k,)."""
     little = curvature[curvature <= FLAT]
     return FLATTER * little.mean() if little.sum() > MOST_LEFT else FLAT
-
-
-def is_long(component: CutComponent, cut: np.ndarray) -> bool:
-    """Whether a cut (e,) bool is more than what a net should take."""
-    area = face_areas(component.positions, component.triangles).sum()
-    return bool(component.length[cut].sum() > LONGEST * np.sqrt(area))

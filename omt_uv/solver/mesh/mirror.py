@@ -20,6 +20,8 @@ from .topology import halfedges, pair_keys, pair_up, row_labels
 MIRROR_TOLERANCE = 1e-4
 # Polygons whose images are looked up before those of all others.
 PROBES = 40
+# Planes across the axes and the principal directions, which come first.
+FIRST_PLANES = 6
 # Planes that are tried of those between a vertex and the others that are as far from the centre.
 MOST_PLANES = 40
 # Vertices are as far from the centre if their distances differ by less than this share of the extent.
@@ -136,20 +138,24 @@ def mirrored_quads(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     points = (points - points.min(axis=0)) / extent
     centred = points - points.mean(axis=0)
     tree, probes = cKDTree(centred), np.random.default_rng(0).permutation(len(points))[:PROBES]
-    for normal in _candidates(points, triangles):
+    for number, normal in enumerate(_candidates(points, triangles)):
         if tree.query(_reflected(centred[probes], normal))[0].max() > MIRROR_TOLERANCE:
             continue
         far, image = tree.query(_reflected(centred, normal))
         if far.max() <= MIRROR_TOLERANCE and (image[image] == np.arange(len(image))).all():
-            pairs = _recut(triangles, image)
+            rest = np.flatnonzero(~_among(image[triangles], triangles))
+            pairs = _recut(triangles, image, rest)
             if len(pairs):
                 return pairs
+            # A body that many planes take to itself is cut alike all around.
+            if number >= FIRST_PLANES and not len(rest):
+                break
     return none
 
 
-def _recut(triangles: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """Pairs (k,2) of triangles (m,3) without an image whose quads have one, for the image (n,) of every vertex."""
-    rest = np.flatnonzero(~_among(image[triangles], triangles))
+def _recut(triangles: np.ndarray, image: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Pairs (k,2) of the triangles `rest` (r,), of (m,3), without an image whose quads have one, for the image (n,) of
+    every vertex."""
     if not 0 < len(rest) <= FEW * len(triangles):
         return np.zeros((0, 2), np.int64)
     tail, head = halfedges(triangles[rest])

@@ -38,7 +38,8 @@ class RasterGrid:
             wider, step = self._widened[-1].copy(), 2 ** (len(self._widened) - 1)
             wider[:, :-step] |= self._widened[-1][:, step:]
             self._widened.append(wider)
-        self._bits = [[np.packbits(d[:, s : s + self._width], axis=1) for s in range(8)] for d in self._widened]
+        self._bits = [_shifted(wider) for wider in self._widened]
+        self._flat = [bits.reshape(8, -1) for bits in self._bits]
 
     @property
     def taken(self) -> np.ndarray:
@@ -65,18 +66,27 @@ class RasterGrid:
                 wider[rows, begin:reach] |= narrow[rows, begin + half : reach + half]
             # Bits that are shifted by s come from s cells farther on.
             begin, stop = max(0, begin - 8), min(self._width, 8 * -(-end // 8))
-            for s, bits in enumerate(self._bits[k]):
-                bits[rows, begin // 8 : stop // 8] = np.packbits(wider[rows, begin + s : stop + s], axis=1)
+            self._bits[k][:, rows, begin // 8 : stop // 8] = _shifted(wider[rows, begin : stop + 8])
 
     def places(self, runs: list[list[int]], height: int, width: int) -> np.ndarray | None:
         """Lower left cells (rows,columns) bool at which a mask of these runs, height and width is free, or None."""
         rows, columns = self.side - height + 1, self.side - width + 1
         if rows <= 0 or columns <= 0:
             return None
-        count = -(-columns // 8)
-        blocked = np.zeros((rows, count), np.uint8)
+        # Rows one after the other: a shift is one stretch of memory, and what runs over the end of a row is not read.
+        stride, count = self._width // 8, -(-columns // 8)
+        blocked = np.zeros(rows * stride, np.uint8)
+        length = (rows - 1) * stride + count
+        ahead = blocked[:length]
         for k, row, column in runs:
-            start = column >> 3
-            blocked |= self._bits[k][column & 7][row : row + rows, start : start + count]
-        free = np.unpackbits(~blocked, axis=1, count=columns).view(bool)
+            start = row * stride + (column >> 3)
+            ahead |= self._flat[k][column & 7][start : start + length]
+        free = np.unpackbits(~blocked.reshape(rows, stride)[:, :count], axis=1, count=columns).view(bool)
         return free if free.any() else None
+
+
+def _shifted(cells: np.ndarray) -> np.ndarray:
+    """Cells (h,8w+8) bool in bits, those from cell s on for s from 0 to 7, (8,h,w)."""
+    bits = np.packbits(cells, axis=1).astype(np.uint16)
+    pairs = bits[:, :-1] << 8 | bits[:, 1:]
+    return (pairs >> np.arange(8, 0, -1, dtype=np.uint16)[:, None, None]).astype(np.uint8)

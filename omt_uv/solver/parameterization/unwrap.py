@@ -70,10 +70,12 @@ class SurfaceMap:
 class CutCharts:
     """A surface cut into charts that are to be mapped, for `unwrap`; maps (by number) are there already.
 
+    surface : with its quads cut along their shorter diagonals
     joined : the charts with the quads of mirror images cut alike; pairs : see `mirrored_charts.mirror_partners`
     search : that found the seams for a bound of the shear, if there is one
     """
 
+    surface: Surface
     prepared: DiskCharts
     pins: list[ChartPins | None]
     targets: list[Target | None]
@@ -116,13 +118,12 @@ def unwrap(
     MeshError : see `disk_charts.cut_to_disks` and `chart_map.map_chart`; element indices are those of the surface
     """
     yield Progress("Charts", 0.0)
-    given, surface = surface, cut_along_shorter(surface)
-    task = _Task(surface, options or UnwrapOptions(), pins, target, markers)
-    begin = 0.0
+    options, begin = options or UnwrapOptions(), 0.0
     if cut is None:
         begin = CUTTING
-        cutting = cut_charts(surface, faces, options=task.options, pins=pins, target=target, avoid=avoid)
+        cutting = cut_charts(surface, faces, options=options, pins=pins, target=target, avoid=avoid)
         cut = yield from part_of(cutting, 0.0, begin)
+    task = _Task(cut.surface, options, pins, target, markers)
     prepared, width = cut.prepared, (1 - begin) * (1 if cut.search is None else MAPPING)
     maps = yield from part_of(task.map_symmetric(cut), begin, width)
     # A draft leaves shear that Standard takes away: it shows the seams that are predicted, and no others.
@@ -131,9 +132,9 @@ def unwrap(
         further = bound_shear(cut.search, prepared, maps, task.map_charts, crossing)
         found = yield from part_of(further, begin + width, 1 - begin - width)
         prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps
-    charts, maps = yield from task.finished(prepared.charts, maps, given)
+    charts, maps = yield from task.finished(prepared.charts, maps, surface)
     if task.options.boundary != "free" and task.options.kind == "authalic":
-        maps = yield from _with_room(task, prepared.charts, maps, given)
+        maps = yield from _with_room(task, prepared.charts, maps, surface)
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
@@ -210,7 +211,9 @@ def _to_be_mapped(surface: Surface, prepared: DiskCharts, pins: CornerPins | Non
     joined = with_mirrored_quads(surface, charts) if free else charts
     targets = [chart_target(target, surface, chart) for chart in joined]
     pairs = mirror_partners(joined, targets) if free else {}
-    return CutCharts(prepared=prepared, pins=chart_pins, targets=targets, joined=joined, pairs=pairs, maps={})
+    return CutCharts(
+        surface=surface, prepared=prepared, pins=chart_pins, targets=targets, joined=joined, pairs=pairs, maps={}
+    )
 
 
 def map_small_charts(several: Sequence[CutCharts], options: UnwrapOptions) -> Steps[list[CutCharts]]:
@@ -261,7 +264,9 @@ class _Task:
         if self.options.kind == "authalic":
             pins = [pins_of_chart(self.pins, chart) for chart in charts]
             maps = yield from with_convex_polygons(self.surface, charts, maps, pins, self.options, self.target, given)
-        drawn = [cut_as_given(chart, self.surface, given) for chart in charts]
+        recut = np.zeros(len(given.face_start) - 1, bool)
+        recut[given.triangle_face[(self.surface.triangles != given.triangles).any(axis=1)]] = True
+        drawn = [cut_as_given(c, self.surface, given) if recut[c.faces].any() else c for c in charts]
         return drawn, [with_folds_counted(chart, chart_map) for chart, chart_map in zip(drawn, maps, strict=True)]
 
     def crossing(self, chart: Chart, chart_map: ChartMap) -> Steps[np.ndarray]:

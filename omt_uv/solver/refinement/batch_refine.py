@@ -38,6 +38,8 @@ REBUILD = 0.6
 FEW = 8
 # Polygons below which a chart has no ties that its mirror image would have to break.
 LEAST_SYMMETRIC = 6
+# Relative differences of lengths that are rounding.
+ISOMETRIC = 1e-9
 
 
 @dataclass(frozen=True)
@@ -391,21 +393,32 @@ def _symmetric(union: MeshUnion, faces: Elements, w: np.ndarray) -> tuple[Mirror
     """The symmetry of all charts that are their own mirror images, and the maps w (n,) made symmetric."""
     of_polygon, w = union.of_polygons(faces), w.copy()
     sizes = np.bincount(of_polygon, minlength=union.count)
-    large = np.flatnonzero(sizes >= LEAST_SYMMETRIC)
+    large = np.flatnonzero((sizes >= LEAST_SYMMETRIC) & ~_isometric(union, faces, w))
     found = without_symmetry(len(w))
+    begin, first = (np.searchsorted(x, np.arange(union.count + 1)) for x in (union.of_vertex, union.of_face))
     for k in large:
-        vertices = np.flatnonzero(union.of_vertex == k)
-        rows = union.of_face == k
-        place = np.full(len(w), -1)
-        place[vertices] = np.arange(len(vertices))
-        chart = restricted(faces, of_polygon == k, place)
+        vertices, rows = np.arange(begin[k], begin[k + 1]), slice(first[k], first[k + 1])
+        chart = restricted(faces, of_polygon == k, np.arange(len(w)) - begin[k])
         polygon = None if union.polygon is None else union.polygon[rows]
-        symmetry = find_symmetry(union.positions[vertices], place[union.triangles[rows]], polygon, chart)
+        symmetry = find_symmetry(union.positions[vertices], union.triangles[rows] - begin[k], polygon, chart)
         start = None if symmetry is None else symmetric_start(symmetry, w[vertices], chart, "free", vertices[:0])
         if start is not None:
             found = found.with_part(start[0], vertices)
             w[vertices] = start[1]
     return (found if found.follows.any() else None), w
+
+
+def _isometric(union: MeshUnion, faces: Elements, w: np.ndarray) -> np.ndarray:
+    """Which charts (c,) bool have the areas asked for in the maps w (n,), and no shear: those are as symmetric as the
+    charts."""
+    owner = union.of_vertex[faces.triangles[:, 0]]
+    a, b = (np.abs(x) for x in faces.derivatives(w))
+    size = np.maximum(a, b) / np.sqrt(faces.of_triangles(faces.ratio))
+    low, high = np.full(union.count, np.inf), np.zeros(union.count)
+    np.minimum.at(low, owner, size)
+    np.maximum.at(high, owner, size)
+    sheared = np.bincount(owner, np.minimum(a, b) > ISOMETRIC * np.maximum(a, b), union.count) > 0
+    return ~sheared & (high - low <= ISOMETRIC * high)
 
 
 def _side_by_side(union: MeshUnion, w: np.ndarray) -> np.ndarray:

@@ -18,6 +18,8 @@ from ..mesh.topology import boundary_loops, expand, halfedges, twins
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
 
+# Faces of stars whose collapses are compared at once, roughly, for memory.
+PART = 200_000
 # A vertex with more faces stays: comparing all its collapses costs the square of their number.
 MOST_FACES = 9
 # Shape (1: equilateral) that new faces need in space, unless the old ones were worse.
@@ -142,7 +144,7 @@ def _round(V, F, flat, mass, rank):
     count = np.bincount(F.ravel(), minlength=len(V))
     star, turned = stars(F, independent_set(F, np.where((count > MOST_FACES) | (count < 2), -1, rank)))
     v, after, before = np.take_along_axis(F[star], turned, 1).T
-    into, good = _best_collapses(V, flat, v, after, before, ahead)
+    into, good = _collapses(V, flat, v, after, before, ahead)
     star, v, after, before, into = (x[good] for x in (star, v, after, before, into))
     vertex, row = np.unique(v, return_inverse=True)
     stays = (after != into) & (before != into)
@@ -166,6 +168,16 @@ def _round(V, F, flat, mass, rank):
     total = np.column_stack([np.bincount(row, column[star], len(vertex)) for column in mass.T])
     handed = part[:, None] * total[row[stays]]
     return np.concatenate([F[others], new]), np.concatenate([mass[others], handed]), removal
+
+
+def _collapses(V, flat, v, after, before, ahead):
+    """`_best_collapses` of some stars after the others: pairs of their faces are several times as many as these."""
+    ends = np.flatnonzero(np.diff(v)) + 1
+    # A star is in one part.
+    parts = ends[np.flatnonzero(np.diff(ends // PART, prepend=0))]
+    several = [np.split(x, parts) for x in (v, after, before)]
+    found = [_best_collapses(V, flat, *part, ahead) for part in zip(*several, strict=True)]
+    return tuple(np.concatenate(x) for x in zip(*found, strict=True))
 
 
 def _best_collapses(V, flat, v, after, before, ahead):

@@ -1,12 +1,14 @@
 """Nets of bodies with flat sides."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
 from short_cuts import component_of
 
 from omt_uv.solver.cutting.cut_graph import cut_classes
-from omt_uv.solver.cutting.developable_nets import is_long, net
+from omt_uv.solver.cutting.developable_nets import net
 from omt_uv.solver.maps.development import developed
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
@@ -14,15 +16,16 @@ from omt_uv.solver.mesh.geometry import angle_defects, angles_from_lengths, half
 
 def test_a_cube_has_a_net_of_seven_edges():
     component = component_of(*meshes.cube())
-    cut, tips = net(component)
-    assert cut.sum() == 7 and component.length[cut].sum() == pytest.approx(7) and len(tips) == 8
-    assert not is_long(component, cut) and is_long(component, np.ones(len(component.pair), bool))
+    found = net(component)
+    assert found.cut.sum() == 7 and found.length == pytest.approx(7) and len(found.tips) == 8
+    assert found.up_to(found.most) is found and found.up_to(6.9) is None
+    assert replace(found, cut=np.ones(len(component.pair), bool)).up_to(found.most) is None
 
 
 def test_a_net_leaves_no_curvature_inside():
     V, F = meshes.cube()
     component = component_of(*meshes.subdivide(V * [1, 2, 3], F))
-    cut, _ = net(component)
+    cut = net(component).cut
     classes = cut_classes(component, cut)
     inner = np.isin(np.arange(component.vertex_count), component.ends[cut], invert=True)
     lengths = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
@@ -43,8 +46,8 @@ def test_the_net_of_a_cylinder_of_many_sides_opens_both_caps():
     V = np.concatenate([np.column_stack([around, 0 * turn + z]) for z in (-1, 1)] + [[[0, 0, -1], [0, 0, 1]]])
     i, j = np.arange(n), (np.arange(n) + 1) % n
     sides = [(i, j, n + j), (i, n + j, n + i), (j, i, 2 * n + 0 * i), (n + i, n + j, 2 * n + 1 + 0 * i)]
-    cut, tips = net(component_of(V, np.concatenate([np.column_stack(side) for side in sides])))
-    assert len(tips) == 2 * n and cut.sum() == 2 * n - 1
+    found = net(component_of(V, np.concatenate([np.column_stack(side) for side in sides])))
+    assert len(found.tips) == 2 * n and found.cut.sum() == 2 * n - 1
 
 
 def test_the_net_of_a_bracket_does_not_cover_itself():
@@ -54,7 +57,8 @@ def test_the_net_of_a_bracket_does_not_cover_itself():
     i, j = np.arange(6), (np.arange(6) + 1) % 6
     sides = [np.column_stack([i, j, j + 6]), np.column_stack([i, j + 6, i + 6])]
     component = component_of(V, np.concatenate([caps[:, ::-1], caps + 6, *sides]))
-    cut, tips = net(component)
+    found = net(component).spread_out()
+    cut, tips = found.cut, found.tips
     classes = cut_classes(component, cut)
     positions = np.zeros((classes.max() + 1, 3))
     positions[classes.ravel()] = component.positions[component.triangles.ravel()]

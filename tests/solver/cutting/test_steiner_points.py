@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.sparse.csgraph import minimum_spanning_tree
 
-from omt_uv.solver.cutting.steiner_points import meeting_points
+from omt_uv.solver.cutting.steiner_points import _tree_costs, meeting_points
 
 
 def distances(points, ends):
@@ -31,3 +32,11 @@ def test_a_tree_through_the_point_is_shorter_in_any_order_of_the_ends(seed):
     np.testing.assert_array_equal(*found)
     direct = distance[:, :3].sum() / 2 - distance[:, :3].max()
     assert all(distance[:, point].sum() < direct for point in found[0])
+
+
+def test_trees_are_as_short_as_those_of_another_program():
+    rng = np.random.default_rng(3)
+    points = rng.random((40, 9, 2))
+    between = np.linalg.norm(points[:, :, None] - points[:, None], axis=3)
+    expected = [minimum_spanning_tree(one).sum() for one in between]
+    np.testing.assert_allclose(_tree_costs(between), expected, rtol=1e-12)

@@ -15,6 +15,7 @@ from omt_uv.solver.parameterization.initial_map import COARSE_ABOVE, mean_value_
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
+from omt_uv.solver.refinement import mesh_hierarchy
 from omt_uv.solver.refinement.boundary_barrier import crossings
 from omt_uv.solver.refinement.mesh_hierarchy import coarsen_disk
 from omt_uv.solver.refinement.vertex_sweeps import smoothed
@@ -149,3 +150,12 @@ def test_a_region_keeps_its_share_of_the_mass_on_the_way_up(name):
     coarse = drain(coarsen_disk(V, F, flat, mass, len(V) // 8, weights))
     assert (coarse.region >= 0).all() and (coarse.region <= 1 + 1e-12).all()
     assert coarse.region @ coarse.mass == pytest.approx(weights @ mass, rel=1e-9)
+
+
+def test_the_coarser_mesh_does_not_hang_on_the_parts_in_which_its_stars_are_compared(monkeypatch):
+    whole = coarse_of("bumpy")[-1]
+    monkeypatch.setattr(mesh_hierarchy, "PART", 37)
+    parts = coarse_of("bumpy")[-1]
+    np.testing.assert_array_equal(parts.kept, whole.kept)
+    np.testing.assert_array_equal(parts.triangles, whole.triangles)
+    np.testing.assert_array_equal(parts.mass, whole.mass)
