@@ -46,7 +46,7 @@ def closed(name: str, at: float, seed: int = 1):
     height.data.foreach_set("value", (z - z.min()).astype(np.float32))
     _some_uv(obj)
     for vertex in obj.data.vertices:
-        vertex.select = int(vertex.index) in order[-6:]
+        vertex.select = vertex.index in order[-6:].tolist()
     return obj
 
 

@@ -76,8 +76,12 @@ def new_points(obj: bpy.types.Object, partition: Partition) -> bpy.types.Object:
 
 
 def _new_object(obj: bpy.types.Object, name: str, mesh: bpy.types.Mesh) -> bpy.types.Object:
-    new = bpy.data.objects.new(name, mesh)
-    new.matrix_world = obj.matrix_world
+    # A copy has the parent, too: location, rotation and scale alone hold no shear.
+    new = obj.copy()
+    new.name, new.data = name, mesh
+    for slot, old in zip(new.material_slots, obj.material_slots, strict=False):
+        slot.link, slot.material = old.link, old.material
+    new.modifiers.clear()
     blender_mesh.link_beside(new, obj)
     bpy.context.view_layer.update()
     return new

@@ -30,8 +30,12 @@ def weights(obj, name):
 def test_everything_arrives_on_the_other_mesh(package):
     source, target, of = pair()
     before, shape = scenes.state(source), positions(target)
+    # A lock of what gets nothing is no hindrance, and landmarks stay where they were picked.
+    target.vertex_groups.new(name="of no concern").lock_weight = True
+    picked = [weights(target, f"LM_{k}") for k in range(5)]
     match()
     assert scenes.state(source) == before and (positions(target) == shape).all()
+    np.testing.assert_array_equal([weights(target, f"LM_{k}") for k in range(5)], picked)
     own = positions(source)[of]
     up, down = weights(target, "up"), weights(target, "down")
     assert np.abs(up - weights(source, "up")[of]).max() < 0.03 and np.abs(up + down - 1).max() < 1e-5

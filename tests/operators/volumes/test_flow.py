@@ -92,6 +92,23 @@ def test_frames_are_keyed_one_after_the_other(count):
         np.testing.assert_allclose(values, np.eye(count)[k], atol=1e-6)
     bpy.context.scene.frame_set(10)
     assert not any(obj.data.shape_keys.key_blocks[name].value for name in names)
+    # Halfway is half of both, and the last one stays.
+    bpy.context.scene.frame_set(11, subframe=0.5)
+    values = [obj.data.shape_keys.key_blocks[name].value for name in names]
+    np.testing.assert_allclose(values[:2], [0.5, 0.5], atol=1e-6)
+    bpy.context.scene.frame_set(30)
+    values = [obj.data.shape_keys.key_blocks[name].value for name in names]
+    np.testing.assert_allclose(values, np.eye(count)[-1], atol=1e-6)
+
+
+def test_a_mesh_with_shape_keys_moves_with_its_basis():
+    obj = ball()
+    obj.shape_key_add(name="Basis"), obj.shape_key_add(name="Other")
+    row = top(obj)
+    select_vertices(obj, [row])
+    assert bpy.ops.object.omt_flow(move=(0, 0, 0.4), result="MESH") == {"FINISHED"}
+    np.testing.assert_array_equal(positions(obj), positions(obj, "Basis"))
+    assert positions(obj)[row, 2] == pytest.approx(1.4, abs=1e-5)
 
 
 def test_empties_groups_and_hooks_take_their_surroundings_along():
