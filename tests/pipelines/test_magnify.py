@@ -8,6 +8,7 @@ from readings import reading
 
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.magnify import Magnified, Region, Shares, magnify, warped_picture, whole_factor
+from omt_uv.pipelines.regions.detail import box_of
 from omt_uv.settings import MagnifySettings
 from omt_uv.solver.errors import ShareError, WeightError
 from omt_uv.solver.mesh.geometry import signed_areas
@@ -162,3 +163,15 @@ def test_a_symmetric_region_of_a_grid_of_quads_keeps_its_centre_lines_straight(s
     for line in (grid[n // 2], grid[:, n // 2]):
         along = (line[-1] - line[0]) / abs(line[-1] - line[0])
         assert np.abs(((line - line[0]) / along).imag).max() < 1e-6 * np.ptp(uv)
+
+
+def test_the_box_of_regions_is_that_of_their_faces_in_the_old_uvs():
+    V, F = meshes.grid(10, 10)
+    middle = V[F].mean(axis=1)[:, :2]
+    inside = ((middle > [0.2, 0.3]) & (middle < [0.5, 0.6])).all(axis=1)
+    one = region(V, F, inside.astype(float), V[:, :2] + 2, "face")
+    assert np.allclose(box_of([one]), [(2.2, 2.3), (2.5, 2.6)], atol=1e-6)
+    nothing = region(V, F, np.zeros(len(F)), V[:, :2] - 7, "face")
+    assert box_of([nothing]) is None and np.allclose(box_of([nothing, one]), box_of([one]))
+    other = region(V, F, inside.astype(float), V[:, :2] + [4, 1], "face")
+    assert np.allclose(box_of([one, other]), [(2.2, 1.3), (4.5, 2.6)], atol=1e-6)

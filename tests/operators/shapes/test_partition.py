@@ -57,9 +57,15 @@ def test_the_cut_mesh_is_a_new_object_of_exact_cells_with_uvs_and_groups():
     obj = ball()
     obj.scale, obj.location = (1, 2, 1), (5, 0, 0)
     obj.vertex_groups.new(name="region").add(list(range(40)), 0.5, "REPLACE")
+    for name in ("left", "right"):
+        obj.data.materials.append(bpy.data.materials.new(name))
+    for polygon in obj.data.polygons:
+        polygon.material_index = int(polygon.center.x > 0)
     bpy.context.view_layer.update()
     divide(write="MESH")
     new = bpy.context.object
+    assert [m.name for m in new.data.materials] == [m.name for m in obj.data.materials]
+    assert all((p.center.x > 0) == (p.material_index == 1) for p in new.data.polygons if abs(p.center.x) > 1e-4)
     assert new.name == "Ball_cells" and len(bpy.data.objects) == 2 and "region" in new.vertex_groups
     assert np.allclose(new.matrix_world, obj.matrix_world) and len(new.data.uv_layers) == 1
     seen = new.data.copy()

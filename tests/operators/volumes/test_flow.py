@@ -92,10 +92,10 @@ def test_frames_are_keyed_one_after_the_other(count):
         np.testing.assert_allclose(values, np.eye(count)[k], atol=1e-6)
     bpy.context.scene.frame_set(10)
     assert not any(obj.data.shape_keys.key_blocks[name].value for name in names)
-    # Halfway is half of both, and the last one stays.
-    bpy.context.scene.frame_set(11, subframe=0.5)
+    # Between frames shapes change evenly, and the last one stays.
+    bpy.context.scene.frame_set(11, subframe=0.25)
     values = [obj.data.shape_keys.key_blocks[name].value for name in names]
-    np.testing.assert_allclose(values[:2], [0.5, 0.5], atol=1e-6)
+    np.testing.assert_allclose(values[:2], [0.75, 0.25], atol=1e-6)
     bpy.context.scene.frame_set(30)
     values = [obj.data.shape_keys.key_blocks[name].value for name in names]
     np.testing.assert_allclose(values, np.eye(count)[-1], atol=1e-6)
