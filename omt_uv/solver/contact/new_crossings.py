@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from .proximity import triangle_distances
 from .self_intersections import FaceCrossings
+
+# Triangles that were closer than this share of their longest side touched: what has no distance is kept apart by
+# nothing but luck of rounding, and an exact test calls it an intersection.
+TOUCHING = 1e-9
 
 
 class NewCrossings:
@@ -34,6 +39,14 @@ class NewCrossings:
             self._old = np.union1d(self._old, _vertex_pairs(triangles, old))
             self._asked |= near
         return found[~np.isin(_vertex_pairs(triangles, found), self._old).any(axis=1)]
+
+    def apart(self, pairs: np.ndarray) -> np.ndarray:
+        """Those of pairs (k,2) of triangles that had a distance from one another before, and did not touch."""
+        if not len(pairs):
+            return pairs
+        corner = self.before[self.faces.triangles[pairs]]
+        size = np.linalg.norm(corner - corner[:, :, [1, 2, 0]], axis=3).max(axis=(1, 2))
+        return pairs[triangle_distances(self.before, self.faces.triangles, pairs) > TOUCHING * size]
 
 
 def new_intersections(before: np.ndarray, after: np.ndarray, faces: FaceCrossings) -> np.ndarray:

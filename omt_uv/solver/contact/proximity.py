@@ -29,6 +29,16 @@ class ClosePairs:
         """Those that are `chosen` (k,) bool."""
         return ClosePairs(self.corners[chosen], int(chosen[: self.points].sum()))
 
+    def joined(self, others: ClosePairs) -> ClosePairs:
+        """These and others."""
+        parts = [
+            self.corners[: self.points],
+            others.corners[: others.points],
+            self.corners[self.points :],
+            others.corners[others.points :],
+        ]
+        return ClosePairs(np.concatenate(parts), self.points + others.points)
+
     def offsets(self, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Ways (k,3) between the closest points of each pair at vertices (n,3), and the weights (k,4) of its corners
         in them."""
@@ -45,22 +55,52 @@ class ClosePairs:
         return np.einsum("kc,kci->ki", weights, corner), weights
 
 
-def close_pairs(vertices: np.ndarray, triangles: np.ndarray, reach: float) -> ClosePairs:
-    """Pairs among triangles (m,3) of vertices (n,3): all that are closer than `reach`, and some that are farther."""
+def close_pairs(
+    vertices: np.ndarray, triangles: np.ndarray, reach: float, moved: np.ndarray | None = None
+) -> ClosePairs:
+    """Pairs among triangles (m,3) of vertices (n,3): all that are closer than `reach`, and some that are farther; only
+    those with a vertex that has `moved` (n,) bool where this is given."""
+    moved = np.ones(len(vertices), bool) if moved is None else moved
     corner = vertices[triangles]
-    near = box_pairs(corner.min(axis=1) - reach / 2, corner.max(axis=1) + reach / 2)
-    both = np.concatenate([near, near[:, ::-1]])
-    count = np.int64(len(triangles))
-    keys = np.unique(triangles[both[:, 0]] * count + both[:, 1:])
-    vertex, face = keys // count, triangles[keys % count]
+    used = np.unique(triangles)
+    low = np.concatenate([vertices[used], corner.min(axis=1) - reach])
+    high = np.concatenate([vertices[used], corner.max(axis=1) + reach])
+    first = np.arange(len(low)) < len(used)
+    everything = moved[used].all()
+    asked = first if everything else np.concatenate([moved[used], moved[triangles].any(axis=1)])
+    found = box_pairs(low, high, asked)
+    found = found[first[found[:, 0]] & ~first[found[:, 1]]]
+    vertex, face = used[found[:, 0]], triangles[found[:, 1] - len(used)]
     apart = (face != vertex[:, None]).all(axis=1)
     faces = np.column_stack([vertex, face])[apart]
-    ends, edge = _edges(triangles)
-    crossed = pair_keys(np.repeat(edge[near[:, 0]], 3, axis=1).ravel(), np.tile(edge[near[:, 1]], 3).ravel())
-    crossed = np.unique(crossed)
-    one, other = ends[crossed >> 32], ends[crossed & 0xFFFFFFFF]
+    ends, _ = _edges(triangles)
+    start, end = vertices[ends[:, 0]], vertices[ends[:, 1]]
+    asked = None if everything else moved[ends].any(axis=1)
+    crossed = box_pairs(np.minimum(start, end) - reach / 2, np.maximum(start, end) + reach / 2, asked)
+    one, other = ends[crossed[:, 0]], ends[crossed[:, 1]]
     apart = (one[:, :, None] != other[:, None, :]).all(axis=(1, 2))
     return ClosePairs(np.concatenate([faces, np.concatenate([one, other], axis=1)[apart]]), len(faces))
+
+
+def triangle_distances(vertices: np.ndarray, triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """How far apart (k,) pairs (k,2) of triangles (m,3) of vertices (n,3) are that do not intersect; with a common
+    vertex, what of them is without it."""
+    if not len(pairs):
+        return np.zeros(0)
+    one, other = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
+    count, corner = len(pairs), np.arange(3)
+    faces = [np.column_stack([a[:, c], b]) for a, b in ((one, other), (other, one)) for c in corner]
+    sides = [
+        np.stack([one[:, a], one[:, (a + 1) % 3], other[:, b], other[:, (b + 1) % 3]], axis=1)
+        for a in corner
+        for b in corner
+    ]
+    every, points = np.concatenate(faces + sides), len(faces) * count
+    length = np.linalg.norm(ClosePairs(every, points).offsets(vertices)[0], axis=1)
+    mine, theirs = every[:, :2].copy(), every[:, 1:].copy()
+    mine[:points, 1], theirs[points:, 0] = mine[:points, 0], theirs[points:, 1]
+    common = (mine[:, :, None] == theirs[:, None, :]).any(axis=(1, 2))
+    return np.where(common, np.inf, length).reshape(-1, count).min(axis=0)
 
 
 def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ from ..contact.barrier import brought
 from ..contact.new_crossings import NewCrossings, touched
 from ..contact.self_intersections import FaceCrossings
 from ..contact.separation import separated
-from ..mesh.geometry import nearest_rotations
+from ..mesh.geometry import affine_images
 from ..mesh.topology import graph_components, halfedges
 from ..progress import Progress, Steps
 from .domain import FlowDomain
@@ -33,6 +33,8 @@ PIECES = 12
 REACH = 5
 # Vertices of a region at most for which distances of all that is close are kept.
 MOST_HELD = 20_000
+# What lengths are divided by where they are nothing.
+TINY = float(np.finfo(float).tiny)
 # Rings of vertices around faces that intersect, in the rounds of mending; beyond them the blend takes as many again.
 RINGS = (1, 2, 3, 4, 6, 8)
 # Times that pairs which others have been moved into are taken apart with those.
@@ -66,24 +68,26 @@ def taken_apart(
     concerned: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n,3) close to those after a move (before and after it, (n,3) each), and the pairs (k,2) that still
-    newly intersect, with those that do behind planes that were between them before the move, and those that come to
-    intersect by that, too. Only vertices `free` (n,) bool move, no farther than `farthest`; pairs without a triangle
-    that is `concerned` (m,) bool are known not to intersect."""
+    newly intersect and were apart, with those that do behind planes that were between them before the move, and those
+    that come to intersect by that, too. Only vertices `free` (n,) bool move, no farther than `farthest`; pairs without
+    a triangle that is `concerned` (m,) bool are known not to intersect."""
     before, after = move
     triangles = crossings.faces.triangles
     pairs = crossings.pairs(after, concerned)
-    best, fewest = after, pairs
+    best, fewest = after, crossings.apart(pairs)
     if not len(pairs) or _too_many(pairs, triangles):
         return best, fewest
+    left, rest = pairs, len(pairs)
     for _ in range(SEPARATIONS):
         position = separated(before, after, triangles, pairs, free)
         if np.abs(position - after).max() > farthest:
             break
         near = touched(after, position, triangles)
-        near[fewest] = True
+        near[left] = True
         left = crossings.pairs(position, near)
-        if len(left) < len(fewest):
-            best, fewest = position, left
+        apart = crossings.apart(left)
+        if (len(apart), len(left)) < (len(fewest), rest):
+            best, fewest, rest = position, apart, len(left)
         both = np.unique(np.concatenate([pairs, left]), axis=0)
         if not len(left) or len(both) == len(pairs):
             break
@@ -125,7 +129,7 @@ def _blended_all(after, crossings: NewCrossings, free, found) -> tuple[np.ndarra
             break
         near = touched(best, position, triangles)
         near[fewest] = True
-        pairs = crossings.pairs(position, near)
+        pairs = crossings.apart(crossings.pairs(position, near))
         if len(pairs) < len(fewest):
             best, fewest = position, pairs
     return best, fewest
@@ -157,33 +161,10 @@ def _blended(before, after, position, graph, seeds: np.ndarray, free, rings: int
         reach |= ring
     moved = position.copy()
     used = np.flatnonzero(reach)
-    target = _affine_images(before[used], after[used], owner[used], fade[used])
+    target = affine_images(before[used], after[used], owner[used], fade[used])
     share = (fade[used] * free[used])[:, None]
     moved[used] = (1 - share) * after[used] + share * target
     return moved
-
-
-def _affine_images(before: np.ndarray, after: np.ndarray, owner: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Images (k,3) of points (k,3) by the affine map of their cluster `owner` (k,) nearest to points `after` (k,3)."""
-    count = int(owner.max()) + 1
-    total = np.bincount(owner, weight, count)
-
-    def means(x):
-        return np.stack([np.bincount(owner, weight * x[:, k], count) for k in range(3)], axis=1) / total[:, None]
-
-    low, high = means(before), means(after)
-    x, y = before - low[owner], after - high[owner]
-    scale = np.sqrt(np.bincount(owner, weight * np.square(x).sum(axis=1), count) / total)
-    products = [np.einsum("ki,kj->kij", weight[:, None] * z, x) for z in (x, y)]
-    square, cross = (
-        np.stack([np.bincount(owner, p[:, i, j], count) for i in range(3) for j in range(3)], axis=1).reshape(-1, 3, 3)
-        for p in products
-    )
-    # Towards the identity across flat patches, whose normal no point says anything about.
-    soft = (1e-3 * scale**2 * total)[:, None, None] * np.eye(3)
-    rotation = nearest_rotations(cross)
-    matrix = (cross + soft @ rotation) @ np.linalg.inv(square + soft)
-    return high[owner] + np.einsum("kij,kj->ki", matrix[owner], x)
 
 
 @dataclass(frozen=True)
@@ -196,33 +177,48 @@ class FlowRegion:
     crossings: NewCrossings
 
 
-def region_around(
+def regions_around(
     move: tuple[np.ndarray, np.ndarray], triangles: np.ndarray, pairs: np.ndarray, mended: np.ndarray, free: np.ndarray
-) -> FlowRegion:
-    """The region around pairs (k,2) of triangles (m,3) and what was `mended` (n,) bool near them; positions before and
-    after the move (n,3), `free` (n,) bool."""
+) -> list[FlowRegion]:
+    """Regions around pairs (k,2) of triangles (m,3) and what was `mended` (n,) bool near them, each by itself;
+    positions before and after the move (n,3), `free` (n,) bool."""
     seeds = np.zeros(len(free), bool)
     seeds[triangles[pairs]] = True
     seeds |= mended & _near(move, triangles, seeds)
     inside = _near(move, triangles, seeds)
-    rows = np.flatnonzero(inside)
-    number = np.cumsum(inside) - 1
-    faces = FaceCrossings(number[triangles[inside[triangles].all(axis=1)]])
-    return FlowRegion(rows, free[rows], NewCrossings(move[0][rows], faces))
+    faces = triangles[inside[triangles].all(axis=1)]
+    # What is neither connected nor meets has ways of its own.
+    joined = np.concatenate([faces[:, :2], faces[:, 1:], triangles[pairs].reshape(-1, 6)[:, [0, 3]]])
+    count, part = graph_components(joined[:, 0], joined[:, 1], len(free))
+    alone = np.bincount(part[triangles[pairs]].ravel(), minlength=count) > 0
+    found = []
+    for k in np.flatnonzero(alone):
+        mine = part == k
+        rows, number = np.flatnonzero(mine), np.cumsum(mine) - 1
+        crossings = NewCrossings(move[0][rows], FaceCrossings(number[faces[mine[faces[:, 0]]]]))
+        found.append(FlowRegion(rows, free[rows], crossings))
+    return found
 
 
 def _near(move: tuple[np.ndarray, np.ndarray], triangles: np.ndarray, seeds: np.ndarray) -> np.ndarray:
-    """Which vertices (n,) bool are near to `seeds` (n,) bool before or after the move."""
+    """Which vertices (n,) bool are near to `seeds` (n,) bool before or after the move, by edges around each seed."""
     from scipy.spatial import cKDTree
 
     around = triangles[seeds[triangles].any(axis=1)]
-    corner = move[0][around]
-    edge = float(np.linalg.norm(corner - corner[:, [1, 2, 0]], axis=2).mean())
+    corner, vertex = move[0][around], around.ravel()
+    sides = np.linalg.norm(corner - corner[:, [1, 2, 0]], axis=2)
+    uses = np.bincount(vertex, minlength=len(seeds))[seeds]
+    edge = np.bincount(vertex, (sides + sides[:, [2, 0, 1]]).ravel() / 2, len(seeds))[seeds] / np.maximum(uses, 1)
     near = seeds.copy()
     near[around] = True
+    # Few classes of lengths instead of one length: around an eye of many small faces, boots have large ones.
+    level = np.round(np.log2(np.maximum(edge / max(float(edge.max()), TINY), TINY))).astype(int)
     for at in move:
-        distance, _ = cKDTree(at[seeds]).query(at, distance_upper_bound=REACH * edge)
-        near |= np.isfinite(distance)
+        for k in np.unique(level):
+            mine = level == k
+            reach = REACH * float(edge[mine].mean())
+            distance, _ = cKDTree(at[seeds][mine]).query(at, distance_upper_bound=reach)
+            near |= np.isfinite(distance)
     return near
 
 
@@ -248,7 +244,7 @@ def _advanced(region: FlowRegion, state, steps: list[FlowStep], domain) -> tuple
     if len(steps) == 1:
         # From where faces meet, no barrier leads to where they do not.
         nearer = best if len(state[1]) else closer(region, state[0], target)
-        meeting = region.crossings.pairs(nearer)
+        nearer, meeting = taken_apart((state[0], nearer), region.crossings, region.free)
         return (nearer, meeting) if len(meeting) < len(left) else (best, left)
     single = state
     for step in steps:

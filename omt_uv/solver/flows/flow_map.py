@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import EmptyMeshError, HandleError, NonFiniteError, plural
 from ..progress import Progress, Steps
-from .creases import MOST_HELD, PIECES, march, region_around
+from .creases import MOST_HELD, PIECES, march, regions_around
 from .domain import FlowDomain
 from .handles import FlowHandle, check_handles, farthest_points, joined, sampled_handles
 from .integration import BLOCK, FlowStep, carried, planned_steps
@@ -193,21 +193,29 @@ def _apart_on_the_way(found: list[SoundFrame], shape: FlowShape, journey: _Journ
     pieces = -(-PIECES // len(found))
     plan, _ = journey.plan(pieces * len(found))
     result = list(found)
+    known: dict[bytes, list[np.ndarray]] = {}
     for _ in range(REGIONS):
-        region = region_around(move, shape.triangles, pairs, mended, shape.free)
-        through = yield from march(region, plan, journey.way.domain)
-        mine, left = region.rows[region.free], [pairs[:0]]
+        regions = regions_around(move, shape.triangles, pairs, mended, shape.free)
+        for region in regions:
+            # What has grown no farther goes the same way again.
+            if region.rows.tobytes() not in known:
+                known[region.rows.tobytes()] = yield from march(region, plan, journey.way.domain)
+        left = [pairs[:0]]
         for k in range(first, len(found)):
             position = found[k].positions.copy()
-            position[mine] = through[(k + 1) * pieces - 1][region.free] * journey.size
-            settled = shape.settled(position, region)
+            for region in regions:
+                through = known[region.rows.tobytes()][(k + 1) * pieces - 1]
+                position[region.rows[region.free]] = through[region.free] * journey.size
+            settled = shape.settled(position, regions)
             left.append(settled.pairs)
             if len(settled.pairs) < len(result[k].pairs):
                 result[k] = settled
-        # What comes into faces beyond the region needs these in it.
+        # What comes into faces beyond the regions, or of two of them, needs these in one.
         beyond = np.concatenate(left)
-        beyond = beyond[~np.isin(shape.triangles[beyond], region.rows).all(axis=(1, 2))]
-        if not len(beyond) or len(region.rows) > MOST_HELD:
+        corners = shape.triangles[beyond].reshape(-1, 6)
+        whole = [np.isin(corners, region.rows).all(axis=1) for region in regions]
+        beyond = beyond[~np.any(whole, axis=0)]
+        if not len(beyond) or max(len(region.rows) for region in regions) > MOST_HELD:
             break
         pairs = np.concatenate([pairs, beyond])
     return result

@@ -75,19 +75,23 @@ class FlowShape:
         result, _ = restore_volumes(self.points, mended, self.parts, self.free & around)
         concerned = around[self.triangles].any(axis=1)
         concerned[pairs] = True
-        return SoundFrame(result, self.crossings.pairs(result, concerned), moved)
+        return SoundFrame(result, self._apart(result, concerned), moved)
 
-    def settled(self, apart: np.ndarray, region: FlowRegion) -> SoundFrame:
-        """The same of positions `apart` (n,3) with faces apart; of these, vertices of a region may move."""
+    def _apart(self, at: np.ndarray, concerned: np.ndarray) -> np.ndarray:
+        """Pairs (k,2) with a triangle that is `concerned` (m,) bool that newly intersect, and were apart."""
+        return self.crossings.apart(self.crossings.pairs(at, concerned))
+
+    def settled(self, apart: np.ndarray, regions: list[FlowRegion]) -> SoundFrame:
+        """The same of positions `apart` (n,3) with faces apart; of these, vertices of regions may move."""
         inside = np.zeros(len(apart), bool)
-        inside[region.rows] = True
+        inside[np.concatenate([region.rows for region in regions])] = True
         concerned, mine = inside[self.triangles].any(axis=1), self.free & inside
         movable, farthest = mine, farthest_mended(self.points, self.triangles)
         for _ in range(SETTLINGS):
             restored, _ = restore_volumes(self.points, apart, self.parts, movable)
             mended, pairs = taken_apart((apart, restored), self.crossings, mine, farthest, concerned)
-            if len(pairs) and len(region.rows) <= MOST_HELD:
-                mended, pairs = self._brought((apart, restored), region, (mended, pairs), concerned)
+            if len(pairs):
+                mended, pairs = self._brought((apart, restored), regions, (mended, pairs), concerned)
             if mended is restored:
                 break
             # What had to go back does not take part in the next round.
@@ -96,13 +100,16 @@ class FlowShape:
         if np.abs(self.changes(restored)).max(initial=0.0) > CHANGED:
             # Volumes come first: what is left of pairs is said.
             restored, _ = restore_volumes(self.points, restored, self.parts, mine)
-            pairs = self.crossings.pairs(restored, concerned)
+            pairs = self._apart(restored, concerned)
         return SoundFrame(restored, pairs, inside)
 
-    def _brought(self, move, region: FlowRegion, found, concerned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (n,3) and pairs (k,2) with a region as near to where the second of a move (n,3) has it as faces
-        let it come from the first, or what was `found`; pairs have a triangle that is `concerned` (m,) bool."""
+    def _brought(self, move, regions: list[FlowRegion], found, concerned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (n,3) and pairs (k,2) with regions as near to where the second of a move (n,3) has them as faces
+        let them come from the first, or what was `found`; pairs have a triangle that is `concerned` (m,) bool."""
         apart, mended = move[0], found[0].copy()
-        mended[region.rows] = closer(region, apart[region.rows], move[1][region.rows])
-        pairs = self.crossings.pairs(mended, concerned)
+        meeting = np.unique(self.triangles[found[1]])
+        for region in regions:
+            if len(region.rows) <= MOST_HELD and np.isin(region.rows, meeting).any():
+                mended[region.rows] = closer(region, apart[region.rows], move[1][region.rows])
+        pairs = self._apart(mended, concerned)
         return (mended, pairs) if len(pairs) < len(found[1]) else found

@@ -80,6 +80,31 @@ def nearest_rotations(matrices: np.ndarray, mirrored: bool = False) -> np.ndarra
     return (left * sign[..., None, :]) @ right
 
 
+def affine_images(before: np.ndarray, after: np.ndarray, owner: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Images (k,3) of points (k,3) by the affine map of their cluster `owner` (k,) nearest to points `after` (k,3), by
+    weights (k,); what lies in a plane, whose normal no point says anything about, turns along."""
+    count = int(owner.max()) + 1
+    total = np.bincount(owner, weight, count)
+
+    def means(x):
+        return np.stack([np.bincount(owner, weight * x[:, k], count) for k in range(3)], axis=1) / total[:, None]
+
+    low, high = means(before), means(after)
+    x, y = before - low[owner], after - high[owner]
+    scale = np.sqrt(np.bincount(owner, weight * np.square(x).sum(axis=1), count) / total)
+    products = [np.einsum("ki,kj->kij", weight[:, None] * z, x) for z in (x, y)]
+    square, cross = (
+        np.stack([np.bincount(owner, p[:, i, j], count) for i in range(3) for j in range(3)], axis=1).reshape(-1, 3, 3)
+        for p in products
+    )
+    # A cluster of one place is only shifted.
+    least = 1e-12 * float(np.square(before - before.mean(axis=0)).sum(axis=1).max()) or 1.0
+    soft = (1e-3 * np.maximum(scale**2, least) * total)[:, None, None] * np.eye(3)
+    rotation = nearest_rotations(cross)
+    matrix = (cross + soft @ rotation) @ np.linalg.inv(square + soft)
+    return high[owner] + np.einsum("kij,kj->ki", matrix[owner], x)
+
+
 def face_normals(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unit normals (m,3) of triangles (m,3) of positions (n,3), 0 for a triangle without area."""
     return unit(np.stack(_double_areas(positions, triangles), axis=1))

@@ -55,3 +55,17 @@ def test_points_that_pass_one_another_carry_what_is_between_them():
     flat = V.copy()
     flat[ends] = at[ends]
     assert len(intersecting_pairs(flat, F)) > 5
+
+
+def test_what_is_stuck_stops_nothing_else():
+    """One ball is pushed against one that is held; another, far away, goes where it shall."""
+    V, F = two_balls(0.05)
+    half = len(V) // 2
+    far, _ = icosphere(2)
+    V, F = np.concatenate([V, far + [0, 9, 0]]), np.concatenate([F, F[: len(F) // 2] + len(V)])
+    goal = V + np.where(np.arange(len(V)) < half, 0.5, 0.0)[:, None] * [1, 0, 0]
+    goal[2 * half :] += [0, 0, 0.3]
+    held = (np.arange(len(V)) >= half) & (np.arange(len(V)) < 2 * half)
+    at = brought(V, goal, NewCrossings(V, FaceCrossings(F)), ~held)
+    assert not len(intersecting_pairs(at, F))
+    np.testing.assert_allclose(at[2 * half :], goal[2 * half :], atol=1e-6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from bodies import icosphere
 
-from omt_uv.solver.contact.proximity import ClosePairs, close_pairs
+from omt_uv.solver.contact.proximity import ClosePairs, close_pairs, triangle_distances
 
 
 def test_offsets_are_those_of_the_nearest_of_many_points():
@@ -47,3 +47,26 @@ def test_close_ones_are_found_and_neighbours_are_none():
     near = found.corners[: found.points][length[: found.points] < gap * 1.001]
     assert set(near[:, 0]) == set(range(len(both)))
     assert not len(close_pairs(V, F[:0], 0.1).corners)
+
+
+def test_what_moved_is_looked_for_alone():
+    V, F = icosphere(2)
+    V, F = np.concatenate([V, V + [2.05, 0, 0]]), np.concatenate([F, F + len(V)])
+    every = {tuple(sorted(row)) for row in close_pairs(V, F, 0.3).corners.tolist()}
+    moved = np.arange(len(V)) == V[:, 0].argmax()
+    mine = {tuple(sorted(row)) for row in close_pairs(V, F, 0.3, moved).corners.tolist()}
+    rest = close_pairs(V, F, 0.3)
+    rest = rest.among(~moved[rest.corners].any(axis=1))
+    assert mine <= every and {row for row in every if moved[list(row)].any()} <= mine
+    both = rest.joined(close_pairs(V, F, 0.3, moved))
+    assert {tuple(sorted(row)) for row in both.corners.tolist()} == every
+
+
+def test_triangles_touch_where_they_have_a_point_besides_their_common_vertex():
+    V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.25, 0.25, 0], [0, 0, 1], [1, 0, 1], [0.3, 0.4, 1]], float)
+    F = np.array([[0, 1, 2], [3, 4, 5], [4, 5, 6], [0, 4, 5], [0, 3, 4]])
+    pairs = np.array([[0, 1], [0, 2], [0, 3], [0, 4]])
+    found = triangle_distances(V, F, pairs)
+    np.testing.assert_allclose(found[[0, 1, 3]], [0, 1, 0], atol=1e-12)
+    assert 0.5 < found[2] < 1
+    assert not len(triangle_distances(V, F, pairs[:0]))

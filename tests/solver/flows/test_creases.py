@@ -7,7 +7,7 @@ from bodies import icosphere
 
 from omt_uv.solver.contact.new_crossings import NewCrossings, new_intersections
 from omt_uv.solver.contact.self_intersections import FaceCrossings
-from omt_uv.solver.flows.creases import FlowRegion, march, region_around
+from omt_uv.solver.flows.creases import FlowRegion, march, regions_around
 from omt_uv.solver.flows.flow_map import flow
 from omt_uv.solver.flows.handles import FlowHandle
 from omt_uv.solver.flows.integration import FlowStep
@@ -42,7 +42,7 @@ def test_a_region_is_around_what_meets_and_near_to_it():
     V, F = icosphere(4)
     pairs, mended = np.array([[0, 1]]), np.zeros(len(V), bool)
     mended[V[:, 2].argmax()] = mended[V[:, 2].argmin()] = True
-    region = region_around((V, V), F, pairs, mended, np.ones(len(V), bool))
+    (region,) = regions_around((V, V), F, pairs, mended, np.ones(len(V), bool))
     assert np.isin(F[:2], region.rows).all() and len(region.rows) < len(V) / 2
     assert region.crossings.faces.triangles.max() < len(region.rows)
     still = drain(march(region, [[FlowStep(0.5, (np.zeros_like,) * 3)]] * 2, None))
@@ -56,3 +56,22 @@ def test_what_met_before_is_looked_for_once():
     known = NewCrossings(before, faces)
     for _ in range(2):
         assert not len(known.pairs(before))
+
+
+def test_what_touched_before_is_no_new_intersection():
+    V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.25, 0.25, 0], [0.2, 0.3, 1], [0.3, 0.2, 1]], float)
+    F = np.array([[0, 1, 2], [3, 4, 5]])
+    known = NewCrossings(V, FaceCrossings(F))
+    after = np.concatenate([V[:3], V[3:] - [0, 0, 0.1]])
+    pairs = known.pairs(after)
+    assert len(pairs) == 1 and not len(known.apart(pairs))
+    lifted = NewCrossings(V + np.repeat([[0.0], [0.01]], 3, axis=0) * [0, 0, 1], FaceCrossings(F))
+    assert len(lifted.apart(lifted.pairs(after))) == 1
+
+
+def test_regions_that_have_nothing_to_do_with_one_another_are_apart():
+    V, F = icosphere(4)
+    far = np.square(V[F].mean(axis=1) + V[F[0]].mean(axis=0)).sum(axis=1).argmin()
+    pairs = np.array([[0, 1], [far, np.flatnonzero((F[far][0] == F).any(axis=1))[0]]])
+    found = regions_around((V, V), F, pairs, np.zeros(len(V), bool), np.ones(len(V), bool))
+    assert len(found) == 2 and not np.intersect1d(found[0].rows, found[1].rows).size

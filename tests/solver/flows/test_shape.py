@@ -7,7 +7,7 @@ import pytest
 from bodies import icosphere
 
 from omt_uv.solver.contact.self_intersections import intersecting_pairs
-from omt_uv.solver.flows.creases import region_around
+from omt_uv.solver.flows.creases import regions_around
 from omt_uv.solver.flows.shape import FlowShape
 
 
@@ -25,8 +25,8 @@ def test_volumes_come_back_though_faces_are_in_the_way():
     smaller = V.copy()
     smaller[:half] = 0.9 * V[:half] + [0.1, 0, 0]
     everything = np.arange(len(F)).reshape(-1, 2)
-    region = region_around((V, smaller), F, everything, np.ones(len(V), bool), shape.free)
-    found = shape.settled(smaller, region)
+    regions = regions_around((V, smaller), F, everything, np.ones(len(V), bool), shape.free)
+    found = shape.settled(smaller, regions)
     assert not len(found.pairs) and not len(intersecting_pairs(found.positions, F))
     np.testing.assert_allclose(shape.changes(found.positions), 0, atol=1e-9)
 
