@@ -25,6 +25,8 @@ from .polygon_disk import cut_as_mapped
 
 # The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
 AREA_KEPT = 1.1
+# Mean shear above 1, and area error, of what is no more than rounded.
+ISOMETRIC = 1e-7
 
 
 def with_convex_polygons(
@@ -44,7 +46,7 @@ def with_convex_polygons(
     it
     """
     drawn = surface if drawn is None else drawn
-    if not (np.diff(surface.face_start) > 3).any():
+    if not (np.diff(surface.face_start) > 3).any() or all(map(_is_isometry, maps)):
         return maps
     from .convexity import keep_convex
 
@@ -107,6 +109,11 @@ def _opened(
         if fewer and figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal):
             new[k] = _measured(old, uv, figures)
     return new
+
+
+def _is_isometry(chart_map: ChartMap) -> bool:
+    """Whether polygons are in the map as they are on the surface, so that those convex there are convex in it."""
+    return chart_map.angle_mean - 1 <= ISOMETRIC and chart_map.area_l1 <= ISOMETRIC and not chart_map.folds
 
 
 def _measured(old: ChartMap, uv: np.ndarray, figures: Distortion) -> ChartMap:

@@ -112,7 +112,9 @@ def _sought(
     """
     end, distance = descend(mesh, points, start)
     reached = distance <= SAME_POINT * np.ptp(mesh.positions, axis=0).max()
-    own = reached & free
+    # What touches the point may be another sheet, as where walls stand on a plate unjoined.
+    beside = (mesh.sides[end][:, :, None] == mesh.sides[faces][:, None, :]).any(axis=(1, 2))
+    own = reached & free & beside
     stuck = np.flatnonzero(~reached)
     corners = mesh.positions[mesh.triangles[start[stuck]]]
     size = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)

@@ -6,6 +6,7 @@ import meshes
 import numpy as np
 
 from omt_uv.solver.mesh.cut_mesh import cut_open, on_seam
+from omt_uv.solver.mesh.topology import boundary_edges
 from omt_uv.solver.transfer.seam_sides import agree_on_sides, locate_corners, locate_faces, reference_vertices
 
 
@@ -71,6 +72,32 @@ def test_corners_are_on_the_side_of_their_face():
         corner = np.flatnonzero(F.ravel() == vertex)
         mine, at = side.ravel()[corner], right[corner // 3]
         np.testing.assert_array_equal(mine[:, None] == mine, at[:, None] == at)
+
+
+def test_a_wall_that_stands_on_a_plate_unjoined_has_its_own_values():
+    plate, F = meshes.grid(4, 4)
+    plate = np.column_stack([plate[:, :2], np.zeros(len(plate))])
+    wall = np.column_stack([0 * plate[:, 0] + 0.4, plate[:, 0], plate[:, 1]])
+    n, m = len(plate), len(F)
+    mesh = cut_open(
+        np.concatenate([plate, wall]), np.concatenate([F, F + n]), boundary_edges(np.concatenate([F, F + n]))
+    )
+    # A new mesh of the wall, whose foot was found on the plate.
+    faces, barycentric = in_corners(F, n)
+    faces += m
+    foot = np.flatnonzero(wall[:, 2] == 0)
+    for v in foot:
+        corners = plate[F][:, :, :2]
+        weights = np.linalg.solve(np.concatenate([corners.transpose(0, 2, 1), np.ones((m, 1, 3))], axis=1),
+                                  np.tile([*wall[v, :2], 1.0], (m, 1))[:, :, None])[:, :, 0]  # fmt: skip
+        faces[v] = weights.min(axis=1).argmax()
+        barycentric[v] = weights[faces[v]]
+    free = ~on_seam(mesh, faces, barycentric)
+    assert free[foot[1:-1]].all()
+    triangle, weights, _, extended = locate_corners(mesh, F, m + np.arange(m), free, wall, faces, barycentric)
+    assert extended == 0 and (triangle >= m).all()
+    at = np.einsum("tkc,tkcj->tkj", weights, mesh.positions[mesh.triangles[triangle]])
+    np.testing.assert_allclose(at, wall[F], atol=1e-12)
 
 
 def test_the_majority_wins():
