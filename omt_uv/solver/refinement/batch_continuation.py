@@ -20,6 +20,7 @@ from .continuation_rules import (
     next_weight,
     planned_weights,
     promised,
+    spare_weight,
     stage_tolerances,
 )
 
@@ -55,8 +56,10 @@ class BatchContinuation:
     residual, multiplier : see `continuation.ContinuationResult`
     """
 
-    def __init__(self, count: int, quality: str, balance: float, energies: Energies):
+    def __init__(self, with_polygons: np.ndarray, quality: str, balance: float, energies: Energies):
+        """Start all charts; with_polygons (c,) : which have more than triangles."""
         self.quality, self.balance = QUALITIES[quality], balance
+        self._with_polygons, count = with_polygons, len(with_polygons)
         self._planned = np.array(planned_weights(balance, self.quality))
         self._level, self.area_weight = np.zeros(count, np.int64), np.full(count, self._planned[0])
         squeezed = is_squeezed(energies(self.area_weight), self._planned[0])
@@ -101,6 +104,8 @@ class BatchContinuation:
         if self.balance == 0:
             self.multiplier = np.where(further, self.multiplier + weight * errors.tilt, self.multiplier)
         following = self._planned[np.clip(self._level, 0, planned - 1)]
+        spare = spare_weight(following, weight, errors.error, quality)
+        following = np.where(self._with_polygons, spare, following)
         following = np.where(self._level < planned, following, next_weight(weight, errors.error_but_share, quality))
         self.area_weight = np.where(further, following, weight)
         self.pressure[further], self._stage_steps[further] = FIRST_PRESSURE, 0

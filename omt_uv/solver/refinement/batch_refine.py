@@ -133,8 +133,11 @@ def refine_batch(
     of_polygon = union.of_polygons(faces)
     share = np.bincount(of_polygon, faces.weight, union.count)
     order = minimum_degree(vertex_graph(faces.triangles, len(w)))
+    with_polygons = np.zeros(union.count, bool)
+    if faces.polygon is not None:
+        with_polygons[of_polygon[np.bincount(faces.polygon) > 1]] = True
     continuation = BatchContinuation(
-        union.count,
+        with_polygons,
         quality,
         balance,
         lambda area_weight: np.bincount(of_polygon, energies(faces, w, area_weight[of_polygon]), union.count) / share,

@@ -38,6 +38,7 @@ from .continuation_rules import (
     next_weight,
     planned_weights,
     promised,
+    spare_weight,
     stage_tolerances,
 )
 from .hessian_blocks import Assembly
@@ -181,6 +182,8 @@ def minimise_in_stages(
             break
         if k >= len(weights):
             weights.append(float(next_weight(weights[-1], rest, quality)))
+        elif problem.faces.polygon is not None:
+            weights[k] = float(spare_weight(weights[k], weight, error, quality))
     return ContinuationResult(
         w=w,
         steps=steps,

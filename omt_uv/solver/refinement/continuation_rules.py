@@ -3,7 +3,7 @@
 A refinement minimises shear + area weight * area error, in stages of growing area weight (a penalty method: Nocedal,
 Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entry a chart:
 
-    start a stage            `planned_weights`, `is_squeezed`, `next_weight`
+    start a stage            `planned_weights`, `spare_weight`, `is_squeezed`, `next_weight`
     within a stage           `first_pressure`, `next_pressure`
     end a stage              `stage_tolerances`, `judge_step`, `is_out_of_reach`, `is_settled`
     end the refinement       `is_enough`, `is_futile`
@@ -79,6 +79,9 @@ FREE_PRESSURE = 0.05
 # By how much it falls after a full step that has kept its promise, and after one that has gained what it promised.
 PRESSURE_FALLS = 3.0
 PRESSURE_DROPS = 10.0
+# Share of what an area error may be that polygons are left with where less would cost shear: the triangles inside them
+# are off by more, whatever the weight.
+SPARE = 0.25
 # By how much more an area error is made to fall than it has to: a last step more takes longer than it shears less.
 MARGIN = 1.05
 # A stage cannot reach an area error that is less than this share of its own and takes more than another step as good.
@@ -172,6 +175,12 @@ def weight_growth(excess: Number) -> Number:
 def next_weight(weight: Number, error: Number, quality: Quality) -> Number:
     """The area weight after one that left this area error, the share of a region aside, beyond the planned ones."""
     return weight * weight_growth(MARGIN * error / quality.area_error)
+
+
+def spare_weight(planned: Number, weight: Number, error: Number, quality: Quality) -> Number:
+    """A planned area weight for polygons after one that left this area error: no more than leaves them SPARE, as the
+    error falls with the weight, and never less than the one before."""
+    return np.minimum(planned, np.maximum(weight, weight * error / (SPARE * quality.area_error)))
 
 
 def promised(decrement: Number, energy: Number) -> Number:

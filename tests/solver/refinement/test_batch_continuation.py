@@ -3,13 +3,13 @@
 import numpy as np
 
 from omt_uv.solver.refinement.batch_continuation import AreaErrors, BatchContinuation
-from omt_uv.solver.refinement.continuation_rules import FIRST_PRESSURE, QUALITIES, SQUEEZED
+from omt_uv.solver.refinement.continuation_rules import FIRST_PRESSURE, QUALITIES, SPARE, SQUEEZED
 
 ENERGIES = np.array([1.0, 2 * SQUEEZED, np.inf, 3.0])
 
 
 def batch(energies=ENERGIES, quality="standard", balance=0.0):
-    return BatchContinuation(len(energies), quality, balance, lambda weight: energies)
+    return BatchContinuation(np.zeros(len(energies), bool), quality, balance, lambda weight: energies)
 
 
 def errors(error, count=4):
@@ -39,6 +39,14 @@ def test_charts_go_on_one_by_one():
     np.testing.assert_array_equal(continuation.steps, [1, 1])
     assert continuation.pressure[0] == FIRST_PRESSURE
     assert continuation.multiplier[0] == weights[0] * 0.5 and continuation.multiplier[1] == 0
+
+
+def test_charts_of_polygons_are_spared_weight_and_those_of_triangles_are_not():
+    first, planned = QUALITIES["standard"].area_weights
+    polygons = np.array([True, False])
+    continuation = BatchContinuation(polygons, "standard", 0.0, lambda weight: np.ones(2))
+    promise(continuation, 1e-9, 2 * SPARE * QUALITIES["standard"].area_error)
+    np.testing.assert_allclose(continuation.area_weight, [2 * first, planned])
 
 
 def test_a_chart_that_has_its_areas_is_solved_and_stays():

@@ -66,6 +66,15 @@ def test_weights_grow_within_bounds_and_with_the_error():
     np.testing.assert_allclose(grown, [1.3, 1.3, 2.25, 4, 9, 10])
 
 
+def test_polygons_are_pressed_no_further_than_a_part_of_what_they_may_be_off():
+    quality = QUALITIES["standard"]
+    weight, planned = quality.area_weights
+    aim = rules.SPARE * quality.area_error
+    error = np.array([0.1 * aim, 2 * aim, 1e3 * aim])
+    # As the error falls with the weight: none less than the one before, none greater than what was planned.
+    np.testing.assert_allclose(rules.spare_weight(planned, weight, error, quality), [weight, 2 * weight, planned])
+
+
 def test_more_area_error_is_futile_only_where_it_hardly_falls():
     quality = QUALITIES["standard"]
     assert not rules.is_futile(quality, 0.5, np.inf)
