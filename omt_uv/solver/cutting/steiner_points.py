@@ -13,6 +13,9 @@ import numpy as np
 
 # Of k ends there are k^3 / 6 threes to try.
 MOST_ENDS = 16
+# Of the length of the tree, what three ends joined at a vertex have to save: where two parts are each other's mirror
+# image, the vertex is on one side, and symmetric seams are worth a tenth.
+WORTH = 0.1
 
 
 def meeting_points(distance: np.ndarray, between: np.ndarray) -> np.ndarray:
@@ -33,7 +36,7 @@ def meeting_points(distance: np.ndarray, between: np.ndarray) -> np.ndarray:
         joined = _joined(between, threes)
         saved = total - _tree_costs(joined) - cost
         best = int(np.argmax(saved))
-        if saved[best] <= 1e-6 * total:
+        if saved[best] <= WORTH * total:
             return np.unique(np.array(points, dtype=np.int64))
         points.append(int(vertex[best]))
         between = joined[best]

@@ -112,7 +112,7 @@ def _sought(
     """
     end, distance = descend(mesh, points, start)
     reached = distance <= SAME_POINT * np.ptp(mesh.positions, axis=0).max()
-    # What touches the point may be another sheet, as where walls stand on a plate unjoined.
+    # What touches the point may be another component, as where walls stand on a plate unjoined.
     beside = (mesh.sides[end][:, :, None] == mesh.sides[faces][:, None, :]).any(axis=(1, 2))
     own = reached & free & beside
     stuck = np.flatnonzero(~reached)

@@ -24,6 +24,14 @@ def test_ends_on_a_line_need_no_point():
     assert len(meeting_points(distance, distance[:, [0, 2, 4]])) == 0
 
 
+def test_what_saves_less_than_a_tenth_is_no_branch():
+    points = np.array([[-1, 0], [1, 0], [0, 1], [0, 0.577]])
+    distance = distances(points, [0, 1, 2])
+    direct = distance[2, 0] + distance[2, 1]
+    assert 0 < 1 - distance[:, 3].sum() / direct < 0.1
+    assert len(meeting_points(distance, distance[:, :3])) == 0
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_tree_through_the_point_is_shorter_in_any_order_of_the_ends(seed):
     points = np.random.default_rng(seed).random((500, 2))
