@@ -8,11 +8,14 @@ import pytest
 
 GOOD = [("share", "0", 0.0), ("share", "1", 1.0), ("shear", "1.01", 1.01), ("shear", "0", 0.0), ("margin", "0", 0.0),
         ("tile", "1999", 1999), ("tile", "1001", 1001), ("texture_size", "1", 1), ("positive", "1e-9", 1e-9),
-        ("angle", "180", 180.0), ("vertices", "357913941", 357913941), ("faces", "1", 1)]  # fmt: skip
+        ("angle", "180", 180.0), ("vertices", "357913941", 357913941), ("faces", "1", 1),
+        ("faces", "715827882", 715827882), ("aspect", "0", 0.0), ("aspect", "9999", 9999.0),
+        ("subdivision", "6", 6), ("subdivision", "off", 0)]  # fmt: skip
 BAD = [("share", "-0.1"), ("share", "nan"), ("shear", "1"), ("shear", "0.5"), ("shear", "-1"), ("shear", "inf"),
        ("margin", "-1"), ("margin", "nan"), ("tile", "1000"), ("tile", "2000"), ("texture_size", "0"),
        ("positive", "0"), ("positive", "-inf"), ("angle", "181"), ("angle", "nan"),
        ("vertices", "0"), ("vertices", "357913942"), ("faces", "-1"),
+       ("faces", "715827883"), ("aspect", "10000"), ("aspect", "-1"), ("subdivision", "7"), ("subdivision", "-1"),
        ("gigabytes", "0.4")]  # fmt: skip
 
 
@@ -25,6 +28,16 @@ def test_values_at_the_ends_are_taken(package, name, text, value):
 def test_values_beyond_are_refused_by_what_they_are(package, name, text):
     with pytest.raises(argparse.ArgumentTypeError, match=f"^{text} "):
         getattr(package("commands.options"), name)(text)
+
+
+def test_as_little_memory_as_blender_starts_with_is_taken(package):
+    """Or, where nothing holds a program to it, refused as any other."""
+    options = package("commands.options")
+    if package("supervision").MEMORY_IS_LIMITED:
+        assert options.gigabytes("0.5") == 0.5
+    else:
+        with pytest.raises(argparse.ArgumentTypeError, match="does not hold"):
+            options.gigabytes("0.5")
 
 
 def test_choices_are_those_of_the_settings_in_lower_case(package):

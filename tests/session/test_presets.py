@@ -31,3 +31,14 @@ def test_nothing_in_a_preset_is_run(package, tmp_path):
     with pytest.raises(ValueError, match="malformed"):
         package("session.presets").values(path)
     assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.skipif(not hasattr(bpy.utils, "register_preset_path"), reason="Blender lists no presets of add-ons")
+def test_menus_of_presets_list_ours_while_we_are_registered(package):
+    presets = package("session.presets")
+    ours = str(presets.FOLDER / "presets" / "operator" / "uv.omt_unwrap")
+    assert ours in bpy.utils.preset_paths("operator/uv.omt_unwrap")
+    presets.unregister_folder()
+    assert ours not in bpy.utils.preset_paths("operator/uv.omt_unwrap")
+    presets.register_folder()
+    assert ours in bpy.utils.preset_paths("operator/uv.omt_unwrap")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.density import (
+    Target,
     checked_density,
     from_vertices,
     gaussian_curvature_density,
@@ -111,3 +112,12 @@ def test_grading_limits_how_fast_the_spacing_grows():
     # Spacing is set at vertices and read at faces, whose corners are one edge apart.
     assert (spacing[:, None] <= spacing[None, ::7] + limit * (1.5 * far + 3 / 40)).all()
     np.testing.assert_allclose(graded_density(np.ones(len(F)), V, F, limit, samples), 1)
+
+
+@pytest.mark.parametrize("rows", [np.array([4, 1, 1]), np.arange(6) % 2 == 0], ids=["numbers", "mask"])
+def test_a_part_of_a_target_keeps_what_it_has(rows):
+    density, region = np.arange(1.0, 7.0), np.linspace(0, 1, 6)
+    part = Target(density, region).of(rows)
+    np.testing.assert_array_equal(part.density, density[rows])
+    np.testing.assert_array_equal(part.region, region[rows])
+    assert Target(density).of(rows).region is None
