@@ -120,7 +120,7 @@ ARROWS: dict[str, str] = {
 }
 SOLVER_LIBRARIES = {"numpy", "scipy"}
 # Libraries that need not be there; imported within functions, which say how to get them.
-OPTIONAL = {"solver.volumes.meshing": {"tetgen"}}
+OPTIONAL = {"solver.volumes.meshing": {"tetgen"}, "solver.volumes.envelope": {"pytetwild"}}
 # Blender's modules stay in these.
 KNOW_BLENDER = ("blender", "files", "display", "session", "operators", "panels", "commands")
 ENTRY = ("__init__", "__main__", "cli", "registration")

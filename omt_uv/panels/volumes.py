@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..operators.volumes.volume import is_available
+from ..operators.volumes.volume import missing
 from .section import Section, big_button, class_of, draw_settings, settings_of
 
 OBJECT_FLOW = "object.omt_flow"
@@ -25,12 +25,14 @@ FLOW = Section("flow", "Move Incompressibly", _draw_flow, (OBJECT_FLOW, UV_FLOW)
 
 
 def _draw_volume(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    if not is_available():
+    settings = settings_of(context, MAP_VOLUME)
+    package = missing(settings.library)
+    if package:
         # In two lines: one is cut off in a sidebar of the usual width.
         column = layout.column(align=True)
-        column.label(text="Needs the library TetGen:", icon="INFO")
-        column.label(text="python -m pip install tetgen", icon="BLANK1", translate=False)
-    draw_settings(layout.column(), MAP_VOLUME, settings_of(context, MAP_VOLUME))
+        column.label(text="Needs a library for tetrahedra:", icon="INFO")
+        column.label(text=f"python -m pip install {package}", icon="BLANK1", translate=False)
+    draw_settings(layout.column(), MAP_VOLUME, settings)
     big_button(layout, MAP_VOLUME, "MESH_ICOSPHERE")
 
 

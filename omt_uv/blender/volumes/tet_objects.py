@@ -92,4 +92,4 @@ def slice_object(like: bpy.types.Object, found: MappedVolume, axis: int, place: 
 def write_places(obj: bpy.types.Object, found: MappedVolume) -> None:
     """Places of the vertices in the domain, as an attribute of the mesh."""
     check_local(obj)
-    _attribute(obj.data, PLACES, "FLOAT_VECTOR", "POINT", "vector", found.map.positions[: len(obj.data.vertices)])
+    _attribute(obj.data, PLACES, "FLOAT_VECTOR", "POINT", "vector", found.surface)

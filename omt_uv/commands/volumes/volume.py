@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ...pipelines.volumes.choices import DEFAULT_TETS, VOLUME_METHODS
+from ...pipelines.volumes.choices import DEFAULT_TETS, VOLUME_LIBRARIES, VOLUME_METHODS
 from ..common import CommandError, UsageError, check_paths, drain_shown, refusals, require_blender, warn, write_figures
 from ..options import add_input, faces, names
 from ..selection import read_file
@@ -25,6 +25,9 @@ def add(commands) -> None:
     )
     command.add_argument("--method", choices=names(VOLUME_METHODS), default="newton", help="how volumes come right")
     command.add_argument("--tets", type=faces, default=DEFAULT_TETS, metavar="N", help="tetrahedra, about")
+    command.add_argument(
+        "--library", choices=names(VOLUME_LIBRARIES), default="tetgen", help="tetwild takes broken surfaces, too"
+    )
     command.add_argument("--report", type=Path, metavar="R.json", help="write figures and a histogram of dilations")
 
 
@@ -52,7 +55,7 @@ def run_volume(options: argparse.Namespace) -> None:
         raise CommandError(
             f"{options.input}: has {len(mine)} meshes to map. Choose one by --object, or write a .blend."
         )
-    settings = VolumeSettings(options.domain if known else "body", options.method, options.tets)
+    settings = VolumeSettings(options.domain if known else "body", options.method, options.tets, options.library)
     found = []
     for obj in mine:
         with refusals(name=obj.name):

@@ -7,11 +7,18 @@ import importlib.util
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...pipelines.volumes.choices import AXES, DEFAULT_TETS, VOLUME_DOMAINS, VOLUME_METHODS, VOLUME_RESULTS
+from ...pipelines.volumes.choices import (
+    AXES,
+    DEFAULT_TETS,
+    VOLUME_DOMAINS,
+    VOLUME_LIBRARIES,
+    VOLUME_METHODS,
+    VOLUME_RESULTS,
+)
 from ...session import run
 from ..base import Complaint, SolverOperator, complaints, mesh_objects, select_alone, warn
 
-LIBRARY = "tetgen"
+MODULES = {"TETGEN": "tetgen", "TETWILD": "pytetwild"}
 
 
 class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
@@ -34,6 +41,7 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
         soft_min=1000,
         soft_max=200_000,
     )
+    library: EnumProperty(name="Library", description="What fills the body with tetrahedra", items=VOLUME_LIBRARIES)
     result: EnumProperty(name="Result", description="What is made of the map", items=VOLUME_RESULTS)
     shells: IntProperty(name="Shells", description="How many shells divide the body", default=3, min=1, max=64)
     points: IntProperty(
@@ -70,7 +78,7 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
                 raise Complaint(f"There is no mesh {self.body!r} to map to, besides what is mapped. Choose one.")
             with complaints(goal):
                 other = read_volume_body(goal)
-        settings = VolumeSettings(self.domain.lower(), self.method.lower(), self.tets)
+        settings = VolumeSettings(self.domain.lower(), self.method.lower(), self.tets, self.library.lower())
         with complaints(objects=objects):
             found = yield from run.aside(in_turn([mapped_volume(body, settings, other) for body in bodies]))
         return list(zip(objects, found, strict=True))
@@ -104,9 +112,9 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
         return []
 
 
-def is_available() -> bool:
-    """Whether the library for tetrahedra is installed."""
-    return importlib.util.find_spec(LIBRARY) is not None
+def missing(library: str) -> str:
+    """The name of the package that a library for tetrahedra needs, empty where it is installed."""
+    return "" if importlib.util.find_spec(MODULES[library]) else MODULES[library]
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
@@ -118,6 +126,7 @@ def draw_settings(layout: bpy.types.UILayout, properties) -> None:
         layout.prop_search(properties, "body", bpy.data, "objects")
     layout.prop(properties, "method")
     layout.prop(properties, "tets")
+    layout.prop(properties, "library")
     layout.prop(properties, "result")
     if properties.result == "SHELLS":
         layout.prop(properties, "shells")

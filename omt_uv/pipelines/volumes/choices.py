@@ -36,6 +36,10 @@ VOLUME_METHODS = (
     ("NEWTON", "Newton", "Volumes exact around every vertex, nothing inverted"),
     ("FLOW", "Flow", "The flow of Hu, Zou and Hua, for comparison: it inverts some tetrahedra"),
 )
+VOLUME_LIBRARIES = (
+    ("TETGEN", "TetGen", "Keeps the surface, which has to be closed and free of crossing faces"),
+    ("TETWILD", "fTetWild", "Takes open and crossing surfaces, too, and replaces them by one close by"),
+)
 VOLUME_RESULTS = (
     ("TETS", "Tetrahedra", "A new object of all tetrahedra, with places in the domain as an attribute"),
     ("SHELLS", "Shells", "New objects that divide the body into parts of equal volume, like the skins of an onion"),

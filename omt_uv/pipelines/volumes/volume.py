@@ -6,15 +6,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ...solver.errors import HandleError
+from ...solver.errors import HandleError, LibraryError, MeshError, TetrahedraError
 from ...solver.progress import Steps, part_of
 from ...solver.volumes.body_map import VolumeMap, into_body, volume_map
+from ...solver.volumes.envelope import filled
 from ...solver.volumes.registration import registered
 from ...solver.volumes.slices import dilation
 from ...solver.volumes.transfer import TetLocation
 
 BODY = "body"
+TETWILD = "tetwild"
 
 
 @dataclass(frozen=True)
@@ -29,19 +32,23 @@ class VolumeBody:
 
 @dataclass(frozen=True)
 class VolumeSettings:
-    """domain: "ball", "cube" or "body"; method: "newton" or "flow"; count: tetrahedra, about."""
+    """domain: "ball", "cube" or "body"; method: "newton" or "flow"; count: tetrahedra, about; library: "tetgen" keeps
+    the surface, "tetwild" takes any, and replaces it."""
 
     domain: str = "ball"
     method: str = "newton"
     count: int = 40_000
+    library: str = "tetgen"
 
 
 @dataclass(frozen=True)
 class MappedVolume:
-    """A map of the inside; ball: positions (n,3) in the ball, where the domain is another body, or the map itself."""
+    """A map of the inside; ball: positions (n,3) in the ball, where the domain is another body, or the map itself;
+    surface: places (k,3) in the domain of the vertices of the body's own surface."""
 
     map: VolumeMap
     ball: np.ndarray
+    surface: np.ndarray
 
     def report(self) -> dict[str, float | int | str]:
         """Figures for a report."""
@@ -69,14 +76,13 @@ def mapped_volume(body: VolumeBody, settings: VolumeSettings, other: VolumeBody 
     """
     domain = "ball" if settings.domain == BODY else settings.domain
     width = 0.35 if settings.domain == BODY else 1.0
-    steps = volume_map(body.positions, body.triangles, domain, settings.method, settings.count)
-    first = yield from part_of(steps, 0.0, width)
+    whole = body
+    body, first = yield from part_of(_mapped(body, domain, settings), 0.0, width)
     if settings.domain != BODY:
-        return MappedVolume(first, first.positions)
+        return MappedVolume(first, first.positions, _own(whole, first))
     if other is None:
         raise HandleError("There is no other body to map to", "Choose one")
-    steps = volume_map(other.positions, other.triangles, "ball", settings.method, settings.count)
-    second = yield from part_of(steps, width, width)
+    other, second = yield from part_of(_mapped(other, domain, settings), width, width)
     placed = None
     names = sorted(body.landmarks.keys() & other.landmarks.keys())
     if len(names) >= 3:
@@ -87,4 +93,32 @@ def mapped_volume(body: VolumeBody, settings: VolumeSettings, other: VolumeBody 
     mapped = yield from part_of(into_body(first, second, placed), 0.8, 0.2)
     # Points inside have moved, and their places in the ball with them.
     ball = TetLocation(first.points, first.tets).values(mapped.points, first.positions if placed is None else placed)
-    return MappedVolume(mapped, ball)
+    return MappedVolume(mapped, ball, _own(whole, mapped))
+
+
+def _own(body: VolumeBody, found: VolumeMap) -> np.ndarray:
+    """Places (k,3) in the domain of the body's own vertices (k,3), which come first where its surface was kept."""
+    k = len(body.positions)
+    if k <= len(found.points) and np.array_equal(found.points[:k], body.positions):
+        return found.positions[:k]
+    return TetLocation(found.points, found.tets).values(body.positions, found.positions)
+
+
+def _mapped(body: VolumeBody, domain: str, settings: VolumeSettings) -> Steps[tuple[VolumeBody, VolumeMap]]:
+    """A body, as it is after a library has replaced its surface, and its map."""
+    if settings.library != TETWILD:
+        steps = volume_map(body.positions, body.triangles, domain, settings.method, settings.count)
+        found = yield from steps
+        return body, found
+    new = filled(body.positions, body.triangles, settings.count)
+    _, nearest = cKDTree(new.vertices).query(body.positions)
+    marks = {name: np.unique(nearest[rows]) for name, rows in body.landmarks.items()}
+    try:
+        steps = volume_map(new.vertices, new.triangles, domain, settings.method, mesh=new.mesh, held=False)
+        found = yield from steps
+    except LibraryError:
+        raise
+    except MeshError as error:
+        # Its elements are those of a surface that nobody has.
+        raise TetrahedraError(f"Around the tetrahedra of fTetWild: {error}") from error
+    return VolumeBody(body.name, new.vertices, new.triangles, marks), found

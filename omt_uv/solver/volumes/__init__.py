@@ -9,6 +9,7 @@ from ..lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     domains="BallDomain CubeDomain",
+    envelope="FilledBody filled",
     paper_flow="PaperFlow",
     registration="VolumeRegistration registered",
     sampling="ball_index interior_points sampled_field",

@@ -17,7 +17,7 @@ from ..errors import TetrahedraError, plural
 from ..flows.enclosed_volume import corner_volumes
 from ..flows.paths import rotation_between
 from ..linalg.sparse import Factor
-from ..mesh.closed_surface import closed_surface
+from ..mesh.closed_surface import ClosedSurface, closed_surface
 from ..progress import Progress, Steps, part_of
 from ..sphere.sphere_map import sphere_map
 from .domains import BALL, CUBE, DOMAINS, BallDomain, CubeDomain, HeldDomain
@@ -64,13 +64,15 @@ def volume_map(
     method: str = NEWTON,
     count: int = 40_000,
     mesh: TetMesh | None = None,
+    held: bool = True,
 ) -> Steps[VolumeMap]:
     """Map the inside of a closed surface (n,3), (m,3) without handles to the unit ball, or the cube from -1 to 1.
 
     Parameters
     ----------
     domain : "ball" or "cube"; method : "newton", or "flow", the paper's
-    count : tetrahedra, about; mesh : those to take instead, of which no point moves
+    count : tetrahedra, about; mesh : those to take instead, whose first points are the vertices
+    held : no point inside a given mesh moves
 
     Raises
     ------
@@ -87,9 +89,8 @@ def volume_map(
     surface = closed_surface(vertices, triangles)
     outwards = _outwards(surface.vertices, triangles)
     yield Progress("Tetrahedra", 0.0)
-    given = mesh is not None
-    if mesh is None:
-        mesh = tetrahedra(surface.vertices, outwards, count)
+    given = mesh is not None and held
+    mesh = tetrahedra(surface.vertices, outwards, count) if mesh is None else _in_box(mesh, vertices, surface)
     sphere = yield from part_of(sphere_map(surface.vertices, outwards), 0.05, 0.15)
     aligned = _aligned(sphere.positions, surface.vertices)
     mesh, positions, steps = yield from _mapped(mesh, aligned, domain, method, given)
@@ -114,6 +115,12 @@ def volume_map(
         steps=steps,
         warnings=tuple(warnings),
     )
+
+
+def _in_box(mesh: TetMesh, vertices: np.ndarray, surface: ClosedSurface) -> TetMesh:
+    """The mesh, whose first points are vertices (n,3), in the unit box of their surface."""
+    inner = (mesh.points[len(vertices) :] - _middle(vertices)) / surface.extent
+    return TetMesh(np.concatenate([surface.vertices, inner]), mesh.tets)
 
 
 def _middle(vertices: np.ndarray) -> np.ndarray:
