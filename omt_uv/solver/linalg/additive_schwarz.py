@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import PrecisionError
 from .kept_factor import KEPT_ENOUGH, MOST_KEPT, by_gradients
 from .nested_dissection import kd_parts, vertex_graph
 from .sparse import Factor, fill, minimum_degree
@@ -47,6 +48,7 @@ class AdditiveSchwarz:
         n = len(points)
         self._keep = keep
         self._kept: Callable[[np.ndarray], np.ndarray] | None = None
+        self._last: np.ndarray | None = None
         self._part = kd_parts(points, max(0, round(np.log2(n / size))))
         self._count = int(self._part.max()) + 1
         graph = vertex_graph(triangles, n).tocsr()
@@ -75,11 +77,12 @@ class AdditiveSchwarz:
         # Its transpose is itself, by rows.
         matrix = matrix.T if sp.issparse(matrix) and matrix.format == "csc" else sp.csr_matrix(matrix)
         if self._kept is not None:
-            x = by_gradients(matrix, b, self._kept, MOST_KEPT, KEPT_ENOUGH)
+            x = by_gradients(matrix, b, self._kept, MOST_KEPT, KEPT_ENOUGH, self._last)
             if x is not None:
+                self._last = x
                 return x
         place = np.full(len(b), -1, np.int64)
-        factors = [Factor(_block(matrix, d, place), "natural") for d in self._unknowns]
+        factors = [_part_factor(_block(matrix, d, place)) for d in self._unknowns]
         spread = self._affine(w, axes)
         gather = spread.T
         coarse = (gather @ (matrix @ spread)).tocsc()
@@ -93,7 +96,9 @@ class AdditiveSchwarz:
 
         self._kept = precondition if self._keep else None
         x = by_gradients(matrix, b, precondition, MOST)
-        return Factor(matrix, "natural").solve(b) if x is None else x
+        x = Factor(matrix, "natural").solve(b) if x is None else x
+        self._last = x if self._keep else None
+        return x
 
     def _affine(self, w, axes) -> sp.csr_matrix:
         """The affine motions of every part, (2n, 6 parts)."""
@@ -110,6 +115,14 @@ class AdditiveSchwarz:
         columns = (6 * np.repeat(part, 2)[:, None] + np.arange(6)).astype(np.int32)
         n = len(columns)
         return sp.csr_matrix((entries.ravel(), columns.ravel(), 6 * np.arange(n + 1)), shape=(n, 6 * count))
+
+
+def _part_factor(block: sp.csc_matrix) -> Factor:
+    """Factors of the equations of one part, in single precision where that can tell them from singular ones."""
+    try:
+        return Factor(block, "natural", single=True)
+    except PrecisionError:
+        return Factor(block, "natural")
 
 
 def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False) -> AdditiveSchwarz | None:

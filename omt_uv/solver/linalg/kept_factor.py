@@ -31,6 +31,7 @@ class KeptFactor:
 
     def __init__(self) -> None:
         self._factor: Factor | None = None
+        self._last: np.ndarray | None = None
 
     def solve(self, matrix: sp.spmatrix, b: np.ndarray, w: np.ndarray, axes: np.ndarray) -> np.ndarray:
         """About the solution x (n,) of matrix x = b (n,), symmetric positive definite; b.x > 0.
@@ -45,11 +46,13 @@ class KeptFactor:
         array([0.5, 0.5, 0.5])
         """
         if self._factor is not None:
-            x = by_gradients(matrix, b, self._factor.solve, MOST_KEPT, KEPT_ENOUGH)
+            x = by_gradients(matrix, b, self._factor.solve, MOST_KEPT, KEPT_ENOUGH, self._last)
             if x is not None:
+                self._last = x
                 return x
         self._factor = Factor(matrix, "natural")
-        return self._factor.solve(b)
+        self._last = self._factor.solve(b)
+        return self._last
 
 
 def by_gradients(
@@ -58,12 +61,21 @@ def by_gradients(
     precondition: Callable[[np.ndarray], np.ndarray],
     most: int,
     enough: float = ENOUGH,
+    guess: np.ndarray | None = None,
 ) -> np.ndarray | None:
     """Conjugate gradients for matrix x = b (n,) until x.matrix.x / 2 - b.x hardly falls any more; None where that takes
-    more than `most` iterations."""
+    more than `most` iterations.
+
+    guess (n,): a direction in which they look before: a slider goes on as it went.
+    """
+    begin, won, left = np.zeros(len(b)), 0.0, b
+    if guess is not None and guess.any():
+        image = matrix @ guess
+        share = (guess @ b) / (guess @ image)
+        begin, won, left = share * guess, float(share * (guess @ b)), b - share * image
     falls: list[float] = []
-    for x, _, fallen in islice(gradient_steps(matrix, b, precondition), most + 1):
-        falls.append(fallen)
-        if len(falls) > WINDOW and fallen - falls[-1 - WINDOW] <= enough * fallen:
-            return x
-    return x if len(falls) <= most else None
+    for x, _, fallen in islice(gradient_steps(matrix, left, precondition), most + 1):
+        falls.append(won + fallen)
+        if len(falls) > WINDOW and falls[-1] - falls[-1 - WINDOW] <= enough * falls[-1]:
+            return begin + x
+    return begin + x if len(falls) <= most else None

@@ -172,7 +172,8 @@ def coarse_initial_map(
         if flat is None:
             flat = mean_value_sites(vertices, triangles, disk.loop, None, Disk())
             even = _even_start(disk, flat) if disk.boundary == "free" and not far else None
-            if even is not None:
+            # A draft has no steps to spare for a start that is squeezed, too.
+            if even is not None and not (draft and map_energy(even, vertices, triangles) > HOPELESS):
                 return InitialChartMap(even)
         goal = len(vertices) // (COARSER_FAR if far else COARSER)
         density = _density(vertices, triangles, disk.target, goal) if far else None

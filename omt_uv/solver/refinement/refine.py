@@ -53,6 +53,8 @@ FEW = 1000
 SWEEPS = 4
 # Up to this ratio of their densities faces ask for their own areas, but for rounding: no sweeps pay then.
 EVEN = 1 + 1e-6
+# Nor for maps of coarse meshes, which have nearly their own areas, and for drafts.
+UNSMOOTHED = ("draft", "relaxed", "sketch")
 # Where the time goes, roughly, as start and width.
 SMOOTHING = (0.0, 0.1)
 STAGES = (0.1, 0.9)
@@ -232,7 +234,7 @@ def _refined(
     several_pins = pins is not None and len(pins.vertices) > 1
     if pins is not None and several_pins:
         problem, w = yield from move_pins(problem, w, pins)
-    elif boundary == "free" and options.quality != "draft" and faces.ratio.max() > EVEN * faces.ratio.min():
+    elif boundary == "free" and options.quality not in UNSMOOTHED and faces.ratio.max() > EVEN * faces.ratio.min():
         w = yield from part_of(
             _smoothed_if_tense(problem, by_triangle, w, planned_weights(balance, quality)[0]), *SMOOTHING
         )

@@ -8,7 +8,7 @@ from work import counted_work
 
 from omt_uv.solver.errors import PrecisionError
 from omt_uv.solver.linalg.additive_schwarz import AdditiveSchwarz
-from omt_uv.solver.linalg.kept_factor import KEPT_ENOUGH, KeptFactor
+from omt_uv.solver.linalg.kept_factor import KEPT_ENOUGH, WINDOW, KeptFactor, by_gradients
 
 
 def stiff_matrix(triangles, n, weight):
@@ -79,3 +79,28 @@ def test_parts_keep_their_factors_where_they_are_told_to(systems):
         assert (work.factorisations == 0) == keep
         exact = KeptFactor().solve(like, b, b, b)
         assert fall(like, b, x) >= 0.85 * fall(like, b, exact)
+
+
+def test_a_guess_that_is_the_solution_needs_the_fewest_iterations(systems):
+    _, _, first, _, other, b = systems
+    exact, used = KeptFactor().solve(other, b, b, b), []
+
+    def precondition(r):
+        used.append(r)
+        return r / other.diagonal()
+
+    for guess in (3 * exact, None):
+        used.clear()
+        x = by_gradients(other, b, precondition, 200, KEPT_ENOUGH, guess)
+        assert 0 < fall(other, b, x) <= (1 + 1e-9) * fall(other, b, exact)
+        if guess is not None:
+            assert len(used) == WINDOW
+            np.testing.assert_allclose(x, exact, atol=1e-6 * np.abs(exact).max())
+    assert len(used) > WINDOW
+    assert by_gradients(other, b, precondition, 2) is None
+
+
+def test_a_guess_that_says_nothing_is_none(systems):
+    _, _, first, _, _, b = systems
+    plain, zero = (by_gradients(first, b, lambda r: r, 50, KEPT_ENOUGH, guess) for guess in (None, np.zeros(len(b))))
+    np.testing.assert_array_equal(plain, zero)

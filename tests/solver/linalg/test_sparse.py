@@ -79,3 +79,12 @@ def test_conjugate_gradients_leave_no_more_than_their_tolerance(tolerance):
     # Preconditioned by its inverse, one iteration is enough.
     inverse = sp.csr_matrix(np.linalg.inv(A.toarray()))
     np.testing.assert_allclose(conjugate_gradients(lambda y: A @ y, b, inverse, 1e-12, 1), exact, rtol=1e-6, atol=1e-9)
+
+
+def test_single_precision_solves_to_its_own_digits():
+    A, b = system()
+    exact = Factor(A).solve(b)
+    found = Factor(A, single=True).solve(b)
+    assert found.dtype == float
+    error = np.abs(found - exact).max() / np.abs(exact).max()
+    assert 1e-9 < error < 1e-3

@@ -109,3 +109,11 @@ def test_a_map_is_settled_where_a_whole_step_changes_neither_shear_nor_areas():
     for share, now in ((0.5, (0.300, 0.0051)), (1.0, (0.280, 0.0051)), (1.0, (0.300, 0.0030)), (1.0, (0.300, 0.0081))):
         assert not rules.is_settled(share, now, (0.302, 0.0053 if now[1] < goal else 0.0082), goal)
     assert not rules.is_settled(1.0, (0.300, 0.0051), (np.inf, np.inf), goal)
+
+
+def test_only_free_boundaries_with_areas_about_right_begin_with_soft_areas():
+    for name, soft in (("standard", True), ("draft", True), ("exact", False)):
+        first = rules.first_pressure(QUALITIES[name], 0.0, True)
+        assert first == (rules.FREE_PRESSURE if soft else rules.FIRST_PRESSURE)
+    assert rules.first_pressure(QUALITIES["standard"], 0.5, True) == rules.FIRST_PRESSURE
+    assert rules.first_pressure(QUALITIES["standard"], 0.0, False) == rules.FIRST_PRESSURE

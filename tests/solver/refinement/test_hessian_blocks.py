@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from omt_uv.solver.maps.energy import area_forms, face_derivatives
+from omt_uv.solver.maps.mirror_symmetry import mirror_symmetry
 from omt_uv.solver.maps.polygon_elements import polygon_elements, with_convex_quads
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.refinement import hessian_blocks as hessian_blocks_module
@@ -71,3 +72,30 @@ def test_large_meshes_have_the_same_matrix_in_less_memory(polygons, monkeypatch)
         results.append((matrix.toarray(), found.gradient, found.scale))
     for whole, parts in zip(*results, strict=True):
         np.testing.assert_allclose(parts, whole, rtol=1e-12, atol=1e-12 * np.abs(whole).max())
+
+
+def test_blocks_of_followers_are_those_of_their_representatives():
+    """Forms carried to the vertices that others follow, and turned there, have the same squares."""
+    x, y = np.meshgrid(np.arange(5.0), np.arange(-2.0, 3.0), indexing="ij")
+    V = np.stack([x, y, 0.2 * x * y**2], axis=-1).reshape(-1, 3)
+    corner = (5 * np.arange(4)[:, None] + np.arange(4)).ravel()
+    T = np.column_stack([corner, corner + 5, corner + 6, corner, corner + 6, corner + 1]).reshape(-1, 3)
+    n, phase = len(V), np.exp(0.4j)
+    image = np.arange(n).reshape(5, 5)[:, ::-1].ravel()
+    symmetry = mirror_symmetry(image[None], phase)
+    w = symmetry.spread(np.sqrt(phase) * (V[:, :2] @ [1, 1j] * (1 + 0.02 * V[:, 0])))
+    faces = polygon_elements(V, T, face_areas(V, T))
+    frame, free = np.exp(1j * np.arange(n)), np.ones((n, 2))
+    free[[2, 7]] = [1, 0]
+    found = hessian_blocks(faces, w, 20.0, 0.3, (frame, free), symmetry)
+    matrix = assembly_of(faces, n, symmetry=symmetry).matrix(found.triangles, np.zeros(2 * n))
+    local = face_derivatives(faces, w, 20.0, 0.3, EAGERNESS * 0.7)
+    vertices, rows = symmetry.carried(T, local.rows)
+    dense = np.zeros((rows.shape[0] * rows.shape[1], 2 * n))
+    place = np.arange(len(dense)).reshape(rows.shape[:2])
+    for k in range(3):
+        turned = rows[:, :, k] * frame[vertices[:, k]][:, None]
+        for axis, part in enumerate((turned.real, -turned.imag)):
+            np.add.at(dense, (place, 2 * vertices[:, k, None] + axis), part)
+    dense *= free.ravel()
+    np.testing.assert_allclose(matrix.toarray(), dense.T @ dense, atol=1e-12 * found.scale)
