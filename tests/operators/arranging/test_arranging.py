@@ -54,6 +54,33 @@ def test_a_strip_has_its_areas_to_the_last_quad(package):
     assert len(np.unique(scenes.uv_of(obj)[:, 1].round(5))) == 2
 
 
+@pytest.mark.parametrize("scale", [0.2, 1.0, 3.0])
+def test_a_rectangle_has_the_area_and_the_middle_of_its_island(scale):
+    obj = scenes.bump(9, 2)
+    uv = scenes.seen_from_above(obj)
+    scenes.set_uv(obj, scale * (uv + 0.1 * np.sin(3 * uv[:, ::-1])) + [2, 1])
+    before, area = scenes.uv_of(obj), scenes.areas(obj)[1].sum()
+    assert bpy.ops.uv.omt_rectify() == {"FINISHED"}
+    assert scenes.areas(obj)[1].sum() == pytest.approx(area, rel=1e-4)
+    after = scenes.uv_of(obj)
+    assert np.abs(after.mean(axis=0) - before.mean(axis=0)).max() < 0.1 * scale
+
+
+def test_the_middle_of_an_object_is_that_of_its_box():
+    """However many vertices are on one side."""
+    y, x = np.mgrid[0:3, 0:3] / 2.0
+    flat = np.stack([x + 0.2, y + 0.3 * x * y, 0.4 * x * (1 - y)], axis=-1).reshape(-1, 3)
+    quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
+    alone = flat * [0.5, 1, 1] + [0, 3, 0]
+    obj = scenes.add([*flat, *(flat * [-1, 1, 1]), *alone], [*quads, *(quads[:, [0, 3, 2, 1]] + 9), *(quads + 18)])
+    uv = scenes.seen_from_above(obj)
+    scenes.set_uv(obj, uv + 0.05 * np.sin(5 * uv[:, ::-1]))
+    assert bpy.ops.uv.omt_symmetrize(halves="STACKED") == {"FINISHED"}
+    corner = np.array([loop.vertex_index for loop in obj.data.loops])
+    place = {int(v): uv for v, uv in zip(corner, scenes.uv_of(obj), strict=True)}
+    np.testing.assert_allclose([place[v] for v in range(9)], [place[v + 9] for v in range(9)], atol=1e-5)
+
+
 def test_what_cannot_be_arranged_is_said_and_changes_nothing():
     obj = scenes.cube()
     scenes.set_uv(obj, np.random.default_rng(0).uniform(size=(len(obj.data.loops), 2)))

@@ -241,6 +241,13 @@ def test_uvs_are_pushed_without_a_change_of_area_and_pins_stay():
     areas = [0.5 * np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1]) for q in quads]
     np.testing.assert_allclose(areas[1], areas[0], rtol=0.08)
     assert abs(areas[1].sum() / areas[0].sum() - 1) < 0.01
+    near = np.linalg.norm(after[[loop.index for loop in obj.data.loops]] - [0.55, 0.5], axis=1)
+    vertex = obj.data.loops[int(near.argmin())].vertex_index
+    pinned = scenes.pin(obj, {vertex}, obj.data.uv_layers.active.name)
+    assert bpy.ops.uv.omt_flow(start=(0.5, 0.5), move=(0.05, 0.0), radius=0.2) == {"FINISHED"}
+    again = scenes.uv_of(obj)
+    np.testing.assert_array_equal(again[pinned], after[pinned])
+    assert np.abs(again - after).max() > 0.02
 
 
 def test_a_uv_drag_leaves_no_trace():

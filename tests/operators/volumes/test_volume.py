@@ -44,7 +44,12 @@ def test_every_result_is_made(package):
     scenes.select([obj])
     assert bpy.ops.object.omt_volume(result="SLICE", axis="Z", **few) == {"FINISHED"}
     cut = bpy.data.objects["Body Slice"].data
-    assert "OMT Dilation" in cut.attributes and cut.color_attributes
+    # Red where it grows, blue where it shrinks.
+    logs, colours = np.zeros(len(cut.polygons), np.float32), np.zeros(4 * len(cut.loops), np.float32)
+    cut.attributes["OMT Dilation"].data.foreach_get("value", logs)
+    cut.color_attributes[0].data.foreach_get("color", colours)
+    red, _, blue, _ = colours.reshape(-1, 3, 4)[:, 0].T
+    assert (np.sign(red - blue) == np.sign(logs))[np.abs(logs) > 0.01].all() and np.abs(logs).max() > 0.1
     scenes.select([obj])
     assert bpy.ops.object.omt_volume(result="TETS", **few) == {"FINISHED"}
     tets = bpy.data.objects["Body Tetrahedra"].data
@@ -54,6 +59,18 @@ def test_every_result_is_made(package):
     np.testing.assert_allclose(radius[: len(V)], 1, atol=1e-6)
     assert radius.max() < 1 + 1e-6 and len(tets.polygons) > 2000
     assert "OMT Ball" not in obj.data.attributes and before == (scenes.state(obj) if before else None)
+
+
+def test_what_is_made_has_the_materials_and_a_slice_lies_where_it_shall():
+    obj = body()
+    obj.location = (5, 0, 0)
+    obj.data.materials.append(bpy.data.materials.new("Paint"))
+    bpy.context.view_layer.update()
+    assert bpy.ops.object.omt_volume(result="SLICE", axis="X", place=0.25, tets=200) == {"FINISHED"}
+    made = bpy.data.objects["Body Slice"]
+    x = 5 + 2 * np.array([v.co.x for v in obj.data.vertices])
+    np.testing.assert_allclose([v.co.x for v in made.data.vertices], x.min() + 0.25 * np.ptp(x), atol=1e-4)
+    assert [m.name for m in made.data.materials] == ["Paint"]
 
 
 def test_the_attribute_is_undone_in_one_step():

@@ -1,0 +1,65 @@
+"""What is read of modifiers, shape keys and groups: levels of the render, shapes as they stand, and whole faces."""
+
+from __future__ import annotations
+
+import bpy
+
+import pytest
+import scenes
+
+
+@pytest.mark.parametrize("in_render, in_view, levels", [(True, True, 3), (True, False, 3), (False, True, 1)])
+def test_levels_are_those_of_the_render_where_there_is_one(package, in_render, in_view, levels):
+    obj = scenes.cube()
+    modifier = obj.modifiers.new("Smooth", "SUBSURF")
+    modifier.levels, modifier.render_levels = 1, 3
+    modifier.show_render, modifier.show_viewport = in_render, in_view
+    of = package("blender.subdivision").modifier_of
+    assert of(obj, obj.data).levels == levels
+    modifier.show_render = modifier.show_viewport = False
+    assert of(obj, obj.data) is None
+    other = obj.modifiers.new("Next", "SUBSURF")
+    other.levels = other.render_levels = 2
+    assert of(obj, obj.data).levels == 2
+
+
+@pytest.mark.parametrize("levels", [(1, 1), (2, 3), (3, 1)])
+def test_a_level_that_is_applied_is_missing_in_render_and_view(package, levels):
+    obj = scenes.bump(3, 2)
+    modifier = obj.modifiers.new("Smooth", "SUBSURF")
+    modifier.levels, modifier.render_levels = levels
+    faces = len(obj.data.polygons)
+    assert package("blender.subdivision").apply_level(obj) == 1
+    assert len(obj.data.polygons) == 4 * faces and list(obj.modifiers) == [modifier]
+    assert (modifier.levels, modifier.render_levels) == tuple(n - 1 for n in levels)
+
+
+@pytest.mark.parametrize("scale", [(1, 1, 1), (3, 1, 0.5), (-1, 2, 1)], ids=str)
+def test_a_shape_key_that_is_the_mesh_is_no_strain_and_one_that_is_larger_none_either(package, scale):
+    obj = scenes.bump()
+    obj.scale = scale
+    obj.shape_key_add(name="Basis"), obj.shape_key_add(name="Same"), obj.shape_key_add(name="Larger")
+    for point in obj.data.shape_keys.key_blocks["Larger"].data:
+        point.co = 2 * point.co
+    bpy.context.view_layer.update()
+    reading = package("blender.mesh").read(obj)
+    for name in ("Same", "Larger"):
+        (row,) = package("blender.shapes.strain").strain_rows(obj, reading, name)
+        assert row.name == "all" and row.greatest < 1e-4
+
+
+def test_faces_belong_to_a_region_with_half_of_the_weight_of_their_corners(package):
+    obj = scenes.bump(3, 1)
+    # Corners of the faces: 0 1 5 4, 1 2 6 5, 2 3 7 6.
+    obj.vertex_groups.new(name="half").add([0, 1], 1.0, "REPLACE")
+    faint = obj.vertex_groups.new(name="faint")
+    faint.add([2, 3, 6, 7], 0.49, "REPLACE")
+    obj.vertex_groups.new(name="strong").add([2, 3, 6, 7], 0.5, "REPLACE")
+    scenes.set_uv(obj, scenes.seen_from_above(obj))
+    pairs = [(obj, package("blender.mesh").read(obj))]
+    labels = package("blender.measuring.region_labels")
+    found = {name: masks[0].tolist() for name, masks in labels.regions_of(pairs, labels.GROUPS)}
+    assert found == {"half": [True, False, False], "strong": [False, False, True]}
+    faint.add([2, 3, 6, 7], 0.51, "REPLACE")
+    found = {name: masks[0].tolist() for name, masks in labels.regions_of(pairs, labels.GROUPS)}
+    assert found["faint"] == [False, False, True]
