@@ -34,15 +34,28 @@ MOST_ROUNDS = 5
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
 SPREAD_OF_SHEAR = 0.19
+# It changes by this power of that square.
+SPREAD_BY_SHEAR = 1.7
 # What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
 MARGIN = 0.95
 # What misses the bound by less stays in one piece: it has so many times the square of log(shear).
-CROWDED = 1.15
+CROWDED = 1.35
 # Vertices this close to where images of others belong, over the extent, are these images.
 SAME_PLACE = 1e-3
 # What shears more than this is seen on any checker, and charts with more of it than that share are cut further.
 STEEP = 3.0
 MOST_STEEP = 0.01
+# Below this bound, what the triangles of a coarse surface shear by themselves counts more than what is cut.
+LEAST_REHEARSED = 1.2
+# Of a surface in one piece the largest chart has this share of the area, but for crumbs.
+ONE_PIECE = 0.97
+# So many times what is steep beyond that share is slit.
+SLIT = 1.5
+# What misses the bound by less after a second search is slit where it shears more than that.
+NEARLY = 0.03
+# A vertex is in a face from this certainty on.
+IN_FACE = 0.5
+SHEARED = 2.0
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
 # The least share of a surface that a warning names as a number.
@@ -83,6 +96,7 @@ class ShearSearch:
     shear : the bound
     target : see `chart_map.map_chart`
     cutting : further arguments of `disk_charts.disk_charts`
+    map_surface : gives the maps of the charts of a small surface, for a target of its own
     """
 
     surface: Surface
@@ -90,6 +104,7 @@ class ShearSearch:
     shear: ShearBound
     target: Target | None
     cutting: dict
+    map_surface: Callable[[Surface, list[Chart], Target | None], Steps[list[ChartMap]]] | None = None
 
     def first_spread(self) -> np.ndarray:
         """The spread (f,) to begin with, see `SeamSearch`."""
@@ -99,8 +114,32 @@ class ShearSearch:
         """The search for a spread (f,)."""
         from ..seams.search import SeamSearch
 
-        further, memory = self.shear.further, self.memory
-        return SeamSearch(spread, self.surface, self.costs, density=self._density, further=further, memory=memory)
+        return SeamSearch(
+            spread,
+            self.surface,
+            self.costs,
+            density=self._density,
+            further=self.shear.further,
+            memory=self.memory,
+            asked=float(np.log(self.shear.bound) ** 2),
+            rehearse=self.rehearsed if self.shear.bound >= LEAST_REHEARSED else None,
+        )
+
+    def rehearsed(self, surface: Surface, log_density: np.ndarray | None) -> Steps[float | None]:
+        """The square of the logarithm of what maps of a small surface shear; log_density (n,) : half the logarithm of
+        the density at its vertices. None where it comes apart, since then it is another surface."""
+        target = None
+        if log_density is not None:
+            target = Target(np.exp(2 * log_density[surface.corner_vertex[surface.triangles]].mean(axis=1)))
+        if self.map_surface is None:
+            return None
+        prepared = yield from disk_charts(surface, extremities=0)
+        maps = yield from self.map_surface(surface, prepared.charts, target)
+        shear = [_shear(chart, one, target is None) for chart, one in zip(prepared.charts, maps, strict=True)]
+        size = np.array([area.sum() for _, area in shear])
+        if size.max() < ONE_PIECE * size.sum():
+            return None
+        return float(np.log(sum(area @ local for local, area in shear) / size.sum()) ** 2)
 
     def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, changes: dict) -> Steps[DiskCharts]:
         """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
@@ -178,30 +217,31 @@ def bound_shear(
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     tried = {_as_a_set(last.cuts.edges)}
+    rehearsed: dict = {}
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
-            last, crossing = best, None
+            # What coarse maps tell does not hold here, either.
+            last, crossing, rehearsed = best, None, {"rehearse": None}
             promised[:] = np.inf
         if not last.searched:
             break
         best = last
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        parting = part_of(_apart(search, last, crossing), begin, width * PARTING)
-        parts = yield from unless_ended(parting, early)
+        parting = _apart(search, last, crossing, rounds > 1)
+        parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
         if parts is None:
             break
         apart, flat = parts
         missed = [k for k in last.searched if k not in apart]
         share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
-        spread = spread * share
+        spread = spread * share**SPREAD_BY_SHEAR
         begin, width = begin + width * PARTING, width * (1 - PARTING)
         within = np.concatenate([np.zeros(0, np.int64), *(_within(last.charts[k]) for k in (*missed, *flat))])
         kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), within)]
         kept = np.concatenate([kept, *apart.values()])
-        memory = dict(last.memory)
         # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
-        changes = {"share": share, "adding": rounds > 1, "memory": memory}
+        changes = {"share": share, "adding": rounds > 1, "memory": (memory := dict(last.memory))} | rehearsed
         cutting = search.again(kept, [last.charts[k] for k in missed], spread, changes)
         again = yield from unless_ended(part_of(cutting, begin, width * SEARCHING), early)
         if again is None:
@@ -218,8 +258,7 @@ def bound_shear(
             break
         last = _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
     best = last if last.excess <= best.excess else best
-    warnings = tuple(best.warnings(ENDED_EARLY if early.is_asked else MORE_SEAMS))
-    return BoundedShear(DiskCharts(best.charts, best.cuts, first.warnings), best.maps, warnings)
+    return best.result(first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
 
 
 @dataclass(frozen=True)
@@ -245,7 +284,7 @@ class _Round:
         # Slivers between sides have a shear, and nobody sees it.
         mean = np.where(area > LEAST_AREA * area.sum(), mean, 1.0)
         steep = np.array([area[local > STEEP].sum() / area.sum() for local, area in shear])
-        pressing = np.where((steep > MOST_STEEP) & (mean > 1), np.maximum(mean, bound * (1 + steep)), mean)
+        pressing = np.array([_pressing(*pair, bound) for pair in zip(mean, steep, strict=True)])
         missed = np.flatnonzero(pressing > bound)
         searched = [int(k) for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
         return _Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched)
@@ -254,6 +293,10 @@ class _Round:
     def excess(self) -> float:
         """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
         return float(self.area[self.searched] @ (self.pressing[self.searched] - self.bound) / self.area.sum())
+
+    def result(self, warnings: tuple[str, ...], why: str) -> BoundedShear:
+        """Its charts and maps, with warnings of how they were made and of those that miss the bound; why they do."""
+        return BoundedShear(DiskCharts(self.charts, self.cuts, warnings), self.maps, tuple(self.warnings(why)))
 
     def warnings(self, why: str) -> Iterator[str]:
         """Warnings of charts that shear more than the bound, those with seams marked by hand apart; why others do."""
@@ -268,6 +311,11 @@ class _Round:
                 who = plural(count, f"An island{part} shears", f"{{}} islands{part} shear")
                 what = what if count == 1 else what.replace("its seams", "their seams")
                 yield f"{who} {mean[chosen].max():.3g} in the mean, above {self.bound:.3g}: {what}"
+
+
+def _pressing(mean: float, steep: float, bound: float) -> float:
+    """A mean shear, or one above the bound where too large a share is steep."""
+    return max(mean, bound * (1 + steep)) if steep > MOST_STEEP and mean > 1 else mean
 
 
 def _percent(share: float) -> str:
@@ -285,31 +333,44 @@ def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float
         faces, reached = last.charts[k].faces, np.log(last.pressing[k]) ** 2
         # What the last search has promised and its map has not kept is asked for on top.
         kept_part = min(float(promised[faces].min()) / reached, 1.0)
-        share[faces] = margin * kept_part * (np.log(last.bound) ** 2 / reached) ** 1.5
+        share[faces] = margin * kept_part * np.log(last.bound) ** 2 / reached
         promised[faces] = share[faces] * reached
     return share, promised
 
 
 def _apart(
-    search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None
+    search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None, late: bool
 ) -> Steps[tuple[dict[int, np.ndarray], list[int]]]:
     """Edges (e,2), by the number of a chart, that part it where it keeps the bound but for lying in its own way, or
     around its flat sides; and the numbers of the latter, whose other cuts are not needed any more."""
     found: dict[int, np.ndarray] = {}
     flat: list[int] = []
     least = np.sqrt(CROWDED) * np.log(search.shear.bound)
-    if crossing is None or not last.searched:
+    if not last.searched:
         return found, flat
     # Hardly any chart misses its bound.
-    from ..seams.parting import flat_sides, parted
+    from ..seams.parting import flat_sides, parted, slits
 
     for k in last.searched:
         chart = last.charts[k]
+        if last.mean[k] <= (1 + NEARLY * late) * last.bound:
+            # No other cut is needed, but one into what shears that much.
+            shear, area = _shear(chart, last.maps[k], search.target is None)
+            missed = max(last.mean[k] / last.bound - 1, 0.0)
+            steep = shear > (STEEP if missed == 0 else SHEARED)
+            excess = float(area[shear > STEEP].sum() / area.sum() - MOST_STEEP) if missed == 0 else missed
+            costs, here = search.costs(), chart.vertex_ids
+            # Rather steep than slit where everybody looks.
+            cost = np.where(costs.face[here] > IN_FACE, np.inf, costs.vertex_cost[here])
+            edges = slits(chart, steep, SLIT * excess * area.sum(), cost, search.images)
+            if len(edges):
+                found[k] = edges
+                continue
         edges = flat_sides(chart)
         if len(edges):
             found[k] = edges
             flat.append(k)
-        if len(edges) or np.log(last.mean[k]) < least:
+        if len(edges) or np.log(last.mean[k]) < least or crossing is None:
             continue
         uv = yield from crossing(chart, last.maps[k])
         shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)

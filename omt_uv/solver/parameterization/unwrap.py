@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -181,11 +181,22 @@ def cut_charts(
     avoid = clear_of_pins(surface, pins, avoid)
     bound = options.shear_bound()
     given: dict[str, Any] = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}
-    search = None if bound is None else ShearSearch(surface, faces, bound, target, given)
+    search = None if bound is None else ShearSearch(surface, faces, bound, target, given, rehearsal(options))
     finder = None if search is None else search.search(search.first_spread())
     prepared = yield from disk_charts(surface, faces, seams=options.seams, search=finder, **given)
     prepared = yield from _cut_alike(surface, faces, prepared, given)
     return replace(_to_be_mapped(surface, prepared, pins, target), search=search)
+
+
+def rehearsal(options: UnwrapOptions) -> Callable[[Surface, list[Chart], Target | None], Steps[list[ChartMap]]]:
+    """Maps of charts of a small surface with these options, whose areas are about right."""
+    # What coarse triangles shear is above that of fine ones for exact areas, and the more the less alike they are.
+    quick = replace(options, quality="relaxed")
+
+    def maps(surface: Surface, charts: list[Chart], target: Target | None) -> Steps[list[ChartMap]]:
+        return (yield from _Task(surface, quick, None, target).map_charts(charts))
+
+    return maps
 
 
 def _cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts, given: dict) -> Steps[DiskCharts]:

@@ -33,6 +33,7 @@ class Found:
     edges (e,) bool : that were cut; base (e,) bool : those of them that made a disk of it first
     mirror : if the others are symmetric
     coarse, steps (k,), root : where and along what they were found, and where on a closed surface they begin
+    rehearsed : the square of log(shear) of a map of the coarse surface that is cut so; None where there is none
     """
 
     edges: np.ndarray
@@ -41,6 +42,7 @@ class Found:
     coarse: CoarseSurface
     steps: np.ndarray
     root: int
+    rehearsed: float | None = None
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,53 @@ def cut_along(task: Task, steps: np.ndarray) -> Cut:
     return Cut(steps=steps, vertices=vertices, spread=task.model.spread_cut(vertices), cost=cost)
 
 
+@dataclass(frozen=True)
+class Removal:
+    """What a cut loses where parts of it are taken back.
+
+    Attributes
+    ----------
+    graph : of the task
+    place (n,) : of the vertices of the cut among themselves; steps (n,) : of it that end at a vertex
+    held (n,) : vertices of its steps that hold a vertex, themselves or as an image
+    inverse (c,c), force (c,) : of Green's function between these, and what holds them
+    """
+
+    graph: PathGraph
+    place: np.ndarray
+    steps: np.ndarray
+    held: np.ndarray
+    inverse: np.ndarray
+    force: np.ndarray
+
+    @staticmethod
+    def of(task: Task, cut: Cut) -> Removal:
+        """Of a cut for a task."""
+        graph, plate = task.graph, task.model.plate
+        n = len(graph.boundary)
+        place = np.zeros(n, np.int64)
+        place[cut.vertices] = np.arange(len(cut.vertices))
+        steps = np.bincount(graph.ends[cut.steps].ravel(), minlength=n)
+        inverse = np.linalg.inv(plate.between(cut.vertices))
+        own = np.flatnonzero(steps)
+        held = np.bincount(_with_images(graph, own), minlength=n)
+        return Removal(graph, place, steps, held, inverse, inverse @ plate.value[cut.vertices])
+
+    def loss(self, gone: np.ndarray) -> float:
+        """The spread that is left once steps (k,) are taken back, over what is left now."""
+        vertices, count = np.unique(self.graph.ends[gone], return_counts=True)
+        let_go, count = np.unique(_with_images(self.graph, vertices[self.steps[vertices] == count]), return_counts=True)
+        free = self.place[let_go[(self.held[let_go] == count) & ~self.graph.boundary[let_go]]]
+        force = self.force[free]
+        return float(force @ np.linalg.solve(self.inverse[np.ix_(free, free)], force))
+
+
+def _with_images(graph: PathGraph, vertices: np.ndarray) -> np.ndarray:
+    """Vertices (k,) and the images of those that have another."""
+    image = graph.image[vertices]
+    return np.concatenate([vertices, image[image != vertices]])
+
+
 def stretches(graph: PathGraph, steps: np.ndarray) -> list[np.ndarray]:
     """Steps (k,) in paths between tips, branchings and the boundary, the most expensive first."""
     return _by_stretch(graph, steps)[0]

@@ -39,23 +39,31 @@ def grow(task: Task, cut: Cut, most: int) -> Cut:
         if cut.spread <= task.bound or cut.cost > MOST_COST:
             break
         model = task.model.cut(cut.vertices) if model is None else model
-        arc = _best_arc(task, cut, model)
-        if arc is None or (arc.worth < LEAST_WORTH * cut.spread and len(cut.steps)):
+        found = _arcs(task, cut, model)
+        if not found or (found[0].worth < LEAST_WORTH * cut.spread and len(cut.steps)):
             break
+        arc = found[0]
         grown = cut_along(task, np.concatenate([cut.steps, task.graph.steps_of(arc.path)]))
         model = model.cut(np.setdiff1d(grown.vertices, cut.vertices))
         cut = grown
     return cut
 
 
-def _best_arc(task: Task, cut: Cut, model: ScaleModel) -> _Arc | None:
+def grown_by_one(task: Task, cut: Cut, most: int) -> list[Cut]:
+    """The cut with one arc more, for so many arcs at most, to different extremities, that are worth most."""
+    arcs = _arcs(task, cut, task.model.cut(cut.vertices))[:most]
+    return [cut_along(task, np.concatenate([cut.steps, task.graph.steps_of(arc.path)])) for arc in arcs]
+
+
+def _arcs(task: Task, cut: Cut, model: ScaleModel) -> list[_Arc]:
+    """The best arc to each of the extremities, those first that are worth most."""
     graph = task.graph
     # Not from images: a path there would hang on nothing where these are not quite on the other side.
     start = np.union1d(np.flatnonzero(graph.boundary), graph.ends[cut.steps])
     cost, before = graph.paths_from(start)
-    best = None
+    found = []
     for tip in _tips(task, model, cost):
-        path = path_to(before, int(tip))
+        path, best = path_to(before, int(tip)), None
         reach = cost[path]
         # From the first vertex that is near enough, or where a cut may end as anywhere; the last is on the cut already.
         begins = {int(np.argmax(reach <= stop * reach[0] + 1e-12)) for stop in STOPS}
@@ -69,7 +77,10 @@ def _best_arc(task: Task, cut: Cut, model: ScaleModel) -> _Arc | None:
             worth = task.tip_factor[part[0]] * fall / cost[part[0]]
             if worth > 0 and (best is None or worth > best.worth * (1 + EVEN)):
                 best = _Arc(part, worth)
-    return best
+        found += [] if best is None else [best]
+    # Where two are worth the same, rounding does not choose between them.
+    worth = np.round(np.log([arc.worth for arc in found]) / EVEN)
+    return [found[k] for k in np.argsort(-worth, kind="stable")]
 
 
 def _tips(task: Task, model: ScaleModel, cost: np.ndarray) -> np.ndarray:

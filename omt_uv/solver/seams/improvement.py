@@ -11,12 +11,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mesh.topology import graph_components
-from .cut_tree import Cut, Task, cut_along, leaves, stretches
+from .cut_tree import Cut, Removal, Task, cut_along, leaves, stretches
 from .growth import grow
 from .path_graph import path_to
 
 # Shares of a leaf that may be taken off its end.
-PARTS = (1.0, 0.5, 0.25)
+PARTS = (1.0, 0.5, 0.25, 0.1)
 # Share of the leaves that is taken back at random.
 RANDOM_SHARE = 0.4
 # A better cut has a score lower by this share.
@@ -43,9 +43,9 @@ def improved(task: Task, cut: Cut, trials: int) -> Iterator[Cut]:
 
 def _taken_back(task: Task, cut: Cut, found: list[np.ndarray], in_vain: int, rng: np.random.Generator) -> Cut:
     """The cut without the leaf that is worth least for its length, or, where those were in vain, without some."""
-    cost = np.array([task.graph.cost[leaf].sum() for leaf in found])
-    loss = np.array([cut_along(task, np.setdiff1d(cut.steps, leaf)).spread - cut.spread for leaf in found])
-    order = np.argsort(loss / cost, kind="stable")
+    without = Removal.of(task, cut)
+    worth = [without.loss(leaf) / task.graph.cost[leaf].sum() for leaf in found]
+    order = np.argsort(worth, kind="stable")
     if in_vain < len(found):
         gone = [found[order[in_vain]]]
     else:
@@ -56,19 +56,18 @@ def _taken_back(task: Task, cut: Cut, found: list[np.ndarray], in_vain: int, rng
 def trimmed(task: Task, cut: Cut) -> Cut:
     """The cut with the ends of its leaves taken off where the bound leaves room, those first that lose least."""
     while True:
+        without, room = Removal.of(task, cut), task.bound - cut.spread
         shorter = []
         for leaf in leaves(task.graph, cut.steps):
             for part in PARTS:
                 gone = leaf[: max(int(part * len(leaf)), 1)]
-                other = cut_along(task, np.setdiff1d(cut.steps, gone))
-                if other.spread <= task.bound:
-                    shorter.append(((other.spread - cut.spread) / (cut.cost - other.cost), gone))
+                loss = without.loss(gone)
+                if loss <= room:
+                    shorter.append((loss / task.graph.cost[gone].sum(), gone))
         if not shorter:
             return cut
-        for _, gone in sorted(shorter, key=lambda pair: pair[0]):
-            other = cut_along(task, np.setdiff1d(cut.steps, gone))
-            if other.spread <= task.bound:
-                cut = other
+        gone = min(shorter, key=lambda pair: pair[0])[1]
+        cut = cut_along(task, np.setdiff1d(cut.steps, gone))
 
 
 def rerouted(task: Task, cut: Cut) -> Cut:
@@ -78,9 +77,10 @@ def rerouted(task: Task, cut: Cut) -> Cut:
             continue
         rest = np.setdiff1d(cut.steps, stretch)
         path = _bridge(task, stretch, rest)
-        if path is None:
+        steps = stretch if path is None else task.graph.steps_of(path)
+        if set(steps.tolist()) == set(stretch.tolist()):
             continue
-        other = cut_along(task, np.concatenate([rest, task.graph.steps_of(path)]))
+        other = cut_along(task, np.concatenate([rest, steps]))
         if other.score(task.bound) < cut.score(task.bound) * (1 - BETTER) and task.graph.is_open(other.steps):
             cut = other
     return cut

@@ -16,7 +16,8 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from ..maps.overlap import cover_pairs
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths, face_areas, unit
-from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up
+from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up
+from .path_graph import path_to
 
 # Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
 POINTS = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
@@ -24,6 +25,8 @@ POINTS = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3],
 LEAST_COVER = 3e-3
 # What is taken off has this share of the chart at least.
 LEAST_PART = 0.03
+# Slits at once at most: small ones far from a seam cost more than they are worth.
+MOST_SLITS = 4
 # Pairs of parts that are cut from one another at most.
 MOST_CUTS = 12
 # Rounds in which crumbs between a cut and its mirror image join what is beside them.
@@ -144,6 +147,53 @@ def flat_sides(chart: Chart) -> np.ndarray:
     if area[flat].sum() < MOSTLY * dual.area.sum():
         return np.zeros((0, 2), np.int64)
     return dual.ends[(one != other) & (flat[one] | flat[other])]
+
+
+def slits(
+    chart: Chart, steep: np.ndarray, least: float, cost: np.ndarray, image: np.ndarray | None = None
+) -> np.ndarray:
+    """Edges (k,2) of the surface from the boundary of a chart into what shears too much, the largest parts first.
+
+    steep (m,) bool : triangles that do; least : area of what is to be slit at least; cost, image : see `parted`, but
+    where a cost is infinite no slit goes
+    """
+    dual = _Dual.of(chart)
+    free = np.isfinite(cost)
+    bad = np.zeros(len(dual.area), dtype=bool)
+    bad[dual.polygon[steep & free[chart.triangles].all(axis=1)]] = True
+    piece = dual.pieces(bad[dual.joined].all(axis=1))
+    size = np.bincount(piece, np.where(bad, dual.area, 0.0))
+    order = np.argsort(-size, kind="stable")
+    chosen = order[: min(int(np.searchsorted(np.cumsum(size[order]), least)) + 1, MOST_SLITS)]
+    n, ends = len(chart.vertices), dual.ends[free[dual.ends].all(axis=1)]
+    price = cost[ends].mean(axis=1) * edge_lengths(chart.vertices, ends) + 1e-300
+    graph = csr_matrix((np.tile(price, 2), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n))
+    known, image_here = pair_keys(*ends.T), _images_in(chart, image)
+    start, found = np.unique(boundary_edges(chart.triangles)), []
+    for k in chosen[bad[np.unique(piece, return_index=True)[1]][chosen]]:
+        around = np.unique(chart.triangles[steep & (piece[dual.polygon] == k)])
+        far, before, _ = dijkstra(graph, indices=start, min_only=True, return_predecessors=True)
+        end = around[np.argmax(np.where(np.isfinite(far[around]), far[around], 0.0))]
+        path = path_to(before, int(end))
+        edges = np.stack([path[:-1], path[1:]], axis=1)
+        images = image_here[edges]
+        apart = len(np.intersect1d(path, images)) == 0
+        if len(edges) and apart and np.isin(pair_keys(*images.T), known).all():
+            edges = np.concatenate([edges, images])
+        found.append(edges)
+        start = np.union1d(start, edges)
+    return chart.vertex_ids[np.concatenate(found)] if found else np.zeros((0, 2), np.int64)
+
+
+def _images_in(chart: Chart, image: np.ndarray | None) -> np.ndarray:
+    """The mirror image (n,) of every vertex of a chart in it, -1 where there is none."""
+    if image is None:
+        return np.full(len(chart.vertices), -1)
+    at = np.full(len(image), -1)
+    inner = chart.vertex_ids >= 0
+    at[chart.vertex_ids[inner]] = np.flatnonzero(inner)
+    there = np.where(inner, image[chart.vertex_ids], -1)
+    return np.where(there >= 0, at[there], -1)
 
 
 def _covering(chart: Chart, uv: np.ndarray, dual: _Dual) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -25,6 +25,7 @@ from .growth import grow
 from .improvement import improved, rerouted, trimmed
 from .options import SearchOptions
 from .predicted_scale import ScaleModel
+from .rehearsal import POWER, Rehearsal
 from .symmetric_base import symmetric_base
 
 # Share of the vertices that have an image in a component with a mirror plane.
@@ -48,6 +49,9 @@ CLOSE = 0.85
 FLAT = 1e-9
 # Where the time of a search goes, roughly: growth ends at this share of it.
 GROWN = 0.5
+# The square of log(shear) of a rehearsal, over that of the map: of the same surface, and of a far finer one. Heads,
+# animals and figures are within a tenth of it.
+REHEARSED = (0.7, 0.9)
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,9 @@ class SeamSearch:
     adding : what was found for a part stays, and more is cut
     memory : what was found for parts, by their fingerprints, to which this search adds
     begun : surfaces of components on their way to coarse ones, and their triangles
+    asked : the square of log(shear) that maps may have
+    rehearse : gives that of a small surface along its seams, with half the logarithm of the density (n,) at its
+        vertices or None; None where predictions have to do
     """
 
     spread: np.ndarray
@@ -78,6 +85,8 @@ class SeamSearch:
     adding: bool = False
     memory: dict[tuple[bytes, ...], Found] = field(default_factory=dict)
     begun: dict[tuple[int, bytes], tuple[np.ndarray, Coarsening]] = field(default_factory=dict)
+    asked: float = 0.0
+    rehearse: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None = None
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether a component of these polygons (m,) is searched, some of whose boundary is marked as a seam or not."""
@@ -108,7 +117,7 @@ class SeamSearch:
             coarse, model = self._modelled(component)
             if self.share is not None:
                 # Nothing was cut of it before, since it was predicted to shear less than it does.
-                bound = min(bound, share * model.spread)
+                bound = min(bound, share**POWER * model.spread)
             if model.spread <= bound and not base.any():
                 return base
         component = self.priced(component)
@@ -119,8 +128,11 @@ class SeamSearch:
         if bounded and model.spread <= bound:
             return base
         plain = (coarse, model) if bounded else None
-        best = yield from part_of(self._best(component, base, bound, mirror, plain), 0.0, 0.9)
-        self.memory[name] = best.carried(component)
+        best = yield from part_of(self._best(component, base, bound, mirror, plain), 0.0, 0.7)
+        coarser = min(self.options.vertices / component.vertex_count, 1.0)
+        asked = self.asked * float(np.interp(coarser, (0, 1), REHEARSED[::-1]))
+        best, kept = yield from part_of(self._rehearsal(component).kept(best, asked), 0.7, 0.2)
+        self.memory[name] = replace(best.carried(component), rehearsed=kept)
         return self.memory[name].edges
 
     def _best(
@@ -154,8 +166,9 @@ class SeamSearch:
             if best is not None and best.score <= self._worth_of_symmetry() * shorter.score:
                 return best
         more = range(1, self._trials(component))
-        others = yield from part_of(self._several_grown(component, base, None, bound, more), 0.8, 0.1)
-        found = best_of([first, *others])
+        others = yield from part_of(self._several_grown(component, base, None, bound, more), 0.8, 0.05)
+        choosing = self._rehearsal(component).best_of([first, *others], self.asked)
+        found = yield from part_of(choosing, 0.85, 0.05)
         if found is first and shorter is not None:
             return shorter
         return (yield from part_of(self._shortened(found), 0.9, 0.1))
@@ -166,7 +179,10 @@ class SeamSearch:
         """The best symmetric cut; None where there is hardly one."""
         trials = range(self._trials(component))
         cuts = yield from part_of(self._several_grown(component, base, mirror, bound, trials), 0.0, GROWN)
-        return (yield from part_of(self._shortened(best_of(cuts)), GROWN, 1 - GROWN)) if cuts else None
+        if not cuts:
+            return None
+        best = yield from part_of(self._rehearsal(component).best_of(cuts, self.asked), GROWN, 0.2)
+        return (yield from part_of(self._shortened(best), GROWN + 0.2, 0.8 - GROWN))
 
     def _trials(self, component: CutComponent) -> int:
         """Coarse surfaces to be tried; what is small has one, itself."""
@@ -199,19 +215,30 @@ class SeamSearch:
         return found
 
     def _again(self, component: CutComponent, found: Found, share: float) -> Steps[Found]:
-        """A cut that leaves a share of the spread that another has left: that one grown on, or where much is missing or
-        its coarse surface is too coarse for that, one on finer surfaces."""
-        best = None
-        if self.adding or share >= CLOSE:
-            best = yield from self._added(component, found, share)
+        """A cut with a share of the square of log(shear) that another has left: that one grown on, or where much is
+        missing or its coarse surface is too coarse for that, one on finer surfaces."""
+        best, spread = None, share**POWER
+        told = found.rehearsed if self.rehearse is not None else None
+        if self.adding or share >= CLOSE or (told is not None and share >= NEARLY_THERE):
+            best = yield from part_of(self._added(component, found, spread), 0.0, GROWN / 2)
+            if told is not None:
+                # What the map of the one before has told holds for those that are like it.
+                keeping = self._rehearsal(component).kept(best, share * told)
+                best, kept = yield from part_of(keeping, GROWN / 2, 1 - GROWN / 2)
+                return replace(best.carried(component), rehearsed=kept)
             if best.cut.spread <= best.task.bound:
                 return best.carried(component)
-        elif share >= NEARLY_THERE:
-            best = yield from part_of(self._grown_further(component, found, share), 0.0, GROWN / 2)
+        elif spread >= NEARLY_THERE:
+            best = yield from part_of(self._grown_further(component, found, spread), 0.0, GROWN / 2)
         if best is None or best.cut.spread > best.task.bound:
-            best = yield from part_of(self._grown_finer(component, found, share), GROWN / 2, GROWN / 2)
+            best = yield from part_of(self._grown_finer(component, found, spread), GROWN / 2, GROWN / 2)
         best = yield from part_of(self._shortened(best), GROWN, 1 - GROWN)
         return best.carried(component)
+
+    def _rehearsal(self, component: CutComponent) -> Rehearsal:
+        plane = self.costs().plane
+        normal = None if plane is None else plane.normal
+        return Rehearsal(component, normal, lambda coarse: self._log_density(component, coarse), self.rehearse)
 
     def _added(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut and arcs added to it: where it was tried by a map, that shears less with any more of them."""

@@ -14,7 +14,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.seams.parting import LEAST_PART, flat_sides, parted
+from omt_uv.solver.seams.parting import LEAST_PART, flat_sides, parted, slits
 
 
 def ramp(turns, steps=60, rings=6, rise=0.2):
@@ -144,3 +144,50 @@ def test_flat_sides_are_cut_around_and_nothing_else(turn):
 def test_a_round_body_has_no_flat_sides():
     (chart,) = strict_charts(triangle_surface(*meshes.cap(12, 24, 0.9)))
     assert len(flat_sides(chart)) == 0
+
+
+def steep_spots(V, F, *middles, radius=0.12):
+    """Triangles (m,) bool near any of the points."""
+    centre = V[F].mean(axis=1)
+    return np.any([np.linalg.norm(centre - middle, axis=1) < radius for middle in middles], axis=0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_slits_run_from_the_boundary_into_what_is_steep(mirrored):
+    V, F = meshes.grid(20, 20)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    spots = [(0.3, 0.55, 0.0), (0.7, 0.55, 0.0)]
+    steep = steep_spots(chart.vertices, chart.triangles, *(spots if mirrored else spots[:1]))
+    assert steep.any()
+    image = None
+    if mirrored:
+        there = V * [-1, 1, 1] + [1, 0, 0]
+        image = np.linalg.norm(V[None] - there[:, None], axis=2).argmin(axis=1)
+    edges = slits(chart, steep, 1e-6, np.ones(len(chart.vertices)), image)
+    tips, degree = np.unique(edges, return_counts=True)
+    outer = (np.abs(V[:, :2] - 0.5) > 0.5 - 1e-9).any(axis=1)
+    ends = tips[degree == 1]
+    inner = ends[~outer[ends]]
+    assert len(inner) == (2 if mirrored else 1) and outer[ends].sum() == len(inner)
+    reached = np.linalg.norm(V[inner][:, None] - np.array(spots), axis=2).min(axis=1)
+    assert (reached < 0.2).all()
+    if mirrored:
+        assert np.array_equal(np.sort(image[tips]), tips)
+    # No more than is asked for: one spot is enough.
+    assert len(strict_charts(triangle_surface(V, F, edges))) == 1
+
+
+def test_no_slit_goes_where_it_must_not():
+    V, F = meshes.grid(20, 20)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    steep = steep_spots(chart.vertices, chart.triangles, (0.25, 0.5, 0.0), (0.75, 0.5, 0.0))
+    cost = np.where(chart.vertices[:, 0] < 0.5, np.inf, 1.0)
+    edges = slits(chart, steep, 1.0, cost)
+    assert len(edges) and (V[edges, 0] >= 0.5).all()
+    assert len(slits(chart, steep, 1.0, np.full(len(V), np.inf))) == 0
+
+
+def test_nothing_steep_nothing_slit():
+    V, F = meshes.grid(6, 6)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    assert slits(chart, np.zeros(len(F), dtype=bool), 0.0, np.ones(len(V))).shape == (0, 2)

@@ -13,7 +13,7 @@ from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.seams.coarse_surface import coarsening
-from omt_uv.solver.seams.cut_tree import Task, cut_along, leaves, stretches
+from omt_uv.solver.seams.cut_tree import Removal, Task, cut_along, leaves, stretches
 from omt_uv.solver.seams.growth import grow
 from omt_uv.solver.seams.improvement import improved, trimmed
 from omt_uv.solver.seams.options import SearchOptions
@@ -65,6 +65,17 @@ def test_growth_keeps_the_bound_and_lowers_the_spread_with_every_arc(cap):
     parts = stretches(task.graph, better.steps)
     assert np.array_equal(np.sort(np.concatenate(parts)), better.steps)
     assert 0 < len(leaves(task.graph, better.steps)) <= len(parts)
+
+
+def test_what_a_cut_loses_is_told_without_a_new_solve(cap):
+    task = task_of(cap, 0.01)
+    cut = grow(task, cut_along(task, np.zeros(0, np.int64)), 6)
+    without, found = Removal.of(task, cut), leaves(task.graph, cut.steps)
+    assert len(found) > 1
+    for leaf in found:
+        for gone in (leaf, leaf[: len(leaf) // 2 + 1]):
+            other = cut_along(task, np.setdiff1d(cut.steps, gone))
+            assert np.isclose(cut.spread + without.loss(gone), other.spread, rtol=1e-6)
 
 
 def found(V, F, spread=0.03):

@@ -1,0 +1,125 @@
+"""A coarse surface opened along a cut is the same surface, cut there; what it shears foretells the fine map."""
+
+import meshes
+import numpy as np
+import pytest
+
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import halfedges, pair_keys, twins
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.shear_bound import ShearSearch, _shear
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
+from omt_uv.solver.seams import search as search_module
+from omt_uv.solver.seams.rehearsal import _along, opened
+
+
+def bumpy(n=40):
+    """A square with two bumps, its own mirror image across x = 1/2."""
+    x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
+    z = sum(0.7 * np.exp(-40 * ((x - a) ** 2 + (y - 0.5) ** 2)) for a in (0.28, 0.72))
+    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    quads = np.stack([i, i + n + 1, i + n + 2, i + 1], axis=1)
+    left = (quads // (n + 1))[:, 0] < n // 2
+    one, other = quads[left], quads[~left]
+    F = np.concatenate([one[:, [0, 1, 2]], one[:, [0, 2, 3]], other[:, [0, 1, 3]], other[:, [1, 2, 3]]])
+    return np.stack([x, y, z], axis=2).reshape(-1, 3), F
+
+
+def rehearsals(monkeypatch, surface, bound, **options):
+    """What an unwrap rehearsed, and what it came to: coarse cuts with the square of log(shear), and its map."""
+    seen = []
+    of = search_module.Rehearsal.of
+
+    def watched(self, found):
+        value = yield from of(self, found)
+        seen.append((self, found, value))
+        return value
+
+    monkeypatch.setattr(search_module.Rehearsal, "of", watched)
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=bound, **options)))
+    return seen, found
+
+
+def silent():
+    """A rehearsal that has no map."""
+    return None
+    yield
+
+
+def mean_shear(found):
+    parts = [_shear(chart, one, True) for chart, one in zip(found.charts, found.maps, strict=True)]
+    return sum(a @ s for s, a in parts) / sum(a.sum() for _, a in parts)
+
+
+@pytest.mark.parametrize("mesh", [bumpy(), meshes.icosphere(3)])
+def test_an_opened_surface_is_the_coarse_one_cut_along_its_steps(monkeypatch, mesh):
+    seen, _ = rehearsals(monkeypatch, triangle_surface(*mesh), 1.3)
+    assert len(seen)
+    for rehearsal, found, value in seen:
+        coarse = found.setting.coarse
+        opening = opened(found, np.zeros((0, 2), np.int64), rehearsal.normal)
+        area = face_areas(opening.positions, opening.triangles).sum()
+        whole = face_areas(coarse.positions, coarse.triangles).sum()
+        assert abs(area - whole) < 0.06 * whole
+        assert np.isin(pair_keys(*opening.seams.T), pair_keys(*halfedges(opening.triangles))).all()
+        # Every triangle has the neighbours that it had: nothing was torn by flips.
+        assert (twins(opening.triangles) < 0).sum() <= 2 * (twins(coarse.triangles) < 0).sum()
+        if len(found.cut.steps) and rehearsal.component.on_boundary().any():
+            (chart,) = strict_charts(triangle_surface(opening.positions, opening.triangles, opening.seams))
+            assert len(chart.vertices) > len(opening.positions)
+        assert value is None or 0 <= value < 1
+
+
+def test_a_symmetric_cut_is_rehearsed_on_a_surface_that_is_its_own_image(monkeypatch):
+    seen, _ = rehearsals(monkeypatch, triangle_surface(*bumpy()), 1.3)
+    assert any(found.mirror is not None for _, found, _ in seen)
+    for rehearsal, found, _ in seen:
+        if found.mirror is None:
+            continue
+        P = opened(found, np.zeros((0, 2), np.int64), rehearsal.normal).positions
+        image = P * [-1, 1, 1] + [1, 0, 0]
+        order, images = np.lexsort(np.round(P, 9).T), np.lexsort(np.round(image, 9).T)
+        assert np.allclose(P[order], image[images], atol=1e-9)
+
+
+def test_a_step_across_an_edge_flips_it_and_one_in_a_triangle_that_is_flipped_goes_around():
+    P = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 0]], dtype=float)
+    F = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 2]])
+    flipped, seams = _along(P, F, np.array([[1, 3]]))
+    assert sorted(map(tuple, np.sort(seams, axis=1))) == [(1, 3)]
+    assert np.isclose(face_areas(P, flipped).sum(), face_areas(P, F).sum())
+    # Across 0 2 and across 1 2: both are of the first triangle.
+    both, seams = _along(P, F, np.array([[1, 3], [0, 4]]))
+    assert np.array_equal(both, F)
+    assert set(map(tuple, np.sort(seams, axis=1))) <= set(map(tuple, np.sort(np.stack(halfedges(F), 1), axis=1)))
+    # Vertices that are not beside each other are joined by the shortest way.
+    _, seams = _along(P, F, np.array([[3, 4]]))
+    used, degree = np.unique(seams, return_counts=True)
+    assert set(used[degree == 1]) == {3, 4}
+
+
+def test_a_rehearsal_foretells_the_map(monkeypatch):
+    """The square of log(shear), of the cut that the search went by."""
+    for bound in (1.3, 1.4):
+        seen, found = rehearsals(monkeypatch, triangle_surface(*bumpy(60)), bound)
+        reached = np.log(mean_shear(found)) ** 2
+        assert mean_shear(found) <= bound + 0.005
+        told = [value for _, _, value in seen if value is not None]
+        assert 0.5 < min(told, key=lambda value: abs(np.log(value / reached))) / reached < 1.5
+
+
+def test_what_coarse_triangles_shear_by_themselves_is_not_cut_for(monkeypatch):
+    """Where a longer cut does not lower what is rehearsed, the shorter one is mapped."""
+
+    def stuck(self, surface, density):
+        return 0.2
+        yield
+
+    monkeypatch.setattr(ShearSearch, "rehearsed", lambda *_: silent())
+    predicted = drain(unwrap(triangle_surface(*bumpy(20)), options=UnwrapOptions(max_shear=1.4))).seams
+    monkeypatch.setattr(ShearSearch, "rehearsed", stuck)
+    seen, found = rehearsals(monkeypatch, triangle_surface(*bumpy(20)), 1.4)
+    assert len(seen) and np.array_equal(found.seams, predicted)
