@@ -176,7 +176,7 @@ def _collapses(V, flat, v, after, before, ahead):
     # A star is in one part.
     parts = ends[np.flatnonzero(np.diff(ends // PART, prepend=0))]
     several = [np.split(x, parts) for x in (v, after, before)]
-    found = [_best_collapses(V, flat, *part, ahead) for part in zip(*several, strict=True)]
+    found = [_best_collapses(V, flat, one, two, three, ahead) for one, two, three in zip(*several, strict=True)]
     return tuple(np.concatenate(x) for x in zip(*found, strict=True))
 
 
