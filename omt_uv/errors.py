@@ -8,3 +8,8 @@ from __future__ import annotations
 
 class UserError(ValueError):
     """What a user can mend: the text says what is wrong, where, and what to do about it."""
+
+
+def one_line(text: str) -> str:
+    """A message on one line, whatever the files and objects are called that it names."""
+    return " ".join(text.split())

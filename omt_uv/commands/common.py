@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from .. import __version__
-from ..errors import UserError
+from ..errors import UserError, one_line
 from ..supervision import PROGRAM
 
 # Formats in which Y is up, by custom, and what turns that to Z.
@@ -196,7 +196,7 @@ def warn(objects: list, solver_warnings: list[tuple[int, str]], warnings: list[s
 
 def warn_of(text: str) -> None:
     """Print a warning on a line of its own."""
-    print(f"{PROGRAM}: warning: {text}", file=sys.stderr)
+    print(f"{PROGRAM}: warning: {one_line(text)}", file=sys.stderr)
 
 
 def write_report(options: argparse.Namespace, more: dict, objects: list, charts: list, written) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from ..settings import (
@@ -95,7 +96,7 @@ def _check_image(options: argparse.Namespace) -> None:
     if options.image_out is None:
         return
     check_target(options.image_out)
-    if not options.image.is_file():
+    if not os.path.isfile(options.image):
         raise CommandError(f"{options.image}: there is no such file")
 
 

@@ -5,6 +5,7 @@ What is written looks like the image it comes from: the same colour space, depth
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
@@ -60,7 +61,7 @@ def load(path: Path) -> bpy.types.Image:
     ------
     ImageError : there is no such file, or it is no image
     """
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise ImageError(f"{path}: there is no such file")
     try:
         with silence():
@@ -133,7 +134,7 @@ def save(path: Path, pixels: np.ndarray, like: bpy.types.Image) -> None:
 
 def check_whole(path: Path, size: tuple[int, ...] = ()) -> None:
     """Raise RuntimeError unless a file reads as an image, of a size if one is given."""
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise RuntimeError("nothing was written. Is the disk full?")
     data = path.read_bytes()
     if data.startswith(PNG_START) and not data.endswith(PNG_END):
@@ -165,6 +166,8 @@ def _render(image: bpy.types.Image, path: Path, file_format: str) -> None:
 def _new_image(name: str, pixels: np.ndarray, like: bpy.types.Image) -> bpy.types.Image:
     """An image of the pixels (h,w,4), in colour space, depth and alpha like another."""
     height, width = pixels.shape[:2]
+    # Names of files may be no UTF-8, those of images are.
+    name = name.encode("utf-8", "replace").decode()
     image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=like.is_float)
     if not like.is_float:
         image.colorspace_settings.name, image.alpha_mode = like.colorspace_settings.name, like.alpha_mode

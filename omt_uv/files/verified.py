@@ -140,7 +140,7 @@ def sweep(folder: Path) -> None:
 
 def same_file(a: Path, b: Path) -> bool:
     """Whether two paths lead to one file, which need not exist."""
-    if a.exists() and b.exists():
+    if os.path.exists(a) and os.path.exists(b):
         return os.path.samefile(a, b)
     return os.path.realpath(a) == os.path.realpath(b)
 

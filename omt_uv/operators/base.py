@@ -13,7 +13,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..display import overlay
-from ..errors import UserError
+from ..errors import UserError, one_line
 from ..session import following, last_run, run
 from ..session.language import counted
 from ..settings import DEFAULT_MAX_SHEAR, DEFAULT_TEXTURE_SIZE
@@ -161,10 +161,10 @@ def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Co
 
         select_culprits(context, complaint.obj, complaint.error)
         names, action = [complaint.obj.name] if complaint.obj else names, action_for(complaint.error)
-    last_run.state.error = str(complaint)
-    notice = last_run.Notice(str(complaint), action)
+    last_run.state.error = text = one_line(str(complaint))
+    notice = last_run.Notice(text, action)
     last_run.keep(last_run.Summary(operator.bl_label, (), (notice,), tuple(names), refused=True))
-    operator.report({"ERROR"}, str(complaint))
+    operator.report({"ERROR"}, text)
     return {"CANCELLED"}
 
 
@@ -177,7 +177,7 @@ def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, 
         several = f" ({counted(count, '{} island', '{} islands')})" if count > 1 else ""
         text = advise(raw) + several
         last_run.state.notices.append(last_run.Notice(text, action_advised(raw)))
-        operator.report({"WARNING"}, name + text)
+        operator.report({"WARNING"}, one_line(name + text))
 
 
 def _is_finite(value) -> bool:

@@ -7,6 +7,8 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
+from ..errors import one_line
+
 
 class UV_OT_omt_preset(bpy.types.Operator):
     """Take over the settings of this preset"""
@@ -21,11 +23,11 @@ class UV_OT_omt_preset(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         from ..session import presets
 
-        path = Path(self.filepath)
+        path = Path(bpy.path.abspath(self.filepath))
         try:
             presets.choose(path, context.window_manager.operator_properties_last(self.operator))
-        except (OSError, SyntaxError, ValueError, TypeError) as error:
-            self.report({"ERROR"}, f"{path.name} cannot be used: {error}")
+        except presets.PresetError as error:
+            self.report({"ERROR"}, one_line(str(error)))
             return {"CANCELLED"}
         self.report({"INFO"}, f"{path.stem}: the settings are chosen, nothing has been unwrapped yet")
         return {"FINISHED"}

@@ -22,7 +22,7 @@ BEGUN = b"ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nprope
 BAD: dict[str, bytes | str | None] = {
     "missing.obj": "", "folder.obj": None, "empty.ply": b"", "noise.glb": NOISE, "noise.gltf": NOISE,
     "noise.fbx": NOISE, "noise.blend": NOISE, "noise.stl": NOISE, "noise.off": NOISE, "begun.ply": BEGUN,
-    "points.obj": POINTS, "lines.obj": LINES, "flat.off": LINE_OFF, "unknown.xyz": POINTS,
+    "x" * 300 + ".obj": "", "points.obj": POINTS, "lines.obj": LINES, "flat.off": LINE_OFF, "unknown.xyz": POINTS,
 }  # fmt: skip
 # Commands that write nothing, or find nothing to do on the bodies here.
 NOTHING_WRITTEN = ("distance", "similar", "symmetrize", "rectify")
@@ -65,7 +65,7 @@ def refused(run, folder, call, named, statuses=(1, 2)):
     assert status in statuses, (call, status, err)
     assert out == "" and len(err.splitlines()) == 1 and err.startswith("omt_uv: error: "), (call, out, err)
     # A mesh has the name of its file.
-    assert any(name.rpartition(".")[0] in err for name in named if name), (call, err)
+    assert any(name.rpartition(".")[0][-40:] in err for name in named if name), (call, err)
     assert "Traceback" not in err and "Location:" not in err, err
     assert contents(folder) == before, call
     return err

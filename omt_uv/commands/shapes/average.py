@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,7 @@ def run(options: argparse.Namespace) -> None:
     if options.output.suffix.lower() != ".blend":
         raise UsageError(f"{options.output}: the mean and its attributes go into a .blend. Name one.")
     check_paths(options)
-    if not options.input.is_dir():
+    if not os.path.isdir(options.input):
         raise CommandError(f"{options.input}: there is no such folder")
     files = _shape_files(options)
     if len(files) < 2:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from pathlib import Path
 
 from ... import __version__
@@ -38,7 +39,7 @@ def run(options: argparse.Namespace) -> None:
     from ...files.verified import check_writable, write_bytes
     from ...pipelines.shapes.signature_index import index_of, read_index
 
-    if not options.input.is_dir():
+    if not os.path.isdir(options.input):
         raise CommandError(f"{options.input}: there is no such folder")
     if options.output.suffix.lower() != SUFFIX:
         raise CommandError(f"{options.output}: an index is an .npz. Name one.")

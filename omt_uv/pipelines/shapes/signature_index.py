@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +18,8 @@ from ...solver.signatures.wasserstein import distance_of, prepared
 
 # Rows and columns of a block of distances.
 BLOCK = 24
+# What numpy and zip raise about files that are none of theirs, or damaged, or longer than any memory.
+UNREADABLE = (OSError, KeyError, ValueError, TypeError, EOFError, BadZipFile, zlib.error, RuntimeError, MemoryError)
 
 
 class IndexFileError(UserError):
@@ -48,7 +52,9 @@ class SignatureIndex(Sequence):
         """The index as a file."""
         data = io.BytesIO()
         arrays = {"packed": self.packed, "floors": self.floors, "coefficients": self.coefficients}
-        np.savez(data, names=np.array(self.names), marks=np.array(self.marks), **arrays)
+        # In bytes: numpy cannot read names of files that are no UTF-8 back as text.
+        names = np.array([name.encode("utf-8", "surrogateescape") for name in self.names])
+        np.savez(data, names=names, marks=np.array(self.marks), **arrays)
         return data.getvalue()
 
 
@@ -107,17 +113,38 @@ def chosen(index: SignatureIndex, names: Sequence[str]) -> SignatureIndex:
 
 def read_index(path: Path) -> SignatureIndex:
     """Read an index. Raises IndexFileError."""
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise IndexFileError(f"{path}: there is no such index. Make one by the command library.")
     try:
         with np.load(path, allow_pickle=False) as data:
             parts = [data[name] for name in ("packed", "floors", "coefficients")]
-            found = SignatureIndex(tuple(data["names"].tolist()), tuple(data["marks"].tolist()), *parts)
-    except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
+            names = tuple(map(_text, data["names"].tolist()))
+            found = SignatureIndex(names, tuple(data["marks"].tolist()), *parts)
+    except UNREADABLE as error:
         raise IndexFileError(f"{path}: is no index of signatures. Make one by the command library.") from error
-    if not len(found) == len(found.marks) == len(found.packed) == len(found.floors) == len(found.coefficients):
+    if not _is_whole(found):
         raise IndexFileError(f"{path}: is no whole index of signatures. Make one by the command library.")
     return found
+
+
+def _text(name: bytes | str) -> str:
+    return name.decode("utf-8", "surrogateescape") if isinstance(name, bytes) else name
+
+
+def _is_whole(index: SignatureIndex) -> bool:
+    """Whether the arrays of an index belong together, and hold numbers."""
+    arrays = (index.packed, index.floors, index.coefficients)
+    sizes = {len(index.names), len(index.marks), *(len(x) if x.ndim else -1 for x in arrays)}
+    dimensions = tuple(x.ndim for x in arrays) == (3, 1, 3)
+    numbers = all(x.dtype.kind == "f" and np.isfinite(x).all() for x in arrays)
+    return (
+        len(sizes) == 1
+        and dimensions
+        and numbers
+        and index.packed.shape[2] in (3, 4)
+        and index.coefficients.shape[2] == 2
+        and all(isinstance(text, str) for text in (*index.names, *index.marks))
+    )
 
 
 def blocks_of(count: int) -> list[tuple[int, int, int, int]]:
