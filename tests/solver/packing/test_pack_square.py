@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
+import hard_meshes
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -191,3 +194,20 @@ def test_where_islands_come_from_plays_no_part_in_blocks_either(monkeypatch):
         np.testing.assert_allclose(new, old, atol=1e-9)
     points = np.concatenate(found)
     assert points.min() > 0 and points.max() < 1 and least_distance(found) >= 1 / 128
+
+
+@pytest.mark.parametrize("make", [hard_meshes.strip, hard_meshes.fan])
+def test_memory_grows_no_faster_than_the_points_of_an_island(make):
+    """Every point beside every other one were sixteen times as much for four times the points: gigabytes."""
+
+    def peak(count):
+        V, polygons = make(count)
+        island = V[:, :2] * [1, 100]
+        triangles = polygons[:, :3] if polygons.shape[1] == 3 else polygons[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+        tracemalloc.start()
+        pack([island, corner(1, 1)], [triangles, FAN])
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    assert peak(16_000) < 5 * peak(4_000)
