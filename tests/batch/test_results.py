@@ -38,6 +38,7 @@ def test_parts_of_a_file_are_one_row(package):
 def test_a_table_has_a_line_for_every_file_and_no_formulas(package):
     rows = [row("=cmd|x.obj"), row("b.obj", "failed", status=1, report="", message='has "quotes", and commas')]
     text = package("batch.tables").csv_text(rows)
+    assert "\r" not in text
     first, second = csv.DictReader(io.StringIO(text))
     assert first["name"] == "'=cmd|x.obj" and float(first["area_l1"]) == pytest.approx(0.4)
     assert second["message"] == 'has "quotes", and commas' and second["area_l1"] == ""

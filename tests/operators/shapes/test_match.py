@@ -43,6 +43,7 @@ def test_everything_arrives_on_the_other_mesh(package):
     target.data.attributes["paint"].data.foreach_get("color", colour)
     assert np.abs(colour.reshape(-1, 4)[:, :3] - (own * 0.2 + 0.5)).max() < 0.03
     assert np.abs(positions(target, "Grow") - 1.2 * shape).max() < 0.05
+    assert target.data.shape_keys.key_blocks.keys() == ["Basis", "Grow"]
     corner = np.array([loop.vertex_index for loop in target.data.loops])
     side = np.array([target.data.materials[p.material_index].name == "blue" for p in target.data.polygons])
     there = own[corner]

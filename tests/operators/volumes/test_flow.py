@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import bpy
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 import scenes
 from bodies import icosphere
+from mathutils import Vector
 
 from omt_uv.solver.flows.enclosed_volume import component_volumes
 
@@ -262,3 +264,24 @@ def test_a_uv_drag_leaves_no_trace():
     assert np.abs(scenes.uv_of(obj) - before).max() > 0.05
     drag.restore()
     np.testing.assert_array_equal(scenes.uv_of(obj), before)
+
+
+@pytest.mark.parametrize("name", ["object.omt_flow", "uv.omt_flow"])
+def test_the_wheel_widens_and_narrows_the_reach_while_it_is_dragged(name, monkeypatch):
+    obj = ball()
+    select_vertices(obj, [top(obj)])
+    if name == "uv.omt_flow":
+        bpy.ops.uv.omt_unwrap(quality="DRAFT", max_shear=0.0)
+    operator = scenes.stand_in(name)
+    if name == "object.omt_flow":
+        monkeypatch.setattr(type(operator), "_shift", lambda *_: Vector((0, 0, 0.1)), raising=False)
+    operator.begin_drag(bpy.context)
+    radii = [operator.radius]
+    for kind in ("WHEELUPMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "WHEELDOWNMOUSE", "WHEELDOWNMOUSE"):
+        event = SimpleNamespace(type=kind, value="PRESS", mouse_region_x=0, mouse_region_y=0)
+        assert operator.modal(bpy.context, event) == {"RUNNING_MODAL"}
+        radii.append(operator.radius)
+    assert radii[0] < radii[1] < radii[2]
+    np.testing.assert_allclose(radii[3:5], radii[1::-1], rtol=1e-6)
+    assert radii[5] < radii[0]
+    operator._drag.restore()

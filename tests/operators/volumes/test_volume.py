@@ -68,6 +68,7 @@ def test_what_is_made_has_the_materials_and_a_slice_lies_where_it_shall():
     bpy.context.view_layer.update()
     assert bpy.ops.object.omt_volume(result="SLICE", axis="X", place=0.25, tets=200) == {"FINISHED"}
     made = bpy.data.objects["Body Slice"]
+    assert len(made.data.vertices) > 3
     x = 5 + 2 * np.array([v.co.x for v in obj.data.vertices])
     np.testing.assert_allclose([v.co.x for v in made.data.vertices], x.min() + 0.25 * np.ptp(x), atol=1e-4)
     assert [m.name for m in made.data.materials] == ["Paint"]
