@@ -73,6 +73,11 @@ def test_the_cut_mesh_is_a_new_object_of_exact_cells_with_uvs_and_groups():
     area = np.bincount(integers(new, CELL), [p.area for p in seen.polygons])
     assert np.abs(area / area.mean() - 1).max() < 1e-3
     assert sum(p.area for p in new.data.polygons) == pytest.approx(sum(p.area for p in obj.data.polygons), rel=1e-5)
+    cell, of_edge = integers(new, CELL), {}
+    for polygon in new.data.polygons:
+        for key in polygon.edge_keys:
+            of_edge.setdefault(key, set()).add(cell[polygon.index])
+    assert {e.key for e in new.data.edges if e.use_seam} >= {key for key, cells in of_edge.items() if len(cells) > 1}
     inside = [uv.vector for uv in new.data.uv_layers[0].uv]
     assert np.min(inside) > -1e-6 and np.max(inside) < 1 + 1e-6
 

@@ -2,8 +2,9 @@
 
 import meshes
 import numpy as np
+import pytest
 
-from omt_uv.solver.mesh.point_location import locate
+from omt_uv.solver.mesh.point_location import _barycentric, locate
 
 
 def test_points_of_the_plane_come_back():
@@ -36,3 +37,15 @@ def test_points_of_the_sphere_come_back():
     again = np.einsum("kc,kcd->kd", barycentric, V[F[found]])
     np.testing.assert_allclose(again / np.linalg.norm(again, axis=1, keepdims=True),
                                points / np.linalg.norm(points, axis=1, keepdims=True), atol=1e-9)  # fmt: skip
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_coordinates_give_the_point_back_and_none_is_positive_in_a_folded_triangle(d):
+    corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.2, 0.8, 1.0]])[:, :d]
+    share = np.random.default_rng(0).dirichlet([1, 1, 1], 20)
+    points = share @ corners
+    found = _barycentric(np.tile(corners, (20, 1, 1)), points)
+    np.testing.assert_allclose(found, share, atol=1e-12)
+    folded = _barycentric(np.tile(corners[[0, 2, 1]], (20, 1, 1)), points)
+    assert (folded < 0).all()
+    np.testing.assert_allclose(-folded[:, [0, 2, 1]], share, atol=1e-12)

@@ -61,6 +61,7 @@ def test_there_and_back_again():
     again = np.einsum("nc,ncd->nd", found.forward.barycentric, back[G[found.forward.faces]])
     assert np.linalg.norm(again - V, axis=1).mean() < 0.02
     assert found.residuals.max() < 1e-6 and found.flipped == 0
+    assert len(found.residuals) == len(found.met) == len(chosen)
 
 
 def test_maps_that_are_known_are_taken():
