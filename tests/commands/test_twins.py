@@ -41,7 +41,6 @@ MATCHED = ("", {"mode": "TRANSFER"})
 ROWS: dict = {
     "unwrap": ("uv.omt_unwrap", [
         ("Closed", DRAFT, None, {"balance": 0.75}),
-        ("Closed", DRAFT, None, {"quality": "STANDARD"}),
         ("Closed", DRAFT, None, {"max_shear": 1.0625}),
         ("Closed", CUT, "--keep-free region", {"keep_free": "region"}),
         ("Closed", DRAFT, None, {"seams": "CHARTS"}),
@@ -66,7 +65,6 @@ ROWS: dict = {
     ]),
     "refine": ("uv.omt_refine", [
         ("Closed", REFINED, None, {"balance": 0.75}),
-        ("Closed", REFINED, None, {"quality": "EXACT"}),
         ("Band", REFINED, "--keep-boundary", {"keep_boundary": True}),
         ("Smooth", REFINED, "--subdivision off", {"use_subdivision": False}),
         ("Closed", REFINED, None, {"pack": True}),
@@ -80,15 +78,12 @@ ROWS: dict = {
         ("Band", MAGNIFIED, "--source mesh", {"source": "MESH"}),
         ("Smooth", ALONE, None, {"boundary": "SQUARE"}),
         ("Band", MAGNIFIED, "--cascade 2", {"cascade": 2}),
-        ("Band", MAGNIFIED, None, {"quality": "EXACT"}),
         ("Smooth", ALONE, None, {"margin": 40}),
         ("Smooth", ALONE, None, {"texture_size": 64}),
-        ("Smooth", ALONE, None, {"max_shear": 1.03125}),
         ("Closed", MAGNIFIED, None, {"weight_group": "second"}),
         ("Closed", MAGNIFIED, "--weights height", {"region": "ATTRIBUTE", "attribute": "height"}),
         ("Closed", ("--quality draft --source uv", MAGNIFIED[1]), "--region region=1.25 --region second=0.5",
          {"factor": 1.25, "further": "second=0.5"}),
-        ("Smooth", ALONE, None, {"balance": 0.75}),
         ("Smooth", ALONE, None, {"tile": 1013}),
         ("Smooth", ALONE, "--subdivision off", {"use_subdivision": False}),
     ]),
@@ -96,7 +91,6 @@ ROWS: dict = {
         ("Closed", GLOBE, "--projection lambert", {"projection": "LAMBERT"}),
         ("Closed", GLOBE, None, {"projection": "OCTAHEDRAL"}),
         ("Closed", GLOBE, None, {"balance": 0.75}),
-        ("Closed", GLOBE, None, {"quality": "EXACT"}),
         ("Closed", GLOBE, "--method flow", {"method": "FLOW"}),
         ("Closed", GLOBE, None, {"method": "MOSER"}),
         ("Closed", GLOBE, "--weights region", {"weight_group": "region"}),
@@ -113,10 +107,8 @@ ROWS: dict = {
         ("Closed", CURVED, "--factor 0.25", {"amount": 0.25}),
         ("Closed", PAINTED, "--factor 2", {"weight_factor": 2.0}),
         ("Closed", PAINTED, None, {"grading": 0.25}),
-        ("Closed", MESHED, None, {"strategy": "CFP-APP"}),
         ("Closed", MESHED, "--sharp 20", {"use_preserve_sharp": True, "sharp_angle": math.radians(20)}),
         ("Closed", MESHED, None, {"use_preserve_seams": False}),
-        ("Closed", ("", MESHED[1] | {"use_preserve_seams": False}), None, {"use_preserve_materials": False}),
         ("Band", MESHED, None, {"use_preserve_boundary": False}),
     ]),
     "seams": ("uv.omt_seams", [
@@ -150,7 +142,6 @@ ROWS: dict = {
         ("Closed", TETS, None, {"domain": "CUBE"}),
         ("Closed", TETS, None, {"domain": "BODY", "body": "Wall"}),
         ("Closed", TETS, None, {"method": "FLOW"}),
-        ("Closed", TETS, None, {"tets": 300}),
         ("Closed", TETS, None, {"result": "ATTRIBUTE"}),
         ("Closed", ("", TETS[1] | {"result": "SHELLS"}), None, {"shells": 2}),
         ("Closed", ("", TETS[1] | {"result": "POINTS"}), None, {"points": 50}),
@@ -161,14 +152,12 @@ ROWS: dict = {
     "match": ("object.omt_match", [
         ("Wall Closed", MATCHED, None, {"mode": "CHECKER"}),
         ("Wall Closed", MATCHED, None, {"transfer": {"UV"}}),
-        ("Wall Closed", MATCHED, None, {"landmark_prefix": "mark"}),
         ("Wall Closed", MATCHED, None, {"balance": 0.0}),
         ("Wall Closed", MATCHED, None, {"mirrored": True}),
         ("Wall Closed", MATCHED, None, {"use_polish": False}),
         ("Wall Closed", MATCHED, None, {"features": 2.0}),
         ("Wall Closed", ("", {"mode": "WRAP"}), None, {"shape_key": "Mine"}),
         ("Wall Closed", ("", {"mode": "MORPH"}), None, {"factor": 0.25}),
-        ("Wall Closed", MATCHED, None, {"domain": "CHARTS"}),
     ]),
     "density": ("uv.omt_density_set", [
         ("Closed", ("", {}), None, {"unit": "M"}),
@@ -292,12 +281,16 @@ OTHERS = {"uv.omt_measure", "uv.omt_regions", "uv.omt_density_get", "uv.omt_wors
           }  # fmt: skip
 # Properties that are looked at elsewhere: pictures, empties, and names that stand in for others.
 ELSEWHERE = {
-    "uv.omt_magnify": {"use_image", "image", "image_size", "detail", "detail_box"},
+    "uv.omt_magnify": {"balance", "max_shear", "use_image", "image", "image_size", "detail", "detail_box"},
     "uv.omt_sphere": {"image", "image_layout"},
     "object.omt_flow": {"handles"},
     "uv.omt_seams": {"use_subdivision"},
     "object.omt_remesh": {"count_of", "target_faces", "edge_length", "density_attribute", "levels", "ratio",
-                          "preserve_attributes", "use_modifiers", "hide_original"},
+                          "preserve_attributes", "use_modifiers", "hide_original", "strategy",
+                          "use_preserve_materials"},
+    "object.omt_match": {"domain", "landmark_prefix"},
+    # Libraries that may not be there.
+    "object.omt_volume": {"library"},
 }  # fmt: skip
 
 
