@@ -63,10 +63,12 @@ class Held:
         """Green's function (k,k) between vertices (k,) that are to be cut."""
         part = self.rows[:, vertices]
         block = self.green[np.ix_(vertices, vertices)] - part.T @ part
+        own, at = block.diagonal(), np.diag_indices(len(vertices))
         if len(vertices) > 1:
             # The first pin of a closed surface takes all of its load: what gave way there would be a spread that stays.
-            own = block.diagonal()
-            block[np.diag_indices(len(own))] += ROUNDING * own + LEAST_ROUNDING * own.max()
+            block[at] += ROUNDING * own + LEAST_ROUNDING * own.max()
+        # What others hold already answers with nothing, but by rounding.
+        block[at] = np.maximum(block[at], LEAST_ROUNDING * self.green[vertices, vertices])
         return block
 
     def own(self, vertices: np.ndarray) -> np.ndarray:

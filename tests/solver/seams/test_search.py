@@ -45,6 +45,16 @@ def test_a_cut_by_green_functions_is_that_of_a_new_solve(cap):
     assert np.isclose(model.gain(one)[0], model.spread - model.spread_cut(one), rtol=1e-6)
 
 
+def test_what_is_held_already_saves_nothing(cap):
+    """Cut twice, or among its neighbours so often that nothing is left but rounding."""
+    model = ScaleModel.of(cap)
+    inner = np.flatnonzero(~cap.boundary)
+    cut = model.cut(inner[:40])
+    for again in (inner[:1], inner[3:4], inner[:7]):
+        assert abs(cut.spread_cut(again) - cut.spread) <= 1e-6 * model.spread
+        assert np.isfinite(cut.cut(again).scale).all()
+
+
 def test_a_flat_surface_has_no_scale():
     V, F = meshes.grid(12, 12)
     assert np.abs(ScaleModel.of(coarsening(V * [1, 1, 0], F, 1000).ended(1000)).scale).max() < 1e-9
