@@ -33,7 +33,7 @@ def run(options: argparse.Namespace) -> None:
     from ..files.saving import save
     from ..pipelines.subdivision import on_subdivided_surface
     from ..solver.parameterization.chart_pins import clear_of_pins
-    from ..solver.parameterization.shear_bound import predicted_cuts
+    from ..solver.parameterization.unwrap import predicted_cuts
 
     if options.output.suffix.lower() != ".blend":
         raise CommandError(f"{options.output}: only .blend files keep seams. Write one of these.")

@@ -81,7 +81,7 @@ def _cut(reading, avoid, modifier, bound: float, options: dict):
     """The cuts of a surface, as it is or as a modifier subdivides it, for a bound of the shear or, with 0, none."""
     from ..pipelines.subdivision import on_subdivided_surface
     from ..solver.parameterization.chart_pins import clear_of_pins
-    from ..solver.parameterization.shear_bound import predicted_cuts
+    from ..solver.parameterization.unwrap import predicted_cuts
     from ..solver.progress import Progress
 
     yield Progress("Seams", 0.0)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..analysis.density import Target
-from ..analysis.facing import SceneAxes
-from ..analysis.seam_costs import SeamCosts, SeamPreferences, seam_costs
-from ..cutting.cuts import Cuts, cut
+from ..analysis.seam_costs import SeamCosts, seam_costs
+from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, plural
 from ..maps.distortion import face_distortion
@@ -23,7 +22,6 @@ from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from .chart_map import ChartMap
-from .mirrored_charts import with_images
 from .options import ShearBound
 
 if TYPE_CHECKING:
@@ -53,9 +51,9 @@ ONE_PIECE = 0.97
 SLIT = 1.5
 # What misses the bound by less after a second search is slit where it shears more than that.
 NEARLY = 0.03
+SHEARED = 2.0
 # A vertex is in a face from this certainty on.
 IN_FACE = 0.5
-SHEARED = 2.0
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
 # The least share of a surface that a warning names as a number.
@@ -128,11 +126,11 @@ class ShearSearch:
     def rehearsed(self, surface: Surface, log_density: np.ndarray | None) -> Steps[float | None]:
         """The square of the logarithm of what maps of a small surface shear; log_density (n,) : half the logarithm of
         the density at its vertices. None where it comes apart, since then it is another surface."""
+        if self.map_surface is None:
+            return None
         target = None
         if log_density is not None:
             target = Target(np.exp(2 * log_density[surface.corner_vertex[surface.triangles]].mean(axis=1)))
-        if self.map_surface is None:
-            return None
         prepared = yield from disk_charts(surface, extremities=0)
         maps = yield from self.map_surface(surface, prepared.charts, target)
         shear = [_shear(chart, one, target is None) for chart, one in zip(prepared.charts, maps, strict=True)]
@@ -182,21 +180,6 @@ class ShearSearch:
     def count(self) -> int:
         """Polygons of the surface."""
         return len(self.surface.face_start) - 1
-
-
-def predicted_cuts(
-    surface: Surface, faces: np.ndarray, bound: float, axes: SceneAxes | None = None, **options: Any
-) -> Cuts:
-    """What `unwrap` cuts for a bound of the shear before its first map; with 0 for none, what it cuts without one.
-
-    faces (f,) bool : polygons of the surface; axes : how it stands in the scene; options and errors: see `cuts.cut`
-    """
-    if bound:
-        shear = ShearBound(bound, preferences=SeamPreferences(axes=axes))
-        search = ShearSearch(surface, faces, shear, None, {})
-        options |= {"search": search.search(search.first_spread())}
-    cuts = cut(surface, faces, **options)
-    return cuts if options.get("fill") else with_images(surface, faces, cuts)
 
 
 def bound_shear(

@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..analysis.density import Target
+from ..analysis.facing import SceneAxes
+from ..analysis.seam_costs import SeamPreferences
 from ..canonical.markers import MapMarkers, markers_of_chart
+from ..cutting.cuts import Cuts
+from ..cutting.cuts import cut as cut_surface
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural
@@ -30,7 +34,7 @@ from .mirrored_charts import (
     with_images,
     with_mirrored_quads,
 )
-from .options import UnwrapOptions
+from .options import ShearBound, UnwrapOptions
 from .shear_bound import ShearSearch, bound_shear
 from .small_charts import is_small, map_together
 
@@ -197,6 +201,21 @@ def rehearsal(options: UnwrapOptions) -> Callable[[Surface, list[Chart], Target 
         return (yield from _Task(surface, quick, None, target).map_charts(charts))
 
     return maps
+
+
+def predicted_cuts(
+    surface: Surface, faces: np.ndarray, bound: float, axes: SceneAxes | None = None, **options: Any
+) -> Cuts:
+    """What `unwrap` cuts for a bound of the shear before its first map; with 0 for none, what it cuts without one.
+
+    faces (f,) bool : polygons of the surface; axes : how it stands in the scene; options and errors: see `cuts.cut`
+    """
+    if bound:
+        shear = ShearBound(bound, preferences=SeamPreferences(axes=axes))
+        search = ShearSearch(surface, faces, shear, None, {}, rehearsal(UnwrapOptions()))
+        options |= {"search": search.search(search.first_spread())}
+    cuts = cut_surface(surface, faces, **options)
+    return cuts if options.get("fill") else with_images(surface, faces, cuts)
 
 
 def _cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts, given: dict) -> Steps[DiskCharts]:

@@ -18,8 +18,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.mirrored_charts import images_of_cuts, motion_between, with_images
 from omt_uv.solver.parameterization.options import UnwrapOptions
-from omt_uv.solver.parameterization.shear_bound import predicted_cuts
-from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.parameterization.unwrap import predicted_cuts, unwrap
 from omt_uv.solver.progress import drain
 
 DRAFT = UnwrapOptions(quality="draft")
