@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,8 +36,10 @@ SPREAD_OF_SHEAR = 0.19
 SPREAD_BY_SHEAR = 1.7
 # What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
 MARGIN = 0.95
-# What misses the bound by less stays in one piece: it has so many times the square of log(shear).
+# What misses the bound by less stays in one piece at first: it has so many times the square of log(shear).
 CROWDED = 1.35
+# Nothing comes apart for less than this share of the bound.
+HARDLY = 0.01
 # Vertices this close to where images of others belong, over the extent, are these images.
 SAME_PLACE = 1e-3
 # What shears more than this is seen on any checker, and charts with more of it than that share are cut further.
@@ -200,11 +202,12 @@ def bound_shear(
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     tried = {_as_a_set(last.cuts.edges)}
-    rehearsed: dict = {}
+    rehearsed, apart = dict[str, Any](), dict[int, np.ndarray]()
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
-            # What coarse maps tell does not hold here, either.
-            last, crossing, rehearsed = best, None, {"rehearse": None}
+            # What coarse maps tell does not hold here, or it is no use to part what lies on itself.
+            last, rehearsed = best, {"rehearse": None}
+            crossing = None if apart else crossing
             promised[:] = np.inf
         if not last.searched:
             break
@@ -220,9 +223,7 @@ def bound_shear(
         share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
         begin, width = begin + width * PARTING, width * (1 - PARTING)
-        within = np.concatenate([np.zeros(0, np.int64), *(_within(last.charts[k]) for k in (*missed, *flat))])
-        kept = last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), within)]
-        kept = np.concatenate([kept, *apart.values()])
+        kept = np.concatenate([_around(last, (*missed, *flat)), *apart.values()])
         # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
         changes = {"share": share, "adding": rounds > 1, "memory": (memory := dict(last.memory))} | rehearsed
         cutting = search.again(kept, [last.charts[k] for k in missed], spread, changes)
@@ -335,31 +336,26 @@ def _apart(
     from ..seams.parting import flat_sides, parted, slits
 
     for k in last.searched:
-        chart = last.charts[k]
-        if last.mean[k] <= (1 + NEARLY * late) * last.bound:
+        chart, mean = last.charts[k], last.mean[k]
+        edges = flat_sides(chart) if mean > last.bound else np.zeros((0, 2), np.int64)
+        if len(edges):
+            flat.append(k)
+        elif crossing is not None and mean > (1 + HARDLY) * last.bound and (late or np.log(mean) >= least):
+            uv = yield from crossing(chart, last.maps[k])
+            shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
+            if area @ shear <= last.bound * area.sum():
+                edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
+        if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
             # No other cut is needed, but one into what shears that much.
             shear, area = _shear(chart, last.maps[k], search.target is None)
-            missed = max(last.mean[k] / last.bound - 1, 0.0)
+            missed = max(mean / last.bound - 1, 0.0)
             steep = shear > (STEEP if missed == 0 else SHEARED)
             excess = float(area[shear > STEEP].sum() / area.sum() - MOST_STEEP) if missed == 0 else missed
             costs, here = search.costs(), chart.vertex_ids
             # Rather steep than slit where everybody looks.
             cost = np.where(costs.face[here] > IN_FACE, np.inf, costs.vertex_cost[here])
             edges = slits(chart, steep, SLIT * excess * area.sum(), cost, search.images)
-            if len(edges):
-                found[k] = edges
-                continue
-        edges = flat_sides(chart)
-        if len(edges):
-            found[k] = edges
-            flat.append(k)
-        if len(edges) or np.log(last.mean[k]) < least or crossing is None:
-            continue
-        uv = yield from crossing(chart, last.maps[k])
-        shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
-        if area @ shear <= search.shear.bound * area.sum():
-            edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
-            found |= {k: edges} if len(edges) else {}
+        found |= {k: edges} if len(edges) else {}
     return found, flat
 
 
@@ -368,6 +364,12 @@ def _cuts(prepared: DiskCharts) -> Cuts:
     if prepared.cuts is None:
         raise ValueError("charts along existing seams alone have no cuts to add to")
     return prepared.cuts
+
+
+def _around(last: _Round, cut_anew: tuple[int, ...]) -> np.ndarray:
+    """Edges (k,2) that were cut, but those within charts that are cut anew."""
+    within = np.concatenate([np.zeros(0, np.int64), *(_within(last.charts[k]) for k in cut_anew)])
+    return last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), within)]
 
 
 def _as_a_set(edges: np.ndarray) -> bytes:
