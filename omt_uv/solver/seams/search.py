@@ -49,8 +49,8 @@ CLOSE = 0.85
 FLAT = 1e-9
 # Where the time of a search goes, roughly: growth ends at this share of it.
 GROWN = 0.5
-# The square of log(shear) of a rehearsal, over that of the map: of the same surface, and of a far finer one. Heads,
-# animals and figures are within a tenth of it.
+# The square of log(shear) of a rehearsal, over that of the map: of about the same surface, and of a far finer one.
+# Heads, animals and figures are within a tenth of it.
 REHEARSED = (0.7, 0.9)
 
 
@@ -238,7 +238,9 @@ class SeamSearch:
     def _rehearsal(self, component: CutComponent) -> Rehearsal:
         plane = self.costs().plane
         normal = None if plane is None else plane.normal
-        return Rehearsal(component, normal, lambda coarse: self._log_density(component, coarse), self.rehearse)
+        # Where the coarse surface is the surface itself, the map that is to be made tells as much as a rehearsal.
+        rehearse = self.rehearse if component.vertex_count > self.options.vertices else None
+        return Rehearsal(component, normal, lambda coarse: self._log_density(component, coarse), rehearse)
 
     def _added(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut and arcs added to it: where it was tried by a map, that shears less with any more of them."""
