@@ -163,7 +163,9 @@ def test_balance_and_quality_count():
         scenes.set_uv(obj, start)
         refine(**options)
         errors.append(error(obj))
-    assert errors == sorted(errors)
+    exact, standard, draft, more, most = errors
+    # Standard presses polygons no further than a quarter of what they may be off, and a draft may come out there.
+    assert exact < min(standard, draft) and max(standard, draft) < more < most
     assert errors[0] < 1e-3 < errors[-1]
 
 

@@ -31,7 +31,7 @@ Truth = bool | np.ndarray
 # A stage that reaches the goal ends when Newton promises less than this share of the energy.
 LOOSE = 3e-2
 # One on the way ends sooner where the boundary is free; vertices on a circle or on sides do not make up for it later.
-ON_THE_WAY = 0.3
+ON_THE_WAY = 0.1
 # One that has missed its goal is told by the steps before it promises less than this: see `is_out_of_reach`.
 FORESEEN = 0.1
 # One that has reached it ends, too, where a whole step changes the shear by less than this share, and the area error by

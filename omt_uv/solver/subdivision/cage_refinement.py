@@ -133,7 +133,8 @@ class _CageProblem:
         ratio, weight = self.faces.ratio, self.faces.weight * self.counted
         a, b = self.faces.derivatives(self.matrix @ w)
         p, q = squared(a) / ratio, squared(b) / ratio
-        d = p - q
+        # What is flat in any map has no area to divide by, and no weight.
+        d = np.where(self.counted, p - q, 1.0)
         chi, slope, bend = _chi(d, eps)
         h, h1, h2 = 1 / chi, -slope / chi**2, 2 * slope**2 / chi**3 - bend / chi**2
         # (d^2 + 1) h / 2, whose second derivative is kept where it is positive.

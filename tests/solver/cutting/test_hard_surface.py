@@ -74,7 +74,8 @@ def test_sides_around_a_saddle_are_not_sheared(profile):
 def test_flat_sides_between_bevels_stay_as_they_are(radius, segments, most):
     figures = shear_of(rounded_cube(radius, segments))
     assert figures.angle_mean < most
-    assert figures.area_l1 < 1e-3 and figures.folds == 0 and figures.overlap == 0
+    # A quarter of what polygons may be off, and no further.
+    assert figures.area_l1 < 2e-3 and figures.folds == 0 and figures.overlap == 0
 
 
 def chamfered_cube(width):
