@@ -10,9 +10,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ...solver.errors import EmptyMeshError
 from ...solver.maps.distortion import face_distortion
-from ...solver.mesh.geometry import signed_areas
+from ...solver.mesh.geometry import edge_lengths, signed_areas
 from ...solver.mesh.polygon_areas import polygon_areas
-from ...solver.mesh.topology import halfedges, pair_keys
+from ...solver.mesh.topology import halfedges, pair_keys, paired
 from ..distortion import ChosenTriangles, triangles_of
 from ..reading import Reading
 
@@ -112,7 +112,7 @@ def perimeter(positions: np.ndarray, triangles: np.ndarray) -> float:
     a, b = halfedges(triangles)
     keys, count = np.unique(pair_keys(a, b), return_counts=True)
     outer = keys[count == 1]
-    return float(np.linalg.norm(positions[outer >> 32] - positions[outer & 0xFFFFFFFF], axis=1).sum())
+    return float(edge_lengths(positions, paired(outer)).sum())
 
 
 def diameter(points: np.ndarray) -> float:

@@ -14,7 +14,7 @@ from ..errors import ZeroAreaFaceError
 from ..mesh.geometry import halfedge_lengths, vertex_areas
 from ..mesh.gluing import polygon_sides
 from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
-from ..mesh.topology import halfedges, pair_keys, pair_up
+from ..mesh.topology import halfedges, pair_keys, pair_up, paired
 from .facing import Facing, SceneAxes, ahead, facing, salient_weights, towards
 from .feature_edges import fold_angles
 from .occlusion import vertex_occlusion
@@ -121,7 +121,7 @@ def seam_costs(
     side = polygon_sides(len(surface.corner_vertex), surface.face_start, corners)
     used, triangles = _in_order(surface.positions, used, triangles)
     space, keys = surface.positions[used], np.unique(pair_keys(*(ends[side] for ends in halfedges(triangles))))
-    edges = np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
+    edges = paired(keys)
     positions = unit_size(space, triangles)
     plane = symmetry_plane(positions, triangles, owner)
     seen, at_vertices = _vertex_reasons(positions, triangles, plane, preferences.axes)

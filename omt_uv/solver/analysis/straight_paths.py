@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.geometry import unit, vertex_normals
-from ..mesh.topology import expand, graph_components, halfedges, pair_keys
+from ..mesh.topology import expand, graph_components, halfedges, pair_keys, paired
 
 # Rings of vertices beside a path in which a straighter one is looked for.
 RINGS = 4
@@ -58,7 +58,7 @@ def edge_network(positions: np.ndarray, triangles: np.ndarray, edges: np.ndarray
     leaving, arriving = (unit(along - (along * normal[v]).sum(axis=1)[:, None] * normal[v]) for v in (tail, head))
     return EdgeNetwork(
         triangles=triangles,
-        sides=np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1),
+        sides=paired(keys),
         start=np.searchsorted(tail, np.arange(len(positions) + 1)),
         head=head,
         price=np.linalg.norm(along, axis=1) * cost,

@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix, csr_matrix, vstack
 from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.geometry import face_areas
-from ..mesh.topology import halfedges, pair_keys
+from ..mesh.topology import halfedges, pair_keys, paired
 from ..progress import Progress, Steps
 
 # Bumps over a surface, whose disks together have four times its area: everything is under some of them.
@@ -65,7 +65,7 @@ def curvature_error(of_first: np.ndarray, of_second: np.ndarray) -> float:
 def _edge_graph(V: np.ndarray, F: np.ndarray) -> csr_matrix:
     """Lengths of the edges, both ways."""
     keys = np.unique(pair_keys(*halfedges(F)))
-    a, b = keys >> 32, keys & 0xFFFFFFFF
+    a, b = paired(keys).T
     length = np.maximum(np.linalg.norm(V[a] - V[b], axis=1), 1e-300)
     n = len(V)
     return coo_matrix((np.tile(length, 2), (np.append(a, b), np.append(b, a))), shape=(n, n)).tocsr()

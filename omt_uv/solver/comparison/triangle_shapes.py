@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.geometry import angles_from_lengths, face_areas, halfedge_lengths
-from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys
+from ..mesh.geometry import angles_from_lengths, edge_lengths, face_areas, halfedge_lengths
+from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, paired
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def compare_shapes(V: np.ndarray, F: np.ndarray) -> TriangleShapes:
     area = face_areas(V, F)
     quality = 16 * area**2 / np.maximum(length.sum(axis=1) * length.prod(axis=1), 1e-300)
     keys = np.unique(pair_keys(*halfedges(F)))
-    edge = np.linalg.norm(V[keys >> 32] - V[keys & 0xFFFFFFFF], axis=1)
+    edge = edge_lengths(V, paired(keys))
     return TriangleShapes(
         angle_min=float(least.min()),
         angle_p1=float(np.percentile(least, 1)),

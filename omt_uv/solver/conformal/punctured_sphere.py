@@ -19,7 +19,7 @@ from ..errors import PrecisionError
 from ..linalg.sparse import solve_spd
 from ..mesh.edge_flips import flip_until_none
 from ..mesh.geometry import angles_from_lengths, cotangents_from_lengths, laplacian_from_weights
-from ..mesh.topology import boundary_loops, halfedges, next_halfedge, pair_keys, previous_halfedge
+from ..mesh.topology import boundary_loops, halfedges, next_halfedge, pair_keys, paired, previous_halfedge
 from ..progress import Progress, Steps
 from .intrinsic_triangulation import IntrinsicTriangulation, edge_cosines, flip_metric_in_place, ptolemy_diagonal
 
@@ -173,7 +173,7 @@ def _inversion(tri: IntrinsicTriangulation, puncture: int) -> np.ndarray:
     key, place = np.unique(pair_keys(tail, head), return_inverse=True)
     length = np.full(len(key), np.inf)
     np.minimum.at(length, place.ravel(), np.exp(tri.log_length))
-    graph = csr_matrix((length, (key >> 32, key & 0xFFFFFFFF)), shape=(n, n))
+    graph = csr_matrix((length, tuple(paired(key).T)), shape=(n, n))
     distance = dijkstra(graph, directed=False, indices=puncture)
     distance[puncture] = 1.0
     return np.where(np.isfinite(shortest), -shortest, -np.log(distance))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.closest_point import closest_on_triangles
-from ..mesh.topology import pair_keys
+from ..mesh.topology import pair_keys, paired
 from .box_pairs import box_pairs
 
 # Edges whose squared sine is less are parallel: every place along them is as close.
@@ -107,7 +107,7 @@ def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Ends (e,2) of edges of triangles (m,3), and the edge (m,3) from each corner to the next."""
     keys = pair_keys(triangles.ravel(), np.roll(triangles, -1, axis=1).ravel())
     used, edge = np.unique(keys, return_inverse=True)
-    return np.stack([used >> 32, used & 0xFFFFFFFF], axis=1), edge.reshape(triangles.shape)
+    return paired(used), edge.reshape(triangles.shape)
 
 
 def _along(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..mesh.topology import halfedges, pair_keys
+from ..mesh.topology import halfedges, pair_keys, paired
 from .box_pairs import box_pairs
 
 # Candidate pairs that are looked at together: their arrays stay in the cache.
@@ -51,7 +51,7 @@ class FaceCrossings:
         uses = np.bincount(edge)
         turns = np.bincount(edge, np.where(tail < head, 1, -1)[order])
         wrong = (uses > 2) | ((uses == 2) & (turns != 0))
-        one, other = ordered[first] >> 32, ordered[first] & 0xFFFFFFFF
+        one, other = paired(ordered[first]).T
         plain = np.ones(n, bool)
         plain[one[wrong]] = plain[other[wrong]] = False
         # A fan that is open has an edge more than triangles; two of them are no single one.

@@ -22,7 +22,7 @@ from ..errors import (
     plural,
 )
 from .repair import faces_without_area, perturbed
-from .topology import graph_components, halfedges, next_halfedge, pair_keys
+from .topology import graph_components, halfedges, next_halfedge, pair_keys, paired
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def _check_edges(triangles: np.ndarray) -> None:
     """Raise unless every edge has two faces that agree about which side is out."""
     tail, head = halfedges(triangles)
     edges, inverse, count = np.unique(pair_keys(tail, head), return_inverse=True, return_counts=True)
-    ends = np.stack([edges >> 32, edges & 0xFFFFFFFF], axis=1)
+    ends = paired(edges)
     if (count > 2).any():
         raise NonManifoldEdgeError("More than two faces meet at an edge", kind="edge", elements=ends[count > 2])
     if (count < 2).any():

@@ -25,6 +25,11 @@ def pair_keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (np.minimum(a, b) << 32) | np.maximum(a, b)
 
 
+def paired(keys: np.ndarray) -> np.ndarray:
+    """The pairs (k,2) of integers that keys (k,) of `pair_keys` stand for, the smaller one first."""
+    return np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
+
+
 def row_labels(rows: np.ndarray) -> np.ndarray:
     """A number (k,), from 0 on, for each of rows (k,q) of integers >= 0: the same where rows are."""
     rows = np.ascontiguousarray(rows, np.int64)

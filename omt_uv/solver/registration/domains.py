@@ -24,7 +24,7 @@ from ..errors import (
 from ..linalg.nested_dissection import mesh_order
 from ..mesh.geometry import face_areas
 from ..mesh.surface import check_finite, triangle_surface
-from ..mesh.topology import boundary_edges, boundary_loops, graph_components, halfedges, pair_keys, with_fans
+from ..mesh.topology import boundary_edges, boundary_loops, graph_components, halfedges, pair_keys, paired, with_fans
 from ..parameterization.options import UnwrapOptions
 from ..parameterization.unwrap import unwrap
 from ..progress import Steps
@@ -71,7 +71,7 @@ def checked(vertices: np.ndarray, triangles: np.ndarray, name: str) -> None:
     check_finite(vertices, triangles)
     tail, head = halfedges(triangles)
     key, count = np.unique(pair_keys(tail, head), return_counts=True)
-    ends = np.stack([key >> 32, key & 0xFFFFFFFF], axis=1)
+    ends = paired(key)
     if (count > 2).any():
         raise NonManifoldEdgeError(f"More than two faces of the {name} meet at an edge", "", "edge", ends[count > 2])
     directed = tail * len(vertices) + head

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from ..maps.overlap import cover_pairs
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths, face_areas, unit
-from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up
+from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up, paired
 from .path_graph import path_to
 
 # Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
@@ -211,7 +211,7 @@ def _covering(chart: Chart, uv: np.ndarray, dual: _Dual) -> list[tuple[np.ndarra
     key, index = np.unique(pair_keys(a, b), return_inverse=True)
     # Every pair is seen from both sides.
     total = np.bincount(index.ravel(), share, len(key)) / 2
-    found = np.stack([key >> 32, key & 0xFFFFFFFF], axis=1)
+    found = paired(key)
     large = (total > LEAST_COVER) & (found[:, 0] != found[:, 1])
     order = np.argsort(-total[large], kind="stable")
     members = [np.flatnonzero(covered & (piece == k)) for k in found[large][order].ravel()]

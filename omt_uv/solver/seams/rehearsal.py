@@ -19,7 +19,7 @@ from ..cutting.component import CutComponent
 from ..errors import MeshError
 from ..mesh.geometry import edge_lengths, face_areas
 from ..mesh.surface import Surface, triangle_surface
-from ..mesh.topology import boundary_edges, halfedges, next_halfedge, pair_keys, twins
+from ..mesh.topology import boundary_edges, halfedges, next_halfedge, pair_keys, paired, twins
 from ..progress import Steps, part_of
 from .coarse_cut import CoarseCut, best_of
 from .coarse_surface import CoarseSurface
@@ -249,10 +249,10 @@ def _along(positions: np.ndarray, triangles: np.ndarray, steps: np.ndarray) -> t
     # Two that meet in a triangle cannot both be flipped, nor such as become slivers: around a corner, then.
     around = [np.stack([apex, tail[h]], axis=1)[~free], np.stack([tail[h], other], axis=1)[~free]]
     far = asked[~along & ~across]
-    ways = _ways(positions, flipped, np.stack([far >> 32, far & 0xFFFFFFFF], axis=1))
+    ways = _ways(positions, flipped, paired(far))
     seams = np.concatenate([asked[along], pair_keys(apex, other)[free], *(pair_keys(*e.T) for e in (*around, ways))])
     seams = np.intersect1d(seams, pair_keys(*halfedges(flipped)))
-    return flipped, np.stack([seams >> 32, seams & 0xFFFFFFFF], axis=1)
+    return flipped, paired(seams)
 
 
 def _ways(positions: np.ndarray, triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:

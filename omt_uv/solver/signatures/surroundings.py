@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import LandmarkError
 from ..mesh.geometry import halfedge_lengths
-from ..mesh.topology import boundary_loops, pair_keys, with_fans
+from ..mesh.topology import boundary_loops, pair_keys, paired, with_fans
 from ..partition.polar_coordinates import WindowMesh, polar_coordinates
 from ..partition.sites import Sites, inner
 
@@ -78,7 +78,7 @@ def _below(vertices: np.ndarray, faces: np.ndarray, value: np.ndarray) -> tuple[
     within = np.concatenate([b[two], c[two], a[one], a[one]])
     outside = np.concatenate([a[two], a[two], b[one], c[one]])
     key, place = np.unique(pair_keys(within, outside), return_inverse=True)
-    x, y = (key >> 32).astype(np.int64), (key & 0xFFFFFFFF).astype(np.int64)
+    x, y = paired(key).T
     with np.errstate(invalid="ignore"):
         share = np.where(np.isfinite(value[x] + value[y]), value[x] / (value[x] - value[y]), 0.5)[:, None]
     cut = vertices[x] + share * (vertices[y] - vertices[x])

@@ -16,6 +16,7 @@ from omt_uv.solver.mesh.topology import (
     on_boundary,
     pair_keys,
     pair_up,
+    paired,
     previous_halfedge,
     twins,
 )
@@ -90,3 +91,9 @@ def test_components_of_a_graph():
     count, label = graph_components(np.array([0, 1, 4]), np.array([1, 2, 5]), 7)
     assert count == 4 and len(np.unique(label)) == 4
     assert label[0] == label[1] == label[2] and label[4] == label[5] != label[3]
+
+
+def test_keys_of_pairs_give_these_back():
+    rng = np.random.default_rng(0)
+    a, b = rng.integers(0, 2**31 - 1, (2, 50))
+    assert np.array_equal(paired(pair_keys(a, b)), np.sort(np.stack([a, b], axis=1), axis=1))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mesh.cut_mesh import cut_open
-from ...mesh.topology import graph_components, halfedges, pair_keys, pair_up
+from ...mesh.topology import graph_components, halfedges, pair_keys, pair_up, paired
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def reopened(points: np.ndarray, triangles: np.ndarray, to_reopen: np.ndarray) -
     """Cut a mesh (n,3), (m,3) along the edges with the sorted keys `to_reopen` (k,): points (p,3), triangles (m,3)."""
     if len(to_reopen) == 0:
         return points, triangles
-    sides = cut_open(points, triangles, np.stack([to_reopen >> 32, to_reopen & 0xFFFFFFFF], axis=1)).sides
+    sides = cut_open(points, triangles, paired(to_reopen)).sides
     return points[triangles.ravel()[np.unique(sides, return_index=True)[1]]], sides
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...mesh.topology import halfedges, next_halfedge, pair_keys, previous_halfedge, twins
+from ...mesh.topology import halfedges, next_halfedge, pair_keys, paired, previous_halfedge, twins
 from ..components.components import Component
 from .split_collapse import independent_splits, split_edges
 from .vertex_count import edge_length
@@ -74,7 +74,7 @@ def split_component(component: Component, h: np.ndarray) -> Component:
 
 
 def _ends(keys: np.ndarray) -> np.ndarray:
-    return np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1)
+    return paired(keys)
 
 
 def _halved(edges: np.ndarray, split_ends: np.ndarray, n: int) -> np.ndarray:

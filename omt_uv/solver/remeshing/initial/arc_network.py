@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mesh.charts import Chart
-from ...mesh.topology import boundary_loops, pair_keys
+from ...mesh.topology import boundary_loops, pair_keys, paired
 
 # A boundary or a feature that turns by more than this, radians, has a corner there.
 CORNER = np.radians(50.0)
@@ -109,7 +109,7 @@ def _network(loops: list[np.ndarray], ids: list[np.ndarray], keys: list[np.ndarr
 
 def _nodes(n: int, keys: np.ndarray, kept_edges: np.ndarray, to_reopen: np.ndarray) -> np.ndarray:
     """Vertices (n,) bool where arcs end: branches, ends, and changes of kind."""
-    ends = np.concatenate([keys >> 32, keys & 0xFFFFFFFF])
+    ends = paired(keys).T.ravel()
     degree = np.bincount(ends, minlength=n)
     kept, open_ = (np.bincount(ends, np.tile(np.isin(keys, kind), 2), n) for kind in (kept_edges, to_reopen))
     return (degree > 0) & ((degree != 2) | (kept == 1) | (open_ == 1))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...mesh.topology import halfedges, pair_keys
+from ...mesh.topology import halfedges, pair_keys, paired
 from ..components.components import Component
 from ..edits.long_edges import split_component
 from ..edits.split_collapse import ANY_COSINE, MIN_COSINE, collapse_edges, independent_splits, interior_edges
@@ -101,7 +101,7 @@ class LineMesh:
 
 def collapse_along_lines(component: Component, vertices: np.ndarray) -> LineMesh:
     """Collapse all vertices of a component's features but `vertices` (v,) along these, as far as that goes."""
-    to_reopen = np.stack([component.to_reopen >> 32, component.to_reopen & 0xFFFFFFFF], axis=1)
+    to_reopen = paired(component.to_reopen)
     mesh = LineMesh(
         points=component.vertices,
         triangles=component.triangles,

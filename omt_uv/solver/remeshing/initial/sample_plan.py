@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mesh.topology import pair_keys
+from ...mesh.topology import pair_keys, paired
 from ..components.coincident_boundaries import reopened_copies
 from ..components.components import Component
 from ..edits.vertex_count import edge_length
@@ -133,7 +133,7 @@ def _kept_edges(component: Component) -> np.ndarray:
 
 def _weighted_length(positions: np.ndarray, keys: np.ndarray, density: np.ndarray) -> float:
     """Length of edges with these keys (k,), in edge lengths that density (n,) asks for at density 1."""
-    a, b = keys >> 32, keys & 0xFFFFFFFF
+    a, b = paired(keys).T
     length = np.linalg.norm(positions[a] - positions[b], axis=1)
     return float(length @ np.sqrt((density[a] + density[b]) / 2))
 
