@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import LibraryError, NonFiniteError, TetrahedraError
 from ..flows.enclosed_volume import corner_volumes
 from .meshing import GROWTH, TetMesh, without_chords
-from .tet_mesh import FACES, tet_volumes
+from .tet_mesh import boundary_triangles, tet_volumes, turned_right
 
 # What is enclosed is at least this share of the box around, where holes make the sum of volumes meaningless.
 LEAST_SHARE = 0.05
@@ -91,17 +91,14 @@ def _tetwild(points: np.ndarray, triangles: np.ndarray, edge: float) -> tuple[np
         if mine:
             left.unlink(missing_ok=True)
     found, tets = np.asarray(found, float), np.asarray(tets, np.int64)
-    if len(tets) and tet_volumes(found, tets).sum() < 0:
-        tets = tets[:, [1, 0, 2, 3]]
+    tets = turned_right(found, tets)
     return found, tets[tet_volumes(found, tets) > 0]
 
 
 def _boundary_first(points: np.ndarray, tets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (n,3) that are used, tetrahedra (m,4), and the triangles (k,3) of their boundary, whose vertices come
     first."""
-    every = tets[:, FACES].reshape(-1, 3)
-    _, first, uses = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
-    boundary = every[first[uses == 1]]
+    boundary = boundary_triangles(tets)
     outer = np.unique(boundary)
     inner = np.setdiff1d(np.unique(tets), outer)
     order = np.concatenate([outer, inner])

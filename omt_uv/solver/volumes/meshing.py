@@ -15,7 +15,7 @@ from ..contact.self_intersections import intersecting_pairs
 from ..errors import LibraryError, SelfIntersectionError, TetrahedraError, plural
 from ..flows.enclosed_volume import corner_volumes
 from ..mesh.topology import halfedges
-from .tet_mesh import EDGES, tet_volumes
+from .tet_mesh import EDGES, tet_volumes, turned_right
 
 # Ratio of radius to shortest edge that TetGen aims for.
 QUALITY = 1.5
@@ -59,9 +59,7 @@ def tetrahedra(vertices: np.ndarray, triangles: np.ndarray, count: int = 40_000)
         points, tets = _tetgen(scaled, triangles, most)
         if len(points) < len(vertices) or np.abs(points[: len(vertices)] - scaled).max() > 1e-12:
             raise TetrahedraError("TetGen moved vertices of the surface")
-        if tet_volumes(points, tets).sum() < 0:
-            tets = tets[:, [1, 0, 2, 3]]
-        points, tets = without_chords(points, tets, triangles)
+        points, tets = without_chords(points, turned_right(points, tets), triangles)
         if len(tets) > NEAR * count:
             break
         most *= len(tets) / count

@@ -16,11 +16,21 @@ def tet_volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     return np.einsum("mi,mi->m", np.cross(a, b), c) / 6
 
 
-def boundary_vertices(tets: np.ndarray) -> np.ndarray:
-    """Vertices (b,) of the triangles that one of tetrahedra (m,4) has alone."""
+def turned_right(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """Tetrahedra (m,4) of points (n,3) with the corners in the order in which their volumes are positive."""
+    return tets[:, [1, 0, 2, 3]] if tet_volumes(points, tets).sum() < 0 else tets
+
+
+def boundary_triangles(tets: np.ndarray) -> np.ndarray:
+    """Triangles (k,3) that one of tetrahedra (m,4) has alone."""
     every = tets[:, FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.unique(every[first[count == 1]])
+    return every[first[count == 1]]
+
+
+def boundary_vertices(tets: np.ndarray) -> np.ndarray:
+    """Vertices (b,) of the triangles that one of tetrahedra (m,4) has alone."""
+    return np.unique(boundary_triangles(tets))
 
 
 def vertex_volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
