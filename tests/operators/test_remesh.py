@@ -104,14 +104,18 @@ def test_groups_and_shape_keys_are_carried():
     assert obj.data.shape_keys is not new.data.shape_keys
 
 
+def write_places(obj, co):
+    """At every corner of an object the place (n,3) of its vertex, as an attribute."""
+    corner = np.array([loop.vertex_index for loop in obj.data.loops])
+    fill(obj.data, "at", "FLOAT_VECTOR", "CORNER", co[corner].astype(np.float32), "vector")
+
+
 def test_faces_that_look_the_other_way_are_turned_in_the_new_mesh_alone(capfd):
     obj = ball(rings=24, sectors=40)
-    corner = np.array([loop.vertex_index for loop in obj.data.loops])
     co = np.array([v.co for v in obj.data.vertices])
     for k in (5, 77, 200, 300):
         obj.data.polygons[k].flip()
-    corner = np.array([loop.vertex_index for loop in obj.data.loops])
-    fill(obj.data, "at", "FLOAT_VECTOR", "CORNER", co[corner].astype(np.float32), "vector")
+    write_places(obj, co)
     before = scenes.state(obj)
     (new,) = remesh(target_vertices=500)
     assert scenes.state(obj) == before
@@ -127,8 +131,7 @@ def test_parts_that_are_joined_the_wrong_way_round_both_stay_outside(capfd):
     above = V[F][:, :, 2].mean(axis=1) > 0
     F[above] = F[above][:, ::-1]
     obj = scenes.add(V, F.tolist(), "Twisted")
-    corner = np.array([loop.vertex_index for loop in obj.data.loops])
-    fill(obj.data, "at", "FLOAT_VECTOR", "CORNER", V[corner].astype(np.float32), "vector")
+    write_places(obj, V)
     before = scenes.state(obj)
     (new,) = remesh(target_vertices=500)
     assert scenes.state(obj) == before
