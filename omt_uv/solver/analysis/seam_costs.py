@@ -41,6 +41,8 @@ SIDE = (0.1, 0.6)
 SALIENT = (0.5, 0.95)
 # Distance from the mirror plane, over the size, at which a seam no longer lies on it.
 ON_PLANE = 0.02
+# A vertex is in a face if it is so with more than this certainty.
+IN_FACE = 0.5
 # Triangles that pair up to quads across their longest sides, of all: so many come from quads and not by chance.
 PAIRED = 0.9
 
@@ -93,6 +95,11 @@ class SeamCosts:
     face: np.ndarray
     plane: SymmetryPlane | None
     facing: Facing
+
+    @property
+    def in_face(self) -> np.ndarray:
+        """Vertices (n,) bool that are in a face."""
+        return self.face > IN_FACE
 
     def of(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Costs (k,) of the edges between vertices a (k,) and b (k,); the mean of its ends where there is no edge."""

@@ -78,6 +78,13 @@ def vertices_around(triangles: np.ndarray, chosen: np.ndarray, n: int, rings: in
     return near
 
 
+def across_edges(triangles: np.ndarray, twin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """One halfedge (k,) of every inner edge of triangles (m,3) with twins (3m,), and the corners (k,2) opposite it: of
+    its own triangle, and of its twin's."""
+    head, h = halfedges(triangles)[1], np.flatnonzero(twin > np.arange(len(twin)))
+    return h, np.stack([head[next_halfedge(h)], head[next_halfedge(twin[h])]], axis=1)
+
+
 def next_halfedge(h: np.ndarray) -> np.ndarray:
     """The following halfedge (k,) of each (k,), within the same triangle."""
     return h + 1 - 3 * (h % 3 == 2)

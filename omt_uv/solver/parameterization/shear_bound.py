@@ -21,6 +21,7 @@ from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface, is_seam
 from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
+from ..seams.options import SPREAD_BY_SHEAR
 from .chart_map import ChartMap
 from .options import ShearBound
 
@@ -32,8 +33,6 @@ MOST_ROUNDS = 5
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
 SPREAD_OF_SHEAR = 0.19
-# It changes by this power of that square.
-SPREAD_BY_SHEAR = 1.7
 # What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
 MARGIN = 0.95
 # What misses the bound by less stays in one piece at first: it has so many times the square of log(shear).
@@ -54,8 +53,6 @@ SLIT = 1.5
 # What misses the bound by less after a second search is slit where it shears more than that.
 NEARLY = 0.03
 SHEARED = 2.0
-# A vertex is in a face from this certainty on.
-IN_FACE = 0.5
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
 # The least share of a surface that a warning names as a number.
@@ -333,7 +330,7 @@ def _apart(
     if not last.searched:
         return found, flat
     # Hardly any chart misses its bound.
-    from ..seams.parting import flat_sides, parted, slits
+    from ..seams.parting import flat_sides, parted
 
     for k in last.searched:
         chart, mean = last.charts[k], last.mean[k]
@@ -347,16 +344,24 @@ def _apart(
                 edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
         if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
             # No other cut is needed, but one into what shears that much.
-            shear, area = _shear(chart, last.maps[k], search.target is None)
-            missed = max(mean / last.bound - 1, 0.0)
-            steep = shear > (STEEP if missed == 0 else SHEARED)
-            excess = float(area[shear > STEEP].sum() / area.sum() - MOST_STEEP) if missed == 0 else missed
-            costs, here = search.costs(), chart.vertex_ids
-            # Rather steep than slit where everybody looks.
-            cost = np.where(costs.face[here] > IN_FACE, np.inf, costs.vertex_cost[here])
-            edges = slits(chart, steep, SLIT * excess * area.sum(), cost, search.images)
+            edges = _slit(search, last, k)
         found |= {k: edges} if len(edges) else {}
     return found, flat
+
+
+def _slit(search: ShearSearch, last: _Round, k: int) -> np.ndarray:
+    """Edges (e,2) from the seams around chart k into what is steep, or, where its mean misses the bound, sheared."""
+    from ..seams.parting import slits
+
+    chart = last.charts[k]
+    shear, area = _shear(chart, last.maps[k], search.target is None)
+    missed = max(last.mean[k] / last.bound - 1, 0.0)
+    steep = shear > (STEEP if missed == 0 else SHEARED)
+    excess = float(area[steep].sum() / area.sum() - MOST_STEEP) if missed == 0 else missed
+    costs, here = search.costs(), chart.vertex_ids
+    # Rather steep than slit where everybody looks.
+    cost = np.where(costs.in_face[here], np.inf, costs.vertex_cost[here])
+    return slits(chart, steep, SLIT * excess * area.sum(), cost, search.images)
 
 
 def _cuts(prepared: DiskCharts) -> Cuts:

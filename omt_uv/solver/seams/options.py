@@ -8,6 +8,8 @@ from dataclasses import dataclass
 COARSE_VERTICES = 1200
 # Coarse surfaces that seams are grown on.
 TRIALS = 3
+# The spread that cuts leave goes with this power of the square of log(shear) that maps have.
+SPREAD_BY_SHEAR = 1.7
 # Arcs that one component gets at most.
 MOST_ARCS = 160
 

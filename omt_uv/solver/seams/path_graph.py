@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.geometry import edge_lengths
-from ..mesh.topology import halfedges, next_halfedge, twins
+from ..mesh.topology import across_edges, halfedges, twins
 from .coarse_surface import CoarseSurface
 
 # Share of the vertices in a mirror plane that symmetric cuts have to be able to reach.
@@ -95,7 +95,7 @@ def path_graph(
     once = np.flatnonzero(twin < np.arange(len(twin)))
     ends = np.column_stack([tail[once], head[once]])
     length = edge_lengths(surface.positions, ends)
-    across, straight = _across(surface.positions, tail, head, twin)
+    across, straight = _across(surface.positions, surface.triangles, twin)
     along_edges = len(ends)
     ends, length = np.concatenate([ends, across]), np.concatenate([length, straight])
     image = np.arange(n)
@@ -130,11 +130,11 @@ def path_to(before: np.ndarray, end: int) -> np.ndarray:
     return np.array(path)
 
 
-def _across(positions, tail, head, twin) -> tuple[np.ndarray, np.ndarray]:
+def _across(positions, triangles, twin) -> tuple[np.ndarray, np.ndarray]:
     """Corners (k,2) opposite each other across an edge, and the length (k,) of the straight line between them."""
-    h = np.flatnonzero(twin > np.arange(len(twin)))
+    tail, head = halfedges(triangles)
+    h, corners = across_edges(triangles, twin)
     a, b = positions[tail[h]], positions[head[h]]
-    corners = np.column_stack([head[next_halfedge(h)], head[next_halfedge(twin[h])]])
     length = np.maximum(np.linalg.norm(b - a, axis=1), 1e-300)
     axis = (b - a) / length[:, None]
     offset = [positions[corner] - a for corner in corners.T]

@@ -17,23 +17,23 @@ from scipy.spatial import cKDTree
 
 from ..cutting.component import CutComponent
 from ..errors import MeshError
+from ..mesh.edge_flips import flip_in_place
 from ..mesh.geometry import edge_lengths, face_areas
 from ..mesh.surface import Surface, triangle_surface
-from ..mesh.topology import boundary_edges, halfedges, next_halfedge, pair_keys, paired, twins
+from ..mesh.topology import across_edges, boundary_edges, halfedges, pair_keys, paired, twins
 from ..progress import Steps, part_of
 from .coarse_cut import CoarseCut, best_of
 from .coarse_surface import CoarseSurface
 from .cut_tree import Cut, Task
 from .growth import EVEN, grow, grown_by_one
 from .improvement import MOST_REGROWN, rerouted, trimmed
+from .options import SPREAD_BY_SHEAR
 from .path_graph import path_to
 
 # A half and its image have the area of the whole but for this share, or they are no image of it.
 WHOLE = 0.05
 # The least share that one of two triangles may have of both when the edge between them is flipped.
 THIN = 0.05
-# The spread that is left changes by this power of the square of log(shear) that maps have.
-POWER = 1.7
 # What a rehearsal makes more of a bound of the spread, at most: squared.
 MOST_CHANGE = 4.0
 # How often a cut is made longer by what rehearsals tell, at most, and for which share of the bound before what is not
@@ -61,12 +61,14 @@ class Rehearsal:
     log_density : half the logarithm of the density (c,) at the vertices of a coarse surface, or None
     sheared : gives the square of log(shear) of a small surface along its seams for such a density (n,), None where it
         has no map of its own; itself None where predictions have to do
+    known : what was rehearsed, by what the small surface is
     """
 
     component: CutComponent
     normal: np.ndarray | None
     log_density: Callable[[CoarseSurface], np.ndarray | None]
     sheared: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None
+    known: dict[tuple[bytes, ...], float | None]
 
     def of(self, found: CoarseCut) -> Steps[float | None]:
         """The square of log(shear) of a map of the coarse surface that is cut so; None where there is no such map."""
@@ -77,12 +79,17 @@ class Rehearsal:
         near_base = cKDTree(coarse.positions).query(self.component.positions[ends])[1].reshape(-1, 2)
         opening = opened(found, near_base, self.normal)
         density = self.log_density(coarse)
-        try:
-            surface = triangle_surface(opening.positions, opening.triangles, opening.seams)
-            return (yield from self.sheared(surface, None if density is None else density[opening.vertex]))
-        except MeshError:
-            # A coarse surface can be worse than the fine one that it stands for.
-            return None
+        density = None if density is None else density[opening.vertex]
+        parts = opening.positions, opening.triangles, opening.seams
+        # Ways to make a cut longer often come to the same.
+        name = tuple(part.tobytes() for part in (*parts, density) if part is not None)
+        if name not in self.known:
+            try:
+                self.known[name] = yield from self.sheared(triangle_surface(*parts), density)
+            except MeshError:
+                # A coarse surface can be worse than the fine one that it stands for.
+                self.known[name] = None
+        return self.known[name]
 
     def best_of(self, cuts: list[CoarseCut], asked: float) -> Steps[CoarseCut]:
         """The cut that costs least for what it shears, where a square of log(shear) is asked for."""
@@ -104,7 +111,7 @@ class Rehearsal:
         for k in range(LONGER):
             if sheared is None or sheared <= asked:
                 break
-            bound = found.cut.spread * (asked * NEAR_ENOUGH / sheared) ** POWER
+            bound = found.cut.spread * (asked * NEAR_ENOUGH / sheared) ** SPREAD_BY_SHEAR
             longer = yield from part_of(self._longer(found, bound), 0.1 + 0.6 * k / LONGER, 0.6 / LONGER)
             if not longer:
                 # None has a map: then predictions have to do.
@@ -133,7 +140,7 @@ class Rehearsal:
             # Halfway to where it was too short, at most: what is flat has no spread to go by.
             bound = float(np.sqrt(found.cut.spread * above))
             if sheared > 0:
-                bound = min(bound, found.cut.spread * (asked / sheared) ** POWER)
+                bound = min(bound, found.cut.spread * (asked / sheared) ** SPREAD_BY_SHEAR)
             other = replace(found, cut=trimmed(replace(found.task, bound=bound), found.cut))
             value = yield from part_of(self.of(other), k / SHORTER, 1 / SHORTER, STAGE)
             if value is None or value > asked:
@@ -231,8 +238,8 @@ def _along(positions: np.ndarray, triangles: np.ndarray, steps: np.ndarray) -> t
     """Triangles (t,3) with edges flipped that steps (k,2) cross, and the edges (k,2) that these are now."""
     tail, head = halfedges(triangles)
     twin = twins(triangles)
-    h = np.flatnonzero(twin > np.arange(len(twin)))
-    apex, other = head[next_halfedge(h)], head[next_halfedge(twin[h])]
+    h, corners = across_edges(triangles, twin)
+    apex, other = corners.T
     asked = np.unique(pair_keys(*steps[steps[:, 0] != steps[:, 1]].T))
     along = np.isin(asked, pair_keys(tail, head))
     crossed, first = np.unique(pair_keys(apex, other), return_index=True)
@@ -245,7 +252,7 @@ def _along(positions: np.ndarray, triangles: np.ndarray, steps: np.ndarray) -> t
     area = np.stack([face_areas(positions, one), face_areas(positions, two)])
     free = (count[owners] == 1).all(axis=1) & (area.min(axis=0) > THIN * area.sum(axis=0))
     flipped = triangles.copy()
-    flipped[owners[free, 0]], flipped[owners[free, 1]] = one[free], two[free]
+    flip_in_place(flipped, twin, h[free])
     # Two that meet in a triangle cannot both be flipped, nor such as become slivers: around a corner, then.
     around = [np.stack([apex, tail[h]], axis=1)[~free], np.stack([tail[h], other], axis=1)[~free]]
     far = asked[~along & ~across]

@@ -23,9 +23,9 @@ from .cut_tree import Cut, Task, cut_along
 from .fine_paths import FineMirror, with_line
 from .growth import grow
 from .improvement import improved, rerouted, trimmed
-from .options import SearchOptions
+from .options import SPREAD_BY_SHEAR, SearchOptions
 from .predicted_scale import ScaleModel
-from .rehearsal import POWER, Rehearsal
+from .rehearsal import Rehearsal
 from .symmetric_base import symmetric_base
 
 # Share of the vertices that have an image in a component with a mirror plane.
@@ -36,8 +36,7 @@ NEARLY = 0.03
 # Seams of what is nearly its own image are symmetric unless that makes them cost so many times what others do: of a
 # body, and, with all between, of one that is hardly a mirror image any more.
 DEARER = (1.5, 1.0)
-# A vertex is in a face if it is so with more than this certainty, and cuts that end there are worth so much less.
-IN_FACE = 0.5
+# Cuts that end in a face are worth so much less.
 BARRED = 0.3
 # What is searched again is harder than it seemed: on a coarse surface of so many times the vertices.
 FINER = 1.5
@@ -73,6 +72,7 @@ class SeamSearch:
     asked : the square of log(shear) that maps may have
     rehearse : gives that of a small surface along its seams, with half the logarithm of the density (n,) at its
         vertices or None; None where predictions have to do
+    rehearsed : what it has given
     """
 
     spread: np.ndarray
@@ -87,6 +87,7 @@ class SeamSearch:
     begun: dict[tuple[int, bytes], tuple[np.ndarray, Coarsening]] = field(default_factory=dict)
     asked: float = 0.0
     rehearse: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None = None
+    rehearsed: dict[tuple[bytes, ...], float | None] = field(default_factory=dict)
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether a component of these polygons (m,) is searched, some of whose boundary is marked as a seam or not."""
@@ -117,7 +118,7 @@ class SeamSearch:
             coarse, model = self._modelled(component)
             if self.share is not None:
                 # Nothing was cut of it before, since it was predicted to shear less than it does.
-                bound = min(bound, share**POWER * model.spread)
+                bound = min(bound, share**SPREAD_BY_SHEAR * model.spread)
             if model.spread <= bound and not base.any():
                 return base
         component = self.priced(component)
@@ -217,7 +218,7 @@ class SeamSearch:
     def _again(self, component: CutComponent, found: Found, share: float) -> Steps[Found]:
         """A cut with a share of the square of log(shear) that another has left: that one grown on, or where much is
         missing or its coarse surface is too coarse for that, one on finer surfaces."""
-        best, spread = None, share**POWER
+        best, spread = None, share**SPREAD_BY_SHEAR
         told = found.rehearsed if self.rehearse is not None else None
         if self.adding or share >= CLOSE or (told is not None and share >= NEARLY_THERE):
             best = yield from part_of(self._added(component, found, spread), 0.0, GROWN / 2)
@@ -240,7 +241,9 @@ class SeamSearch:
         normal = None if plane is None else plane.normal
         # Where the coarse surface is the surface itself, the map that is to be made tells as much as a rehearsal.
         rehearse = self.rehearse if component.vertex_count > self.options.vertices else None
-        return Rehearsal(component, normal, lambda coarse: self._log_density(component, coarse), rehearse)
+        return Rehearsal(
+            component, normal, lambda coarse: self._log_density(component, coarse), rehearse, self.rehearsed
+        )
 
     def _added(self, component: CutComponent, found: Found, share: float) -> Steps[CoarseCut]:
         """A cut and arcs added to it: where it was tried by a map, that shears less with any more of them."""
@@ -353,10 +356,10 @@ class SeamSearch:
 
     def _tip_factor(self, component: CutComponent) -> np.ndarray:
         """Factor (n,) on what cuts are worth that end at a vertex: less on a face."""
-        face = np.zeros(component.vertex_count)
+        face = np.zeros(component.vertex_count, dtype=bool)
         real = component.vertex_ids < len(self.surface.positions)
-        face[real] = self.costs().face[component.vertex_ids[real]]
-        return component.tip_factor() * np.where(face > IN_FACE, BARRED, 1.0)
+        face[real] = self.costs().in_face[component.vertex_ids[real]]
+        return component.tip_factor() * np.where(face, BARRED, 1.0)
 
     def _log_density(self, component: CutComponent, coarse: CoarseSurface) -> np.ndarray | None:
         """Half the logarithm of the density at the vertices (c,) of the coarse surface."""
