@@ -73,5 +73,8 @@ def choose(path: Path, properties) -> None:
             setattr(properties, name, value)
     except (ValueError, TypeError, OverflowError, AttributeError) as error:
         for name, (value, was_set) in before.items():
-            setattr(properties, name, value) if was_set else properties.property_unset(name)
+            if was_set:
+                setattr(properties, name, value)
+            else:
+                properties.property_unset(name)
         raise PresetError(f"{path.name} cannot be used: {error}. Choose another one.") from error

@@ -221,8 +221,9 @@ def bound_shear(
         spread = spread * share**SPREAD_BY_SHEAR
         begin, width = begin + width * PARTING, width * (1 - PARTING)
         kept = np.concatenate([_around(last, (*missed, *flat)), *apart.values()])
+        memory = dict(last.memory)
         # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
-        changes = {"share": share, "adding": rounds > 1, "memory": (memory := dict(last.memory))} | rehearsed
+        changes = {"share": share, "adding": rounds > 1, "memory": memory} | rehearsed
         cutting = search.again(kept, [last.charts[k] for k in missed], spread, changes)
         again = yield from unless_ended(part_of(cutting, begin, width * SEARCHING), early)
         if again is None:

@@ -42,8 +42,7 @@ def grow(task: Task, cut: Cut, most: int) -> Cut:
         found = _arcs(task, cut, model)
         if not found or (found[0].worth < LEAST_WORTH * cut.spread and len(cut.steps)):
             break
-        arc = found[0]
-        grown = cut_along(task, np.concatenate([cut.steps, task.graph.steps_of(arc.path)]))
+        grown = _with_arc(task, cut, found[0])
         model = model.cut(np.setdiff1d(grown.vertices, cut.vertices))
         cut = grown
     return cut
@@ -52,7 +51,11 @@ def grow(task: Task, cut: Cut, most: int) -> Cut:
 def grown_by_one(task: Task, cut: Cut, most: int) -> list[Cut]:
     """The cut with one arc more, for so many arcs at most, to different extremities, that are worth most."""
     arcs = _arcs(task, cut, task.model.cut(cut.vertices))[:most]
-    return [cut_along(task, np.concatenate([cut.steps, task.graph.steps_of(arc.path)])) for arc in arcs]
+    return [_with_arc(task, cut, arc) for arc in arcs]
+
+
+def _with_arc(task: Task, cut: Cut, arc: _Arc) -> Cut:
+    return cut_along(task, np.concatenate([cut.steps, task.graph.steps_of(arc.path)]))
 
 
 def _arcs(task: Task, cut: Cut, model: ScaleModel) -> list[_Arc]:
