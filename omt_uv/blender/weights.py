@@ -12,6 +12,7 @@ import numpy as np
 
 from ..pipelines.layout import Refusal
 from ..pipelines.reading import Reading
+from ..settings import DEFAULT_HIGH, DEFAULT_LOW
 from ..solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
 from ..solver.errors import MeshError
 from .vertex_groups import GroupError, group_weights
@@ -136,8 +137,8 @@ def named_weights(
 def computed_weights(
     reading: Reading,
     kind: str,
-    low: float = 0.5,
-    high: float = 0.95,
+    low: float = DEFAULT_LOW,
+    high: float = DEFAULT_HIGH,
     invert: bool = False,
     selected: np.ndarray | None = None,
 ) -> np.ndarray:

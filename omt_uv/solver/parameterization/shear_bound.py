@@ -53,6 +53,8 @@ SLIT = 1.5
 # What misses the bound by less after a second search is slit where it shears more than that.
 NEARLY = 0.03
 SHEARED = 2.0
+# Where a second search and later ones take off less than this share of what is missing, no seams are left that pay.
+LITTLE = 0.1
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
 # The least share of a surface that a warning names as a number.
@@ -208,12 +210,12 @@ def bound_shear(
             promised[:] = np.inf
         if not last.searched:
             break
-        best = last
+        is_stuck, best = rounds > 1 and last.is_hardly_better(best), last
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
         parting = _apart(search, last, crossing, rounds > 1)
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
-        if parts is None:
+        if parts is None or (is_stuck and not parts[0]):
             break
         apart, flat = parts
         missed = [k for k in last.searched if k not in apart]
@@ -275,6 +277,10 @@ class _Round:
     def excess(self) -> float:
         """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
         return float(self.area[self.searched] @ (self.pressing[self.searched] - self.bound) / self.area.sum())
+
+    def is_hardly_better(self, before: _Round) -> bool:
+        """Whether hardly more of it keeps the bound than before, and much does not."""
+        return self.excess > max((1 - LITTLE) * before.excess, NEARLY * self.bound)
 
     def result(self, warnings: tuple[str, ...], why: str) -> BoundedShear:
         """Its charts and maps, with warnings of how they were made and of those that miss the bound; why they do."""

@@ -4,6 +4,8 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.analysis.density import region_share
+from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.analysis.vertex_scores import distance, scaled_vertex_areas, soft_weights, vertex_score
 from omt_uv.solver.errors import EmptyMeshError, WeightError
 from omt_uv.solver.mesh.geometry import vertex_areas
@@ -34,6 +36,15 @@ def test_soft_weights_by_area(invert):
     assert (w.min(), w.max()) == (0, 1)
     assert area[w == (1 if invert else 0)].sum() / area.sum() == pytest.approx(0.4, abs=0.03)
     assert area[w == (0 if invert else 1)].sum() / area.sum() == pytest.approx(0.2, abs=0.03)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_weights_as_they_come_leave_room_for_four_times_their_share(seed):
+    random = np.random.default_rng(seed)
+    scores, area = random.lognormal(size=500) ** random.uniform(0.2, 4), random.uniform(0.5, 2, 500)
+    share = region_share(soft_weights(scores, area), area)
+    assert 0.01 < share < 0.2
+    assert exact_density(soft_weights(scores, area), area, 4.0).target_share == pytest.approx(4 * share)
 
 
 def test_weights_of_nothing():
