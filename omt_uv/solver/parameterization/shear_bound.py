@@ -213,7 +213,7 @@ def bound_shear(
         is_stuck, best = rounds > 1 and last.is_hardly_better(best), last
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        parting = _apart(search, last, crossing, rounds > 1)
+        parting = _apart(search, last, crossing, rounds > 1 or any(found.gave_up for found in last.memory.values()))
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
         if parts is None or (is_stuck and not parts[0]):
             break

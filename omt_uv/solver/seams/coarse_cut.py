@@ -34,6 +34,7 @@ class Found:
     mirror : if the others are symmetric
     coarse, steps (k,), root : where and along what they were found, and where on a closed surface they begin
     rehearsed : the square of log(shear) of a map of the coarse surface that is cut so; None where there is none
+    gave_up : no longer cut seemed to be worth what it costs, though that is more than was asked for
     """
 
     edges: np.ndarray
@@ -43,6 +44,7 @@ class Found:
     steps: np.ndarray
     root: int
     rehearsed: float | None = None
+    gave_up: bool = False
 
 
 @dataclass(frozen=True)

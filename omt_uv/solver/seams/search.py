@@ -133,7 +133,8 @@ class SeamSearch:
         coarser = min(self.options.vertices / component.vertex_count, 1.0)
         asked = self.asked * float(np.interp(coarser, (0, 1), REHEARSED[::-1]))
         best, kept = yield from part_of(self._rehearsal(component).kept(best, asked), 0.7, 0.2)
-        self.memory[name] = replace(best.carried(component), rehearsed=kept)
+        gave_up = kept is not None and kept > asked
+        self.memory[name] = replace(best.carried(component), rehearsed=kept, gave_up=gave_up)
         return self.memory[name].edges
 
     def _best(
