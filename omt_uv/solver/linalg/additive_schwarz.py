@@ -39,7 +39,7 @@ SHIFT = 1e-12
 
 
 class AdditiveSchwarz:
-    """Parts of a mesh (n,d), (m,3): where they overlap, and in which order their vertices are eliminated.
+    """Parts of a mesh (n,d), (m,3), and where they overlap.
 
     Unknown 2 i and 2 i + 1 are those of vertex i. keep: factors, for the next matrices, as long as they will do.
     """
@@ -49,6 +49,7 @@ class AdditiveSchwarz:
         self._keep = keep
         self._kept: Callable[[np.ndarray], np.ndarray] | None = None
         self._last: np.ndarray | None = None
+        self._ordered = False
         self._part = kd_parts(points, max(0, round(np.log2(n / size))))
         self._count = int(self._part.max()) + 1
         graph = vertex_graph(triangles, n).tocsr()
@@ -60,11 +61,9 @@ class AdditiveSchwarz:
         for _ in range(OVERLAP):
             member = spreading @ member
         member = member.tocsc()
-        place = np.full(n, -1, np.int64)
-        self._unknowns = []
+        self._unknowns: list[np.ndarray] = []
         for k in range(self._count):
             v = np.sort(member.indices[member.indptr[k] : member.indptr[k + 1]])
-            v = v[minimum_degree(_block(graph, v, place))]
             self._unknowns.append((2 * v[:, None] + np.arange(2)).ravel())
 
     def solve(self, matrix: sp.spmatrix, b: np.ndarray, w: np.ndarray, axes: np.ndarray) -> np.ndarray:
@@ -82,6 +81,7 @@ class AdditiveSchwarz:
                 self._last = x
                 return x
         place = np.full(len(b), -1, np.int64)
+        self._order(matrix, place)
         factors = [_part_factor(_block(matrix, d, place)) for d in self._unknowns]
         spread = self._affine(w, axes)
         gather = spread.T
@@ -99,6 +99,14 @@ class AdditiveSchwarz:
         x = Factor(matrix, "natural").solve(b) if x is None else x
         self._last = x if self._keep else None
         return x
+
+    def _order(self, matrix: sp.csr_matrix, place: np.ndarray) -> None:
+        """Order the unknowns of every part for little fill, by the first matrix: all corners of a quad are neighbours
+        there, and what a vertex follows, which no triangle says."""
+        for k, d in enumerate(self._unknowns if not self._ordered else []):
+            vertices = minimum_degree(_block(matrix, d, place)[::2, ::2])
+            self._unknowns[k] = d.reshape(-1, 2)[vertices].ravel()
+        self._ordered = True
 
     def _affine(self, w, axes) -> sp.csr_matrix:
         """The affine motions of every part, (2n, 6 parts)."""

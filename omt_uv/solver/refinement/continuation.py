@@ -156,8 +156,7 @@ def minimise_in_stages(
     overlap, with_barrier = problem.boundary_crosses(w), problem.with_barrier
     steps, k, before, last = 0, 0, np.inf, weights[0]
     while True:
-        weight = weights[k]
-        problem = rescaled(problem, w) if problem.scale_free else problem
+        weight, problem = weights[k], rescaled(problem, w) if problem.scale_free else problem
         problem = replace(problem, faces=with_convex_quads(problem.faces, w))
         newton = problem.newton_problem(w, weight, with_barrier, multiplier / weight)
         if problem.smoother is not None:
@@ -184,6 +183,8 @@ def minimise_in_stages(
             weights.append(float(next_weight(weights[-1], rest, quality)))
         elif problem.faces.polygon is not None:
             weights[k] = float(spare_weight(weights[k], weight, error, quality))
+            if enough and weights[k:] == [weight] and is_through(stage, balance, quality):
+                break
     return ContinuationResult(
         w=w,
         steps=steps,
@@ -277,6 +278,11 @@ class Minimisable(Protocol):
 
     def step(self, w: np.ndarray, value: float, pressure: float) -> NewtonStep:
         """A line-searched step from a map of energy `value`; pressure: see `energy.face_derivatives`."""
+
+
+def is_through(stage: StageResult, balance: float, quality: Quality) -> bool:
+    """Whether the last stage, at the same weight as this one on the way, would only see that nothing is left to do."""
+    return balance == 0 and stage.status == "converged" and stage.residual < quality.loose_tolerance
 
 
 def minimise(

@@ -36,6 +36,8 @@ EAGERNESS = 0.75
 
 # Polygons whose blocks are found at once, in large meshes: what is found on the way takes four times their memory.
 AT_ONCE = 100_000
+# Pairs of corners of all cells up to which it is kept where each entry of a block belongs.
+MOST_PAIRS = 2 * 9 * AT_ONCE
 # Axes of row and column within the block of two vertices.
 AXES = ((0, 0), (1, 0), (0, 1), (1, 1))
 
@@ -72,7 +74,7 @@ class Assembly:
         self._indices = np.empty(4 * len(key), np.int32)
         for p, q in AXES:
             self._indices[self._slot + p + q * self._stride] = 2 * row + p
-        self._every = self._every_slot(cells) if len(triangles) <= 2 * AT_ONCE else None
+        self._every = self._every_slot(cells) if len(self._block) <= MOST_PAIRS else None
         own = np.flatnonzero(row == column)
         self._diagonal = np.column_stack([self._slot[own], self._slot[own] + 1 + self._stride[own]]).ravel()
         self._size = 2 * n

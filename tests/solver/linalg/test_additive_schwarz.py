@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import hard_meshes
 import meshes
 import numpy as np
 import pytest
@@ -113,6 +114,21 @@ def test_nonzeros_grow_with_the_mesh():
             newton_direction(problem, w)
         counts.append(tally.nonzeros / len(w))
     assert counts[1] <= 1.15 * counts[0]
+
+
+def test_parts_of_quads_have_the_fill_of_their_equations():
+    # All corners of a quad are neighbours in its equations, while its triangles know of one diagonal.
+    V, quads = hard_meshes.terrain(60)
+    every = quads[:, [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]].reshape(-1, 3)
+    w, axes, counts = V[:, 0] + 1j * V[:, 1], np.tile([1, 1j], (len(V), 1)), []
+    blocks = np.tile(np.eye(6) - 1 / 6, (len(every), 1, 1))
+    matrix = Assembly(every, len(w)).matrix(blocks, np.full(2 * len(w), 0.1))
+    for triangles in (every.reshape(-1, 4, 3)[:, :2].reshape(-1, 3), every):
+        parts = AdditiveSchwarz(V, triangles, 1000)
+        with counted_work() as tally:
+            parts.solve(matrix, np.ones(2 * len(w)), w, axes)
+        counts.append(tally.nonzeros)
+    assert counts[0] <= 1.1 * counts[1]
 
 
 def test_a_hub_brings_its_neighbours_into_no_other_part():
