@@ -3,7 +3,8 @@
 usage: mutate.py LOG [--seed 0] [--count 40] [--only FOLDER] [--seconds 60]
 
 LOG gets a line of each: seen or SURVIVED, where, what, the line. Modules of LOG are left out of the next call. First
-the tests of the module run, then, for what survives, those of every dataclass, operator and command. Needs git.
+the tests of the module run, then, for what survives, all that import it, and those of every dataclass, operator and
+command. Needs git.
 """
 
 from __future__ import annotations
@@ -97,6 +98,15 @@ def tests_of(module: Path) -> list[str]:
     return list(dict.fromkeys(found))[:3]
 
 
+def users_of(module: Path) -> list[str]:
+    """Files of tests that import a module of the package by its own name, those of its folder first."""
+    dotted = ".".join(module.with_suffix("").parts)
+    package, name = dotted.rsplit(".", 1)
+    ways = (f"{dotted} import", f"import {dotted}", f'"{dotted}', f"from {package} import {name}")
+    some = sorted(Path("tests").rglob("test_*.py"), key=lambda path: (path.parts[1:-1] != module.parts[1:-1], path))
+    return [str(path) for path in some if any(way in path.read_text() for way in ways)]
+
+
 def survives(tests: list[str], seconds: int) -> bool:
     """Whether tests pass, in a process of their own."""
     child = os.fork()
@@ -117,7 +127,10 @@ def try_one(module: Path, bug: Bug, seconds: int) -> str:
     module.write_bytes(source[: bug[0]] + bug[2].encode() + source[bug[1] :])
     try:
         front = FRONT if module.parts[1] in ("operators", "commands") else []
-        survived = survives(tests_of(module), seconds) and survives([*EVERYWHERE, *front], seconds)
+        own = tests_of(module)
+        others = [path for path in users_of(module) if path not in own]
+        survived = survives(own, seconds) and all(survives([path], seconds) for path in others)
+        survived = survived and survives([*EVERYWHERE, *front], seconds)
     finally:
         module.write_bytes(source)
     return "SURVIVED" if survived else "seen"
