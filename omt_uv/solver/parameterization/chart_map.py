@@ -133,7 +133,7 @@ def map_chart(
         )
         asked = None if target is None else disk.target
         given = {"target": asked, "region": disk.region, "pins": places, "polygons": disk.polygons}
-        refined = good_enough(disk, start, draft) if plain else None
+        refined = good_enough(disk, start, draft, initial.apart) if plain else None
         if refined is None:
             refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
         # Centres of polygons were there for the map alone.
@@ -301,7 +301,7 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool) -> St
     if disk.boundary == "free":
         flat = unroll(disk.vertices, disk.triangles, disk.loop)
         if flat is not None:
-            return InitialChartMap(flat)
+            return InitialChartMap(flat, apart=True)
         if draft and len(disk.vertices) <= COARSE_ABOVE:
             even = flat_initial_map(disk, log, DRAFT_SPREAD)
             if even is not None:

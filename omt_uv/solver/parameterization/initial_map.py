@@ -123,6 +123,7 @@ class InitialChartMap:
         none
     warm : the map comes from a refined one, and is smooth
     multiplier : of that, see `refine.Refinement`
+    apart : it is known to cover no place twice
     """
 
     uv: np.ndarray
@@ -130,6 +131,7 @@ class InitialChartMap:
     cells: Transport | None = None
     warm: bool = False
     multiplier: float = 0.0
+    apart: bool = False
 
 
 def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD) -> InitialChartMap | None:
@@ -255,16 +257,18 @@ def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
     return (yield from initial_map(disk, log)) if flat is None else flat
 
 
-def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool) -> Refinement | None:
+def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool, apart: bool) -> Refinement | None:
     """An initial map uv (n,2) as the result, if no face folds and nothing covers itself, and it is an isometry; for a
-    draft it only needs to have a draft's areas."""
+    draft it only needs to have a draft's areas. apart : that it covers no place twice is known."""
     faces = polygon_elements(disk.vertices, disk.triangles, disk.target, disk.polygons, disk.region)
     w = uv @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / np.abs(faces.areas(w).sum()))
     value, error = energy(faces, w, SMOOTH_WEIGHT_FAR), area_error(faces, w)
     if not draft and (disk.boundary != "free" or not value < ISOMETRY):
         return None
-    if not np.isfinite(value) or error > QUALITIES["draft"].area_error or covers_itself(w, disk.loop):
+    if not np.isfinite(value) or error > QUALITIES["draft"].area_error:
+        return None
+    if not apart and covers_itself(w, disk.loop):
         return None
     return Refinement(
         uv=np.column_stack([w.real, w.imag]),

@@ -63,6 +63,8 @@ LEAST_TOLD = 0.01
 NO_EXCESS = 0.005
 # Shear of what has no area to speak of.
 VANISHED = 50.0
+# Mean shear above 1, and area error, of maps that have no shear to speak of: what is unrolled.
+UNROLLED = 1e-4
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
 # Where charts lie on themselves that may, before that.
@@ -437,10 +439,13 @@ def _shear(chart: Chart, chart_map: ChartMap, kept: bool) -> tuple[np.ndarray, n
 
     kept : areas are to be kept; then it is the shear that has the symmetric Dirichlet energy of their polygons
     """
+    area = polygon_areas(chart.vertices, chart.triangles, chart.faces)
+    if not chart_map.folds and max(chart_map.angle_mean - 1, chart_map.area_l1) <= UNROLLED:
+        return np.ones(len(area)), area
     octaves, shear = face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles], chart.faces)
     if kept:
         ratio = 2.0 ** np.clip(octaves, -20, 20)
         energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
         # Quads that fold or vanish, also along the other diagonal, are mended at last: no seam helps against them.
         shear = np.minimum(energy + np.sqrt(energy**2 - 1), VANISHED)
-    return shear, polygon_areas(chart.vertices, chart.triangles, chart.faces)
+    return shear, area

@@ -20,8 +20,10 @@ from ..errors import MeshError, plural
 from ..mesh.charts import Chart
 from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.surface import Surface
+from ..mesh.topology import on_boundary
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
+from ..refinement.initial_maps import NEARLY_FLAT, inner_curvature
 from .chart_indices import chart_target, cut_as_given, in_order_of_places, located
 from .chart_map import ChartMap, map_chart, refined_again
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
@@ -223,6 +225,9 @@ def _cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts,
     as they are otherwise. given : further arguments of `disk_charts`"""
     if prepared.cuts is None or not len(prepared.cuts.edges) or any(len(c.patches) for c in prepared.charts):
         return prepared
+    # What unrolls has no slits that it could spare.
+    if all(_is_flat(chart) for chart in prepared.charts):
+        return prepared
     cuts = with_images(surface, faces, prepared.cuts)
     if cuts is prepared.cuts:
         return prepared
@@ -231,6 +236,12 @@ def _cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts,
     if len(found.charts) > len(prepared.charts) or found.cuts is None or len(found.cuts.edges):
         return prepared
     return replace(prepared, charts=found.charts, cuts=cuts)
+
+
+def _is_flat(chart: Chart) -> bool:
+    """Whether a chart without holes unrolls."""
+    boundary = np.flatnonzero(on_boundary(chart.triangles, len(chart.vertices)))
+    return inner_curvature(chart.vertices, chart.triangles, boundary) <= NEARLY_FLAT
 
 
 def _to_be_mapped(surface: Surface, prepared: DiskCharts, pins: CornerPins | None, target: Target | None) -> CutCharts:

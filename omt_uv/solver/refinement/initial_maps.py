@@ -206,7 +206,7 @@ def unroll(vertices, triangles, loop) -> np.ndarray | None:
 
     Developable charts are developed, others mapped by least squares conformal (Levy et al. 2002). None for any other.
     """
-    if _curvature(vertices, triangles, loop) > NEARLY_FLAT:
+    if inner_curvature(vertices, triangles, loop) > NEARLY_FLAT:
         return None
     w, gap = developed(vertices, triangles)
     first, second = farthest_from_first(vertices, loop[:, None], np.zeros(len(loop), np.int64))
@@ -347,11 +347,11 @@ def _released(triangles, loop, side, corner, n, quads=NO_QUADS):
     return released
 
 
-def _curvature(vertices, triangles, loop):
-    """Sum of |angle defect| over the inner vertices, radians."""
+def inner_curvature(vertices: np.ndarray, triangles: np.ndarray, boundary: np.ndarray) -> float:
+    """Sum of |angle defect|, in radians, over the vertices (n,3) of triangles (m,3) but those of the boundary (b,)."""
     p = vertices[triangles]
     after, before = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
     angle = np.arctan2(np.linalg.norm(np.cross(after, before), axis=2), (after * before).sum(2))
     defect = 2 * np.pi - np.bincount(triangles.ravel(), angle.ravel(), len(vertices))
-    defect[loop] = 0
-    return np.abs(defect).sum()
+    defect[boundary] = 0
+    return float(np.abs(defect).sum())
