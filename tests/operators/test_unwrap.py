@@ -406,3 +406,19 @@ def test_a_conformal_disk_with_its_centre_and_start_where_they_are_marked():
     before = scenes.state(obj)
     text = scenes.error_of(bpy.ops.uv.omt_unwrap, kind="POLAR", boundary="FREE")
     assert "convex domain" in text and scenes.state(obj) == before
+
+
+@pytest.mark.parametrize("width", [0.05, 0.01])
+def test_bevels_that_collapse_leave_the_faces_around_them_their_areas(width):
+    # A blade: its bevel is as wide as half of it, so that strips along its whole length have no width.
+    bpy.ops.mesh.primitive_cube_add(size=1, scale=(0.12, 0.02, 2))
+    obj = bpy.context.object
+    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+    obj.modifiers.new("bevel", "BEVEL").width = width
+    obj.modifiers["bevel"].segments = 2
+    bpy.ops.object.modifier_apply(modifier="bevel")
+    space, uv = scenes.areas(obj)
+    assert (space < 1e-6 * space.max()).any()
+    unwrap()
+    space, uv = scenes.areas(obj)
+    assert np.abs(np.abs(uv) / np.abs(uv).sum() - space / space.sum()).sum() < 0.02

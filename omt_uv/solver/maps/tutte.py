@@ -10,6 +10,10 @@ from ..linalg.sparse import solve_general
 from ..mesh.geometry import angles_from_lengths, halfedge_lengths
 from ..mesh.topology import halfedges
 
+# Sides that are shorter than this share of the mean get so much of a convex boundary: faces between vertices that
+# nearly coincide would fold by rounding.
+LEAST_STEP = 1e-4
+
 
 def mean_value_weights(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Floater's mean value weights of every halfedge, seen from its tail and from its head, (m,3) each.
@@ -25,10 +29,13 @@ def mean_value_weights(length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return at_tail / safe, at_head / safe
 
 
-def tutte(positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, boundary: np.ndarray) -> np.ndarray:
-    """Mean value embedding (n,2) of a disk mesh (n,3), (m,3) with its loop (b,) at points boundary (b,2)."""
+def tutte(
+    positions: np.ndarray, triangles: np.ndarray, loop: np.ndarray, boundary: np.ndarray, equal: bool = False
+) -> np.ndarray:
+    """Mean value embedding (n,2) of a disk mesh (n,3), (m,3) with its loop (b,) at points boundary (b,2); equal: with
+    the weights of equilateral triangles in place of the mesh's own."""
     n = len(positions)
-    length = halfedge_lengths(positions, triangles).reshape(-1, 3)
+    length = np.ones((len(triangles), 3)) if equal else halfedge_lengths(positions, triangles).reshape(-1, 3)
     at_tail, at_head = mean_value_weights(length)
     tail, head = halfedges(triangles)
     rows, columns = np.concatenate([tail, head]), np.concatenate([head, tail])
@@ -54,6 +61,7 @@ def _inner_order(positions: np.ndarray, triangles: np.ndarray, inside: np.ndarra
 
 
 def arc_length_parameters(positions: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Share of the boundary's length before each vertex of the loop, (b,) in [0, 1)."""
+    """Share of the boundary's length before each vertex of the loop, (b,) in [0, 1); no two are at the same place."""
     step = np.linalg.norm(positions[np.roll(loop, -1)] - positions[loop], axis=1)
+    step = np.maximum(step, LEAST_STEP * step.mean())
     return np.concatenate([[0.0], np.cumsum(step)[:-1]]) / step.sum()

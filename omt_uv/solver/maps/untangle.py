@@ -27,13 +27,18 @@ def untangle(
     """An embedding near uv (n,2) with the loop (b,) at points boundary (b,2) of a convex curve, and what was done.
 
     Two systems are tried: mean value weights of the map itself, and where that folds or squeezes faces beyond use,
-    those of the surface. The second return value is None after the first and a warning after the second.
+    those of the surface, or equal ones where these fold. The second return value is None after the first and a warning
+    after the second.
     """
     straight = tutte(uv, triangles, loop, boundary)
     first = map_energy(straight, positions, triangles)
     if first <= USABLE:
         return straight, None
     fresh = tutte(positions, triangles, loop, boundary)
+    if count_folds(fresh, triangles):
+        # Needles give weights that double precision does not solve; equal ones are right, and far from the areas.
+        equal = tutte(positions, triangles, loop, boundary, equal=True)
+        fresh = equal if count_folds(equal, triangles) < count_folds(fresh, triangles) else fresh
     fewer = count_folds(fresh, triangles) < count_folds(straight, triangles)
     if fewer or map_energy(fresh, positions, triangles) < first:
         return fresh, "The start could not be untangled; the refinement starts from a mean value map of the surface"

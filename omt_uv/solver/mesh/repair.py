@@ -25,6 +25,10 @@ PERTURBATION_ROUNDS = 12
 # Triangles with less than this share of the square of their longest side have no area that a texture could show, but
 # their angles would cost the solvers half of their digits.
 NEEDLE = 1e-7
+# With less than this share, the height of a triangle is no measure of what is around it.
+THIN = 1e-4
+# Vertices of nothing but bad triangles take the height from so many triangles away.
+ACROSS_BAD = 8
 # Share of the extent of the mesh that stands for the size of a chart which has none.
 SHAPELESS_SIZE = 1e-5
 
@@ -198,11 +202,12 @@ def perturbed(
     shapeless = bad.all() or size < 1e-9 * extent
     scale = (extent if size < 1e-9 * extent else size) or 1.0
     moving = SHAPELESS_SIZE * rng.random((len(vertices), 3)) if shapeless else vertices / scale - low / scale
+    # Of the mesh as it came: next to what has moved already, heights say nothing.
+    reach = _least_height(moving, triangles, bad)
     for k in range(PERTURBATION_ROUNDS):
         bad = degenerate_triangles(moving, triangles, NEEDLE)
         if not bad.any():
             return moving * scale, count
-        reach = _least_height(moving, triangles, bad)
         moved = np.unique(triangles[bad])
         moving[moved] += PERTURBATION * 4.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
     names = np.arange(len(triangles)) if faces is None else faces
@@ -210,13 +215,18 @@ def perturbed(
 
 
 def _least_height(vertices: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> np.ndarray:
-    """Least height (n,) of the sound triangles around every vertex, or of those nearest along edges."""
+    """Least height (n,) of the sound triangles around every vertex, or of those nearest across triangles (m,) that are
+    bad."""
+    thin = degenerate_triangles(vertices, triangles, THIN)
+    bad = bad if thin.all() else bad | thin
     p = vertices[triangles]
     double_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
     longest = np.linalg.norm(p - p[:, [1, 2, 0]], axis=2).max(axis=1)
     height = np.where(bad, np.inf, double_area / np.where(longest > 0, longest, 1))
     reach = np.full(len(vertices), np.inf)
     np.minimum.at(reach, triangles.ravel(), np.repeat(height, 3))
+    for _ in range(ACROSS_BAD):
+        np.minimum.at(reach, triangles[bad].ravel(), np.repeat(reach[triangles[bad]].min(axis=1), 3))
     known = reach[np.isfinite(reach)]
     usual = np.median(known) if len(known) else 1 / np.sqrt(len(vertices))
     return np.where(np.isfinite(reach), reach, usual)

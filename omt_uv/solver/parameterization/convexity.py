@@ -200,10 +200,12 @@ def _relaxed(mesh: CornerMesh, w: np.ndarray, corners: PolygonCorners, fixed: np
     faces = near[triangles].any(1)
     if not free.any():
         return w
-    vertices = np.unique(triangles[faces])
+    # Corners may reach to vertices of squeezed triangles alone.
+    joined = np.concatenate([triangles[faces], corners.triangles[here]])
+    vertices = np.unique(joined)
     place = np.full(len(w), -1)
     place[vertices] = np.arange(len(vertices))
-    joined = place[np.concatenate([triangles[faces], corners.triangles[here]])]
+    joined = place[joined]
     vertices = vertices[minimum_degree(vertex_graph(joined, len(vertices)))]
     place[vertices] = np.arange(len(vertices))
     patches = CornerPatches(mesh.of(vertices, faces, place), corners.of(here, place), free[vertices])

@@ -14,7 +14,7 @@ from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, plural
-from ..maps.distortion import face_distortion
+from ..maps.distortion import RATIO_FLOOR, face_distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
 from ..mesh.polygon_areas import polygon_areas
@@ -444,7 +444,8 @@ def _shear(chart: Chart, chart_map: ChartMap, kept: bool) -> tuple[np.ndarray, n
         return np.ones(len(area)), area
     octaves, shear = face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles], chart.faces)
     if kept:
-        ratio = 2.0 ** np.clip(octaves, -20, 20)
+        # A corner of a polygon that folds is mended at last, too: what the rest of it shears is what a seam can help.
+        ratio = np.where(octaves > np.log2(2 * RATIO_FLOOR), 2.0 ** np.clip(octaves, -20, 20), 1.0)
         energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
         # Quads that fold or vanish, also along the other diagonal, are mended at last: no seam helps against them.
         shear = np.minimum(energy + np.sqrt(energy**2 - 1), VANISHED)

@@ -79,7 +79,12 @@ def disk_initial_map(vertices, triangles, uv, loop) -> InitialMap:
     if places is None:
         warnings.append(SPREAD)
         places = arc_length_boundary(vertices, loop, radius)
-    straight = _straighten(uv, vertices, triangles, loop, places, warnings)
+    try:
+        straight = _straighten(uv, vertices, triangles, loop, places, warnings)
+    except FoldedUVError:
+        warnings.append(SPREAD)
+        places = arc_length_boundary(vertices, loop, radius)
+        straight = _straighten(uv, vertices, triangles, loop, places, warnings)
     return InitialMap(straight, CircleMotion(loop, radius, len(vertices)), tuple(warnings))
 
 

@@ -17,6 +17,8 @@ from .path_graph import PathGraph, path_to
 
 # How far from the coarse path a fine one may run, in lengths of coarse edges.
 REACH = 6.0
+# Where one passes a vertex of the coarse path at more, it has taken a short cut, around a limb and not along it.
+ASIDE = 3.0
 # At one coarse edge from the coarse path, an edge counts so many times more.
 ASTRAY = 0.5
 
@@ -65,16 +67,25 @@ def carried(
     used = start.copy()
     spacing = coarse.size * float(np.median(graph.cost)) if len(graph.cost) else 0.0
     paths = []
-    for stretch, end in _outwards(graph, steps):
-        along = coarse.kept[np.unique(graph.ends[stretch])]
-        in_plane = bool(graph.in_plane[graph.ends[stretch]].all())
+    waiting = _outwards(graph, steps)
+    while waiting:
+        stretch = waiting.pop(0)
+        along, end = coarse.kept[stretch], int(coarse.kept[stretch[-1]])
+        in_plane = bool(graph.in_plane[stretch].all())
         allowed = np.ones(component.vertex_count, dtype=bool)
         if mirror is not None:
             # Off the plane nothing comes back to it: that would, with its mirror image, close a loop.
             allowed = mirror.plane if in_plane else (mirror.side & ~mirror.plane) | used
-        path = half.path(used, int(coarse.kept[end]), along, spacing, allowed)
+        path = half.path(used, end, along, spacing, allowed)
         if mirror is not None and len(path) == 0:
-            path = fine.path(used, int(coarse.kept[end]), along, spacing, allowed)
+            path = fine.path(used, end, along, spacing, allowed)
+        if len(path) == 0 and in_plane:
+            # A line along the plane may take diagonals of polygons, where there is none of edges: near to it, then.
+            path = fine.path(used, end, along, spacing, np.ones_like(allowed))
+        missed = fine.missed(path, along[1:-1], ASIDE * spacing)
+        if missed is not None:
+            waiting = [stretch[: missed + 2], stretch[missed + 1 :], *waiting]
+            continue
         used[path] = True
         paths.append(path)
         if mirror is not None and not in_plane and len(path):
@@ -110,16 +121,16 @@ def _forest(component: CutComponent, chosen: np.ndarray, start: np.ndarray) -> n
     return forest
 
 
-def _outwards(graph: PathGraph, steps: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    """Stretches of a cut with their far ends, each after those between it and the boundary."""
+def _outwards(graph: PathGraph, steps: np.ndarray) -> list[np.ndarray]:
+    """Vertices (k,) of the stretches of a cut from near to far, each after those between it and the boundary."""
     if len(steps) == 0:
         return []
     depth = graph.depth(steps)
     found = []
     for stretch in stretches(graph, steps):
         vertices = np.unique(graph.ends[stretch])
-        found.append((depth[vertices].min(), stretch, int(vertices[np.argmax(depth[vertices])])))
-    return [(stretch, end) for _, stretch, end in sorted(found, key=lambda item: item[0])]
+        found.append(vertices[np.argsort(depth[vertices], kind="stable")])
+    return sorted(found, key=lambda vertices: depth[vertices[0]])
 
 
 @dataclass(frozen=True)
@@ -156,6 +167,14 @@ class FineGraph:
         """Whether there is an edge between all vertices (k,) that follow each other, or they are one."""
         a, b = path[:-1], path[1:]
         return bool((np.asarray(self.cost[a, b]).ravel() > 0)[a != b].all()) if len(a) else True
+
+    def missed(self, path: np.ndarray, along: np.ndarray, reach: float) -> int | None:
+        """The number of one of the vertices `along` (a,), amid those that are beyond reach of a path (k,); None if none
+        is, or there is no path."""
+        if not len(path) or not len(along):
+            return None
+        beyond = np.flatnonzero(np.isinf(dijkstra(self.length, indices=path, min_only=True, limit=reach)[along]))
+        return int(beyond[len(beyond) // 2]) if len(beyond) else None
 
     def path(self, start: np.ndarray, end: int, along: np.ndarray, spacing: float, allowed: np.ndarray) -> np.ndarray:
         """Vertices (k,) of the cheapest path from `end` to any of `start` (n,) bool, near the vertices `along` (a,).

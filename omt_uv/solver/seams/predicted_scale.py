@@ -24,6 +24,8 @@ from .coarse_surface import CoarseSurface
 
 # The plate of a closed surface is held a little everywhere: its Green's function has digits left for the first pin.
 PLATE_GROUND = 1e-2
+# Where a plate has slivers, its diagonal grows by this share.
+SLIVER_GROUND = 1e-9
 # Areas below this share of the mean would make a plate stiff without end.
 LEAST_AREA = 1e-3
 # Added to the diagonal of Green's functions, over itself and over its largest, against rounding.
@@ -148,7 +150,12 @@ def _inverse(matrix, free: np.ndarray, n: int) -> np.ndarray:
     whole = np.zeros((n, n))
     if len(free):
         # Nearly all of the inverse is asked for: dense, by Cholesky, is the quickest there is.
-        root, flaw = lapack.dpotrf(matrix.toarray(), lower=1)
+        dense = matrix.toarray()
+        root, flaw = lapack.dpotrf(dense, lower=1)
+        if flaw:
+            # Slivers differ from their neighbours by more than double precision has: each is held a little by itself.
+            dense[np.diag_indices(len(free))] *= 1 + SLIVER_GROUND
+            root, flaw = lapack.dpotrf(dense, lower=1)
         inverse, flaw = lapack.dpotri(root, lower=1) if flaw == 0 else (root, flaw)
         if flaw:
             raise PrecisionError("The matrix of a coarse surface is singular in double precision")

@@ -54,3 +54,13 @@ def test_parameters_are_shares_of_the_length():
     loop = boundary_loops(F)[0]
     np.testing.assert_allclose(arc_length_parameters(V, loop), np.arange(16) / 16)
     np.testing.assert_allclose(arc_length_parameters(7 * V + 3, loop), np.arange(16) / 16)
+
+
+def test_sides_without_length_have_room_on_a_convex_boundary():
+    V, F = meshes.cone()
+    (loop,) = boundary_loops(F)
+    V[loop[1:9]] = V[loop[1]] + 1e-13 * np.arange(8)[:, None]
+    places = circle(V, loop)
+    step = np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1)
+    assert step.min() > 1e-5 * step.mean()
+    assert (signed_areas(tutte(V, F, loop, places, equal=True), F) > 0).all()

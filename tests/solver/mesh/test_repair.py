@@ -330,3 +330,17 @@ def test_triangle_soups_become_disks(seed):
     V, F = rng.normal(size=(n, 3)), rng.integers(0, n, size=(rng.integers(1, 100), 3))
     F[0] = [0, 1, 2]
     assert sum(len(c.triangles) for c in prepared(V, F, fill_holes=seed % 2 == 0).charts) == len(F)
+
+
+@pytest.mark.parametrize("width", [0.0, 1e-9, 1e-8])
+def test_what_has_area_keeps_it_next_to_long_strips_without_width(width):
+    # Two long sides with a strip between them that has no width, and one that has hardly any.
+    x = np.array([0, 0.1, 0.1 + width, 0.1 + 2.5 * width, 0.2])
+    V = np.column_stack([np.tile(x, 3), np.repeat([0.0, 1.0, 2.0], len(x)), np.zeros(15)])
+    F = meshes.grid(4, 2)[1]
+    before = face_areas(V, F)
+    moved, count = repair.perturbed(V, F, 2.0)
+    after = face_areas(moved, F)
+    assert count == 8
+    assert not degenerate_triangles(moved, F, repair.NEEDLE).any()
+    np.testing.assert_allclose(after[before > 0.01], before[before > 0.01], rtol=5e-3)

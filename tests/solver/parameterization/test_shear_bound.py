@@ -1,5 +1,7 @@
 """The shear bound: more seam, less shear, and charts that stay disks."""
 
+from types import SimpleNamespace
+
 import hard_meshes
 import meshes
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
 from omt_uv.solver.maps.distortion import face_distortion
 from omt_uv.solver.mesh.charts import strict_charts
-from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import shear_bound
@@ -184,3 +186,17 @@ def test_nothing_is_offered_before_the_first_map():
     steps = unwrap(surface, options=UnwrapOptions(max_shear=1.3))
     stages = [progress.stage for progress in steps if progress.early is None]
     assert stages[0] == "Charts" and stages[-1] != "Charts"
+
+
+def test_a_folded_corner_is_not_what_its_polygon_shears():
+    angle = 2 * np.pi * np.arange(48) / 48
+    V = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    surface = meshes.polygon_surface(V, [list(range(48))])
+    (chart,) = strict_charts(surface)
+    uv = chart.vertices[:, :2].copy()
+    ear = chart.triangles[np.argmin(face_areas(chart.vertices, chart.triangles))]
+    middle = uv[ear].mean(axis=0)
+    uv[ear] = middle + (uv[ear] - middle) @ np.diag([1, -1e-3])
+    assert (signed_areas(uv, chart.triangles) <= 0).any()
+    local, area = shear_bound._shear(chart, SimpleNamespace(uv=uv), True)
+    assert area @ local / area.sum() < 1.5

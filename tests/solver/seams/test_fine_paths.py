@@ -3,13 +3,16 @@
 import meshes
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, graph_components
 from omt_uv.solver.seams import coarse_cut
-from omt_uv.solver.seams.fine_paths import carried
+from omt_uv.solver.seams.coarse_surface import coarsening
+from omt_uv.solver.seams.fine_paths import FineMirror, carried
+from omt_uv.solver.seams.path_graph import Mirrored, path_graph
 from omt_uv.solver.seams.search import SeamSearch
 
 
@@ -32,3 +35,73 @@ def test_what_is_carried_is_a_forest_that_hangs_on_the_boundary(monkeypatch, spr
     vertices = np.unique(ends)
     label = graph_components(*ends.T, len(start) + 1)[1]
     assert len(vertices) == chosen.sum() + 1 and (label[vertices] == label[0]).all()
+
+
+def test_a_path_around_a_tip_takes_no_short_cut_around_the_limb():
+    # Up on the one side of a finger, and down on the other one.
+    V, F = _finger()
+    component = _component(V, F)
+    start = component.on_boundary()
+    coarse = coarsening(component.positions, component.triangles, len(V), None).ended(len(V))
+    graph = path_graph(coarse, np.ones(len(V)), start[coarse.kept])
+    around = np.concatenate([_meridian(V, 0), _meridian(V, np.pi)[::-1]])
+    way = _places(component, coarse, V, around[: -len(around) // 6])
+    chosen = carried(component, coarse, graph, graph.steps_of(way), start, None)
+    assert set(coarse.kept[way].tolist()) <= set(np.unique(component.ends[chosen]).tolist())
+
+
+def test_a_line_along_a_mirror_plane_that_is_none_of_edges_is_cut_all_the_same():
+    V, F = _finger()
+    component = _component(V, F)
+    start = component.on_boundary()
+    coarse = coarsening(component.positions, component.triangles, len(V), None).ended(len(V))
+    image = cKDTree(component.positions).query(component.positions * [1, -1, 1] + [0, 2 * _middle(component), 0])[1]
+    plane = np.zeros(len(V), dtype=bool)
+    height = component.positions[:, 1] - _middle(component)
+    graph = path_graph(coarse, np.ones(len(V)), start[coarse.kept], Mirrored(image, height >= -1e-9))
+    way = _places(component, coarse, V, _meridian(V, 0))
+    assert graph.in_plane[way].all()
+    # Of the line every other vertex is missing, and all on the other side.
+    plane[coarse.kept[way[::2]]] = True
+    mirror = FineMirror(image, height, plane, exact=False)
+    chosen = carried(component, coarse, graph, graph.steps_of(way), start, mirror)
+    assert component.length[chosen].sum() > 0.9 * np.linalg.norm(np.diff(coarse.positions[way], axis=0), axis=1).sum()
+
+
+def _finger():
+    """A closed finger of eight sides, open at its root."""
+    return meshes.polar(lambda t: 0.1 * np.sqrt(t * (2 - t)), lambda t: 1 - t, 40, 8)
+
+
+def _middle(component):
+    return component.positions[:, 1].min() / 2 + component.positions[:, 1].max() / 2
+
+
+def _places(component, coarse, V, vertices):
+    """Coarse vertices at vertices (k,) of a mesh, in their order."""
+    scale = np.ptp(component.positions, axis=0).max() / np.ptp(V, axis=0).max()
+    low = component.positions.min(axis=0) - scale * V.min(axis=0)
+    way = cKDTree(coarse.positions).query(scale * V[vertices] + low)[1]
+    return way[np.concatenate([[True], way[1:] != way[:-1]])]
+
+
+def _component(V, F):
+    """The one component of a disk, as searches get it."""
+    seen = []
+
+    class Watching(SeamSearch):
+        def __call__(self, component, base):
+            seen.append(component)
+            yield from ()
+            return base
+
+    surface = triangle_surface(V, F)
+    cut(surface, search=Watching(np.full(len(F), 1.0), surface, lambda: seam_costs(surface)))
+    return seen[0]
+
+
+def _meridian(V, angle):
+    """Vertices of a finger from its root to its tip, at an angle around it."""
+    axis = np.array([np.cos(angle), np.sin(angle)])
+    there = np.flatnonzero(V[:, :2] @ axis >= np.linalg.norm(V[:, :2], axis=1) * (1 - 1e-9))
+    return there[np.argsort(V[there, 2])]
