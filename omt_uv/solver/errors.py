@@ -10,6 +10,8 @@ import numpy as np
 
 # Elements that a message names at most.
 FEW = 5
+# The least share that a message names as a number.
+LEAST_TOLD = 0.01
 
 
 def first_of(elements: np.ndarray) -> str:
@@ -279,6 +281,11 @@ class HandednessError(LandmarkError):
     """Landmarks of one surface are a mirror image of those of the other."""
 
     remedy = "Exchange left and right on one side, or match mirrored"
+
+
+def percent(share: float) -> str:
+    """A share in words: what is hardly seen shall not read as nothing, or as all."""
+    return f"{100 * share:.0f} %" if share >= LEAST_TOLD else f"less than {100 * LEAST_TOLD:.0f} %"
 
 
 def plural(count: int, one: str, many: str) -> str:

@@ -13,7 +13,7 @@ from ..analysis.density import Target
 from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
-from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, plural
+from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, percent, plural
 from ..maps.distortion import RATIO_FLOOR, face_distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
@@ -57,8 +57,6 @@ SHEARED = 2.0
 LITTLE = 0.1
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
-# The least share of a surface that a warning names as a number.
-LEAST_TOLD = 0.01
 # A mean excess of the shear up to this is not worse than none: what was parted is cut further.
 NO_EXCESS = 0.005
 # Shear of what has no area to speak of.
@@ -297,7 +295,7 @@ class _Round:
             if chosen.any():
                 count, share = int(chosen.sum()), self.area[missed[chosen]].sum() / self.area.sum()
                 # Of a whole surface there is no share to tell.
-                part = "" if share == 1 else f", {_percent(share)} of the surface,"
+                part = "" if share == 1 else f", {percent(share)} of the surface,"
                 who = plural(count, f"An island{part} shears", f"{{}} islands{part} shear")
                 what = what if count == 1 else what.replace("its seams", "their seams")
                 yield f"{who} {mean[chosen].max():.3g} in the mean, above {self.bound:.3g}: {what}"
@@ -306,11 +304,6 @@ class _Round:
 def _pressing(mean: float, steep: float, bound: float) -> float:
     """A mean shear, or one above the bound where too large a share is steep."""
     return max(mean, bound * (1 + steep)) if steep > MOST_STEEP and mean > 1 else mean
-
-
-def _percent(share: float) -> str:
-    """A share in words: what is hardly seen shall not read as all."""
-    return f"{100 * share:.0f} %" if share >= LEAST_TOLD else f"less than {100 * LEAST_TOLD:.0f} %"
 
 
 def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
