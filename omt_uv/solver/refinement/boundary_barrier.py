@@ -8,7 +8,8 @@ nearly touch that is most of what a step changes, and without it one such pair h
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -107,6 +108,8 @@ class BoundaryBarrier:
     vertex_reach: np.ndarray
     edge_reach: np.ndarray
     strength: float
+    # The last map that was asked about, and what is near there: a step begins where the one before has ended.
+    _found: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def energy(self, w: np.ndarray) -> float:
         """Sum over near pairs of strength * (reach / distance - 1)^2."""
@@ -139,7 +142,12 @@ class BoundaryBarrier:
         times = _contact_times(p[i] - a[j], dp[i] - da[j], b[j] - a[j], db[j] - da[j])
         return CONTACT_SHARE * float(times.min(initial=np.inf))
 
-    def _near(self, w):
+    def _near(self, w: np.ndarray) -> _Near:
+        if self._found.get("map") is not w:
+            self._found.update(map=w, near=self._near_in(w))
+        return self._found["near"]
+
+    def _near_in(self, w: np.ndarray) -> _Near:
         tail, head = self.tail, self.head
         p, a, b = w[tail], w[tail], w[head]
         low, high = _box(p[None])
