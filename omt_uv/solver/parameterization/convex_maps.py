@@ -66,7 +66,7 @@ def with_convex_polygons(
         if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and not figures.folds:
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
-            new[k] = _measured(old, uv, figures)
+            new[k] = with_figures(old, uv, figures)
     return new
 
 
@@ -107,7 +107,7 @@ def _opened(
         figures = measured_chart(vertices, chart, flat, density[place])
         fewer = reflex_triangles(surface, [chart], [uv])[0] < folded[k] and figures.folds <= old.folds
         if fewer and figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal):
-            new[k] = _measured(old, uv, figures)
+            new[k] = with_figures(old, uv, figures)
     return new
 
 
@@ -116,7 +116,7 @@ def _is_isometry(chart_map: ChartMap) -> bool:
     return chart_map.angle_mean - 1 <= ISOMETRIC and chart_map.area_l1 <= ISOMETRIC and not chart_map.folds
 
 
-def _measured(old: ChartMap, uv: np.ndarray, figures: Distortion) -> ChartMap:
+def with_figures(old: ChartMap, uv: np.ndarray, figures: Distortion) -> ChartMap:
     """A map with other UVs and their figures."""
     names = ("area_l1", "area_sd", "angle_mean", "folds")
     warnings = tuple(text for text in old.warnings if not text.endswith(FOLDED))

@@ -270,7 +270,7 @@ class _Round:
         steep = np.array([area[local > STEEP].sum() / area.sum() for local, area in shear])
         pressing = np.array([_pressing(*pair, bound) for pair in zip(mean, steep, strict=True)])
         missed = np.flatnonzero(pressing > bound)
-        searched = [int(k) for k in missed if search.shear.further or not _is_marked(search.surface, charts[k])]
+        searched = [int(k) for k in missed if search.shear.further or not is_marked(search.surface, charts[k])]
         return _Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched)
 
     @property
@@ -389,20 +389,20 @@ def _joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
     return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
 
 
-def _outline(chart: Chart) -> np.ndarray:
+def outline(chart: Chart) -> np.ndarray:
     """Keys (e,) of the edges around a chart."""
     return pair_keys(*chart.vertex_ids[boundary_edges(chart.triangles)].T)
 
 
 def _within(chart: Chart) -> np.ndarray:
     """Keys (e,) of the edges that a chart lies on both sides of, cut all the same."""
-    keys, count = np.unique(_outline(chart), return_counts=True)
+    keys, count = np.unique(outline(chart), return_counts=True)
     return keys[count > 1]
 
 
-def _is_marked(surface: Surface, chart: Chart) -> bool:
+def is_marked(surface: Surface, chart: Chart) -> bool:
     """Whether seams of the surface bound a chart."""
-    return bool(is_seam(surface, _outline(chart)).any())
+    return bool(is_seam(surface, outline(chart)).any())
 
 
 def _polygon_density(surface: Surface, target: Target | None) -> np.ndarray | None:

@@ -17,17 +17,18 @@ from ..cutting.cuts import cut as cut_surface
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural
-from ..mesh.charts import Chart
+from ..mesh.charts import Chart, sound_disks
 from ..mesh.edge_flips import cut_along_shorter
+from ..mesh.geometry import signed_areas
 from ..mesh.surface import Surface
-from ..mesh.topology import on_boundary
+from ..mesh.topology import on_boundary, pair_keys
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.initial_maps import NEARLY_FLAT, inner_curvature
 from .chart_indices import chart_target, cut_as_given, in_order_of_places, located
-from .chart_map import ChartMap, map_chart, refined_again
+from .chart_map import ChartMap, in_unit_box, map_chart, measured_chart, refined_again
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
-from .convex_maps import with_convex_polygons, with_folds_counted
+from .convex_maps import with_convex_polygons, with_figures, with_folds_counted
 from .mirrored_charts import (
     as_given,
     equal_chart_map,
@@ -37,12 +38,18 @@ from .mirrored_charts import (
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
-from .shear_bound import ShearSearch, bound_shear
+from .shear_bound import ShearSearch, bound_shear, is_marked, outline
 from .small_charts import is_small, map_together
 
 # Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps.
 CUTTING = 0.15
 MAPPING = 0.7
+
+# A chart that is longer than a square of the whole area by so many times is cut across, in so many times as long
+# pieces, at most so many.
+LONG = 3.0
+PIECE = 1.2
+MOST_PIECES = 12
 
 # Charts and their maps.
 _Drawn = tuple[list[Chart], list[ChartMap]]
@@ -142,7 +149,54 @@ def unwrap(
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, prepared.charts, maps, surface)
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
+    if cut.search is not None and pins is None and target is None and task.options.boundary == "free":
+        charts, maps, cuts = _without_bands(cut.search, charts, maps, cuts)
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
+
+
+def _without_bands(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: np.ndarray):
+    """Charts, maps and cuts (k,2), long bands cut across: such as those of a gear or a cable, which leave most of a
+    texture empty. What had been a disk before stays one."""
+    length = np.array([np.ptp(_upright(m.uv), axis=0).max() for m in maps])
+    side = np.sqrt(sum(np.abs(signed_areas(m.uv, c.triangles)).sum() for c, m in zip(charts, maps, strict=True)))
+    new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts]
+    for chart, chart_map, count in zip(charts, maps, np.ceil(length / (PIECE * side)).astype(int), strict=True):
+        pieces = [(chart, chart_map)]
+        was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
+        if count > LONG / PIECE and was_cut and not len(chart.patches) and not is_marked(search.surface, chart):
+            found, between = _in_pieces(search, chart, chart_map, min(count, MOST_PIECES))
+            pieces, edges = (found, [*edges, between]) if found else (pieces, edges)
+        new_charts += [chart for chart, _ in pieces]
+        new_maps += [chart_map for _, chart_map in pieces]
+    return new_charts, new_maps, np.concatenate(edges)
+
+
+def _in_pieces(search: ShearSearch, chart: Chart, chart_map: ChartMap, count: int):
+    """A chart and its map cut across, as pairs, and the edges (k,2) in between; no pairs where pieces are no disks."""
+    from ..seams.parting import in_pieces
+
+    piece, between = in_pieces(chart, chart_map.uv, search.costs().vertex_cost[chart.vertex_ids], count)
+    found = []
+    for k in range(int(piece.max()) + 1):
+        rows = piece == k
+        used, triangles = np.unique(chart.triangles[rows], return_inverse=True)
+        part = Chart(
+            chart.vertices[used],
+            triangles.reshape(-1, 3),
+            chart.corners[rows],
+            chart.faces[rows],
+            chart.vertex_ids[used],
+        )
+        (vertices, _), (flat, _) = in_unit_box(part.vertices), in_unit_box(chart_map.uv[used])
+        figures = measured_chart(vertices, part, flat, None)
+        found.append((part, with_folds_counted(part, with_figures(chart_map, chart_map.uv[used], figures))))
+    return (found if sound_disks([part for part, _ in found]).all() else []), between
+
+
+def _upright(uv: np.ndarray) -> np.ndarray:
+    """A map (n,2) with its principal axes along the axes."""
+    centred = uv - uv.mean(axis=0)
+    return centred @ np.linalg.eigh(centred.T @ centred)[1]
 
 
 def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[list[ChartMap]]:

@@ -40,6 +40,8 @@ LEAST_OUTLINE = 6
 # share of it, it is no body of flat sides.
 LEAST_SIDE = 0.05
 MOSTLY = 0.4
+# A cut across a long chart is looked for within this share of a piece of where pieces of the same length would end.
+NEAR_CUT = 0.2
 # Capacities are whole numbers: that of an edge of mean cost, the greatest, and that of what may not be cut.
 MEAN_CAPACITY = 10_000
 MOST_CAPACITY = 10_000_000
@@ -86,8 +88,7 @@ def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray, image: np.ndarray | N
     """
     dual = _Dual.of(chart)
     pairs = _covering(chart, uv, dual)
-    price = cost[dual.ends].mean(axis=1) * edge_lengths(chart.vertices, dual.ends)
-    capacity = np.clip(np.round(MEAN_CAPACITY * price / max(price.mean(), 1e-300)), 1, MOST_CAPACITY).astype(np.int32)
+    capacity = _capacity(chart, dual, cost)
     steps = dual.graph(edge_lengths(chart.vertices, dual.ends) + 1e-300)
     cut = np.zeros(len(dual.joined), dtype=bool)
     for one, other in pairs[:MOST_CUTS]:
@@ -183,6 +184,32 @@ def slits(
         found.append(edges)
         start = np.union1d(start, edges)
     return chart.vertex_ids[np.concatenate(found)] if found else np.zeros((0, 2), np.int64)
+
+
+def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The piece (m,) of every triangle where a long chart with map uv (n,2) is cut across in `count` of about the same
+    length, and the edges (k,2) of the surface in between; cost (n,) : see `parted`."""
+    dual = _Dual.of(chart)
+    corners = uv[chart.triangles]
+    area = np.bincount(dual.polygon, face_areas(chart.vertices, chart.triangles))
+    middle = np.stack([np.bincount(dual.polygon, x) for x in corners.mean(axis=1).T], axis=1)
+    middle = middle / np.bincount(dual.polygon)[:, None]
+    middle -= area @ middle / area.sum()
+    along = middle @ np.linalg.eigh(middle.T @ (area[:, None] * middle))[1][:, 1]
+    along = (along - along.min()) / max(np.ptp(along), 1e-300)
+    capacity, cut = _capacity(chart, dual, cost), np.zeros(len(dual.joined), dtype=bool)
+    for k in range(1, count):
+        before, after = along * count < k - NEAR_CUT, along * count > k + NEAR_CUT
+        if before.any() and after.any():
+            side = _minimum_cut(dual, capacity, np.flatnonzero(before), np.flatnonzero(after))
+            cut |= side[dual.joined[:, 0]] != side[dual.joined[:, 1]]
+    return dual.pieces(~cut)[dual.polygon], chart.vertex_ids[dual.ends[cut]]
+
+
+def _capacity(chart: Chart, dual: _Dual, cost: np.ndarray) -> np.ndarray:
+    """What cutting an edge (e,) between polygons costs, in whole numbers; cost (n,) : at the vertices, per length."""
+    price = cost[dual.ends].mean(axis=1) * edge_lengths(chart.vertices, dual.ends)
+    return np.clip(np.round(MEAN_CAPACITY * price / max(price.mean(), 1e-300)), 1, MOST_CAPACITY).astype(np.int32)
 
 
 def _images_in(chart: Chart, image: np.ndarray | None) -> np.ndarray:

@@ -248,3 +248,44 @@ def test_models(name):
         assert chart_map.newton_transport is None and chart_map.angle_mean <= 1.001
     elif chart_map.newton_transport is not None:
         assert chart_map.newton_transport <= 25 and chart_map.residual_transport <= 1e-6
+
+
+def _cable(length, closed):
+    """A tube of quads about x, with ends to taste."""
+    sectors, rings = 12, 4 * length
+    angle = 2 * np.pi * np.arange(sectors) / sectors
+    x = np.linspace(0, length, rings + 1)
+    V = np.stack(np.broadcast_arrays(x[:, None], 0.2 * np.cos(angle), 0.2 * np.sin(angle)), axis=2).reshape(-1, 3)
+    k = np.arange(sectors)
+    quads = np.concatenate([np.column_stack([k, (k + 1) % sectors]) + sectors * r for r in range(rings)])
+    polygons = np.column_stack([quads, quads[:, ::-1] + sectors]).tolist()
+    ends = [k[::-1].tolist(), (k + sectors * rings).tolist()] if closed else []
+    return meshes.polygon_surface(V, polygons + ends)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_long_bands_are_cut_across(closed):
+    surface = _cable(24, closed)
+    result = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35)))
+    side = np.sqrt(sum(signed_areas(m.uv, c.triangles).sum() for c, m in zip(result.charts, result.maps, strict=True)))
+    long = [
+        max(np.ptp(m.uv @ turned, axis=0).max() for turned in (np.eye(2), np.array([[1, 1], [1, -1]]) / np.sqrt(2)))
+        for m in result.maps
+    ]
+    assert max(long) < 2 * side and len(result.charts) < 12
+    assert all(m.folds == 0 and m.area_l1 < 0.01 for m in result.maps)
+    faces = np.concatenate([np.unique(c.faces) for c in result.charts])
+    assert np.array_equal(np.sort(faces), np.arange(len(surface.face_start) - 1))
+    # Along its seams the surface comes apart into these charts.
+    again = strict_charts(replace(surface, seams=result.seams))
+    assert {frozenset(c.faces.tolist()) for c in again} == {frozenset(c.faces.tolist()) for c in result.charts}
+
+
+def test_ribbons_and_bands_between_marked_seams_stay_whole():
+    V, F = meshes.grid(120, 1, width=120.0, height=1.0)
+    ribbon = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(max_shear=1.35)))
+    assert len(ribbon.charts) == 1
+    cable = _cable(24, False)
+    line = 12 * np.arange(24 * 4 + 1)
+    marked = replace(cable, seams=np.column_stack([line[:-1], line[1:]]))
+    assert len(drain(unwrap(marked, options=UnwrapOptions(max_shear=1.35))).charts) == 1
