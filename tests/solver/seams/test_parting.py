@@ -121,7 +121,9 @@ def gear(teeth, width=0.4):
 def test_the_flat_sides_of_a_gear_are_islands_without_shear():
     surface = meshes.polygon_surface(*gear(20))
     found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.2)))
-    assert len(found.charts) == 3 and not found.warnings
+    # Both sides, and the band of the teeth in pieces.
+    assert [len(np.unique(c.faces)) for c in found.charts].count(80) == 2
+    assert 3 <= len(found.charts) <= 8 and not found.warnings
     for chart, one in zip(found.charts, found.maps, strict=True):
         figures = distortion(chart.vertices, chart.triangles, one.uv[chart.triangles], polygons=chart.faces)
         assert figures.angle_mean == pytest.approx(1, abs=1e-3) and figures.folds == 0 and figures.overlap == 0
