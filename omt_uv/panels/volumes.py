@@ -26,12 +26,13 @@ FLOW = Section("flow", "Move Incompressibly", _draw_flow, (OBJECT_FLOW, UV_FLOW)
 
 def _draw_volume(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     settings = settings_of(context, MAP_VOLUME)
-    package = missing(settings.library)
-    if package:
-        # In two lines: one is cut off in a sidebar of the usual width.
+    packages = missing(settings.library)
+    if packages:
+        # In three lines: one is cut off in a sidebar of the usual width.
         column = layout.column(align=True)
         column.label(text="Needs a library for tetrahedra:", icon="INFO")
-        column.label(text=f"python -m pip install {package}", icon="BLANK1", translate=False)
+        for line in ("python -m pip install", packages):
+            column.label(text=line, icon="BLANK1", translate=False)
     draw_settings(layout.column(), MAP_VOLUME, settings)
     big_button(layout, MAP_VOLUME, "MESH_ICOSPHERE")
 

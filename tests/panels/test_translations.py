@@ -109,7 +109,7 @@ def of_code():
 
 
 # What is the same in every language.
-CODE = {"python -m pip install tetgen", "python -m pip install pytetwild", ""}
+CODE = {"python -m pip install", "tetgen", "pytetwild pyvista", ""}
 
 
 @pytest.mark.parametrize("language", ["de_DE", "ja_JP"])

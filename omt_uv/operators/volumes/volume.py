@@ -18,7 +18,8 @@ from ...pipelines.volumes.choices import (
 from ...session import run
 from ..base import Complaint, SolverOperator, complaints, mesh_objects, select_alone, warn
 
-MODULES = {"TETGEN": "tetgen", "TETWILD": "pytetwild"}
+# What pip has to install for a library: fTetWild does not bring PyVista, which it asks for.
+PACKAGES = {"TETGEN": ("tetgen",), "TETWILD": ("pytetwild", "pyvista")}
 
 
 class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
@@ -113,8 +114,9 @@ class OBJECT_OT_omt_volume(SolverOperator, bpy.types.Operator):
 
 
 def missing(library: str) -> str:
-    """The name of the package that a library for tetrahedra needs, empty where it is installed."""
-    return "" if importlib.util.find_spec(MODULES[library]) else MODULES[library]
+    """The packages that a library for tetrahedra needs, as pip takes them, empty where all are installed."""
+    packages = PACKAGES[library]
+    return "" if all(map(importlib.util.find_spec, packages)) else " ".join(packages)
 
 
 def draw_settings(layout: bpy.types.UILayout, properties) -> None:
