@@ -21,6 +21,7 @@ VOLUME_BODIES = ("max_planck", "spot", "bunny_small", "homer", "rocker_arm")
 STAND_IN = ("icosphere",)
 SEEDS = Option("seeds", (0,), "of handles, one flow of a body for each; default 0", {"nargs": "+", "type": int})
 HANDLES = Option("handles", 6, "single vertices, default 6; 20 are far from one another", {"type": int})
+LEAST = Option("least", 0, "vertices: faces are divided into four until there are so many", {"type": int})
 WAY = Option("way", 0.1, "of a handle, as a share of the diagonal", {"type": float})
 TETS = Option("tets", 40_000, "tetrahedra, about", {"type": int})
 # From so many handles on they are chosen far from one another, as an artist's are.
@@ -57,6 +58,8 @@ def flows_table(args) -> Table:
     table = Table("Flows of handles chosen by chance", columns | {"back": 9, "seconds": 8, "missed goals": 24})
     for name in _named(args, FLOW_BODIES):
         V, F = _loaded(name)
+        while len(V) < args.least:
+            V, F = meshes.subdivide(V, F)
         rows = []
         for seed in args.seeds:
             handles = chance_handles(V, seed, args.handles, args.way)
@@ -111,7 +114,7 @@ def _loaded(name: str):
 
 PARTS = (
     Part("flows", "bodies moved by handles chosen by chance: volumes, new intersections, the way back, time",
-         flows_table, (MODELS, SEEDS, HANDLES, WAY), by_default=False),
+         flows_table, (MODELS, SEEDS, HANDLES, WAY, LEAST), by_default=False),
     Part("volumes", "insides mapped to the ball: inverted tetrahedra, volumes, time, memory; refusals",
          volumes_table, (MODELS, TETS), by_default=False),
 )  # fmt: skip
