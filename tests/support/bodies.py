@@ -42,6 +42,24 @@ def limbed(levels: int = 4) -> tuple[np.ndarray, np.ndarray]:
     return points * radius[:, None], faces
 
 
+def bowl(rings: int, sectors: int, thick: float) -> tuple[np.ndarray, np.ndarray]:
+    """A closed bowl of a radius of 1, whose wall is `thick`, with a narrow mouth."""
+    polar = np.linspace(0, 0.85 * np.pi, rings + 1)[1:]
+    polar = np.concatenate([polar, polar[::-1]])
+    radius = np.repeat([1.0, 1 - thick], rings)
+    turn = 2 * np.pi * np.arange(sectors) / sectors
+    ring = np.stack([np.outer(radius * np.sin(polar), f(turn)) for f in (np.cos, np.sin)], axis=2)
+    depth = np.repeat(-radius * np.cos(polar), sectors).reshape(len(polar), sectors, 1)
+    V = np.concatenate([np.concatenate([ring, depth], axis=2).reshape(-1, 3), [[0, 0, -1], [0, 0, thick - 1]]])
+    k, after = np.arange(sectors), (np.arange(sectors) + 1) % sectors
+    last = (len(polar) - 1) * sectors
+    F = [np.column_stack([after, k, 0 * k + len(V) - 2])]
+    for low in sectors * np.arange(len(polar) - 1):
+        up = low + sectors
+        F += [np.column_stack([low + k, low + after, up + k]), np.column_stack([low + after, up + after, up + k])]
+    return V, np.concatenate([*F, np.column_stack([last + k, last + after, 0 * k + len(V) - 1])])
+
+
 def hourglass(rings: int, sectors: int) -> tuple[np.ndarray, np.ndarray]:
     """Two bulbs that a closed surface joins through a common line: with all faces wound alike, one is inside out."""
     polar = np.pi * (np.arange(rings) + 1) / (rings + 1)

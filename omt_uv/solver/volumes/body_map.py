@@ -20,12 +20,12 @@ from ..linalg.sparse import Factor
 from ..mesh.closed_surface import ClosedSurface, closed_surface
 from ..progress import Progress, Steps, part_of
 from ..sphere.sphere_map import sphere_map
-from .domains import BALL, CUBE, DOMAINS, BallDomain, CubeDomain, HeldDomain
+from .domains import BALL, CUBE, DOMAINS, BallDomain, CubeDomain, HeldDomain, on_cube
 from .meshing import TetMesh, tetrahedra
 from .paper_flow import paper_flow
 from .tet_exact import exact_volumes
 from .tet_mesh import boundary_vertices, graph_laplacian, share_error, stiffness, tet_volumes, vertex_share_error
-from .tet_newton import inverted, refined, tet_problem, untangled
+from .tet_newton import LONG_STAGES, STAGES, inverted, refined, tet_problem, unlocked, untangled
 from .transfer import TetLocation
 
 NEWTON = "newton"
@@ -35,6 +35,8 @@ METHODS = (NEWTON, FLOW)
 POSITIVE = 1e-3
 # What volumes of tetrahedra may be off, summed up.
 TOLERANCE = 9.5e-3
+# From here on they are told to be off.
+COARSE = 0.02
 
 
 @dataclass(frozen=True)
@@ -98,23 +100,32 @@ def volume_map(
     count_inverted = inverted(positions, mesh.tets)
     points = mesh.points * surface.extent + _middle(vertices)
     points[: len(vertices)] = vertices
-    warnings = [*surface.warnings, *sphere.warnings]
-    if count_inverted:
-        warnings.append(
-            plural(count_inverted, "A tetrahedron is", "{} tetrahedra are")
-            + " inverted in the map; the method newton has none"
-        )
+    shares = share_error(positions, mesh.tets, target)
+    told = _told(count_inverted, shares if method == NEWTON and not given else 0.0)
     return VolumeMap(
         points=points,
         tets=mesh.tets,
         positions=positions,
         domain=domain,
-        shares=share_error(positions, mesh.tets, target),
+        shares=shares,
         around_vertices=vertex_share_error(positions, mesh.tets, target),
         inverted=count_inverted,
         steps=steps,
-        warnings=tuple(warnings),
+        warnings=(*surface.warnings, *sphere.warnings, *told),
     )
+
+
+def _told(count_inverted: int, shares: float) -> list[str]:
+    """What is to be said of a map with so many tetrahedra inverted and volumes off."""
+    told = []
+    if count_inverted:
+        told.append(
+            plural(count_inverted, "A tetrahedron is", "{} tetrahedra are")
+            + " inverted in the map; the method newton has none"
+        )
+    if shares > COARSE:
+        told.append(f"Volumes are {100 * shares:.0f} % off in sum: remesh the surface evenly, with smaller faces")
+    return told
 
 
 def _in_box(mesh: TetMesh, vertices: np.ndarray, surface: ClosedSurface) -> TetMesh:
@@ -162,12 +173,28 @@ def _mapped(
     if method == FLOW:
         flowed = yield from part_of(paper_flow(mesh.points, mesh.tets, start, kind), 0.2, 0.8)
         return mesh, flowed.positions, len(flowed.errors) - 1
+    stages = STAGES
+    try:
+        free = yield from part_of(untangled(tet_problem(mesh.points, mesh.tets, kind), start), 0.2, 0.15)
+    except TetrahedraError:
+        if given:
+            raise
+        stages = LONG_STAGES
+        mesh, free = yield from part_of(_with_room(mesh, sphere, domain), 0.35, 0.05)
     problem = tet_problem(mesh.points, mesh.tets, kind)
-    free = yield from part_of(untangled(problem, start), 0.2, 0.2)
-    rough, steps = yield from part_of(refined(problem, free), 0.4, 0.2)
+    rough, steps = yield from part_of(refined(problem, free, stages), 0.4, 0.2)
     exact = exact_volumes(mesh.points, mesh.tets, rough, kind, TOLERANCE, slide=not given)
     found = yield from part_of(exact, 0.6, 0.4)
     return TetMesh(found.points, mesh.tets), found.positions, steps + found.rounds
+
+
+def _with_room(mesh: TetMesh, sphere: np.ndarray, domain: str) -> Steps[tuple[TetMesh, np.ndarray]]:
+    """A finer mesh and positions (n,3) with nothing inverted and the boundary held at unit vectors (b,3), or along
+    their rays on the cube, where the middle sees all faces that it sees on the sphere."""
+    mesh, positions = yield from part_of(unlocked(mesh, harmonic(mesh, sphere), len(sphere)), 0.0, 0.6)
+    if domain == CUBE:
+        mesh, positions = yield from part_of(unlocked(mesh, on_cube(positions), len(sphere)), 0.6, 0.4)
+    return mesh, positions
 
 
 def into_body(first: VolumeMap, other: VolumeMap, placed: np.ndarray | None = None) -> Steps[VolumeMap]:

@@ -99,6 +99,11 @@ class HeldDomain:
 Domain = BallDomain | CubeDomain | HeldDomain
 
 
+def on_cube(points: np.ndarray) -> np.ndarray:
+    """Points (k,3) of the unit ball along their rays in the cube from -1 to 1: what the middle sees, it sees then."""
+    return points * (np.linalg.norm(points, axis=1) / np.maximum(np.abs(points).max(axis=1), 1e-300))[:, None]
+
+
 def cube_points(sphere: np.ndarray) -> np.ndarray:
     """Points (k,3) on the cube from -1 to 1 for unit vectors (k,3), even in angles: areas within 1.4 of equal."""
     axis = np.abs(sphere).argmax(axis=1)

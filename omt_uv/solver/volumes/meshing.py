@@ -15,7 +15,7 @@ from ..contact.self_intersections import intersecting_pairs
 from ..errors import LibraryError, SelfIntersectionError, TetrahedraError, plural
 from ..flows.enclosed_volume import corner_volumes
 from ..mesh.topology import halfedges
-from .tet_mesh import EDGES, tet_volumes, turned_right
+from .tet_mesh import EDGES, boundary_triangles, tet_volumes, turned_right
 
 # Ratio of radius to shortest edge that TetGen aims for.
 QUALITY = 1.5
@@ -113,6 +113,28 @@ def without_chords(points: np.ndarray, tets: np.ndarray, triangles: np.ndarray) 
         tets = np.concatenate([tets[~mine], halves])
         on = np.concatenate([on, np.zeros(len(points) - n, bool)])
     return points, tets
+
+
+def split_inside(mesh: TetMesh, positions: np.ndarray, asked: np.ndarray) -> tuple[TetMesh, np.ndarray]:
+    """The mesh and positions (n,3) with the longest edge inside of tetrahedra `asked` (m,) bool split in its middle.
+
+    Length is that in the body and at the positions together; of edges that share a tetrahedron the longest is split.
+    """
+    tail, head = halfedges(boundary_triangles(mesh.tets))
+    n = np.int64(len(mesh.points))
+    surface = np.unique(np.minimum(tail, head) * n + np.maximum(tail, head))
+    ends = np.sort(mesh.tets[:, EDGES], axis=2)
+    keys = ends[..., 0] * n + ends[..., 1]
+    places = np.concatenate([mesh.points, positions], axis=1)
+    way = places[ends[..., 0]] - places[ends[..., 1]]
+    length = np.linalg.norm(way[..., :3], axis=2) + np.linalg.norm(way[..., 3:], axis=2)
+    length[np.isin(keys, surface)] = -1.0
+    rows = np.flatnonzero(asked & (length.max(axis=1) > 0))
+    chosen = np.isin(keys, keys[rows, length[rows].argmax(axis=1)])
+    # All tetrahedra around such an edge have it, so the others need no look.
+    mine = chosen.any(axis=1)
+    places, halves = _split(places, mesh.tets[mine], keys[mine], np.where(chosen[mine], length[mine], -1.0))
+    return TetMesh(places[:, :3], np.concatenate([mesh.tets[~mine], halves])), places[:, 3:]
 
 
 def _split(points: np.ndarray, tets: np.ndarray, keys: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,8 @@ from scipy.sparse.linalg import cg
 
 from ..errors import TetrahedraError, plural
 from ..progress import Progress, Steps
-from .domains import Domain
+from .domains import Domain, HeldDomain
+from .meshing import TetMesh, split_inside
 from .tet_energy import RestShape, TetAssembly, rest_shape, tet_energy
 from .tet_mesh import tet_volumes
 
@@ -24,11 +25,17 @@ FIRST_EPS = 0.3
 EPS_FACTOR = 0.75
 EPS_BACK = 12.0
 LEAST_EPS = 2e-3
+# Rounds of steps with edges split between them, the steps of each, and rounds in a row with no fewer inverted.
+SPLITTING = 24
+ROUND_STEPS = 20
+SPLIT_PATIENCE = 4
 # Volumes of slivers are taken for this share of the mean while untangling, and then.
 COARSE = 0.1
 FINE = 0.01
 # Weights of the volumes, and the steps at each.
 STAGES = ((1.0, 2), (10.0, 4), (100.0, 3))
+# The same where what was tangled had to be given room: it starts far from the shape of the body.
+LONG_STAGES = ((1.0, 30), (10.0, 20), (100.0, 20))
 # Predicted decrease over the energy at which a stage ends.
 ENOUGH = 0.02
 # Of conjugate gradients.
@@ -85,30 +92,65 @@ def untangled(problem: TetProblem, points: np.ndarray) -> Steps[np.ndarray]:
     ------
     TetrahedraError : some remain
     """
+    points = yield from _untangling(problem, points, UNTANGLING, FIRST_EPS)
+    _without_inverted(points, problem.tets)
+    return points
+
+
+def unlocked(mesh: TetMesh, positions: np.ndarray, count: int) -> Steps[tuple[TetMesh, np.ndarray]]:
+    """A finer mesh and positions (n,3) of it with no tetrahedron inverted, the first `count`, its boundary, held.
+
+    Edges in a fixed number may leave no room for all tetrahedra, and a boundary that slides may fold over. Where
+    steps get no further, edges inside of what is inverted are split, which leaves more room than there was.
+
+    Raises
+    ------
+    TetrahedraError : some remain
+    """
+    edge, best, idle, eps = HeldDomain(np.arange(count)), len(mesh.tets), 0, FIRST_EPS
+    for k in range(SPLITTING):
+        yield Progress("Untangling", k / SPLITTING)
+        problem = tet_problem(mesh.points, mesh.tets, edge)
+        positions = yield from _untangling(problem, positions, ROUND_STEPS, eps)
+        wrong = ~(tet_volumes(positions, mesh.tets) > 0)
+        left = int(wrong.sum())
+        idle = idle + 1 if left >= best else 0
+        if left == 0 or idle == SPLIT_PATIENCE:
+            break
+        best = min(best, left)
+        mesh, positions = split_inside(mesh, positions, wrong)
+        eps = LEAST_EPS * EPS_BACK
+    _without_inverted(positions, mesh.tets)
+    return mesh, positions
+
+
+def _untangling(problem: TetProblem, points: np.ndarray, most: int, eps: float) -> Steps[np.ndarray]:
+    """Points (n,3) after at most so many steps, the first of which is with `eps`; none once nothing is inverted."""
     even = np.full(len(problem.tets), 1 / len(problem.tets))
     shape = replace(problem.coarse, weight=(problem.coarse.weight + even) / 2)
-    eps = FIRST_EPS
-    for k in range(UNTANGLING):
-        count = inverted(points, problem.tets)
-        if count == 0:
-            return points
-        yield Progress("Untangling", k / UNTANGLING)
+    for k in range(most):
+        if inverted(points, problem.tets) == 0:
+            break
+        yield Progress("Untangling", k / most)
         size = float(tet_volumes(points, problem.tets).sum())
         points, fall = _step(problem, shape, points, _Terms(size, 1.0, eps))
         # Where no step helps, a softer energy may.
         eps = max(eps * EPS_FACTOR, LEAST_EPS) if fall > 0 else min(eps * EPS_BACK, FIRST_EPS)
-    count = inverted(points, problem.tets)
-    if count:
-        raise TetrahedraError(
-            f"{count} of {len(problem.tets)} tetrahedra {plural(count, 'stays', 'stay')} inverted in the map"
-        )
     return points
 
 
-def refined(problem: TetProblem, points: np.ndarray) -> Steps[tuple[np.ndarray, int]]:
-    """Points (n,3) with volumes nearer to what they should be, stage by stage, and the steps; nothing is inverted."""
-    steps, total = 0, sum(most for _, most in STAGES)
-    for weight, most in STAGES:
+def _without_inverted(points: np.ndarray, tets: np.ndarray) -> None:
+    """Refuse points (n,3) at which some of tetrahedra (m,4) are inverted."""
+    count = inverted(points, tets)
+    if count:
+        raise TetrahedraError(f"{count} of {len(tets)} tetrahedra {plural(count, 'stays', 'stay')} inverted in the map")
+
+
+def refined(problem: TetProblem, points: np.ndarray, stages=STAGES) -> Steps[tuple[np.ndarray, int]]:
+    """Points (n,3) with volumes nearer to what they should be, and the steps; nothing is inverted. `stages` are pairs
+    of a weight of the volumes and the most steps with it."""
+    steps, total = 0, sum(most for _, most in stages)
+    for weight, most in stages:
         for _ in range(most):
             yield Progress("Volumes", steps / total)
             size = float(tet_volumes(points, problem.tets).sum())

@@ -6,13 +6,13 @@ import sys
 
 import numpy as np
 import pytest
-from bodies import icosphere, limbed
+from bodies import bowl, icosphere, limbed
 
 from omt_uv.solver.errors import LibraryError, NotASphereError, OpenSurfaceError, SelfIntersectionError
 from omt_uv.solver.progress import drain
 from omt_uv.solver.volumes.body_map import harmonic, volume_map
 from omt_uv.solver.volumes.domains import BallDomain, CubeDomain, cube_points
-from omt_uv.solver.volumes.meshing import tetrahedra, without_chords
+from omt_uv.solver.volumes.meshing import TetMesh, split_inside, tetrahedra, without_chords
 from omt_uv.solver.volumes.paper_flow import paper_flow
 from omt_uv.solver.volumes.tet_energy import REGULAR, TetAssembly, rest_shape, signed_svd, tet_energy
 from omt_uv.solver.volumes.tet_exact import exact_volumes
@@ -27,7 +27,7 @@ from omt_uv.solver.volumes.tet_mesh import (
     vertex_volumes,
     volume_gradients,
 )
-from omt_uv.solver.volumes.tet_newton import inverted, tet_problem, untangled
+from omt_uv.solver.volumes.tet_newton import inverted, tet_problem, unlocked, untangled
 
 
 @pytest.fixture(scope="module")
@@ -160,6 +160,39 @@ def test_what_is_tangled_is_untangled(body):
     assert inverted(mixed, found.tets) > 10
     free = drain(untangled(tet_problem(found.points, found.tets, BallDomain(np.arange(len(V)))), mixed))
     assert inverted(free, found.tets) == 0
+
+
+def test_edges_inside_are_split_in_their_middle_and_the_surface_stays(body):
+    V, _, found = body
+    asked = np.random.default_rng(0).random(len(found.tets)) < 0.2
+    finer, positions = split_inside(TetMesh(found.points, found.tets), found.positions, asked)
+    assert (
+        len(finer.tets) > len(found.tets) and inverted(finer.points, finer.tets) == inverted(positions, finer.tets) == 0
+    )
+    assert np.array_equal(finer.points[: len(found.points)], found.points)
+    keys = [np.unique(np.sort(boundary_triangles(tets), axis=1), axis=0) for tets in (finer.tets, found.tets)]
+    assert np.array_equal(*keys)
+    for places in ((finer.points, found.points), (positions, found.positions)):
+        assert np.isclose(*(tet_volumes(x, mesh.tets).sum() for x, mesh in zip(places, (finer, found), strict=True)))
+
+
+def test_what_has_no_room_is_given_some(body):
+    V, _, found = body
+    crowded = found.positions.copy()
+    # All points inside at one place: most tetrahedra have no volume, and the boundary may not give way.
+    crowded[len(V) :] = 0.0
+    mesh, positions = drain(unlocked(TetMesh(found.points, found.tets), crowded, len(V)))
+    assert inverted(positions, mesh.tets) == inverted(mesh.points, mesh.tets) == 0
+    assert np.array_equal(positions[: len(V)], found.positions[: len(V)])
+
+
+@pytest.mark.parametrize("domain", ["ball", "cube"])
+def test_a_body_with_a_thin_wall_is_mapped(domain):
+    V, F = bowl(5, 12, 0.15)
+    found = drain(volume_map(V, F, domain, count=1000))
+    assert found.inverted == inverted(found.points, found.tets) == 0
+    assert any("off in sum" in told for told in found.warnings) == (found.shares > 0.02)
+    assert np.array_equal(found.points[: len(V)], V)
 
 
 def test_bad_input_is_named_and_has_a_remedy(monkeypatch):
