@@ -34,7 +34,8 @@ CHUNK = 8192
 # `energy.eager_bend`, where no pressure is kept: a quarter fewer steps, most on the long way of limbs.
 EAGERNESS = 0.75
 
-# Polygons whose blocks are found at once, in large meshes: what is found on the way takes four times their memory.
+# Polygons whose blocks are found at once, in meshes of more than twice as many triangles: what is found on the way
+# takes four times their memory.
 AT_ONCE = 100_000
 # Pairs of corners of all cells up to which it is kept where each entry of a block belongs.
 MOST_PAIRS = 2 * 9 * AT_ONCE
@@ -162,7 +163,7 @@ def hessian_blocks(
     weight : of the area term, one or (p,) of the polygons; pressure : see `energy.face_derivatives`
     """
     count = len(faces.area)
-    if count <= 2 * AT_ONCE:
+    if len(faces.triangles) <= 2 * AT_ONCE:
         return _blocks_at_once(faces, w, weight, pressure, axes, symmetry)
     first = lone_triangles(faces)
     four = (len(faces.triangles) - first) // 4
@@ -195,9 +196,10 @@ def _blocks_at_once(faces: Elements, w: np.ndarray, weight, pressure, axes, symm
     blocks = triangle_blocks(faces.gradient, a, b, kept, radial)
     vertex = _in_axes(blocks, faces.triangles, frame, free, symmetry)
     scale = float(np.einsum("iim->", blocks)) / (2 * n)
-    lone = blocks[:, :, :first].transpose(2, 0, 1)
     if faces.polygon is None:
-        return Blocks(gradient, lone, None, None, scale)
+        return Blocks(gradient, blocks.transpose(2, 0, 1), None, None, scale)
+    # A view would keep the blocks of all triangles of quads.
+    lone = blocks[:, :, :first].copy().transpose(2, 0, 1)
     forms = area_forms_of(faces, a, b, weight, eagerness)
     if symmetry is not None:
         _, forms = symmetry.carried(faces.triangles, forms)

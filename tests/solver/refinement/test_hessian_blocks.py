@@ -64,14 +64,25 @@ def test_large_meshes_have_the_same_matrix_in_less_memory(polygons, monkeypatch)
     faces = polygon_elements(V, T, face_areas(V, T), owner if polygons else None)
     axes, weight = (np.exp(1j * np.arange(n)), np.ones((n, 2))), np.linspace(1, 20, len(faces.area))
     results = []
-    for at_once in (hessian_blocks_module.AT_ONCE, 5):
+    for at_once, pairs in ((hessian_blocks_module.AT_ONCE, hessian_blocks_module.MOST_PAIRS), (5, 0)):
         monkeypatch.setattr(hessian_blocks_module, "AT_ONCE", at_once)
+        monkeypatch.setattr(hessian_blocks_module, "MOST_PAIRS", pairs)
         found = hessian_blocks(faces, w, weight, 0.5, axes)
         matrix = assembly_of(faces, n).matrix(found.triangles, np.arange(2.0 * n), found.quads)
         matrix = matrix if found.rest is None else matrix + found.rest
         results.append((matrix.toarray(), found.gradient, found.scale))
     for whole, parts in zip(*results, strict=True):
         np.testing.assert_allclose(parts, whole, rtol=1e-12, atol=1e-12 * np.abs(whole).max())
+
+
+def test_blocks_of_quads_keep_no_others():
+    """What comes back refers to no memory but its own: blocks of all triangles of quads take twice as much."""
+    V, T, owner = patch(7)
+    faces = polygon_elements(V, T, face_areas(V, T), owner)
+    n = len(V)
+    found = hessian_blocks(faces, V[:, :2] @ [1, 1j], 3.0, 0.5, (np.ones(n, complex), np.ones((n, 2))))
+    kept = found.triangles.base
+    assert kept is None or kept.nbytes <= 2 * found.triangles.nbytes
 
 
 def test_blocks_of_followers_are_those_of_their_representatives():

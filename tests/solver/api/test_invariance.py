@@ -1,0 +1,176 @@
+"""What no function may see: where a mesh lies, how large it is, how it is turned, and how it is numbered.
+
+Each function is run on a mesh and on the same mesh told in another way; what comes out has the same shape.
+"""
+
+from __future__ import annotations
+
+import functools
+from itertools import product
+from typing import NamedTuple
+
+import meshes
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from omt_uv import solver as omt
+
+
+class Told(NamedTuple):
+    """A mesh (n,3), (m,4) told in one way, and what there is to undo: its size, the faces (m,) it began with in its
+    order, and by how much their corners have been rolled."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    size: float = 1.0
+    order: np.ndarray | slice = slice(None)
+    rolled: int = 0
+
+
+def plain(V, F):
+    return Told(V, F)
+
+
+def moved(V, F):
+    return Told(V + [3.0, -7.0, 11.0], F)
+
+
+def enlarged(V, F):
+    return Told(1000.0 * V, F, 1000.0)
+
+
+def made_small(V, F):
+    return Told(V / 4096, F, 1 / 4096)
+
+
+def turned(V, F):
+    return Told(Rotation.from_rotvec([0.3, -1.1, 0.6]).apply(V), F)
+
+
+def other_faces_first(V, F):
+    order = np.random.default_rng(1).permutation(len(F))
+    return Told(V, F[order], order=order)
+
+
+def other_vertices_first(V, F):
+    new = np.random.default_rng(2).permutation(len(V))
+    other = np.empty_like(V)
+    other[new] = V
+    return Told(other, new[F])
+
+
+def other_corners_first(V, F):
+    return Told(V, np.roll(F, 1, axis=1), rolled=1)
+
+
+WAYS = (moved, enlarged, made_small, turned, other_faces_first, other_vertices_first, other_corners_first)
+
+
+def ramp(V, F, low, high):
+    """Numbers (m,) of faces that rise along the mesh, whatever it is told by."""
+    along = np.linalg.norm(V[F].mean(axis=1) - V[F].mean(axis=(0, 1)), axis=1)
+    return low + (high - low) * (along - along.min()) / np.ptp(along)
+
+
+def near_middle(V, F):
+    """Weights (n,) that fall with the distance from the middle of the mesh."""
+    away = np.linalg.norm(V - V[F].mean(axis=(0, 1)), axis=1)
+    return np.clip(1.5 - 3 * away / away.max(), 0, 1)
+
+
+def unwrapped(V, F, **options):
+    return omt.unwrap(V, F, **options).uv
+
+
+def flat(V, F):
+    """UVs (m,4,2) that are sheared, from the mesh itself."""
+    return omt.unwrap(V, F, quality="draft", balance=1.0).uv
+
+
+ENTRIES = {
+    "unwrap": unwrapped,
+    "unwrap draft": lambda V, F: unwrapped(V, F, quality="draft"),
+    "unwrap exact": lambda V, F: unwrapped(V, F, quality="exact"),
+    "unwrap disk": lambda V, F: unwrapped(V, F, boundary="disk"),
+    "unwrap square": lambda V, F: unwrapped(V, F, boundary="square"),
+    "unwrap balance": lambda V, F: unwrapped(V, F, balance=0.5),
+    "unwrap density": lambda V, F: unwrapped(V, F, density=ramp(V, F, 1, 4)),
+    "refine": lambda V, F: omt.refine(V, F, flat(V, F)).uv,
+    "refine balance": lambda V, F: omt.refine(V, F, flat(V, F), balance=0.5).uv,
+    "magnify": lambda V, F: omt.magnify(V, F, flat(V, F), near_middle(V, F), 2.0).uv,
+}
+
+
+def patch(count=7):
+    """A curved patch of quads (m,4) without any symmetry."""
+    x, y = np.meshgrid(np.linspace(0, 1.3, count + 1), np.linspace(0, 1, count + 1))
+    V = np.column_stack([x.ravel(), y.ravel(), (0.5 * np.sin(2.2 * x + 0.4) * np.cos(1.7 * y) + 0.1 * x * x).ravel()])
+    corner = ((count + 1) * np.arange(count)[:, None] + np.arange(count)).ravel()
+    return V, np.column_stack([corner, corner + 1, corner + count + 2, corner + count + 1])
+
+
+def lengths(uv):
+    """Lengths (m,k,k) between the corners of faces (m,k,d)."""
+    return np.linalg.norm(uv[:, :, None] - uv[:, None], axis=3)
+
+
+def as_before(uv, told: Told):
+    """Places (m,k,d) on a mesh that was told otherwise, at the faces and corners it had."""
+    uv = np.roll(uv, -told.rolled, axis=1)
+    found = np.empty_like(uv)
+    found[told.order] = uv
+    return found
+
+
+@functools.cache
+def as_it_is(name, mesh):
+    """What a function makes of a mesh as it is."""
+    return lengths(ENTRIES[name](*mesh()))
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+@pytest.mark.parametrize("name", ENTRIES)
+def test_maps_are_those_of_the_same_mesh_told_otherwise(name, way):
+    told, expected = way(*patch()), as_it_is(name, patch)
+    off = np.abs(lengths(as_before(ENTRIES[name](told.vertices, told.faces), told)) / told.size - expected)
+    assert off.max() <= 1e-5 * expected.mean()
+
+
+def body():
+    """A closed body of triangles (m,3) without any symmetry."""
+    V, F = meshes.icosphere(2)
+    x, y, z = V.T
+    return V * (1 + 0.2 * np.sin(2 * x + 0.5) + 0.15 * np.cos(3 * y + z) + 0.1 * z)[:, None] * [1.3, 1.0, 0.8], F
+
+
+CLOSED = {
+    "unwrap": unwrapped,
+    "unwrap max_shear": lambda V, F: unwrapped(V, F, max_shear=1.2),
+    "sphere": lambda V, F: omt.sphere_map(V, F).positions[F],
+    "sphere balance": lambda V, F: omt.sphere_map(V, F, balance=0.5).positions[F],
+}
+
+
+# A search for seams takes the first of cuts that are worth the same.
+BY_ORDER = {("unwrap max_shear", other_faces_first)}
+
+
+@pytest.mark.parametrize(("name", "way"), [pair for pair in product(CLOSED, WAYS) if pair not in BY_ORDER])
+def test_maps_of_bodies_are_those_of_the_same_body_told_otherwise(name, way):
+    told, expected = way(*body()), lengths(CLOSED[name](*body()))
+    size = 1 if name.startswith("sphere") else told.size
+    off = np.abs(lengths(as_before(CLOSED[name](told.vertices, told.faces), told)) / size - expected)
+    assert off.max() <= 1e-5 * expected.mean()
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+def test_figures_are_those_of_the_same_mesh_told_otherwise(way):
+    told, (V, F) = way(*patch()), patch()
+    uv = V[F][:, :, :2] * [1, 0.7] + 0.1 * V[F][:, :, 2:]
+    uv[3] = uv[3, ::-1]
+    mine = np.roll(uv[told.order], told.rolled, axis=1)
+    before, after = omt.distortion(V, F, uv), omt.distortion(told.vertices, told.faces, mine)
+    for name, value in vars(before).items():
+        if isinstance(value, (int, float)):
+            assert getattr(after, name) == pytest.approx(value, rel=1e-9), name
