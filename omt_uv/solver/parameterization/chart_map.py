@@ -29,7 +29,6 @@ from .initial_map import (
     DRAFT_SPREAD,
     DiskMesh,
     InitialChartMap,
-    coarse_above,
     coarse_initial_map,
     direct_initial_map,
     flat_initial_map,
@@ -307,7 +306,7 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool) -> St
             even = flat_initial_map(disk, log, DRAFT_SPREAD)
             if even is not None:
                 return even
-    if len(disk.vertices) > (DRAFT_ABOVE if draft else coarse_above(disk)):
+    if len(disk.vertices) > (DRAFT_ABOVE if draft else COARSE_ABOVE):
         try:
             found = yield from coarse_initial_map(disk, balance, log, draft=draft)
             if found is not None:

@@ -16,13 +16,13 @@ from ..conformal.boundary_first import boundary_first
 from ..errors import PrecisionError, TransportError
 from ..maps.energy import area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
-from ..maps.tutte import arc_length_parameters, evened_tutte, tutte
+from ..maps.tutte import arc_length_parameters, tutte
 from ..maps.untangle import count_folds, map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.boundary_barrier import covers_itself
-from ..refinement.continuation_rules import QUALITIES, is_squeezed
+from ..refinement.continuation_rules import QUALITIES
 from ..refinement.initial_maps import is_far
 from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
@@ -48,11 +48,6 @@ SITE_RESOLUTION = 1e-7
 CENTRED = 1e-3
 # Charts with more vertices than this come by way of a coarser one.
 COARSE_ABOVE = 5000
-# With a free boundary, more than this: an evened map leaves as little to do, and shears less in the end.
-COARSE_ABOVE_FREE = 9000
-# Charts of at most so many vertices start from a mean value map where others start from an evened one: steps take
-# little time there, and searches for seams foretell the shear of a map by that of coarse surfaces with such a start.
-EVENED_ABOVE = 1500
 # That has the vertices divided by this, and at most this share of them: otherwise it does not pay.
 COARSER = 8
 COARSE_ENOUGH = 0.25
@@ -140,26 +135,15 @@ class InitialChartMap:
 
 
 def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD) -> InitialChartMap | None:
-    """A disk flattened as its boundary comes; an evened map where that would fold, cover itself, or be squeezed.
+    """A disk flattened with the boundary as it comes, or a mean value map where that would fold or cover itself.
 
-    None where it would scale unevenly.
+    None where it would scale unevenly: areas are farther from a mean value map than from the transport's, then.
     """
     with log.timed("flattening"):
         flat = _evenly_flattened(disk, spread)
-        if flat is None:
-            return None
-        if len(flat) <= EVENED_ABOVE:
-            one_to_one = _one_to_one(disk, flat)
-            unit = (disk.vertices, disk.triangles, disk.loop, None, Disk())
-            return InitialChartMap(flat if one_to_one else mean_value_sites(*unit))
-        with_room = not is_squeezed(_energy_with_targets(disk, flat), SMOOTH_WEIGHT)
-        return InitialChartMap(flat if with_room and _one_to_one(disk, flat) else evened_sites(disk))
-
-
-def _energy_with_targets(disk: DiskMesh, uv: np.ndarray) -> float:
-    """The energy of a map uv (n,2), as large as its targets, with which its refinement would begin."""
-    faces, w = elements(disk.vertices, disk.triangles, disk.target), uv @ [1, 1j]
-    return energy(faces, w * np.sqrt((faces.area @ faces.ratio) / np.abs(faces.areas(w).sum())), SMOOTH_WEIGHT)
+        if flat is None or _one_to_one(disk, flat):
+            return None if flat is None else InitialChartMap(flat)
+        return InitialChartMap(mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk()))
 
 
 def _evenly_flattened(disk: DiskMesh, spread: float) -> np.ndarray | None:
@@ -267,29 +251,9 @@ def _density(vertices, triangles, target, goal: int) -> np.ndarray:
     return has / all_of_it
 
 
-def evened_sites(disk: DiskMesh) -> np.ndarray:
-    """An embedding (n,2) in the unit disk whose areas are nearly those asked for, see `evened_tutte`."""
-    faces = elements(disk.vertices, disk.triangles, disk.target)
-    boundary = Disk().map_boundary(arc_length_parameters(disk.vertices, disk.loop))
-    return evened_tutte(disk.vertices, disk.loop, boundary, faces, SMOOTH_WEIGHT)
-
-
-def coarse_above(disk: DiskMesh) -> int:
-    """With how many vertices a disk comes by way of a coarser one."""
-    even = disk.boundary == "free" and not is_far(disk.target, face_areas(disk.vertices, disk.triangles))
-    return COARSE_ABOVE_FREE if even else COARSE_ABOVE
-
-
 def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
-    """Map a disk by itself: where its boundary is free flattened or evened, by conformal map and transport else, and
-    where the target is far."""
-    if disk.boundary != "free":
-        return (yield from initial_map(disk, log))
-    flat = flat_initial_map(disk, log)
-    far = is_far(disk.target, face_areas(disk.vertices, disk.triangles))
-    if flat is None and not far and len(disk.vertices) > EVENED_ABOVE:
-        with log.timed("flattening"):
-            return InitialChartMap(evened_sites(disk))
+    """Map a disk by itself: flattened where its boundary is free and it may be, by conformal map and transport else."""
+    flat = flat_initial_map(disk, log) if disk.boundary == "free" else None
     return (yield from initial_map(disk, log)) if flat is None else flat
 
 

@@ -11,7 +11,7 @@ from omt_uv.solver.mesh.charts import triangle_rows
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, twins
-from omt_uv.solver.parameterization.initial_map import COARSE_ABOVE_FREE, mean_value_sites
+from omt_uv.solver.parameterization.initial_map import COARSE_ABOVE, mean_value_sites
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -70,8 +70,8 @@ def test_places_are_found_even_in_stars_without_room():
 
 
 def test_large_charts_come_by_way_of_coarser_ones():
-    V, F = meshes.head(96)
-    assert len(V) > COARSE_ABOVE_FREE
+    V, F = meshes.head(75)
+    assert len(V) > COARSE_ABOVE
     (chart_map,) = drain(unwrap(triangle_surface(V, F))).maps
     assert "coarsening" in chart_map.seconds and chart_map.newton_refinement <= 25
     assert chart_map.folds == 0 and chart_map.area_l1 <= 0.01 and not chart_map.warnings
