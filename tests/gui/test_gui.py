@@ -39,7 +39,7 @@ def load():
 
 NAMES = (
     *("tour", "escape", "uv_editor", "sections", "shapes", "panels"),
-    *("install", "drag", "live", "pins", "disk", "menus"),
+    *("install", "drag", "live", "pins", "disk", "menus", "volume"),
 )
 AGES = os.environ.get("OMT_UV_GUI_AGES", "here trixie sid").split()
 
@@ -213,6 +213,16 @@ def test_uvs_follow_the_mouse_and_go_back_on_escape(play):
     assert facts["uvs moved before Esc"] > 0.01 and facts["uvs moved after Esc"] == 0
 
 
+def test_an_inside_is_mapped_by_clicks(play):
+    """Shells and a slice as new objects; volumes within a percent, nothing inverted."""
+    facts = play("volume")
+    for result, count in (("shells", 3), ("slice", 1)):
+        made = facts[result]
+        assert len(made["new"]) == count and min(made["vertices"]) > 50
+        figures = dict(made["said"][1:])
+        assert figures["Inverted"] == "0" and float(figures["Volume error"].split()[0]) < 1
+
+
 def test_the_zip_is_dropped_and_a_few_clicks_lead_to_a_checker(play):
     """Two to install, one for a good unwrap, one for its checker, none for its figures."""
     facts = play("install")
@@ -252,6 +262,7 @@ STORIES = [
     ("panels", 30),
     ("install", 3),
     ("drag", 2),
+    ("volume", 3),
     ("live", 6),
     ("pins", 4),
     ("disk", 4),
