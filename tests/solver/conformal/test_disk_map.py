@@ -6,7 +6,13 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 from omt_uv.solver import errors
-from omt_uv.solver.conformal.disk_map import conformal_disk, conformal_rectangle, quarter_points, sharpest_corners
+from omt_uv.solver.conformal.disk_map import (
+    boundary_turns,
+    conformal_disk,
+    conformal_rectangle,
+    quarter_points,
+    sharpest_corners,
+)
 from omt_uv.solver.conformal.double_cover import double_disk
 from omt_uv.solver.conformal.intrinsic_triangulation import euclidean_diagonal, from_mesh, make_delaunay
 from omt_uv.solver.conformal.rectangle_to_disk import centre_in_disk, rectangle_to_disk
@@ -240,6 +246,14 @@ def test_corners():
     uneven = np.array([[0, 0, 0], [100, 0, 0], [100, 1, 0], [99, 1, 0], [98, 1, 0], [0, 1, 0.0]])
     quarters = quarter_points(uneven, np.arange(6))
     assert len(set(quarters)) == 4 and (np.diff(quarters) > 0).all()
+
+
+def test_a_flat_boundary_turns_by_the_angles_of_its_polygon():
+    V, F = meshes.bumpy(6, 5, 0.0)
+    V = V @ [[1, 0, 0], [0.7, 1, 0], [0, 0, 1]]
+    (loop,) = boundary_loops(F)
+    side = np.diff(V[np.append(loop, loop[0])][:, :2] @ [1, 1j])
+    np.testing.assert_allclose(boundary_turns(V, F, loop), np.angle(side / np.roll(side, 1)), atol=1e-7)
 
 
 def test_turning_sense_is_counter_clockwise():

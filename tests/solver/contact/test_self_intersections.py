@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from bodies import icosphere
 
 from omt_uv.solver.contact.self_intersections import intersecting_pairs
@@ -33,6 +34,15 @@ def test_random_triangles_agree_with_brute_force():
     F = F[np.unique(np.sort(F, axis=1), axis=0, return_index=True)[1]]
     # Triangles with an edge in common pass by the rule, and here none of them would be told anyway.
     assert [tuple(p) for p in intersecting_pairs(V, F)] == by_sampling(V, F)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e3])
+def test_their_number_does_not_depend_on_size_and_place(size):
+    rng = np.random.default_rng(3)
+    V, F = rng.uniform(-1, 1, (60, 3)), np.arange(60).reshape(-1, 3)
+    pairs = intersecting_pairs(V, F)
+    assert len(pairs) > 10
+    np.testing.assert_array_equal(intersecting_pairs(size * (V + [2.0, -1.0, 0.5]), F), pairs)
 
 
 def test_two_balls_and_one():

@@ -116,6 +116,18 @@ def test_nonzeros_grow_with_the_mesh():
     assert counts[1] <= 1.15 * counts[0]
 
 
+def test_affine_motions_of_parts_are_among_the_coarse_ones():
+    V, F = meshes.bumpy(20, 20)
+    w = V[:, 0] + 1j * V[:, 1] + 3 - 2j
+    frame = np.exp(1j * np.arange(len(w)))
+    parts = AdditiveSchwarz(V, F, 100)
+    spread = parts._affine(w, frame[:, None] * [1, 1j]).toarray()
+    for motion in (np.ones(len(w)), 1j * np.ones(len(w)), w, 1j * w, w.conj(), 1j * w.conj()):
+        along = (motion * frame.conj()).view(float)
+        found = np.linalg.lstsq(spread, along, rcond=None)[0]
+        np.testing.assert_allclose(spread @ found, along, atol=1e-9)
+
+
 def test_parts_of_quads_have_the_fill_of_their_equations():
     # All corners of a quad are neighbours in its equations, while its triangles know of one diagonal.
     V, quads = hard_meshes.terrain(60)

@@ -4,7 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.mesh.edge_flips import flip_in_place, flip_until_none
+from omt_uv.solver.mesh.edge_flips import flip_in_place, flip_until_none, shorter_diagonals
 from omt_uv.solver.mesh.geometry import angles_from_lengths, halfedge_lengths, signed_areas
 from omt_uv.solver.mesh.topology import pair_keys, twins
 
@@ -75,3 +75,18 @@ def test_flips_until_none_end_at_delaunay():
     assert flips and ended
     np.testing.assert_array_equal(twin, twins(G))
     assert (signed_areas(uv, G) > 0).all() and (excess(np.flatnonzero(twin >= 0)) >= 0).all()
+
+
+def test_convex_quads_are_cut_along_the_shorter_diagonal():
+    """Of parallelograms of all shapes, in all places, apart from one another."""
+    rng = np.random.default_rng(5)
+    corner, one, other = (rng.normal(size=(200, 3)) for _ in range(3))
+    V = np.stack([corner, corner + one, corner + one + other, corner + other], axis=1).reshape(-1, 3)
+    quads = np.arange(800).reshape(-1, 4)
+    sine = np.linalg.norm(np.cross(one, other), axis=1) / np.linalg.norm(one, axis=1) / np.linalg.norm(other, axis=1)
+    thick = sine > 0.3
+    cut = shorter_diagonals(V, quads, quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3))
+    assert thick.sum() > 100
+    np.testing.assert_array_equal(np.sort(cut, axis=1), quads)
+    mine, left = (np.linalg.norm(V[cut[:, k]] - V[cut[:, k + 2]], axis=1)[thick] for k in (0, 1))
+    assert (mine <= left).all()

@@ -102,6 +102,20 @@ def test_polygons_that_fold_are_cut_by_their_ears():
     assert len(other.triangles) == sides - 2
 
 
+def test_ears_are_the_same_wherever_the_polygon_lies():
+    random = np.random.default_rng(4)
+    angle = 2 * np.pi * (np.arange(12) + random.uniform(0, 0.5, 12)) / 12
+    # Uneven: no two ears are as round as each other.
+    V = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    for _ in range(5):
+        uv, cuts = V[:, :2] * random.uniform(0.2, 1.0, 12)[:, None], []
+        for place in ([0, 0, 0], [5.0, -3.0, 2.0]):
+            (chart,) = strict_charts(meshes.polygon_surface(V + place, [list(range(12))]))
+            mapped = (uv + place[:2])[chart.vertex_ids]
+            cuts.append(chart.vertex_ids[cut_as_mapped(chart, mapped).triangles])
+        assert {tuple(sorted(t)) for t in cuts[0].tolist()} == {tuple(sorted(t)) for t in cuts[1].tolist()}
+
+
 def hill_of_triangles(height, turned):
     """A hill of 144 quads, its own image in x, cut into triangles symmetrically but for the quads `turned`."""
     x, y = np.meshgrid(np.linspace(-1, 1, 13), np.linspace(-1, 1, 13), indexing="ij")

@@ -14,7 +14,7 @@ from omt_uv.solver.volumes.registration import registered
 from omt_uv.solver.volumes.sampling import ball_index, interior_points, sampled_field
 from omt_uv.solver.volumes.shells import icosphere, level_surface, shell_surfaces
 from omt_uv.solver.volumes.slices import dilation, plane_slice
-from omt_uv.solver.volumes.tet_mesh import tet_volumes
+from omt_uv.solver.volumes.tet_mesh import tet_volumes, turned_right
 from omt_uv.solver.volumes.transfer import TetLocation
 
 
@@ -103,3 +103,14 @@ def test_a_body_in_itself_stays_and_slices_show_its_dilation(body):
     np.testing.assert_allclose(cut.vertices[:, 2], 0.1, atol=1e-9)
     assert len(cut.dilation) == len(cut.triangles) and np.abs(cut.dilation).mean() < 0.6
     assert np.abs(dilation(body.points, 3 * body.points, body.tets)).max() < 1e-9
+
+
+def test_tetrahedra_the_wrong_way_are_turned_and_no_others():
+    points = np.random.default_rng(0).normal(size=(5, 3))
+    tets = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+    volume = tet_volumes(points, tets)
+    tets = np.where((volume < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
+    np.testing.assert_array_equal(turned_right(points, tets), tets)
+    turned = turned_right(points, tets[:, [0, 1, 3, 2]])
+    np.testing.assert_array_equal(np.sort(turned, axis=1), np.sort(tets, axis=1))
+    np.testing.assert_allclose(tet_volumes(points, turned), np.abs(volume))
