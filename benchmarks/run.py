@@ -18,6 +18,7 @@ from benchmarks.part import Option, Part
 from benchmarks.parts import (
     alike,
     bodies,
+    cage,
     cascade,
     cuts,
     hard,
@@ -56,6 +57,7 @@ MODULES = (
     match,
     partition,
     polygons,
+    cage,
     alike,
     bodies,
     pace,
