@@ -19,7 +19,7 @@ from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural
 from ..mesh.charts import Chart, sound_disks
 from ..mesh.edge_flips import cut_along_shorter
-from ..mesh.geometry import signed_areas
+from ..mesh.geometry import face_areas
 from ..mesh.surface import Surface
 from ..mesh.topology import on_boundary, pair_keys
 from ..progress import Progress, Steps, part_of
@@ -154,25 +154,34 @@ def unwrap(
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
 
-def _without_bands(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: np.ndarray):
-    """Charts, maps and cuts (k,2), long bands cut across: such as those of a gear or a cable, which leave most of a
-    texture empty. What had been a disk before stays one."""
-    length = np.array([np.ptp(_upright(m.uv), axis=0).max() for m in maps])
-    side = np.sqrt(sum(np.abs(signed_areas(m.uv, c.triangles)).sum() for c, m in zip(charts, maps, strict=True)))
+def _without_bands(
+    search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: np.ndarray
+) -> tuple[list[Chart], list[ChartMap], np.ndarray]:
+    """Charts, maps and cuts (k,2), long bands cut across, such as those of a gear or a cable: they leave most of a
+    texture empty. Charts that were not cut at all, and those with marked seams, stay whole."""
+    surface = search.surface
+    chosen = surface.triangles if search.faces is None else surface.triangles[search.faces[surface.triangle_face]]
+    longest = LONG * np.sqrt(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
     new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts]
-    for chart, chart_map, count in zip(charts, maps, np.ceil(length / (PIECE * side)).astype(int), strict=True):
-        pieces = [(chart, chart_map)]
-        was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
-        if count > LONG / PIECE and was_cut and not len(chart.patches) and not is_marked(search.surface, chart):
-            found, between = _in_pieces(search, chart, chart_map, min(count, MOST_PIECES))
-            pieces, edges = (found, [*edges, between]) if found else (pieces, edges)
-        new_charts += [chart for chart, _ in pieces]
-        new_maps += [chart_map for _, chart_map in pieces]
+    for chart, chart_map in zip(charts, maps, strict=True):
+        found, between = [(chart, chart_map)], cuts[:0]
+        # Most are short, and of thousands nothing else is asked.
+        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > longest and not len(chart.patches):
+            length = np.ptp(_upright(chart_map.uv), axis=0).max()
+            was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
+            if length > longest and was_cut and not is_marked(surface, chart):
+                count = min(int(np.ceil(length * LONG / (PIECE * longest))), MOST_PIECES)
+                found, between = _in_pieces(search, chart, chart_map, count)
+        new_charts += [chart for chart, _ in found]
+        new_maps += [chart_map for _, chart_map in found]
+        edges.append(between)
     return new_charts, new_maps, np.concatenate(edges)
 
 
-def _in_pieces(search: ShearSearch, chart: Chart, chart_map: ChartMap, count: int):
-    """A chart and its map cut across, as pairs, and the edges (k,2) in between; no pairs where pieces are no disks."""
+def _in_pieces(
+    search: ShearSearch, chart: Chart, chart_map: ChartMap, count: int
+) -> tuple[list[tuple[Chart, ChartMap]], np.ndarray]:
+    """A chart and its map cut across, as pairs, and the edges (k,2) in between; whole where the pieces are no disks."""
     from ..seams.parting import in_pieces
 
     piece, between = in_pieces(chart, chart_map.uv, search.costs().vertex_cost[chart.vertex_ids], count)
@@ -190,7 +199,9 @@ def _in_pieces(search: ShearSearch, chart: Chart, chart_map: ChartMap, count: in
         (vertices, _), (flat, _) = in_unit_box(part.vertices), in_unit_box(chart_map.uv[used])
         figures = measured_chart(vertices, part, flat, None)
         found.append((part, with_folds_counted(part, with_figures(chart_map, chart_map.uv[used], figures))))
-    return (found if sound_disks([part for part, _ in found]).all() else []), between
+    if not sound_disks([part for part, _ in found]).all():
+        return [(chart, chart_map)], between[:0]
+    return found, between
 
 
 def _upright(uv: np.ndarray) -> np.ndarray:
