@@ -32,7 +32,7 @@ def tell(story):
 def keep(story, tab, large):
     """A bound that takes several rounds of seams: Enter keeps what the first had."""
     bpy.data.objects.remove(large)
-    obj = story.head(40)
+    obj = story.head(80)
     bpy.context.window_manager.operator_properties_last("uv.omt_unwrap").max_shear = 1.03
     yield from tab.click("omt_unwrap(")
     yield from story.until(lambda: not story.running() or story.running().early)
