@@ -38,7 +38,7 @@ def untangle(
     if count_folds(fresh, triangles):
         # Needles give weights that double precision does not solve; equal ones are right, and far from the areas.
         equal = tutte(positions, triangles, loop, boundary, equal=True)
-        fresh = equal if count_folds(equal, triangles) < count_folds(fresh, triangles) else fresh
+        fresh = min(fresh, equal, key=lambda start: count_folds(start, triangles))
     fewer = count_folds(fresh, triangles) < count_folds(straight, triangles)
     if fewer or map_energy(fresh, positions, triangles) < first:
         return fresh, "The start could not be untangled; the refinement starts from a mean value map of the surface"

@@ -203,7 +203,7 @@ def perturbed(
     scale = (extent if size < 1e-9 * extent else size) or 1.0
     moving = SHAPELESS_SIZE * rng.random((len(vertices), 3)) if shapeless else vertices / scale - low / scale
     # Of the mesh as it came: next to what has moved already, heights say nothing.
-    reach = _least_height(moving, triangles, bad)
+    reach = _least_height(moving, triangles)
     for k in range(PERTURBATION_ROUNDS):
         bad = degenerate_triangles(moving, triangles, NEEDLE)
         if not bad.any():
@@ -214,11 +214,10 @@ def perturbed(
     raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(names[bad[: len(names)]]))
 
 
-def _least_height(vertices: np.ndarray, triangles: np.ndarray, bad: np.ndarray) -> np.ndarray:
-    """Least height (n,) of the sound triangles around every vertex, or of those nearest across triangles (m,) that are
-    bad."""
-    thin = degenerate_triangles(vertices, triangles, THIN)
-    bad = bad if thin.all() else bad | thin
+def _least_height(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Least height (n,) of the sound triangles around every vertex, or of those nearest across others."""
+    bad = degenerate_triangles(vertices, triangles, THIN)
+    bad = degenerate_triangles(vertices, triangles, NEEDLE) if bad.all() else bad
     p = vertices[triangles]
     double_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
     longest = np.linalg.norm(p - p[:, [1, 2, 0]], axis=2).max(axis=1)

@@ -343,6 +343,11 @@ def measured_chart(vertices: np.ndarray, chart: Chart, uv: np.ndarray, density: 
     return distortion(vertices, chart.triangles, mapped, overlap=False, density=density, polygons=chart.faces)
 
 
+def measured_map(chart: Chart, uv: np.ndarray, density: np.ndarray | None) -> Distortion:
+    """Figures of a map (n,2) of a chart, of any size, against a density (m,)."""
+    return measured_chart(in_unit_box(chart.vertices)[0], chart, in_unit_box(uv)[0], density)
+
+
 def placed_chart(
     uv: np.ndarray, vertices, chart: Chart, density, unit: float, pins: ChartPins | None, centred: bool = True
 ) -> np.ndarray:

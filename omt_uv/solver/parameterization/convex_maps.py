@@ -18,7 +18,7 @@ from ..mesh.topology import boundary_loops
 from ..progress import Steps
 from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import chart_target
-from .chart_map import FOLDED, ChartMap, in_unit_box, measured_chart, refined_again
+from .chart_map import FOLDED, ChartMap, in_unit_box, measured_chart, measured_map, refined_again
 from .chart_pins import ChartPins
 from .options import MapOptions
 from .polygon_disk import cut_as_mapped
@@ -103,8 +103,7 @@ def _opened(
         if options.boundary == "free":
             (flat, unit) = in_unit_box(uv)
             uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
-        (vertices, _), (flat, _) = in_unit_box(chart.vertices), in_unit_box(uv)
-        figures = measured_chart(vertices, chart, flat, density[place])
+        figures = measured_map(chart, uv, density[place])
         fewer = reflex_triangles(surface, [chart], [uv])[0] < folded[k] and figures.folds <= old.folds
         if fewer and figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal):
             new[k] = with_figures(old, uv, figures)

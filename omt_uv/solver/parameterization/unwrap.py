@@ -26,7 +26,7 @@ from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.initial_maps import NEARLY_FLAT, inner_curvature
 from .chart_indices import chart_target, cut_as_given, in_order_of_places, located
-from .chart_map import ChartMap, in_unit_box, map_chart, measured_chart, refined_again
+from .chart_map import ChartMap, map_chart, measured_map, refined_again
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons, with_figures, with_folds_counted
 from .mirrored_charts import (
@@ -196,9 +196,8 @@ def _in_pieces(
             chart.faces[rows],
             chart.vertex_ids[used],
         )
-        (vertices, _), (flat, _) = in_unit_box(part.vertices), in_unit_box(chart_map.uv[used])
-        figures = measured_chart(vertices, part, flat, None)
-        found.append((part, with_folds_counted(part, with_figures(chart_map, chart_map.uv[used], figures))))
+        uv = chart_map.uv[used]
+        found.append((part, with_folds_counted(part, with_figures(chart_map, uv, measured_map(part, uv, None)))))
     if not sound_disks([part for part, _ in found]).all():
         return [(chart, chart_map)], between[:0]
     return found, between

@@ -6,6 +6,7 @@ with the boundary spread by its length. Whatever replaces the given map is said 
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,19 +74,15 @@ def is_far(target: np.ndarray, area: np.ndarray) -> bool:
 def disk_initial_map(vertices, triangles, uv, loop) -> InitialMap:
     """Boundary on the circle about 0 that has the area of the surface."""
     radius = np.sqrt(face_areas(vertices, triangles).sum() / np.pi)
-    warnings = []
     uv = uv * (radius / np.linalg.norm(uv[loop], axis=1).mean())
-    places = circle_boundary(uv, loop, radius)
-    if places is None:
-        warnings.append(SPREAD)
-        places = arc_length_boundary(vertices, loop, radius)
-    try:
-        straight = _straighten(uv, vertices, triangles, loop, places, warnings)
-    except FoldedUVError:
-        warnings.append(SPREAD)
-        places = arc_length_boundary(vertices, loop, radius)
-        straight = _straighten(uv, vertices, triangles, loop, places, warnings)
-    return InitialMap(straight, CircleMotion(loop, radius, len(vertices)), tuple(warnings))
+    motion, places = CircleMotion(loop, radius, len(vertices)), circle_boundary(uv, loop, radius)
+    # Vertices that nearly coincide on the outline fold what is between them, and are spread, too.
+    with contextlib.suppress(FoldedUVError):
+        if places is not None:
+            warnings: list[str] = []
+            return InitialMap(_straighten(uv, vertices, triangles, loop, places, warnings), motion, tuple(warnings))
+    warnings, places = [SPREAD], arc_length_boundary(vertices, loop, radius)
+    return InitialMap(_straighten(uv, vertices, triangles, loop, places, warnings), motion, tuple(warnings))
 
 
 def notched_disk(start: InitialMap, triangles, loop) -> InitialMap | None:

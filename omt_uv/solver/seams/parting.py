@@ -191,11 +191,10 @@ def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tup
     length, and the edges (k,2) of the surface in between; cost (n,) : see `parted`."""
     dual = _Dual.of(chart)
     corners = uv[chart.triangles]
-    area = np.bincount(dual.polygon, face_areas(chart.vertices, chart.triangles))
     middle = np.stack([np.bincount(dual.polygon, x) for x in corners.mean(axis=1).T], axis=1)
     middle = middle / np.bincount(dual.polygon)[:, None]
-    middle -= area @ middle / area.sum()
-    along = middle @ np.linalg.eigh(middle.T @ (area[:, None] * middle))[1][:, 1]
+    middle -= dual.area @ middle / dual.area.sum()
+    along = middle @ np.linalg.eigh(middle.T @ (dual.area[:, None] * middle))[1][:, 1]
     along = (along - along.min()) / max(np.ptp(along), 1e-300)
     capacity, cut = _capacity(chart, dual, cost), np.zeros(len(dual.joined), dtype=bool)
     for k in range(1, count):

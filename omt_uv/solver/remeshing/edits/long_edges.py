@@ -69,12 +69,8 @@ def split_component(component: Component, h: np.ndarray) -> Component:
         input_barycentric=input_barycentric,
         shift=np.concatenate([component.shift, component.shift[t]]),
         features=_halved(component.features, edit.split_ends, len(component.vertices)),
-        to_reopen=np.sort(pair_keys(*_halved(_ends(component.to_reopen), edit.split_ends, len(component.vertices)).T)),
+        to_reopen=np.sort(pair_keys(*_halved(paired(component.to_reopen), edit.split_ends, len(component.vertices)).T)),
     )
-
-
-def _ends(keys: np.ndarray) -> np.ndarray:
-    return paired(keys)
 
 
 def _halved(edges: np.ndarray, split_ends: np.ndarray, n: int) -> np.ndarray:
