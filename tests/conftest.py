@@ -29,6 +29,10 @@ def pytest_sessionstart(session):
         import bpy
 
         bpy.ops.extensions.package_install_files(filepath=archive, repo="user_default", enable_on_install=True)
+        # What tests start in processes of their own finds it there, too.
+        import scipy
+
+        os.environ["PYTHONPATH"] = str(Path(scipy.__file__).parents[1])
 
 
 @pytest.fixture(scope="session")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +18,9 @@ name = source.name
 with open(os.environ["OMT_UV_TEST_LOG"], "a") as log:
     log.write(f"{name}\\n")
 if "slow" in name:
-    signal.pause()
+    # As the program does: it ends with its parent.
+    os.read(0, 1)
+    sys.exit(3)
 if "crash" in name:
     os.kill(os.getpid(), signal.SIGSEGV)
 if "bad" in name:
@@ -56,7 +60,23 @@ def work(tmp_path, monkeypatch):
     (tmp_path / "in").mkdir()
     (tmp_path / "program.py").write_text(PROGRAM)
     monkeypatch.setenv("OMT_UV_TEST_LOG", str(tmp_path / "log.txt"))
-    return Work(tmp_path, (sys.executable, str(tmp_path / "program.py")))
+    yield Work(tmp_path, (sys.executable, str(tmp_path / "program.py")))
+    for _ in range(200):
+        left = processes_of(tmp_path)
+        if not left:
+            break
+        threading.Event().wait(0.05)
+    assert not left, f"processes were left behind: {left}"
+
+
+def processes_of(folder):
+    """The words of all processes that name a folder, where the system tells."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            words = path.read_bytes().split(b"\0")
+            found += [words] if any(str(folder).encode() in word for word in words) else []
+    return found
 
 
 @pytest.fixture

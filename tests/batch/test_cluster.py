@@ -121,6 +121,6 @@ def test_a_scheduler_that_dies_ends_the_batch_and_the_next_one_goes_on(package, 
             process.kill()
             process.wait()
     path = program.root / "program.py"
-    path.write_text(path.read_text().replace("signal.pause()", "pass"))
+    path.write_text(path.read_text().replace('if "slow"', 'if "never"'))
     assert go()[0].counts == {"done": 2}
     assert program.runs().count("a.obj") <= 2

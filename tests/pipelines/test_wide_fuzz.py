@@ -62,6 +62,9 @@ def judged(judge, surface, faces, uv):
     _, chart = judge.chart_of_face(F, UV)
     signed = judge.signed_area(UV)
     turned = np.bincount(chart, signed)
+    if not signed.any():
+        # All lie in points: nothing folds, and nothing covers anything.
+        return 0, 0.0
     folds = int(((signed * turned[chart] <= 0) & (np.abs(signed) > FLAT * np.abs(signed).sum())).sum())
     return folds, judge.overlap_share(UV, samples=40_000)
 

@@ -106,9 +106,9 @@ def distortion(V, F, uv, *, overlap: bool = True, density=None, polygons=None) -
     NonFiniteError : a position or UV is NaN or infinite
     ZeroAreaFaceError : no face has an area in 3D
     """
-    V, F, uv = _checked(V, F, uv)
-    polygons = _counted(polygons, len(F))
+    V, F, uv, polygons = _checked(V, F, uv, polygons)
     area, real = _surface_area(V, F, polygons)
+    polygons = _counted(polygons)
     target = area if density is None else area * np.asarray(density, float)
     faces = _measure_faces(_Triangles(V, F[real], uv[real], target[real]), None if polygons is None else polygons[real])
     w, ratio, good = faces.weight, faces.ratio, ~faces.folded
@@ -144,9 +144,9 @@ def face_distortion(V, F, uv, polygons=None) -> tuple[np.ndarray, np.ndarray]:
     log2 of RATIO_FLOOR (about -40), a face without area in 3D has 0 and shear 1. With polygons (m,), every triangle has
     the values of its polygon.
     """
-    V, F, uv = _checked(V, F, uv)
-    polygons = _counted(polygons, len(F))
+    V, F, uv, polygons = _checked(V, F, uv, polygons)
     area, real = _surface_area(V, F, polygons)
+    polygons = _counted(polygons)
     of = np.arange(real.sum()) if polygons is None else np.unique(polygons[real], return_inverse=True)[1].ravel()
     faces = _measure_faces(_Triangles(V, F[real], uv[real], area[real]), None if polygons is None else of)
     octaves, shear = np.zeros(len(F)), np.ones(len(F))
@@ -155,41 +155,48 @@ def face_distortion(V, F, uv, polygons=None) -> tuple[np.ndarray, np.ndarray]:
     return octaves, shear
 
 
-def _checked(V, F, uv):
-    """Positions, triangles and UVs as arrays; raises what `distortion` raises."""
+def _checked(V, F, uv, polygons):
+    """Positions, triangles, UVs and polygons, if any, as arrays; raises what `distortion` raises."""
     V, F, uv = np.asarray(V, float), np.asarray(F, np.int64), np.asarray(uv, float)
     if uv.shape != (*F.shape, 2) or F.ndim != 2 or F.shape[1] != 3:
         raise ValueError(f"expected F (m,3) and uv (m,3,2), got {F.shape} and {uv.shape}")
+    if polygons is not None and np.shape(polygons) != (len(F),):
+        raise ValueError(f"expected polygons ({len(F)},), got {np.shape(polygons)}")
+    polygons = None if polygons is None else np.asarray(polygons)
     if not len(F):
         raise EmptyMeshError("There are no faces to measure")
     bad_vertex = np.flatnonzero(~np.isfinite(V).all(1))
     bad_vertex = bad_vertex[np.isin(bad_vertex, F)]
     if len(bad_vertex):
         raise NonFiniteError("A position is not a finite number", "", "vertex", bad_vertex)
-    bad_face = np.flatnonzero(~np.isfinite(uv).all((1, 2)))
+    bad_face = _names(polygons, ~np.isfinite(uv).all((1, 2)))
     if len(bad_face):
         raise NonFiniteError("A UV is not a finite number", "Unwrap these faces anew first", "face", bad_face)
-    return V, F, uv
+    return V, F, uv, polygons
 
 
-def _counted(polygons, m: int) -> np.ndarray | None:
+def _names(polygons: np.ndarray | None, chosen: np.ndarray) -> np.ndarray:
+    """Numbers of the faces of chosen triangles (m,) bool."""
+    return np.flatnonzero(chosen) if polygons is None else np.unique(polygons[chosen])
+
+
+def _counted(polygons: np.ndarray | None) -> np.ndarray | None:
     """Polygons (m,) counted from 0; None where each triangle is a polygon of its own."""
     if polygons is None:
         return None
-    if np.shape(polygons) != (m,):
-        raise ValueError(f"expected polygons ({m},), got {np.shape(polygons)}")
     found, counted = np.unique(polygons, return_inverse=True)
-    return None if len(found) == m else counted.ravel()
+    return None if len(found) == len(polygons) else counted.ravel()
 
 
 def _surface_area(V, F, polygons):
     """3D areas (m,), summing to those of the polygons (m,), and which triangles belong to faces with an area (m,)."""
-    area = polygon_areas(V, F, polygons)
-    whole = area if polygons is None else np.bincount(polygons, area)
+    counted = _counted(polygons)
+    area = polygon_areas(V, F, counted)
+    whole = area if counted is None else np.bincount(counted, area)
     real = whole > NEGLIGIBLE_AREA * whole.sum()
     if not real.any():
-        raise ZeroAreaFaceError("No face has an area", "", "face", np.arange(len(F)))
-    return area, real if polygons is None else real[polygons]
+        raise ZeroAreaFaceError("No face has an area", "", "face", _names(polygons, np.ones(len(F), bool)))
+    return area, real if counted is None else real[counted]
 
 
 def _measure_faces(mesh: _Triangles, polygons) -> _FaceFigures:

@@ -171,6 +171,17 @@ def test_bad_input_is_a_named_error():
         distortion(V * [1, 0, 0], F, uv)
     with pytest.raises(ValueError, match="expected F"):
         distortion(V, F, uv[:, :2])
+    with pytest.raises(ValueError, match="expected polygons"):
+        distortion(V, F, uv, polygons=np.zeros(len(F) - 1, int))
+    # Faces of a chart are named as they are in the surface.
+    polygons = 100 + np.arange(len(F)) // 2
+    for measure in (distortion, face_distortion):
+        with pytest.raises(NonFiniteError) as caught:
+            measure(V, F, broken, polygons=polygons)
+        assert caught.value.elements.tolist() == [101]
+        with pytest.raises(ZeroAreaFaceError) as caught:
+            measure(V * [1, 0, 0], F, uv, polygons=polygons)
+        assert caught.value.elements.tolist() == np.unique(polygons).tolist()
 
 
 def test_faces_without_area_are_skipped_and_vanished_maps_are_all_folds():
