@@ -1,14 +1,24 @@
-"""Embed a disk in the plane by mean value weights, its boundary convex (Tutte 1963, Floater 2003)."""
+"""Embed a disk in the plane by mean value weights, its boundary convex (Tutte 1963, Floater 2003).
+
+Any positive weights do. Where they squeeze a vertex, its neighbours let it go (Yoshizawa, Belyaev, Seidel 2004).
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 
-from ..linalg.nested_dissection import LARGE, Dissection
-from ..linalg.sparse import solve_general
+from ..errors import PrecisionError
+from ..linalg.nested_dissection import LARGE, Dissection, mesh_order
+from ..linalg.sparse import Factor, solve_general
 from ..mesh.geometry import angles_from_lengths, halfedge_lengths
 from ..mesh.topology import halfedges
+from .energy import Elements, energies_of, squared
+
+# Rounds at most in which weights are evened, and the share of its energy that one has to win for another one: each
+# takes a third of the time of a Newton step.
+ROUNDS = 6
+WORTHWHILE = 0.3
 
 # Sides that are shorter than this share of the mean get so much of a convex boundary: faces between vertices that
 # nearly coincide would fold by rounding.
@@ -35,11 +45,7 @@ def tutte(
     """Mean value embedding (n,2) of a disk mesh (n,3), (m,3) with its loop (b,) at points boundary (b,2); equal: with
     the weights of equilateral triangles in place of the mesh's own."""
     n = len(positions)
-    length = np.ones((len(triangles), 3)) if equal else halfedge_lengths(positions, triangles).reshape(-1, 3)
-    at_tail, at_head = mean_value_weights(length)
-    tail, head = halfedges(triangles)
-    rows, columns = np.concatenate([tail, head]), np.concatenate([head, tail])
-    weight = csr_matrix((np.concatenate([at_tail.ravel(), at_head.ravel()]), (rows, columns)), shape=(n, n))
+    weight = _weights(positions, triangles, equal)
     inside = np.ones(n, dtype=bool)
     inside[loop] = False
     uv = np.zeros((n, 2))
@@ -52,6 +58,86 @@ def tutte(
         order = "colamd" if n < LARGE else _inner_order(positions, triangles, inside)
         uv[inside] = solve_general(matrix.tocsc(), rows[:, loop] @ boundary, order)
     return uv
+
+
+def evened_tutte(
+    positions: np.ndarray, loop: np.ndarray, uv: np.ndarray, faces: Elements, area_weight: float, most: float = np.inf
+) -> np.ndarray | None:
+    """An embedding (n,2) of a disk mesh (n,3) of less energy than one by `tutte`, uv (n,2), with its boundary, the loop
+    (b,); None where that does not come down to `most`.
+
+    faces : elements of the mesh, with the areas it is to have; area_weight : in the energy that counts
+
+    In every round the pull of a vertex on its neighbours is divided by how much the map has to be stretched there:
+    first by lengths, then by areas, which draws no slivers (Yoshizawa, Belyaev, Seidel 2004, A fast and simple
+    stretch-minimizing mesh parameterization). The map of the least energy is taken.
+    """
+    n, triangles = len(positions), faces.triangles
+    order = mesh_order(positions, triangles)
+    inner = order[~np.isin(order, loop)]
+    rows = _weights(positions, triangles)[inner]
+    inside, outside = rows[:, inner], rows[:, loop]
+    best, least, uv = uv, np.inf, uv.copy()
+    for k in range(ROUNDS):
+        a, b = faces.derivatives(uv @ [1, 1j])
+        scale = np.sqrt((faces.area @ faces.ratio) / float(faces.area @ faces.sums(np.abs(squared(a) - squared(b)))))
+        a, b = scale * a, scale * b
+        before, value = least, float(energies_of(faces, a, b, area_weight).sum())
+        if value < least:
+            best, least = uv.copy(), value
+        if not value < (1 - WORTHWHILE) * before or not len(inner):
+            break
+        # Lengths are evened once: only what areas win foretells what they will.
+        if k > 1 and value * (value / before) ** (ROUNDS - 1 - k) > most:
+            break
+        kept = np.sqrt(_growth(faces, a, b, n) if k else 1 / _stretch(faces, a, b, n))
+        for part, columns in ((inside, inner), (outside, loop)):
+            part.data *= kept[columns][part.indices]
+        try:
+            uv[inner] = _weighted(inside, outside, uv[loop])
+        except PrecisionError:
+            break
+    return best if least <= most else None
+
+
+def _weighted(inside: csr_matrix, outside: csr_matrix, boundary: np.ndarray) -> np.ndarray:
+    """Vertices (k,2), each the mean of its neighbours by the weights (k,k) of those inside and (k,b) of a boundary
+    (b,2). Raises PrecisionError."""
+    total = 1 / (_row_sums(inside) + _row_sums(outside))
+    matrix = diags(np.ones(len(total))) - diags(total) @ inside
+    return Factor(matrix.tocsc(), "natural", spd=False).solve(total[:, None] * (outside @ boundary))
+
+
+def _row_sums(matrix: csr_matrix) -> np.ndarray:
+    return matrix @ np.ones(matrix.shape[1])
+
+
+def _stretch(faces: Elements, a: np.ndarray, b: np.ndarray, n: int) -> np.ndarray:
+    """Mean squares (n,), over the stars of vertices, of the stretch from the map with these derivatives (m,) complex
+    to the surface (Sander, Snyder, Gortler, Hoppe 2001), as large as its targets."""
+    outer, inner = squared(a), squared(b)
+    return _of_stars(faces, faces.of_triangles(faces.ratio) * (outer + inner) / (outer - inner) ** 2, n)
+
+
+def _growth(faces: Elements, a: np.ndarray, b: np.ndarray, n: int) -> np.ndarray:
+    """Means (n,) over the stars of vertices of areas in the map over those they are to have."""
+    return _of_stars(faces, (squared(a) - squared(b)) / faces.of_triangles(faces.ratio), n)
+
+
+def _of_stars(faces: Elements, values: np.ndarray, n: int) -> np.ndarray:
+    flat, area = faces.triangles.ravel(), faces.triangle_areas
+    return np.bincount(flat, np.repeat(area * values, 3), n) / np.bincount(flat, np.repeat(area, 3), n)
+
+
+def _weights(positions: np.ndarray, triangles: np.ndarray, equal: bool = False) -> csr_matrix:
+    """Mean value weights (n,n) of a disk mesh (n,3), (m,3): in row i those of the neighbours of vertex i; equal: see
+    `tutte`."""
+    n = len(positions)
+    length = np.ones((len(triangles), 3)) if equal else halfedge_lengths(positions, triangles).reshape(-1, 3)
+    at_tail, at_head = mean_value_weights(length)
+    tail, head = halfedges(triangles)
+    rows, columns = np.concatenate([tail, head]), np.concatenate([head, tail])
+    return csr_matrix((np.concatenate([at_tail.ravel(), at_head.ravel()]), (rows, columns)), shape=(n, n))
 
 
 def _inner_order(positions: np.ndarray, triangles: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -34,6 +34,7 @@ from .initial_map import (
     flat_initial_map,
     good_enough,
     mean_value_sites,
+    roomy_initial_map,
 )
 from .options import MapOptions
 from .polygon_disk import of_polygon_disk, polygon_disk, with_centres
@@ -306,6 +307,9 @@ def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool) -> St
             even = flat_initial_map(disk, log, DRAFT_SPREAD)
             if even is not None:
                 return even
+        roomy = None if draft else roomy_initial_map(disk, log)
+        if roomy is not None:
+            return roomy
     if len(disk.vertices) > (DRAFT_ABOVE if draft else COARSE_ABOVE):
         try:
             found = yield from coarse_initial_map(disk, balance, log, draft=draft)

@@ -7,22 +7,23 @@ do. Coarsening goes on until the chart is small.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..analysis.density import graded_density
-from ..conformal.boundary_first import boundary_first
+from ..conformal.boundary_first import FlatDisk, boundary_first
 from ..errors import PrecisionError, TransportError
-from ..maps.energy import area_error, elements, energy
+from ..maps.energy import Elements, area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
-from ..maps.tutte import arc_length_parameters, tutte
+from ..maps.tutte import arc_length_parameters, evened_tutte, tutte
 from ..maps.untangle import count_folds, map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
 from ..refinement.boundary_barrier import covers_itself
-from ..refinement.continuation_rules import QUALITIES
+from ..refinement.continuation_rules import QUALITIES, UNSQUEEZED, is_squeezed
 from ..refinement.initial_maps import is_far
 from ..refinement.mesh_hierarchy import coarsen_disk
 from ..refinement.refine import Refinement, RefinementOptions, refine
@@ -48,6 +49,12 @@ SITE_RESOLUTION = 1e-7
 CENTRED = 1e-3
 # Charts with more vertices than this come by way of a coarser one.
 COARSE_ABOVE = 5000
+# Up to so many come without one where their boundary is free and what they are flattened or evened to has room: that
+# leaves as little to do, and shears less in the end.
+DIRECT_WITH_ROOM = 9000
+# Charts of at most so many vertices start from a mean value map where others start from an evened one: steps take
+# little time there, and searches for seams foretell the shear of a map by that of coarse surfaces with such a start.
+EVENED_ABOVE = 1500
 # That has the vertices divided by this, and at most this share of them: otherwise it does not pay.
 COARSER = 8
 COARSE_ENOUGH = 0.25
@@ -78,6 +85,9 @@ LEAST_DENSITY = 1e-4
 SWEEPS = 8
 SMOOTH_WEIGHT = 30.0
 SMOOTH_WEIGHT_FAR = 500.0
+# The most energy at that weight of an evened map that is a start: a stage in which a squeezed one relaxes would leave
+# as much, were it all of areas.
+ROOM = SMOOTH_WEIGHT * UNSQUEEZED
 
 
 @dataclass(frozen=True)
@@ -111,6 +121,19 @@ class DiskMesh:
         root = np.sqrt(self.aspect)
         return Disk() if self.corners is None else Rectangle(float(1 / root), float(root))
 
+    @cached_property
+    def embedded(self) -> np.ndarray:
+        """A mean value map (n,2) to the unit disk."""
+        return mean_value_sites(self.vertices, self.triangles, self.loop, None, Disk())
+
+    @cached_property
+    def flat(self) -> FlatDisk | None:
+        """The disk flattened with the boundary as it comes; None where double precision has no such map."""
+        try:
+            return boundary_first(self.vertices, self.triangles, self.loop)
+        except PrecisionError:
+            return None
+
 
 @dataclass(frozen=True)
 class InitialChartMap:
@@ -143,17 +166,13 @@ def flat_initial_map(disk: DiskMesh, log: RunLog, spread: float = LITTLE_SPREAD)
         flat = _evenly_flattened(disk, spread)
         if flat is None or _one_to_one(disk, flat):
             return None if flat is None else InitialChartMap(flat)
-        return InitialChartMap(mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk()))
+        return InitialChartMap(disk.embedded)
 
 
 def _evenly_flattened(disk: DiskMesh, spread: float) -> np.ndarray | None:
     """A disk flattened (n,2) with the boundary as it comes; None where that scales unevenly."""
     mass = np.bincount(disk.triangles.ravel(), np.repeat(disk.target / 3, 3), len(disk.vertices))
-    try:
-        flat = boundary_first(disk.vertices, disk.triangles, disk.loop)
-    except PrecisionError:
-        return None
-    return flat.uv if flat.spread(mass) < spread else None
+    return disk.flat.uv if disk.flat is not None and disk.flat.spread(mass) < spread else None
 
 
 def _one_to_one(disk: DiskMesh, uv: np.ndarray) -> bool:
@@ -172,7 +191,7 @@ def coarse_initial_map(
     far = is_far(disk.target, face_areas(vertices, triangles))
     with log.timed("coarsening"):
         if flat is None:
-            flat = mean_value_sites(vertices, triangles, disk.loop, None, Disk())
+            flat = disk.embedded
             even = _even_start(disk, flat) if disk.boundary == "free" and not far else None
             # A draft has no steps to spare for a start that is squeezed, too.
             if even is not None and not (draft and map_energy(even, vertices, triangles) > HOPELESS):
@@ -249,6 +268,39 @@ def _density(vertices, triangles, target, goal: int) -> np.ndarray:
     density = area * graded_density(stretch, vertices, triangles, np.sqrt(AROUND / goal), goal)
     has, all_of_it = (np.bincount(triangles.ravel(), np.repeat(x, 3), len(vertices)) for x in (density, area))
     return has / all_of_it
+
+
+def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
+    """A disk of a middle size with a free boundary, flattened as that comes or mapped by evened weights; None where
+    neither gives it room."""
+    n = len(disk.vertices)
+    if disk.boundary != "free" or not EVENED_ABOVE < n <= DIRECT_WITH_ROOM:
+        return None
+    if is_far(disk.target, face_areas(disk.vertices, disk.triangles)):
+        return None
+    with log.timed("flattening"):
+        faces = elements(disk.vertices, disk.triangles, disk.target)
+        # Small ones are flattened in any case, and large ones embedded.
+        flat = _roomy_flat(disk, faces) if n <= COARSE_ABOVE else None
+        if flat is not None:
+            return InitialChartMap(flat)
+        try:
+            evened = evened_tutte(disk.vertices, disk.loop, disk.embedded, faces, SMOOTH_WEIGHT, ROOM)
+        except PrecisionError:
+            return None
+        if evened is not None and n > COARSE_ABOVE:
+            flat = _roomy_flat(disk, faces)
+        return None if evened is None else InitialChartMap(evened if flat is None else flat)
+
+
+def _roomy_flat(disk: DiskMesh, faces: Elements) -> np.ndarray | None:
+    """A disk flattened (n,2) that scales evenly, is one to one, and not squeezed; None where that is not so."""
+    flat = _evenly_flattened(disk, LITTLE_SPREAD)
+    if flat is None or not _one_to_one(disk, flat):
+        return None
+    w = flat @ [1, 1j]
+    w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
+    return None if is_squeezed(energy(faces, w, SMOOTH_WEIGHT), SMOOTH_WEIGHT) else flat
 
 
 def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.maps import tutte as module
-from omt_uv.solver.maps.tutte import arc_length_parameters, mean_value_weights, tutte
-from omt_uv.solver.mesh.geometry import halfedge_lengths, signed_areas
+from omt_uv.solver.maps.energy import area_error, elements, energy
+from omt_uv.solver.maps.tutte import arc_length_parameters, evened_tutte, mean_value_weights, tutte
+from omt_uv.solver.mesh.geometry import face_areas, halfedge_lengths, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 
 
@@ -22,6 +23,38 @@ def test_embeddings_have_no_folds(mesh):
     uv = tutte(V, F, loop, circle(V, loop))
     assert (signed_areas(uv, F) > 0).all()
     np.testing.assert_array_equal(uv[loop], circle(V, loop))
+
+
+@pytest.mark.parametrize("graded", [False, True])
+@pytest.mark.parametrize("mesh", [meshes.bumpy(), meshes.cone(), meshes.head(24), meshes.spiral_strip()])
+def test_evened_weights_leave_less_to_do_and_fold_nothing(mesh, graded):
+    V, F = mesh
+    loop = boundary_loops(F)[0]
+    x = V[F].mean(axis=1)[:, 0]
+    target = face_areas(V, F) * (np.exp(2 * (x - x.mean()) / np.ptp(x)) if graded else 1)
+    faces = elements(V, F, target)
+    before = tutte(V, F, loop, circle(V, loop))
+    after = evened_tutte(V, loop, before, faces, 30.0)
+    assert (signed_areas(after, F) > 0).all()
+    np.testing.assert_array_equal(after[loop], circle(V, loop))
+    root = np.sqrt(target.sum() / np.abs(signed_areas(after, F)).sum())
+    has, had = (energy(faces, root * (uv @ [1, 1j]), 30.0) for uv in (after, before))
+    assert has <= had * (1 + 1e-6)
+    if len(np.unique(F)) > len(loop):
+        assert area_error(faces, after @ [1, 1j]) <= area_error(faces, before @ [1, 1j]) + 1e-9
+
+
+def test_maps_that_keep_too_much_energy_are_none():
+    V, F = meshes.head(24)
+    loop = boundary_loops(F)[0]
+    faces = elements(V, F, face_areas(V, F))
+    start = tutte(V, F, loop, circle(V, loop))
+    given = start.copy()
+    after = evened_tutte(V, loop, start, faces, 30.0)
+    has = energy(faces, np.sqrt(face_areas(V, F).sum() / signed_areas(after, F).sum()) * (after @ [1, 1j]), 30.0)
+    assert evened_tutte(V, loop, start, faces, 30.0, most=0.9 * has) is None
+    np.testing.assert_array_equal(evened_tutte(V, loop, start, faces, 30.0, most=1.1 * has), after)
+    np.testing.assert_array_equal(start, given)
 
 
 def test_what_is_flat_comes_back():

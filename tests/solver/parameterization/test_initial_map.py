@@ -7,6 +7,7 @@ import pytest
 
 from omt_uv.solver.conformal.disk_map import sharpest_corners
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.maps.energy import elements, energy
 from omt_uv.solver.maps.untangle import count_folds, map_energy
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -17,6 +18,7 @@ from omt_uv.solver.parameterization.initial_map import (
     coarse_initial_map,
     initial_map,
     mean_value_sites,
+    roomy_initial_map,
 )
 from omt_uv.solver.progress import RunLog, drain
 from omt_uv.solver.transport.convex_domain import Disk, Rectangle
@@ -54,6 +56,33 @@ def test_an_initial_map_keeps_the_boundary_in_order(boundary):
     s = disk.domain.boundary_parameter(found.uv[disk.loop])
     step = np.mod(np.roll(s, -1) - s, disk.domain.period)
     assert (step > 0).all() and step.sum() == pytest.approx(disk.domain.period)
+
+
+def subdivided(V, F, least=1600):
+    while len(V) < least:
+        V, F = meshes.subdivide(V, F)
+    return V, F
+
+
+@pytest.mark.parametrize("mesh", [meshes.head(50), meshes.cone(), meshes.hemisphere(), meshes.bumpy()])
+def test_a_start_with_room_folds_nothing_and_is_not_squeezed(mesh):
+    V, F = subdivided(*mesh)
+    disk = disk_of(V, F)
+    start = roomy_initial_map(disk, RunLog()).uv
+    w = np.sqrt(disk.target.sum() / signed_areas(start, F).sum()) * (start @ [1, 1j])
+    assert count_folds(start, F) == 0
+    flat = disk.flat is not None and np.array_equal(start, disk.flat.uv)
+    assert energy(elements(V, F, disk.target), w, 30.0) < (50 if flat else 9)
+
+
+def test_there_is_no_start_with_room_where_it_would_be_squeezed_or_another_one_is_asked_for():
+    assert roomy_initial_map(disk_of(*subdivided(*meshes.spiral_strip())), RunLog()) is None
+    V, F = subdivided(*meshes.head(50))
+    assert roomy_initial_map(disk_of(V, F, "disk"), RunLog()) is None
+    assert roomy_initial_map(disk_of(*meshes.head(20)), RunLog()) is None
+    density = np.where(V[F].mean(axis=1)[:, 0] > V[:, 0].mean(), 100.0, 1.0)
+    magnified = DiskMesh(V, F, face_areas(V, F) * density, boundary_loops(F)[0])
+    assert roomy_initial_map(magnified, RunLog()) is None
 
 
 def test_centroids_of_the_cells_have_the_mass_of_the_disk():

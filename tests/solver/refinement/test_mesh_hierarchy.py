@@ -11,7 +11,7 @@ from omt_uv.solver.mesh.charts import triangle_rows
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, twins
-from omt_uv.solver.parameterization.initial_map import COARSE_ABOVE, mean_value_sites
+from omt_uv.solver.parameterization.initial_map import DIRECT_WITH_ROOM, mean_value_sites
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -70,8 +70,8 @@ def test_places_are_found_even_in_stars_without_room():
 
 
 def test_large_charts_come_by_way_of_coarser_ones():
-    V, F = meshes.head(75)
-    assert len(V) > COARSE_ABOVE
+    V, F = meshes.head(96)
+    assert len(V) > DIRECT_WITH_ROOM
     (chart_map,) = drain(unwrap(triangle_surface(V, F))).maps
     assert "coarsening" in chart_map.seconds and chart_map.newton_refinement <= 25
     assert chart_map.folds == 0 and chart_map.area_l1 <= 0.01 and not chart_map.warnings
@@ -83,7 +83,7 @@ def test_large_charts_come_by_way_of_coarser_ones():
 
 @pytest.mark.parametrize("boundary", ["disk", "square"])
 def test_domains_are_reached_by_way_of_coarser_charts_too(boundary):
-    V, F = meshes.head(75)
+    V, F = meshes.head(96)
     (chart_map,) = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(boundary, "draft"))).maps
     assert "coarsening" in chart_map.seconds
     assert chart_map.folds == 0 and chart_map.area_l1 <= 0.05 and not chart_map.warnings
@@ -97,7 +97,7 @@ def test_coarser_meshes_keep_their_boundary():
 
 
 def test_a_region_of_most_of_the_texture_gets_it_by_way_of_coarser_charts():
-    V, F = meshes.head(75)
+    V, F = meshes.head(96)
     surface = triangle_surface(V, F)
     centre = V[F].mean(axis=1)
     w = np.clip(2 - 4 * np.linalg.norm(centre - V[np.argmax(V[:, 2])], axis=1) / np.ptp(V[:, 2]), 0, 1)
