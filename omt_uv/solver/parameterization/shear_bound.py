@@ -37,6 +37,8 @@ SPREAD_OF_SHEAR = 0.19
 MARGIN = 0.95
 # What misses the bound by less stays in one piece at first: it has so many times the square of log(shear).
 CROWDED = 1.35
+# After a second search, what lies on itself comes apart, too, where that takes off all but this share of what is missing.
+ROOM = 0.5
 # Nothing comes apart for less than this share of the bound.
 HARDLY = 0.01
 # Vertices this close to where images of others belong, over the extent, are these images.
@@ -342,7 +344,8 @@ def _apart(
         elif crossing is not None and mean > (1 + HARDLY) * last.bound and (late or np.log(mean) >= least):
             uv = yield from crossing(chart, last.maps[k])
             shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
-            if area @ shear <= last.bound * area.sum():
+            without = float(area @ shear / area.sum())
+            if without <= last.bound + late * ROOM * (mean - last.bound):
                 edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
         if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
             # No other cut is needed, but one into what shears that much.
@@ -361,9 +364,8 @@ def _slit(search: ShearSearch, last: _Round, k: int) -> np.ndarray:
     steep = shear > (STEEP if missed == 0 else SHEARED)
     excess = float(area[steep].sum() / area.sum() - MOST_STEEP) if missed == 0 else missed
     costs, here = search.costs(), chart.vertex_ids
-    # Rather steep than slit where everybody looks.
-    cost = np.where(costs.in_face[here], np.inf, costs.vertex_cost[here])
-    return slits(chart, steep, SLIT * excess * area.sum(), cost, search.images)
+    least, barred = SLIT * excess * area.sum(), costs.in_face[here]
+    return slits(chart, steep, least, costs.vertex_cost[here], barred, search.images)
 
 
 def _cuts(prepared: DiskCharts) -> Cuts:

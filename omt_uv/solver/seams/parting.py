@@ -151,17 +151,23 @@ def flat_sides(chart: Chart) -> np.ndarray:
 
 
 def slits(
-    chart: Chart, steep: np.ndarray, least: float, cost: np.ndarray, image: np.ndarray | None = None
+    chart: Chart,
+    steep: np.ndarray,
+    least: float,
+    cost: np.ndarray,
+    barred: np.ndarray,
+    image: np.ndarray | None = None,
 ) -> np.ndarray:
     """Edges (k,2) of the surface from the boundary of a chart into what shears too much, the largest parts first.
 
-    steep (m,) bool : triangles that do; least : area of what is to be slit at least; cost, image : see `parted`, but
-    where a cost is infinite no slit goes
+    steep (m,) bool : triangles that do; least : area of what is to be slit at least; barred (n,) bool : vertices that
+    no slit passes through, unless there is not as much to be slit elsewhere; cost, image : see `parted`
     """
     dual = _Dual.of(chart)
-    free = np.isfinite(cost)
-    bad = np.zeros(len(dual.area), dtype=bool)
+    bad, free = np.zeros(len(dual.area), dtype=bool), ~barred
     bad[dual.polygon[steep & free[chart.triangles].all(axis=1)]] = True
+    if dual.area[bad].sum() < least:
+        free[:] = bad[dual.polygon[steep]] = True
     piece = dual.pieces(bad[dual.joined].all(axis=1))
     size = np.bincount(piece, np.where(bad, dual.area, 0.0))
     order = np.argsort(-size, kind="stable")

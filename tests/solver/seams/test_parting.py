@@ -165,7 +165,8 @@ def test_slits_run_from_the_boundary_into_what_is_steep(mirrored):
     if mirrored:
         there = V * [-1, 1, 1] + [1, 0, 0]
         image = np.linalg.norm(V[None] - there[:, None], axis=2).argmin(axis=1)
-    edges = slits(chart, steep, 1e-6, np.ones(len(chart.vertices)), image)
+    n = len(chart.vertices)
+    edges = slits(chart, steep, 1e-6, np.ones(n), np.zeros(n, dtype=bool), image)
     tips, degree = np.unique(edges, return_counts=True)
     outer = (np.abs(V[:, :2] - 0.5) > 0.5 - 1e-9).any(axis=1)
     ends = tips[degree == 1]
@@ -179,17 +180,20 @@ def test_slits_run_from_the_boundary_into_what_is_steep(mirrored):
     assert len(strict_charts(triangle_surface(V, F, edges))) == 1
 
 
-def test_no_slit_goes_where_it_must_not():
+def test_slits_go_where_they_should_not_only_where_nothing_else_helps():
     V, F = meshes.grid(20, 20)
     (chart,) = strict_charts(triangle_surface(V, F))
     steep = steep_spots(chart.vertices, chart.triangles, (0.25, 0.5, 0.0), (0.75, 0.5, 0.0))
-    cost = np.where(chart.vertices[:, 0] < 0.5, np.inf, 1.0)
-    edges = slits(chart, steep, 1.0, cost)
+    barred, cost = chart.vertices[:, 0] < 0.5, np.ones(len(V))
+    there = face_areas(chart.vertices, chart.triangles)[steep & ~barred[chart.triangles].any(axis=1)].sum()
+    edges = slits(chart, steep, 0.9 * there, cost, barred)
     assert len(edges) and (V[edges, 0] >= 0.5).all()
-    assert len(slits(chart, steep, 1.0, np.full(len(V), np.inf))) == 0
+    everywhere = slits(chart, steep, 2.5 * there, cost, barred)
+    assert (V[everywhere, 0] < 0.5).any() and (V[everywhere, 0] > 0.5).any()
 
 
 def test_nothing_steep_nothing_slit():
     V, F = meshes.grid(6, 6)
     (chart,) = strict_charts(triangle_surface(V, F))
-    assert slits(chart, np.zeros(len(F), dtype=bool), 0.0, np.ones(len(V))).shape == (0, 2)
+    nowhere = np.zeros(len(V), dtype=bool)
+    assert slits(chart, np.zeros(len(F), dtype=bool), 0.0, np.ones(len(V)), nowhere).shape == (0, 2)
