@@ -45,9 +45,10 @@ from .small_charts import is_small, map_together
 CUTTING = 0.15
 MAPPING = 0.7
 
-# A chart that is longer than a square of the whole area by so many times is cut across, in so many times as long
-# pieces, at most so many.
-LONG = 3.0
+# A chart that is longer than a square of the whole area by so many times, and has this share of its length as width at
+# most, is cut across, in so many times as long pieces, at most so many.
+LONG = 1.8
+NARROW = 1 / 3
 PIECE = 1.2
 MOST_PIECES = 12
 
@@ -167,9 +168,9 @@ def _without_bands(
         found, between = [(chart, chart_map)], cuts[:0]
         # Most are short, and of thousands nothing else is asked.
         if np.hypot(*np.ptp(chart_map.uv, axis=0)) > longest and not len(chart.patches):
-            length = np.ptp(_upright(chart_map.uv), axis=0).max()
+            width, length = np.sort(np.ptp(_upright(chart_map.uv), axis=0))
             was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
-            if length > longest and was_cut and not is_marked(surface, chart):
+            if length > max(longest, width / NARROW) and was_cut and not is_marked(surface, chart):
                 count = min(int(np.ceil(length * LONG / (PIECE * longest))), MOST_PIECES)
                 found, between = _in_pieces(search, chart, chart_map, count)
         new_charts += [chart for chart, _ in found]
