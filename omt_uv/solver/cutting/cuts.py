@@ -30,6 +30,7 @@ from .component import (
     fingerprint,
     make_component,
 )
+from .crease_sides import hard_borders
 from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import net
 from .gluing_facts import TurningLines, cost_factors, marked_triangles, total_curvature, turning_lines
@@ -167,6 +168,9 @@ def cut_gluing(
     gone = np.zeros(len(gluing.first), dtype=bool)
     if sieve is not None:
         gone = partition_pairs(gluing, positions, one_sided)
+    crowded = bool(gone.any())
+    if search is not None and avoid is None:
+        gone |= hard_borders(surface, gluing, positions, gone, search.wants)
     gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]
     holes, sieves = 0, not fill
@@ -189,7 +193,7 @@ def cut_gluing(
     edges = np.concatenate([edges, parting, repaired.torn]).astype(np.int64)
     turned = gluing.triangles[: len(twisted), 1] != repaired.gluing.triangles[:, 1]
     backwards, mirrored = (len(np.unique(repaired.gluing.owner[turned & k])) for k in (~twisted, twisted))
-    warnings = (*repaired.warnings, *_warnings(len(parting), backwards, mirrored, holes * sieves, touching))
+    warnings = (*repaired.warnings, *_warnings(crowded, backwards, mirrored, holes * sieves, touching))
     cuts = Cuts(edges=edges, length=length, components=tuple(report), torn=repaired.torn, warnings=warnings)
     return CutSurface(surface=surface, gluing=gluing, cuts=cuts, extent=unit)
 
@@ -200,7 +204,7 @@ def _uncut(surface: Surface, gluing: Gluing, repaired: Repaired, component_of: n
     every = np.ones(int(component_of.max()) + 1, dtype=bool)
     touching = coincident_boundary_vertices(surface, gluing, component_of, every)
     backwards = len(np.unique(repaired.gluing.owner[turned]))
-    warnings = (*repaired.warnings, *_warnings(0, backwards, 0, 0, touching))
+    warnings = (*repaired.warnings, *_warnings(False, backwards, 0, 0, touching))
     edges = repaired.torn.astype(np.int64)
     cuts = Cuts(edges=edges, length=0.0, components=(), torn=repaired.torn, warnings=warnings)
     return CutSurface(surface=surface, gluing=gluing, cuts=cuts, extent=unit)
@@ -212,10 +216,10 @@ def sieved(holes: int) -> str:
     return f"{who} filled for the map: cuts to them would leave it no shape"
 
 
-def _warnings(parting: int, backwards: int, mirrored: int, holes: int, touching: int) -> Iterator[str]:
-    """Warnings, from the numbers of partition edges, of faces turned over on surfaces of two sides and of one, of holes
-    of sieves, and of coincident vertices."""
-    if parting:
+def _warnings(crowded: bool, backwards: int, mirrored: int, holes: int, touching: int) -> Iterator[str]:
+    """Warnings, from whether crowded parts came apart, and the numbers of faces turned over on surfaces of two sides
+    and of one, of holes of sieves, and of coincident vertices."""
+    if crowded:
         yield "A part with many handles was taken apart, along the hard edges of its holes or into clusters"
     if backwards:
         yield _turned_warning(backwards)

@@ -35,6 +35,7 @@ from .initial_map import (
     good_enough,
     mean_value_sites,
     roomy_initial_map,
+    touches_itself,
 )
 from .options import MapOptions
 from .polygon_disk import of_polygon_disk, polygon_disk, with_centres
@@ -122,7 +123,8 @@ def map_chart(
     if options.kind != "authalic":
         return (yield from _named_map(chart, disk, unit, options, markers, log))
     draft = options.quality == "draft" and options.balance == 0 and plain
-    initial = yield from part_of(_initial_map(disk, options.balance, log, draft), *INITIAL)
+    goal = QUALITIES[options.quality].area_error if plain else 0.0
+    initial = yield from part_of(_initial_map(disk, options.balance, log, draft, goal), *INITIAL)
     with log.timed("refinement"):
         start, places = mirrored_to_pins(initial.uv, pins)
         refinement_options = RefinementOptions(
@@ -134,7 +136,7 @@ def map_chart(
         )
         asked = None if target is None else disk.target
         given = {"target": asked, "region": disk.region, "pins": places, "polygons": disk.polygons}
-        refined = good_enough(disk, start, draft, initial.apart) if plain else None
+        refined = good_enough(disk, start, draft, initial.apart, goal) if plain else None
         if refined is None:
             refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
         # Centres of polygons were there for the map alone.
@@ -296,12 +298,13 @@ def _disk_mesh(
     )
 
 
-def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool) -> Steps[InitialChartMap]:
+def _initial_map(disk: DiskMesh, balance: float, log: RunLog, draft: bool, goal: float) -> Steps[InitialChartMap]:
     """The initial map: charts with a free boundary are unrolled or flattened where that changes their areas little;
     large ones come by way of a coarser mesh."""
     if disk.boundary == "free":
         flat = unroll(disk.vertices, disk.triangles, disk.loop)
-        if flat is not None:
+        # What touches itself and is to be refined has to begin where it does not.
+        if flat is not None and (not touches_itself(flat, disk.loop) or good_enough(disk, flat, draft, True, goal)):
             return InitialChartMap(flat, apart=True)
         if draft and len(disk.vertices) <= COARSE_ABOVE:
             even = flat_initial_map(disk, log, DRAFT_SPREAD)

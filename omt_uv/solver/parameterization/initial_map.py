@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..analysis.density import graded_density
 from ..conformal.boundary_first import FlatDisk, boundary_first
@@ -71,6 +72,10 @@ LITTLE_SPREAD = 0.5
 HOPELESS = 50.0
 # Energy below which a map is an isometry, but for rounding, and nothing is left to refine.
 ISOMETRY = 1e-8
+# What is unrolled so that its outline lies on itself may be that far from one: shear of 1.02 to 1.1.
+UNROLLED = 1e-2
+# Vertices of a boundary touch one another that are nearer than this share of the mean of its edges.
+TOUCHING = 1e-6
 # Drafts of charts with more vertices than this come by way of a coarser mesh, unless their log scale spreads less.
 DRAFT_ABOVE = 600
 DRAFT_COARSE_ABOVE = 2000
@@ -176,8 +181,9 @@ def _evenly_flattened(disk: DiskMesh, spread: float) -> np.ndarray | None:
 
 
 def _one_to_one(disk: DiskMesh, uv: np.ndarray) -> bool:
-    """Whether no face of a map uv (n,2) folds, and it does not cover itself."""
-    return count_folds(uv, disk.triangles) == 0 and not covers_itself(uv @ [1, 1j], disk.loop)
+    """Whether no face of a map uv (n,2) folds, it does not cover itself, nor its boundary lie on itself."""
+    apart = count_folds(uv, disk.triangles) == 0 and not touches_itself(uv, disk.loop)
+    return apart and not covers_itself(uv @ [1, 1j], disk.loop)
 
 
 def coarse_initial_map(
@@ -309,14 +315,16 @@ def direct_initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:
     return (yield from initial_map(disk, log)) if flat is None else flat
 
 
-def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool, apart: bool) -> Refinement | None:
+def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool, apart: bool, goal: float) -> Refinement | None:
     """An initial map uv (n,2) as the result, if no face folds and nothing covers itself, and it is an isometry; for a
-    draft it only needs to have a draft's areas. apart : that it covers no place twice is known."""
+    draft it only needs to have a draft's areas, and unrolled with slits whose sides lie on one another, which no
+    barrier moves apart, an area error up to `goal`. apart : that it is unrolled, and covers no place twice."""
     faces = polygon_elements(disk.vertices, disk.triangles, disk.target, disk.polygons, disk.region)
     w = uv @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / np.abs(faces.areas(w).sum()))
     value, error = energy(faces, w, SMOOTH_WEIGHT_FAR), area_error(faces, w)
-    if not draft and (disk.boundary != "free" or not value < ISOMETRY):
+    as_it_is = value < ISOMETRY or (apart and value < UNROLLED and error <= goal and touches_itself(uv, disk.loop))
+    if not draft and (disk.boundary != "free" or not as_it_is):
         return None
     if not np.isfinite(value) or error > QUALITIES["draft"].area_error:
         return None
@@ -333,6 +341,13 @@ def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool, apart: bool) -> Ref
         overlap=False,
         warnings=(),
     )
+
+
+def touches_itself(uv: np.ndarray, loop: np.ndarray) -> bool:
+    """Whether vertices of a boundary (b,) lie on one another in a map uv (n,2), as those along a slit do."""
+    points = uv[loop]
+    step = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).mean()
+    return bool((cKDTree(points).query(points, k=2)[0][:, 1] < TOUCHING * step).any())
 
 
 def initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:

@@ -37,7 +37,7 @@ SPREAD_OF_SHEAR = 0.19
 MARGIN = 0.95
 # What misses the bound by less stays in one piece at first: it has so many times the square of log(shear).
 CROWDED = 1.35
-# After a second search, what lies on itself comes apart, too, where that takes off all but this share of what is missing.
+# After a second search, what lies on itself comes apart where that leaves this share of what is missing at most.
 ROOM = 0.5
 # Nothing comes apart for less than this share of the bound.
 HARDLY = 0.01

@@ -7,6 +7,7 @@ import pytest
 
 from omt_uv.solver.conformal.disk_map import sharpest_corners
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.energy import elements, energy
 from omt_uv.solver.maps.untangle import count_folds, map_energy
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
@@ -19,7 +20,10 @@ from omt_uv.solver.parameterization.initial_map import (
     initial_map,
     mean_value_sites,
     roomy_initial_map,
+    touches_itself,
 )
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import RunLog, drain
 from omt_uv.solver.transport.convex_domain import Disk, Rectangle
 from omt_uv.solver.transport.inverse_map import centroid_map
@@ -136,3 +140,35 @@ def test_slivers_start_from_no_worse_than_a_mean_value_map(monkeypatch):
     flat = mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk())
     energies = [map_energy(uv, disk.vertices, disk.triangles) for uv in (found.uv, flat)]
     assert energies[0] <= 1.001 * energies[1]
+
+
+def perforated_plate(lift, n=20):
+    """A plate of quads (q,4) with four holes, bent by `lift` in its corners, so that all triangles unroll."""
+    x, y = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
+    V = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1) / n
+    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    Q = np.stack([i, i + 1, i + n + 2, i + n + 1], axis=1)
+    middle = V[Q].mean(axis=1)[:, :2]
+    holes = [np.abs(middle - [a, b]).max(axis=1) < 0.1 for a in (0.3, 0.7) for b in (0.3, 0.7)]
+    used, quads = np.unique(Q[~np.any(holes, axis=0)], return_inverse=True)
+    V = V[used]
+    V[(np.abs(V[:, :2] - 0.5) == 0.5).all(axis=1), 2] = lift
+    return V, quads.reshape(-1, 4)
+
+
+@pytest.mark.parametrize("lift", [0.0, 0.02, 0.05])
+def test_slits_whose_sides_lie_on_one_another_move_nothing(lift):
+    V, Q = perforated_plate(lift)
+    found = drain(unwrap(meshes.polygon_surface(V, [list(q) for q in Q]), options=UnwrapOptions(max_shear=1.35)))
+    (chart,), (chart_map,) = found.charts, found.maps
+    figures = distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles])
+    assert figures.angle_mean < 1.01 and figures.area_l1 < 1e-3 and figures.folds == 0
+
+
+def test_a_boundary_touches_itself_where_vertices_lie_on_one_another():
+    V, F = meshes.grid(4, 4)
+    loop, uv = boundary_loops(F)[0], V[:, :2].copy()
+    assert not touches_itself(uv, loop)
+    assert not touches_itself(1e-9 * uv, loop)
+    uv[loop[5]] = uv[loop[0]] + 1e-9
+    assert touches_itself(uv, loop) and touches_itself(1e6 * uv, loop)

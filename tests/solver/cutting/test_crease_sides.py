@@ -1,0 +1,134 @@
+"""Bodies of flat and round sides come apart along their creases, and lie undistorted; all others stay whole."""
+
+import meshes
+import numpy as np
+import pytest
+from short_cuts import component_of
+
+from omt_uv.solver.cutting.crease_sides import hard_sides, side_borders
+from omt_uv.solver.mesh.surface import Surface
+from omt_uv.solver.mesh.topology import graph_components
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
+
+
+def turned(profile, sectors=48):
+    """A ring: a closed profile (k,2) of radius and height, turned about the axis, as quads."""
+    k, angle = len(profile), 2 * np.pi * np.arange(sectors) / sectors
+    r, z = np.asarray(profile, float).T
+    V = np.stack([np.outer(np.cos(angle), r), np.outer(np.sin(angle), r), np.tile(z, (sectors, 1))], axis=2).reshape(
+        -1, 3
+    )
+    i, j = np.divmod(np.arange(sectors * k), k)
+    up, on = (j + 1) % k, (i + 1) % sectors
+    return V, np.stack([i * k + j, on * k + j, on * k + up, i * k + up], axis=1)
+
+
+def washer(sectors=48):
+    return turned([(0.7, -0.15), (1.0, -0.15), (1.0, 0.15), (0.7, 0.15)], sectors)
+
+
+def triangles_of(quads):
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def prism(outline, height=0.5):
+    """An extruded outline (k,2) counter-clockwise, its ends fans."""
+    k = len(outline)
+    low, high = (np.column_stack([outline, np.full(k, z)]) for z in (0.0, height))
+    V = np.concatenate([low, high, [[*outline.mean(axis=0), 0.0]], [[*outline.mean(axis=0), height]]])
+    i = np.arange(k)
+    j = (i + 1) % k
+    sides = np.concatenate([np.stack([i, j, k + j], axis=1), np.stack([i, k + j, k + i], axis=1)])
+    ends = [np.stack([j, i, np.full(k, 2 * k)], axis=1), np.stack([k + i, k + j, np.full(k, 2 * k + 1)], axis=1)]
+    return V, np.concatenate([sides, *ends])
+
+
+def borders(component):
+    found = hard_sides(component)
+    return np.zeros(len(component.pair), dtype=bool) if found is None else side_borders(component, *found)
+
+
+def sides(component, border):
+    return graph_components(*(component.pair[~border] // 3).T, len(component.triangles))[1]
+
+
+def test_a_washer_comes_apart_into_two_rings_and_two_walls():
+    V, Q = washer()
+    component = component_of(V, triangles_of(Q))
+    border = borders(component)
+    side = sides(component, border)
+    assert side.max() + 1 == 4
+    corners = component.positions[component.triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    level = np.abs(normal[:, 2]) > 0.5 * np.linalg.norm(normal, axis=1)
+    # No side is both flat and round.
+    assert all(len(np.unique(level[side == k])) == 1 for k in range(4))
+
+
+def test_flat_sides_stay_together_across_straight_edges():
+    # Three quarters of a disk: the two walls that are flat meet the ends along straight edges.
+    angle = np.linspace(0, 1.5 * np.pi, 60)
+    outline = np.concatenate([[[0.0, 0.0]], np.column_stack([np.cos(angle), np.sin(angle)])])
+    component = component_of(*prism(outline, 0.3))
+    border = borders(component)
+    assert border.any()
+    side = sides(component, border)
+    assert 2 <= side.max() + 1 < 5
+
+
+@pytest.mark.parametrize(
+    "mesh", [meshes.icosphere(0), meshes.icosphere(1), meshes.icosphere(3), meshes.torus(24, 8), meshes.head()]
+)
+def test_what_is_round_all_over_stays_whole(mesh):
+    assert hard_sides(component_of(*mesh)) is None
+
+
+def test_place_size_and_order_do_not_matter():
+    V, Q = washer(24)
+    F = triangles_of(Q)
+    rng = np.random.default_rng(3)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    order = rng.permutation(len(V))
+    places = [
+        set(map(tuple, np.sort(found, axis=1)))
+        for found in (_border_ends(V, F), order[_border_ends(V[order], np.argsort(order)[F[::-1]])])
+    ]
+    assert places[0] == places[1]
+    moved = set(map(tuple, np.sort(_border_ends(V @ turn.T * 40 + 7, F), axis=1)))
+    assert moved == places[0]
+
+
+def _border_ends(V, F):
+    component = component_of(V, F)
+    return component.vertex_ids[component.ends[borders(component)]]
+
+
+def surface_of(V, Q, seams=()):
+    return meshes.polygon_surface(V, [list(q) for q in Q], seams)
+
+
+def shear_of(surface: Surface, **options):
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35, **options)))
+    total = np.concatenate(
+        [np.repeat(m.angle_mean, len(c.triangles)) for c, m in zip(found.charts, found.maps, strict=True)]
+    )
+    return found, total.mean()
+
+
+def test_a_washer_is_unwrapped_without_distortion():
+    V, Q = washer()
+    found, shear = shear_of(surface_of(V, Q))
+    assert len(found.charts) == 4 and shear < 1.001
+    assert sum(m.folds for m in found.maps) == 0
+
+
+def test_what_has_a_marked_seam_does_not_come_apart():
+    V, Q = washer()
+    k = 4
+    ring = np.arange(0, len(V), k)
+    marked = np.stack([ring, np.roll(ring, -1)], axis=1)
+    found = drain(unwrap(surface_of(V, Q, marked), options=UnwrapOptions(max_shear=1.35)))
+    assert len(found.charts) == 1
