@@ -45,10 +45,11 @@ from .small_charts import is_small, map_together
 CUTTING = 0.15
 MAPPING = 0.7
 
-# A chart that is longer than a square of the whole area by so many times, and has this share of its length as width at
-# most, is cut across, in so many times as long pieces, at most so many.
-LONG = 1.8
-NARROW = 1 / 3
+# A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
+# length or whatever it is, is cut across, in so many times as long pieces, at most so many.
+LONG_AND_NARROW = 1.8
+NARROW = 0.6
+LONG = 3.0
 PIECE = 1.2
 MOST_PIECES = 12
 
@@ -162,16 +163,17 @@ def _without_bands(
     texture empty. Charts that were not cut at all, and those with marked seams, stay whole."""
     surface = search.surface
     chosen = surface.triangles if search.faces is None else surface.triangles[search.faces[surface.triangle_face]]
-    longest = LONG * np.sqrt(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
+    side = np.sqrt(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
     new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts]
     for chart, chart_map in zip(charts, maps, strict=True):
         found, between = [(chart, chart_map)], cuts[:0]
         # Most are short, and of thousands nothing else is asked.
-        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > longest and not len(chart.patches):
+        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > LONG_AND_NARROW * side and not len(chart.patches):
             width, length = np.sort(np.ptp(_upright(chart_map.uv), axis=0))
             was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
-            if length > max(longest, width / NARROW) and was_cut and not is_marked(surface, chart):
-                count = min(int(np.ceil(length * LONG / (PIECE * longest))), MOST_PIECES)
+            longest = (LONG_AND_NARROW if width <= NARROW * length else LONG) * side
+            if length > longest and was_cut and not is_marked(surface, chart):
+                count = min(int(np.ceil(length / (PIECE * side))), MOST_PIECES)
                 found, between = _in_pieces(search, chart, chart_map, count)
         new_charts += [chart for chart, _ in found]
         new_maps += [chart_map for _, chart_map in found]

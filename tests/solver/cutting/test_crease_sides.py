@@ -121,7 +121,9 @@ def shear_of(surface: Surface, **options):
 def test_a_washer_is_unwrapped_without_distortion():
     V, Q = washer()
     found, shear = shear_of(surface_of(V, Q))
-    assert len(found.charts) == 4 and shear < 1.001
+    # Rings, and walls in pieces: as strips they would leave most of a texture empty.
+    assert 4 < len(found.charts) < 9 and shear < 1.001
+    assert max(np.ptp(m.uv, axis=0).max() for m in found.maps) < 2 * np.pi * 0.9
     assert sum(m.folds for m in found.maps) == 0
 
 

@@ -285,6 +285,8 @@ def test_ribbons_and_bands_between_marked_seams_stay_whole():
     V, F = meshes.grid(120, 1, width=120.0, height=1.0)
     ribbon = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(max_shear=1.35)))
     assert len(ribbon.charts) == 1
+    short, long = (drain(unwrap(_cable(n, True), options=UnwrapOptions(max_shear=1.35))) for n in (2, 6))
+    assert len(short.charts) == 1 and len(long.charts) > 1
     cable = _cable(24, False)
     line = 12 * np.arange(24 * 4 + 1)
     marked = replace(cable, seams=np.column_stack([line[:-1], line[1:]]))
