@@ -132,7 +132,7 @@ def _line(row: dict) -> str:
     boundary = "" if row["boundary"] is None else f", boundary {row['boundary']:.5f}"
     kept = "kept" if row["topology_kept"] else "not kept"
     return (
-        f"{row['file']}: {row['vertices']} vertices, {row['faces']} faces; Hausdorff {row['hausdorff']:.5f}, "
+        f"{row['file']}: {row['vertices']} vertices, {row['faces']} triangles; Hausdorff {row['hausdorff']:.5f}, "
         f"rms {row['rms']:.6f} of the diagonal{boundary}; normals off {row['normal_mean']:.2f} degrees "
         f"(99 % within {row['normal_p99']:.1f}); curvature off {100 * row['gaussian_error']:.1f} % Gaussian, "
         f"{100 * row['mean_error']:.1f} % mean; least angle {row['angle_min']:.1f} (99 % above {row['angle_p1']:.1f}) "

@@ -24,7 +24,7 @@ MOST_SHEAR = 1e6
 class RegionFigures:
     """Figures of a region.
 
-    name : of the region; faces : triangles in it; area, perimeter : in space; surface_share, texture_share : of all;
+    name : of the region; faces : polygons in it; area, perimeter : in space; surface_share, texture_share : of all;
     uv_area, uv_diameter : of its UVs; ratio_mean, ratio_sd : of the area ratio over its surface, UV share over surface
     share, 1 is exact; shear : mean ratio of the singular values; texel_density : pixels per unit of length
     """
@@ -93,7 +93,7 @@ def _row(name: str, measured: _Measured, inside: np.ndarray, texture_size: float
     mean = float(weight @ ratio)
     return RegionFigures(
         name=name,
-        faces=int(inside.sum()),
+        faces=len(np.unique(measured.found.polygons[inside])),
         area=float(area.sum()),
         surface_share=float(area.sum() / measured.area.sum()),
         texture_share=float(uv_area.sum() / max(measured.uv_area.sum(), 1e-300)),

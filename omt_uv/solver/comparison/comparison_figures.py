@@ -32,7 +32,7 @@ BOUNDARY_POINTS = 2000
 class Comparison(TriangleShapes):
     """Figures of a surface B beside a surface A; lengths are shares of the diagonal of the box of A.
 
-    vertices, faces : of B
+    vertices, faces : of B, whose faces are triangles
     hausdorff, hausdorff_a, hausdorff_b : greatest distance: of both ways, from A to B, and from B to A
     hausdorff_bound : no distance is above it; None where distances are those of points alone
     rms, rms_a, rms_b : root of the mean square over the area, both ways, from A to B, and from B to A

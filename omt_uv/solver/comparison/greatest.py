@@ -56,8 +56,7 @@ class _Pieces:
 def by_position(index: ClosestPoint, points: np.ndarray) -> SurfacePoints:
     """The closest points to points (k,3) by position alone, whichever way the surface looks there; seldom one is found
     that is not the closest of all, see `exact_distances`."""
-    none = np.zeros(points.shape)
-    return index.closer(points, none, index(points, none))
+    return index.walk(points, index.near_by_position(points))
 
 
 def exact_distances(index: ClosestPoint, points: np.ndarray, most: np.ndarray) -> np.ndarray:

@@ -156,6 +156,13 @@ class ClosestPoint:
         parts = zip(vars(found).values(), vars(other).values(), strict=True)
         return SurfacePoints(*(np.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in parts))
 
+    def near_by_position(self, points: np.ndarray) -> np.ndarray:
+        """The nearest triangle (k,) of those of the samples nearest to points (k,3), whichever way it looks."""
+        owner = self._spread[0]
+        k = min(MORE_CANDIDATES, len(owner))
+        faces = owner[self._plain.query(points, k=k)[1].reshape(len(points), k)]
+        return faces[np.arange(len(faces)), self.distance(points, faces)[1].argmin(axis=1)]
+
     def nearest_face(self, points: np.ndarray) -> np.ndarray:
         """The triangle (k,) of the sample nearest to each of points (k,3): where it is about, for smooth quantities."""
         return self._spread[0][self._plain.query(points)[1]]

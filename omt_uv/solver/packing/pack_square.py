@@ -54,6 +54,8 @@ TIRED = 4
 FINE_TIRED = 2
 # Boxes of islands that go into blocks are so much apart, in cells, at least.
 APART = 1e-6
+# Coordinates beyond 2 to this power, or its inverse, are scaled before they are squared.
+MOST_EXPONENT = 400
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,10 @@ def pack(
     used = list(map(np.unique, triangles))
     points = [p[u] for p, u in zip(islands, used, strict=True)]
     faces = [np.searchsorted(u, t) for u, t in zip(used, triangles, strict=True)]
+    # Squares of sizes beyond these are no numbers; a power of two changes no digit.
+    exponent = int(np.frexp(max(np.abs(p).max(initial=0.0) for p in points))[1])
+    exponent = exponent if abs(exponent) > MOST_EXPONENT else 0
+    points = [np.ldexp(p, -exponent) for p in points] if exponent else points
     if len(points) == 1 and not len(around):
         placed, scale = _alone(points[0], (texture_size - margin) / texture_size)
     else:
@@ -152,7 +158,7 @@ def pack(
         found = yield from _search(task)
         placed, scale = _filled(_placed(points, found), found.task, found.scale)
     whole = [_spread(p, u, len(i)) for p, u, i in zip(placed, used, islands, strict=True)]
-    return Packing(whole, scale, "raster", covered_area(placed, faces))
+    return Packing(whole, float(np.ldexp(scale, -exponent)), "raster", covered_area(placed, faces))
 
 
 def stack(islands: Sequence[np.ndarray]) -> Packing:

@@ -168,7 +168,7 @@ def _without_bands(
     for chart, chart_map in zip(charts, maps, strict=True):
         found, between = [(chart, chart_map)], cuts[:0]
         # Most are short, and of thousands nothing else is asked.
-        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > LONG_AND_NARROW * side and not len(chart.patches):
+        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > LONG_AND_NARROW * side > 0 and not len(chart.patches):
             width, length = np.sort(np.ptp(_upright(chart_map.uv), axis=0))
             was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
             longest = (LONG_AND_NARROW if width <= NARROW * length else LONG) * side

@@ -211,3 +211,13 @@ def test_memory_grows_no_faster_than_the_points_of_an_island(make):
         return most
 
     assert peak(16_000) < 5 * peak(4_000)
+
+
+@pytest.mark.parametrize("exponent", [-1000, -450, 450, 900])
+def test_islands_of_any_size_are_packed_alike(exponent):
+    points = [np.array([[0, 0], [w, 0], [w, 1], [0, 1.0]]) for w in (1.0, 1.5, 2.0)]
+    faces = [np.array([[0, 1, 2], [0, 2, 3]])] * 3
+    before = drain(pack_square.pack(points, faces))
+    after = drain(pack_square.pack([np.ldexp(p, exponent) for p in points], faces))
+    assert all(np.array_equal(a, b) for a, b in zip(before.islands, after.islands, strict=True))
+    assert after.scale == np.ldexp(before.scale, -exponent)

@@ -291,3 +291,12 @@ def test_ribbons_and_bands_between_marked_seams_stay_whole():
     line = 12 * np.arange(24 * 4 + 1)
     marked = replace(cable, seams=np.column_stack([line[:-1], line[1:]]))
     assert len(drain(unwrap(marked, options=UnwrapOptions(max_shear=1.35))).charts) == 1
+
+
+@pytest.mark.parametrize("size", [1e-150, 1e-60, 1e60])
+def test_sizes_of_which_squares_are_no_numbers_come_out_as_others(size):
+    V, F = meshes.cap(rings=3, sectors=8)
+    options = UnwrapOptions("free", "draft", balance=0.5, max_shear=1.1)
+    found = [drain(unwrap(triangle_surface(s * V, F), options=options)) for s in (1.0, size)]
+    assert len(found[0].maps) == len(found[1].maps)
+    assert all(np.isfinite(chart_map.uv).all() for chart_map in found[1].maps)
