@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..settings import RemeshSettings
+from ..settings import DEFAULT_HIGH, DEFAULT_LOW, RemeshSettings
 from ..solver.analysis.density import (
     checked_density,
     from_vertices,
@@ -34,6 +34,7 @@ from ..solver.transfer.correspondence import Correspondence, correspond
 BYTES_PER_VERTEX = 10_000
 # Share of the work on one level that its mesh takes; the rest is where it lies on the surface.
 REMESHING = 0.95
+ODD = " joined the wrong way round to others that look outwards, too"
 NO_EDGES = np.zeros((0, 2), np.int64)
 
 
@@ -194,13 +195,20 @@ class Oriented:
 
     kept (m,) bool : triangles that are turned back in the new mesh, since their part looks outwards then
     joints (e,2) : edges between these and their neighbours
-    warnings : what was turned
+    wrong, odd : words about the faces that were wound wrongly, and about those that are turned back; empty for none
     """
 
     surface: Surface
     kept: np.ndarray
     joints: np.ndarray
-    warnings: tuple[str, ...] = ()
+    wrong: str = ""
+    odd: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What becomes of these faces in a new mesh."""
+        said = (self.wrong, "turned over in the new mesh"), (self.odd, "sides stay as they are")
+        return tuple(f"{found}; {done}" for found, done in said if found)
 
 
 def oriented(surface: Surface) -> Oriented:
@@ -224,12 +232,15 @@ def oriented(surface: Surface) -> Oriented:
     between = kept[gluing.first // 3] != kept[gluing.second // 3]
     joints = np.stack([end[between] for end in gluing.ends(gluing.first)], axis=1)
     wrong, odd = (len(np.unique(surface.triangle_face[those])) for those in (turned != kept, turned & kept))
-    said = plural(wrong, "A face looks to another side than its neighbours", "{} faces look to another side")
-    warnings = [f"{said}; turned over in the new mesh"] if wrong else []
-    if odd:
-        said = plural(odd, "A face is", "{} faces are")
-        warnings.append(f"{said} joined the wrong way round to others that look outwards, too; sides stay as they are")
-    return Oriented(replace(surface, triangles=triangles), kept, joints, tuple(warnings))
+    return Oriented(
+        surface=replace(surface, triangles=triangles),
+        kept=kept,
+        joints=joints,
+        wrong=plural(wrong, "A face looks to another side than its neighbours", "{} faces look to another side")
+        if wrong
+        else "",
+        odd=plural(odd, "A face is", "{} faces are") + ODD if odd else "",
+    )
 
 
 def _sides_back(positions: np.ndarray, given: np.ndarray, gluing: Gluing, turned: np.ndarray) -> np.ndarray:
@@ -263,7 +274,8 @@ def _gaussian(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -
 def _saliency(job: RemeshJob, triangles: np.ndarray, settings: RemeshSettings) -> np.ndarray:
     """Density (m,) by saliency, up to the factor of the settings."""
     positions = job.surface.positions
-    weights = soft_weights(vertex_score("saliency", positions, triangles), scaled_vertex_areas(positions, triangles))
+    area = scaled_vertex_areas(positions, triangles)
+    weights = soft_weights(vertex_score("saliency", positions, triangles), area, DEFAULT_LOW, DEFAULT_HIGH)
     return painted_density(from_vertices(weights, triangles), settings.factor)
 
 

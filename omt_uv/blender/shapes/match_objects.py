@@ -58,7 +58,7 @@ def read_carrier(obj: bpy.types.Object) -> Carried:
     names = tuple(group.name for group in obj.vertex_groups)
     attributes = read_attributes(obj.data, names)
     materials = tuple(slot.material.name if slot.material else "" for slot in obj.material_slots)
-    told = tuple(f"{text.split(';')[0]}; turned over for the match" for text in sides.warnings)
+    told = tuple(f"{found}; turned over for the match" for found in (sides.wrong, sides.odd) if found)
     return Carried(sides.surface, attributes, stretch, materials, told)
 
 

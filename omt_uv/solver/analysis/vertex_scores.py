@@ -58,9 +58,7 @@ def vertex_score(
     return found if found.max() > NO_CURVATURE[kind] else np.zeros(len(positions))
 
 
-def soft_weights(
-    values: np.ndarray, area: np.ndarray, low: float = 0.8, high: float = 0.98, invert: bool = False
-) -> np.ndarray:
+def soft_weights(values: np.ndarray, area: np.ndarray, low: float, high: float, invert: bool = False) -> np.ndarray:
     """Weights (n,) in [0,1] from scores (n,): 0 on the share `low` of the area (n,) with the least score, 1 above the
     share `high`, and a smooth step between; `invert` for the contrary.
 

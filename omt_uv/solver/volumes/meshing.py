@@ -14,7 +14,7 @@ import numpy as np
 from ..contact.self_intersections import intersecting_pairs
 from ..errors import LibraryError, SelfIntersectionError, TetrahedraError, plural
 from ..flows.enclosed_volume import corner_volumes
-from ..mesh.topology import halfedges
+from ..mesh.topology import halfedges, pair_keys, paired
 from .tet_mesh import EDGES, boundary_triangles, tet_volumes, turned_right
 
 # Ratio of radius to shortest edge that TetGen aims for.
@@ -98,11 +98,11 @@ def without_chords(points: np.ndarray, tets: np.ndarray, triangles: np.ndarray) 
     tail, head = halfedges(triangles)
     on = np.zeros(len(points), bool)
     on[triangles] = True
+    surface = np.unique(pair_keys(tail, head))
     for _ in range(ROUNDS):
-        n = np.int64(len(points))
-        surface = np.unique(np.minimum(tail, head) * n + np.maximum(tail, head))
-        ends = np.sort(tets[:, EDGES], axis=2)
-        keys = ends[..., 0] * n + ends[..., 1]
+        n = len(points)
+        ends = tets[:, EDGES]
+        keys = pair_keys(ends[..., 0], ends[..., 1])
         chord = on[ends].all(axis=2) & ~np.isin(keys, surface)
         if not chord.any():
             break
@@ -121,10 +121,9 @@ def split_inside(mesh: TetMesh, positions: np.ndarray, asked: np.ndarray) -> tup
     Length is that in the body and at the positions together; of edges that share a tetrahedron the longest is split.
     """
     tail, head = halfedges(boundary_triangles(mesh.tets))
-    n = np.int64(len(mesh.points))
-    surface = np.unique(np.minimum(tail, head) * n + np.maximum(tail, head))
-    ends = np.sort(mesh.tets[:, EDGES], axis=2)
-    keys = ends[..., 0] * n + ends[..., 1]
+    surface = np.unique(pair_keys(tail, head))
+    ends = mesh.tets[:, EDGES]
+    keys = pair_keys(ends[..., 0], ends[..., 1])
     places = np.concatenate([mesh.points, positions], axis=1)
     way = places[ends[..., 0]] - places[ends[..., 1]]
     length = np.linalg.norm(way[..., :3], axis=2) + np.linalg.norm(way[..., 3:], axis=2)
@@ -140,20 +139,17 @@ def split_inside(mesh: TetMesh, positions: np.ndarray, asked: np.ndarray) -> tup
 def _split(points: np.ndarray, tets: np.ndarray, keys: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Split edges of tetrahedra (m,4) in their middle that are the longest, length (m,6), in all of theirs; keys
     (m,6)."""
-    # Ties are broken by the key, so that no two edges of a tetrahedron are both the longest.
-    _, rank = np.unique(np.stack([length.ravel(), keys.ravel()], axis=1), axis=0, return_inverse=True)
-    rank = rank.ravel().reshape(length.shape)
-    best = rank.argmax(axis=1)
-    rows = np.arange(len(tets))
-    here = length[rows, best] > 0
     used, inverse = np.unique(keys, return_inverse=True)
     inverse = inverse.ravel().reshape(keys.shape)
+    # Ties are broken by the key, so that no two edges of a tetrahedron are both the longest.
+    best = np.where(length == length.max(axis=1, keepdims=True), inverse, -1).argmax(axis=1)
+    rows = np.arange(len(tets))
+    here = length[rows, best] > 0
     around = np.bincount(inverse.ravel(), minlength=len(used))
     first = np.bincount(inverse[rows[here], best[here]], minlength=len(used))
     chosen = (first == around) & (first > 0)
     place = np.where(chosen, len(points) + np.cumsum(chosen) - 1, -1)
-    n = np.int64(len(points))
-    middle = (points[used[chosen] // n] + points[used[chosen] % n]) / 2
+    middle = points[paired(used[chosen])].sum(axis=1) / 2
     mine = here & chosen[inverse[rows, best]]
     split = np.flatnonzero(mine)
     vertex = place[inverse[split, best[split]]]

@@ -42,21 +42,21 @@ def test_soft_weights_by_area(invert):
 def test_weights_as_they_come_leave_room_for_four_times_their_share(seed):
     random = np.random.default_rng(seed)
     scores, area = random.lognormal(size=500) ** random.uniform(0.2, 4), random.uniform(0.5, 2, 500)
-    share = region_share(soft_weights(scores, area), area)
+    share = region_share(soft_weights(scores, area, 0.8, 0.98), area)
     assert 0.01 < share < 0.2
-    assert exact_density(soft_weights(scores, area), area, 4.0).target_share == pytest.approx(4 * share)
+    assert exact_density(soft_weights(scores, area, 0.8, 0.98), area, 4.0).target_share == pytest.approx(4 * share)
 
 
 def test_weights_of_nothing():
     V, F = meshes.grid(10, 10)
     area = vertex_areas(V, F)
     with pytest.raises(WeightError, match="same everywhere"):
-        soft_weights(vertex_score("saliency", V, F), area)
+        soft_weights(vertex_score("saliency", V, F), area, 0.8, 0.98)
     with pytest.raises(WeightError, match="no range"):
         soft_weights(V[:, 0], area, 0.9, 0.1)
     with pytest.raises(EmptyMeshError, match="selected"):
         vertex_score("distance", V, F, np.zeros(len(V), bool))
-    cube = soft_weights(np.where(np.arange(100) < 95, 0.0, 1.0), np.ones(100))
+    cube = soft_weights(np.where(np.arange(100) < 95, 0.0, 1.0), np.ones(100), 0.8, 0.98)
     assert cube.sum() == 5
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.joint_density import shares_of
+from omt_uv.solver.editing import magnify_regions as magnify_regions_module
 from omt_uv.solver.editing.magnify_regions import magnify_regions
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.progress import drain
@@ -38,3 +39,18 @@ def test_without_exact_shares_the_factor_is_that_between_the_weights():
     outside, inside = (regions == 0).all(axis=0), regions[1] == 1
     ratio = area[inside].sum() / inside.sum() / (area[outside].sum() / outside.sum())
     assert ratio == pytest.approx(3, rel=0.03)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.5, 6.0, 40.0])
+def test_no_step_changes_densities_by_more_than_it_may_and_none_is_idle(factor, monkeypatch):
+    """Steps are as many as the range of what is asked has parts of the largest step, each of which moves the map."""
+    V, F = meshes.grid(8, 8)
+    calls = []
+    whole = magnify_regions_module.magnify_map
+    monkeypatch.setattr(magnify_regions_module, "magnify_map", lambda *a, **k: calls.append(a[2]) or whole(*a, **k))
+    regions = np.clip(1.5 - 3 * np.linalg.norm(V[F].mean(axis=1)[:, :2] - 0.5, axis=1), 0, 1)[None]
+    drain(magnify_regions(V[:, :2], F, regions, [factor], exact=False))
+    spread = np.log(max(np.ptp(np.log(density)) for density in calls) + 1e-300) if factor > 1 else -np.inf
+    asked = np.log(factor)
+    assert len(calls) == max(1, int(np.ceil(asked / magnify_regions_module.LARGEST_STEP - 1e-9)))
+    assert np.exp(spread) <= magnify_regions_module.LARGEST_STEP + 1e-9

@@ -9,7 +9,7 @@ from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.refine import refine_islands
 from omt_uv.settings import RefineSettings
 from omt_uv.solver.editing.live_map import LiveMap
-from omt_uv.solver.editing.refine_island import STRAIGHTENED, refine_island
+from omt_uv.solver.editing.refine_island import STRAIGHTENED, refine_island, signed_area_of
 from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import FoldedUVError, PinError
 from omt_uv.solver.maps.distortion import distortion
@@ -375,3 +375,12 @@ def test_a_symmetric_island_of_quads_gets_a_symmetric_map(balance):
     if balance == 0:
         figures = distortion(V, F, result.uv[F], polygons=faces)
         assert figures.area_l1 < 0.01 < distortion(V, F, lopsided[F], polygons=faces).area_l1
+
+
+@pytest.mark.parametrize("sides", [3, 4, 9])
+def test_the_area_of_an_outline_is_that_of_its_fan_wherever_it_lies(sides):
+    turn = 2 * np.pi * np.arange(sides) / sides
+    polygon = np.column_stack([3 + 2 * np.cos(turn), 5 + np.sin(turn)])
+    fan = np.column_stack([np.zeros(sides - 2, int), np.arange(1, sides - 1), np.arange(2, sides)])
+    assert signed_area_of(polygon) == pytest.approx(signed_areas(polygon, fan).sum()) and signed_area_of(polygon) > 0
+    assert signed_area_of(polygon[::-1]) == pytest.approx(-signed_area_of(polygon))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
 from mesh_checks import topology
+from scipy.spatial import cKDTree
 
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.remeshing.initial.arc_network import find_arcs, sample_arcs
@@ -43,3 +46,14 @@ def test_other_vertices_leave_the_lines(square):
     assert signed_areas(mesh.points[:, :2], mesh.triangles).sum() == pytest.approx(component.area.sum())
     fewer = collapse_short_edges(mesh, lambda points: np.full(len(points), 9.0))
     assert len(fewer.points) < len(mesh.points) and len(fewer.lines) == 20 and topology(fewer.triangles) == (1, 1)
+    asked = []
+
+    def shortest(points):
+        asked.append(points)
+        return np.full(len(points), 0.0)
+
+    far = replace(mesh, points=mesh.points + [5.0, -3.0, 2.0])
+    assert len(collapse_short_edges(far, shortest).points) == len(far.points)
+    # The places asked about are middles of edges.
+    (tree,) = {cKDTree((far.points[:, None] + far.points[None]).reshape(-1, 3) / 2)}
+    assert tree.query(np.concatenate(asked))[0].max() < 1e-12
