@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
 
 from ..errors import MERGING, TURN_OUTSIDE, plural
 from ..mesh.edge_flips import cut_along_shorter
@@ -21,12 +20,10 @@ from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluin
 from ..mesh.surface import Surface, chosen_triangles
 from ..progress import Steps, drain, part_of
 from .component import (
-    NOISE,
     CutComponent,
     Topology,
     boundary_vertices,
     classify,
-    edge_graph,
     fingerprint,
     make_component,
 )
@@ -36,14 +33,11 @@ from .developable_nets import net
 from .gluing_facts import TurningLines, cost_factors, marked_triangles, total_curvature, turning_lines
 from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes
-from .protrusions import log_scale, spread
+from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, peak, spread
 from .steiner_points import MOST_ENDS, meeting_points
 
 # Tips that a surface is cut open through.
 MOST_EXTREMITIES = 8
-# A further cut does not pay where the lengths of a flat map are predicted to be off by a factor of e^0.5 at most,
-# in the mean square over the surface.
-BEARABLE = 0.5**2
 # Vertices from which loops through handles are tried.
 ROOT_TRIALS = 4
 # A component with less curvature than this within, in radians and summed without sign, is not searched for seams.
@@ -375,7 +369,7 @@ def cut_component(
     """Edges (e,) bool that cut the component, number k of the topology, into a disk, and the tips (t,) they reach."""
     closed = topology.boundaries[k] == 0
     if closed and topology.handles[k] == 0:
-        tips = _first_tips(component)
+        tips = first_tips(component)
     else:
         tips = np.zeros(0, dtype=np.int64)
     if closed and len(tips) == 0:
@@ -389,43 +383,14 @@ def cut_component(
         if spread(component, scale) <= BEARABLE:
             break
         # A tip is worth its cut where much distortion is far from the boundary.
-        far = _distance(component, _cut_vertices(component, chosen))
-        tips = np.append(tips, _peak(scale * far * component.tip_factor()))
+        far = edge_distance(component, _cut_vertices(component, chosen))
+        tips = np.append(tips, peak(scale * far * component.tip_factor()))
         path = path_to(component, _cut_vertices(component, chosen), tips[-1])
         chosen = shorten(component, chosen | path, tips, around=path)
     chosen = shorten(component, chosen, tips)
     if extremities and topology.handles[k] == 0 and 2 < len(tips) + topology.boundaries[k] <= MOST_ENDS:
         chosen = min(chosen, _branching_tree(component, tips), key=lambda edges: component.cost[edges].sum())
     return chosen, tips
-
-
-def _first_tips(component: CutComponent) -> np.ndarray:
-    """The sharpest extremity of a sphere and the vertex farthest from it, (2,); (3,) if they are neighbours.
-
-    A slit of a single edge would not open anything.
-    """
-    scale = log_scale(component, np.zeros(len(component.pair), dtype=bool))
-    tips = _farthest(component, np.array([_peak(scale * component.tip_factor())]), 1)
-    neighbours = (np.sort(component.ends, axis=1) == np.sort(tips)).all(axis=1).any()
-    return _farthest(component, tips, 1) if neighbours else tips
-
-
-def _farthest(component: CutComponent, points: np.ndarray, more: int) -> np.ndarray:
-    """The points (k,) and `more` others, each as far from those before it as the edges go."""
-    for _ in range(more):
-        points = np.append(points, _peak(_distance(component, points) * component.tip_factor()))
-    return points
-
-
-def _distance(component: CutComponent, vertices: np.ndarray) -> np.ndarray:
-    """Cost (n,) of the cheapest path from the vertices (k,)."""
-    graph = edge_graph(component, np.arange(len(component.pair)), component.ends, component.vertex_count)
-    return dijkstra(graph, indices=vertices, min_only=True)
-
-
-def _peak(value: np.ndarray) -> int:
-    """Vertex of the largest value (n,) >= 0; on symmetric models rounding shall not choose between equals."""
-    return int(np.argmax(value * (1 + NOISE * np.random.default_rng(0).random(len(value)))))
 
 
 def _cut_vertices(component: CutComponent, chosen: np.ndarray) -> np.ndarray:
@@ -437,7 +402,7 @@ def _cut_vertices(component: CutComponent, chosen: np.ndarray) -> np.ndarray:
 def _branching_tree(component: CutComponent, tips: np.ndarray) -> np.ndarray:
     """Edges (e,) bool of a short tree that joins the tips (k,) and all boundaries of a component without handles."""
     ends = [np.array([tip]) for tip in tips] + boundary_vertices(component)
-    distance = np.array([_distance(component, end) for end in ends])
+    distance = np.array([edge_distance(component, end) for end in ends])
     between = np.array([distance[:, end].min(axis=1) for end in ends])
     points = meeting_points(distance, between)
     return shorten(component, greedy_arcs(component, np.union1d(tips, points)), tips)
@@ -445,6 +410,6 @@ def _branching_tree(component: CutComponent, tips: np.ndarray) -> np.ndarray:
 
 def _best_root(component: CutComponent) -> np.ndarray:
     """Shortest of the greedy systems of loops from a few roots, spread evenly: edges (e,) bool."""
-    roots = _farthest(component, np.array([0]), ROOT_TRIALS)[1:]
+    roots = farthest(component, np.array([0]), ROOT_TRIALS)[1:]
     systems = [greedy_arcs(component, np.array([root])) for root in roots]
     return min(systems, key=lambda edges: component.cost[edges].sum())

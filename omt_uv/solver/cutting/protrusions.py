@@ -8,6 +8,7 @@ much curvature far from the boundary, are where |u| peaks; a cut to the peak tak
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse.csgraph import dijkstra
 
 from ..linalg.sparse import solve_spd
 from ..mesh.geometry import (
@@ -19,8 +20,12 @@ from ..mesh.geometry import (
     vertex_areas,
 )
 from ..mesh.topology import halfedges
-from .component import CutComponent
+from .component import NOISE, CutComponent, edge_graph
 from .cut_graph import cut_boundary, cut_classes
+
+# A further cut does not pay where the lengths of a flat map are predicted to be off by a factor of e^0.5 at most,
+# in the mean square over the surface.
+BEARABLE = 0.5**2
 
 
 def log_scale(component: CutComponent, cut: np.ndarray) -> np.ndarray:
@@ -51,3 +56,32 @@ def spread(component: CutComponent, scale: np.ndarray) -> float:
     """Mean square over the surface of a log scale (n,)."""
     area = vertex_areas(component.positions, component.triangles)
     return float(area @ scale**2 / area.sum())
+
+
+def first_tips(component: CutComponent) -> np.ndarray:
+    """The sharpest extremity of a sphere and the vertex farthest from it, (2,); (3,) if they are neighbours.
+
+    A slit of a single edge would not open anything.
+    """
+    scale = log_scale(component, np.zeros(len(component.pair), dtype=bool))
+    tips = farthest(component, np.array([peak(scale * component.tip_factor())]), 1)
+    neighbours = (np.sort(component.ends, axis=1) == np.sort(tips)).all(axis=1).any()
+    return farthest(component, tips, 1) if neighbours else tips
+
+
+def farthest(component: CutComponent, points: np.ndarray, more: int) -> np.ndarray:
+    """The points (k,) and `more` others, each as far from those before it as the edges go."""
+    for _ in range(more):
+        points = np.append(points, peak(edge_distance(component, points) * component.tip_factor()))
+    return points
+
+
+def edge_distance(component: CutComponent, vertices: np.ndarray) -> np.ndarray:
+    """Cost (n,) of the cheapest path from the vertices (k,)."""
+    graph = edge_graph(component, np.arange(len(component.pair)), component.ends, component.vertex_count)
+    return dijkstra(graph, indices=vertices, min_only=True)
+
+
+def peak(value: np.ndarray) -> int:
+    """Vertex of the largest value (n,) >= 0; on symmetric models rounding shall not choose between equals."""
+    return int(np.argmax(value * (1 + NOISE * np.random.default_rng(0).random(len(value)))))
