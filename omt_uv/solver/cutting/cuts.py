@@ -35,6 +35,7 @@ from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, peak, spread
 from .steiner_points import MOST_ENDS, meeting_points
+from .symmetric_cut import symmetric_cut, symmetric_half
 
 # Tips that a surface is cut open through.
 MOST_EXTREMITIES = 8
@@ -42,6 +43,13 @@ MOST_EXTREMITIES = 8
 ROOT_TRIALS = 4
 # A component with less curvature than this within, in radians and summed without sign, is not searched for seams.
 CURVED = 0.2
+# Symmetric cuts may cost so many times what others do, where they leave as much distortion: until there is so many
+# times that of others in the mean square, where this is not below what nobody sees, a tenth of all lengths. What more
+# than halves it is worth no further cuts.
+DEARER = 1.5
+STEEPER = 1.5
+UNSEEN = 0.1**2
+LEAST_GAIN = 0.5
 # A net may be so many times as long as another cut, and as long as `developable_nets.Net.most` says anyway.
 LONGER = 1.5
 
@@ -366,7 +374,23 @@ def _in_unit_box(surface: Surface, gluing: Gluing) -> tuple[np.ndarray, float]:
 def cut_component(
     component: CutComponent, topology: Topology, k: int, extremities: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (e,) bool that cut the component, number k of the topology, into a disk, and the tips (t,) they reach."""
+    """Edges (e,) bool that cut the component, number k of the topology, into a disk, and the tips (t,) they reach;
+    symmetric ones where it is its own mirror image."""
+    found = _plain_cut(component, topology, k, extremities)
+    half = symmetric_half(component)
+    if half is None:
+        return found
+    left = max(spread(component, log_scale(component, found[0])), UNSEEN) if extremities else np.inf
+    symmetric = symmetric_cut(half, extremities, min(BEARABLE, STEEPER * left))
+    if symmetric is None:
+        return found
+    dearer = component.cost[symmetric[0]].sum() / component.cost[found[0]].sum()
+    steeper = spread(component, log_scale(component, symmetric[0])) / left if extremities else 1.0
+    return found if dearer * np.sqrt(max(steeper, LEAST_GAIN)) > DEARER else symmetric
+
+
+def _plain_cut(component: CutComponent, topology: Topology, k: int, extremities: int) -> tuple[np.ndarray, np.ndarray]:
+    """What `cut_component` finds where nothing is to be symmetric."""
     closed = topology.boundaries[k] == 0
     if closed and topology.handles[k] == 0:
         tips = first_tips(component)

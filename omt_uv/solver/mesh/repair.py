@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError, plural
 from .charts import Chart
+from .geometry import edge_lengths
 from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam
 from .topology import halfedges, pair_keys, pair_up
@@ -20,6 +21,8 @@ from .topology import halfedges, pair_keys, pair_up
 # Vertices of a triangle without area move by this share of the height of the flattest sound triangle around them:
 # it has area then, and its neighbours keep theirs to within a few thousandths.
 PERTURBATION = 1e-3
+# Polygons whose perimeters differ by less than this share may be each other's mirror image.
+ALIKE = 1e-4
 # A round moves four times as far as the one before.
 PERTURBATION_ROUNDS = 12
 # Triangles with less than this share of the square of their longest side have no area that a texture could show, but
@@ -51,7 +54,8 @@ def repaired_gluing(surface: Surface, faces: np.ndarray, triangles: np.ndarray, 
     gluing = polygon_gluing(triangles, owner, surface.corner_vertex, surface.face_start)
     layer, warnings = _layers(surface, faces)
     joined, torn = _pair_sides(surface, gluing, layer)
-    while len(folded := _folded_faces(joined, layer)):
+    around = _perimeters(surface)
+    while len(folded := _folded_faces(joined, layer, around)):
         layer[folded] = -1
         joined, torn = _pair_sides(surface, gluing, layer)
         warnings.append(
@@ -112,8 +116,9 @@ def _pair_sides(surface: Surface, gluing: Gluing, layer: np.ndarray) -> tuple[Gl
     return replace(gluing, first=first, second=second), torn
 
 
-def _folded_faces(gluing: Gluing, layer: np.ndarray) -> np.ndarray:
-    """One polygon for every diagonal that has the same two ends as another edge: no plane map keeps them apart.
+def _folded_faces(gluing: Gluing, layer: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """One polygon for every diagonal that has the same two ends as another edge: no plane map keeps them apart. Its
+    mirror image, which is as long around (f,), goes with it.
 
     Polygons of layer (f,) -1 are apart already.
     """
@@ -126,8 +131,19 @@ def _folded_faces(gluing: Gluing, layer: np.ndarray) -> np.ndarray:
     polygon = gluing.owner[h // 3]
     last = np.zeros(len(count), dtype=np.int64)
     np.maximum.at(last, number[h], polygon)
-    folded = np.unique(last[number[h]])
+    alike = np.abs(around[polygon] - around[last[number[h]]]) <= ALIKE * around[polygon]
+    folded = np.unique(polygon[alike])
     return folded[layer[folded] >= 0]
+
+
+def _perimeters(surface: Surface) -> np.ndarray:
+    """Length (f,) around every polygon, of those that have one."""
+    start, vertex = surface.face_start, surface.corner_vertex
+    after = np.arange(len(vertex)) + 1
+    filled = start[1:] > start[:-1]
+    after[start[1:][filled] - 1] = start[:-1][filled]
+    length = edge_lengths(surface.positions, np.column_stack([vertex, vertex[after]]))
+    return np.bincount(np.repeat(np.arange(len(filled)), np.diff(start)), length, len(filled))
 
 
 def _healed(gluing: Gluing) -> Gluing:

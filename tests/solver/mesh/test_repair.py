@@ -171,6 +171,20 @@ def test_polygons_that_share_two_edges_in_a_row_come_apart():
     assert any("several edges in a row" in w for w in result.warnings)
 
 
+def test_of_mirror_images_around_a_vertex_both_come_apart():
+    """What is left is its own mirror image as before."""
+    V = np.array(
+        [[-2, 0, 0], [0, 2, 0], [2, 0, 0], [0, -2, 0], [-1, 0, 0], [0, 1, 0], [1, 0, 0], [0, -1, 0], [0, 0, 0.1]]
+    )
+    around = [[0, 4, 5, 1], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 4, 0]]
+    equal = cut_to_disks(meshes.polygon_surface(V, [*around, [5, 4, 7, 8], [7, 6, 5, 8]]))
+    assert sorted(len(np.unique(c.faces)) for c in equal.charts) == [1, 1, 4]
+    other = V.copy()
+    other[6, 0] = 1.2
+    unequal = cut_to_disks(meshes.polygon_surface(other, [*around, [5, 4, 7, 8], [7, 6, 5, 8]]))
+    assert sorted(len(np.unique(c.faces)) for c in unequal.charts) == [1, 5]
+
+
 def needle(V, F, at):
     """Split the edge between faces `at` and its neighbour by a vertex on it that only one side knows."""
     a, b, c = F[at]

@@ -1,0 +1,99 @@
+"""Cuts of bodies that are their own mirror image: symmetric, and into one disk."""
+
+import meshes
+import numpy as np
+import pytest
+from meshes import polygon_surface
+from short_cuts import component_of
+
+from omt_uv.solver.cutting.cuts import cut
+from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.cutting.symmetric_cut import symmetric_cut, symmetric_half
+from omt_uv.solver.mesh.mirror import find_mirror
+from omt_uv.solver.mesh.surface import Surface
+from omt_uv.solver.mesh.topology import pair_keys
+
+
+def figure(*holes: str, side: int = 4) -> Surface:
+    """A body of quads that is its own image in x alone, on a grid: two limbs above, a tail below; open where told."""
+    cells = {(x, y, z) for x in range(-3, 3) for y in range(2 * side) for z in range(-2, 2)}
+    cells |= {(x, y, z) for x in (-3, 2) for y in range(2 * side, 4 * side) for z in range(-1, 1)}
+    cells |= {(x, -1 - y, 1) for x in (-1, 0) for y in range(side)}
+    sides = []
+    for axis in range(3):
+        for sign in (0, 1):
+            step = np.eye(3, dtype=int)[axis] * (2 * sign - 1)
+            corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]][:: 2 * sign - 1])
+            square = np.insert(corners, axis, sign, axis=1)
+            sides += [np.array(c) + square for c in cells if tuple(np.array(c) + step) not in cells]
+    quads = np.array(sides)
+    middle = quads.mean(axis=1)
+    gone = np.zeros(len(quads), dtype=bool)
+    if "limbs" in holes:
+        gone |= middle[:, 1] == 4 * side
+    if "front" in holes:
+        gone |= (middle[:, 2] == -2) & (np.abs(middle[:, 0]) < 1) & (np.abs(middle[:, 1] - side) < 1)
+    if "tail" in holes:
+        gone |= middle[:, 1] == -side
+    V, ids = np.unique(quads[~gone].reshape(-1, 3), axis=0, return_inverse=True)
+    V = V + 0.1 * np.sin(V * [0, 1.3, 0.7]) + np.column_stack([0.05 * V[:, 0] * np.cos(V[:, 1]), 0 * V[:, 1:]])
+    return polygon_surface(V.astype(float), ids.reshape(-1, 4).tolist())
+
+
+def is_symmetric(surface: Surface, edges: np.ndarray) -> bool:
+    mirror = find_mirror(surface.positions, surface.corner_vertex[surface.triangles], surface.triangle_face)
+    return bool(np.isin(pair_keys(*mirror.image[edges].T), pair_keys(*edges.T)).all())
+
+
+@pytest.mark.parametrize("holes", [[], ["limbs"], ["front", "limbs"], ["tail", "limbs"], ["tail", "front"],
+                                   ["tail", "front", "limbs"]])  # fmt: skip
+@pytest.mark.parametrize("extremities", [0, 8])
+def test_a_figure_is_cut_symmetrically_into_one_disk(holes, extremities):
+    surface = figure(*holes)
+    found = cut_to_disks(surface, extremities=extremities)
+    assert len(found.charts) == 1 and len(found.cuts.edges)
+    assert is_symmetric(surface, found.cuts.edges)
+
+
+def test_where_the_plane_runs_through_polygons_twice_nothing_is_cut_symmetrically():
+    # A tube of an odd number of quads across would have to be cut through the middle of some.
+    found = cut_to_disks(meshes.polygon_surface(*open_box(3)))
+    assert len(found.charts) == 1 and len(found.cuts.edges) == 7
+    surface = meshes.polygon_surface(*open_box(4))
+    assert is_symmetric(surface, cut_to_disks(surface).cuts.edges)
+
+
+def open_box(across: int) -> tuple[np.ndarray, list]:
+    """A tube of quads, `across` of them wide, 5 deep and 7 high, without ends."""
+    ring = [(x, 0) for x in range(across)] + [(across, z) for z in range(5)]
+    ring += [(across - x, 5) for x in range(across)] + [(0, 5 - z) for z in range(5)]
+    n = len(ring)
+    V = np.array([(x, y, z + 0.2 * x * (across - x) + 0.1 * y) for y in range(8) for x, z in ring], float)
+    quads = [[y * n + k, y * n + (k + 1) % n, (y + 1) * n + (k + 1) % n, (y + 1) * n + k]
+             for y in range(7) for k in range(n)]  # fmt: skip
+    return V, quads
+
+
+def test_a_closed_body_is_opened_by_one_symmetric_tree():
+    V, F = meshes.icosphere(3)
+    component = component_of(V * [1.0, 1.3, 3.0], F)
+    half = symmetric_half(component)
+    cuts, tips = symmetric_cut(half, 2, 0.0)
+    image = half.image[component.ends[cuts]]
+    assert np.isin(pair_keys(*image.T), pair_keys(*component.ends[cuts].T)).all()
+    assert np.isin(tips, component.ends[cuts]).all() and np.isin(half.image[tips], tips).all()
+
+
+def test_what_has_no_mirror_has_no_half():
+    V, F = meshes.icosphere(2)
+    assert symmetric_half(component_of(V @ [[1, 0.2, 0.1], [0, 1, 0.3], [0, 0, 1]], F)) is None
+
+
+def test_symmetric_cuts_are_those_of_any_order_of_the_vertices():
+    surface = figure("front")
+    order = np.random.default_rng(0).permutation(len(surface.positions))
+    back = np.argsort(order)
+    polygons = [order[p].tolist() for p in np.split(surface.corner_vertex, surface.face_start[1:-1])]
+    other = polygon_surface(surface.positions[back], polygons)
+    one, two = (np.sort(pair_keys(*e.T)) for e in (order[cut(surface).edges], cut(other).edges))
+    assert np.array_equal(one, two)
