@@ -15,6 +15,8 @@ from ..linalg.additive_schwarz import schwarz_solver
 from ..maps.energy import Elements, area_error, elements, has_folds
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import polygon_elements
+from ..maps.tutte import tutte
+from ..maps.untangle import arc_length_boundary
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps, part_of
@@ -227,6 +229,8 @@ def _refined(
     if known is not None and symmetry is None:
         symmetry, w = yield from part_of(_relaxed_to_image(free, known, w, by_triangle, options, loop), *SMOOTHING)
         warm = warm or symmetry is not None
+        if symmetry is None and boundary == "free" and not warm:
+            symmetry, w = _embedded_to_image(free, known, w, by_triangle, mesh, loop)
     assembly = assembly if symmetry is None else assembly_of(faces, n, parts, symmetry)
     problem = _mirrored(_map_problem(faces, assembly, initial, loop, boundary, smoother), symmetry, w)
     if options.crossing:
@@ -282,6 +286,17 @@ def _relaxed_to_image(
     its mean with its image has folds."""
     relaxed = yield from minimise_in_stages(problem, w, options.balance, QUALITIES["relaxed"])
     found, mean = _next_to_image(problem, symmetry, relaxed.w, by_triangle, options.boundary, loop)
+    return (None, w) if found is None else (found, mean)
+
+
+def _embedded_to_image(
+    problem: MapProblem, symmetry: MirrorSymmetry, w: np.ndarray, by_triangle: Elements, mesh: Renumbered, loop
+) -> tuple[MirrorSymmetry | None, np.ndarray]:
+    """The same by way of a mean value map: what came from a coarser mesh need not be symmetric, and its mean with its
+    image may cross itself."""
+    radius = np.sqrt(by_triangle.area.sum() / np.pi)
+    fresh = tutte(mesh.vertices, mesh.triangles, loop, arc_length_boundary(mesh.vertices, loop, radius)) @ [1, 1j]
+    found, mean = _next_to_image(problem, symmetry, fresh, by_triangle, "free", loop)
     return (None, w) if found is None else (found, mean)
 
 

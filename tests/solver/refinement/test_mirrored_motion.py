@@ -14,7 +14,8 @@ from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.mirror import find_mirror
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
-from omt_uv.solver.progress import drain
+from omt_uv.solver.progress import Progress, drain
+from omt_uv.solver.refinement import refine as refinement
 from omt_uv.solver.refinement.mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
 from omt_uv.solver.refinement.projected_newton import FreeMotion
 
@@ -120,3 +121,28 @@ def test_one_half_makes_a_symmetric_start_where_the_mean_of_both_folds():
     # Not where it would cross itself, and the map given does not.
     asked = symmetric_start(found, w, elements, "free", np.arange(0), lambda z: not np.array_equal(z, w))
     assert asked is None
+
+
+def test_where_no_map_nearby_is_symmetric_a_mean_value_map_is_the_start(monkeypatch):
+    """What comes from a coarser mesh may have laid two limbs over each other's place, relaxed or not."""
+    V, Q = hill(height=0.3)
+    triangles = np.concatenate([Q[:, :3], Q[:, [0, 2, 3]]])
+    polygons = np.tile(np.arange(len(Q)), 2)
+    # Bent like an S.
+    along = np.linspace(-1, 1, 2001)
+    middle = np.cumsum(np.exp(3j * along**2)) * 8e-3
+    at = np.searchsorted(along, V[:, 1] - 1e-9)
+    bent = middle[at] + 0.3j * V[:, 0] * np.exp(3j * along[at] ** 2)
+
+    def nothing(problem, symmetry, w, *rest):
+        yield Progress("Refinement", 0.0)
+        return None, w
+
+    monkeypatch.setattr(refinement, "_relaxed_to_image", nothing)
+    start = np.column_stack([bent.real, bent.imag])
+    found = drain(refinement.refine(V, triangles, start, polygons=polygons))
+    mirror = find_mirror(V, triangles, polygons)
+    w = found.uv @ [1, 1j]
+    centred = w - w.mean()
+    turn = (centred[mirror.image] * centred).sum()
+    assert np.abs(centred[mirror.image] - turn / abs(turn) * centred.conj()).max() < 1e-9
