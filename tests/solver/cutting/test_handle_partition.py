@@ -5,8 +5,7 @@ import numpy as np
 from short_cuts import gluing_of
 
 from omt_uv.solver.cutting.component import classify
-from omt_uv.solver.cutting.geodesic_clusters import FEW, cluster_borders
-from omt_uv.solver.cutting.handle_partition import MANY_HANDLES, partition_pairs
+from omt_uv.solver.cutting.handle_partition import FEW, MANY_HANDLES, cluster_borders, partition_pairs
 from omt_uv.solver.mesh.gluing import components, corner_classes
 
 
