@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 
-from ..mesh.topology import halfedges
+from ..mesh.topology import graph_components, halfedges
 from .component import CutComponent, edge_graph
 
 # Times that all stretches of a cut are tried again.
@@ -138,15 +138,29 @@ def _is_stretch(component: CutComponent, cut: np.ndarray, stretch: np.ndarray) -
 
 
 def cut_classes(component: CutComponent, cut: np.ndarray) -> np.ndarray:
-    """Vertex (m,3) of every triangle corner in the component cut open along the cut (e,) bool, numbered from 0."""
-    flat = component.triangles.ravel()
-    after = np.arange(len(flat)) + 1 - 3 * (np.arange(len(flat)) % 3 == 2)
-    f, s = component.pair[~cut].T
+    """Vertex (m,3) of every triangle corner in the component cut open along the cut (e,) bool, numbered from 0 as they
+    first occur."""
+    flat, n = component.triangles.ravel(), component.vertex_count
+    on_cut = np.zeros(n, dtype=bool)
+    on_cut[component.ends[cut].ravel()] = True
+    # A vertex off the cut stays one: only the corners of the others are joined anew.
+    corner = np.flatnonzero(on_cut[flat])
+    place = np.empty(len(flat), dtype=np.int64)
+    place[corner] = np.arange(len(corner))
+    f, s = component.pair[~cut & on_cut[component.ends].any(axis=1)].T
+    next_f, next_s = (h + 1 - 3 * (h % 3 == 2) for h in (f, s))
     same = flat[f] == flat[s]
-    rows = np.concatenate([f, after[f]])
-    columns = np.concatenate([np.where(same, s, after[s]), np.where(same, after[s], s)])
-    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(flat),) * 2)
-    return connected_components(graph, directed=False)[1].reshape(-1, 3).astype(np.int64)
+    rows = np.concatenate([f, next_f])
+    columns = np.concatenate([np.where(same, s, next_s), np.where(same, next_s, s)])
+    joined = on_cut[flat[rows]]
+    count, part = graph_components(place[rows[joined]], place[columns[joined]], len(corner))
+    found = flat.astype(np.int64)
+    found[corner] = n + part
+    first = np.full(n + count, len(flat))
+    first[found[::-1]] = np.arange(len(flat))[::-1]
+    number = np.empty(n + count, dtype=np.int64)
+    number[np.argsort(first)] = np.arange(n + count)
+    return number[found].reshape(-1, 3)
 
 
 def cut_boundary(component: CutComponent, cut: np.ndarray) -> np.ndarray:
@@ -160,25 +174,25 @@ def _shortest_bridge(component: CutComponent, cut: np.ndarray, tips: np.ndarray)
     n = int(classes.max()) + 1
     tail, head = halfedges(classes)
     boundary = cut_boundary(component, cut)
-    graph = coo_matrix((np.ones(len(boundary)), (tail[boundary], head[boundary])), shape=(n, n))
-    label = connected_components(graph, directed=False)[1]
-    on_boundary = np.zeros(n, dtype=bool)
+    on_boundary, is_tip = np.zeros(n, dtype=bool), np.zeros(component.vertex_count, dtype=bool)
     on_boundary[tail[boundary]] = on_boundary[head[boundary]] = True
     # A tip that the rest does not touch is a boundary of one point.
-    on_boundary[classes.ravel()[np.isin(component.triangles.ravel(), tips)]] = True
-    boundaries = np.unique(label[on_boundary])
-    if len(boundaries) != 2:
+    is_tip[tips] = True
+    on_boundary[classes[is_tip[component.triangles]]] = True
+    at = np.flatnonzero(on_boundary)
+    place = np.cumsum(on_boundary) - 1
+    count, label = graph_components(place[tail[boundary]], place[head[boundary]], len(at))
+    if count != 2:
         return None
-    one, other = (on_boundary & (label == c) for c in boundaries)
+    one, other = at[label == 0], at[label == 1]
     inner = np.flatnonzero(~cut)
     ends = np.stack([tail[component.pair[inner, 0]], head[component.pair[inner, 0]]], axis=1)
     distance, before, _ = dijkstra(
-        edge_graph(component, inner, ends, n), indices=np.flatnonzero(one), min_only=True, return_predecessors=True
+        edge_graph(component, inner, ends, n), indices=one, min_only=True, return_predecessors=True
     )
-    target = np.flatnonzero(other)
-    if not np.isfinite(distance[target]).any():
+    if not np.isfinite(distance[other]).any():
         return None
-    on_path = _ancestors(before, target[[np.argmin(distance[target])]])
+    on_path = _ancestors(before, other[[np.argmin(distance[other])]])
     on_path = on_path[before[on_path] >= 0]
     return inner[_edges_between(ends, on_path, before[on_path].astype(np.int64), n)]
 

@@ -24,6 +24,8 @@ PANEL = 2
 RELAX = 1
 # Up to this many unknowns are few.
 FEW = 100_000
+# An order has lost its use where factors have more than so many times the least entries there were.
+FILLED = 1.2
 # Names of elimination orders, and SuperLU's for them.
 _ORDERS = {"mmd": "MMD_AT_PLUS_A", "colamd": "COLAMD", "natural": "NATURAL"}
 
@@ -59,6 +61,11 @@ class Factor:
         except RuntimeError as error:
             raise PrecisionError("A linear system is singular in double precision") from error
 
+    @property
+    def entries(self) -> int:
+        """How many entries the factors have."""
+        return int(self._lu.nnz)
+
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solution of A x = b for b (n,) or (n,k)."""
         p = self._permutation
@@ -70,6 +77,33 @@ class Factor:
         if not np.isfinite(x).all():
             raise PrecisionError("A linear system is singular in double precision")
         return x
+
+
+class FillOrder:
+    """Order in which unknowns, two a vertex, of matrices are eliminated whose patterns change from one to the next.
+
+    Where vertices come near to each other and part again, entries come and go that no order of their mesh foresees, and
+    factors fill. Then an order is found anew: it takes a third of the time of the factors that it saves.
+
+    order : of the first matrices, see `Factor`
+    """
+
+    def __init__(self, order: str | np.ndarray = "natural"):
+        self.order, self._least = order, np.inf
+
+    def factor(self, A: sp.spmatrix) -> Factor:
+        """Factors of A (2n,2n), symmetric positive definite. Raises PrecisionError.
+
+        >>> FillOrder().factor(sp.identity(4, format="csc")).solve(np.ones(4))
+        array([1., 1., 1., 1.])
+        """
+        factor = Factor(A, self.order)
+        if factor.entries > FILLED * self._least:
+            vertices = minimum_degree(sp.csc_matrix(A)[::2, ::2])
+            self.order, self._least = (2 * vertices[:, None] + np.arange(2)).ravel(), np.inf
+        else:
+            self._least = min(self._least, factor.entries)
+        return factor
 
 
 def solve_spd(A: sp.spmatrix, b: np.ndarray, order: str | np.ndarray | None = None) -> np.ndarray:

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.kept_factor import KeptFactor
 from ..linalg.nested_dissection import LARGE, vertex_graph
-from ..linalg.sparse import minimum_degree
+from ..linalg.sparse import FillOrder, minimum_degree
 from ..maps.energy import (
     Elements,
     area_forms_of,
@@ -47,10 +47,8 @@ class Assembly:
     """Scatters dense blocks of triangles, and of quads, into one sparse matrix whose pattern never changes.
 
     Unknown 2 i and 2 i + 1 are the axes of vertex i. parts: what solves for a step that is nearly right, or None;
-    order: in which unknowns are eliminated, see `sparse.Factor`.
+    order: in which unknowns are eliminated.
     """
-
-    order: str | np.ndarray = "natural"
 
     def __init__(
         self,
@@ -59,7 +57,7 @@ class Assembly:
         parts: AdditiveSchwarz | KeptFactor | None = None,
         quads: np.ndarray | None = None,
     ):
-        self.parts = parts
+        self.parts, self.order = parts, FillOrder()
         cells = [triangles] if quads is None or not len(quads) else [triangles, quads]
         # The diagonal, too: a vertex may follow another, and be in no cell.
         pairs = [_pairs(c, n) for c in cells]
@@ -123,7 +121,7 @@ def assembly_of(
     if symmetry is not None and n < LARGE:
         # The order of the mesh is no order of its half: folded, its separators are neighbours of both sides.
         vertices = minimum_degree(vertex_graph(place[faces.triangles], n))
-        assembly.order = (2 * vertices[:, None] + np.arange(2)).ravel()
+        assembly.order = FillOrder((2 * vertices[:, None] + np.arange(2)).ravel())
     return assembly
 
 

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from ..errors import PrecisionError
 from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.kept_factor import KeptFactor
-from ..linalg.sparse import Factor
+from ..linalg.sparse import FillOrder
 from ..maps.energy import Elements, energies, squared, target_error
 from ..maps.mirror_symmetry import MirrorSymmetry
 from .hessian_blocks import Assembly, hessian_blocks
@@ -218,13 +218,13 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
 
 
 def _solution(
-    matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | KeptFactor | None, w, axes, order
+    matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | KeptFactor | None, w, axes, order: FillOrder
 ) -> np.ndarray:
     """Solution x (n,) of matrix x = b, shifted where rounding makes it singular: the step is shorter, and goes down."""
     shift = SHIFT
     while True:
         try:
-            return Factor(matrix, order).solve(b) if parts is None else parts.solve(matrix, b, w, axes)
+            return order.factor(matrix).solve(b) if parts is None else parts.solve(matrix, b, w, axes)
         except PrecisionError:
             if shift > 1:
                 raise

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..linalg.nested_dissection import mesh_order
 from ..maps.energy import Elements, FaceDerivatives, elements, face_derivatives_of, squared
 from ..mesh.spherical_geometry import signed_volumes, spherical_areas
 from ..mesh.topology import vertices_around
@@ -139,7 +140,11 @@ def straighten_around(
     target = np.maximum(area, 1e-9 * np.median(area))
     inside = free[triangles].any(axis=1)
     vertices, small = np.unique(triangles[inside], return_inverse=True)
-    small = small.reshape(-1, 3)
+    # Newton eliminates unknowns as they come.
+    order = mesh_order(reference[vertices], small.reshape(-1, 3))
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    vertices, small = vertices[order], place[small.reshape(-1, 3)]
     faces = elements(reference[vertices], small, target[inside])
     assembly = Assembly(small, len(vertices))
     straight, _ = yield from untangle_on_sphere(faces, assembly, positions[vertices], ~free[vertices])

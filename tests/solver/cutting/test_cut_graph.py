@@ -42,6 +42,29 @@ def test_a_cut_opens_two_halfedges_for_every_edge():
     np.testing.assert_array_equal(np.sort(cut_boundary(component, np.zeros_like(cut))), np.sort(component.boundary))
 
 
+@pytest.mark.parametrize("mesh", [meshes.torus, meshes.annulus, lambda: meshes.icosphere(2)])
+def test_corners_are_one_vertex_where_a_walk_around_it_crosses_no_cut(mesh):
+    component = component_of(*mesh())
+    for share in (0.0, 0.1, 0.5, 1.0):
+        cut = np.random.default_rng(0).random(len(component.pair)) < share
+        flat = component.triangles.ravel()
+        label = np.arange(len(flat))
+        for _ in range(len(flat)):
+            before = label.copy()
+            for f, s in component.pair[~cut]:
+                for a, b in ((f, s), (f, _next(s)), (_next(f), s), (_next(f), _next(s))):
+                    if flat[a] == flat[b]:
+                        label[[a, b]] = label[[a, b]].min()
+            if (label == before).all():
+                break
+        _, expected = np.unique(label, return_inverse=True)
+        np.testing.assert_array_equal(cut_classes(component, cut).ravel(), expected)
+
+
+def _next(halfedge):
+    return halfedge + 1 - 3 * (halfedge % 3 == 2)
+
+
 def test_nothing_cut_leaves_the_vertices_as_they_are():
     component = component_of(*meshes.torus())
     classes = cut_classes(component, np.zeros(len(component.pair), bool))

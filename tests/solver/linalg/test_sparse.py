@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from omt_uv.solver.errors import PrecisionError
 from omt_uv.solver.linalg.sparse import (
     Factor,
+    FillOrder,
     conjugate_gradients,
     fill,
     minimum_degree,
@@ -37,6 +38,24 @@ def test_minimum_degree_is_a_permutation_with_less_fill_than_none():
     order = minimum_degree(A)
     assert np.array_equal(np.sort(order), np.arange(A.shape[0]))
     assert Factor(A, order)._lu.nnz < Factor(A, "natural")._lu.nnz
+
+
+def test_an_order_is_found_anew_once_vertices_far_from_each_other_meet():
+    V, F = meshes.head(24)
+    order = minimum_degree(cotangent_laplacian(V, F))
+    mesh = sp.kron(cotangent_laplacian(V, F)[order][:, order] + 0.1 * sp.identity(len(V)), np.ones((2, 2)), "csc")
+    plain = mesh + sp.identity(2 * len(V))
+    far = np.random.default_rng(0).integers(len(V), size=(60, 2))
+    forms = sp.csr_matrix((np.tile([1.0, -1.0], 60), (np.repeat(np.arange(60), 2), 2 * far.ravel())), (60, 2 * len(V)))
+    with_contacts, b = plain + forms.T @ forms, np.arange(2.0 * len(V))
+    orders = FillOrder()
+    entries = []
+    for matrix in (plain, plain, with_contacts, with_contacts, with_contacts):
+        factor = orders.factor(matrix)
+        np.testing.assert_allclose(matrix @ factor.solve(b), b, atol=1e-6)
+        entries.append(factor.entries)
+    assert entries[0] == entries[1] and entries[2] > 1.2 * entries[0]
+    assert entries[3] < entries[2] and entries[4] == entries[3]
 
 
 def test_fill_is_that_of_the_order_given():
