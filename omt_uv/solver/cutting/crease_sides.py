@@ -16,21 +16,23 @@ from ..maps.overlap import overlap_share
 from ..mesh.geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
-from ..mesh.topology import graph_components, pair_keys
+from ..mesh.topology import graph_components, pair_keys, paired
 from .component import SMOOTH, CutComponent, make_component
 from .cut_graph import cut_classes
-from .developable_nets import HARD, net
+from .developable_nets import BENT, HARD, MUCH, net
 from .gluing_facts import cost_factors, marked_triangles
 
 # Components with less than this share of the area stay whole: of thousands of pieces none is looked at.
 VISIBLE = 1e-3
 # A side unrolls but for little if it has no more curvature than this, in radians and summed without sign.
 ROUND = 1.0
+# A fold belongs to a bevel if its radius is at most that share of the side of a square with the area of the body.
+TIGHT = 0.05
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
 # whose sides meet at more than `HARD` along that share of their borders, has a hard surface: low ones of animals are
 # folded everywhere, into small sides and bluntly.
 LARGE = 0.03
-MOSTLY = 0.5
+MOSTLY = 0.7
 SHARP = 0.8
 # Sides stay together across an edge whose curvature, in radians and summed without sign, is no more than this, and
 # which is that share of the outline of the smaller one; laid flat, they cover no more than a share of themselves.
@@ -38,10 +40,14 @@ STRAIGHT = 0.1
 SHARED = 0.15
 COVERED = 2e-3
 SAMPLES = 2_000
+# Joined sides fill that share of a box, turned in so many ways, at least: a cross does, sprawling nets leave a texture
+# empty.
+FILLED = 0.4
+TURNS = 12
 # So many of the longest edges are tried.
 MOST_JOINED = 256
 # What does not close when it is laid flat, over its extent, does not unroll.
-GAP = 0.01
+GAP = 0.02
 # Sides of less than this share of the area stay with what they share most of their outline with.
 CRUMB = 3e-3
 
@@ -82,42 +88,62 @@ def hard_borders(
 def _has_clear_net(component: CutComponent) -> bool:
     unrolled = net(component)
     found = None if unrolled is None else unrolled.up_to(unrolled.most)
-    return found is not None and found.is_clear()
+    if found is None:
+        return False
+    # Corners of bevels do not lie flat, and what covers itself for that is little.
+    flat, corners, _ = _laid_out(component, found.cut, np.ones(len(component.triangles), dtype=bool))
+    return _covered(flat, corners) <= MUCH
 
 
 def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     """The side (m,) of every triangle of a component of a hard surface, and which sides (s,) bool unroll; None of any
     other."""
     fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
-    joined, count = component.pair // 3, len(component.triangles)
-    hard = (fold > SMOOTH) & np.isfinite(component.cost)
+    joined, count, length = component.pair // 3, len(component.triangles), component.length
+    tight = _tight(component, fold)
+    hard = ((fold > SMOOTH) | tight) & np.isfinite(component.cost)
     side = graph_components(joined[~hard, 0], joined[~hard, 1], count)[1]
     border = side[joined[:, 0]] != side[joined[:, 1]]
-    length = component.length
-    if not border.any() or length[border & (fold > HARD)].sum() < SHARP * length[border].sum():
+    if not border.any():
         return None
     area = np.bincount(side, face_areas(component.positions, component.triangles))
     unrolls = _inner_curvature(component, side, border, _curvature(component)) <= ROUND
-    if area[unrolls & (area >= LARGE * area.sum())].sum() < MOSTLY * area.sum():
+    large = area >= LARGE * area.sum()
+    # Bands of bevels lie between large sides; where these meet in a blunt fold, that is no bevel.
+    sharp = border & ((fold > HARD) | (tight & ~large[side[joined]].all(axis=1)))
+    if area[unrolls & large].sum() < MOSTLY * area.sum() or length[sharp].sum() < SHARP * length[border].sum():
         return None
-    return side, unrolls
+    pair, blunt = np.sort(side[joined[border]], axis=1), np.where(fold[border] <= HARD, length[border], 0.0)
+    group = _with_bands(pair, length[border], blunt, large)
+    anchored = np.bincount(group, large, len(area)) > 0
+    return group[side], np.where(anchored, np.bincount(group, unrolls & large, len(area)) > 0, unrolls)
 
 
-def _curvature(component: CutComponent) -> np.ndarray:
-    """Curvature (n,) of the vertices without sign, in radians, 0 on the boundary."""
-    angle = angles_from_lengths(halfedge_lengths(component.positions, component.triangles).reshape(-1, 3))
-    outer = component.on_boundary()
-    defects = np.abs(angle_defects(component.triangles, angle, np.flatnonzero(outer), component.vertex_count))
-    return np.where(outer, 0.0, defects)
+def _tight(component: CutComponent, fold: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool of bevels: with folds (e,) of a radius that is small for the body, however many they are."""
+    _, polygon = np.unique(component.polygons, return_inverse=True)
+    area = np.bincount(polygon.ravel(), face_areas(component.positions, component.triangles))
+    width = area[polygon.ravel()[component.pair // 3]].min(axis=1) / np.maximum(component.length, 1e-30)
+    return (fold > BENT) & (width < TIGHT * np.sqrt(area.sum()) * fold)
 
 
-def _inner_curvature(component: CutComponent, side: np.ndarray, border: np.ndarray, curvature) -> np.ndarray:
-    """What of the curvature (n,) lies within each side (s,), off the borders (e,) bool."""
-    of_vertex = np.zeros(component.vertex_count, np.int64)
-    of_vertex[component.triangles.ravel()] = np.repeat(side, 3)
-    inner = np.ones(component.vertex_count, dtype=bool)
-    inner[component.ends[border]] = False
-    return np.bincount(of_vertex[inner], curvature[inner], int(side.max()) + 1)
+def _with_bands(pair: np.ndarray, length: np.ndarray, blunt: np.ndarray, large: np.ndarray) -> np.ndarray:
+    """A number (s,) for every side, the same for a large one (s,) bool and the bands of bevels around it.
+
+    pair (e,2) : the sides at the borders, the smaller one first; length (e,), blunt (e,) : of these, and of what of
+    them is no hard edge
+    """
+    count = len(large)
+    outline, soft = (np.bincount(pair.ravel(), np.repeat(x, 2), count) for x in (length, blunt))
+    anchor = large | (soft < SHARP * outline)
+    keys, index = np.unique(pair_keys(*pair.T), return_inverse=True)
+    total, group, fixed = np.bincount(index.ravel(), blunt), np.arange(count), anchor.copy()
+    for one, other in paired(keys[np.argsort(-total, kind="stable")[: np.count_nonzero(total)]]):
+        one, other = group[one], group[other]
+        if one != other and not (fixed[one] and fixed[other]):
+            group[group == other] = one
+            fixed[one] |= fixed[other]
+    return group
 
 
 def side_borders(component: CutComponent, side: np.ndarray, unrolls: np.ndarray) -> np.ndarray:
@@ -125,7 +151,9 @@ def side_borders(component: CutComponent, side: np.ndarray, unrolls: np.ndarray)
     which they stay together."""
     joined = side[component.pair // 3]
     border = (joined[:, 0] != joined[:, 1]) & unrolls[joined].any(axis=1)
-    area = np.bincount(side, face_areas(component.positions, component.triangles))
+    if not border.any():
+        return border
+    area = np.bincount(side, face_areas(component.positions, component.triangles), len(unrolls))
     chain, pair, length, turned = _chains(component, side, border, _curvature(component))
     outline = np.bincount(pair.ravel(), np.repeat(length, 2), len(area))
     smaller = np.take_along_axis(pair, np.argmin(area[pair], axis=1)[:, None], axis=1)[:, 0]
@@ -144,6 +172,23 @@ def side_borders(component: CutComponent, side: np.ndarray, unrolls: np.ndarray)
         if one != other and min(total[one], total[other]) < CRUMB * area.sum():
             left, group = left & (chain != k), np.where(group == other, one, group)
     return left
+
+
+def _curvature(component: CutComponent) -> np.ndarray:
+    """Curvature (n,) of the vertices without sign, in radians, 0 on the boundary."""
+    angle = angles_from_lengths(halfedge_lengths(component.positions, component.triangles).reshape(-1, 3))
+    outer = component.on_boundary()
+    defects = np.abs(angle_defects(component.triangles, angle, np.flatnonzero(outer), component.vertex_count))
+    return np.where(outer, 0.0, defects)
+
+
+def _inner_curvature(component: CutComponent, side: np.ndarray, border: np.ndarray, curvature) -> np.ndarray:
+    """What of the curvature (n,) lies within each side (s,), off the borders (e,) bool."""
+    of_vertex = np.zeros(component.vertex_count, np.int64)
+    of_vertex[component.triangles.ravel()] = np.repeat(side, 3)
+    inner = np.ones(component.vertex_count, dtype=bool)
+    inner[component.ends[border]] = False
+    return np.bincount(of_vertex[inner], curvature[inner], int(side.max()) + 1)
 
 
 def _chains(component, side, border, curvature) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -170,12 +215,25 @@ def _chains(component, side, border, curvature) -> tuple[np.ndarray, np.ndarray,
 
 
 def _lies_flat(component: CutComponent, border: np.ndarray, rows: np.ndarray) -> bool:
-    """Whether triangles (m,) bool of a component that is open along borders (e,) bool unroll beside one another."""
+    """Whether triangles (m,) bool of a component that is open along borders (e,) bool unroll beside one another, and
+    fill a box well enough."""
+    flat, corners, gap = _laid_out(component, border, rows)
+    turned = flat * np.exp(1j * np.pi / 2 * np.arange(TURNS) / TURNS)[:, None]
+    boxes = np.ptp(turned.real, axis=1) * np.ptp(turned.imag, axis=1)
+    area = face_areas(component.positions, component.triangles[rows]).sum()
+    return gap <= GAP and area >= FILLED * boxes.min() and _covered(flat, corners) <= COVERED
+
+
+def _laid_out(component: CutComponent, border: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Places (k,) complex and corners (t,3) of triangles (m,) bool of a component that is open along borders (e,) bool,
+    laid flat, and how far these do not close, over their extent."""
     corners = cut_classes(component, border)[rows]
-    used, first, triangles = np.unique(corners, return_index=True, return_inverse=True)
-    positions = component.positions[component.triangles[rows].ravel()[first]]
-    triangles = triangles.reshape(-1, 3)
+    _, first, triangles = np.unique(corners, return_index=True, return_inverse=True)
+    positions, triangles = component.positions[component.triangles[rows].ravel()[first]], triangles.reshape(-1, 3)
     flat, gap = developed(positions, triangles)
-    if gap.max() > GAP * np.ptp(positions, axis=0).max():
-        return False
-    return overlap_share(np.stack([flat.real, flat.imag], axis=1)[triangles], samples=SAMPLES) <= COVERED
+    return flat, triangles, float(gap.max() / np.ptp(positions, axis=0).max())
+
+
+def _covered(flat: np.ndarray, corners: np.ndarray) -> float:
+    """Which share of themselves triangles (t,3) with places (k,) complex cover."""
+    return overlap_share(np.stack([flat.real, flat.imag], axis=1)[corners], samples=SAMPLES)

@@ -73,15 +73,11 @@ class Net:
         found = self.spread_out() if self.length <= length else self
         return found if found.length <= length else None
 
-    def is_clear(self) -> bool:
-        """Whether the component laid flat along it does not lie on itself."""
-        return not _covers_itself(self.component, self.cut)
-
     def spread_out(self) -> Net:
         """This net or, where the component laid flat along it lies on itself, the shortest of some others along which
         it does not."""
         component, cost = self.component, self.cost
-        if len(component.triangles) > MOST_TRIANGLES or self.is_clear():
+        if len(component.triangles) > MOST_TRIANGLES or not _covers_itself(component, self.cut):
             return self
         random = np.random.default_rng(0)
         varied = [cost * np.exp(VARIED * random.standard_normal(len(cost))) for _ in range(NETS)]

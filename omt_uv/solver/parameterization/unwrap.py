@@ -48,7 +48,7 @@ MAPPING = 0.7
 # A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
 # length or whatever it is, is cut across, in so many times as long pieces, at most so many.
 LONG_AND_NARROW = 1.8
-NARROW = 0.6
+NARROW = 1 / 3
 LONG = 3.0
 PIECE = 1.2
 MOST_PIECES = 12

@@ -6,7 +6,7 @@ import pytest
 from short_cuts import component_of
 
 from omt_uv.solver.cutting.crease_sides import hard_sides, side_borders
-from omt_uv.solver.mesh.surface import Surface
+from omt_uv.solver.mesh.surface import Surface, triangle_surface
 from omt_uv.solver.mesh.topology import graph_components
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -76,6 +76,48 @@ def test_flat_sides_stay_together_across_straight_edges():
     assert border.any()
     side = sides(component, border)
     assert 2 <= side.max() + 1 < 5
+
+
+def bevelled_cylinder(sectors=32):
+    """Caps as fans around their centres, walls, and bevels of three segments."""
+    arc = np.linspace(0, np.pi / 2, 4)
+    rise = np.column_stack([0.44 + 0.06 * np.sin(arc), 0.06 * (1 - np.cos(arc)) - 1])
+    r, z = np.concatenate([rise, (rise * [1, -1])[::-1]]).T
+    angle = 2 * np.pi * np.arange(sectors) / sectors
+    V = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle)), np.repeat(z[:, None], sectors, 1)], axis=2)
+    k = np.arange(sectors)
+    ring = np.concatenate([np.column_stack([k, np.roll(k, -1)]) + sectors * i for i in range(len(r) - 1)])
+    quads = np.column_stack([ring, ring[:, ::-1] + sectors])
+    n, top = len(r) * sectors, (len(r) - 1) * sectors
+    ends = [np.column_stack([np.roll(k, -1), k, np.full(sectors, n)])]
+    ends += [np.column_stack([k + top, np.roll(k, -1) + top, np.full(sectors, n + 1)])]
+    return np.concatenate([V.reshape(-1, 3), [[0, 0, -1], [0, 0, 1]]]), np.concatenate([triangles_of(quads), *ends])
+
+
+def test_bands_of_bevels_go_with_the_sides_beside_them():
+    V, F = bevelled_cylinder()
+    component = component_of(V, F)
+    side = sides(component, borders(component))
+    assert side.max() + 1 == 3
+    middle = component.positions[component.triangles].mean(axis=1)
+    for k in range(3):
+        # Caps keep to the ends, the wall to what is between.
+        height = np.abs(middle[side == k, 2])
+        assert height.min() > 0.9 or height.max() < 0.999
+    found = drain(unwrap(triangle_surface(V, F), options=UnwrapOptions(max_shear=1.35)))
+    assert all(m.angle_mean < 1.05 and m.folds == 0 for m in found.maps)
+
+
+def test_the_number_of_segments_of_an_arc_does_not_make_it_a_bevel():
+    angle = np.linspace(0, 1.5 * np.pi, 20)
+    coarse = np.concatenate([[[0.0, 0.0]], np.column_stack([np.cos(angle), np.sin(angle)])])
+    angle = np.linspace(0, 1.5 * np.pi, 200)
+    fine = np.concatenate([[[0.0, 0.0]], np.column_stack([np.cos(angle), np.sin(angle)])])
+    counts = []
+    for outline in (coarse, fine):
+        component = component_of(*prism(outline, 0.3))
+        counts.append(int(hard_sides(component)[0].max()) + 1)
+    assert counts[0] == counts[1] == 5
 
 
 @pytest.mark.parametrize(
