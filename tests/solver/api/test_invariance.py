@@ -7,70 +7,12 @@ from __future__ import annotations
 
 import functools
 from itertools import product
-from typing import NamedTuple
 
-import meshes
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from told_otherwise import WAYS, Told, body, other_faces_first, patch, ramp
 
 from omt_uv import solver as omt
-
-
-class Told(NamedTuple):
-    """A mesh (n,3), (m,4) told in one way, and what there is to undo: its size, the faces (m,) it began with in its
-    order, and by how much their corners have been rolled."""
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    size: float = 1.0
-    order: np.ndarray | slice = slice(None)
-    rolled: int = 0
-
-
-def plain(V, F):
-    return Told(V, F)
-
-
-def moved(V, F):
-    return Told(V + [3.0, -7.0, 11.0], F)
-
-
-def enlarged(V, F):
-    return Told(1000.0 * V, F, 1000.0)
-
-
-def made_small(V, F):
-    return Told(V / 4096, F, 1 / 4096)
-
-
-def turned(V, F):
-    return Told(Rotation.from_rotvec([0.3, -1.1, 0.6]).apply(V), F)
-
-
-def other_faces_first(V, F):
-    order = np.random.default_rng(1).permutation(len(F))
-    return Told(V, F[order], order=order)
-
-
-def other_vertices_first(V, F):
-    new = np.random.default_rng(2).permutation(len(V))
-    other = np.empty_like(V)
-    other[new] = V
-    return Told(other, new[F])
-
-
-def other_corners_first(V, F):
-    return Told(V, np.roll(F, 1, axis=1), rolled=1)
-
-
-WAYS = (moved, enlarged, made_small, turned, other_faces_first, other_vertices_first, other_corners_first)
-
-
-def ramp(V, F, low, high):
-    """Numbers (m,) of faces that rise along the mesh, whatever it is told by."""
-    along = np.linalg.norm(V[F].mean(axis=1) - V[F].mean(axis=(0, 1)), axis=1)
-    return low + (high - low) * (along - along.min()) / np.ptp(along)
 
 
 def near_middle(V, F):
@@ -102,14 +44,6 @@ ENTRIES = {
 }
 
 
-def patch(count=7):
-    """A curved patch of quads (m,4) without any symmetry."""
-    x, y = np.meshgrid(np.linspace(0, 1.3, count + 1), np.linspace(0, 1, count + 1))
-    V = np.column_stack([x.ravel(), y.ravel(), (0.5 * np.sin(2.2 * x + 0.4) * np.cos(1.7 * y) + 0.1 * x * x).ravel()])
-    corner = ((count + 1) * np.arange(count)[:, None] + np.arange(count)).ravel()
-    return V, np.column_stack([corner, corner + 1, corner + count + 2, corner + count + 1])
-
-
 def lengths(uv):
     """Lengths (m,k,k) between the corners of faces (m,k,d)."""
     return np.linalg.norm(uv[:, :, None] - uv[:, None], axis=3)
@@ -135,13 +69,6 @@ def test_maps_are_those_of_the_same_mesh_told_otherwise(name, way):
     told, expected = way(*patch()), as_it_is(name, patch)
     off = np.abs(lengths(as_before(ENTRIES[name](told.vertices, told.faces), told)) / told.size - expected)
     assert off.max() <= 1e-5 * expected.mean()
-
-
-def body():
-    """A closed body of triangles (m,3) without any symmetry."""
-    V, F = meshes.icosphere(2)
-    x, y, z = V.T
-    return V * (1 + 0.2 * np.sin(2 * x + 0.5) + 0.15 * np.cos(3 * y + z) + 0.1 * z)[:, None] * [1.3, 1.0, 0.8], F
 
 
 CLOSED = {
