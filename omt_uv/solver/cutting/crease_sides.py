@@ -1,4 +1,4 @@
-"""Take bodies of flat and developable sides apart along their creases, where no net of them is short enough.
+"""Take bodies of flat and developable sides apart along their creases, where no net of them lies beside itself.
 
 A casting or a machined part bends along hard edges that are curved: a flat side beside a round one. Joined along such
 an edge, neither can be laid flat. Sides come apart there; across straight edges they stay together, as a net does.
@@ -61,8 +61,8 @@ def hard_borders(
 ) -> np.ndarray:
     """Pairs (p,) bool of a gluing, without those that are gone (p,) bool, along which bodies of hard sides come apart.
 
-    Bodies with a net that is short enough, and those that are not searched, stay whole; positions (n,3) in a unit box,
-    wants: see `cuts.SeamFinder`
+    Bodies with a net that is short enough and lies beside itself, and those that are not searched, stay whole;
+    positions (n,3) in a unit box, wants: see `cuts.SeamFinder`
     """
     left, number, found = gluing.without(gone), np.flatnonzero(~gone), np.zeros(len(gone), dtype=bool)
     component_of, classes = components(left), corner_classes(left)
@@ -171,7 +171,16 @@ def side_borders(component: CutComponent, side: np.ndarray, unrolls: np.ndarray)
         total = np.bincount(group, area, len(area))
         if one != other and min(total[one], total[other]) < CRUMB * area.sum():
             left, group = left & (chain != k), np.where(group == other, one, group)
-    return left
+    return left & ~lone_edges(component, left)
+
+
+def lone_edges(component: CutComponent, cut: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool of a cut (e,) bool that touch no other of it, nor the boundary: these open nothing."""
+    ends = component.ends[cut]
+    label = graph_components(ends[:, 0], ends[:, 1], component.vertex_count)[1][ends[:, 0]]
+    lone = np.zeros(len(cut), dtype=bool)
+    lone[cut] = (np.bincount(label)[label] == 1) & ~component.on_boundary()[ends].any(axis=1)
+    return lone
 
 
 def _curvature(component: CutComponent) -> np.ndarray:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from short_cuts import component_of
 
-from omt_uv.solver.cutting.crease_sides import hard_sides, side_borders
+from omt_uv.solver.cutting.crease_sides import hard_sides, lone_edges, side_borders
 from omt_uv.solver.mesh.surface import Surface, triangle_surface
 from omt_uv.solver.mesh.topology import graph_components
 from omt_uv.solver.parameterization.options import UnwrapOptions
@@ -125,6 +125,16 @@ def test_the_number_of_segments_of_an_arc_does_not_make_it_a_bevel():
 )
 def test_what_is_round_all_over_stays_whole(mesh):
     assert hard_sides(component_of(*mesh)) is None
+
+
+def test_an_edge_that_touches_no_other_of_a_cut_is_told():
+    component = component_of(*meshes.grid(8, 8))
+    middle = 8 * component.positions[component.ends].mean(axis=1)[:, :2]
+    # One alone, two that meet, and one from the boundary.
+    alone, *others = (np.argmin(np.abs(middle - at).sum(axis=1)) for at in ((2.5, 2), (5.5, 5), (6.5, 5), (0.5, 6)))
+    cut = np.zeros(len(component.pair), dtype=bool)
+    cut[[alone, *others]] = True
+    assert cut.sum() == 4 and np.flatnonzero(lone_edges(component, cut)).tolist() == [alone]
 
 
 def test_place_size_and_order_do_not_matter():
