@@ -73,7 +73,7 @@ def clicks_table(args) -> Table:
             steep=steep > STEEP_GOAL,
             areas=figures.area_l1 > AREA_GOAL,
             folds=figures.folds > 0,
-            overlap=figures.overlap > 0,
+            overlap=bool(figures.overlap),
             time=seconds > TIME_GOAL * plain,
         )
         table.add(**row, **goals)
