@@ -69,6 +69,8 @@ def drawn(cls):
 def test_what_panels_draw_in_which_state_is_that_of_the_table(package, monkeypatch):
     # Libraries that somebody has not installed are asked for in the panel.
     monkeypatch.setattr(package("panels.volumes"), "missing", lambda _: "")
+    # Tests before may have left a queue, and which these are changes from run to run.
+    monkeypatch.setattr(package("session.queue"), "state", None)
     found: dict[tuple[str, str], list[str]] = {}
     for name, make in STATES.items():
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
