@@ -60,7 +60,7 @@ def view_of(name):
     return renders.VIEWS.get(name, renders.View())
 
 
-def draw(name, maps, rows, scratch, pixels):
+def draw(name, maps, rows, scratch, pixels, cells=CELLS):
     """Pictures of the rows by method, as `plates.plate` takes them: (title, paths, captions, scale) for every row."""
     view = view_of(name)
     views = {"front": view, "back": replace(view, azimuth=view.azimuth + 180)}
@@ -74,13 +74,23 @@ def draw(name, maps, rows, scratch, pixels):
                 rgb = plates.lit(found.V, found.F, plates.shear_colours(rival_maps.shear_of(found)))
                 plates.layout(found.uv, rgb, path, pixels, rival_maps.outline(found))
             else:
-                uv = textures.equal_density(found.V, found.F, found.uv, CELLS)
+                uv = textures.equal_density(found.V, found.F, found.uv, cells)
                 renders.render_cut(replace(found, uv=uv), views[row], path, texture, pixels)
         captions = figures if row == rows[-1] else [""] * len(paths)
         scale = plates.SHEAR_SCALE if row == "layout" else None
         title = name if row == rows[0] else row
         drawn.append((title.removeprefix("optcuts_").replace("_", " "), paths, captions, scale))
     return drawn
+
+
+def draw_bodies(path, columns, maps, views, cells, pixels):
+    """Write a plate of bodies that are no models: a row of checkers and one of layouts for each, maps by name and
+    column, and views by name; cells : of the checker, on a body."""
+    renders.VIEWS.update(views)
+    with tempfile.TemporaryDirectory() as scratch:
+        rows = [r for name in maps for r in draw(name, maps[name], ("front", "layout"), Path(scratch), pixels, cells)]
+        plates.plate(path, columns, rows)
+    print(f"{path} {path.stat().st_size // 1000} kB")
 
 
 def main():

@@ -8,7 +8,6 @@ A torus, suzanne and a sphere with seams marked by hand, the same for all three 
 from __future__ import annotations
 
 import sys
-import tempfile
 from pathlib import Path
 
 import bpy
@@ -19,7 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import compare
-import plates
 import renders
 import rival_maps
 
@@ -88,12 +86,8 @@ def maps_of(name):
 def main():
     """Map, draw, and write the plate."""
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/pictures/quads.png"
-    compare.CELLS = CELLS
-    renders.VIEWS.update(VIEWS)
-    with tempfile.TemporaryDirectory() as scratch:
-        rows = [r for n in BODIES for r in compare.draw(n, maps_of(n), ("front", "layout"), Path(scratch), PIXELS)]
-        plates.plate(path, COLUMNS, rows)
-    print(f"{path} {path.stat().st_size // 1000} kB")
+    maps = {name: maps_of(name) for name in BODIES}
+    compare.draw_bodies(path, COLUMNS, maps, VIEWS, CELLS, PIXELS)
 
 
 if __name__ == "__main__":

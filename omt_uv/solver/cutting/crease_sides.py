@@ -13,13 +13,13 @@ import numpy as np
 from ..analysis.feature_edges import fold_angles
 from ..maps.development import developed
 from ..maps.overlap import overlap_share
-from ..mesh.geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
+from ..mesh.geometry import face_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, pair_keys, paired
 from .component import SMOOTH, CutComponent, make_component
 from .cut_graph import cut_classes
-from .developable_nets import BENT, HARD, MUCH, net
+from .developable_nets import BENT, HARD, MUCH, defects, net
 from .gluing_facts import cost_factors, marked_triangles
 
 # Components with less than this share of the area stay whole: of thousands of pieces none is looked at.
@@ -107,7 +107,7 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     if not border.any():
         return None
     area = np.bincount(side, face_areas(component.positions, component.triangles))
-    unrolls = _inner_curvature(component, side, border, _curvature(component)) <= ROUND
+    unrolls = _inner_curvature(component, side, border, np.abs(defects(component))) <= ROUND
     large = area >= LARGE * area.sum()
     # Bands of bevels lie between large sides; where these meet in a blunt fold, that is no bevel.
     sharp = border & ((fold > HARD) | (tight & ~large[side[joined]].all(axis=1)))
@@ -154,7 +154,7 @@ def side_borders(component: CutComponent, side: np.ndarray, unrolls: np.ndarray)
     if not border.any():
         return border
     area = np.bincount(side, face_areas(component.positions, component.triangles), len(unrolls))
-    chain, pair, length, turned = _chains(component, side, border, _curvature(component))
+    chain, pair, length, turned = _chains(component, side, border, np.abs(defects(component)))
     outline = np.bincount(pair.ravel(), np.repeat(length, 2), len(area))
     smaller = np.take_along_axis(pair, np.argmin(area[pair], axis=1)[:, None], axis=1)[:, 0]
     fits = unrolls[pair].all(axis=1) & (turned <= STRAIGHT) & (length >= SHARED * outline[smaller])
@@ -181,14 +181,6 @@ def lone_edges(component: CutComponent, cut: np.ndarray) -> np.ndarray:
     lone = np.zeros(len(cut), dtype=bool)
     lone[cut] = (np.bincount(label)[label] == 1) & ~component.on_boundary()[ends].any(axis=1)
     return lone
-
-
-def _curvature(component: CutComponent) -> np.ndarray:
-    """Curvature (n,) of the vertices without sign, in radians, 0 on the boundary."""
-    angle = angles_from_lengths(halfedge_lengths(component.positions, component.triangles).reshape(-1, 3))
-    outer = component.on_boundary()
-    defects = np.abs(angle_defects(component.triangles, angle, np.flatnonzero(outer), component.vertex_count))
-    return np.where(outer, 0.0, defects)
 
 
 def _inner_curvature(component: CutComponent, side: np.ndarray, border: np.ndarray, curvature) -> np.ndarray:

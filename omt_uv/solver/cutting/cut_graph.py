@@ -168,6 +168,18 @@ def cut_boundary(component: CutComponent, cut: np.ndarray) -> np.ndarray:
     return np.concatenate([component.boundary, component.pair[cut].ravel()])
 
 
+def is_disk(component: CutComponent, cut: np.ndarray) -> bool:
+    """Whether the component, open along the cut (e,) bool, is a disk."""
+    corners = cut_classes(component, cut)
+    border = cut_boundary(component, cut)
+    tail, head = (ends[border] for ends in halfedges(corners))
+    used, ends = np.unique(np.stack([tail, head]), return_inverse=True)
+    one, other = ends.reshape(2, -1)
+    loops = graph_components(one, other, len(used))[0]
+    edges = (3 * len(corners) + len(border)) // 2
+    return loops == 1 and int(corners.max()) + 1 - edges + len(corners) == 1
+
+
 def _shortest_bridge(component: CutComponent, cut: np.ndarray, tips: np.ndarray) -> np.ndarray | None:
     """Edges of the shortest path between the two boundaries of the component cut open along `cut`; None if not two."""
     classes = cut_classes(component, cut)

@@ -91,8 +91,8 @@ def net(component: CutComponent) -> Net | None:
 
     None if it has none, or if seams would pass through vertices to be kept free of them.
     """
-    defects = _defects(component)
-    curvature = np.abs(defects)
+    signed = defects(component)
+    curvature = np.abs(signed)
     fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
     folded = fold > HARD
     hard = np.zeros(component.vertex_count, dtype=bool)
@@ -101,7 +101,7 @@ def net(component: CutComponent) -> Net | None:
     corner = (hard & (curvature > _flat(curvature[hard]))) | spike
     tips = np.flatnonzero(corner)
     if spike.sum() > MOST_SPIKES or curvature[~corner].sum() > MOST_LEFT:
-        found = rounded_corners(component, defects, face_areas(component.positions, component.triangles))
+        found = rounded_corners(component, signed, face_areas(component.positions, component.triangles))
         folded = fold > BENT
         tips = np.zeros(0, np.int64) if found is None else found
     # A closed surface needs a cut of two edges at least.
@@ -125,14 +125,14 @@ def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:
     return overlap_share(uv[corners], samples=FEW) > MUCH or overlap_share(uv[corners], samples=SAMPLES) > COVERED
 
 
-def _defects(component: CutComponent) -> np.ndarray:
+def defects(component: CutComponent) -> np.ndarray:
     """Curvature (n,) of the vertices, in radians, 0 on the boundary."""
     length = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
     on_boundary = component.on_boundary()
-    defects = angle_defects(
+    signed = angle_defects(
         component.triangles, angles_from_lengths(length), np.flatnonzero(on_boundary), component.vertex_count
     )
-    return np.where(on_boundary, 0.0, defects)
+    return np.where(on_boundary, 0.0, signed)
 
 
 def _flat(curvature: np.ndarray) -> float:

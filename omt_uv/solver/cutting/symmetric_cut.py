@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..mesh.mirror import find_mirror
 from ..mesh.topology import graph_components, halfedges, pair_keys
 from .component import CutComponent
-from .cut_graph import MOST_STRETCHES, SWEEPS, cut_boundary, cut_classes, stretches
+from .cut_graph import MOST_STRETCHES, SWEEPS, is_disk, stretches
 from .protrusions import edge_distance, log_scale, peak, spread
 
 # Parts of the line that are tried uncut, at most.
@@ -185,15 +185,7 @@ class SymmetricHalf:
 
     def opens(self, chosen: np.ndarray) -> bool:
         """Whether the component, open along the edges chosen (k,) bool, is a disk."""
-        cut = self.whole(chosen)
-        corners = cut_classes(self.component, cut)
-        border = cut_boundary(self.component, cut)
-        tail, head = (ends[border] for ends in halfedges(corners))
-        used, ends = np.unique(np.stack([tail, head]), return_inverse=True)
-        one, other = ends.reshape(2, -1)
-        loops = graph_components(one, other, len(used))[0]
-        edges = (3 * len(corners) + len(border)) // 2
-        return loops == 1 and int(corners.max()) + 1 - edges + len(corners) == 1
+        return is_disk(self.component, self.whole(chosen))
 
 
 def _backwards(before: np.ndarray, vertex: int) -> Iterator[int]:

@@ -13,8 +13,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..cutting.component import CutComponent, boundary_vertices
-from ..cutting.cut_graph import cut_boundary, cut_classes
-from ..mesh.topology import graph_components, halfedges, pair_keys
+from ..cutting.cut_graph import is_disk
+from ..mesh.topology import pair_keys
 from .fine_paths import FineGraph, FineMirror
 from .path_graph import path_to
 
@@ -64,19 +64,7 @@ def symmetric_base(component: CutComponent, mirror: FineMirror) -> np.ndarray | 
     keys = [pair_keys(path[:-1], path[1:]) for path in paths]
     cut = np.isin(pair_keys(*component.ends.T), np.concatenate([np.zeros(0, np.int64), *keys]))
     # Where the mesh is not quite its own image, an arc may meet another one's image.
-    return cut if _is_disk(component, cut) else None
-
-
-def _is_disk(component: CutComponent, cut: np.ndarray) -> bool:
-    """Whether the component, open along the cut (e,) bool, is a disk."""
-    corners = cut_classes(component, cut)
-    border = cut_boundary(component, cut)
-    tail, head = (ends[border] for ends in halfedges(corners))
-    used, ends = np.unique(np.stack([tail, head]), return_inverse=True)
-    one, other = ends.reshape(2, -1)
-    loops = graph_components(one, other, len(used))[0]
-    edges = (3 * len(corners) + len(border)) // 2
-    return loops == 1 and int(corners.max()) + 1 - edges + len(corners) == 1
+    return cut if is_disk(component, cut) else None
 
 
 def _ways(mirror: FineMirror, joined: np.ndarray, target: np.ndarray, crossing: np.ndarray) -> list[_ArcPlace]:
