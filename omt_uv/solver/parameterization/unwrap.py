@@ -23,7 +23,7 @@ from ..mesh.geometry import face_areas
 from ..mesh.surface import Surface
 from ..mesh.topology import on_boundary, pair_keys
 from ..progress import Progress, Steps, part_of
-from ..refinement.continuation_rules import QUALITIES
+from ..refinement.continuation_rules import PROMISED, QUALITIES
 from ..refinement.initial_maps import NEARLY_FLAT, inner_curvature
 from .chart_indices import chart_target, cut_as_given, in_order_of_places, located
 from .chart_map import ChartMap, map_chart, measured_map, refined_again
@@ -397,7 +397,7 @@ class _Task:
                 as_it_was = replace(cut, joined=charts, targets=targets, pairs=pairs, maps={})
                 return (yield from self.map_all(as_it_was))
             alone = k not in cut.pairs and all(k != partner for partner, _ in cut.pairs.values())
-            if alone and self.options.quality == "standard" and found.area_l1 > goal:
+            if alone and self.options.quality == "standard" and found.area_l1 > max(goal, PROMISED):
                 found = yield from self.map_closer(charts[k], cut.joined[k], cut.targets[k], maps[k], found)
             maps[k] = found
         return maps
