@@ -26,8 +26,10 @@ OPPOSITE = -0.5
 PITCH = 0.7
 # Points on the faces at most, for memory.
 MOST_SAMPLES = 600_000
-# Edges that a walk crosses at most.
+# Edges that a walk crosses at most,
 WALK_ROUNDS = 20
+# from where the coordinate of the corner that is opposite is no greater than this.
+ON_EDGE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -45,48 +47,45 @@ def closest_on_triangles(q: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndar
     By regions of the triangle's plane (Ericson 2005, section 5.1.5).
     """
     ab, ac, ap = (np.moveaxis(x, -1, 0) for x in np.broadcast_arrays(b - a, c - a, q - a))
-    v, w = _in_frame(_product(ab, ap), _product(ac, ap), _product(ab, ab), _product(ab, ac), _product(ac, ac))
+    v, w = _in_frame(_product(ab, ap), _product(ac, ap), *_frame(ab, ac))
     return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1)
 
 
-def _in_frame(d1: np.ndarray, d2: np.ndarray, e: np.ndarray, f: np.ndarray, g: np.ndarray):
+def _frame(ab: np.ndarray, ac: np.ndarray) -> np.ndarray:
+    """Products (6, ...) of the sides ab, ac (3, ...): of ab with itself, with ac, of ac with itself, and these three
+    over the square of twice the area, 0 where there is none."""
+    products = np.stack([_product(ab, ab), _product(ab, ac), _product(ac, ac)])
+    square = products[0] * products[2] - products[1] ** 2
+    over = np.zeros_like(square)
+    np.divide(1.0, square, out=over, where=square > 0)
+    return np.concatenate([products, products * over])
+
+
+def _in_frame(d1, d2, e, f, g, e1, f1, g1) -> tuple[np.ndarray, np.ndarray]:
     """Second and third coordinate of the closest points, from the products of the sides ab, ac with the way to the
-    point, and of ab with itself, with ac, and of ac with itself."""
-    va, vb, vc = _scaled_coordinates(d1, d2, e, f, g)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        total = va + vb + vc
-        v, w = vb / total, vc / total
-    beside = ~((va > 0) & (vb > 0) & (vc > 0))
+    point, and their `_frame`."""
+    v, w = g1 * d1 - f1 * d2, e1 * d2 - f1 * d1
+    # So is what is no number.
+    beside = np.nonzero(~((v > 0) & (w > 0) & (v + w < 1)))
     v[beside], w[beside] = _on_triangle_boundary(d1[beside], d2[beside], e[beside], f[beside], g[beside])
     return v, w
 
 
-def _scaled_coordinates(d1, d2, e, f, g):
-    """Barycentric coordinates of the nearest point of the plane, times the square of twice the area."""
-    d3, d4, d5, d6 = d1 - e, d2 - f, d1 - f, d2 - g
-    return d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-
-
-def _on_triangle_boundary(d1, d2, e, f, g):
-    """As `_in_frame`, for points whose nearest point of the plane is outside of the triangle."""
-    va, vb, vc = _scaled_coordinates(d1, d2, e, f, g)
-    d3, d4, d5, d6 = d1 - e, d2 - f, d1 - f, d2 - g
-    with np.errstate(divide="ignore", invalid="ignore"):
-        on_bc = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        on_ac, on_ab = d2 / g, d1 / e
-    # Later rules overrule earlier ones: edges the inside, corners the edges.
-    v, w = np.full(d1.shape, np.nan), np.full(d1.shape, np.nan)
-    for rule, second, third in (
-        ((va <= 0) & (d4 >= d3) & (d5 >= d6), 1 - on_bc, on_bc),
-        ((vb <= 0) & (d2 >= 0) & (d6 <= 0), 0.0, on_ac),
-        ((vc <= 0) & (d1 >= 0) & (d3 <= 0), on_ab, 0.0),
-        ((d6 >= 0) & (d5 <= d6), 0.0, 1.0),
-        ((d3 >= 0) & (d4 <= d3), 1.0, 0.0),
-        ((d1 <= 0) & (d2 <= 0), 0.0, 0.0),
-    ):
-        v, w = np.where(rule, second, v), np.where(rule, third, w)
-    # No number, as in a triangle without area, is 0.
-    return np.fmin(np.fmax(v, 0), 1), np.fmin(np.fmax(w, 0), 1)
+def _on_triangle_boundary(d1, d2, e, f, g) -> tuple[np.ndarray, np.ndarray]:
+    """As `_in_frame`, on the nearest of the sides: for points whose nearest point of the plane is outside of the
+    triangle."""
+    tiny = np.finfo(float).tiny
+    on_ab, on_ac = d1 / np.maximum(e, tiny), d2 / np.maximum(g, tiny)
+    on_bc = (d2 - d1 + e - f) / np.maximum(e + g - 2 * f, tiny)
+    # No number, as in a triangle whose squares overflow, is 0.
+    on_ab, on_ac, on_bc = (np.fmin(np.fmax(x, 0.0), 1.0) for x in (on_ab, on_ac, on_bc))
+    # Squared distances, less that from the first corner.
+    from_ab, from_ac = on_ab * (on_ab * e - 2 * d1), on_ac * (on_ac * g - 2 * d2)
+    left = 1 - on_bc
+    from_bc = left * (left * e - 2 * d1 + 2 * on_bc * f) + on_bc * (on_bc * g - 2 * d2)
+    by_ab, by_bc = from_ab <= from_ac, from_bc < np.minimum(from_ab, from_ac)
+    v, w = np.where(by_ab, on_ab, 0.0), np.where(by_ab, 0.0, on_ac)
+    return np.where(by_bc, left, v), np.where(by_bc, on_bc, w)
 
 
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -102,14 +101,16 @@ def _square(a: np.ndarray) -> np.ndarray:
 class ClosestPoint:
     """Closest points on a mesh (n,3), (m,3); queries are expected about `spacing` apart."""
 
-    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, spacing: float):
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, spacing: float, twin: np.ndarray | None = None):
+        """With the `twins` (3m,) of the triangles where they are known."""
         self.vertices, self.triangles = vertices, triangles
         self.normals = face_normals(vertices, triangles)
         a, b, c = (vertices.T.take(corner, axis=1) for corner in triangles.T)
         self._a, self._ab, self._ac = a, b - a, c - a
-        ab, ac = self._ab, self._ac
-        self._products = np.stack([_product(ab, ab), _product(ab, ac), _product(ac, ac)])
-        self.neighbour = np.where((t := twins(triangles)) >= 0, t // 3, -1).reshape(-1, 3)
+        self._frames = _frame(self._ab, self._ac)
+        twin = twins(triangles) if twin is None else twin
+        # Opposite to corner k is the edge from corner k + 1, where the coordinate k is zero.
+        self.opposite = np.where(twin >= 0, twin // 3, -1).reshape(-1, 3).take((1, 2, 0), axis=1)
         # A normal to the opposite side counts as far as one spacing.
         self.normal_scale = 0.5 * spacing
         self.spacing = spacing
@@ -171,22 +172,21 @@ class ClosestPoint:
         """From starting faces (k,) across edges for as long as that brings nearer to the points (k,3)."""
         faces = faces.copy()
         barycentric, distance = self.distance(points, faces)
-        active = np.arange(len(points))
+        active = np.flatnonzero((barycentric <= ON_EDGE).any(axis=1))
         for _ in range(WALK_ROUNDS):
-            # The edge from corner k to k + 1 is where the coordinate k + 2 is zero.
-            beyond = self.neighbour.take(faces[active], axis=0)
-            row, side = np.nonzero((barycentric[active][:, [2, 0, 1]] <= 1e-12) & (beyond >= 0))
+            beyond = self.opposite.take(faces[active], axis=0)
+            row, corner = np.nonzero((barycentric.take(active, axis=0) <= ON_EDGE) & (beyond >= 0))
             if len(row) == 0:
                 break
-            found = np.full(beyond.shape, -1)
-            found[row, side] = np.arange(len(row))
-            face = beyond[row, side]
-            b, d = self.distance(points.take(active[row], axis=0), face)
-            nearest = np.append(d, np.inf)[found].argmin(axis=1)
-            best = found[np.arange(len(found)), nearest]
-            better = (best >= 0) & (d[best] < distance[active] * (1 - 1e-12))
-            active, best = active[better], best[better]
-            faces[active], barycentric[active], distance[active] = face[best], b[best], d[best]
+            face, mine = beyond[row, corner], active[row]
+            b, d = self.distance(points.take(mine, axis=0), face)
+            nearer = np.flatnonzero(d < distance[mine] * (1 - 1e-12))
+            mine = mine[nearer]
+            active = mine[np.flatnonzero(np.diff(mine, prepend=-1))]
+            # Where two are nearer, that which comes last is kept.
+            last = np.argsort(-d[nearer], kind="stable")
+            mine, nearer = mine[last], nearer[last]
+            faces[mine], barycentric[mine], distance[mine] = face[nearer], b[nearer], d[nearer]
         return SurfacePoints(self.at(faces, barycentric), faces, barycentric)
 
     def at(self, faces: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
@@ -201,7 +201,7 @@ class ClosestPoint:
         p = points.T if faces.ndim == 1 else points.T[:, :, None]
         ab, ac = self._ab.take(faces, axis=1), self._ac.take(faces, axis=1)
         ap = p - self._a.take(faces, axis=1)
-        v, w = _in_frame(_product(ab, ap), _product(ac, ap), *self._products.take(faces, axis=1))
+        v, w = _in_frame(_product(ab, ap), _product(ac, ap), *self._frames.take(faces, axis=1))
         off = ap - v * ab - w * ac
         return np.stack([np.maximum(1 - v - w, 0), v, w], axis=-1), _product(off, off)
 

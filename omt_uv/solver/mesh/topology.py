@@ -7,16 +7,18 @@ has twin -1 and is walked with the surface on its left.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 # Nodes of graphs whose components are found without a sparse matrix.
 FEW_NODES = 2000
+# Pairs up to which it takes longer to count than to compare them.
+FEW_PAIRS = 8000
 
 
 def halfedges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tail and head vertex of every halfedge, (3m,) each, of triangles (m,3)."""
-    return triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    return triangles.ravel(), triangles.take((1, 2, 0), axis=1).ravel()
 
 
 def pair_keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -42,15 +44,33 @@ def row_labels(rows: np.ndarray) -> np.ndarray:
     return np.unique(keys, return_inverse=True)[1].ravel()
 
 
+def order_of_pairs(keys: np.ndarray) -> np.ndarray:
+    """The stable ascending order (k,) of keys (k,) of `pair_keys`; by counting, in linear time, where they are many."""
+    if len(keys) > FEW_PAIRS:
+        larger = (keys & 0xFFFFFFFF).astype(np.int32)
+        most = int(larger.max())
+        if most < 2 * len(keys):
+            order = _counted(larger, most)
+            return order[_counted((keys >> 32).astype(np.int32)[order], most)].astype(np.int64)
+    return np.argsort(keys, kind="stable")
+
+
+def _counted(values: np.ndarray, most: int) -> np.ndarray:
+    """The stable order (k,) of int32 values (k,) from 0 to `most`: a matrix of one a row is transposed by counting."""
+    k = len(values)
+    rows = csr_matrix((np.zeros(k, np.int8), values, np.arange(k + 1, dtype=np.int32)), shape=(k, most + 1))
+    return rows.tocsc().indices
+
+
 def pair_up(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions of the two members of every key (k,) that occurs exactly twice, (p,) and (p,)."""
-    order = np.argsort(keys)
+    order = order_of_pairs(keys)
     ordered = keys[order]
-    start = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
-    count = np.diff(np.r_[start, len(ordered)])
-    twice = start[count == 2]
-    # Whichever comes first in the order, which differs between processors, is not first here.
-    return np.minimum(order[twice], order[twice + 1]), np.maximum(order[twice], order[twice + 1])
+    alike = np.zeros(len(keys) + 1, dtype=bool)
+    np.equal(ordered[1:], ordered[:-1], out=alike[1:-1])
+    twice = np.flatnonzero(alike[1:-1] & ~alike[:-2] & ~alike[2:])
+    # The order is a stable one: whichever comes first does so on every processor.
+    return order[twice], order[twice + 1]
 
 
 def twins(triangles: np.ndarray) -> np.ndarray:

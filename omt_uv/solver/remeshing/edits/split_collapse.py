@@ -36,9 +36,12 @@ class Edit:
     new_number: np.ndarray
 
 
-def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray) -> Edit:
-    """Put a vertex in the middle of the edges of halfedges h (k,), no two of which share a triangle."""
-    twin = twins(triangles)
+def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray, twin: np.ndarray | None = None) -> Edit:
+    """Put a vertex in the middle of the edges of halfedges h (k,), no two of which share a triangle.
+
+    twin (3m,): opposite halfedges, where they are known, here and below
+    """
+    twin = twins(triangles) if twin is None else twin
     tail, head = halfedges(triangles)
     n, k = len(points), len(h)
     new = n + np.arange(k)
@@ -60,9 +63,9 @@ def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray) -> Edi
     )
 
 
-def independent_splits(triangles: np.ndarray, h: np.ndarray) -> np.ndarray:
+def independent_splits(triangles: np.ndarray, h: np.ndarray, twin: np.ndarray | None = None) -> np.ndarray:
     """Choose those of the halfedges h (k,), in order of preference, whose triangles none before them has."""
-    twin = twins(triangles)
+    twin = twins(triangles) if twin is None else twin
     rank = np.arange(len(h))
     t, s = h // 3, np.where(twin[h] >= 0, twin[h], h) // 3
     first = np.full(len(triangles), len(h))
@@ -79,16 +82,17 @@ def collapse_edges(
     most: int,
     min_cosine: float = MIN_COSINE,
     along: bool = False,
+    twin: np.ndarray | None = None,
 ) -> Edit:
     """Collapse up to `most` of the edges of interior halfedges h (k,), in order, as far as the topology allows.
 
     The two ends meet in the middle, or where the one is that is `fixed` (n,) bool or on a boundary. No face turns by
     more than `least_cosine`. Edges `along` lines may be on boundaries, and their ends meet in one of them.
     """
-    n = len(points)
+    n, twin = len(points), twins(triangles) if twin is None else twin
     tail, head = halfedges(triangles)
     boundary = np.zeros(n, dtype=bool)
-    boundary[tail[twins(triangles) < 0]] = True
+    boundary[tail[twin < 0]] = True
     fixed_ends = fixed if along else fixed | boundary
     h = h[~(fixed_ends[tail[h]] & fixed_ends[head[h]])]
     keep, gone = np.where(fixed_ends[tail[h]], tail[h], head[h]), np.where(fixed_ends[tail[h]], head[h], tail[h])
@@ -97,7 +101,7 @@ def collapse_edges(
     )
     neighbours.data[:] = 1
     place = np.where(fixed_ends[keep][:, None] | along, points[keep], (points[keep] + points[gone]) / 2)
-    ok = _keeps_topology(points, triangles, h, neighbours, boundary)
+    ok = _keeps_topology(triangles, twin, h, neighbours, boundary)
     keep, gone, place = keep[ok], gone[ok], place[ok]
     chosen = _chosen(points, triangles, neighbours, keep, gone, place, most, min_cosine)
     keep, gone, place = keep[chosen], gone[chosen], place[chosen]
@@ -119,12 +123,11 @@ def collapse_edges(
     )
 
 
-def _keeps_topology(points, triangles, h, neighbours, boundary) -> np.ndarray:
+def _keeps_topology(triangles, twin, h, neighbours, boundary) -> np.ndarray:
     """Edges (k,) bool whose ends share two neighbours and no more (the link condition), none of valence three."""
     tail, head = halfedges(triangles)
     common = np.asarray(neighbours[tail[h]].multiply(neighbours[head[h]]).sum(axis=1)).ravel()
     valence = np.diff(neighbours.indptr)
-    twin = twins(triangles)
     single = twin[h] < 0
     left = tail[previous_halfedge(h)]
     right = np.where(single, left, tail[previous_halfedge(twin[h])])
@@ -193,9 +196,9 @@ def _unfolded(points, triangles, keep, gone, place, min_cosine: float) -> np.nda
     return sound
 
 
-def interior_edges(triangles: np.ndarray, locked: np.ndarray) -> np.ndarray:
+def interior_edges(triangles: np.ndarray, locked: np.ndarray, twin: np.ndarray | None = None) -> np.ndarray:
     """One halfedge (k,) of every edge that is neither on the boundary nor among the keys `locked`."""
-    twin = twins(triangles)
+    twin = twins(triangles) if twin is None else twin
     h = np.flatnonzero(twin > np.arange(len(twin)))
     tail, head = halfedges(triangles)
     return h[~np.isin(pair_keys(tail[h], head[h]), locked)] if len(locked) else h

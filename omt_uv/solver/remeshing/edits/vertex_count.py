@@ -123,7 +123,7 @@ def reach_vertex_count(mesh: WorkingMesh, count: int, sizing: SizeFunction, allo
         deficit = count - len(mesh.points)
         if deficit == 0:
             return mesh
-        h = interior_edges(mesh.triangles, mesh.locked)
+        h = interior_edges(mesh.triangles, mesh.locked, mesh.twin)
         tail, head = halfedges(mesh.triangles)
         a, b = mesh.points[tail[h]], mesh.points[head[h]]
         length = np.linalg.norm(a - b, axis=1) / sizing((a + b) / 2)
@@ -141,15 +141,17 @@ def reach_vertex_count(mesh: WorkingMesh, count: int, sizing: SizeFunction, allo
 
 def _split(mesh: WorkingMesh, h: np.ndarray, length: np.ndarray, deficit: int) -> WorkingMesh:
     longest = np.argsort(-length, kind="stable")[: max(int(ROUND_SHARE * deficit), 8)]
-    chosen = independent_splits(mesh.triangles, h[longest])[:deficit]
-    return after_edit(mesh, split_edges(mesh.points, mesh.triangles, chosen))
+    chosen = independent_splits(mesh.triangles, h[longest], mesh.twin)[:deficit]
+    return after_edit(mesh, split_edges(mesh.points, mesh.triangles, chosen, mesh.twin))
 
 
 def _collapse(mesh: WorkingMesh, h: np.ndarray, length: np.ndarray, surplus: int, min_cosine: float) -> WorkingMesh:
     order = np.argsort(length, kind="stable")
     reach = 4 * surplus + 32
     while True:
-        edit = collapse_edges(mesh.points, mesh.triangles, h[order[:reach]], mesh.fixed, surplus, min_cosine)
+        edit = collapse_edges(
+            mesh.points, mesh.triangles, h[order[:reach]], mesh.fixed, surplus, min_cosine, twin=mesh.twin
+        )
         if len(edit.points) < len(mesh.points):
             return after_edit(mesh, edit)
         if reach >= len(order):

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+from ...mesh.topology import twins
 
 
 @dataclass(frozen=True)
@@ -20,3 +23,8 @@ class WorkingMesh:
     fixed: np.ndarray
     locked: np.ndarray
     delaunay: bool = True
+
+    @cached_property
+    def twin(self) -> np.ndarray:
+        """Opposite halfedges (3m,), for edits, which ask for them again and again."""
+        return twins(self.triangles)

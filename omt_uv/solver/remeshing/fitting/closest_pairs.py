@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mesh.closest_point import ClosestPoint, ClosestPointTracker, SurfacePoints, subdivision_centroids
-from ...mesh.geometry import face_areas, face_normals
+from ...mesh.geometry import face_areas
 from ...mesh.topology import expand
 from ..relaxation.surface_samples import SurfaceSamples
 
@@ -127,20 +127,22 @@ class Pairing:
         q = len(self.places)
         self.surface_faces.reshape(-1, q)[faces] = other.surface_faces.reshape(-1, q)[from_faces]
 
-    def __call__(self, points: np.ndarray, triangles: np.ndarray, on: np.ndarray) -> ClosestPairs:
+    def __call__(
+        self, points: np.ndarray, triangles: np.ndarray, on: np.ndarray, twin: np.ndarray | None = None
+    ) -> ClosestPairs:
         """Pair the samples with a mesh (n,3), (m,3), and its places and vertices with the surface; each way weighs 1/2.
 
-        on (n,3): the closest points of the vertices
+        on (n,3): the closest points of the vertices; twin (3m,): opposite halfedges, where they are known
         """
         samples, n, area = self.samples, len(points), face_areas(points, triangles)
-        mesh = ClosestPoint(points, triangles, self.index.spacing)
+        mesh = ClosestPoint(points, triangles, self.index.spacing, twin)
         near = self._on_mesh(mesh, samples.points, samples.normals)
         if self._patch is not None:
             self._search_patch(mesh, self._patch, near)
         owner = np.repeat(np.arange(len(triangles)), len(self.places))
         bary = np.tile(self.places, (len(triangles), 1))
         places = np.einsum("qc,mcj->mqj", self.places, points[triangles]).reshape(-1, 3)
-        far = self._on_surface(self.index, places, face_normals(points, triangles)[owner]).points
+        far = self._on_surface(self.index, places, mesh.normals[owner]).points
         corner = np.zeros(n, np.int64)
         corner[triangles.ravel()] = np.arange(triangles.size)
         at = VERTEX_WEIGHT * np.bincount(triangles.ravel(), np.repeat(area / 3, 3), n)

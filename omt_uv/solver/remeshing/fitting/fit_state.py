@@ -66,7 +66,7 @@ class FitState:
 
     def pairs(self) -> ClosestPairs:
         """Pair closest points of mesh and surface."""
-        return self.pairing(self.points, self.triangles, self.on.points)
+        return self.pairing(self.points, self.triangles, self.on.points, self.twin)
 
     def place(self, points: np.ndarray) -> None:
         """Put the vertices at points (n,3)."""
@@ -101,7 +101,7 @@ class FitState:
 
     def add_samples(self, extra: SurfaceSamples, places: np.ndarray) -> None:
         """Pair more samples of the surface from now on, and these places (r,3) of the mesh's triangles."""
-        mesh = ClosestPoint(self.points, self.triangles, self.index.spacing)
+        mesh = ClosestPoint(self.points, self.triangles, self.index.spacing, self.twin)
         start = PairingStart(
             mesh_faces=np.append(self.pairing.mesh_faces, mesh(extra.points, extra.normals).faces),
             surface_faces=self.pairing.surface_faces_for(places),

@@ -127,7 +127,7 @@ def _lowered(state: FitState, pairs: ClosestPairs, patches: RingPatches, rms: fl
     before = distance_norms(pairs, len(owner), owner, p)
     norm = distance_norms(after, len(batch.owner), batch.owner, TRIALS * p).reshape(TRIALS, p)
     shape = patch_shapes(state.points[patches.vertices], patches.triangles, patches.of_face, p)
-    norm[~acceptable(shape, patch_shapes(trial.points, trial.triangles, batch.owner, p))] = np.inf
+    norm[~acceptable(shape, patch_shapes(trial.points, trial.triangles, batch.owner, p, trial.twin))] = np.inf
     best = np.where(norm.min(axis=0) < (1 - GAIN) * before, norm.argmin(axis=0), -1)
     put_best_back(batch, trial, after, pairs, best)
     return best >= 0

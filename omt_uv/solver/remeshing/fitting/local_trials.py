@@ -155,9 +155,15 @@ class PatchShapes:
     variation: np.ndarray
 
 
-def patch_shapes(points: np.ndarray, triangles: np.ndarray, owner: np.ndarray, patches: int) -> PatchShapes:
-    """Measure the shapes of the patches of a mesh (n,3), (m,3), (c,p) for p `patches`; owner (m,): patch of each."""
-    length, normal, twin = halfedge_lengths(points, triangles), face_normals(points, triangles), twins(triangles)
+def patch_shapes(
+    points: np.ndarray, triangles: np.ndarray, owner: np.ndarray, patches: int, twin: np.ndarray | None = None
+) -> PatchShapes:
+    """Measure the shapes of the patches of a mesh (n,3), (m,3), (c,p) for p `patches`; owner (m,): patch of each.
+
+    twin (3m,): opposite halfedges, where they are known
+    """
+    length, normal = halfedge_lengths(points, triangles), face_normals(points, triangles)
+    twin = twins(triangles) if twin is None else twin
     count = int(owner.max()) + 1
     angle, cosine = np.full(count, np.pi), np.ones(count)
     np.minimum.at(angle, owner, angles_from_lengths(length.reshape(-1, 3)).min(axis=1))

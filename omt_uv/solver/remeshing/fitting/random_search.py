@@ -61,7 +61,7 @@ def search_randomly(
         norm = distance_norms(after, len(batch.owner), batch.owner, copies * p).reshape(copies, p)
         bad = np.bincount(batch.owner, smallness(trial.points, trial.triangles), copies * p).reshape(copies, p)
         cost = np.maximum(norm / target, 1) + SHAPE_WEIGHT * bad
-        ok = acceptable(before, patch_shapes(trial.points, trial.triangles, batch.owner, p))
+        ok = acceptable(before, patch_shapes(trial.points, trial.triangles, batch.owner, p, trial.twin))
         small = (least_angles(trial.points, trial.triangles).reshape(copies, -1) < limit).ravel()
         ok &= np.bincount(batch.owner, small, copies * p).reshape(copies, p) == 0
         cost[1:][~ok[1:]] = np.inf

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...mesh.topology import halfedges, pair_keys, paired
+from ...mesh.topology import halfedges, pair_keys, paired, twins
 from ..components.components import Component
 from ..edits.long_edges import split_component
 from ..edits.split_collapse import ANY_COSINE, MIN_COSINE, collapse_edges, independent_splits, interior_edges
@@ -117,7 +117,7 @@ def collapse_along_lines(component: Component, vertices: np.ndarray) -> LineMesh
             break
         keys, index = np.unique(pair_keys(*halfedges(mesh.triangles)), return_index=True)
         on_lines = index[np.isin(keys, pair_keys(*mesh.lines.T))]
-        fewer = _collapsed(mesh, on_lines, kept, least, True)
+        fewer = _collapsed(mesh, on_lines, kept, least, True, None)
         if len(fewer.points) == len(mesh.points):
             if least == ANY_COSINE:
                 break
@@ -130,23 +130,26 @@ def collapse_short_edges(mesh: LineMesh, shortest: Callable[[np.ndarray], np.nda
     """Collapse edges between a mesh's lines that are shorter than (k,) what `shortest` gives for places (k,3)."""
     for _ in range(MAX_ROUNDS):
         tail, head = halfedges(mesh.triangles)
-        h = interior_edges(mesh.triangles, np.sort(pair_keys(*mesh.lines.T)))
+        twin = twins(mesh.triangles)
+        h = interior_edges(mesh.triangles, np.sort(pair_keys(*mesh.lines.T)), twin)
         a, b = mesh.points[tail[h]], mesh.points[head[h]]
         short = np.linalg.norm(a - b, axis=1) < shortest((a + b) / 2)
         kept = np.zeros(len(mesh.points), dtype=bool)
         kept[mesh.lines] = kept[mesh.vertices] = True
-        fewer = _collapsed(mesh, h[short], kept, MIN_COSINE, False)
+        fewer = _collapsed(mesh, h[short], kept, MIN_COSINE, False, twin)
         if len(fewer.points) == len(mesh.points):
             break
         mesh = fewer
     return mesh
 
 
-def _collapsed(mesh: LineMesh, h: np.ndarray, kept: np.ndarray, least: float, along: bool) -> LineMesh:
+def _collapsed(
+    mesh: LineMesh, h: np.ndarray, kept: np.ndarray, least: float, along: bool, twin: np.ndarray | None
+) -> LineMesh:
     """Collapse edges of the halfedges h (k,), the shortest first, but for vertices `kept` (n,) bool."""
     tail, head = halfedges(mesh.triangles)
     h = h[np.argsort(np.linalg.norm(mesh.points[tail[h]] - mesh.points[head[h]], axis=1), kind="stable")]
-    edit = collapse_edges(mesh.points, mesh.triangles, h, kept, len(h), least, along)
+    edit = collapse_edges(mesh.points, mesh.triangles, h, kept, len(h), least, along, twin)
     lines, to_reopen = (
         np.unique(np.sort(edit.new_number[pairs], axis=1), axis=0) for pairs in (mesh.lines, mesh.to_reopen)
     )

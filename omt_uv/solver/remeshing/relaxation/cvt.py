@@ -14,7 +14,6 @@ import numpy as np
 
 from ...linalg.lbfgs import LBFGS
 from ...mesh.geometry import vertex_areas, vertex_normals
-from ...mesh.topology import twins
 from ...progress import Progress, Steps
 from ..edits.delaunay_flips import make_delaunay_embedded
 from ..edits.working_mesh import WorkingMesh
@@ -41,7 +40,7 @@ def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[
     Boundary vertices should be fixed.
     """
     triangles, fixed = mesh.triangles.copy(), mesh.fixed
-    twin = twins(triangles)
+    twin = mesh.twin.copy()
     descent = LBFGS()
     best, residual = np.inf, 0.0
     normal = vertex_normals(mesh.points, triangles)

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ...linalg.sparse import solve_conjugate_gradients
 from ...mesh.geometry import laplacian_from_weights, vertex_normals
-from ...mesh.topology import halfedges, previous_halfedge, twins
+from ...mesh.topology import halfedges, previous_halfedge
 from ..edits.split_collapse import Edit, collapse_edges, independent_splits, interior_edges, split_edges
 from ..edits.vertex_count import SizeFunction, after_edit, reach_vertex_count
 from ..edits.working_mesh import WorkingMesh
@@ -94,11 +94,11 @@ def _surplus(mesh: WorkingMesh, measure: np.ndarray, sizing: SizeFunction) -> np
     n = len(measure)
     tail, head = halfedges(mesh.triangles)
     boundary = np.zeros(n, dtype=bool)
-    boundary[tail[twins(mesh.triangles) < 0]] = True
+    boundary[tail[mesh.twin < 0]] = True
     # The cell of a boundary vertex is half on the surface.
     cells = np.where(boundary, 0.5, 1.0)
     surplus = cells - measure * (cells.sum() / measure.sum())
-    h = interior_edges(mesh.triangles, NO_EDGES)
+    h = interior_edges(mesh.triangles, NO_EDGES, mesh.twin)
     target = sizing(mesh.points)
     a, b = target[tail[h]], target[head[h]]
     alike = (np.minimum(a, b) / np.maximum(a, b)) ** CONTRAST
@@ -116,14 +116,16 @@ def _carried(mesh: WorkingMesh, measure: np.ndarray, surplus: np.ndarray) -> tup
     n = len(surplus)
     excess = np.maximum(surplus, 0)
     best = _best_edges(mesh, excess, collapse=True)
-    edit = collapse_edges(mesh.points, mesh.triangles, best, mesh.fixed, int(np.ceil(excess.sum())))
+    edit = collapse_edges(mesh.points, mesh.triangles, best, mesh.fixed, int(np.ceil(excess.sum())), twin=mesh.twin)
     taken = n - len(edit.points)
     if taken == 0:
         return mesh, measure
     measure, deficit = _inherited(mesh, edit, measure), np.maximum(-surplus[edit.origin], 0)
     mesh = after_edit(mesh, edit)
     best = _best_edges(mesh, deficit * (taken / max(deficit.sum(), 1e-300)), collapse=False)
-    edit = split_edges(mesh.points, mesh.triangles, independent_splits(mesh.triangles, best)[:taken])
+    edit = split_edges(
+        mesh.points, mesh.triangles, independent_splits(mesh.triangles, best, mesh.twin)[:taken], mesh.twin
+    )
     # Vertices between others have no measure yet; averaging gives it to them.
     return after_edit(mesh, edit), np.append(measure, np.zeros(len(edit.points) - len(measure)))
 
@@ -148,8 +150,8 @@ def _best_edges(mesh: WorkingMesh, amount: np.ndarray, collapse: bool) -> np.nda
     order = cKDTree(mesh.points).indices
     group = np.zeros(len(amount), np.int64)
     group[order] = np.floor(np.cumsum(amount[order]))
-    h = interior_edges(mesh.triangles, mesh.locked)
-    twin = twins(mesh.triangles)
+    twin = mesh.twin
+    h = interior_edges(mesh.triangles, mesh.locked, twin)
     tail, head = halfedges(mesh.triangles)
     h = h[amount[tail[h]] > 0]
     if len(h) == 0:
