@@ -27,17 +27,35 @@ INPUTS = {
     ".glb": mesh_bytes.glb_bytes(),
 }
 TARGETS = [".obj", ".ply", ".glb", ".blend", ".fbx", ".stl"]
+# A disk that takes its time to flush, as those do that hold more than these files: a file is written in milliseconds.
+FLUSH = 0.05
+SLOW_DISK = f"""
+import os, time
+flush = os.fsync
+def slow(handle):
+    time.sleep({FLUSH})
+    flush(handle)
+    time.sleep({FLUSH})
+os.fsync = slow
+"""
 
 
-def start(folder, source, target):
+def start(folder, source, target, slow=None):
     words = [sys.executable, "-m", "omt_uv", "unwrap", folder / f"in{source}", "-o", folder / f"out{target}"]
+    places = [str(slow), os.environ.get("PYTHONPATH", "")] if slow else [os.environ.get("PYTHONPATH", "")]
     return subprocess.Popen(list(map(str, [*words, "--quality", "draft"])), cwd=ROOT, stdout=subprocess.PIPE,
-                            stderr=subprocess.DEVNULL)  # fmt: skip
+                            stderr=subprocess.DEVNULL,
+                            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, places))})  # fmt: skip
 
 
 def parts(folder):
-    """What a run has begun to write."""
+    """What a run has begun to write, and its lock."""
     return [path for path in folder.glob(".omt_uv_*") if not path.name.endswith(".lock.new")]
+
+
+def written(folder):
+    """What is being written; a lock alone is there before the work as well, when the folder is tried."""
+    return [path for path in parts(folder) if not path.name.endswith(".lock")]
 
 
 def wait(process, seconds, until=lambda: False):
@@ -54,6 +72,8 @@ def wait(process, seconds, until=lambda: False):
 def test_killed_runs_leave_a_whole_file(package, tmp_path):
     pytest.importorskip("scipy", reason="runs outside Blender, where the wheels of the extension are not")
     sweep = package("files.verified").sweep
+    (tmp_path / "slow").mkdir()
+    (tmp_path / "slow" / "sitecustomize.py").write_text(SLOW_DISK)
     rng = np.random.default_rng(KILLS)
     while_writing = 0
     for k in range(1, KILLS + 1):
@@ -63,16 +83,16 @@ def test_killed_runs_leave_a_whole_file(package, tmp_path):
         (folder / f"in{source}").write_bytes(INPUTS[source])
         out = folder / f"out{target}"
         out.write_bytes(b"old")
-        process = start(folder, source, target)
-        # Two of three while something is written, the others at any time.
+        process = start(folder, source, target, tmp_path / "slow")
+        # Two of three while something is written, or put in its place; the others at any time.
         if k % 3:
-            wait(process, LONGEST, lambda folder=folder: bool(parts(folder)))
-            wait(process, rng.random() * 0.02)
+            wait(process, LONGEST, lambda folder=folder: bool(written(folder)))
+            wait(process, rng.random() * 3 * FLUSH)
         else:
             wait(process, rng.random() * 4)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        while_writing += bool(parts(folder))
+        while_writing += bool(written(folder))
         # The child ends with it, if not at once: the pipe is its, too.
         process.stdout.read()
         assert (folder / f"in{source}").read_bytes() == INPUTS[source]
