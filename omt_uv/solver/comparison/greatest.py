@@ -60,8 +60,12 @@ def by_position(index: ClosestPoint, points: np.ndarray) -> SurfacePoints:
 
 
 def exact_distances(index: ClosestPoint, points: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Distances (k,) of a few points (k,3) from the surface of an index, of which (k,) are known to be no less: all
-    triangles that may be as near are tried."""
+    """Distances (k,) of a few points (k,3) from the surface of an index, of which (k,) are known to be no less."""
+    return nearest_of_all(index, points, most)[0]
+
+
+def nearest_of_all(index: ClosestPoint, points: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`exact_distances` and a triangle (k,) that is so near, -1 where none is nearer: all that may be are tried."""
     V, F = index.vertices, index.triangles
     middle = V[F].mean(axis=1)
     radius = np.linalg.norm(V[F] - middle[:, None], axis=2).max(axis=1)
@@ -73,9 +77,12 @@ def exact_distances(index: ClosestPoint, points: np.ndarray, most: np.ndarray) -
     a, b, c = (V[F[faces, k]] for k in range(3))
     weights = closest_on_triangles(points[owner], a, b, c)
     off = np.linalg.norm(weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c - points[owner], axis=1)
-    found = most.copy()
-    np.minimum.at(found, owner, off)
-    return found
+    order = np.lexsort((off, owner))
+    first = order[np.append(True, np.diff(owner[order]) > 0)] if len(order) else order
+    first = first[off[first] < most[owner[first]]]
+    found, nearest = most.copy(), np.full(len(points), -1)
+    found[owner[first]], nearest[owner[first]] = off[first], faces[first]
+    return found, nearest
 
 
 def greatest_distance(
@@ -96,10 +103,9 @@ def greatest_distance(
         if not len(pieces.bound) or points >= MOST_POINTS:
             return GreatestDistance(found, max(least, float(pieces.bound.max(initial=0.0))))
         order = np.argsort(-pieces.bound)
-        parts, middles, distance = _cut(index, pieces.taken(order[:MOST_AT_ONCE]))
+        parts, found, count = _cut(index, pieces.taken(order[:MOST_AT_ONCE]), found)
         pieces = _joined(parts, pieces.taken(order[MOST_AT_ONCE:]))
-        found = farthest(index, middles, distance, found)
-        points += len(middles)
+        points += count
         yield Progress("greatest distance", min(points / MOST_POINTS, 1.0))
 
 
@@ -114,18 +120,25 @@ def farthest(index: ClosestPoint, points: np.ndarray, most: np.ndarray, least: f
     return least
 
 
-def _cut(index: ClosestPoint, pieces: _Pieces) -> tuple[_Pieces, np.ndarray, np.ndarray]:
-    """Four pieces of each; then the middles (k,3) of their edges, and distances (k,) that may be too great."""
+def _cut(index: ClosestPoint, pieces: _Pieces, found: float) -> tuple[_Pieces, float, int]:
+    """Four pieces of each; then the greatest distance, which was `found` before, and how many points were looked for:
+    the middles of their edges."""
     middles = 0.5 * (pieces.corners[:, [1, 2, 0]] + pieces.corners[:, [2, 0, 1]])
     # Neighbours share their edges.
     points, place = np.unique(middles.reshape(-1, 3), axis=0, return_inverse=True)
     closest = by_position(index, points)
+    distance, faces = np.linalg.norm(closest.points - points, axis=1), closest.faces.copy()
+    # Bounds by triangles that are not the nearest would never come down to what was found.
+    doubtful = np.flatnonzero(distance > found * (1 + ROUNDING))
+    if len(doubtful):
+        distance[doubtful], nearest = nearest_of_all(index, points[doubtful], distance[doubtful])
+        faces[doubtful] = np.where(nearest >= 0, nearest, faces[doubtful])
+        found = max(found, float(distance[doubtful].max()))
     six = np.concatenate([pieces.corners, middles], axis=1)[:, QUARTERS].reshape(-1, 3, 3)
-    near = np.concatenate([pieces.nearest, closest.faces[place.reshape(-1, 3)]], axis=1)[:, QUARTERS].reshape(-1, 3)
+    near = np.concatenate([pieces.nearest, faces[place.reshape(-1, 3)]], axis=1)[:, QUARTERS].reshape(-1, 3)
     parts = _bounded(index, six, near)
     # What bounds the whole bounds its parts.
-    parts = replace(parts, bound=np.minimum(parts.bound, np.repeat(pieces.bound, 4)))
-    return parts, points, np.linalg.norm(closest.points - points, axis=1)
+    return replace(parts, bound=np.minimum(parts.bound, np.repeat(pieces.bound, 4))), found, len(points)
 
 
 def _bounded(index: ClosestPoint, corners: np.ndarray, nearest: np.ndarray) -> _Pieces:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import meshes
 import numpy as np
 import pytest
 
@@ -45,6 +46,20 @@ def test_distances_are_those_of_trying_every_triangle():
         assert exact_distances(index, points, exact + more) == pytest.approx(exact, abs=1e-12)
     assert farthest(index, points, exact + np.random.default_rng(2).random(40)) == pytest.approx(exact.max())
     assert farthest(index, points, exact, least=100.0) == 100.0
+
+
+@pytest.mark.parametrize("far", [0.6, 5.0, 100.0])
+def test_a_vertex_far_away_asks_for_few_points(far, monkeypatch):
+    """The bound comes down where the nearest triangles are known, not the ones that samples are nearest to."""
+    V, F = meshes.bumpy(12, 12)
+    W, asked = V.copy(), []
+    W[60] += np.array([0.1, 0.2, 1.0]) * far
+    index = ClosestPoint(V, F, 0.005)
+    near = by_position(index, W).faces
+    monkeypatch.setattr(greatest, "by_position", lambda i, points: asked.append(len(points)) or by_position(i, points))
+    found = drain(greatest_distance(W, F, index, near, (W, np.linalg.norm(index.walk(W, near).points - W, axis=1))))
+    assert found.distance == pytest.approx(brute(V, F, W).max())
+    assert found.bound <= found.distance * 1.0011 and sum(asked) < 20_000
 
 
 @pytest.mark.parametrize("seed", range(3))
