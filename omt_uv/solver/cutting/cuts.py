@@ -200,6 +200,13 @@ def cut_gluing(
     return CutSurface(surface=surface, gluing=gluing, cuts=cuts, extent=unit)
 
 
+def uncut(surface: Surface, repaired: Repaired) -> CutSurface | None:
+    """A repaired gluing, its faces turned to one side, with no cuts but where it was torn; None if it has one side."""
+    positions, unit = _in_unit_box(surface, repaired.gluing)
+    gluing, one_sided = _oriented(repaired.gluing, positions)
+    return None if one_sided.any() else _uncut(surface, gluing, repaired, components(gluing), unit)
+
+
 def _uncut(surface: Surface, gluing: Gluing, repaired: Repaired, component_of: np.ndarray, unit: float) -> CutSurface:
     """What `cut_gluing` returns where all components (m,) are disks."""
     turned = gluing.triangles[:, 1] != repaired.gluing.triangles[:, 1]

@@ -7,15 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DISSOLVE, ZeroAreaFaceError, plural
-from ..mesh.charts import Chart, charts_of, check_disks, strict_charts
+from ..errors import (
+    DISSOLVE,
+    DuplicateFaceError,
+    NonManifoldEdgeError,
+    OrientationError,
+    ZeroAreaFaceError,
+    plural,
+)
+from ..mesh.charts import Chart, charts_of, check_disks
+from ..mesh.gluing import Gluing
 from ..mesh.repair import charts_without_area, repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
 from ..progress import Steps, drain
-from .cuts import MOST_EXTREMITIES, Cuts, SeamFinder, cut_gluing, sieved
+from .cuts import MOST_EXTREMITIES, Cuts, SeamFinder, cut_gluing, sieved, uncut
 from .hole_filling import fill_holes as fill_holes_of
 
 SEAMS = ("existing", "auto")
+# What is wrong with a mesh where a repair helps.
+BROKEN = (ZeroAreaFaceError, DuplicateFaceError, NonManifoldEdgeError, OrientationError)
 
 
 @dataclass(frozen=True)
@@ -47,8 +57,8 @@ def disk_charts(
 
     Parameters
     ----------
-    seams : "existing" splits along the seams of the surface alone and refuses what is no disk, or broken;
-        "auto" repairs and cuts, for the map only
+    seams : "existing" splits along the seams of the surface alone and refuses what is no disk; "auto" cuts, for the map
+        only. Both repair what is broken, for the map only
     fill_holes : fill all boundaries of a component but the longest, for the map only, instead of cutting to them; such
         charts have `patches`
     sieve : fill the holes of a component that has more than so many; with "auto" it is then cut to its extremities, and
@@ -59,16 +69,14 @@ def disk_charts(
 
     Raises
     ------
-    MeshError : see `charts.strict_charts`; with "auto" only EmptyMeshError, NonFiniteError, and ZeroAreaFaceError or
-        NonManifoldEdgeError where no repair helps
+    MeshError : EmptyMeshError, NonFiniteError, and ZeroAreaFaceError or NonManifoldEdgeError where no repair helps;
+        with "existing" NotADiskError, and OrientationError where a surface has one side only
     """
     if seams not in SEAMS:
         raise ValueError(f"seams must be one of {', '.join(SEAMS)}, not {seams!r}")
     if seams == "existing":
         return _existing(surface, faces, fill_holes, sieve)
-    faces, triangles, owner = chosen_triangles(surface, faces)
-    if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
-        raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
+    faces, triangles, owner = _with_some_area(surface, faces)
     repaired = repaired_gluing(surface, faces, triangles, owner)
     options: dict[str, Any] = {
         "avoid": avoid,
@@ -79,11 +87,21 @@ def disk_charts(
     }
     found = yield from cut_gluing(surface, repaired, **options)
     charts, flat = _sound(charts_of(found.surface, found.gluing), found.extent)
-    warnings = list(found.cuts.warnings)
-    if flat:
-        who = plural(flat, "A face has", "{} faces have")
-        warnings.append(f"{who} no area and got a little for the map; {DISSOLVE}")
-    return DiskCharts(charts, found.cuts, tuple(warnings))
+    return DiskCharts(charts, found.cuts, (*found.cuts.warnings, *_of_flat(flat)))
+
+
+def _with_some_area(surface: Surface, faces: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `chosen_triangles` finds, if any of it has an area."""
+    faces, triangles, owner = chosen_triangles(surface, faces)
+    if _all_lines(surface.positions[surface.corner_vertex[triangles]]):
+        raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
+    return faces, triangles, owner
+
+
+def _of_flat(count: int) -> list[str]:
+    """The warning that so many faces have no area, if any."""
+    who = plural(count, "A face has", "{} faces have")
+    return [f"{who} no area and got a little for the map; {DISSOLVE}"] if count else []
 
 
 def _all_lines(points: np.ndarray) -> bool:
@@ -95,16 +113,27 @@ def _all_lines(points: np.ndarray) -> bool:
 
 
 def _existing(surface: Surface, faces: np.ndarray | None, fill: bool, sieve: int | None) -> DiskCharts:
-    if not fill and sieve is None:
-        return DiskCharts(strict_charts(surface, faces), None, ())
-    gluing = strict_gluing(surface, faces)
-    filled = fill_holes_of(surface, gluing, np.zeros(len(gluing.triangles), dtype=bool), None if fill else sieve)
-    if not fill and not filled.holes:
-        return DiskCharts(strict_charts(surface, faces), None, ())
+    """Charts along the seams alone; what is broken is repaired as where seams are added, and said."""
+    try:
+        return _filled(surface, strict_gluing(surface, faces), fill, sieve, ())
+    except BROKEN:
+        found = uncut(surface, repaired_gluing(surface, *_with_some_area(surface, faces)))
+        if found is None:
+            # No seam was made to open what has one side only.
+            raise
+        return _filled(found.surface, found.gluing, fill, sieve, found.cuts.warnings)
+
+
+def _filled(surface: Surface, gluing: Gluing, fill: bool, sieve: int | None, told: tuple[str, ...]) -> DiskCharts:
+    """Charts of a gluing that is not cut, with its holes filled, all or those of sieves, and what was said of it."""
     positions = surface.positions[surface.corner_vertex[gluing.triangles]] / 2
-    # Faces have areas, but what fills a hole that is a line has none.
-    charts, _ = _sound(charts_of(filled.surface, filled.gluing), 2 * float(np.ptp(positions, axis=(0, 1)).max()))
-    return DiskCharts(charts, None, () if fill else (sieved(filled.holes),))
+    extent, holes = 2 * float(np.ptp(positions, axis=(0, 1)).max()), 0
+    if fill or sieve is not None:
+        filled = fill_holes_of(surface, gluing, np.zeros(len(gluing.triangles), dtype=bool), None if fill else sieve)
+        surface, gluing, holes = filled.surface, filled.gluing, filled.holes
+    charts, flat = _sound(charts_of(surface, gluing), extent)
+    sieves = () if fill or not holes else (sieved(holes),)
+    return DiskCharts(charts, None, (*told, *sieves, *_of_flat(flat)))
 
 
 def _sound(charts: list[Chart], extent: float) -> tuple[list[Chart], int]:

@@ -70,8 +70,8 @@ class UnwrapOptions(MapOptions):
 
     Attributes
     ----------
-    seams : "auto" repairs and cuts, for the map only; "existing" splits along the seams of the surface alone and
-        refuses what is no disk
+    seams : "auto" cuts, for the map only; "existing" splits along the seams of the surface alone and refuses what is
+        no disk. Both repair what is broken, for the map only
     fill_holes : fill all boundaries of a component but the longest, for the map only, instead of cutting to them
     max_shear : with "auto", and a free boundary, seams are added until the mean shear s1/s2 of charts is at most this,
         > 1; 0 for none that no disk needs. Parts whose seams were marked by hand are left as they are

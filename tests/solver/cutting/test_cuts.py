@@ -13,6 +13,7 @@ from short_cuts import cotree_length, shortest_tree
 
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.errors import OrientationError
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.chart_pins import CornerPins
@@ -75,6 +76,12 @@ SURFACES = {
     "holed sphere": holed_sphere, "torus": meshes.torus, "holed torus": holed_torus, "double torus": double_torus,
     "moebius": moebius, "projective plane": projective_plane,
 }  # fmt: skip
+
+
+@pytest.mark.parametrize("mesh", [moebius, projective_plane])
+def test_no_seam_alone_opens_what_has_one_side_only(mesh):
+    with pytest.raises(OrientationError):
+        cut_to_disks(triangle_surface(*mesh()), seams="existing")
 
 
 @pytest.mark.parametrize("name", SURFACES)

@@ -262,9 +262,29 @@ def test_a_face_that_no_move_gives_an_area_is_named_by_its_number_in_the_mesh(mo
     assert caught.value.kind == "face" and caught.value.elements.tolist() == [2]
 
 
-@pytest.mark.parametrize("mesh", [fin, meshes.icosphere, meshes.annulus])
-def test_existing_seams_alone_refuse_what_they_did(mesh):
-    with pytest.raises(errors.MeshError):
+def broken(kind):
+    V, F = meshes.bumpy(6, 6)
+    if kind == "no area":
+        V[F[40]] = V[F[40][0]]
+    elif kind == "turned over":
+        F[[3, 17]] = F[[3, 17]][:, ::-1]
+    elif kind == "double":
+        F = np.concatenate([F, F[:3]])
+    return (V, F) if kind != "three at an edge" else fin()
+
+
+@pytest.mark.parametrize("kind", ["no area", "turned over", "double", "three at an edge"])
+def test_existing_seams_alone_repair_what_is_broken_and_say_so_as_others_do(kind):
+    ours, theirs = (cut_to_disks(triangle_surface(*broken(kind)), seams=seams) for seams in ("existing", "auto"))
+    assert ours.warnings == theirs.warnings and ours.warnings
+    for one, other in zip(ours.charts, theirs.charts, strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(vars(one).values(), vars(other).values(), strict=True))
+        mapped(one)
+
+
+@pytest.mark.parametrize("mesh", [meshes.icosphere, meshes.annulus])
+def test_existing_seams_alone_refuse_what_they_do_not_open(mesh):
+    with pytest.raises(errors.NotADiskError):
         cut_to_disks(triangle_surface(*mesh()), seams="existing")
 
 
