@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
@@ -65,6 +66,11 @@ class CutComponent:
     def vertex_count(self) -> int:
         """Number n of vertices."""
         return len(self.positions)
+
+    @cached_property
+    def graph(self) -> csr_matrix:
+        """The cost of all inner edges as `edge_graph` gives it; a cut asks for it again and again."""
+        return edge_graph(self, np.arange(len(self.pair)), self.ends, self.vertex_count)
 
     def tip_factor(self) -> np.ndarray:
         """Factor (n,) > 0 by which a cut would rather end at a vertex: small where cuts are to be avoided."""

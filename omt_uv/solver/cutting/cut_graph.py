@@ -29,11 +29,8 @@ def greedy_arcs(component: CutComponent, roots: np.ndarray) -> np.ndarray:
     """
     start = component.on_boundary()
     start[roots] = True
-    everything = np.arange(len(component.pair))
-    distance, before, _ = dijkstra(
-        edge_graph(component, everything, component.ends, component.vertex_count),
-        indices=np.flatnonzero(start), min_only=True, return_predecessors=True,
-    )  # fmt: skip
+    roots = np.flatnonzero(start)
+    distance, before, _ = dijkstra(component.graph, indices=roots, min_only=True, return_predecessors=True)
     above = _edge_above(component, before)
     forest = np.zeros(len(component.pair), dtype=bool)
     forest[above[above >= 0]] = True
@@ -98,8 +95,9 @@ def shorten(component: CutComponent, cut: np.ndarray, tips: np.ndarray, around: 
                 continue
             rest = cut.copy()
             rest[stretch] = False
-            path = _shortest_bridge(component, rest, tips)
-            if path is not None and component.cost[path].sum() < component.cost[stretch].sum() * (1 - 1e-9):
+            length = component.cost[stretch].sum()
+            path = _shortest_bridge(component, rest, tips, length)
+            if path is not None and component.cost[path].sum() < length * (1 - 1e-9):
                 cut = rest
                 cut[path] = True
         if component.cost[cut].sum() >= before * (1 - 1e-3):
@@ -158,9 +156,9 @@ def cut_classes(component: CutComponent, cut: np.ndarray) -> np.ndarray:
     found[corner] = n + part
     first = np.full(n + count, len(flat))
     first[found[::-1]] = np.arange(len(flat))[::-1]
-    number = np.empty(n + count, dtype=np.int64)
-    number[np.argsort(first)] = np.arange(n + count)
-    return number[found].reshape(-1, 3)
+    is_first = np.zeros(len(flat) + 1, dtype=bool)
+    is_first[first] = True
+    return (np.cumsum(is_first)[first] - 1)[found].reshape(-1, 3)
 
 
 def cut_boundary(component: CutComponent, cut: np.ndarray) -> np.ndarray:
@@ -180,8 +178,11 @@ def is_disk(component: CutComponent, cut: np.ndarray) -> bool:
     return loops == 1 and int(corners.max()) + 1 - edges + len(corners) == 1
 
 
-def _shortest_bridge(component: CutComponent, cut: np.ndarray, tips: np.ndarray) -> np.ndarray | None:
-    """Edges of the shortest path between the two boundaries of the component cut open along `cut`; None if not two."""
+def _shortest_bridge(component: CutComponent, cut: np.ndarray, tips: np.ndarray, longest: float) -> np.ndarray | None:
+    """Edges of the shortest path between the two boundaries of the component cut open along `cut`.
+
+    None if there are not two, or if it is longer than `longest`: what is farther away is not looked at.
+    """
     classes = cut_classes(component, cut)
     n = int(classes.max()) + 1
     tail, head = halfedges(classes)
@@ -200,7 +201,7 @@ def _shortest_bridge(component: CutComponent, cut: np.ndarray, tips: np.ndarray)
     inner = np.flatnonzero(~cut)
     ends = np.stack([tail[component.pair[inner, 0]], head[component.pair[inner, 0]]], axis=1)
     distance, before, _ = dijkstra(
-        edge_graph(component, inner, ends, n), indices=one, min_only=True, return_predecessors=True
+        edge_graph(component, inner, ends, n), indices=one, min_only=True, return_predecessors=True, limit=longest
     )
     if not np.isfinite(distance[other]).any():
         return None
@@ -222,8 +223,7 @@ def _edges_between(ends: np.ndarray, a: np.ndarray, b: np.ndarray, n: int) -> np
 def path_to(component: CutComponent, start: np.ndarray, end: int) -> np.ndarray:
     """Edges (e,) bool of the shortest path from any of the vertices `start` (k,) to the vertex `end`."""
     n = component.vertex_count
-    graph = edge_graph(component, np.arange(len(component.pair)), component.ends, n)
-    _, before, _ = dijkstra(graph, indices=start, min_only=True, return_predecessors=True)
+    _, before, _ = dijkstra(component.graph, indices=start, min_only=True, return_predecessors=True)
     on_path = _ancestors(before, np.array([end]))
     on_path = on_path[before[on_path] >= 0]
     path = np.zeros(len(component.pair), dtype=bool)

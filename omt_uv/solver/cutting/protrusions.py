@@ -20,7 +20,7 @@ from ..mesh.geometry import (
     vertex_areas,
 )
 from ..mesh.topology import halfedges
-from .component import NOISE, CutComponent, edge_graph
+from .component import NOISE, CutComponent
 from .cut_graph import cut_boundary, cut_classes
 
 # A further cut does not pay where the lengths of a flat map are predicted to be off by a factor of e^0.5 at most,
@@ -78,8 +78,7 @@ def farthest(component: CutComponent, points: np.ndarray, more: int) -> np.ndarr
 
 def edge_distance(component: CutComponent, vertices: np.ndarray) -> np.ndarray:
     """Cost (n,) of the cheapest path from the vertices (k,)."""
-    graph = edge_graph(component, np.arange(len(component.pair)), component.ends, component.vertex_count)
-    return dijkstra(graph, indices=vertices, min_only=True)
+    return dijkstra(component.graph, indices=vertices, min_only=True)
 
 
 def peak(value: np.ndarray) -> int:
