@@ -33,7 +33,7 @@ from .developable_nets import net
 from .gluing_facts import TurningLines, cost_factors, marked_triangles, total_curvature, turning_lines
 from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes
-from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, peak, spread
+from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
 from .steiner_points import MOST_ENDS, meeting_points
 from .symmetric_cut import symmetric_cut, symmetric_half
 
@@ -43,13 +43,12 @@ MOST_EXTREMITIES = 8
 ROOT_TRIALS = 4
 # A component with less curvature than this within, in radians and summed without sign, is not searched for seams.
 CURVED = 0.2
-# Symmetric cuts may cost so many times what others do, where they leave as much distortion: until there is so many
-# times that of others in the mean square, where this is not below what nobody sees, a tenth of all lengths. What more
-# than halves it is worth no further cuts.
+# Symmetric cuts may cost so many times what others do, and leave so many times their distortion in the mean square,
+# where this is not below what nobody sees, a tenth of all lengths; in an outline, where all cuts distort more, so many.
 DEARER = 1.5
-STEEPER = 1.5
+STEEPER = 1.1
+STEEPER_OUTLINED = 1.5
 UNSEEN = 0.1**2
-LEAST_GAIN = 0.5
 # A net may be so many times as long as another cut, and as long as `developable_nets.Net.most` says anyway.
 LONGER = 1.5
 
@@ -155,8 +154,9 @@ def cut_gluing(
     sieve: int | None = None,
     extremities: int = MOST_EXTREMITIES,
     search: SeamFinder | None = None,
+    outline: bool = False,
 ) -> Steps[CutSurface]:
-    """A repaired gluing cut into disks; see `cut`."""
+    """A repaired gluing cut into disks; see `cut`. outline : they are to fill an outline"""
     vertex_count = len(surface.positions)
     positions, unit = _in_unit_box(surface, repaired.gluing)
     gluing, one_sided = _oriented(repaired.gluing, positions)
@@ -185,7 +185,7 @@ def cut_gluing(
     keep_free[:vertex_count] = 0
     if avoid is not None:
         keep_free[:vertex_count] = np.clip(np.asarray(avoid, float), 0, 1)
-    cutter = _Cutter(surface, gluing, positions, keep_free, extremities, search)
+    cutter = _Cutter(surface, gluing, positions, keep_free, extremities, search, outline)
     gone, report, touching = yield from cutter.cut(one_sided, unit, sieves)
     edges = np.stack(gluing.ends(gluing.first[gone]), axis=1)
     edges = edges[(edges < vertex_count).all(axis=1)]
@@ -251,6 +251,7 @@ class _Cutter:
     avoid: np.ndarray
     extremities: int
     search: SeamFinder | None
+    outline: bool
 
     def cut(self, one_sided: np.ndarray, unit: float, sieves: bool) -> Steps[tuple[np.ndarray, list, int]]:
         """Pairs (p,) bool to cut so that every component is a disk, what was done to each that was cut, and how many
@@ -320,7 +321,7 @@ class _Cutter:
             return found.cut, found.tips
         if searched and self.search is not None:
             return (yield from self._search_component(component, topology, k, self.search))
-        other = cut_component(component, topology, k, self.extremities)
+        other = cut_component(component, topology, k, self.extremities, self.outline)
         found = None if unrolled is None else unrolled.up_to(LONGER * component.length[other[0]].sum())
         return other if found is None else (found.cut, found.tips)
 
@@ -379,21 +380,24 @@ def _in_unit_box(surface: Surface, gluing: Gluing) -> tuple[np.ndarray, float]:
 
 
 def cut_component(
-    component: CutComponent, topology: Topology, k: int, extremities: int
+    component: CutComponent, topology: Topology, k: int, extremities: int, outline: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """Edges (e,) bool that cut the component, number k of the topology, into a disk, and the tips (t,) they reach;
-    symmetric ones where it is its own mirror image."""
+    symmetric ones where it is its own mirror image, and an outline that is given is not distorted more by them."""
     found = _plain_cut(component, topology, k, extremities)
     half = symmetric_half(component)
     if half is None:
         return found
     left = max(spread(component, log_scale(component, found[0])), UNSEEN) if extremities else np.inf
-    symmetric = symmetric_cut(half, extremities, min(BEARABLE, STEEPER * left))
+    most = STEEPER_OUTLINED if outline else STEEPER
+    symmetric = symmetric_cut(half, extremities, min(BEARABLE, most * left), not outline)
     if symmetric is None:
         return found
     dearer = component.cost[symmetric[0]].sum() / component.cost[found[0]].sum()
+    if outline and outline_spread(component, symmetric[0]) > most * outline_spread(component, found[0]):
+        return found
     steeper = spread(component, log_scale(component, symmetric[0])) / left if extremities else 1.0
-    return found if dearer * np.sqrt(max(steeper, LEAST_GAIN)) > DEARER else symmetric
+    return found if dearer * np.sqrt(max(steeper, 1.0)) > DEARER else symmetric
 
 
 def _plain_cut(component: CutComponent, topology: Topology, k: int, extremities: int) -> tuple[np.ndarray, np.ndarray]:

@@ -26,6 +26,8 @@ from .hole_filling import fill_holes as fill_holes_of
 SEAMS = ("existing", "auto")
 # What is wrong with a mesh where a repair helps.
 BROKEN = (ZeroAreaFaceError, DuplicateFaceError, NonManifoldEdgeError, OrientationError)
+# As "auto", for charts that fill an outline.
+OUTLINED = "outlined"
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def disk_charts(
     Parameters
     ----------
     seams : "existing" splits along the seams of the surface alone and refuses what is no disk; "auto" cuts, for the map
-        only. Both repair what is broken, for the map only
+        only, "outlined" does for charts that fill a disk or a square. All repair what is broken, for the map only
     fill_holes : fill all boundaries of a component but the longest, for the map only, instead of cutting to them; such
         charts have `patches`
     sieve : fill the holes of a component that has more than so many; with "auto" it is then cut to its extremities, and
@@ -72,8 +74,8 @@ def disk_charts(
     MeshError : EmptyMeshError, NonFiniteError, and ZeroAreaFaceError or NonManifoldEdgeError where no repair helps;
         with "existing" NotADiskError, and OrientationError where a surface has one side only
     """
-    if seams not in SEAMS:
-        raise ValueError(f"seams must be one of {', '.join(SEAMS)}, not {seams!r}")
+    if seams not in (*SEAMS, OUTLINED):
+        raise ValueError(f"seams must be one of {', '.join((*SEAMS, OUTLINED))}, not {seams!r}")
     if seams == "existing":
         return _existing(surface, faces, fill_holes, sieve)
     faces, triangles, owner = _with_some_area(surface, faces)
@@ -84,6 +86,7 @@ def disk_charts(
         "sieve": sieve,
         "extremities": extremities,
         "search": search,
+        "outline": seams == OUTLINED,
     }
     found = yield from cut_gluing(surface, repaired, **options)
     charts, flat = _sound(charts_of(found.surface, found.gluing), found.extent)

@@ -7,7 +7,10 @@ much curvature far from the boundary, are where |u| peaks; a cut to the peak tak
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..linalg.sparse import solve_spd
@@ -15,6 +18,7 @@ from ..mesh.geometry import (
     LEAST_STIFFNESS,
     angle_defects,
     angles_from_lengths,
+    face_areas,
     halfedge_lengths,
     laplacian_from_lengths,
     vertex_areas,
@@ -33,23 +37,64 @@ def log_scale(component: CutComponent, cut: np.ndarray) -> np.ndarray:
 
     On a closed surface without a cut its mean is 0, and it is largest at the sharpest extremity.
     """
-    classes = cut_classes(component, cut)
-    n = int(classes.max()) + 1
-    tail, head = halfedges(classes)
-    boundary = cut_boundary(component, cut)
-    fixed = np.zeros(n, dtype=bool)
-    fixed[tail[boundary]] = fixed[head[boundary]] = True
-    length = halfedge_lengths(component.positions, component.triangles).reshape(-1, 3)
-    curvature = angle_defects(classes, angles_from_lengths(length), np.flatnonzero(fixed), n)
-    matrix = laplacian_from_lengths(length, classes, n, LEAST_STIFFNESS)
+    metric = _Metric.of(component, cut)
+    curvature, fixed = metric.curvature, metric.on_boundary
     if not fixed.any():
         curvature = curvature - curvature.mean()
-        fixed[int(np.argmin(curvature))] = True
-    u = np.zeros(n)
-    u[~fixed] = solve_spd(matrix[~fixed][:, ~fixed].tocsc(), curvature[~fixed])
+        fixed = np.arange(len(curvature)) == np.argmin(curvature)
+    u = metric.solved(curvature, fixed)
     at_vertex = np.zeros(component.vertex_count)
-    np.maximum.at(at_vertex, component.triangles.ravel(), np.abs(u)[classes.ravel()])
+    np.maximum.at(at_vertex, component.triangles.ravel(), np.abs(u)[metric.classes.ravel()])
     return at_vertex
+
+
+def outline_spread(component: CutComponent, cut: np.ndarray) -> float:
+    """Predicted mean square over the surface of the log scale of a flat map of the component, cut to a disk along edges
+    (e,) bool, onto a round disk: the curvature of its boundary goes where the circle is as long as it."""
+    metric = _Metric.of(component, cut)
+    n, area = len(metric.curvature), face_areas(component.positions, component.triangles)
+    around = np.bincount(metric.ends.ravel(), np.repeat(metric.end_lengths, 2), n)
+    curvature = metric.curvature - 2 * np.pi * around / around.sum()
+    u = metric.solved(curvature - curvature.mean(), np.arange(n) == 0)
+    share = np.bincount(metric.classes.ravel(), np.repeat(area, 3), n) / (3 * area.sum())
+    return float(share @ (u - share @ u) ** 2)
+
+
+@dataclass(frozen=True)
+class _Metric:
+    """A component cut open: its vertices as classes (m,3), their curvature (n,) and whether they are on the boundary
+    (n,) bool, the boundary's edges by their ends (b,2) and how long they are (b,), and the Laplacian (n,n)."""
+
+    classes: np.ndarray
+    curvature: np.ndarray
+    on_boundary: np.ndarray
+    ends: np.ndarray
+    end_lengths: np.ndarray
+    matrix: csr_matrix
+
+    @staticmethod
+    def of(component: CutComponent, cut: np.ndarray) -> _Metric:
+        """That of a component cut open along edges (e,) bool."""
+        classes = cut_classes(component, cut)
+        n, length = int(classes.max()) + 1, halfedge_lengths(component.positions, component.triangles)
+        boundary = cut_boundary(component, cut)
+        ends = np.column_stack([side[boundary] for side in halfedges(classes)])
+        open_there, sides = np.zeros(n, dtype=bool), length.reshape(-1, 3)
+        open_there[ends] = True
+        return _Metric(
+            classes=classes,
+            curvature=angle_defects(classes, angles_from_lengths(sides), np.flatnonzero(open_there), n),
+            on_boundary=open_there,
+            ends=ends,
+            end_lengths=length[boundary],
+            matrix=laplacian_from_lengths(sides, classes, n, LEAST_STIFFNESS),
+        )
+
+    def solved(self, curvature: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+        """The log scale (n,) that flattens a curvature (n,), 0 where it is fixed (n,) bool."""
+        u = np.zeros(len(curvature))
+        u[~fixed] = solve_spd(self.matrix[~fixed][:, ~fixed].tocsc(), curvature[~fixed])
+        return u
 
 
 def spread(component: CutComponent, scale: np.ndarray) -> float:

@@ -301,11 +301,14 @@ class _Line:
         return _Line(found, vertices, last)
 
 
-def symmetric_cut(half: SymmetricHalf, extremities: int, bearable: float) -> tuple[np.ndarray, np.ndarray] | None:
+def symmetric_cut(
+    half: SymmetricHalf, extremities: int, bearable: float, once_more: bool = True
+) -> tuple[np.ndarray, np.ndarray] | None:
     """Edges (e,) bool that cut a component into a disk, symmetrically, and the tips (t,) they reach; None where there
     are none, as where a half has handles.
 
-    extremities : tips that the cut reaches, at most, until its spread is `bearable`
+    extremities : tips that the cut reaches, at most, until its spread is `bearable`; once_more : still so when the cut
+        is as short as it can be
     """
     component, chosen = half.component, np.zeros(len(half.edges), dtype=bool)
     closed = not len(component.boundary) and not half.held.any()
@@ -320,16 +323,22 @@ def symmetric_cut(half: SymmetricHalf, extremities: int, bearable: float) -> tup
     if joined is None:
         return None
     chosen = joined | half.held
-    while len(tips) < extremities:
-        scale = log_scale(component, half.whole(chosen))
-        if spread(component, scale) <= bearable:
-            break
+    while True:
+        full = len(tips) >= extremities
+        scale = np.zeros(0) if full else log_scale(component, half.whole(chosen))
+        if full or spread(component, scale) <= bearable:
+            chosen = half.shortened(half.turned(chosen, tips), tips)
+            if full or not once_more:
+                break
+            # Shorter cuts may leave more.
+            scale = log_scale(component, half.whole(chosen))
+            if spread(component, scale) <= bearable:
+                break
         tips = np.append(tips, half.peak(scale, chosen, tips))
         joined = half.joined(chosen, tips)
         if joined is None:
             return None
         chosen = half.shortened(joined, tips, 1)
-    chosen = half.shortened(half.turned(chosen, tips), tips)
     return (half.whole(chosen), half.both(tips)) if half.opens(chosen) else None
 
 

@@ -14,7 +14,7 @@ from ..analysis.seam_costs import SeamPreferences
 from ..canonical.markers import MapMarkers, markers_of_chart
 from ..cutting.cuts import Cuts
 from ..cutting.cuts import cut as cut_surface
-from ..cutting.disk_charts import DiskCharts, disk_charts
+from ..cutting.disk_charts import OUTLINED, DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural
 from ..mesh.charts import Chart, sound_disks
@@ -256,7 +256,8 @@ def cut_charts(
     given: dict[str, Any] = {"fill_holes": options.fill_holes, "sieve": MANY, "avoid": avoid}
     search = None if bound is None else ShearSearch(surface, faces, bound, target, given, rehearsal(options))
     finder = None if search is None else search.search(search.first_spread())
-    prepared = yield from disk_charts(surface, faces, seams=options.seams, search=finder, **given)
+    seams = OUTLINED if options.seams == "auto" and options.boundary != "free" else options.seams
+    prepared = yield from disk_charts(surface, faces, seams=seams, search=finder, **given)
     prepared = yield from _cut_alike(surface, faces, prepared, given)
     return replace(_to_be_mapped(surface, prepared, pins, target), search=search)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from short_cuts import component_of
 
-from omt_uv.solver.cutting.protrusions import log_scale, spread
+from omt_uv.solver.cutting.protrusions import log_scale, outline_spread, spread
 
 
 def uncut(component):
@@ -36,3 +36,19 @@ def test_the_scale_does_not_depend_on_the_unit():
 def test_the_spread_of_a_constant_is_its_square():
     component = component_of(*meshes.bumpy())
     assert spread(component, np.full(component.vertex_count, 3.0)) == pytest.approx(9)
+
+
+def test_round_surfaces_fill_a_disk_and_long_ones_are_distorted():
+    """A strip is turned at its ends alone, a circle everywhere."""
+    rings, sectors = np.divmod(np.arange(12 * 48), 48)
+    turn, radius = 2 * np.pi * sectors / 48, (rings + 1) / 12
+    V = np.concatenate([[[0, 0, 0]], np.column_stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn])])
+    here, after = 1 + np.arange(48), 1 + np.roll(np.arange(48), -1)
+    around = np.concatenate([np.column_stack([here + k, after + k, after + k - 48]) for k in range(48, 12 * 48, 48)])
+    inner = np.concatenate([np.column_stack([here + k, after + k - 48, here + k - 48]) for k in range(48, 12 * 48, 48)])
+    F = np.concatenate([np.column_stack([0 * here, here, after]), around, inner])
+    far = []
+    for stretch in (1.0, 2.0, 6.0):
+        component = component_of(V * [stretch, 1, 1], F)
+        far.append(outline_spread(component, uncut(component)))
+    assert far[0] < 1e-6 < far[1] < far[2]

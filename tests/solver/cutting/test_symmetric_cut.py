@@ -6,8 +6,10 @@ import pytest
 from meshes import polygon_surface
 from short_cuts import component_of
 
-from omt_uv.solver.cutting.cuts import cut
+from omt_uv.solver.cutting import cuts as cuts_module
+from omt_uv.solver.cutting.cuts import DEARER, STEEPER_OUTLINED, cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.cutting.protrusions import outline_spread
 from omt_uv.solver.cutting.symmetric_cut import symmetric_cut, symmetric_half
 from omt_uv.solver.mesh.mirror import find_mirror
 from omt_uv.solver.mesh.surface import Surface
@@ -53,6 +55,30 @@ def test_a_figure_is_cut_symmetrically_into_one_disk(holes, extremities):
     found = cut_to_disks(surface, extremities=extremities)
     assert len(found.charts) == 1 and len(found.cuts.edges)
     assert is_symmetric(surface, found.cuts.edges)
+
+
+def both_cuts(monkeypatch, surface, seams, extremities):
+    """The component of a surface, and its cuts (e,) bool, symmetric or not and never so."""
+    found, chosen = [], cuts_module.cut_component
+
+    def compared(component, *given):
+        found[:] = [component, chosen(component, *given)[0], cuts_module._plain_cut(component, *given[:3])[0]]
+        return found[1], np.zeros(0, np.int64)
+
+    monkeypatch.setattr(cuts_module, "cut_component", compared)
+    cut_to_disks(surface, seams=seams, extremities=extremities)
+    return found
+
+
+@pytest.mark.parametrize("holes", [[], ["limbs"], ["front", "limbs"], ["tail", "front", "limbs"]])
+@pytest.mark.parametrize("seams", ["auto", "outlined"])
+@pytest.mark.parametrize("extremities", [0, 8])
+def test_symmetry_has_its_price_and_no_more(monkeypatch, holes, seams, extremities):
+    """Symmetric cuts are at most half as dear again as others, and in an outline leave not much more distortion."""
+    component, found, plain = both_cuts(monkeypatch, figure(*holes), seams, extremities)
+    assert component.cost[found].sum() <= DEARER * component.cost[plain].sum()
+    if seams == "outlined":
+        assert outline_spread(component, found) <= STEEPER_OUTLINED * outline_spread(component, plain)
 
 
 def test_where_the_plane_runs_through_polygons_twice_nothing_is_cut_symmetrically():
