@@ -63,6 +63,24 @@ def test_constants_of_every_type_on_every_domain_stay_what_they_are():
     assert (new.keys[0].offsets == [0, 0, 2]).all() and new.folded == 0
 
 
+def test_what_lies_between_members_and_others_is_a_member_where_it_has_weight():
+    V, F = meshes.grid(4, 4)
+    W, G = meshes.grid(16, 16)
+    # A point of the finer mesh in the face of the coarser one that it lies in.
+    a, b, c = (V[F[:, k]] for k in range(3))
+    inverse = np.linalg.inv(np.stack([b - a, c - a], axis=2)[:, :2])
+    local = np.einsum("fij,wfj->wfi", inverse, (W[:, None] - a)[:, :, :2])
+    weights = np.concatenate([1 - local.sum(axis=2, keepdims=True), local], axis=2)
+    face = weights.min(axis=2).argmax(axis=1)
+    at = correspond(V, F, np.zeros((0, 2), np.int64), W, G, face, weights[np.arange(len(W)), face])
+    rng = np.random.default_rng(4)
+    member = rng.random((len(V), 3)) < 0.4
+    old = Attributes(np.zeros(len(F), np.int32), np.zeros(len(F), bool), no_marks(), groups=("a", "b", "c"),
+                     weights=member * rng.uniform(0.2, 1, member.shape), member=member)  # fmt: skip
+    new = carry(old, triangle_surface(V, F), at)
+    assert np.array_equal(new.member, new.weights > 1e-9) and 0.2 < new.member.mean() < 0.95
+
+
 def test_a_linear_uv_map_is_carried_as_it_is():
     V, F, W, G, at = mesh_and_coarser()
     linear = np.array([[0.3, 0.1], [-0.2, 0.6]])

@@ -67,6 +67,23 @@ def test_islands_stay_where_their_middle_is_and_keep_it_without_area():
     assert (new[:24].min(axis=0) + new[:24].max(axis=0)) / 2 == pytest.approx([0.125, 0.125])
 
 
+def test_all_together_grow_about_the_middle_of_what_they_cover():
+    """However many vertices lie on one side of it."""
+    V, F, uv = two_squares()
+    uv = uv + 0.4 * uv**2
+    fine = meshes.grid(9, 9)
+    readings = [reading(V, F, uv), reading(*fine, uv=0.1 * fine[0][:, :2] + [0.6, 0.1])]
+
+    def box(corners):
+        return np.array([np.min(corners, axis=0), np.max(corners, axis=0)])
+
+    before = box(np.concatenate([r.uv for r in readings]))
+    for target in (100.0, 700.0):
+        after = box(np.concatenate([new for _, new in with_texel_density(readings, target, TEXELS, False)]))
+        assert after.mean(axis=0) == pytest.approx(before.mean(axis=0), abs=1e-6)
+        assert np.ptp(after, axis=0) / np.ptp(before, axis=0) == pytest.approx(target / texel_density(readings, TEXELS))
+
+
 def test_nothing_to_measure_is_an_error():
     V, F, uv = two_squares()
     for wrong in (reading(V, F), reading(V, F, uv, np.zeros(len(F), bool))):

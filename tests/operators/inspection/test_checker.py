@@ -53,6 +53,17 @@ def test_without_a_material_none_is_left():
     assert not obj.material_slots
 
 
+def test_what_is_edited_is_chosen_whether_it_is_selected_or_not():
+    first, second = with_uvs("First"), with_uvs("Second")
+    scenes.select([first, second])
+    bpy.ops.uv.omt_checker()
+    scenes.edit(first)
+    first.select_set(False)
+    assert bpy.ops.uv.omt_checker_remove() == {"FINISHED"}
+    scenes.leave_edit()
+    assert not first.material_slots and second.material_slots
+
+
 def test_objects_that_share_a_mesh():
     first = with_uvs()
     first.data.materials.append(bpy.data.materials.new("Skin"))

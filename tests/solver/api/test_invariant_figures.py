@@ -15,6 +15,7 @@ from omt_uv.solver.analysis import curvature, density
 from omt_uv.solver.analysis.feature_edges import sharp_edges
 from omt_uv.solver.analysis.saliency import saliency
 from omt_uv.solver.analysis.vertex_scores import scaled_vertex_areas, soft_weights, vertex_score
+from omt_uv.solver.comparison import comparison_figures
 from omt_uv.solver.comparison.comparison_figures import compare, distances_to
 from omt_uv.solver.comparison.triangle_shapes import compare_shapes, topology_of
 from omt_uv.solver.mesh.geometry import face_areas, vertex_areas, vertex_normals
@@ -52,6 +53,12 @@ def order_of(told, V):
     new = np.empty(len(V), np.int64)
     new[np.roll(told.faces, -told.rolled, axis=1)] = F[told.order]
     return new
+
+
+@pytest.fixture(autouse=True)
+def fewer_samples(monkeypatch):
+    """A surface of so few faces needs no hundred thousand points to be found by: what is exact stays so."""
+    monkeypatch.setattr(comparison_figures, "POINTS", 4000)
 
 
 @pytest.mark.parametrize(("name", "way"), list(product(OF_VERTICES, WAYS)), ids=lambda x: getattr(x, "__name__", x))
