@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 
+import numpy as np
 import pytest
 
 CHART = {"object": "a", "chart": 0, "faces": 10, "folds": 1, "area_l1": 0.1, "seconds": {"packing": 1.0}, "status": "x"}
@@ -70,6 +71,15 @@ def test_a_summary_has_percentiles_growth_and_causes(package):
     assert summary.causes == {"FILE: face N of N is a line.": 3, "not done within N s": 1}
     assert summary.figures["seconds"][0] == pytest.approx(0.1)
     assert "seconds grow as bytes ^ 1.50" in summary.text() and "3 x FILE" in summary.text()
+
+
+@pytest.mark.parametrize("power", [0.8, 1.0, 2.0])
+def test_what_every_run_takes_does_not_hide_how_seconds_grow(package, power):
+    """Small files cost what starting costs; the order of the rows means nothing."""
+    sizes = 2.0 ** np.arange(16)
+    pairs = [(x, 50.0 + 0.01 * (x if x > 200 else 0) ** power * 1e6) for x in sizes]
+    pairs = [pairs[k] for k in np.random.default_rng(0).permutation(16)]
+    assert package("batch.statistics").growth_of(pairs) == pytest.approx(power, abs=0.02)
 
 
 def test_an_empty_batch_has_a_summary_and_a_page(package, tmp_path):
