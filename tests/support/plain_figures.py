@@ -45,6 +45,7 @@ def read(*names):
 
 
 def areas(P):
+    """Areas (m,) of triangles (m,3,3) in space."""
     return np.linalg.norm(np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]), axis=1) / 2
 
 
