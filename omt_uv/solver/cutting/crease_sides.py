@@ -29,27 +29,36 @@ ROUND = 1.0
 # A fold belongs to a bevel if its radius is at most that share of the side of a square with the area of the body.
 TIGHT = 0.05
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
-# whose sides meet at more than `HARD` along that share of their borders, has a hard surface: low ones of animals are
-# folded everywhere, into small sides and bluntly.
+# whose sides meet at more than `HARD` along that share of their borders, has a hard surface, and one of which nearly
+# all does: low ones of animals are folded everywhere, into small sides and bluntly.
 LARGE = 0.03
 MOSTLY = 0.7
 SHARP = 0.8
+ALL = 0.95
+# A band stays with a side unless it is no wider than the first share of its length, or turns about, and its far edge
+# would have to be longer or shorter by the second share, and is shorter than the third: where a hole is countersunk.
+COMPACT = 0.3
+STRAIN = 0.25
+NARROWS = 0.75
 # Sides stay together across an edge whose curvature, in radians and summed without sign, is no more than this, and
 # which is that share of the outline of the smaller one; laid flat, they cover no more than a share of themselves.
 STRAIGHT = 0.1
 SHARED = 0.15
 COVERED = 2e-3
 SAMPLES = 2_000
-# Joined sides fill that share of a box, turned in so many ways, at least: a cross does, sprawling nets leave a texture
-# empty.
+# Joined sides fill that share of a box, turned in so many ways, at least, and nets the second one of a square as long:
+# a cross does, sprawling ones leave a texture empty.
 FILLED = 0.4
+SPRAWLING = 0.25
 TURNS = 12
 # So many of the longest edges are tried.
 MOST_JOINED = 256
 # What does not close when it is laid flat, over its extent, does not unroll.
 GAP = 0.02
-# Sides of less than this share of the area stay with what they share most of their outline with.
+# Sides of less than this share of the area stay with what they share most of their outline with; the wall of a hole,
+# and what is beside another such side, only where both lie flat together. Specks of less than the second one always do.
 CRUMB = 3e-3
+SPECK = 3e-5
 
 
 def hard_borders(
@@ -92,7 +101,8 @@ def _has_clear_net(component: CutComponent) -> bool:
         return False
     # Corners of bevels do not lie flat, and what covers itself for that is little.
     flat, corners, _ = _laid_out(component, found.cut, np.ones(len(component.triangles), dtype=bool))
-    return _covered(flat, corners) <= MUCH
+    area, (wide, high) = face_areas(component.positions, component.triangles).sum(), _boxes(flat)
+    return _covered(flat, corners) <= MUCH and area >= SPRAWLING * float(np.maximum(wide, high).max()) ** 2
 
 
 def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
@@ -107,16 +117,24 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     if not border.any():
         return None
     area = np.bincount(side, face_areas(component.positions, component.triangles))
-    unrolls = _inner_curvature(component, side, border, np.abs(defects(component))) <= ROUND
+    curvature = np.abs(defects(component))
+    unrolls = _inner_curvature(component, side, border, curvature, len(area)) <= ROUND
     large = area >= LARGE * area.sum()
     # Bands of bevels lie between large sides; where these meet in a blunt fold, that is no bevel.
     sharp = border & ((fold > HARD) | (tight & ~large[side[joined]].all(axis=1)))
-    if area[unrolls & large].sum() < MOSTLY * area.sum() or length[sharp].sum() < SHARP * length[border].sum():
-        return None
+    mostly, keen = area[unrolls & large].sum() / area.sum(), length[sharp].sum() / length[border].sum()
     pair, blunt = np.sort(side[joined[border]], axis=1), np.where(fold[border] <= HARD, length[border], 0.0)
-    group = _with_bands(pair, length[border], blunt, large)
-    anchored = np.bincount(group, large, len(area)) > 0
-    return group[side], np.where(anchored, np.bincount(group, unrolls & large, len(area)) > 0, unrolls)
+    whole = _with_bands(pair, length[border], blunt, large, area)[side]
+    whole = _without_strained(component, whole, fold, large[side], curvature)
+    inside = np.bincount(whole, large[side]) > 0
+    border = whole[joined[:, 0]] != whole[joined[:, 1]]
+    # What is folded everywhere into sides that unroll is hard, too, if it is where bands have joined these.
+    clear = length[border & (fold > HARD)].sum() >= SHARP * length[border].sum()
+    wholly = clear and area[unrolls].sum() >= ALL * area.sum()
+    if (mostly < MOSTLY or keen < SHARP) and not wholly:
+        return None
+    flat = _inner_curvature(component, whole, border, curvature, len(inside)) <= ROUND
+    return whole, np.where(inside, np.bincount(whole, (unrolls & large)[side]) > 0, flat)
 
 
 def _tight(component: CutComponent, fold: np.ndarray) -> np.ndarray:
@@ -127,23 +145,59 @@ def _tight(component: CutComponent, fold: np.ndarray) -> np.ndarray:
     return (fold > BENT) & (width < TIGHT * np.sqrt(area.sum()) * fold)
 
 
-def _with_bands(pair: np.ndarray, length: np.ndarray, blunt: np.ndarray, large: np.ndarray) -> np.ndarray:
-    """A number (s,) for every side, the same for a large one (s,) bool and the bands of bevels around it.
+def _with_bands(
+    pair: np.ndarray, length: np.ndarray, blunt: np.ndarray, large: np.ndarray, area: np.ndarray
+) -> np.ndarray:
+    """A number (s,) for every side, the same for a large one (s,) bool and the bands of bevels around it, and for the
+    strips of the wall of a hole.
 
     pair (e,2) : the sides at the borders, the smaller one first; length (e,), blunt (e,) : of these, and of what of
-    them is no hard edge
+    them is no hard edge; area (s,)
     """
     count = len(large)
     outline, soft = (np.bincount(pair.ravel(), np.repeat(x, 2), count) for x in (length, blunt))
-    anchor = large | (soft < SHARP * outline)
+    # Bands have blunt edges all around, strips of a wall on two sides.
+    rank = np.where(large, 2, np.where(soft < SHARP * outline, 1, 0))
     keys, index = np.unique(pair_keys(*pair.T), return_inverse=True)
-    total, group, fixed = np.bincount(index.ravel(), blunt), np.arange(count), anchor.copy()
-    for one, other in paired(keys[np.argsort(-total, kind="stable")[: np.count_nonzero(total)]]):
+    total, group = np.bincount(index.ravel(), blunt), np.arange(count)
+    order = np.argsort(-total, kind="stable")[: np.count_nonzero(total)]
+    for k, (one, other) in zip(order, paired(keys[order]), strict=True):
+        # Strips of a wall are beside one another; ribbons end at one another.
+        beside = total[k] ** 2 >= min(area[one], area[other])
         one, other = group[one], group[other]
-        if one != other and not (fixed[one] and fixed[other]):
+        if one != other and (min(rank[one], rank[other]) == 0 or (beside and rank[one] == rank[other] == 1)):
             group[group == other] = one
-            fixed[one] |= fixed[other]
+            rank[one] = max(rank[one], rank[other])
     return group
+
+
+def _without_strained(component: CutComponent, side, fold, large, curvature) -> np.ndarray:
+    """A number (m,) for every triangle, that of its side (m,), but others for bands that would be strained there.
+
+    fold (e,); large (m,) bool : what is no band; curvature (n,)
+    """
+    joined, area = component.pair // 3, face_areas(component.positions, component.triangles)
+    inner = side[joined[:, 0]] == side[joined[:, 1]]
+    band = (np.bincount(side, large) > 0)[side] & ~large
+    within, beside = inner & band[joined].all(axis=1), inner & (band[joined].sum(axis=1) == 1)
+    label = graph_components(joined[within, 0], joined[within, 1], len(side))[1]
+    count = int(label.max()) + 1
+    last = np.where(band[joined[beside, 0]], joined[beside, 0], joined[beside, 1])
+    shared = np.bincount(label[last], component.length[beside], count)
+    at = np.full(component.vertex_count, -1)
+    at[component.triangles[band].ravel()] = np.repeat(label[band], 3)
+    at[component.ends[~inner]] = -1
+    bent = np.bincount(at[at >= 0], curvature[at >= 0], count)
+    outer, along = joined[~inner], np.repeat(component.length[~inner], 2).reshape(-1, 2)
+    far = np.bincount(label[outer[band[outer]]], along[band[outer]], count)
+    size = np.bincount(label, area, count)
+    shape = (size < COMPACT * shared**2) | (bent > np.pi)
+    strained = shape & (bent * size > STRAIN * shared**2) & (far < NARROWS * shared)
+    # The cone of a countersunk hole and its wall unroll each by itself.
+    smooth = within & (fold <= SMOOTH)
+    strained, label = strained[label], graph_components(joined[smooth, 0], joined[smooth, 1], len(side))[1]
+    _, number = np.unique(np.where(band & strained, len(area) + label, side), return_inverse=True)
+    return number.ravel()
 
 
 def side_borders(component: CutComponent, side: np.ndarray, unrolls: np.ndarray) -> np.ndarray:
@@ -166,12 +220,38 @@ def side_borders(component: CutComponent, side: np.ndarray, unrolls: np.ndarray)
             without = left & (chain != k)
             if _lies_flat(component, without, np.isin(group[side], (one, other))):
                 left, group = without, np.where(group == other, one, group)
+    left = _without_crumbs(component, side, group, left, unrolls, chain, pair, length)
+    return left & ~lone_edges(component, left)
+
+
+def _without_crumbs(component, side, group, left, unrolls, chain, pair, length) -> np.ndarray:
+    """Borders (e,) bool that are left where small sides stay with what is beside them; see `_chains`."""
+    area = np.bincount(side, face_areas(component.positions, component.triangles), len(unrolls))
+    total = np.bincount(group, area, len(area))
+    apart = (np.bincount(group, ~unrolls, len(area)) == 0) & ~_disks(component, left, group[side], len(area))
     for k in np.argsort(-length, kind="stable"):
         one, other = group[pair[k]]
-        total = np.bincount(group, area, len(area))
-        if one != other and min(total[one], total[other]) < CRUMB * area.sum():
-            left, group = left & (chain != k), np.where(group == other, one, group)
-    return left & ~lone_edges(component, left)
+        small = one if total[one] < total[other] else other
+        if one == other or total[small] >= CRUMB * area.sum():
+            continue
+        without, speck = left & (chain != k), total[small] < SPECK * area.sum()
+        if (
+            speck
+            or not (apart[small] or (total[[one, other]] < CRUMB * area.sum()).all())
+            or _lies_flat(component, without, np.isin(group[side], (one, other)), 0.0, float(np.sqrt(total[small])))
+        ):
+            left, group = without, np.where(group == other, one, group)
+            total[one], apart[one] = total[one] + total[other], apart[[one, other]].any()
+    return left
+
+
+def _disks(component: CutComponent, border: np.ndarray, group: np.ndarray, count: int) -> np.ndarray:
+    """Which of so many groups (m,) of triangles between borders (e,) bool are disks: they have no hole."""
+    corners = cut_classes(component, border)
+    first = np.unique(corners, return_index=True)[1]
+    inner = group[component.pair[~border, 0] // 3]
+    vertices, edges, faces = (np.bincount(x, minlength=count) for x in (group[first // 3], inner, group))
+    return vertices + edges - 2 * faces == 1
 
 
 def lone_edges(component: CutComponent, cut: np.ndarray) -> np.ndarray:
@@ -183,13 +263,15 @@ def lone_edges(component: CutComponent, cut: np.ndarray) -> np.ndarray:
     return lone
 
 
-def _inner_curvature(component: CutComponent, side: np.ndarray, border: np.ndarray, curvature) -> np.ndarray:
-    """What of the curvature (n,) lies within each side (s,), off the borders (e,) bool."""
+def _inner_curvature(
+    component: CutComponent, side: np.ndarray, border: np.ndarray, curvature: np.ndarray, count: int
+) -> np.ndarray:
+    """What of the curvature (n,) lies within each of so many sides, off the borders (e,) bool."""
     of_vertex = np.zeros(component.vertex_count, np.int64)
     of_vertex[component.triangles.ravel()] = np.repeat(side, 3)
     inner = np.ones(component.vertex_count, dtype=bool)
     inner[component.ends[border]] = False
-    return np.bincount(of_vertex[inner], curvature[inner], int(side.max()) + 1)
+    return np.bincount(of_vertex[inner], curvature[inner], count)
 
 
 def _chains(component, side, border, curvature) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -215,24 +297,41 @@ def _chains(component, side, border, curvature) -> tuple[np.ndarray, np.ndarray,
     return chain, pair[first], np.bincount(of_edge, component.length[edges], count), turned
 
 
-def _lies_flat(component: CutComponent, border: np.ndarray, rows: np.ndarray) -> bool:
+def _lies_flat(
+    component: CutComponent,
+    border: np.ndarray,
+    rows: np.ndarray,
+    filled: float = FILLED,
+    extent: float | None = None,
+) -> bool:
     """Whether triangles (m,) bool of a component that is open along borders (e,) bool unroll beside one another, and
-    fill a box well enough."""
+    fill such a share of a box; extent : of what may not move by more than `GAP` of it, that of all by default"""
     flat, corners, gap = _laid_out(component, border, rows)
-    turned = flat * np.exp(1j * np.pi / 2 * np.arange(TURNS) / TURNS)[:, None]
-    boxes = np.ptp(turned.real, axis=1) * np.ptp(turned.imag, axis=1)
     area = face_areas(component.positions, component.triangles[rows]).sum()
-    return gap <= GAP and area >= FILLED * boxes.min() and _covered(flat, corners) <= COVERED
+    extent = (
+        float(np.ptp(component.positions[component.triangles[rows]], axis=(0, 1)).max()) if extent is None else extent
+    )
+    return (
+        gap <= GAP * extent
+        and area >= filled * float(np.prod(_boxes(flat), axis=0).min())
+        and _covered(flat, corners) <= COVERED
+    )
 
 
 def _laid_out(component: CutComponent, border: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Places (k,) complex and corners (t,3) of triangles (m,) bool of a component that is open along borders (e,) bool,
-    laid flat, and how far these do not close, over their extent."""
+    laid flat, and how far these do not close."""
     corners = cut_classes(component, border)[rows]
     _, first, triangles = np.unique(corners, return_index=True, return_inverse=True)
     positions, triangles = component.positions[component.triangles[rows].ravel()[first]], triangles.reshape(-1, 3)
     flat, gap = developed(positions, triangles)
-    return flat, triangles, float(gap.max() / np.ptp(positions, axis=0).max())
+    return flat, triangles, float(gap.max())
+
+
+def _boxes(flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both extents (k,) of places (n,) complex turned in some ways."""
+    turned = flat * np.exp(1j * np.pi / 2 * np.arange(TURNS) / TURNS)[:, None]
+    return np.ptp(turned.real, axis=1), np.ptp(turned.imag, axis=1)
 
 
 def _covered(flat: np.ndarray, corners: np.ndarray) -> float:

@@ -32,7 +32,7 @@ from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import net
 from .gluing_facts import TurningLines, cost_factors, marked_triangles, total_curvature, turning_lines
 from .handle_partition import partition_pairs
-from .hole_filling import MANY, fill_holes
+from .hole_filling import MANY, fill_holes, level_parts, sieved
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
 from .steiner_points import MOST_ENDS, meeting_points
 from .symmetric_cut import symmetric_cut, symmetric_half
@@ -175,9 +175,11 @@ def cut_gluing(
         gone |= hard_borders(surface, gluing, positions, gone, search.wants)
     gluing, parting = gluing.without(gone), np.stack(gluing.ends(gluing.first[gone]), axis=1)
     apart = positions[parting[:, 0]] - positions[parting[:, 1]]
-    holes, sieves = 0, not fill
+    holes, sieves, level = 0, not fill, np.zeros(len(gluing.triangles), dtype=bool)
+    if sieve is not None and search is not None:
+        level = level_parts(gluing, positions)
     if fill or sieve is not None:
-        filled = fill_holes(surface, gluing, one_sided, None if fill else sieve)
+        filled = fill_holes(surface, gluing, one_sided, None if fill else sieve, level)
         surface, gluing, holes = filled.surface, filled.gluing, filled.holes
         one_sided = np.append(one_sided, np.zeros(len(gluing.triangles) - len(one_sided), dtype=bool))
         positions, unit = _in_unit_box(surface, gluing)
@@ -186,7 +188,7 @@ def cut_gluing(
     if avoid is not None:
         keep_free[:vertex_count] = np.clip(np.asarray(avoid, float), 0, 1)
     cutter = _Cutter(surface, gluing, positions, keep_free, extremities, search, outline)
-    gone, report, touching = yield from cutter.cut(one_sided, unit, sieves)
+    gone, report, touching = yield from cutter.cut(one_sided, unit, sieves, level)
     edges = np.stack(gluing.ends(gluing.first[gone]), axis=1)
     edges = edges[(edges < vertex_count).all(axis=1)]
     # What could not be oriented can be, now that it is cut.
@@ -219,12 +221,6 @@ def _uncut(surface: Surface, gluing: Gluing, repaired: Repaired, component_of: n
     return CutSurface(surface=surface, gluing=gluing, cuts=cuts, extent=unit)
 
 
-def sieved(holes: int) -> str:
-    """The warning that so many holes of sieves are filled."""
-    who = plural(holes, "A hole is", "{} holes are")
-    return f"{who} filled for the map: cuts to them would leave it no shape"
-
-
 def _warnings(crowded: bool, backwards: int, mirrored: int, holes: int, touching: int) -> Iterator[str]:
     """Warnings, from whether crowded parts came apart, and the numbers of faces turned over on surfaces of two sides
     and of one, of holes of sieves, and of coincident vertices."""
@@ -253,11 +249,14 @@ class _Cutter:
     search: SeamFinder | None
     outline: bool
 
-    def cut(self, one_sided: np.ndarray, unit: float, sieves: bool) -> Steps[tuple[np.ndarray, list, int]]:
+    def cut(
+        self, one_sided: np.ndarray, unit: float, sieves: bool, level: np.ndarray
+    ) -> Steps[tuple[np.ndarray, list, int]]:
         """Pairs (p,) bool to cut so that every component is a disk, what was done to each that was cut, and how many
         vertices a weld would join.
 
-        sieves : what has been filled are sieves, which are cut to extremities as closed components are, disks too
+        sieves : what has been filled are sieves, which are cut to extremities as closed components are, disks too,
+        but for those of the triangles `level`
         """
         component_of = components(self.gluing)
         whole = classify(self.gluing, corner_classes(self.gluing), component_of, one_sided)
@@ -275,6 +274,7 @@ class _Cutter:
         known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
         patched = np.zeros(len(members), dtype=bool)
         patched[component_of[self.gluing.owner < 0]] = True
+        patched[component_of[np.flatnonzero(level)]] = False
         searched = self._to_search(component_of, corner_class, members)
         chosen_ones = np.flatnonzero(~whole.is_disk | (patched & sieves) | searched)
         for count, k in enumerate(chosen_ones):

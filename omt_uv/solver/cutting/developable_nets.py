@@ -91,7 +91,7 @@ def net(component: CutComponent) -> Net | None:
 
     None if it has none, or if seams would pass through vertices to be kept free of them.
     """
-    signed = defects(component)
+    signed, area = defects(component), face_areas(component.positions, component.triangles)
     curvature = np.abs(signed)
     fold = np.abs(fold_angles(component.positions, component.triangles, component.pair))
     folded = fold > HARD
@@ -99,15 +99,21 @@ def net(component: CutComponent) -> Net | None:
     hard[component.ends[folded]] = True
     spike = ~hard & (curvature > SPIKE)
     corner = (hard & (curvature > _flat(curvature[hard]))) | spike
-    tips = np.flatnonzero(corner)
+    tips, enter = np.flatnonzero(corner), np.zeros(len(fold))
+    if component.vertex_count - len(component.pair) + len(component.triangles) == 2:
+        # The wall of a coin shall not become flaps: it is left at no less than what an edge around it costs. Walls of
+        # holes are left by the shortest way: whole they would lie on what is around them.
+        least = np.full(component.vertex_count, np.inf)
+        np.minimum.at(least, component.ends[folded].ravel(), np.repeat(component.cost[folded], 2))
+        enter = np.where(hard[component.ends].all(axis=1), least[component.ends].min(axis=1), 0.0)
     if spike.sum() > MOST_SPIKES or curvature[~corner].sum() > MOST_LEFT:
-        found = rounded_corners(component, signed, face_areas(component.positions, component.triangles))
-        folded = fold > BENT
+        found = rounded_corners(component, signed, area)
+        folded, enter = fold > BENT, np.zeros(len(fold))
         tips = np.zeros(0, np.int64) if found is None else found
     # A closed surface needs a cut of two edges at least.
     if len(tips) < 3 or (component.avoid[tips] > 0).any():
         return None
-    cost = np.where(folded, component.cost, ACROSS * component.cost) * net_factors(component, folded)
+    cost = np.where(folded, component.cost, ACROSS * component.cost + enter) * net_factors(component, folded)
     return Net(component, greedy_arcs(replace(component, cost=cost), tips), tips, cost)
 
 

@@ -20,8 +20,9 @@ from ..mesh.gluing import Gluing
 from ..mesh.repair import charts_without_area, repaired_gluing, with_area
 from ..mesh.surface import Surface, chosen_triangles, strict_gluing
 from ..progress import Steps, drain
-from .cuts import MOST_EXTREMITIES, Cuts, SeamFinder, cut_gluing, sieved, uncut
+from .cuts import MOST_EXTREMITIES, Cuts, SeamFinder, cut_gluing, uncut
 from .hole_filling import fill_holes as fill_holes_of
+from .hole_filling import sieved
 
 SEAMS = ("existing", "auto")
 # What is wrong with a mesh where a repair helps.

@@ -10,42 +10,83 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import plural
+from ..mesh.geometry import face_areas, face_normals
 from ..mesh.gluing import Gluing, components, corner_classes
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, halfedges
 from .component import NOISE
+from .gluing_facts import total_curvature
 
 NO_POLYGON = -1
 # Cuts to more holes than these make a chart of slits, for which there is hardly a map: such a component is a sieve.
 MANY = 32
+# A component looks one way if its normals sum up to that share of their lengths, and unrolls with no more curvature
+# than the second figure; its holes are small with no more than the third share of it.
+LEVEL = 0.95
+FLAT = 1e-3
+SMALL = 0.01
 # Boundaries of a sieve that are so many times as long as most are no holes, but outer boundaries; at most MANY.
 OUTSTANDING = 3.0
 
 
 @dataclass(frozen=True)
 class Filled:
-    """The surface with a vertex in the middle of every hole, the gluing with the fans, and the number of holes."""
+    """The surface with a vertex in the middle of every hole, the gluing with the fans, and the number of holes, but for
+    those of what was to be filled as a whole."""
 
     surface: Surface
     gluing: Gluing
     holes: int
 
 
-def fill_holes(surface: Surface, gluing: Gluing, one_sided: np.ndarray, sieve: int | None = None) -> Filled:
+def fill_holes(
+    surface: Surface,
+    gluing: Gluing,
+    one_sided: np.ndarray,
+    sieve: int | None = None,
+    whole: np.ndarray | None = None,
+) -> Filled:
     """Fill all boundaries but the longest of every component of an oriented gluing.
 
     one_sided : (m,) triangles that are left alone
     sieve : fill only where there are more than so many holes, and leave outer boundaries open
+    whole : (m,) triangles of components that are filled all the same
     """
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
-    boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve)
+    boundary, loop = hole_boundaries(surface.positions, gluing, one_sided, sieve, whole)
     if len(boundary) == 0:
         return Filled(surface, gluing, 0)
-    return _fans(surface, gluing, boundary, loop, tail, head, int(max(tail.max(), head.max())) + 1)
+    counted = len(np.unique(loop if whole is None else loop[~whole[boundary // 3]]))
+    filled = _fans(surface, gluing, boundary, loop, tail, head, int(max(tail.max(), head.max())) + 1)
+    return replace(filled, holes=counted)
+
+
+def level_parts(gluing: Gluing, positions: np.ndarray) -> np.ndarray:
+    """Triangles (m,) bool of components that look one way but do not quite unroll: their holes need no cut.
+
+    Cuts to the holes of what unrolls close again in its map.
+    """
+    component_of, triangles = components(gluing), gluing.vertex[gluing.triangles]
+    area = face_areas(positions, triangles)
+    vector = area[:, None] * face_normals(positions, triangles)
+    whole = np.linalg.norm(np.stack([np.bincount(component_of, x) for x in vector.T]), axis=0)
+    curvature = total_curvature(gluing, corner_classes(gluing), component_of, positions)
+    return ((whole >= LEVEL * np.bincount(component_of, area)) & (curvature > FLAT))[component_of]
+
+
+def sieved(holes: int) -> str:
+    """The warning that so many holes of sieves are filled."""
+    who = plural(holes, "A hole is", "{} holes are")
+    return f"{who} filled for the map: cuts to them would leave it no shape"
 
 
 def hole_boundaries(
-    positions: np.ndarray, gluing: Gluing, one_sided: np.ndarray, sieve: int | None = None
+    positions: np.ndarray,
+    gluing: Gluing,
+    one_sided: np.ndarray,
+    sieve: int | None = None,
+    whole: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The halfedges (r,) around the holes that `fill_holes` fills, and the number (r,) of the hole of each."""
     tail, head = halfedges(corner_classes(gluing)[gluing.triangles])
@@ -58,28 +99,41 @@ def hole_boundaries(
     size = int(max(tail.max(), head.max())) + 1
     loop = graph_components(tail[boundary], head[boundary], size)[1]
     loop = np.unique(loop[tail[boundary]], return_inverse=True)[1].ravel()
-    hole = _holes(positions, gluing, boundary, loop, sieve)
+    hole = _holes(positions, gluing, boundary, loop, sieve, whole)
     return boundary[hole[loop]], np.unique(loop[hole[loop]], return_inverse=True)[1].ravel()
 
 
 def _holes(
-    positions: np.ndarray, gluing: Gluing, boundary: np.ndarray, loop: np.ndarray, sieve: int | None
+    positions: np.ndarray,
+    gluing: Gluing,
+    boundary: np.ndarray,
+    loop: np.ndarray,
+    sieve: int | None,
+    whole: np.ndarray | None,
 ) -> np.ndarray:
-    """Loops (l,) bool that are not the longest of their component, or that are holes of sieves."""
+    """Loops (l,) bool that are not the longest of their component, or that are holes of sieves or of the triangles
+    `whole`."""
     a, b = gluing.ends(boundary)
     # Halves: the difference of two huge numbers may be infinite.
     step = np.linalg.norm(positions[a] / 2 - positions[b] / 2, axis=1)
     around = np.bincount(loop, step)
     # Of many equal holes rounding shall not choose the one that stays open.
     length = around * (1 + NOISE * np.random.default_rng(0).random(len(around)))
-    component_of = components(gluing)[boundary[np.unique(loop, return_index=True)[1]] // 3]
+    first_of = boundary[np.unique(loop, return_index=True)[1]]
+    component_at, size = components(gluing), face_areas(positions, gluing.vertex[gluing.triangles])
+    component_of = component_at[first_of // 3]
     order = np.lexsort((-length, component_of))
     _, first, place, count = np.unique(component_of[order], return_index=True, return_inverse=True, return_counts=True)
     hole = np.ones(len(length), dtype=bool)
     hole[order[first]] = False
     if sieve is not None:
+        inner = hole.copy()
         ordinary = length[order[first + np.minimum(count // 2, MANY)]]
         hole[order] &= (count > sieve + 1)[place] & (length[order] <= OUTSTANDING * ordinary[place])
+        if whole is not None:
+            # A disk inside such a loop is no more than that.
+            small = around**2 <= 4 * np.pi * SMALL * np.bincount(component_at, size)[component_of]
+            hole |= inner & small & whole[first_of // 3]
     return hole
 
 

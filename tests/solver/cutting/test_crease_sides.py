@@ -108,6 +108,82 @@ def test_bands_of_bevels_go_with_the_sides_beside_them():
     assert all(m.angle_mean < 1.05 and m.folds == 0 for m in found.maps)
 
 
+def plate(*steps, sectors=48):
+    """A round plate with a hole of some steps (radius, height) down from its top."""
+    return turned([(steps[-1][0], -0.05), (1.0, -0.05), (1.0, 0.05), *steps], sectors)
+
+
+@pytest.mark.parametrize(
+    "steps, slopes",
+    [([(0.08, 0.05)], 2), ([(0.3, 0.05), (0.3, 0.0), (0.1, 0.0)], 2)],
+    ids=["plain", "stepped"],
+)
+def test_holes_leave_a_plate_flat(steps, slopes):
+    V, Q = plate(*steps)
+    component = component_of(V, triangles_of(Q))
+    side = sides(component, borders(component))
+    corners = component.positions[component.triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    slope = np.round(np.abs(normal[:, 2]) / np.linalg.norm(normal, axis=1), 3)
+    assert len(np.unique(slope)) == slopes
+    # What is level, the cone, and walls each are sides of their own.
+    assert all(len(np.unique(slope[side == k])) == 1 for k in range(side.max() + 1))
+    found, shear = shear_of(surface_of(V, Q))
+    assert shear < 1.001 and sum(m.folds for m in found.maps) == 0
+
+
+def test_a_hole_with_a_cone_and_a_wall_comes_apart_from_what_is_level():
+    V, Q = plate((0.2, 0.05), (0.1, -0.02), sectors=48)
+    component = component_of(V, triangles_of(Q))
+    side, unrolls = hard_sides(component)
+    tight = np.linalg.norm(component.positions[component.triangles].mean(axis=1)[:, :2], axis=1) < 0.15
+    assert not np.isin(np.unique(side[tight]), np.unique(side[~tight])).all()
+    assert unrolls.all()
+
+
+def test_many_small_sides_are_a_hard_surface_where_they_are_all_of_it():
+    # A ring with teeth, whose flat sides are a tenth of it: no tooth is large, and all edges are hard.
+    k = 40
+    angle, r = np.pi * np.arange(2 * k) / k, np.where(np.arange(2 * k) % 4 < 2, 1.0, 0.85)
+    wall = np.column_stack([r * np.cos(angle), r * np.sin(angle)])
+    V = np.concatenate(
+        [np.column_stack([s * wall, np.full(2 * k, z)]) for s, z in ((1, 0), (1, 1), (0.8, 1), (0.8, 0))]
+    )
+    i, j = np.arange(2 * k), np.roll(np.arange(2 * k), -1)
+    Q = np.concatenate(
+        [
+            np.stack([2 * k * a + i, 2 * k * a + j, 2 * k * b + j, 2 * k * b + i], axis=1)
+            for a, b in ((0, 1), (1, 2), (2, 3), (3, 0))
+        ]
+    )
+    found = hard_sides(component_of(V, triangles_of(Q)))
+    assert found is not None and found[1].all()
+    charts, shear = shear_of(surface_of(V, Q))
+    assert shear < 1.001 and sum(m.folds for m in charts.maps) == 0
+
+
+@pytest.mark.parametrize("sectors, depth", [(16, 0.15), (32, 0.1), (64, 0.02)])
+def test_the_wall_of_a_coin_stays_in_strips(sectors, depth):
+    angle = 2 * np.pi * np.arange(sectors) / sectors
+    V, F = prism(np.column_stack([np.cos(angle), np.sin(angle)]), depth)
+    found, shear = shear_of(triangle_surface(V, F))
+    assert shear < 1.001
+    upright = [np.ptp(c.vertices[c.triangles][:, :, 2], axis=1) > 0 for c in found.charts]
+    # No flap hangs on a face, and few pieces of the wall are no flaps either.
+    assert all(k.all() or not k.any() for k in upright) and sum(k.all() for k in upright) <= 8
+
+
+def test_a_relief_with_holes_is_not_cut_to_them():
+    # It looks one way, and does not unroll.
+    V, F = meshes.grid(24, 24)
+    V = V + np.column_stack([np.zeros((len(V), 2)), 0.04 * np.sin(9 * V[:, 0]) * np.sin(7 * V[:, 1])])
+    middle = V[F].mean(axis=1)[:, :2]
+    hole = (np.abs(middle - [0.3, 0.4]).max(axis=1) < 0.06) | (np.abs(middle - [0.7, 0.6]).max(axis=1) < 0.06)
+    (chart,) = shear_of(triangle_surface(V, F[~hole]))[0].charts
+    # Its vertices are those of the mesh, none twice, and one in each hole.
+    assert len(chart.vertices) == len(np.unique(F[~hole])) + 2 and len(chart.patches) > 0
+
+
 def test_the_number_of_segments_of_an_arc_does_not_make_it_a_bevel():
     angle = np.linspace(0, 1.5 * np.pi, 20)
     coarse = np.concatenate([[[0.0, 0.0]], np.column_stack([np.cos(angle), np.sin(angle)])])
