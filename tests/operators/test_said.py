@@ -119,6 +119,39 @@ def test_regions_are_counted(said):
         assert said("uv.omt_regions", kind="GROUPS")[0] == [count]
 
 
+@pytest.mark.parametrize("kind", ["MATERIALS", "GROUPS", "ATTRIBUTE"])
+@pytest.mark.parametrize("bare", [0, 1])
+def test_regions_are_those_of_all_objects_also_where_one_has_none(said, kind, bare):
+    objects = [scenes.bump(4, 3, name="First"), scenes.bump(4, 3, name="Second", offset=2.0)]
+    for obj in objects:
+        scenes.set_uv(obj, scenes.seen_from_above(obj, 0.2))
+    mesh = objects[1 - bare].data
+    if kind == "MATERIALS":
+        for name in ("red", "blue"):
+            mesh.materials.append(bpy.data.materials.new(name))
+        mesh.polygons[2].material_index = 1
+    elif kind == "GROUPS":
+        for k in range(2):
+            objects[1 - bare].vertex_groups.new(name=f"group {k}").add(list(range(9 + k)), 1.0, "REPLACE")
+    else:
+        mesh.attributes.new("kind", "INT", "FACE").data.foreach_set("value", [1 + k % 2 for k in range(12)])
+    # Faces without a material are a region of their own; those without a value are none.
+    told, _ = said("uv.omt_regions", kind=kind, attribute="kind" if kind == "ATTRIBUTE" else "")
+    assert told == [3 if kind == "MATERIALS" else 2]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_faces_of_empty_slots_are_a_region_beside_those_of_materials(said, count):
+    for k in range(count):
+        obj = scenes.bump(4, 3, name=f"Patch {k}", offset=2.0 * k)
+        scenes.set_uv(obj, scenes.seen_from_above(obj, 0.2))
+        obj.data.materials.append(bpy.data.materials.new(f"own {k}"))
+        obj.data.materials.append(None)
+        for face in range(5):
+            obj.data.polygons[face].material_index = 1
+    assert said("uv.omt_regions", kind="MATERIALS")[0] == [count + 1]
+
+
 @pytest.mark.parametrize("count", [2, 5])
 def test_parts_that_are_opened_are_counted_over_all_objects(said, count):
     found = spheres(count, 1)

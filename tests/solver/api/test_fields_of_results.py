@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from sphere_shapes import blob
 
 from omt_uv.solver.analysis.region_density import MOST_OF_HARD, exact_density, target_density
+from omt_uv.solver.comparison import comparison_figures
 from omt_uv.solver.conformal.disk_map import conformal_disk
 from omt_uv.solver.errors import ShareError
 from omt_uv.solver.flows.domain import ball_domain
@@ -60,6 +61,23 @@ def test_of_the_strain_of_regions():
     for one, other in ((far, near), (near, far)):
         assert compare_regions(one, other) == pytest.approx({"all": 1.0, "soft": 1.0, "hard": 1.0})
     assert compare_regions(rows, near[:2]).keys() == {"all", "soft"}
+
+
+@pytest.mark.parametrize(("width", "mean"), [(0.03, 0.9), (0.07, 2.1)])
+def test_of_the_normals_of_a_comparison(width, mean, monkeypatch):
+    """A sheet, a strip of which is bent up by 30 degrees: three hundredths are beyond the 95th, not the 99th part."""
+    monkeypatch.setattr(comparison_figures, "POINTS", 20_000)
+    x, y = np.meshgrid([0.0, 0.5, 1 - width, 1.0], np.linspace(0, 1, 5))
+    V = np.column_stack([x.ravel(), y.ravel(), np.zeros(20)])
+    a = (np.arange(4)[:, None] * 4 + np.arange(3)).ravel()
+    F = np.concatenate([np.column_stack([a, a + 1, a + 5]), np.column_stack([a, a + 5, a + 4])])
+    bent = V + np.where(V[:, :1] > 0.999, width * np.array([np.cos(np.pi / 6) - 1, 0, 0.5]), 0)
+    found = drain(comparison_figures.compare((V, F), (bent, F)))
+    assert found.normal_p99 == pytest.approx(30, abs=0.1) and found.normal_mean == pytest.approx(mean, rel=0.15)
+    few = drain(comparison_figures.compare((V, F), (V + 0.0, F)))
+    assert few.normal_p99 < 1e-3 and few.hausdorff < 1e-9
+    # The other way: what bends up is farthest from the sheet, by half of the strip's width.
+    assert found.hausdorff_b == pytest.approx(0.5 * width / np.sqrt(2), rel=0.02)
 
 
 @pytest.mark.parametrize("size", [1.0, 0.01, 300.0])
