@@ -65,7 +65,7 @@ def test_of_the_strain_of_regions():
 
 @pytest.mark.parametrize(("width", "mean"), [(0.03, 0.9), (0.07, 2.1)])
 def test_of_the_normals_of_a_comparison(width, mean, monkeypatch):
-    """A sheet, a strip of which is bent up by 30 degrees: three hundredths are beyond the 95th, not the 99th part."""
+    """A patch, a strip of which is bent up by 30 degrees: three hundredths are beyond the 95th, not the 99th part."""
     monkeypatch.setattr(comparison_figures, "POINTS", 20_000)
     x, y = np.meshgrid([0.0, 0.5, 1 - width, 1.0], np.linspace(0, 1, 5))
     V = np.column_stack([x.ravel(), y.ravel(), np.zeros(20)])
@@ -76,7 +76,7 @@ def test_of_the_normals_of_a_comparison(width, mean, monkeypatch):
     assert found.normal_p99 == pytest.approx(30, abs=0.1) and found.normal_mean == pytest.approx(mean, rel=0.15)
     few = drain(comparison_figures.compare((V, F), (V + 0.0, F)))
     assert few.normal_p99 < 1e-3 and few.hausdorff < 1e-9
-    # The other way: what bends up is farthest from the sheet, by half of the strip's width.
+    # The other way: what bends up is farthest from the patch, by half of the strip's width.
     assert found.hausdorff_b == pytest.approx(0.5 * width / np.sqrt(2), rel=0.02)
 
 
