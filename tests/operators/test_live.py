@@ -56,6 +56,21 @@ def test_the_uvs_follow_the_slider(patch, slider, package):
     assert (scenes.uv_of(patch) == seen[2]).all()
 
 
+@pytest.mark.parametrize("tile", [1001, 1010, 1013, 1100])
+def test_what_is_accepted_is_packed_into_the_tile_of_the_last_unwrap(patch, slider, tile):
+    operator, before = begin(pack=True), slider.tile
+    slider.tile, slider.balance = tile, 0.7
+    try:
+        tick(operator, 3)
+        assert operator.modal(bpy.context, event("RET", "PRESS")) == {"FINISHED"}
+    finally:
+        slider.tile = before
+    corner = divmod(tile - 1001, 10)[::-1]
+    uv = scenes.uv_of(patch)
+    assert (np.floor((uv.min(axis=0) + uv.max(axis=0)) / 2) == corner).all()
+    assert (uv >= corner).all() and (uv <= np.add(corner, 1)).all()
+
+
 def test_escape_gives_every_bit_back(patch, slider):
     before = scenes.state(patch)
     operator = begin()
