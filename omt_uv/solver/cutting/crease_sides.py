@@ -12,8 +12,8 @@ import numpy as np
 
 from ..analysis.feature_edges import fold_angles
 from ..maps.development import developed
-from ..maps.overlap import overlap_share
-from ..mesh.geometry import face_areas
+from ..maps.overlap import cover_pairs, overlap_share
+from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
 from ..mesh.topology import graph_components, pair_keys, paired
@@ -41,10 +41,12 @@ COMPACT = 0.3
 STRAIN = 0.25
 NARROWS = 0.75
 # Sides stay together across an edge whose curvature, in radians and summed without sign, is no more than this, and
-# which is that share of the outline of the smaller one; laid flat, they cover no more than a share of themselves.
+# which is that share of the outline of the smaller one; laid flat, they cover no more than a share of themselves, and
+# of the smaller one.
 STRAIGHT = 0.1
 SHARED = 0.15
 COVERED = 2e-3
+COVERED_PART = 1e-2
 SAMPLES = 2_000
 # Joined sides fill that share of a box, turned in so many ways, at least, and nets the second one of a square as long:
 # a cross does, sprawling ones leave a texture empty.
@@ -212,13 +214,14 @@ def side_borders(component: CutComponent, side: np.ndarray, unrolls: np.ndarray)
     outline = np.bincount(pair.ravel(), np.repeat(length, 2), len(area))
     smaller = np.take_along_axis(pair, np.argmin(area[pair], axis=1)[:, None], axis=1)[:, 0]
     fits = unrolls[pair].all(axis=1) & (turned <= STRAIGHT) & (length >= SHARED * outline[smaller])
-    group = np.arange(len(area))
+    group, total = np.arange(len(area)), area.copy()
     left = border.copy()
     for k in np.argsort(-length, kind="stable")[:MOST_JOINED]:
         one, other = group[pair[k]]
         if fits[k] and one != other:
             without = left & (chain != k)
-            if _lies_flat(component, without, np.isin(group[side], (one, other))):
+            if _lies_flat(component, without, *_rows(group[side], total, one, other)):
+                total[one] += total[other]
                 left, group = without, np.where(group == other, one, group)
     left = _without_crumbs(component, side, group, left, unrolls, chain, pair, length)
     return left & ~lone_edges(component, left)
@@ -238,7 +241,7 @@ def _without_crumbs(component, side, group, left, unrolls, chain, pair, length) 
         if (
             speck
             or not (apart[small] or (total[[one, other]] < CRUMB * area.sum()).all())
-            or _lies_flat(component, without, np.isin(group[side], (one, other)), 0.0, float(np.sqrt(total[small])))
+            or _lies_flat(component, without, *_rows(group[side], total, one, other), 0.0, float(np.sqrt(total[small])))
         ):
             left, group = without, np.where(group == other, one, group)
             total[one], apart[one] = total[one] + total[other], apart[[one, other]].any()
@@ -297,15 +300,25 @@ def _chains(component, side, border, curvature) -> tuple[np.ndarray, np.ndarray,
     return chain, pair[first], np.bincount(of_edge, component.length[edges], count), turned
 
 
+def _rows(group: np.ndarray, total: np.ndarray, one: int, other: int) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (m,) bool of two groups (m,), and those of the smaller one by their areas (s,)."""
+    return np.isin(group, (one, other)), group == (one if total[one] < total[other] else other)
+
+
 def _lies_flat(
     component: CutComponent,
     border: np.ndarray,
     rows: np.ndarray,
+    part: np.ndarray,
     filled: float = FILLED,
     extent: float | None = None,
 ) -> bool:
     """Whether triangles (m,) bool of a component that is open along borders (e,) bool unroll beside one another, and
-    fill such a share of a box; extent : of what may not move by more than `GAP` of it, that of all by default"""
+    fill such a share of a box.
+
+    part (m,) bool : those of them that are beside what is known to lie flat; extent : of what may not move by more than
+    `GAP` of it, that of all by default
+    """
     flat, corners, gap = _laid_out(component, border, rows)
     area = face_areas(component.positions, component.triangles[rows]).sum()
     extent = (
@@ -315,6 +328,7 @@ def _lies_flat(
         gap <= GAP * extent
         and area >= filled * float(np.prod(_boxes(flat), axis=0).min())
         and _covered(flat, corners) <= COVERED
+        and _part_covered(flat, corners, np.flatnonzero(part[rows])) <= COVERED_PART
     )
 
 
@@ -332,6 +346,17 @@ def _boxes(flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Both extents (k,) of places (n,) complex turned in some ways."""
     turned = flat * np.exp(1j * np.pi / 2 * np.arange(TURNS) / TURNS)[:, None]
     return np.ptp(turned.real, axis=1), np.ptp(turned.imag, axis=1)
+
+
+def _part_covered(flat: np.ndarray, corners: np.ndarray, part: np.ndarray) -> float:
+    """Which share of some triangles (p,) others of them (t,3) with places (k,) complex cover, too: a small part of them
+    is missed by samples of all."""
+    uv = np.stack([flat.real, flat.imag], axis=1)[corners]
+    inside = 0.75 * np.eye(3) + 0.25 / 3
+    point, over = cover_pairs(uv, np.einsum("kc,pcd->pkd", inside, uv[part]).reshape(-1, 2))
+    twice = np.unique(point[over != part[point // 3]])
+    area = np.abs(signed_areas(uv[part].reshape(-1, 2), np.arange(3 * len(part)).reshape(-1, 3)))
+    return float(area[twice // 3].sum() / (3 * area.sum()))
 
 
 def _covered(flat: np.ndarray, corners: np.ndarray) -> float:

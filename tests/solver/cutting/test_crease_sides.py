@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from short_cuts import component_of
 
-from omt_uv.solver.cutting.crease_sides import hard_sides, lone_edges, side_borders
+from omt_uv.solver.cutting.crease_sides import _part_covered, hard_sides, lone_edges, side_borders
 from omt_uv.solver.mesh.surface import Surface, triangle_surface
 from omt_uv.solver.mesh.topology import graph_components
 from omt_uv.solver.parameterization.options import UnwrapOptions
@@ -171,6 +171,15 @@ def test_the_wall_of_a_coin_stays_in_strips(sectors, depth):
     upright = [np.ptp(c.vertices[c.triangles][:, :, 2], axis=1) > 0 for c in found.charts]
     # No flap hangs on a face, and few pieces of the wall are no flaps either.
     assert all(k.all() or not k.any() for k in upright) and sum(k.all() for k in upright) <= 8
+
+
+def test_a_small_part_that_lies_on_a_large_one_is_seen():
+    V, F = meshes.grid(40, 40)
+    small = np.array([[0.512, 0.503], [0.522, 0.503], [0.512, 0.511]])
+    for move, share in ((0.0, 1.0), (1.0, 0.0)):
+        flat = np.concatenate([V[:, :2], small + [move, 0]]) @ [1, 1j]
+        corners = np.concatenate([F, len(V) + np.arange(3)[None]])
+        assert _part_covered(flat, corners, np.array([len(F)])) == share
 
 
 def test_a_relief_with_holes_is_not_cut_to_them():
