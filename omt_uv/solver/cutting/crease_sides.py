@@ -29,12 +29,13 @@ ROUND = 1.0
 # A fold belongs to a bevel if its radius is at most that share of the side of a square with the area of the body.
 TIGHT = 0.05
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
-# whose sides meet at more than `HARD` along that share of their borders, has a hard surface, and one of which nearly
-# all does: low ones of animals are folded everywhere, into small sides and bluntly.
+# whose sides meet at more than `HARD` along that share of their borders, has a hard surface, and one of so many sides
+# that nearly all unroll: low ones of animals are folded everywhere, into small sides and bluntly.
 LARGE = 0.03
 MOSTLY = 0.7
 SHARP = 0.8
 ALL = 0.95
+MOST_SIDES = 2_000
 # A band stays with a side unless it is no wider than the first share of its length, or turns about, and its far edge
 # would have to be longer or shorter by the second share, and is shorter than the third: where a hole is countersunk.
 COMPACT = 0.3
@@ -53,7 +54,7 @@ SAMPLES = 2_000
 FILLED = 0.4
 SPRAWLING = 0.25
 TURNS = 12
-# So many of the longest edges are tried.
+# So many of the longest edges are tried, and of those around small sides.
 MOST_JOINED = 256
 # What does not close when it is laid flat, over its extent, does not unroll.
 GAP = 0.02
@@ -125,15 +126,17 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     # Bands of bevels lie between large sides; where these meet in a blunt fold, that is no bevel.
     sharp = border & ((fold > HARD) | (tight & ~large[side[joined]].all(axis=1)))
     mostly, keen = area[unrolls & large].sum() / area.sum(), length[sharp].sum() / length[border].sum()
+    sure = mostly >= MOSTLY and keen >= SHARP
+    # Of noise every triangle is a side.
+    if not sure and (len(area) > MOST_SIDES or area[unrolls].sum() < ALL * area.sum()):
+        return None
     pair, blunt = np.sort(side[joined[border]], axis=1), np.where(fold[border] <= HARD, length[border], 0.0)
     whole = _with_bands(pair, length[border], blunt, large, area)[side]
     whole = _without_strained(component, whole, fold, large[side], curvature)
     inside = np.bincount(whole, large[side]) > 0
     border = whole[joined[:, 0]] != whole[joined[:, 1]]
     # What is folded everywhere into sides that unroll is hard, too, if it is where bands have joined these.
-    clear = length[border & (fold > HARD)].sum() >= SHARP * length[border].sum()
-    wholly = clear and area[unrolls].sum() >= ALL * area.sum()
-    if (mostly < MOSTLY or keen < SHARP) and not wholly:
+    if not sure and length[border & (fold > HARD)].sum() < SHARP * length[border].sum():
         return None
     flat = _inner_curvature(component, whole, border, curvature, len(inside)) <= ROUND
     return whole, np.where(inside, np.bincount(whole, (unrolls & large)[side]) > 0, flat)
@@ -232,17 +235,19 @@ def _without_crumbs(component, side, group, left, unrolls, chain, pair, length) 
     area = np.bincount(side, face_areas(component.positions, component.triangles), len(unrolls))
     total = np.bincount(group, area, len(area))
     apart = (np.bincount(group, ~unrolls, len(area)) == 0) & ~_disks(component, left, group[side], len(area))
+    tries = MOST_JOINED
     for k in np.argsort(-length, kind="stable"):
         one, other = group[pair[k]]
         small = one if total[one] < total[other] else other
         if one == other or total[small] >= CRUMB * area.sum():
             continue
-        without, speck = left & (chain != k), total[small] < SPECK * area.sum()
-        if (
-            speck
-            or not (apart[small] or (total[[one, other]] < CRUMB * area.sum()).all())
-            or _lies_flat(component, without, *_rows(group[side], total, one, other), 0.0, float(np.sqrt(total[small])))
-        ):
+        without = left & (chain != k)
+        stays = total[small] < SPECK * area.sum()
+        stays |= not (apart[small] or (total[[one, other]] < CRUMB * area.sum()).all())
+        if not stays and tries:
+            tries, extent = tries - 1, float(np.sqrt(total[small]))
+            stays = _lies_flat(component, without, *_rows(group[side], total, one, other), 0.0, extent)
+        if stays:
             left, group = without, np.where(group == other, one, group)
             total[one], apart[one] = total[one] + total[other], apart[[one, other]].any()
     return left

@@ -212,6 +212,12 @@ def test_what_is_round_all_over_stays_whole(mesh):
     assert hard_sides(component_of(*mesh)) is None
 
 
+def test_noise_is_no_hard_surface():
+    V, F = meshes.grid(50, 50)
+    V = V + np.column_stack([np.zeros((len(V), 2)), 0.02 * np.random.default_rng(0).standard_normal(len(V))])
+    assert hard_sides(component_of(V, F)) is None
+
+
 def test_an_edge_that_touches_no_other_of_a_cut_is_told():
     component = component_of(*meshes.grid(8, 8))
     middle = 8 * component.positions[component.ends].mean(axis=1)[:, :2]
