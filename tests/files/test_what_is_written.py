@@ -45,10 +45,7 @@ def test_a_face_that_is_missing_is_seen(package, tmp_path, suffix):
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb", ".gltf", ".fbx"])
 def test_uvs_that_are_missing_are_seen(package, tmp_path, suffix):
-    obj = patch("Patch")
-    bare = obj.copy()
-    bare.data = obj.data.copy()
-    bpy.context.collection.objects.link(bare)
+    obj, bare = patch("Patch"), patch("Bare")
     bare.data.uv_layers.remove(bare.data.uv_layers[0])
     with pytest.raises(package("files.verified").FileError, match="uv corners"):
         package("files.read_back").check(written(package, tmp_path, suffix, bare), suffix, [obj])
