@@ -22,7 +22,8 @@ NEAR = 3
 # Share of the length of all sides along one direction that makes it the direction of an island. Directions without
 # any order put 0.04 there, three families of parallel edges 0.33, hand-made grids 0.5 and more.
 DOMINANT = 0.3
-# Share of the outline along one direction from which on the outline alone decides: squares, nets.
+# Share of the outline along one direction from which on the outline alone decides: squares, nets. With less it does
+# where it is clearer than all sides are, among which are the diagonals of what came in triangles.
 STRAIGHT = 0.5
 # Heights have a direction in the map where their gradients add up to this share of what they would in parallel, ...
 PARALLEL = 0.1
@@ -100,7 +101,7 @@ def _together(charts: Sequence[Chart], maps: Sequence[np.ndarray]) -> _Islands:
 def _edge_directions(islands: _Islands) -> tuple[np.ndarray, np.ndarray]:
     """Share (k,) of the length of sides along one direction up to quarter turns, and that direction (k,).
 
-    Sides are those of the outline where it is straight enough, else those of all polygons.
+    Sides are those of the outline where it is straight enough or straighter, else those of all polygons.
     """
     tail, head = halfedges(islands.triangles)
     face = np.repeat(islands.polygons, 3)
@@ -110,7 +111,7 @@ def _edge_directions(islands: _Islands) -> tuple[np.ndarray, np.ndarray]:
     side = outline.copy()
     side[first] = face[first] != face[second]
     (share, direction), (straight, along) = (_main_direction(islands, tail, head, x) for x in (side, outline))
-    own = straight >= STRAIGHT
+    own = straight >= np.minimum(np.maximum(share, DOMINANT), STRAIGHT)
     return np.where(own, straight, share), np.where(own, along, direction)
 
 

@@ -96,3 +96,16 @@ def test_islands_do_not_depend_on_each_other():
     for chart, uv, found in zip(charts, turned, together, strict=True):
         np.testing.assert_allclose(found, turn_upright([chart], [uv], [UP])[0], atol=1e-12)
     assert turn_upright([], [], []) == []
+
+
+@pytest.mark.parametrize("angle", [0.2, 0.7, 2.5])
+def test_an_outline_that_is_straight_in_part_decides_over_diagonals(angle):
+    """A plate with round ends, in a fan of triangles: its long sides are upright."""
+    arc = np.linspace(-np.pi / 2, np.pi / 2, 24)
+    end = np.stack([0.6 + 0.5 * np.cos(arc), 0.5 * np.sin(arc)], axis=1)
+    ring = np.concatenate([end, -end])
+    k = np.arange(len(ring))
+    V = np.column_stack([np.concatenate([ring, [[0, 0]]]) @ rotation(angle).T, np.zeros(len(ring) + 1)])
+    chart = chart_of(triangle_surface(V, np.stack([k, np.roll(k, -1), np.full(len(ring), len(ring))], axis=1)))
+    (found,) = turn_upright([chart], [chart.vertices[:, :2]], [UP])
+    assert np.sort(np.ptp(found, axis=0)) == pytest.approx([1.0, 2.2], abs=0.01)
