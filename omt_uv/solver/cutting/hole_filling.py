@@ -120,7 +120,7 @@ def _holes(
     # Of many equal holes rounding shall not choose the one that stays open.
     length = around * (1 + NOISE * np.random.default_rng(0).random(len(around)))
     first_of = boundary[np.unique(loop, return_index=True)[1]]
-    component_at, size = components(gluing), face_areas(positions, gluing.vertex[gluing.triangles])
+    component_at = components(gluing)
     component_of = component_at[first_of // 3]
     order = np.lexsort((-length, component_of))
     _, first, place, count = np.unique(component_of[order], return_index=True, return_inverse=True, return_counts=True)
@@ -130,9 +130,10 @@ def _holes(
         inner = hole.copy()
         ordinary = length[order[first + np.minimum(count // 2, MANY)]]
         hole[order] &= (count > sieve + 1)[place] & (length[order] <= OUTSTANDING * ordinary[place])
-        if whole is not None:
+        if whole is not None and whole.any():
+            size = np.bincount(component_at, face_areas(positions, gluing.vertex[gluing.triangles]))
             # A disk inside such a loop is no more than that.
-            small = around**2 <= 4 * np.pi * SMALL * np.bincount(component_at, size)[component_of]
+            small = around**2 <= 4 * np.pi * SMALL * size[component_of]
             hole |= inner & small & whole[first_of // 3]
     return hole
 
