@@ -26,7 +26,7 @@ from ..refinement.continuation import ContinuationResult, MapProblem, minimise_i
 from ..refinement.continuation_rules import QUALITIES, Quality
 from ..refinement.elimination_order import Renumbered, renumbered
 from ..refinement.hessian_blocks import assembly_of
-from ..refinement.mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
+from ..refinement.mirrored_motion import MirroredMotion, find_symmetry, halved, symmetric_start
 from .outline import Outline, centroid, free_motion, recognise_outline
 from .refine_island import meets_itself
 
@@ -242,14 +242,16 @@ def _magnified(
     if outline.kind != "free":
         # Holes are free all the same.
         edges = edges[~np.isin(edges[:, 0], loop)]
+    half = halved(faces, symmetry)
     task = MapProblem(
-        faces=faces,
-        assembly=assembly_of(faces, len(given), schwarz_solver(mesh.vertices, mesh.triangles), symmetry),
+        faces=half,
+        assembly=assembly_of(half, len(given), schwarz_solver(mesh.vertices, mesh.triangles), symmetry),
         motion=outline.motion if symmetry is None else MirroredMotion(outline.motion, symmetry, start),
         loop=edges if len(edges) and not meets_itself(start, edges) else None,
         with_barrier=False,
         scale_free=outline.kind != "free",
         symmetry=symmetry,
+        count=len(faces.area),
     )
     found = yield from minimise_in_stages(task, start, 0.0, settings)
     error = area_error(faces, found.w)

@@ -25,7 +25,7 @@ from ..refinement.continuation_rules import QUALITIES, Quality
 from ..refinement.elimination_order import Renumbered, renumbered
 from ..refinement.hessian_blocks import assembly_of
 from ..refinement.initial_maps import disk_initial_map
-from ..refinement.mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
+from ..refinement.mirrored_motion import MirroredMotion, find_symmetry, halved, symmetric_start
 from ..refinement.pins import aligned_to_pins, move_pins, placed_like
 from ..refinement.projected_newton import FreeMotion
 from ..refinement.refine import Refinement, refinement_of
@@ -102,13 +102,15 @@ def _refined(
     symmetric = None if pins is not None else _symmetric(mesh, polygons, faces, start, guard)
     symmetry, w = (None, start) if symmetric is None else symmetric
     free = FreeMotion(np.zeros(n, bool))
+    half = halved(faces, symmetry)
     task = MapProblem(
-        faces=faces,
-        assembly=assembly_of(faces, n, schwarz_solver(mesh.vertices, mesh.triangles), symmetry),
+        faces=half,
+        assembly=assembly_of(half, n, schwarz_solver(mesh.vertices, mesh.triangles), symmetry),
         motion=free if symmetry is None else MirroredMotion(free, symmetry, w),
         loop=guard,
         with_barrier=False,
         symmetry=symmetry,
+        count=len(faces.area),
     )
     if several is not None:
         task, w = yield from move_pins(task, w, several)

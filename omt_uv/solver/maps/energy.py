@@ -29,10 +29,12 @@ FACE_ERROR = 0.45
 @dataclass(frozen=True)
 class Quads:
     """Quads of a surface: size (q,4), the areas of their four triangles over that of the quad, those of the given
-    diagonal first; convex (q,) bool, whether all four are on the quad's own side."""
+    diagonal first; convex (q,) bool, whether all four are on the quad's own side; crossed (q,) bool, if there are any,
+    whether one stands for images that are cut along the other diagonal, too, so that it needs both in every map."""
 
     size: np.ndarray
     convex: np.ndarray
+    crossed: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

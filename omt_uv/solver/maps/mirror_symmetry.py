@@ -18,8 +18,9 @@ class MirrorSymmetry:
     """The images (k,n) of every vertex in one mirror, or in two across one another.
 
     phase : of the first mirror in the plane; the second has the opposite one. For every vertex: representative (n,),
-    the lowest of its images; flip (n,) bool and factor (n,), by which w is factor w[representative], conjugated where
-    flip; line (n,), direction of the axis on which it must stay, 0 for a vertex in the middle, nan for one that is free
+    one of its images, the same for all of them; flip (n,) bool and factor (n,), by which w is factor
+    w[representative], conjugated where flip; line (n,), direction of the axis on which it must stay, 0 for a vertex in
+    the middle, nan for one that is free
     """
 
     images: np.ndarray
@@ -106,13 +107,21 @@ class MirrorSymmetry:
         return self.spread(found / 2 ** len(self.images))
 
 
-def mirror_symmetry(images: np.ndarray, phase: complex = 1.0) -> MirrorSymmetry:
-    """The symmetry of images (k,n) in one mirror, or in two, whose first one has this phase in the plane."""
+def mirror_symmetry(images: np.ndarray, phase: complex = 1.0, w: np.ndarray | None = None) -> MirrorSymmetry:
+    """The symmetry of images (k,n) in one mirror, or in two, whose first one has this phase in the plane.
+
+    w (n,) complex : a symmetric map about the axis; vertices on its left, or in one quarter of it, represent the others
+    then, so that hardly any face has representatives from both sides. By default those of the lowest numbers do.
+    """
     n = images.shape[1]
     # What takes a vertex to its image, by number: nothing, the mirrors, and both of them.
-    moves = [np.arange(n), *images, *([images[0][images[1]]] if len(images) == 2 else [])]
+    moves = orbits(images)
     flips, factors = np.array([False, True, True, False]), np.array([1, phase, -phase, -1])
-    lowest = np.argmin(moves, axis=0)
+    rank = np.arange(n)
+    if w is not None:
+        turned = w * np.sqrt(np.conj(phase))
+        rank = rank - n * (2 * (turned.imag > 0) + (turned.real > 0))
+    lowest = np.argmin(rank[moves], axis=0)
     axes = np.sqrt(np.array([phase, -phase], complex))
     line = np.full(n, np.nan, complex)
     for image, axis in zip(images, axes, strict=False):
@@ -121,11 +130,17 @@ def mirror_symmetry(images: np.ndarray, phase: complex = 1.0) -> MirrorSymmetry:
     return MirrorSymmetry(
         images=images,
         phase=complex(phase),
-        representative=np.min(moves, axis=0),
+        representative=np.take_along_axis(moves, lowest[None], axis=0)[0],
         flip=flips[lowest],
         factor=factors[lowest],
         line=line,
     )
+
+
+def orbits(images: np.ndarray) -> np.ndarray:
+    """What nothing, every mirror and both of them take a vertex, or a face, to, (2 or 4, n), by the images (k,n)."""
+    own = np.arange(images.shape[1])[None]
+    return np.concatenate([own, images, *([images[0][images[1]][None]] if len(images) == 2 else [])])
 
 
 def without_symmetry(n: int) -> MirrorSymmetry:

@@ -149,6 +149,8 @@ def with_convex_quads_of(faces: Elements, area: np.ndarray) -> Elements:
         return faces
     first = len(faces.triangles) - 4 * len(faces.quads.convex)
     both = faces.quads.convex & (area > CONVEX * area[:, :2].sum(axis=1)[:, None]).all(axis=1)
+    if faces.quads.crossed is not None:
+        both |= faces.quads.crossed
     part = faces.part.copy()
     part[first:] = (faces.quads.size * np.where(both[:, None], 0.5, [1, 1, 0, 0])).ravel()
     return faces if np.array_equal(part, faces.part) else replace(faces, part=part)
@@ -161,7 +163,7 @@ def restricted(faces: Elements, kept: np.ndarray, place: np.ndarray) -> Elements
     quads = faces.quads
     if quads is not None:
         four = kept[len(kept) - len(quads.convex) :]
-        quads = Quads(quads.size[four], quads.convex[four])
+        quads = Quads(quads.size[four], quads.convex[four], None if quads.crossed is None else quads.crossed[four])
     return Elements(
         triangles=place[faces.triangles[here]],
         area=faces.area[kept],

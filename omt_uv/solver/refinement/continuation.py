@@ -60,6 +60,8 @@ class MapProblem:
     loop : a boundary, see `boundary_barrier.loop_edges`, that may not cross itself, or None
     with_barrier : from the beginning
     scale_free : the scale of the targets follows the map
+    symmetry : of the maps, or None
+    count : of the polygons, where `faces` are those of one half, see `mirrored_motion.halved`
     """
 
     faces: Elements
@@ -70,6 +72,7 @@ class MapProblem:
     scale_free: bool = False
     smoother: Smoother | None = None
     symmetry: MirrorSymmetry | None = None
+    count: int | None = None
 
     def newton_problem(self, w: np.ndarray, area_weight: float, with_barrier: bool, tilt: float = 0.0) -> NewtonProblem:
         """What Newton minimises at an area weight, starting from the map w (n,), with the `barrier` of that map or not.
@@ -93,7 +96,8 @@ class MapProblem:
         """The barrier that keeps the boundary of the map w (n,) from crossing itself."""
         if self.loop is None:
             raise ValueError("a boundary that may not move has nothing to be kept from")
-        return make_barrier(w, self.loop, CONTACT_STRENGTH / len(self.faces.area))
+        count = len(self.faces.area) if self.count is None else self.count
+        return make_barrier(w, self.loop, CONTACT_STRENGTH / count)
 
     def boundary_crosses(self, w: np.ndarray) -> bool:
         """Whether the boundary of the map w (n,) crosses itself; never without a loop."""

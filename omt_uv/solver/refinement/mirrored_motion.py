@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ..maps.energy import Elements, has_folds, squared
 from ..maps.local_untangle import inner_folds_straightened
-from ..maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry
+from ..maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry, orbits
+from ..maps.polygon_elements import restricted
 from ..mesh.mirror import find_mirror
-from ..mesh.topology import boundary_edges
+from ..mesh.topology import boundary_edges, row_labels
+from .hessian_blocks import corners_of_quads, lone_triangles
 from .projected_newton import Motion
 
 # How far, over its extent, an initial map may be from its mirror image: farther, it is no map of a symmetric chart.
@@ -23,6 +26,8 @@ FEW = 0.01
 ROUNDS = 5
 # Relative difference of the targets of mirror images up to which they are symmetric.
 SAME_TARGET = 1e-4
+# The same of areas and shapes of polygons up to which one stands for its image, too.
+ALIKE = 1e-5
 
 
 class MirroredMotion:
@@ -68,6 +73,74 @@ def find_symmetry(
     return mirror_symmetry(np.array([m.image for m in (first, second) if m is not None]))
 
 
+def halved(faces: Elements, symmetry: MirrorSymmetry | None) -> Elements:
+    """The polygons that stand for their images, too: energies, areas and slopes of symmetric maps are those of all.
+
+    Polygons of several triangles that are no quads stay as they are, and so do those whose images differ.
+    """
+    if symmetry is None:
+        return faces
+    count = len(faces.area)
+    found = np.array([_image_polygons(faces, image) for image in orbits(symmetry.images)])
+    alike = (found >= 0).all(axis=0) & _alike(faces, np.maximum(found, 0))
+    crossed = _cut_otherwise(faces, found, symmetry)
+    if faces.quads is not None:
+        # Only one of both diagonals is inside.
+        alike[count - len(crossed) :] &= ~crossed | faces.quads.convex
+    # All that stand for one another, or none of them.
+    alike &= alike[np.maximum(found, 0)].all(axis=0)
+    found = np.where(alike, found, np.arange(count))
+    owner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
+    # The one with most corners that no other vertex represents; of several, the first.
+    rank = np.arange(count) - count * np.bincount(owner, (~symmetry.follows)[faces.triangles].sum(axis=1), count)
+    kept = np.take_along_axis(found, rank[found].argmin(axis=0)[None], axis=0)[0] == np.arange(count)
+    times = (len(found) / (found == found[0]).sum(axis=0))[kept]
+    half = restricted(faces, kept, np.arange(len(symmetry.representative)))
+    if half.quads is not None:
+        half = replace(
+            half,
+            quads=replace(half.quads, crossed=(crossed & alike[count - len(crossed) :])[kept[count - len(crossed) :]]),
+        )
+    return replace(half, area=half.area * times, weight=half.weight * times)
+
+
+def _image_polygons(faces: Elements, image: np.ndarray) -> np.ndarray:
+    """The polygon (p,) that is the image of each triangle and quad, for the images (n,) of vertices; -1 for others."""
+    count, lone, quads = len(faces.area), lone_triangles(faces), corners_of_quads(faces)
+    single = np.arange(lone) if faces.alone is None else np.flatnonzero(faces.alone[:lone])
+    owner = single if faces.polygon is None else faces.polygon[single]
+    found = np.full(count, -1)
+    for cells, own in ((faces.triangles[single], owner), (quads, np.arange(count - len(quads), count))):
+        label = row_labels(np.sort(np.concatenate([cells, image[cells]]), axis=1))
+        of, to = label[: len(cells)], label[len(cells) :]
+        place = np.full(label.max(initial=-1) + 1, -1)
+        # Two polygons with the same corners are none's image.
+        place[of] = np.where(np.bincount(of)[of] == 1, own, -1)
+        found[own] = place[to]
+    return found
+
+
+def _alike(faces: Elements, found: np.ndarray) -> np.ndarray:
+    """Polygons (p,) bool that are as large as all their images (k,p), ask for as much, and have their shape."""
+    squares = (squared(faces.gradient)).sum(axis=1), (squared(faces.gradient) ** 2).sum(axis=1)
+    owner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
+    values = [faces.area, faces.ratio, *(np.bincount(owner, x, len(faces.area)) for x in squares)]
+    values += [] if faces.region is None else [1 + faces.region]
+    return np.all([(np.abs(x[found] - x) <= ALIKE * x).all(axis=0) for x in values], axis=0)
+
+
+def _cut_otherwise(faces: Elements, found: np.ndarray, symmetry: MirrorSymmetry) -> np.ndarray:
+    """Quads (q,) bool of which an image, among the polygons (k,p), is cut along the other diagonal."""
+    quads = corners_of_quads(faces)
+    first = len(faces.area) - len(quads)
+    own = np.sort(quads[:, [0, 2]], axis=1)
+    other = np.zeros(len(quads), bool)
+    for image, polygon in zip(orbits(symmetry.images), found[:, first:], strict=True):
+        elsewhere = (polygon >= 0) & (polygon != found[0, first:])
+        other |= elsewhere & (np.sort(image[own], axis=1) != own[np.maximum(polygon - first, 0)]).any(axis=1)
+    return other
+
+
 def symmetric_start(
     symmetry: MirrorSymmetry,
     w: np.ndarray,
@@ -103,7 +176,7 @@ def symmetric_start(
         if start is None or has_folds(faces, start):
             continue
         if crosses is None or not watched or not crosses(start):
-            return found, start
+            return mirror_symmetry(symmetry.images, phase, start), start
     return None
 
 

@@ -20,6 +20,7 @@ from ..maps.untangle import arc_length_boundary
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps, part_of
+from .boundary_barrier import crossings
 from .continuation import ContinuationResult, MapProblem, minimise_in_stages
 from .continuation_rules import QUALITIES, planned_weights
 from .elimination_order import Renumbered, renumbered
@@ -33,7 +34,7 @@ from .initial_maps import (
     rectangle_initial_map,
     square_initial_map,
 )
-from .mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
+from .mirrored_motion import MirroredMotion, find_symmetry, halved, symmetric_start
 from .pins import move_pins, placed_like
 from .vertex_sweeps import Smoother, smoothed
 
@@ -222,23 +223,23 @@ def _refined(
     # Sweeps know of triangles alone, of no pins, and of no balance.
     swept = faces.polygon is None and faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
     smoother = Smoother(mesh.triangles, n) if swept else None
-    assembly = assembly_of(faces, n, parts)
-    free = _map_problem(faces, assembly, initial, loop, boundary, smoother)
     warm, known = options.warm_start, symmetry
-    symmetry, w = _next_to_image(free, known, w, by_triangle, boundary, loop)
+    symmetry, w = _next_to_image(faces, initial.may_cross, known, w, by_triangle, boundary, loop)
     if known is not None and symmetry is None:
+        free = _map_problem(faces, assembly_of(faces, n, parts), initial, loop, boundary, smoother)
         symmetry, w = yield from part_of(_relaxed_to_image(free, known, w, by_triangle, options, loop), *SMOOTHING)
         warm = warm or symmetry is not None
         if symmetry is None and boundary == "free" and not warm:
-            symmetry, w = _embedded_to_image(free, known, w, by_triangle, mesh, loop)
-    assembly = assembly if symmetry is None else assembly_of(faces, n, parts, symmetry)
-    problem = _mirrored(_map_problem(faces, assembly, initial, loop, boundary, smoother), symmetry, w)
+            symmetry, w = _embedded_to_image(faces, known, w, by_triangle, mesh, loop)
+    half = halved(faces, symmetry)
+    assembly = assembly_of(half, n, parts, symmetry)
+    problem = _mirrored(_map_problem(half, assembly, initial, loop, boundary, smoother), symmetry, w, len(faces.area))
     if options.crossing:
         problem = replace(problem, loop=None, with_barrier=False)
     several_pins = pins is not None and len(pins.vertices) > 1
     if pins is not None and several_pins:
         problem, w = yield from move_pins(problem, w, pins)
-    elif boundary == "free" and options.quality not in UNSMOOTHED and faces.ratio.max() > EVEN * faces.ratio.min():
+    elif _may_be_tense(faces, options):
         w = yield from part_of(
             _smoothed_if_tense(problem, by_triangle, w, planned_weights(balance, quality)[0]), *SMOOTHING
         )
@@ -248,7 +249,8 @@ def _refined(
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):
         notched = notched_disk(initial, mesh.triangles, loop)
         if notched is not None:
-            problem = _mirrored(_map_problem(faces, assembly, notched, loop, boundary, smoother), symmetry, w)
+            again = _map_problem(half, assembly, notched, loop, boundary, smoother)
+            problem = _mirrored(again, symmetry, w, len(faces.area))
             with_notches = yield from minimise_in_stages(problem, w, balance, quality)
             if area_error(faces, with_notches.w) < error:
                 found, initial = with_notches, notched
@@ -259,7 +261,8 @@ def _refined(
 
 
 def _next_to_image(
-    problem: MapProblem,
+    faces: Elements,
+    may_cross: bool,
     symmetry: MirrorSymmetry | None,
     w: np.ndarray,
     by_triangle: Elements,
@@ -269,9 +272,10 @@ def _next_to_image(
     """The symmetry with its axis, and a symmetric map next to w (n,) complex; None, and w, where there is none."""
     if symmetry is None:
         return None, w
-    found = symmetric_start(symmetry, w, by_triangle, boundary, loop, problem.boundary_crosses)
+    crosses = (lambda z: len(crossings(z, loop)) > 0) if may_cross else None
+    found = symmetric_start(symmetry, w, by_triangle, boundary, loop, crosses)
     # What a mean with its image leaves next to nothing may be a fold by rounding.
-    return (None, w) if found is None or has_folds(problem.faces, found[1]) else found
+    return (None, w) if found is None or has_folds(faces, found[1]) else found
 
 
 def _relaxed_to_image(
@@ -285,18 +289,19 @@ def _relaxed_to_image(
     """The same by way of a map that was relaxed first: scales of an initial map vary so much from face to face that
     its mean with its image has folds."""
     relaxed = yield from minimise_in_stages(problem, w, options.balance, QUALITIES["relaxed"])
-    found, mean = _next_to_image(problem, symmetry, relaxed.w, by_triangle, options.boundary, loop)
+    crossing = problem.loop is not None
+    found, mean = _next_to_image(problem.faces, crossing, symmetry, relaxed.w, by_triangle, options.boundary, loop)
     return (None, w) if found is None else (found, mean)
 
 
 def _embedded_to_image(
-    problem: MapProblem, symmetry: MirrorSymmetry, w: np.ndarray, by_triangle: Elements, mesh: Renumbered, loop
+    faces: Elements, symmetry: MirrorSymmetry, w: np.ndarray, by_triangle: Elements, mesh: Renumbered, loop
 ) -> tuple[MirrorSymmetry | None, np.ndarray]:
     """The same by way of a mean value map: what came from a coarser mesh need not be symmetric, and its mean with its
     image may cross itself."""
     radius = np.sqrt(by_triangle.area.sum() / np.pi)
     fresh = tutte(mesh.vertices, mesh.triangles, loop, arc_length_boundary(mesh.vertices, loop, radius)) @ [1, 1j]
-    found, mean = _next_to_image(problem, symmetry, fresh, by_triangle, "free", loop)
+    found, mean = _next_to_image(faces, True, symmetry, fresh, by_triangle, "free", loop)
     return (None, w) if found is None else (found, mean)
 
 
@@ -307,6 +312,12 @@ def _start_options(boundary: str, faces: Elements, far: bool) -> dict:
     return {"relaxed": np.inf} if far else {}
 
 
+def _may_be_tense(faces: Elements, options: RefinementOptions) -> bool:
+    """Whether an initial map may need to be smoothed."""
+    uneven = faces.ratio.max() > EVEN * faces.ratio.min() and len(faces.triangles) > FEW
+    return bool(options.boundary == "free" and options.quality not in UNSMOOTHED and uneven)
+
+
 def _smoothed_if_tense(
     problem: MapProblem, by_triangle: Elements, w: np.ndarray, area_weight: float
 ) -> Steps[np.ndarray]:
@@ -315,8 +326,7 @@ def _smoothed_if_tense(
     Triangles of three boundary vertices are slivers in a disk. They hold up Newton's first steps, and have lost the
     digits that say whither.
     """
-    faces = problem.faces
-    tense = len(faces.triangles) > FEW and problem.newton_problem(w, area_weight, False).energy(w) > TENSE
+    tense = problem.newton_problem(w, area_weight, False).energy(w) > TENSE
     if tense and not problem.boundary_crosses(w):
         free = yield from smoothed(by_triangle, w, area_weight, SWEEPS, problem.loop)
         # Sweeps are not symmetric: halves may have gone ways whose mean folds.
@@ -326,12 +336,12 @@ def _smoothed_if_tense(
     return w
 
 
-def _mirrored(problem: MapProblem, symmetry: MirrorSymmetry | None, w: np.ndarray) -> MapProblem:
-    """The problem for maps that keep the symmetry of the map w (n,) complex, if there is one."""
+def _mirrored(problem: MapProblem, symmetry: MirrorSymmetry | None, w: np.ndarray, count: int) -> MapProblem:
+    """The problem for maps that keep the symmetry of the map w (n,) complex, if there is one, of so many polygons."""
     if symmetry is None:
         return problem
     motion = MirroredMotion(problem.motion, symmetry, w)
-    return replace(problem, motion=motion, symmetry=symmetry, smoother=None)
+    return replace(problem, motion=motion, symmetry=symmetry, smoother=None, count=count)
 
 
 def _map_problem(

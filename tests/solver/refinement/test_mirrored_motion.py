@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.analysis.density import Target
-from omt_uv.solver.maps.energy import has_folds
+from omt_uv.solver.maps.energy import area_error, energy, gradient, has_folds, target_error
 from omt_uv.solver.maps.mirror_symmetry import mirror_symmetry
-from omt_uv.solver.maps.polygon_elements import polygon_elements
+from omt_uv.solver.maps.polygon_elements import polygon_elements, with_convex_quads
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.mirror import find_mirror
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import Progress, drain
 from omt_uv.solver.refinement import refine as refinement
-from omt_uv.solver.refinement.mirrored_motion import MirroredMotion, find_symmetry, symmetric_start
+from omt_uv.solver.refinement.hessian_blocks import assembly_of, hessian_blocks
+from omt_uv.solver.refinement.mirrored_motion import MirroredMotion, find_symmetry, halved, symmetric_start
 from omt_uv.solver.refinement.projected_newton import FreeMotion
 
 
@@ -101,6 +102,70 @@ def test_moves_of_representatives_keep_a_map_symmetric():
     np.testing.assert_allclose(symmetry.spread(moved), moved, atol=1e-12)
     # Both mirrors: a quarter of the vertices and their axes are all that is free.
     assert motion.free.sum() == 2 * 9 + 2 * 3
+
+
+@pytest.mark.parametrize("cut", ["one way", "the other way in one half", "triangles"])
+@pytest.mark.parametrize("mirrors", [1, 2])
+def test_polygons_that_stand_for_their_images_have_energy_slopes_and_areas_of_all(cut, mirrors):
+    """In maps in which some quads are not convex, too, and of densities and regions that are as symmetric."""
+    V, Q = hill(6)
+    V = V + np.array([0.0, 0.0, 0.3]) * (V[:, 1:2] ** 3 if mirrors == 1 else 0)
+    Q = np.where((V[Q].mean(axis=1)[:, :1] > 0) & (cut != "one way"), np.roll(Q, 1, axis=1), Q)
+    T, faces = Q[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), np.repeat(np.arange(len(Q)), 2)
+    at = V[Q].mean(axis=1)[faces] if cut != "triangles" else V[T].mean(axis=1)
+    polygons = None if cut == "triangles" else faces
+    target, region = face_areas(V, T) * (1 + at[:, 0] ** 2), (np.abs(at[:, 0]) < 0.4) * 1.0
+    elements = polygon_elements(V, T, target, polygons, region)
+    found = find_symmetry(V, T, polygons, elements)
+    assert len(found.images) == (1 if cut == "triangles" else mirrors)
+    start = V[:, :2] @ [1, 1j] * np.exp(0.3j) * (1 + 0.2 * np.abs(V[:, 0]) ** 2)
+    symmetry, w = symmetric_start(found, start, elements, "free", np.arange(0))
+    elements = with_convex_quads(elements, w)
+    half = halved(elements, symmetry)
+    assert len(half.area) < (0.4 if len(found.images) == 2 else 0.6) * len(elements.area)
+    motion = MirroredMotion(FreeMotion(np.zeros(len(V), bool)), symmetry, w)
+    axes = motion.frame(w), motion.free.astype(float)
+    slopes = [symmetry.folded(gradient(x, w, 30.0)) * axes[0].conj() for x in (elements, half)]
+    along = [x.view(float).reshape(-1, 2) * axes[1] for x in slopes]
+    np.testing.assert_allclose(along[1], along[0], atol=1e-12 * np.abs(along[0]).max())
+    for measure in (lambda x: energy(x, w, 30.0), lambda x: area_error(x, w), lambda x: target_error(x, w)):
+        np.testing.assert_allclose(measure(half), measure(elements), rtol=1e-12)
+    matrices = []
+    for x in (elements, half):
+        blocks = hessian_blocks(x, w, 30.0, 0.5, axes, symmetry)
+        assembly = assembly_of(x, len(V), symmetry=symmetry)
+        matrices.append(assembly.matrix(blocks.triangles, np.zeros(2 * len(V)), blocks.quads).toarray())
+    np.testing.assert_allclose(matrices[1], matrices[0], atol=1e-12 * np.abs(matrices[0]).max())
+
+
+def test_quads_cut_otherwise_than_their_images_need_both_diagonals_where_one_would_do():
+    """A symmetric map may not fold either of them, though only one is there."""
+    V, Q = hill(6)
+    Q = np.where(V[Q].mean(axis=1)[:, :1] > 0, np.roll(Q, 1, axis=1), Q)
+    T, faces = Q[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), np.repeat(np.arange(len(Q)), 2)
+    elements = polygon_elements(V, T, face_areas(V, T), faces)
+    symmetry, w = symmetric_start(
+        find_symmetry(V, T, faces, elements), V[:, :2] @ [1, 1j], elements, "free", np.arange(0)
+    )
+    half = halved(elements, symmetry)
+    for vertex in range(len(V)):
+        bent = w.copy()
+        bent[vertex] += 0.7 * (1 + 1j) / 6
+        bent = symmetry.spread(bent)
+        whole, one = (has_folds(with_convex_quads(x, bent), bent) for x in (elements, half))
+        assert whole == one
+
+
+def test_polygons_unlike_their_images_stand_for_themselves():
+    """Within what is taken for a mirror image; their areas would be a little off otherwise."""
+    V, Q = hill(8)
+    V = V + np.array([0.0, 0.0, 1e-4]) * np.random.default_rng(0).normal(size=(len(V), 1))
+    T, faces = Q[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), np.repeat(np.arange(len(Q)), 2)
+    elements = polygon_elements(V, T, face_areas(V, T), faces)
+    images = np.arange(81).reshape(9, 9)[::-1].ravel()[None]
+    half = halved(elements, mirror_symmetry(images))
+    assert len(half.area) > 0.9 * len(elements.area)
+    np.testing.assert_allclose(half.area.sum(), 1)
 
 
 def test_one_half_makes_a_symmetric_start_where_the_mean_of_both_folds():
