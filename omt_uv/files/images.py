@@ -90,8 +90,11 @@ def pixels_of(image: bpy.types.Image) -> np.ndarray:
 
 
 def has_straight_alpha(image: bpy.types.Image) -> bool:
-    """Whether the colours of an image are not multiplied by its alpha. Those of floats are, whatever the file has."""
-    return image.alpha_mode == "STRAIGHT" and not image.is_float
+    """Whether the colours of an image are not multiplied by its alpha.
+
+    Those of floats are, whatever the file has; those of bytes are not: Blender divides what it reads as premultiplied.
+    """
+    return image.alpha_mode in ("STRAIGHT", "PREMUL") and not image.is_float
 
 
 def packed_image(name: str, pixels: np.ndarray, like: bpy.types.Image) -> bpy.types.Image:
@@ -170,7 +173,10 @@ def _new_image(name: str, pixels: np.ndarray, like: bpy.types.Image) -> bpy.type
     name = name.encode("utf-8", "replace").decode()
     image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=like.is_float)
     if not like.is_float:
-        image.colorspace_settings.name, image.alpha_mode = like.colorspace_settings.name, like.alpha_mode
+        # Its pixels are not multiplied by alpha. They are written so, and where they were said to be, they would be
+        # divided once more when they are read.
+        image.alpha_mode = "STRAIGHT" if has_straight_alpha(like) else like.alpha_mode
+        image.colorspace_settings.name = like.colorspace_settings.name
     else:
         # Its pixels are linear, and multiplied by alpha, and are packed so, whatever the file had.
         image.alpha_mode = "PREMUL" if like.alpha_mode == "STRAIGHT" else like.alpha_mode
