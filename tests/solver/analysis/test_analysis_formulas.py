@@ -153,8 +153,8 @@ def test_the_factors_that_are_named_are_nearly_as_far_as_it_goes(factors):
 def test_vertices_in_one_place_are_ordered_by_the_mean_middle_of_their_triangles():
     """A star whose triangles all have a corner of their own in the middle, one of them two triangles."""
     angle = np.arange(7) * 2 * np.pi / 7
-    rim = np.column_stack([np.cos(angle), np.sin(angle) * 1.7, 0.3 * angle])
-    V = np.concatenate([rim, np.tile([[0.1, 0.2, 0.3]], (6, 1))])
+    outer = np.column_stack([np.cos(angle), np.sin(angle) * 1.7, 0.3 * angle])
+    V = np.concatenate([outer, np.tile([[0.1, 0.2, 0.3]], (6, 1))])
     own = [7, 7, 8, 9, 10, 11, 12]
     F = np.array([[own[k], k, (k + 1) % 7] for k in range(7)])
     order = order_of_places(V, F)
