@@ -30,9 +30,11 @@ ROUND = 1.0
 TIGHT = 0.05
 # A side is large with this share of the area of a body. One whose large sides that unroll have that share of it, and
 # whose sides meet at more than `HARD` along that share of their borders, has a hard surface, and one of so many sides
-# that nearly all unroll: low ones of animals are folded everywhere, into small sides and bluntly.
+# that nearly all unroll, or half where nearly all borders are hard: low ones of animals are folded everywhere, into
+# small sides and bluntly.
 LARGE = 0.03
 MOSTLY = 0.7
+HALF = 0.5
 SHARP = 0.8
 ALL = 0.95
 MOST_SIDES = 2_000
@@ -128,7 +130,8 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     mostly, keen = area[unrolls & large].sum() / area.sum(), length[sharp].sum() / length[border].sum()
     sure = mostly >= MOSTLY and keen >= SHARP
     # Of noise every triangle is a side.
-    if not sure and (len(area) > MOST_SIDES or area[unrolls].sum() < ALL * area.sum()):
+    likely = area[unrolls].sum() >= ALL * area.sum() or (mostly >= HALF and keen >= ALL)
+    if not sure and (len(area) > MOST_SIDES or not likely):
         return None
     pair, blunt = np.sort(side[joined[border]], axis=1), np.where(fold[border] <= HARD, length[border], 0.0)
     whole = _with_bands(pair, length[border], blunt, large, area)[side]

@@ -16,9 +16,9 @@ from .component import CutComponent
 
 # Curved vertices belong to one corner if edges join them that are at most so long, next to the side of a square with
 # the area of the body.
-LINK = 0.05
+LINK = 0.1
 # Of a body with such corners they take at most this share of the area, ...
-SMALL = 0.06
+SMALL = 0.16
 # ... are at most so many, ...
 MOST_CORNERS = 256
 # ... and each holds at least so much curvature in sum, in radians; what holds less is hardly sheared uncut.

@@ -94,6 +94,29 @@ def bevelled_cylinder(sectors=32):
     return np.concatenate([V.reshape(-1, 3), [[0, 0, -1], [0, 0, 1]]]), np.concatenate([triangles_of(quads), *ends])
 
 
+def domed_box(height, count=48):
+    """A box of 2 x 2 and half as high, with a hill on top, as triangles."""
+    V, F = meshes.grid(count, count, 2.0, 2.0)
+    x, y = V[:, 0] - V[:, 0].mean(), V[:, 1] - V[:, 1].mean()
+    hill = height * (np.cos(np.pi * x / 2) * np.cos(np.pi * y / 2)) ** 2
+    rim = np.flatnonzero((np.abs(x) > 0.999) | (np.abs(y) > 0.999))
+    rim = rim[np.argsort(np.arctan2(y[rim], x[rim]))]
+    n, k = len(V), len(rim)
+    V = np.concatenate([np.stack([x, y, hill], 1), np.stack([x[rim], y[rim], np.full(k, -1.0)], 1), [[0, 0, -1.0]]])
+    i, j = np.arange(k), (np.arange(k) + 1) % k
+    walls = [np.stack([n + i, n + j, rim[j]], axis=1), np.stack([n + i, rim[j], rim[i]], axis=1)]
+    return V, np.concatenate([F, *walls, np.stack([n + j, n + i, np.full(k, n + k)], axis=1)])
+
+
+def test_half_of_a_body_in_flat_sides_between_hard_edges_is_enough():
+    component = component_of(*domed_box(1.2))
+    whole, unrolls = hard_sides(component)
+    # The hill alone does not unroll.
+    assert len(unrolls) == 6 and np.count_nonzero(~unrolls) == 1
+    # The more of it there is, the less of the body is hard.
+    assert hard_sides(component_of(*domed_box(5.0))) is None
+
+
 def test_bands_of_bevels_go_with_the_sides_beside_them():
     V, F = bevelled_cylinder()
     component = component_of(V, F)

@@ -70,7 +70,7 @@ def test_sides_around_a_saddle_are_not_sheared(profile):
     assert figures.folds == 0 and figures.overlap == 0
 
 
-@pytest.mark.parametrize("radius, segments, most", [(0.1, 3, 1.02), (0.1, 6, 1.02), (0.25, 2, 1.05)])
+@pytest.mark.parametrize("radius, segments, most", [(0.1, 3, 1.02), (0.1, 6, 1.02), (0.25, 2, 1.05), (0.45, 6, 1.1)])
 def test_flat_sides_between_bevels_stay_as_they_are(radius, segments, most):
     figures = shear_of(rounded_cube(radius, segments))
     assert figures.angle_mean < most
