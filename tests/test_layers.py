@@ -35,7 +35,7 @@ ARROWS: dict[str, str] = {
     "solver.packing": "solver solver.mesh",
     "solver.transport": "solver solver.mesh solver.linalg",
     "solver.cutting": "solver solver.mesh solver.linalg solver.analysis solver.maps",
-    "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.cutting",
+    "solver.seams": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.packing solver.cutting",
     "solver.conformal": "solver solver.mesh solver.linalg solver.maps",
     "solver.canonical": "solver solver.mesh solver.linalg solver.maps solver.transport solver.conformal",
     "solver.refinement": "solver solver.mesh solver.linalg solver.analysis solver.maps",

@@ -117,6 +117,19 @@ def _with_patches(chart: Chart) -> Chart:
     )
 
 
+def part_of_chart(chart: Chart, rows: np.ndarray) -> tuple[Chart, np.ndarray]:
+    """The triangles `rows` (m,) bool of a chart without patches as a chart, and its vertices (k,) in the whole one."""
+    used, triangles = np.unique(chart.triangles[rows], return_inverse=True)
+    part = Chart(
+        chart.vertices[used],
+        triangles.reshape(-1, 3),
+        chart.corners[rows],
+        chart.faces[rows],
+        chart.vertex_ids[used],
+    )
+    return part, used
+
+
 def triangle_rows(surface: Surface, chart: Chart) -> np.ndarray:
     """Which triangles of the surface the triangles of a chart are, (m,).
 

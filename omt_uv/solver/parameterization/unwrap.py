@@ -17,7 +17,7 @@ from ..cutting.cuts import cut as cut_surface
 from ..cutting.disk_charts import OUTLINED, DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural
-from ..mesh.charts import Chart, sound_disks
+from ..mesh.charts import Chart, part_of_chart, sound_disks
 from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.geometry import face_areas
 from ..mesh.surface import Surface
@@ -45,13 +45,10 @@ from .small_charts import is_small, map_together
 CUTTING = 0.15
 MAPPING = 0.7
 
-# A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
-# length or whatever it is, is cut across, in so many times as long pieces, at most so many.
-LONG_AND_NARROW = 1.8
-NARROW = 1 / 3
-LONG = 3.0
-PIECE = 1.2
-MOST_PIECES = 12
+# Charts that are no longer than a square of the whole area by so many times stay in one piece, and of bodies with limbs
+# those that are not that share of the whole.
+COMPACT = 1.8
+MOSTLY = 0.5
 
 # Charts and their maps.
 _Drawn = tuple[list[Chart], list[ChartMap]]
@@ -152,64 +149,57 @@ def unwrap(
         maps = yield from _with_room(task, prepared.charts, maps, surface)
     cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     if cut.search is not None and pins is None and target is None and task.options.boundary == "free":
-        charts, maps, cuts = _without_bands(cut.search, charts, maps, cuts)
+        charts, maps, cuts = _in_pieces(cut.search, charts, maps, cuts)
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
 
-def _without_bands(
+def _in_pieces(
     search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: np.ndarray
 ) -> tuple[list[Chart], list[ChartMap], np.ndarray]:
-    """Charts, maps and cuts (k,2), long bands cut across, such as those of a gear or a cable: they leave most of a
-    texture empty. Charts that were not cut at all, and those with marked seams, stay whole."""
+    """Charts, maps and cuts (k,2), those cut in pieces that leave most of a texture empty: long bands, as those of a
+    gear or a cable, and bodies with limbs. Charts that were not cut at all, and those with marked seams, stay whole."""
     surface = search.surface
     chosen = surface.triangles if search.faces is None else surface.triangles[search.faces[surface.triangle_face]]
-    side = np.sqrt(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
+    whole = float(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
     new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts]
     for chart, chart_map in zip(charts, maps, strict=True):
         found, between = [(chart, chart_map)], cuts[:0]
-        # Most are short, and of thousands nothing else is asked.
-        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > LONG_AND_NARROW * side > 0 and not len(chart.patches):
-            width, length = np.sort(np.ptp(_upright(chart_map.uv), axis=0))
+        # Most are compact, and of thousands nothing else is asked.
+        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > COMPACT * np.sqrt(whole) > 0 and not len(chart.patches):
             was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
-            longest = (LONG_AND_NARROW if width <= NARROW * length else LONG) * side
-            if length > longest and was_cut and not is_marked(surface, chart):
-                count = min(int(np.ceil(length / (PIECE * side))), MOST_PIECES)
-                found, between = _in_pieces(search, chart, chart_map, count)
+            if was_cut and not is_marked(surface, chart):
+                found, between = _pieces(search, chart, chart_map, whole)
         new_charts += [chart for chart, _ in found]
         new_maps += [chart_map for _, chart_map in found]
         edges.append(between)
     return new_charts, new_maps, np.concatenate(edges)
 
 
-def _in_pieces(
-    search: ShearSearch, chart: Chart, chart_map: ChartMap, count: int
+def _pieces(
+    search: ShearSearch, chart: Chart, chart_map: ChartMap, whole: float
 ) -> tuple[list[tuple[Chart, ChartMap]], np.ndarray]:
-    """A chart and its map cut across, as pairs, and the edges (k,2) in between; whole where the pieces are no disks."""
-    from ..seams.parting import in_pieces
+    """A chart of a surface of area `whole` and its map cut in pieces, as pairs, and the edges (k,2) in between; whole
+    where it is neither long nor sprawls, or the pieces are no disks."""
+    from ..seams.limbs import sprawls, without_limbs
+    from ..seams.parting import in_pieces, pieces_of_band
 
-    piece, between = in_pieces(chart, chart_map.uv, search.costs().vertex_cost[chart.vertex_ids], count)
+    cost, uv, axes = search.costs().vertex_cost[chart.vertex_ids], chart_map.uv, search.shear.preferences.axes
+    up = (axes or SceneAxes()).up
+    count = pieces_of_band(uv, np.sqrt(whole))
+    if count > 1:
+        piece, between = in_pieces(chart, uv, cost, count)
+    elif face_areas(chart.vertices, chart.triangles).sum() > MOSTLY * whole and sprawls(chart, uv, up):
+        piece, between = without_limbs(chart, uv, cost, up, search.images)
+    else:
+        return [(chart, chart_map)], np.zeros((0, 2), np.int64)
     found = []
     for k in range(int(piece.max()) + 1):
-        rows = piece == k
-        used, triangles = np.unique(chart.triangles[rows], return_inverse=True)
-        part = Chart(
-            chart.vertices[used],
-            triangles.reshape(-1, 3),
-            chart.corners[rows],
-            chart.faces[rows],
-            chart.vertex_ids[used],
-        )
-        uv = chart_map.uv[used]
-        found.append((part, with_folds_counted(part, with_figures(chart_map, uv, measured_map(part, uv, None)))))
+        part, used = part_of_chart(chart, piece == k)
+        mapped = with_figures(chart_map, uv[used], measured_map(part, uv[used], None))
+        found.append((part, with_folds_counted(part, mapped)))
     if not sound_disks([part for part, _ in found]).all():
         return [(chart, chart_map)], between[:0]
     return found, between
-
-
-def _upright(uv: np.ndarray) -> np.ndarray:
-    """A map (n,2) with its principal axes along the axes."""
-    centred = uv - uv.mean(axis=0)
-    return centred @ np.linalg.eigh(centred.T @ centred)[1]
 
 
 def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[list[ChartMap]]:

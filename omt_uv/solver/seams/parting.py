@@ -40,6 +40,13 @@ LEAST_OUTLINE = 6
 # share of it, it is no body of flat sides.
 LEAST_SIDE = 0.05
 MOSTLY = 0.4
+# A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
+# length or whatever it is, is a band, cut across in so many times as long pieces, at most so many.
+LONG_AND_NARROW = 1.8
+NARROW = 1 / 3
+LONG = 3.0
+PIECE = 1.2
+MOST_PIECES = 12
 # A cut across a long chart is looked for within this share of a piece of where pieces of the same length would end.
 NEAR_CUT = 0.2
 # Capacities are whole numbers: that of an edge of mean cost, the greatest, and that of what may not be cut.
@@ -49,7 +56,7 @@ WHOLE = 2_000_000_000
 
 
 @dataclass(frozen=True)
-class _Dual:
+class PolygonGraph:
     """Polygons of a chart: of each triangle (m,), their areas (p,), and the edges between two of them (e,2), with the
     vertices (e,2) of these."""
 
@@ -59,7 +66,7 @@ class _Dual:
     ends: np.ndarray
 
     @staticmethod
-    def of(chart: Chart, glued: bool = False) -> _Dual:
+    def of(chart: Chart, glued: bool = False) -> PolygonGraph:
         """The polygons of a chart; glued: joined across its seams, too, the ends being vertices of the surface."""
         _, polygon = np.unique(chart.faces, return_inverse=True)
         polygon = polygon.ravel()
@@ -68,14 +75,14 @@ class _Dual:
         joined = polygon[np.stack([one, other], axis=1) // 3]
         between = joined[:, 0] != joined[:, 1]
         area = np.bincount(polygon, face_areas(chart.vertices, chart.triangles))
-        return _Dual(polygon, area, joined[between], np.stack([tail[one], head[one]], axis=1)[between])
+        return PolygonGraph(polygon, area, joined[between], np.stack([tail[one], head[one]], axis=1)[between])
 
     def pieces(self, kept: np.ndarray) -> np.ndarray:
         """The piece (p,) that each polygon is in, joined by the edges that are kept (e,) bool."""
         return graph_components(self.joined[kept, 0], self.joined[kept, 1], len(self.area))[1]
 
-    def graph(self, weight: np.ndarray) -> csr_matrix:
-        """The graph (p,p) of the polygons, with a weight (e,) > 0 for each edge; the sum where two share several."""
+    def matrix(self, weight: np.ndarray) -> csr_matrix:
+        """A weight (e,) > 0 for each edge as a matrix (p,p); the sum where two polygons share several."""
         rows, columns = np.concatenate([self.joined, self.joined[:, ::-1]]).T
         return csr_matrix((np.tile(weight, 2), (rows, columns)), shape=(len(self.area),) * 2)
 
@@ -86,42 +93,42 @@ def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray, image: np.ndarray | N
     cost (n,): of a cut through its vertices, per length; image: mirror image of every vertex of the surface, which the
     cuts then have, too, -1 where there is none. No edges where it does not, or is in one piece all the same.
     """
-    dual = _Dual.of(chart)
-    pairs = _covering(chart, uv, dual)
-    capacity = _capacity(chart, dual, cost)
-    steps = dual.graph(edge_lengths(chart.vertices, dual.ends) + 1e-300)
-    cut = np.zeros(len(dual.joined), dtype=bool)
+    graph = PolygonGraph.of(chart)
+    pairs = _covering(chart, uv, graph)
+    capacity = capacities(chart, graph, cost)
+    steps = graph.matrix(edge_lengths(chart.vertices, graph.ends) + 1e-300)
+    cut = np.zeros(len(graph.joined), dtype=bool)
     for one, other in pairs[:MOST_CUTS]:
-        part = dual.pieces(~cut)
+        part = graph.pieces(~cut)
         if part[one[0]] == part[other[0]]:
-            side = _minimum_cut(dual, capacity, *_enlarged(dual, steps, one, other))
-            cut |= side[dual.joined[:, 0]] != side[dual.joined[:, 1]]
-    return chart.vertex_ids[dual.ends[cut if image is None else _with_images(chart, dual, cut, image)]]
+            side = minimum_cut(graph, capacity, *_enlarged(graph, steps, one, other))
+            cut |= side[graph.joined[:, 0]] != side[graph.joined[:, 1]]
+    return chart.vertex_ids[graph.ends[cut if image is None else with_images(chart, graph, cut, image)]]
 
 
-def _with_images(chart: Chart, dual: _Dual, cut: np.ndarray, image: np.ndarray) -> np.ndarray:
+def with_images(chart: Chart, graph: PolygonGraph, cut: np.ndarray, image: np.ndarray) -> np.ndarray:
     """The cut (e,) bool with its mirror image, if that is one, and crumbs between both can be left out; else as it
     is."""
-    ends = chart.vertex_ids[dual.ends]
+    ends = chart.vertex_ids[graph.ends]
     images = image[ends[cut]]
     if not len(images) or (images < 0).any():
         return cut
     mine, theirs = pair_keys(*ends.T), pair_keys(*images.T)
     both = cut | np.isin(mine, theirs)
-    length = edge_lengths(chart.vertices, dual.ends)
+    length = edge_lengths(chart.vertices, graph.ends)
     if not np.isin(theirs, mine).all():
         return cut
     for _ in range(MOST_CRUMBS):
-        piece = dual.pieces(~both)
-        crumb = np.bincount(piece, dual.area) < LEAST_PART / 2 * dual.area.sum()
+        piece = graph.pieces(~both)
+        crumb = np.bincount(piece, graph.area) < LEAST_PART / 2 * graph.area.sum()
         if not crumb.any():
             return both
         # Each joins the piece that it has most of an outline with.
-        one, other = np.concatenate([piece[dual.joined[both]], piece[dual.joined[both]][:, ::-1]]).T
+        one, other = np.concatenate([piece[graph.joined[both]], piece[graph.joined[both]][:, ::-1]]).T
         shared = csr_matrix((np.tile(length[both], 2), (one, other)), shape=(len(crumb),) * 2)
         shared.sum_duplicates()
         joins = np.asarray(shared.argmax(axis=1)).ravel()
-        one, other = piece[dual.joined].T
+        one, other = piece[graph.joined].T
         both &= ~((crumb[one] & (joins[one] == other)) | (crumb[other] & (joins[other] == one)))
     return cut
 
@@ -132,22 +139,22 @@ def flat_sides(chart: Chart) -> np.ndarray:
     What is between them are bands, as the teeth of a gear, that unroll: only flat sides with much of an outline hold
     them back.
     """
-    dual = _Dual.of(chart, glued=True)
+    graph = PolygonGraph.of(chart, glued=True)
     corners = chart.vertices[chart.triangles]
     vector = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    count = len(dual.area)
-    whole = np.stack([np.bincount(dual.polygon, x, count) for x in vector.T], axis=1)
+    count = len(graph.area)
+    whole = np.stack([np.bincount(graph.polygon, x, count) for x in vector.T], axis=1)
     normal = unit(whole)
-    near = np.einsum("ed,ed->e", *normal[dual.joined.T]) > np.cos(TURNED)
-    side = dual.pieces(near)
-    area = np.bincount(side, dual.area)
+    near = np.einsum("ed,ed->e", *normal[graph.joined.T]) > np.cos(TURNED)
+    side = graph.pieces(near)
+    area = np.bincount(side, graph.area)
     size = np.linalg.norm(np.stack([np.bincount(side, x) for x in whole.T], axis=1), axis=1)
-    one, other = side[dual.joined.T]
+    one, other = side[graph.joined.T]
     outline = np.bincount(np.concatenate([one[one != other], other[one != other]]), minlength=len(area))
-    flat = (size >= FLAT * area) & (area >= LEAST_SIDE * dual.area.sum()) & (outline >= LEAST_OUTLINE)
-    if area[flat].sum() < MOSTLY * dual.area.sum():
+    flat = (size >= FLAT * area) & (area >= LEAST_SIDE * graph.area.sum()) & (outline >= LEAST_OUTLINE)
+    if area[flat].sum() < MOSTLY * graph.area.sum():
         return np.zeros((0, 2), np.int64)
-    return dual.ends[(one != other) & (flat[one] | flat[other])]
+    return graph.ends[(one != other) & (flat[one] | flat[other])]
 
 
 def slits(
@@ -163,23 +170,23 @@ def slits(
     steep (m,) bool : triangles that do; least : area of what is to be slit at least; barred (n,) bool : vertices that
     no slit passes through, unless there is not as much to be slit elsewhere; cost, image : see `parted`
     """
-    dual = _Dual.of(chart)
-    bad, free = np.zeros(len(dual.area), dtype=bool), ~barred
-    bad[dual.polygon[steep & free[chart.triangles].all(axis=1)]] = True
-    if dual.area[bad].sum() < least:
-        free[:] = bad[dual.polygon[steep]] = True
-    piece = dual.pieces(bad[dual.joined].all(axis=1))
-    size = np.bincount(piece, np.where(bad, dual.area, 0.0))
+    graph = PolygonGraph.of(chart)
+    bad, free = np.zeros(len(graph.area), dtype=bool), ~barred
+    bad[graph.polygon[steep & free[chart.triangles].all(axis=1)]] = True
+    if graph.area[bad].sum() < least:
+        free[:] = bad[graph.polygon[steep]] = True
+    piece = graph.pieces(bad[graph.joined].all(axis=1))
+    size = np.bincount(piece, np.where(bad, graph.area, 0.0))
     order = np.argsort(-size, kind="stable")
     chosen = order[: min(int(np.searchsorted(np.cumsum(size[order]), least)) + 1, MOST_SLITS)]
-    n, ends = len(chart.vertices), dual.ends[free[dual.ends].all(axis=1)]
+    n, ends = len(chart.vertices), graph.ends[free[graph.ends].all(axis=1)]
     price = cost[ends].mean(axis=1) * edge_lengths(chart.vertices, ends) + 1e-300
-    graph = csr_matrix((np.tile(price, 2), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n))
+    ways = csr_matrix((np.tile(price, 2), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n))
     known, image_here = pair_keys(*ends.T), _images_in(chart, image)
     start, found = np.unique(boundary_edges(chart.triangles)), []
     for k in chosen[bad[np.unique(piece, return_index=True)[1]][chosen]]:
-        around = np.unique(chart.triangles[steep & (piece[dual.polygon] == k)])
-        far, before, _ = dijkstra(graph, indices=start, min_only=True, return_predecessors=True)
+        around = np.unique(chart.triangles[steep & (piece[graph.polygon] == k)])
+        far, before, _ = dijkstra(ways, indices=start, min_only=True, return_predecessors=True)
         end = around[np.argmax(np.where(np.isfinite(far[around]), far[around], 0.0))]
         path = path_to(before, int(end))
         edges = np.stack([path[:-1], path[1:]], axis=1)
@@ -192,29 +199,40 @@ def slits(
     return chart.vertex_ids[np.concatenate(found)] if found else np.zeros((0, 2), np.int64)
 
 
+def pieces_of_band(uv: np.ndarray, side: float) -> int:
+    """In how many pieces a chart with map uv (n,2) is to be cut across, next to a square with such a side: 1 where it
+    is no band."""
+    centred = uv - uv.mean(axis=0)
+    width, length = np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
+    longest = (LONG_AND_NARROW if width <= NARROW * length else LONG) * side
+    return min(int(np.ceil(length / (PIECE * side))), MOST_PIECES) if length > longest else 1
+
+
 def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The piece (m,) of every triangle where a long chart with map uv (n,2) is cut across in `count` of about the same
     length, and the edges (k,2) of the surface in between; cost (n,) : see `parted`."""
-    dual = _Dual.of(chart)
+    graph = PolygonGraph.of(chart)
     corners = uv[chart.triangles]
-    middle = np.stack([np.bincount(dual.polygon, x) for x in corners.mean(axis=1).T], axis=1)
-    middle = middle / np.bincount(dual.polygon)[:, None]
-    middle -= dual.area @ middle / dual.area.sum()
-    along = middle @ np.linalg.eigh(middle.T @ (dual.area[:, None] * middle))[1][:, 1]
+    middle = np.stack([np.bincount(graph.polygon, x) for x in corners.mean(axis=1).T], axis=1)
+    middle = middle / np.bincount(graph.polygon)[:, None]
+    middle -= graph.area @ middle / graph.area.sum()
+    along = middle @ np.linalg.eigh(middle.T @ (graph.area[:, None] * middle))[1][:, 1]
     along = (along - along.min()) / max(np.ptp(along), 1e-300)
-    capacity, cut = _capacity(chart, dual, cost), np.zeros(len(dual.joined), dtype=bool)
+    capacity, cut = capacities(chart, graph, cost), np.zeros(len(graph.joined), dtype=bool)
     for k in range(1, count):
         before, after = along * count < k - NEAR_CUT, along * count > k + NEAR_CUT
         if before.any() and after.any():
-            side = _minimum_cut(dual, capacity, np.flatnonzero(before), np.flatnonzero(after))
-            cut |= side[dual.joined[:, 0]] != side[dual.joined[:, 1]]
-    return dual.pieces(~cut)[dual.polygon], chart.vertex_ids[dual.ends[cut]]
+            side = minimum_cut(graph, capacity, np.flatnonzero(before), np.flatnonzero(after))
+            cut |= side[graph.joined[:, 0]] != side[graph.joined[:, 1]]
+    return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
 
 
-def _capacity(chart: Chart, dual: _Dual, cost: np.ndarray) -> np.ndarray:
+def capacities(chart: Chart, graph: PolygonGraph, cost: np.ndarray) -> np.ndarray:
     """What cutting an edge (e,) between polygons costs, in whole numbers; cost (n,) : at the vertices, per length."""
-    price = cost[dual.ends].mean(axis=1) * edge_lengths(chart.vertices, dual.ends)
-    return np.clip(np.round(MEAN_CAPACITY * price / max(price.mean(), 1e-300)), 1, MOST_CAPACITY).astype(np.int32)
+    price = cost[graph.ends].mean(axis=1) * edge_lengths(chart.vertices, graph.ends)
+    return np.clip(
+        np.round(MEAN_CAPACITY * price / max(price.sum() / max(len(price), 1), 1e-300)), 1, MOST_CAPACITY
+    ).astype(np.int32)
 
 
 def _images_in(chart: Chart, image: np.ndarray | None) -> np.ndarray:
@@ -228,17 +246,17 @@ def _images_in(chart: Chart, image: np.ndarray | None) -> np.ndarray:
     return np.where(there >= 0, at[there], -1)
 
 
-def _covering(chart: Chart, uv: np.ndarray, dual: _Dual) -> list[tuple[np.ndarray, np.ndarray]]:
+def _covering(chart: Chart, uv: np.ndarray, graph: PolygonGraph) -> list[tuple[np.ndarray, np.ndarray]]:
     """Polygons (a,) and (b,) of pieces that cover each other, those first that do so most."""
     corners = uv[chart.triangles]
     point, over = cover_pairs(corners, np.einsum("kc,mcd->mkd", POINTS, corners).reshape(-1, 2))
-    below = dual.polygon[point // len(POINTS)]
-    above = dual.polygon[over]
-    share = face_areas(chart.vertices, chart.triangles)[point // len(POINTS)] / (len(POINTS) * dual.area.sum())
+    below = graph.polygon[point // len(POINTS)]
+    above = graph.polygon[over]
+    share = face_areas(chart.vertices, chart.triangles)[point // len(POINTS)] / (len(POINTS) * graph.area.sum())
     share, below, above = (x[below != above] for x in (share, below, above))
-    covered = np.zeros(len(dual.area), dtype=bool)
+    covered = np.zeros(len(graph.area), dtype=bool)
     covered[below] = covered[above] = True
-    piece = dual.pieces(covered[dual.joined].all(axis=1))
+    piece = graph.pieces(covered[graph.joined].all(axis=1))
     a, b = np.sort(np.stack([piece[below], piece[above]]), axis=0)
     key, index = np.unique(pair_keys(a, b), return_inverse=True)
     # Every pair is seen from both sides.
@@ -250,7 +268,9 @@ def _covering(chart: Chart, uv: np.ndarray, dual: _Dual) -> list[tuple[np.ndarra
     return list(zip(members[::2], members[1::2], strict=True))
 
 
-def _enlarged(dual: _Dual, steps: csr_matrix, one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _enlarged(
+    graph: PolygonGraph, steps: csr_matrix, one: np.ndarray, other: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Both pieces with what lies around them, as large as an island should be at least."""
     far = np.stack([dijkstra(steps, indices=piece, min_only=True) for piece in (one, other)])
     nearer = np.argmin(far, axis=0)
@@ -258,17 +278,17 @@ def _enlarged(dual: _Dual, steps: csr_matrix, one: np.ndarray, other: np.ndarray
     for k, piece in enumerate((one, other)):
         around = np.flatnonzero((nearer == k) & np.isfinite(far[k]))
         around = around[np.argsort(far[k][around], kind="stable")]
-        enough = np.cumsum(dual.area[around]) <= LEAST_PART * dual.area.sum()
+        enough = np.cumsum(graph.area[around]) <= LEAST_PART * graph.area.sum()
         grown.append(np.union1d(piece, around[enough]))
     return grown[0], np.setdiff1d(grown[1], grown[0])
 
 
-def _minimum_cut(dual: _Dual, capacity: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def minimum_cut(graph: PolygonGraph, capacity: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Which polygons (p,) bool are on the side of `one` (a,) of the cheapest cut between these and `other` (b,)."""
-    count = len(dual.area)
+    count = len(graph.area)
     source, sink = count, count + 1
-    tail = np.concatenate([dual.joined[:, 0], dual.joined[:, 1], np.full(len(one), source), other])
-    head = np.concatenate([dual.joined[:, 1], dual.joined[:, 0], one, np.full(len(other), sink)])
+    tail = np.concatenate([graph.joined[:, 0], graph.joined[:, 1], np.full(len(one), source), other])
+    head = np.concatenate([graph.joined[:, 1], graph.joined[:, 0], one, np.full(len(other), sink)])
     room = np.concatenate([capacity, capacity, np.full(len(one) + len(other), WHOLE, np.int32)])
     graph = csr_matrix((room, (tail, head)), shape=(count + 2,) * 2, dtype=np.int32)
     left = graph - maximum_flow(graph, source, sink).flow

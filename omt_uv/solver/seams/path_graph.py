@@ -110,7 +110,7 @@ def path_graph(
     _, first = np.unique(ends[:, 0] * n + ends[:, 1], return_index=True)
     ends, length = ends[first], length[first]
     # A step without length still costs something: sparse graphs take a zero for no step.
-    floor = 1e-9 * max(float(length.mean()), 1e-30)
+    floor = 1e-9 * max(float(length.mean()) if len(length) else 1.0, 1e-30)
     cost = (length + floor) * factor[ends].mean(axis=1) / surface.size
     (rows, columns), both = np.concatenate([ends, ends[:, ::-1]]).T, np.tile(cost, 2)
     number = csr_matrix((np.tile(np.arange(len(cost)) + 1, 2), (rows, columns)), shape=(n, n))

@@ -99,12 +99,12 @@ def domed_box(height, count=48):
     V, F = meshes.grid(count, count, 2.0, 2.0)
     x, y = V[:, 0] - V[:, 0].mean(), V[:, 1] - V[:, 1].mean()
     hill = height * (np.cos(np.pi * x / 2) * np.cos(np.pi * y / 2)) ** 2
-    rim = np.flatnonzero((np.abs(x) > 0.999) | (np.abs(y) > 0.999))
-    rim = rim[np.argsort(np.arctan2(y[rim], x[rim]))]
-    n, k = len(V), len(rim)
-    V = np.concatenate([np.stack([x, y, hill], 1), np.stack([x[rim], y[rim], np.full(k, -1.0)], 1), [[0, 0, -1.0]]])
+    outer = np.flatnonzero((np.abs(x) > 0.999) | (np.abs(y) > 0.999))
+    outer = outer[np.argsort(np.arctan2(y[outer], x[outer]))]
+    n, k = len(V), len(outer)
+    V = np.concatenate([np.stack([x, y, hill], 1), np.stack([x[outer], y[outer], np.full(k, -1.0)], 1), [[0, 0, -1.0]]])
     i, j = np.arange(k), (np.arange(k) + 1) % k
-    walls = [np.stack([n + i, n + j, rim[j]], axis=1), np.stack([n + i, rim[j], rim[i]], axis=1)]
+    walls = [np.stack([n + i, n + j, outer[j]], axis=1), np.stack([n + i, outer[j], outer[i]], axis=1)]
     return V, np.concatenate([F, *walls, np.stack([n + j, n + i, np.full(k, n + k)], axis=1)])
 
 

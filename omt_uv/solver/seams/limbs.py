@@ -1,0 +1,208 @@
+"""Take limbs off a chart whose map leaves most of a texture empty, where it is narrow.
+
+A body with limbs in one piece is a star, and a square around a star is empty for the most part: its texels are twice as
+large as they had to be. An artist takes off a head or an arm, at the neck: a cut that is short beside what it parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from ..maps.upright import turn_upright
+from ..mesh.charts import Chart, part_of_chart
+from ..mesh.geometry import edge_lengths, signed_areas
+from ..mesh.topology import pair_keys
+from ..packing.pack_square import pack
+from ..progress import drain
+from .parting import LEAST_PART, PolygonGraph, capacities, minimum_cut, with_images
+
+# A chart that fills less of the square around it sprawls; cuts are made where the pieces fill so many times as much
+# once they are packed, which is tried where their boxes promise so many times as much.
+SPRAWLING = 0.3
+FULLER = 1.4
+HOPEFUL = 1.25
+# What fills as much needs no further cut; one that is made fills more by this factor at least.
+FULL = 0.45
+LITTLE = 1.05
+# A neck costs at most that share of the side of a square with the area of the smaller part, what has mean costs being
+# as long as it is; and a part has this share of the chart at least.
+NECK = 0.5
+LEAST_LIMB = 0.05
+MOST_CUTS = 8
+# So many tips of a piece, and lengths around each, are looked at; necks are looked for within that share of the side of
+# a square with the area of the smaller part.
+TIPS = 8
+LEVELS = 24
+NEAR = 0.25
+# Boxes of pieces lie beside one another with that much between them.
+BETWEEN = 1.15
+
+
+def sprawls(chart: Chart, uv: np.ndarray, up: Sequence[float]) -> bool:
+    """Whether the map uv (n,2) of a chart, turned so that `up` (3,) of space is up, fills little of a square."""
+    upright = turn_upright([chart], [uv], [up])[0]
+    return bool(_area(chart, uv) < SPRAWLING * np.ptp(upright, axis=0).max() ** 2)
+
+
+def without_limbs(
+    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float], image: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The piece (m,) of every triangle of a chart with map uv (n,2) without its limbs, and the edges (k,2) of the
+    surface in between; one piece where the pieces would fill a square little better.
+
+    cost, image : see `parting.parted`; up (3,) : see `sprawls`
+    """
+    body = _Body.of(chart, uv, cost, up)
+    whole = cut = np.zeros(len(body.graph.joined), dtype=bool)
+    cuts, shares, room = [cut], [body.filled(cut)], body.room(cut)
+    while len(cuts) <= MOST_CUTS and shares[-1] < FULL:
+        necks = [cut | neck for neck in body.necks(cut, image)]
+        if image is not None:
+            # What was symmetric stays so, as long as it can.
+            alike = [neck for neck in necks if body.is_own_image(neck, image)]
+            necks = alike if alike or body.is_own_image(cut, image) else necks
+        rooms = [body.room(neck) for neck in necks]
+        # A short neck that does as much as a longer one is the better.
+        best = max(range(len(necks)), key=lambda k: rooms[k] / body.cost(necks[k]), default=-1)
+        if best < 0 or rooms[best] < LITTLE * room:
+            break
+        cut, room = necks[best], rooms[best]
+        cuts.append(cut)
+        shares.append(body.filled(cut))
+    # Of a star every arm but one has to go before anything is gained; then few more cuts are worth their seams.
+    cut = next(cut for cut, share in zip(cuts, shares, strict=True) if LITTLE * share >= max(shares))
+    if max(shares) < HOPEFUL * shares[0] or body.packed(cut) < FULLER * body.packed(whole):
+        cut = whole
+    return body.graph.pieces(~cut)[body.graph.polygon], chart.vertex_ids[body.graph.ends[cut]]
+
+
+def _area(chart: Chart, uv: np.ndarray) -> float:
+    return float(np.abs(signed_areas(uv, chart.triangles)).sum())
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A chart with its map uv (n,2) and its polygons, the places (p,2) of these in the map; price (e,) of the edges
+    between them, whose mean is their length, and the same as capacity (e,) and as length (e,) in the map."""
+
+    chart: Chart
+    uv: np.ndarray
+    up: Sequence[float]
+    graph: PolygonGraph
+    places: np.ndarray
+    price: np.ndarray
+    capacity: np.ndarray
+    steps: np.ndarray
+
+    @staticmethod
+    def of(chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float]) -> _Body:
+        graph = PolygonGraph.of(chart)
+        centre = uv[chart.triangles].mean(axis=1)
+        places = np.stack([np.bincount(graph.polygon, x) for x in centre.T], axis=1)
+        places = places / np.bincount(graph.polygon)[:, None]
+        length = edge_lengths(chart.vertices, graph.ends)
+        price = cost[graph.ends].mean(axis=1) * length
+        price *= length.sum() / max(price.sum(), 1e-300)
+        steps = np.linalg.norm(np.diff(places[graph.joined], axis=1)[:, 0], axis=1) + 1e-300
+        return _Body(chart, uv, up, graph, places, price, capacities(chart, graph, cost), steps)
+
+    @property
+    def whole(self) -> float:
+        """The area of the chart."""
+        return float(self.graph.area.sum())
+
+    def cost(self, cut: np.ndarray) -> float:
+        """Of a cut (e,) bool, next to the side of a square with the area of the chart, and of that square's side."""
+        return 1 + float(self.price[cut].sum() / np.sqrt(self.whole))
+
+    def is_own_image(self, cut: np.ndarray, image: np.ndarray) -> bool:
+        """Whether a cut (e,) bool is its own mirror image, for the most part: the nearest image of an image may be
+        another vertex."""
+        ends = self.chart.vertex_ids[self.graph.ends[cut]]
+        images = image[ends]
+        alike = (images >= 0).all(axis=1) & np.isin(pair_keys(*images.T), pair_keys(*ends.T))
+        return len(ends) > 0 and bool(alike.mean() > 0.5)
+
+    def pieces(self, cut: np.ndarray) -> tuple[list[Chart], list[np.ndarray]]:
+        """The pieces that a cut (e,) bool leaves, and their maps, upright."""
+        piece = self.graph.pieces(~cut)[self.graph.polygon]
+        found = [part_of_chart(self.chart, piece == k) for k in range(int(piece.max()) + 1)]
+        charts = [part for part, _ in found]
+        return charts, turn_upright(charts, [self.uv[used] for _, used in found], [self.up] * len(charts))
+
+    def filled(self, cut: np.ndarray) -> float:
+        """What the pieces that a cut (e,) bool leaves fill of a square around them, about: by their boxes."""
+        boxes, longest = self._boxes(cut)
+        return self.whole / max(boxes, longest**2)
+
+    def room(self, cut: np.ndarray) -> float:
+        """The same, but better for every box that is smaller, also where another one is as long as before."""
+        boxes, longest = self._boxes(cut)
+        return self.whole / (np.sqrt(boxes) * longest)
+
+    def _boxes(self, cut: np.ndarray) -> tuple[float, float]:
+        """The area of the boxes of all pieces that a cut (e,) bool leaves, beside one another, and the longest side."""
+        boxes = np.array([np.ptp(uv, axis=0) for uv in self.pieces(cut)[1]])
+        return (BETWEEN if len(boxes) > 1 else 1.0) * float(boxes.prod(axis=1).sum()), float(boxes.max())
+
+    def packed(self, cut: np.ndarray) -> float:
+        """The same when they are packed."""
+        charts, maps = self.pieces(cut)
+        return drain(pack(maps, [chart.triangles for chart in charts])).coverage
+
+    def necks(self, cut: np.ndarray, image: np.ndarray | None) -> Iterator[np.ndarray]:
+        """Edges (e,) bool across necks of the pieces that a cut (e,) bool leaves; image: see `parting.parted`."""
+        piece = self.graph.pieces(~cut)
+        size = np.bincount(piece, self.graph.area)
+        for k in np.flatnonzero(size > 2 * LEAST_LIMB * self.whole):
+            here = piece == k
+            inner = ~cut & here[self.graph.joined[:, 0]]
+            for far in self._from_tips(here, inner):
+                side = self._narrowest(here, inner, far)
+                if side is None:
+                    continue
+                neck = inner & (side[self.graph.joined[:, 0]] != side[self.graph.joined[:, 1]])
+                smaller = min(float(self.graph.area[side].sum()), float(self.graph.area[here & ~side].sum()))
+                if self.price[neck].sum() > NECK * np.sqrt(smaller):
+                    continue
+                both = neck if image is None else with_images(self.chart, self.graph, neck, image)
+                parts = np.bincount(self.graph.pieces(~(cut | both)), self.graph.area)
+                if parts.min() >= LEAST_PART * self.whole:
+                    yield both
+
+    def _from_tips(self, here: np.ndarray, inner: np.ndarray) -> Iterator[np.ndarray]:
+        """Distances (p,) in the map of polygons `here` (p,) bool, joined by edges `inner` (e,) bool, from the tips of
+        what they are: each is as far from those before as can be."""
+        steps = self.graph.matrix(np.where(inner, self.steps, 0.0))
+        steps.eliminate_zeros()
+        centre = self.graph.area[here] @ self.places[here] / self.graph.area[here].sum()
+        middle = np.argmin(np.where(here, np.linalg.norm(self.places - centre, axis=1), np.inf))
+        nearest = dijkstra(steps, indices=middle)
+        for k in range(TIPS):
+            tip = int(np.argmax(np.where(here & np.isfinite(nearest), nearest, -1.0)))
+            far = dijkstra(steps, indices=tip)
+            nearest = far if k == 0 else np.minimum(nearest, far)
+            yield far
+
+    def _narrowest(self, here: np.ndarray, inner: np.ndarray, far: np.ndarray) -> np.ndarray | None:
+        """The side (p,) bool of the polygons `here` (p,) bool of the shortest cut for what it takes off that is about
+        as far (p,) everywhere from a tip; None where there is none."""
+        area = np.where(here, self.graph.area, 0.0)
+        order = np.argsort(np.where(here, far, np.inf), kind="stable")[: int(here.sum())]
+        within, whole = np.cumsum(area[order]), float(area.sum())
+        off = np.linspace(LEAST_LIMB * self.whole, whole - LEAST_LIMB * self.whole, LEVELS)
+        level = np.interp(off, within, far[order])
+        low, high = np.sort(far[self.graph.joined[inner]], axis=1).T
+        across = ((low <= level[:, None]) & (high > level[:, None])) @ self.price[inner]
+        smaller = np.sqrt(np.minimum(off, whole - off))
+        best = int(np.argmin(across / smaller))
+        near = here & (far <= level[best] - NEAR * smaller[best])
+        beyond = here & (far >= level[best] + NEAR * smaller[best])
+        if not near.any() or not beyond.any():
+            return None
+        side = minimum_cut(self.graph, np.where(inner, self.capacity, 1), np.flatnonzero(near), np.flatnonzero(beyond))
+        return side & here

@@ -1,0 +1,88 @@
+"""Bodies that sprawl in a texture lose limbs at their necks; what is compact stays whole."""
+
+from dataclasses import replace
+
+import meshes
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from omt_uv.solver.mesh.charts import part_of_chart, strict_charts
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.seams.limbs import FULLER, LEAST_LIMB, sprawls, without_limbs
+
+UP = (0.0, 0.0, 1.0)
+
+
+def cross(length=14, width=3, lean=(0, 0)):
+    """A flat chart of four arms of so many cells around a square, upright in x and z, and its map; leaning, the arms
+    are longer on one side."""
+    n = 2 * length + width
+    V, F = meshes.grid(n, n, width=n, height=n)
+    cell = V[F].mean(axis=1)[:, :2] - V[:, :2].mean(axis=0)
+    F = F[(np.abs(cell - np.array(lean)) < width / 2).any(axis=1)]
+    used, F = np.unique(F, return_inverse=True)
+    flat = V[used, :2] - V[:, :2].mean(axis=0)
+    points = np.stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]], axis=1)
+    surface = triangle_surface(points, F.reshape(-1, 3))
+    (chart,) = strict_charts(surface)
+    return surface, chart, flat[chart.vertex_ids]
+
+
+def test_a_cross_loses_arms_across_the_shortest_edges():
+    surface, chart, uv = cross()
+    assert sprawls(chart, uv, UP)
+    piece, edges = without_limbs(chart, uv, np.ones(len(uv)), UP)
+    area = np.bincount(piece, face_areas(chart.vertices, chart.triangles))
+    assert 2 <= len(area) <= 5 and area.min() >= LEAST_LIMB * area.sum() / 2
+    # Each cut runs straight across one arm.
+    assert len(edges) == 3 * (len(area) - 1)
+    apart = strict_charts(replace(surface, seams=edges))
+    assert sorted(len(c.triangles) for c in apart) == sorted(np.bincount(piece).tolist())
+    boxes = [np.ptp(uv[chart.triangles[piece == k]].reshape(-1, 2), axis=0) for k in range(len(area))]
+    assert sum(a * b for a, b in boxes) * FULLER < np.prod(np.ptp(uv, axis=0))
+
+
+def test_what_is_dear_is_not_cut():
+    surface, chart, uv = cross()
+    dear = (np.abs(uv) > 2).any(axis=1) & (np.abs(uv) < 8).all(axis=1)
+    _, edges = without_limbs(chart, uv, np.where(dear, 50.0, 1.0), UP)
+    cut = np.isin(chart.vertex_ids, edges)
+    assert cut.any() and not dear[cut].any()
+
+
+@pytest.mark.parametrize("scale", [2.0**-20, 2.0**20])
+def test_scale_plays_no_part(scale):
+    surface, chart, uv = cross(lean=(1, 3))
+    given = without_limbs(chart, uv, np.ones(len(uv)), UP)
+    large = type(chart)(scale * chart.vertices, chart.triangles, chart.corners, chart.faces, chart.vertex_ids)
+    scaled = without_limbs(large, scale * uv, np.full(len(uv), 4.0), UP)
+    assert all(np.array_equal(a, b) for a, b in zip(given, scaled, strict=True))
+
+
+def test_cuts_of_what_is_symmetric_are_their_own_image():
+    surface, chart, uv = cross()
+    image = cKDTree(surface.positions).query(surface.positions * [-1, 1, 1])[1]
+    _, edges = without_limbs(chart, uv, np.ones(len(uv)), UP, image)
+    assert len(edges)
+    assert {frozenset(e) for e in image[edges].tolist()} == {frozenset(e) for e in edges.tolist()}
+
+
+def test_what_is_compact_stays_whole():
+    V, F = meshes.grid(12, 10)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    uv = chart.vertices[:, :2]
+    assert not sprawls(chart, uv, UP)
+    piece, edges = without_limbs(chart, uv, np.ones(len(uv)), UP)
+    assert not piece.any() and not len(edges)
+
+
+def test_parts_of_a_chart_know_their_vertices():
+    _, chart, _ = cross()
+    rows = chart.vertices[chart.triangles].mean(axis=1)[:, 0] > 3
+    part, used = part_of_chart(chart, rows)
+    assert np.array_equal(part.vertices, chart.vertices[used])
+    assert np.array_equal(used[part.triangles], chart.triangles[rows])
+    assert np.array_equal(part.vertex_ids, chart.vertex_ids[used])
+    assert np.array_equal(part.corners, chart.corners[rows]) and np.array_equal(part.faces, chart.faces[rows])
