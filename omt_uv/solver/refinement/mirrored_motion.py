@@ -10,7 +10,7 @@ import numpy as np
 from ..maps.energy import Elements, has_folds, squared
 from ..maps.local_untangle import inner_folds_straightened
 from ..maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry, orbits
-from ..maps.polygon_elements import restricted
+from ..maps.polygon_elements import polygon_mesh, restricted
 from ..mesh.mirror import find_mirror
 from ..mesh.topology import boundary_edges, row_labels
 from .hessian_blocks import corners_of_quads, lone_triangles
@@ -57,10 +57,10 @@ def find_symmetry(
     vertices: np.ndarray, triangles: np.ndarray, polygons: np.ndarray | None, faces: Elements
 ) -> MirrorSymmetry | None:
     """The mirror symmetry of a mesh (n,3), (m,3) whose polygons (m,) have symmetric targets, too; None without one."""
-    n, target = len(vertices), faces.area * faces.ratio
-    owner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
-    pairs = np.unique(np.repeat(owner, 3).astype(np.int64) * n + faces.triangles.ravel())
-    asked = [target] if faces.region is None else [target, target * faces.region]
+    n, owner, target = len(vertices), _given_polygons(triangles, polygons, faces), faces.area * faces.ratio
+    corner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
+    pairs = np.unique(np.repeat(owner[corner], 3).astype(np.int64) * n + faces.triangles.ravel())
+    asked = [np.bincount(owner, x) for x in ([target] if faces.region is None else [target, target * faces.region])]
     around = [np.bincount(pairs % n, values[pairs // n], n) for values in asked]
 
     def accepted(image: np.ndarray) -> bool:
@@ -71,6 +71,18 @@ def find_symmetry(
         return None
     second = find_mirror(vertices, triangles, polygons, across=first, accepted=accepted)
     return mirror_symmetry(np.array([m.image for m in (first, second) if m is not None]))
+
+
+def _given_polygons(triangles: np.ndarray, polygons: np.ndarray | None, faces: Elements) -> np.ndarray:
+    """A number for the polygon of the mesh (m,3), (m,) to which each polygon of its elements (p,) belongs: long ones
+    that are not convex count triangle by triangle, and are cut as they come."""
+    count, lone = len(faces.area), lone_triangles(faces)
+    own = np.arange(count)
+    if polygons is None or faces.polygon is None or faces.alone is None or not faces.alone[:lone].any():
+        return own
+    given = polygons[polygon_mesh(triangles, polygons).rows[:lone]]
+    own[faces.polygon[:lone]] = count + np.unique(given, return_inverse=True)[1].ravel()
+    return np.unique(own, return_inverse=True)[1].ravel()
 
 
 def halved(faces: Elements, symmetry: MirrorSymmetry | None) -> Elements:

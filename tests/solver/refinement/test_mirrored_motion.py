@@ -156,6 +156,21 @@ def test_quads_cut_otherwise_than_their_images_need_both_diagonals_where_one_wou
         assert whole == one
 
 
+def test_long_polygons_that_are_not_convex_are_as_large_as_their_images_however_they_are_cut():
+    """Two halves of a ring, each one polygon: their triangles are those of whoever drew them."""
+    count = 20
+    turn = np.exp(2j * np.pi * np.arange(count) / count)
+    V = np.concatenate([np.column_stack([w.real, w.imag, 0 * w.real]) for w in (turn, 2 * turn)])
+    V[:, 2] = 0.2 * V[:, 1] ** 3
+    i, j = np.arange(count), np.roll(np.arange(count), -1)
+    one = np.stack([np.column_stack([i, i + count, j + count]), np.column_stack([i, j + count, j])], axis=1)
+    two = np.stack([np.column_stack([i, i + count, j]), np.column_stack([j, i + count, j + count])], axis=1)
+    T = np.where((np.random.default_rng(0).random(count) < 0.5)[:, None, None], one, two).reshape(-1, 3)
+    halves = np.repeat(i // (count // 2), 2)
+    found = find_symmetry(V, T, halves, polygon_elements(V, T, face_areas(V, T), halves))
+    np.testing.assert_allclose(V[found.images[0]], V * [-1, 1, 1], atol=1e-12)
+
+
 def test_polygons_unlike_their_images_stand_for_themselves():
     """Within what is taken for a mirror image; their areas would be a little off otherwise."""
     V, Q = hill(8)
