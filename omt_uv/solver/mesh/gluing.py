@@ -8,6 +8,7 @@ edge runs in opposite directions in them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -39,6 +40,18 @@ class Gluing:
         # A diagonal between two corners on one vertex has equal ends, whichever way it runs.
         opposite = (tail[self.first] == head[self.second]) & (head[self.first] == tail[self.second])
         return (self.vertex[tail[self.first]] == self.vertex[tail[self.second]]) & ~opposite
+
+    @cached_property
+    def classes(self) -> np.ndarray:
+        """See `corner_classes`: each of a repair, a cut, and the charts that it leaves asks for them."""
+        tail, head = halfedges(self.triangles)
+        same = self.parallel()
+        f, s = self.first, self.second
+        rows = np.concatenate([tail[f], head[f]])
+        columns = np.concatenate([np.where(same, tail[s], head[s]), np.where(same, head[s], tail[s])])
+        found = graph_components(rows, columns, len(self.vertex))[1]
+        found.flags.writeable = False
+        return found
 
     def without(self, gone: np.ndarray) -> Gluing:
         """The same triangles with the pairs `gone` (p,) bool cut open."""
@@ -77,12 +90,7 @@ def diagonal_pairs(triangles: np.ndarray, side: np.ndarray) -> tuple[np.ndarray,
 
 def corner_classes(gluing: Gluing) -> np.ndarray:
     """Class (c,) of every corner: corners around one vertex that joined halfedges lead from one to the next."""
-    tail, head = halfedges(gluing.triangles)
-    same = gluing.parallel()
-    f, s = gluing.first, gluing.second
-    rows = np.concatenate([tail[f], head[f]])
-    columns = np.concatenate([np.where(same, tail[s], head[s]), np.where(same, head[s], tail[s])])
-    return graph_components(rows, columns, len(gluing.vertex))[1]
+    return gluing.classes
 
 
 def components(gluing: Gluing) -> np.ndarray:

@@ -137,8 +137,13 @@ def mirrored_quads(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         return none
     points = (points - points.min(axis=0)) / extent
     centred = points - points.mean(axis=0)
-    tree, probes = cKDTree(centred), np.random.default_rng(0).permutation(len(points))[:PROBES]
+    tree, probes = None, np.random.default_rng(0).permutation(len(points))[:PROBES]
     for number, normal in enumerate(_candidates(points, triangles)):
+        # What a plane takes to itself reaches as far to either side of it.
+        height = centred @ normal
+        if abs(height.max() + height.min()) > 2 * MIRROR_TOLERANCE:
+            continue
+        tree = tree or cKDTree(centred)
         if tree.query(_reflected(centred[probes], normal))[0].max() > MIRROR_TOLERANCE:
             continue
         far, image = tree.query(_reflected(centred, normal))

@@ -16,7 +16,7 @@ from .charts import Chart
 from .geometry import edge_lengths
 from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam
-from .topology import halfedges, pair_keys, pair_up
+from .topology import halfedges, order_of_pairs, pair_keys, pair_up
 
 # Vertices of a triangle without area move by this share of the height of the flattest sound triangle around them:
 # it has area then, and its neighbours keep theirs to within a few thousandths.
@@ -105,10 +105,11 @@ def _pair_sides(surface: Surface, gluing: Gluing, layer: np.ndarray) -> tuple[Gl
     floor = layer[gluing.owner[sides // 3]]
     keep = (floor >= 0) & ~is_seam(surface, edge)
     sides, a, b, edge, floor = sides[keep], a[keep], b[keep], edge[keep], floor[keep]
-    number = np.unique(edge, return_inverse=True)[1].ravel()
-    key = number * (floor.max(initial=0) + 1) + floor
-    _, index, count = np.unique(key, return_index=True, return_counts=True)
-    h = index[count > 2]
+    layers = int(floor.max(initial=0)) + 1
+    key = edge if layers == 1 else np.unique(edge, return_inverse=True)[1].ravel() * layers + floor
+    order = order_of_pairs(key)
+    first = np.flatnonzero(np.diff(key[order], prepend=-1))
+    h = order[first[np.diff(first, append=len(key)) > 2]]
     torn = np.unique(np.stack([np.minimum(a[h], b[h]), np.maximum(a[h], b[h])], axis=1), axis=0)
     first, second = pair_up(key)
     first = np.concatenate([gluing.first, sides[first]])
@@ -122,6 +123,8 @@ def _folded_faces(gluing: Gluing, layer: np.ndarray, around: np.ndarray) -> np.n
 
     Polygons of layer (f,) -1 are apart already.
     """
+    if gluing.side.all():
+        return np.zeros(0, np.int64)
     tail, head = halfedges(gluing.triangles)
     corner_class = corner_classes(gluing)
     key = pair_keys(corner_class[tail], corner_class[head])
@@ -156,6 +159,8 @@ def _healed(gluing: Gluing) -> Gluing:
     first, second = pair_up(pair_keys(corner_class[tail[h]], corner_class[head[h]]))
     first, second = h[first], h[second]
     slit = first // 3 != second // 3
+    if not slit.any():
+        return gluing
     return replace(
         gluing,
         first=np.concatenate([gluing.first, first[slit]]),

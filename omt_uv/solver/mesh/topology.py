@@ -55,6 +55,26 @@ def order_of_pairs(keys: np.ndarray) -> np.ndarray:
     return np.argsort(keys, kind="stable")
 
 
+def order_of_numbers(values: np.ndarray) -> np.ndarray:
+    """The stable ascending order (k,) of integers (k,) >= 0; by counting where there are many, and none is large."""
+    most = int(values.max(initial=0))
+    if len(values) > FEW_PAIRS and most < 2 * len(values):
+        return _counted(values.astype(np.int32), most).astype(np.int64)
+    return np.argsort(values, kind="stable")
+
+
+def runs(ordered: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values (r,) that occur in an ordered array (k,), and the number (k,) of each entry's: what `np.unique` would sort
+    for again.
+
+    >>> runs(np.array([2, 2, 5]))
+    (array([2, 5]), array([0, 0, 1]))
+    """
+    begins = np.ones(len(ordered), dtype=bool)
+    np.not_equal(ordered[1:], ordered[:-1], out=begins[1:])
+    return ordered[begins], np.cumsum(begins) - 1
+
+
 def _counted(values: np.ndarray, most: int) -> np.ndarray:
     """The stable order (k,) of int32 values (k,) from 0 to `most`: a matrix of one a row is transposed by counting."""
     k = len(values)

@@ -76,11 +76,13 @@ ISOMETRY = 1e-8
 UNROLLED = 1e-2
 # Vertices of a boundary touch one another that are nearer than this share of the mean of its edges.
 TOUCHING = 1e-6
-# Drafts of charts with more vertices than this come by way of a coarser mesh, unless their log scale spreads less.
+# Drafts of charts with more vertices than this come by way of a coarser mesh, unless their log scale spreads less, and
+# need no step of all vertices where sweeps bring the areas of a draft.
 DRAFT_ABOVE = 600
 DRAFT_COARSE_ABOVE = 2000
+DRAFT_COARSER = 6
 DRAFT_SPREAD = 0.03
-DRAFT_SWEEPS = 4
+DRAFT_SWEEPS = 16
 # Their edges grow by at most the root of this over the number of vertices for a length: as they do around a disk that
 # gets most of the map, and meets its ring with as many edges as the ring has around it.
 AROUND = 4.0
@@ -89,6 +91,7 @@ LEAST_DENSITY = 1e-4
 # What comes back is smoothed so many times, with these area weights.
 SWEEPS = 8
 SMOOTH_WEIGHT = 30.0
+SMOOTH_WEIGHT_DRAFT = 200.0
 SMOOTH_WEIGHT_FAR = 500.0
 # The most energy at that weight of an evened map that is a start: a stage in which a squeezed one relaxes would leave
 # as much, were it all of areas.
@@ -202,9 +205,10 @@ def coarse_initial_map(
             # A draft has no steps to spare for a start that is squeezed, too.
             if even is not None and not (draft and map_energy(even, vertices, triangles) > HOPELESS):
                 return InitialChartMap(even)
-        goal = len(vertices) // (COARSER_FAR if far else COARSER)
+        goal = len(vertices) // (COARSER_FAR if far else DRAFT_COARSER if draft else COARSER)
         density = _density(vertices, triangles, disk.target, goal) if far else None
-        steps = coarsen_disk(vertices, triangles, flat, disk.target, goal, disk.region, density)
+        whole = draft and disk.boundary != "free"
+        steps = coarsen_disk(vertices, triangles, flat, disk.target, goal, disk.region, density, whole)
         coarse = yield from part_of(steps, *COARSENING)
     if len(coarse.kept) > (COARSE_ENOUGH_FAR if far else COARSE_ENOUGH) * len(vertices):
         return None
@@ -218,9 +222,11 @@ def coarse_initial_map(
     )
     found = None
     if len(points) > (DIRECT_FAR if far else DRAFT_COARSE_ABOVE if draft else COARSE_ABOVE):
-        coarser = coarse_initial_map(coarse_disk, balance, log, flat[coarse.kept])
+        coarser = coarse_initial_map(coarse_disk, balance, log, flat[coarse.kept], draft)
         found = yield from part_of(coarser, *COARSE_MAP)
-    if found is None:
+    if found is None and draft and corners is None:
+        found = _draft_start(coarse_disk, flat[coarse.kept], log)
+    elif found is None:
         found = yield from part_of(direct_initial_map(coarse_disk, log), *COARSE_MAP)
     with log.timed("coarse refinement"):
         refined = yield from part_of(
@@ -230,8 +236,8 @@ def coarse_initial_map(
     log.warnings += refined.warnings
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
-        weight, sweeps = SMOOTH_WEIGHT_FAR if far or draft else SMOOTH_WEIGHT, DRAFT_SWEEPS if draft else SWEEPS
-        uv = yield from part_of(_smoothed(disk, uv, weight, sweeps), *SMOOTHING)
+        weight = SMOOTH_WEIGHT_DRAFT if draft else SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT
+        uv = yield from part_of(_smoothed(disk, uv, weight, draft), *SMOOTHING)
         # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
         if not (far or draft) and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(flat)
@@ -258,11 +264,18 @@ def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, qu
     return refine(disk.vertices, disk.triangles, initial.uv, options, target=disk.target, region=disk.region)
 
 
-def _smoothed(disk: DiskMesh, uv: np.ndarray, area_weight: float, sweeps: int) -> Steps[np.ndarray]:
+def _draft_start(disk: DiskMesh, flat: np.ndarray, log: RunLog) -> InitialChartMap:
+    """Where a draft of a coarse mesh begins: flattened, or as embedded (n,2). What a transport spares takes less."""
+    even = flat_initial_map(disk, log) if disk.boundary == "free" else None
+    return InitialChartMap(flat) if even is None else even
+
+
+def _smoothed(disk: DiskMesh, uv: np.ndarray, area_weight: float, draft: bool) -> Steps[np.ndarray]:
     """A map uv (n,2) that came from a coarser mesh, its vertices moved within their stars."""
+    sweeps, goal = (DRAFT_SWEEPS, QUALITIES["draft"].area_error) if draft else (SWEEPS, 0.0)
     faces, w = elements(disk.vertices, disk.triangles, disk.target), uv @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
-    w = yield from smoothed(faces, w, area_weight, sweeps)
+    w = yield from smoothed(faces, w, area_weight, sweeps, goal=goal)
     return np.column_stack([w.real, w.imag])
 
 

@@ -38,6 +38,10 @@ class PolygonDisk:
 
 def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     """The chart, with its vertices at (n,3), cut for its map."""
+    if len(np.unique(chart.faces)) == len(chart.faces):
+        # Triangles alone are there as they were.
+        numbers = np.arange(len(chart.faces)), -1 - np.arange(len(chart.patches))
+        return PolygonDisk(vertices, np.concatenate([chart.triangles, chart.patches]), np.concatenate(numbers))
     faces = _numbered(chart.faces)
     cut = polygon_mesh(chart.triangles, faces, most=len(faces))
     quads = shorter_diagonals(vertices, cut.quads, chart.disk)

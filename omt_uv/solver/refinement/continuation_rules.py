@@ -129,13 +129,9 @@ QUALITIES = {
         area_error=0.1, area_weights=(30.0,), greatest_weight=1e4, max_steps=80, tolerance=3e-2, loose_tolerance=1e-2
     ),
     "rough": Quality(area_error=0.03, area_weights=(30.0, 500.0), greatest_weight=1e4, max_steps=80, tolerance=1e-2),
+    # For that of a draft. Sweeps of the fine mesh do what is left.
     "sketch": Quality(
-        area_error=0.01,
-        area_weights=(30.0, 500.0),
-        greatest_weight=4e3,
-        max_steps=30,
-        tolerance=0.1,
-        loose_tolerance=0.1,
+        area_error=0.035, area_weights=(30.0,), greatest_weight=4e3, max_steps=30, tolerance=0.3, loose_tolerance=0.3
     ),
     # Areas about right, whatever is left of the shear.
     "draft": Quality(

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..maps.energy import Elements, elements
 from ..mesh.geometry import cross2, dot2, face_areas
-from ..mesh.topology import boundary_loops, expand, halfedges, twins
+from ..mesh.topology import boundary_loops, expand, halfedges, runs, twins
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
 
@@ -34,8 +34,8 @@ HEAVY = 1.0
 BOUNDARY_SHARE = 0.25
 # Share of the area at a safe place that every returning face keeps.
 KEPT_AREA = 0.1
-# Newton steps of a returning vertex.
-RELAX_STEPS = 6
+# Newton steps of a returning vertex: its neighbours have yet to move.
+RELAX_STEPS = 2
 # Area weight in them.
 RELAX_WEIGHT = 10.0
 
@@ -98,12 +98,15 @@ class CoarseMesh:
         return np.column_stack([w.real, w.imag])
 
 
-def coarsen_disk(vertices, triangles, flat, mass, goal: int, region=None, density=None) -> Steps[CoarseMesh]:
+def coarsen_disk(
+    vertices, triangles, flat, mass, goal: int, region=None, density=None, whole_boundary=False
+) -> Steps[CoarseMesh]:
     """Coarsen a disk (n,3), (m,3) to about `goal` vertices.
 
     flat (n,2): an embedding in the plane with a convex boundary; mass (m,): what the triangles' areas in the final map
     are to be, handed on; region (m,) in [0, 1]: weights of a region, which keeps its share of the mass; density (n,):
-    how many vertices are to be left there for an area, relative to elsewhere; by default that is left to chance.
+    how many vertices are to be left there for an area, relative to elsewhere; by default that is left to chance;
+    whole_boundary: its vertices stay, however many they are of those that are left.
     """
     mass = np.column_stack([mass] if region is None else [mass, mass * region])
     rounds: list[RemovalRound] = []
@@ -112,7 +115,7 @@ def coarsen_disk(vertices, triangles, flat, mass, goal: int, region=None, densit
     while left > goal:
         yield Progress("Coarser mesh", np.log(count / left) / np.log(count / goal))
         rank = np.random.default_rng(len(rounds)).permutation(count)
-        if len(boundary) <= BOUNDARY_SHARE * left:
+        if whole_boundary or len(boundary) <= BOUNDARY_SHARE * left:
             rank[boundary] = -1
         if density is not None:
             rank[_heavy(vertices, triangles, density)] = -1
@@ -146,7 +149,7 @@ def _round(V, F, flat, mass, rank):
     v, after, before = np.take_along_axis(F[star], turned, 1).T
     into, good = _collapses(V, flat, v, after, before, ahead)
     star, v, after, before, into = (x[good] for x in (star, v, after, before, into))
-    vertex, row = np.unique(v, return_inverse=True)
+    vertex, row = runs(v)
     stays = (after != into) & (before != into)
     new = np.column_stack([into, after, before])[stays]
     corner, share = _places(V, flat, vertex, row[stays], new, ahead)
@@ -187,7 +190,9 @@ def _best_collapses(V, flat, v, after, before, ahead):
     """
     if not len(v):
         return v, np.zeros(0, bool)
-    _, first, row, size = np.unique(v, return_index=True, return_inverse=True, return_counts=True)
+    row = runs(v)[1]
+    size = np.bincount(row)
+    first = np.cumsum(size) - size
     # All pairs of a candidate, the corner `after` of one face, and another face of the same star.
     candidate, other = expand(size[row])
     other = other + first[row[candidate]]

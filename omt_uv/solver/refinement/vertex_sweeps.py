@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..maps.energy import Elements, energies, squared
-from ..mesh.topology import halfedges, twins
+from ..maps.energy import Elements, area_error, energies, squared
+from ..mesh.topology import halfedges, order_of_numbers, runs, twins
 from ..progress import Progress, Steps
 from .boundary_barrier import crossings_on_the_way, loop_edges
 
@@ -23,7 +23,7 @@ HALVINGS = 5
 # Passes that add to an independent set.
 PASSES = 3
 # Independent sets that make a sweep; what is in none of them waits for Newton.
-SETS = 8
+SETS = 6
 # A boundary vertex moves only where it might go so many times as far before edges cross.
 ROOM = 6.0
 # Stars with so many times the mean energy are smoothed after a step of Newton's method.
@@ -32,11 +32,13 @@ WORST = 2.0
 AFTER_STEP = 4
 
 
-def smoothed(faces: Elements, w: np.ndarray, area_weight: float, sweeps: int, loop=None) -> Steps[np.ndarray]:
+def smoothed(
+    faces: Elements, w: np.ndarray, area_weight: float, sweeps: int, loop=None, goal: float = 0.0
+) -> Steps[np.ndarray]:
     """A map w (n,) complex without folds after sweeps over all its vertices, without folds.
 
     loop: a boundary, see `boundary_barrier.loop_edges`, that moves, too, and does not come to cross itself. Without it
-    the boundary stays.
+    the boundary stays. goal: area error at which the sweeps end
     """
     w = w.copy()
     sets = list(_sets(faces, len(w), loop is not None))
@@ -48,6 +50,8 @@ def smoothed(faces: Elements, w: np.ndarray, area_weight: float, sweeps: int, lo
             w = start
             _sweep(sets, w, area_weight, loop)
         yield Progress("Smoothing", (k + 1) / sweeps)
+        if goal and area_error(faces, w) <= goal:
+            break
     return w
 
 
@@ -116,21 +120,23 @@ def _stars(F: np.ndarray, n: int, whole=False):
         chosen = independent_set(F, np.where(inner, random.permutation(n), -1))
         inner &= ~chosen
         star, corner = stars(F, chosen)
-        vertex, row = np.unique(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0], return_inverse=True)
+        vertex, row = runs(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0])
         yield vertex, row, star, corner
 
 
 def independent_set(F: np.ndarray, rank: np.ndarray) -> np.ndarray:
     """Vertices (n,) bool, no two in one face, those of high rank (n,) first; none of negative rank."""
     faces = np.bincount(F.ravel(), minlength=len(rank))
-    rank = rank.copy()
+    rank, left = rank.copy(), F
     chosen = np.zeros(len(rank), bool)
     for _ in range(PASSES):
-        here = rank[F]
-        wins = here.argmax(1)
-        winner = np.take_along_axis(F, wins[:, None], 1)[:, 0]
+        here = rank[left]
+        # Most faces have nobody left to win after the first pass.
+        open_ = (here >= 0).any(1)
+        left, here = left[open_], here[open_]
+        winner = np.take_along_axis(left, here.argmax(1)[:, None], 1)[:, 0]
         chosen |= (np.bincount(winner, minlength=len(rank)) == faces) & (rank >= 0)
-        rank[F[chosen[F].any(1)]] = -1
+        rank[left[chosen[left].any(1)]] = -1
     return chosen
 
 
@@ -138,7 +144,7 @@ def stars(F: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Faces (s,) around the chosen vertices (n,) bool, by vertex, and their corners (s,3) from that vertex on."""
     star = np.flatnonzero(chosen[F].any(1))
     corner = (chosen[F[star]].argmax(1)[:, None] + np.arange(3)) % 3
-    order = np.argsort(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0], kind="stable")
+    order = order_of_numbers(np.take_along_axis(F[star], corner[:, :1], 1)[:, 0])
     return star[order], corner[order]
 
 
