@@ -46,3 +46,24 @@ def test_levels_stand_in_a_collection_and_are_shown_in_turn():
 def test_nothing_to_compare_with_is_said():
     scenes.bump()
     assert "Remesh it first" in scenes.error_of(bpy.ops.object.omt_compare)
+
+
+def test_of_two_that_were_remeshed_the_active_one_is_shown_with_its_own():
+    first, second = scenes.bump(name="First"), scenes.bump(name="Second", offset=3.0)
+    for obj in (first, second):
+        scenes.select([obj])
+        bpy.ops.object.omt_remesh(target_vertices=60, hide_original=False)
+    for active, others in ((second, {"First", "First_remesh"}), (first, {"Second", "Second_remesh"})):
+        for obj in bpy.context.view_layer.objects:
+            obj.hide_set(False)
+        scenes.select([first, second])
+        bpy.context.view_layer.objects.active = active
+        assert bpy.ops.object.omt_compare() == {"FINISHED"}
+        assert set(shown()) == {f"{active.name}_remesh", *others}
+    # A lamp that is active says nothing: what is selected does.
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    bpy.context.collection.objects.link(lamp)
+    scenes.select([second])
+    bpy.context.view_layer.objects.active = lamp
+    assert bpy.ops.object.omt_compare() == {"FINISHED"}
+    assert "Second_remesh" in shown() and "Second" not in shown()
