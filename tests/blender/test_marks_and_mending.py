@@ -103,14 +103,16 @@ def test_vertices_on_one_another_are_joined_whatever_the_scale(package, mode, sc
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
-def test_the_extent_counts_that_a_wide_object_has(package, mode):
-    """Scaled along one axis alone: lengths are told by the greatest scale."""
-    obj = flat(2e-6, (10, 1, 1))
-    if mode == "EDIT":
-        scenes.edit(obj)
-    extent = 10 / 10
-    assert package("blender.clean").merge(obj) == (2 if 1e-6 * extent > 2e-7 else 0)
-    scenes.leave_edit()
+def test_lengths_of_an_object_scaled_along_one_axis_are_told_by_the_greatest_scale(package, mode):
+    """Ten wide and scaled by ten: one of its own units, of which a gap of 4e-6 is too much to be joined."""
+    for gap, joined in ((4e-5, 0), (4e-6, 2)):
+        obj = flat(gap, (10, 1, 1))
+        obj.data.vertices.foreach_set("co", (np.array([v.co[:] for v in obj.data.vertices]) * [1, 0.1, 1]).ravel())
+        bpy.context.view_layer.update()
+        if mode == "EDIT":
+            scenes.edit(obj)
+        assert package("blender.clean").merge(obj) == joined
+        scenes.leave_edit()
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
