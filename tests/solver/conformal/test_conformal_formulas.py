@@ -67,6 +67,9 @@ def test_a_rectangle_fills_the_disk_as_it_stands(height):
     e = 1e-5
     here, right, up = (rectangle_to_disk(inner + d, height) @ [1, 1j] for d in ([0, 0], [e, 0], [0, e]))
     assert (up - here) / (right - here) == pytest.approx(np.full(len(inner), 1j), abs=1e-3)
+    # Wide ones stand as they are, high ones are turned by a quarter.
+    corner = rectangle_to_disk(np.array([[0.0, 0.0]]), height)[0]
+    assert (corner < 0).tolist() == [True, height < 1]
     # From one shape to another the middle of the right side goes on where it was, as far as the two ways allow.
     middle = rectangle_to_disk(np.array([[1.0, height / 2]]), height)[0] @ [1, 1j]
     up_there = rectangle_to_disk(np.array([[0.5, height]]), height)[0] @ [1, 1j]

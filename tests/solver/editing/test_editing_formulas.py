@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.editing.image_warp import bilinear, continued, old_places, rounded, warp_image
-from omt_uv.solver.editing.inset_images import InsetImage
+from omt_uv.solver.editing.inset_images import InsetImage, warp_with_insets
 from omt_uv.solver.editing.magnify_regions import _direction, magnify_regions
 from omt_uv.solver.editing.outline import recognise_outline
 from omt_uv.solver.progress import drain
@@ -107,3 +107,21 @@ def test_an_inset_has_its_share_within_its_borders():
     np.testing.assert_allclose(local, [[0, 0], [1, 1], [0.5, 0.5], [0.75, 0.75]])
     share = inset.share(np.array([[0.4, 0.6], [0.1, 0.5], [0.7, 0.5], [0.4, 0.9], [0.4, 0.3]]))
     assert share[0] == pytest.approx(1) and not share[1:].any()
+
+
+def test_insets_cover_by_their_alpha_and_are_filtered_where_they_are_finer():
+    whole = np.array([[[0, 0], [1, 0], [1, 1.0]], [[0, 0], [1, 1], [0, 1.0]]])
+    picture = np.zeros((32, 32, 4))
+    picture[..., 3] = 1
+    half = InsetImage(np.full((8, 8, 4), [1.0, 0.5, 0.25, 0.5]), (0.25, 0.25), (0.75, 0.75))
+    found = warp_with_insets(picture, whole, whole, [half])
+    np.testing.assert_allclose(found[12:20, 12:20], np.tile([0.5, 0.25, 0.125, 1], (8, 8, 1)), atol=1e-9)
+    assert not found[:8, :, :3].any() and not found[:, 24:, :3].any()
+    # Stripes four times as fine as the pixels are grey, ones of three pixels are not.
+    for wide, least, most in ((1, 0, 0.1), (12, 0.8, 1)):
+        stripes = np.repeat((np.arange(64) // wide % 2)[None, :, None] * np.ones((64, 1, 3)), 1, axis=0)
+        fine = InsetImage(stripes, (0.25, 0.25), (0.75, 0.75))
+        inner = warp_with_insets(picture[..., :3], whole, whole, [fine])[11:21, 11:21]
+        assert least <= np.ptp(inner) <= most
+    larger = warp_with_insets(picture, whole, whole, size=(64, 48))
+    assert larger.shape == (64, 48, 4) and not larger[..., :3].any()

@@ -110,7 +110,8 @@ def test_samples_are_the_farthest_each_time():
 
 
 def test_handles_in_one_place_have_to_go_one_way():
-    one = FlowHandle(np.array([[0.0, 0, 0], [1, 0, 0]]), np.array([[0.0, 1, 0], [1, 1, 0]]), name="one")
+    first = np.array([[3.0, 2, 1], [4, 2, 1]])
+    one = FlowHandle(first, first + [0, 1, 0], name="one")
     same = FlowHandle(one.start[:1] + 5e-4, one.end[:1] + 5e-4, name="same")
     start, _, owner = joined((one, same), 1.0)
     np.testing.assert_array_equal(start, one.start)
