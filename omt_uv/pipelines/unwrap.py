@@ -11,11 +11,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..settings import Settings
-from ..solver.errors import MeshError, plural
+from ..solver.canonical.markers import MapMarkers
+from ..solver.errors import MERGING, MeshError, plural
 from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import signed_areas
-from ..solver.mesh.topology import twins
+from ..solver.mesh.repair import joined_vertices
+from ..solver.mesh.surface import side_ends
+from ..solver.mesh.topology import pair_keys, paired, twins
 from ..solver.parameterization.options import UnwrapOptions
 from ..solver.parameterization.small_charts import SMALL
 from ..solver.parameterization.unwrap import CutCharts, SurfaceMap, cut_charts, map_small_charts, unwrap
@@ -54,17 +57,17 @@ def lay_out(
     """
     options = UnwrapOptions(**settings.unwrap_arguments())
     maps: list[SurfaceMap] = []
-    warnings: list[tuple[int, str]] = []
-    if settings.seams == "charts":
-        seamed = [_with_charts(index, job) for index, job in enumerate(jobs)]
-        jobs = [job for job, _ in seamed]
-        warnings += [(index, warning) for index, (_, warning) in enumerate(seamed) if warning]
+    given, prepare = jobs, {"charts": _with_charts, "auto": _joined}.get(settings.seams, _as_it_is)
+    prepared = [prepare(index, job) for index, job in enumerate(jobs)]
+    jobs = [job for job, _ in prepared]
+    warnings = [(index, warning) for index, (_, warning) in enumerate(prepared) if warning]
     share = PACKING_FROM / len(jobs)
     cuts = yield from _cut_together(jobs, options)
     for index, job in enumerate(jobs):
         try:
             unwrapping = _unwrapped(job, _standing(options, job), cuts.get(index))
-            maps.append((yield from part_of(unwrapping, index * share, share)))
+            found = yield from part_of(unwrapping, index * share, share)
+            maps.append(_seams_as_given(found, given[index], job) if settings.seams == "auto" else found)
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for text in maps[-1].warnings]
@@ -181,6 +184,47 @@ def _with_charts(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
         return job, f"{error}; cut only where it has to be"
     seams = np.concatenate([job.surface.seams, more])
     return replace(job, surface=replace(job.surface, seams=seams)), ""
+
+
+def _as_it_is(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
+    return job, ""
+
+
+def _joined(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
+    """The job with parts joined whose sides lie on one another, as importers leave them, or as it is; and a warning.
+
+    A modifier subdivides the mesh as it is.
+    """
+    surface, count = job.surface, len(job.surface.face_start) - 1
+    if job.subdivision is not None:
+        return job, ""
+    same = joined_vertices(surface, np.ones(count, dtype=bool) if job.faces is None else job.faces)
+    moved = np.flatnonzero(same != np.arange(len(same)))
+    if not len(moved):
+        return job, ""
+    avoid, markers = job.avoid, job.markers
+    if avoid is not None:
+        least = np.zeros(len(same))
+        np.maximum.at(least, same, avoid)
+        avoid = least
+    if markers is not None:
+        markers = MapMarkers(same[markers.centre], same[markers.start], same[markers.corners])
+    surface = replace(
+        surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams], sharp=same[surface.sharp]
+    )
+    who = plural(len(moved), "A boundary vertex lies on another and is", "{} boundary vertices lie on others and are")
+    text = f"{who} joined to them for the map; {MERGING} joins them in the mesh, too"
+    return replace(job, surface=surface, avoid=avoid, markers=markers), text
+
+
+def _seams_as_given(found: SurfaceMap, given: UnwrapJob, joined: UnwrapJob) -> SurfaceMap:
+    """What was found for a job whose parts were joined, its seams along the edges of all vertices that were joined."""
+    if joined is given:
+        return found
+    ends, there = side_ends(given.surface), side_ends(joined.surface)
+    cut, keys = pair_keys(*found.seams.T), pair_keys(*there)
+    every = pair_keys(*ends)[np.isin(keys, cut)]
+    return replace(found, seams=paired(np.unique(np.concatenate([every, cut[~np.isin(cut, keys)]]))))
 
 
 def _connected_triangles(chart: Chart) -> np.ndarray:

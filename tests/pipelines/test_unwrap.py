@@ -69,3 +69,42 @@ def test_what_is_unwrapped_lies_beside_the_polygons_that_keep_their_uvs(mirrored
     moved = new[surface.triangles[chosen]]
     assert moved.min() >= 0 and moved.max() <= 1
     assert overlap_share(np.concatenate([kept, moved])) == 0
+
+
+def split(V, F):
+    """The triangles of a mesh, each with vertices of its own."""
+    return triangle_surface(np.asarray(V)[F].reshape(-1, 3), np.arange(3 * len(F)).reshape(-1, 3))
+
+
+def test_a_mesh_split_by_an_importer_is_mapped_as_if_it_were_whole():
+    V, F = meshes.icosphere(2)
+    settings = Settings(max_shear=1.35)
+    whole, apart = (drain(lay_out([UnwrapJob(s)], settings)) for s in (triangle_surface(V, F), split(V, F)))
+    assert len(apart.maps[0].charts) == len(whole.maps[0].charts) == 1
+    assert [text for _, text in whole.warnings] == []
+    assert [text for _, text in apart.warnings if f"{3 * len(F) - len(V)} boundary vertices" in text]
+    order = [np.argsort(layout.corners[0]) for layout in (whole, apart)]
+    uv = [layout.uv[0][o] for layout, o in zip((whole, apart), order, strict=True)]
+    np.testing.assert_allclose(uv[0], uv[1], atol=1e-9)
+    # Seams run along edges that the given mesh has, in all copies.
+    seams = apart.maps[0].seams
+    assert (seams[:, 0] // 3 == seams[:, 1] // 3).all()
+    places = {frozenset(map(tuple, V[F].reshape(-1, 3)[edge])) for edge in seams}
+    assert places == {frozenset(map(tuple, V[edge])) for edge in whole.maps[0].seams}
+
+
+def test_painted_vertices_and_markers_go_with_what_is_joined():
+    V, F = meshes.icosphere(2)
+    surface = split(V, F)
+    places = surface.positions
+    avoid = np.where(places[:, 0] > 0.2, 1.0, 0.0)
+    found = drain(lay_out([UnwrapJob(surface, avoid=avoid)], Settings(max_shear=1.35)))
+    seams = found.maps[0].seams
+    assert len(seams) and (places[seams][:, :, 0] <= 0.2).all()
+    assert len(found.maps[0].charts) == 1
+
+
+def test_parts_between_existing_seams_are_not_joined():
+    V, F = meshes.cube()
+    found = drain(lay_out([UnwrapJob(split(V, F))], Settings(seams="existing")))
+    assert len(found.maps[0].charts) == len(F)

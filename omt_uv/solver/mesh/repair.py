@@ -15,8 +15,8 @@ from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError, plural
 from .charts import Chart
 from .geometry import edge_lengths
 from .gluing import Gluing, corner_classes, polygon_gluing
-from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam
-from .topology import halfedges, order_of_pairs, pair_keys, pair_up
+from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam, side_ends
+from .topology import graph_components, halfedges, order_of_pairs, pair_keys, pair_up
 
 # Vertices of a triangle without area move by this share of the height of the flattest sound triangle around them:
 # it has area then, and its neighbours keep theirs to within a few thousandths.
@@ -278,3 +278,32 @@ def _more_than_one(group: np.ndarray, value: np.ndarray) -> np.ndarray:
 def _keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """One integer (k,) for each pair of integers from 0 to 2^31 - 1."""
     return (a.astype(np.int64) << 32) | b.astype(np.int64)
+
+
+def joined_vertices(surface: Surface, faces: np.ndarray) -> np.ndarray:
+    """The vertex (n,) that each one is, where sides of separate parts lie exactly on one another: the first of those
+    that are joined, or itself. Importers split meshes so, at hard edges and at the borders of their UVs.
+
+    faces (f,) bool : the polygons that count. Two sides are joined that run against each other where no third one lies,
+    and neither is a seam. A part that touches itself was meant to be open there, and a leaf whose polygons lie on one
+    another to have two sides.
+    """
+    n, here = len(surface.positions), np.repeat(faces, np.diff(surface.face_start))
+    ends = side_ends(surface)[:, here]
+    # Adding zero makes -0.0 and 0.0 the same.
+    place = np.unique(surface.positions + 0.0, axis=0, return_inverse=True)[1].ravel()
+    part, key = graph_components(ends[0], ends[1], n)[1], pair_keys(*ends)
+    twofold = np.zeros(len(faces), dtype=bool)
+    twofold[duplicate_faces(replace(surface, corner_vertex=place[surface.corner_vertex]), faces)[:, 0]] = True
+    _, index, count = np.unique(key, return_inverse=True, return_counts=True)
+    owner = np.repeat(np.arange(len(faces)), np.diff(surface.face_start))[here]
+    open_ = (count[index.ravel()] == 1) & (place[ends[0]] != place[ends[1]]) & ~is_seam(surface, key)
+    sides = ends[:, open_ & ~twofold[owner]]
+    one, other = pair_up(pair_keys(*place[sides]))
+    against = (place[sides[0, one]] == place[sides[1, other]]) & (part[sides[0, one]] != part[sides[0, other]])
+    one, other = sides[:, one[against]], sides[::-1, other[against]]
+    label = graph_components(one.ravel(), other.ravel(), n)[1]
+    # No polygon shall have one vertex twice.
+    _, index, count = np.unique(pair_keys(owner + n, label[ends[0]]), return_inverse=True, return_counts=True)
+    spoilt = np.isin(label, label[ends[0]][count[index.ravel()] > 1])
+    return np.where(spoilt, np.arange(n), np.unique(label, return_index=True)[1][label])

@@ -171,6 +171,14 @@ def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Gluin
     )
 
 
+def side_ends(surface: Surface) -> np.ndarray:
+    """The vertices (2,c) at both ends of the side of its polygon that begins at each corner."""
+    after = np.arange(len(surface.corner_vertex)) + 1
+    filled = surface.face_start[1:] > surface.face_start[:-1]
+    after[surface.face_start[1:][filled] - 1] = surface.face_start[:-1][filled]
+    return np.stack([surface.corner_vertex, surface.corner_vertex[after]])
+
+
 def is_seam(surface: Surface, key: np.ndarray) -> np.ndarray:
     """Whether edges, given by `topology.pair_keys` of their vertices, are seams; (k,) bool."""
     return np.isin(key, pair_keys(surface.seams[:, 0], surface.seams[:, 1]))

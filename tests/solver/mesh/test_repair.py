@@ -378,3 +378,82 @@ def test_what_has_area_keeps_it_next_to_long_strips_without_width(width):
     assert count == 8
     assert not degenerate_triangles(moved, F, repair.NEEDLE).any()
     np.testing.assert_allclose(after[before > 0.01], before[before > 0.01], rtol=5e-3)
+
+
+def split(V, polygons, seams=()):
+    """A polygon mesh in which every polygon has vertices of its own, and the vertex of each before; seams by those."""
+    origin = np.concatenate(polygons)
+    ends = np.cumsum([len(p) for p in polygons])
+    apart = [part.tolist() for part in np.split(np.arange(len(origin)), ends[:-1])]
+    copies = [(a, b) for s in seams for a in np.flatnonzero(origin == s[0]) for b in np.flatnonzero(origin == s[1])]
+    return meshes.polygon_surface(np.asarray(V, float)[origin], apart, copies), origin
+
+
+def joined(surface, faces=None):
+    count = len(surface.face_start) - 1
+    same = repair.joined_vertices(surface, np.ones(count, bool) if faces is None else faces)
+    # What stands for others stands for itself, lies there, and is the first.
+    assert np.array_equal(same[same], same) and (same <= np.arange(len(same))).all()
+    assert np.array_equal(surface.positions[same] + 0.0, surface.positions + 0.0)
+    return same
+
+
+def quads_of_a_cube():
+    corners = 2.0 * np.array([[k >> 2 & 1, k >> 1 & 1, k & 1] for k in range(8)]) - 1
+    return corners, [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+def test_what_an_importer_split_is_joined_again():
+    for V, polygons in (quads_of_a_cube(), meshes.icosphere(1), meshes.torus(8, 6)):
+        surface, origin = split(V, [list(p) for p in polygons])
+        same = joined(surface)
+        _, before = np.unique(origin, return_inverse=True)
+        _, after = np.unique(same, return_inverse=True)
+        assert len(np.unique(np.stack([before, after]), axis=1).T) == len(V) == after.max() + 1
+
+
+def test_what_is_whole_stays_as_it_is():
+    for V, F in (meshes.icosphere(2), meshes.bumpy(6, 6), meshes.comb()):
+        assert np.array_equal(joined(triangle_surface(V, F)), np.arange(len(V)))
+
+
+def test_polygons_that_are_not_chosen_and_sides_that_are_seams_join_nothing():
+    V, quads = quads_of_a_cube()
+    surface, origin = split(V, quads)
+    only = np.arange(6) < 1
+    assert np.array_equal(joined(surface, only), np.arange(24))
+    edge = (0, 1)
+    marked = split(V, quads, [edge])[0]
+    same, without = joined(marked), joined(surface)
+    # The corners are still joined across the other sides.
+    assert len(np.unique(without)) == len(np.unique(same)) == 8
+    loop = [(0, 1), (1, 3), (2, 3), (0, 2)]
+    same = joined(split(V, quads, loop)[0])
+    assert len(np.unique(same)) == 12 and (same[:4] == np.arange(4)).all()
+
+
+def test_a_part_that_touches_itself_and_a_leaf_with_two_sides_stay_open():
+    V, F = meshes.grid(12, 4)
+    rolled = np.stack([np.cos(2 * np.pi * V[:, 0]), np.sin(2 * np.pi * V[:, 0]), V[:, 1]], axis=1)
+    end = np.isclose(V[:, 0], 1)
+    rolled[end] = rolled[np.flatnonzero(np.isclose(V[:, 0], 0))]
+    assert np.array_equal(joined(triangle_surface(rolled, F)), np.arange(len(V)))
+    both = triangle_surface(np.concatenate([V, V]), np.concatenate([F, F[:, ::-1] + len(V)]))
+    assert np.array_equal(joined(both), np.arange(2 * len(V)))
+
+
+def test_sides_in_one_direction_or_in_threes_stay_apart():
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -1, 0], [0.5, 0, 1]])
+    alike, _ = split(V, [(0, 1, 2), (0, 1, 3)])
+    assert np.array_equal(joined(alike), np.arange(6))
+    three, _ = split(V, [(0, 1, 2), (1, 0, 3), (1, 0, 4)])
+    assert np.array_equal(joined(three), np.arange(9))
+
+
+def test_no_polygon_gets_one_vertex_twice():
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [2, -1, 0]])
+    surface, _ = split(V, [(0, 1, 2, 3), (1, 0, 4), (5, 2, 4)])
+    same = joined(surface)
+    for k in range(3):
+        corners = surface.corner_vertex[surface.face_start[k] : surface.face_start[k + 1]]
+        assert len(np.unique(same[corners])) == len(corners)
