@@ -288,22 +288,33 @@ def joined_vertices(surface: Surface, faces: np.ndarray) -> np.ndarray:
     and neither is a seam. A part that touches itself was meant to be open there, and a leaf whose polygons lie on one
     another to have two sides.
     """
-    n, here = len(surface.positions), np.repeat(faces, np.diff(surface.face_start))
-    ends = side_ends(surface)[:, here]
-    # Adding zero makes -0.0 and 0.0 the same.
-    place = np.unique(surface.positions + 0.0, axis=0, return_inverse=True)[1].ravel()
-    part, key = graph_components(ends[0], ends[1], n)[1], pair_keys(*ends)
-    twofold = np.zeros(len(faces), dtype=bool)
-    twofold[duplicate_faces(replace(surface, corner_vertex=place[surface.corner_vertex]), faces)[:, 0]] = True
+    n, owner = len(surface.positions), np.repeat(np.arange(len(faces)), np.diff(surface.face_start))
+    ends, here = side_ends(surface), faces[owner]
+    key = pair_keys(*ends[:, here])
     _, index, count = np.unique(key, return_inverse=True, return_counts=True)
-    owner = np.repeat(np.arange(len(faces)), np.diff(surface.face_start))[here]
-    open_ = (count[index.ravel()] == 1) & (place[ends[0]] != place[ends[1]]) & ~is_seam(surface, key)
-    sides = ends[:, open_ & ~twofold[owner]]
+    here[here] = (count[index.ravel()] == 1) & ~is_seam(surface, key)
+    # Most meshes are whole, or open in few places.
+    border = np.zeros(len(faces), dtype=bool)
+    border[owner[here]] = True
+    corners = surface.corner_vertex[border[owner]]
+    place = np.full(n, -1)
+    used = np.unique(corners)
+    # Adding zero makes -0.0 and 0.0 the same.
+    place[used] = np.unique(surface.positions[used] + 0.0, axis=0, return_inverse=True)[1].ravel()
+    twofold = np.zeros(len(faces), dtype=bool)
+    twofold[duplicate_faces(replace(surface, corner_vertex=place[surface.corner_vertex]), border)[:, 0]] = True
+    sides = ends[:, here & ~twofold[owner]]
+    sides = sides[:, place[sides[0]] != place[sides[1]]]
     one, other = pair_up(pair_keys(*place[sides]))
-    against = (place[sides[0, one]] == place[sides[1, other]]) & (part[sides[0, one]] != part[sides[0, other]])
+    against = place[sides[0, one]] == place[sides[1, other]]
     one, other = sides[:, one[against]], sides[::-1, other[against]]
-    label = graph_components(one.ravel(), other.ravel(), n)[1]
+    if not one.size:
+        return np.arange(n)
+    part = graph_components(ends[0, faces[owner]], ends[1, faces[owner]], n)[1]
+    apart = part[one[0]] != part[other[0]]
+    label = graph_components(one[:, apart].ravel(), other[:, apart].ravel(), n)[1]
     # No polygon shall have one vertex twice.
-    _, index, count = np.unique(pair_keys(owner + n, label[ends[0]]), return_inverse=True, return_counts=True)
-    spoilt = np.isin(label, label[ends[0]][count[index.ravel()] > 1])
+    twice = pair_keys(owner[border[owner]] + n, label[corners])
+    _, index, count = np.unique(twice, return_inverse=True, return_counts=True)
+    spoilt = np.isin(label, label[corners][count[index.ravel()] > 1])
     return np.where(spoilt, np.arange(n), np.unique(label, return_index=True)[1][label])
