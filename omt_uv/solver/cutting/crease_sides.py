@@ -128,10 +128,10 @@ def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:
     # Bands of bevels lie between large sides; where these meet in a blunt fold, that is no bevel.
     sharp = border & ((fold > HARD) | (tight & ~large[side[joined]].all(axis=1)))
     mostly, keen = area[unrolls & large].sum() / area.sum(), length[sharp].sum() / length[border].sum()
-    sure = mostly >= MOSTLY and keen >= SHARP
     # Of noise every triangle is a side.
-    likely = area[unrolls].sum() >= ALL * area.sum() or (mostly >= HALF and keen >= ALL)
-    if not sure and (len(area) > MOST_SIDES or not likely):
+    few = len(area) <= MOST_SIDES
+    sure = (mostly >= MOSTLY and keen >= SHARP) or (few and mostly >= HALF and keen >= ALL)
+    if not sure and not (few and area[unrolls].sum() >= ALL * area.sum()):
         return None
     pair, blunt = np.sort(side[joined[border]], axis=1), np.where(fold[border] <= HARD, length[border], 0.0)
     whole = _with_bands(pair, length[border], blunt, large, area)[side]
