@@ -26,6 +26,8 @@ from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.progress import drain
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
+# Cases that come in parts.
+SPLIT = 20
 JUDGE = Path(os.environ.get("OMT_UV_JUDGE", SHARED / "tools" / "judge_uv.py"))
 FIRST, CASES = int(os.environ.get("OMT_UV_FUZZ_FIRST", "0")), int(os.environ.get("OMT_UV_FUZZ", "33"))
 CHUNK = 33
@@ -69,9 +71,22 @@ def judged(judge, surface, faces, uv):
     return folds, judge.overlap_share(UV, samples=40_000)
 
 
-def outcome(judge, seed):
-    """A word for what became of a case, with folds and overlap; what must not be raises."""
+def split_case(seed):
+    """A case whose polygons fall into groups with vertices of their own, as importers leave them, without seams."""
     kind, surface, faces, settings = wide_case(seed)
+    rng, size = np.random.default_rng(seed), np.diff(surface.face_start)
+    group = np.repeat(rng.integers(0, rng.choice([2, 8, 1_000_000]), len(size)), size)
+    own, vertex = np.unique(np.stack([group, surface.corner_vertex], axis=1), axis=0, return_inverse=True)
+    none = np.zeros((0, 2), np.int64)
+    surface = replace(
+        surface, positions=surface.positions[own[:, 1]], corner_vertex=vertex.ravel(), seams=none, sharp=none
+    )
+    return kind, surface, faces, replace(settings, seams="auto")
+
+
+def outcome(judge, seed, case=wide_case):
+    """A word for what became of a case, with folds and overlap; what must not be raises."""
+    kind, surface, faces, settings = case(seed)
     before = arrays(surface)
     chosen = np.ones(len(surface.face_start) - 1, bool) if faces is None else faces
     try:
@@ -110,3 +125,13 @@ def test_no_fold_and_no_overlap_is_unsaid(judge, first):
         if "OMT_UV_FUZZ_LOG" in os.environ:
             with open(os.environ["OMT_UV_FUZZ_LOG"], "a") as log:
                 print(seed, *found, file=log)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_parts_that_are_joined_for_the_map_hide_no_fold_and_no_overlap(judge):
+    for seed in range(SPLIT):
+        try:
+            outcome(judge, seed, split_case)
+        except Exception as error:
+            error.add_note(f"case {seed}, {split_case(seed)[0]}, {split_case(seed)[3]}")
+            raise
