@@ -17,7 +17,9 @@ from ..errors import UserError
 from ..pipelines.reading import Reading
 from ..solver.analysis.facing import SceneAxes
 from ..solver.errors import MeshError, NonFiniteError
-from ..solver.mesh.surface import Surface
+from ..solver.mesh.geometry import places
+from ..solver.mesh.surface import Surface, with_joined_vertices
+from ..solver.mesh.topology import first_of
 from .subdivision import modifier_of
 from .versions import uv_values
 
@@ -149,13 +151,8 @@ def weld_split_vertices(reading: Reading) -> Reading:
         uv = np.zeros((len(key), 2))
         uv[surface.corner_vertex] = reading.uv
         key = np.concatenate([key, uv], axis=1)
-    # Adding zero makes -0.0 and 0.0 the same bytes.
-    _, first, inverse = np.unique(key + 0.0, axis=0, return_index=True, return_inverse=True)
-    same = first[inverse.ravel()]
-    surface = replace(
-        surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams], sharp=same[surface.sharp]
-    )
-    return replace(reading, surface=surface)
+    same = first_of(places(key))
+    return replace(reading, surface=with_joined_vertices(surface, same))
 
 
 def read_uv(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:

@@ -12,7 +12,7 @@ from ..solver.maps.distortion import distortion
 from ..solver.maps.mirror_symmetry import MirrorSymmetry
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.surface import Surface
-from ..solver.mesh.topology import boundary_loops
+from ..solver.mesh.topology import boundary_loops, next_corners
 from ..solver.parameterization.chart_map import ChartMap
 from ..solver.parameterization.chart_pins import CornerPins, pins_of_chart
 from ..solver.parameterization.mirrored_charts import mirror_partners
@@ -385,10 +385,8 @@ def _creases(
     """Creased edges (k,2) between the vertices of UVs, and their sharpness (k,), as between the surface's vertices."""
     if not len(modifier.ends):
         return modifier.ends, modifier.sharpness
-    following = np.arange(len(vertex)) + 1
-    following[face_start[1:] - 1] = face_start[:-1]
     n = int(max(ids.max(initial=0), modifier.ends.max())) + 1
-    ends = np.column_stack([vertex, vertex[following]])
+    ends = np.column_stack([vertex, vertex[next_corners(face_start)]])
     low, high = np.sort(ids[ends], axis=1).T
     creased = modifier.ends.min(axis=1) * n + modifier.ends.max(axis=1)
     order = np.argsort(creased)

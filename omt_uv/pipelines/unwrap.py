@@ -17,7 +17,7 @@ from ..solver.maps.upright import turn_upright
 from ..solver.mesh.charts import Chart
 from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.repair import joined_vertices
-from ..solver.mesh.surface import side_ends
+from ..solver.mesh.surface import side_ends, with_joined_vertices
 from ..solver.mesh.topology import pair_keys, paired, twins
 from ..solver.parameterization.options import UnwrapOptions
 from ..solver.parameterization.small_charts import SMALL
@@ -67,7 +67,7 @@ def lay_out(
         try:
             unwrapping = _unwrapped(job, _standing(options, job), cuts.get(index))
             found = yield from part_of(unwrapping, index * share, share)
-            maps.append(_seams_as_given(found, given[index], job) if settings.seams == "auto" else found)
+            maps.append(_seams_as_given(found, given[index], job))
         except MeshError as error:
             raise Refusal(index, error) from error
         warnings += [(index, text) for text in maps[-1].warnings]
@@ -209,17 +209,14 @@ def _joined(index: int, job: UnwrapJob) -> tuple[UnwrapJob, str]:
         avoid = least
     if markers is not None:
         markers = MapMarkers(same[markers.centre], same[markers.start], same[markers.corners])
-    surface = replace(
-        surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams], sharp=same[surface.sharp]
-    )
     who = plural(len(moved), "A boundary vertex lies on another and is", "{} boundary vertices lie on others and are")
     text = f"{who} joined to them for the map; {MERGING} joins them in the mesh, too"
-    return replace(job, surface=surface, avoid=avoid, markers=markers), text
+    return replace(job, surface=with_joined_vertices(surface, same), avoid=avoid, markers=markers), text
 
 
 def _seams_as_given(found: SurfaceMap, given: UnwrapJob, joined: UnwrapJob) -> SurfaceMap:
     """What was found for a job whose parts were joined, its seams along the edges of all vertices that were joined."""
-    if joined is given:
+    if joined.surface.corner_vertex is given.surface.corner_vertex:
         return found
     ends, there = side_ends(given.surface), side_ends(joined.surface)
     cut, keys = pair_keys(*found.seams.T), pair_keys(*there)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...solver.mesh.geometry import unit, vertex_normals
-from ...solver.mesh.surface import Surface
+from ...solver.mesh.surface import Surface, side_ends
 from ...solver.mesh.topology import halfedges, pair_keys
 from ...solver.transfer.correspondence import Correspondence, correspond
 from ..attributes import Attributes, Layer, Marks, ShapeKey
@@ -71,10 +71,7 @@ def _of_polygons(layer: Layer, corner: np.ndarray, face: np.ndarray) -> Layer:
 
 def _real_edges(marks: Marks, surface: Surface) -> Marks:
     """The marks of those edges that are sides of polygons."""
-    after = np.arange(len(surface.corner_vertex)) + 1
-    after[surface.face_start[1:] - 1] = surface.face_start[:-1]
-    sides = pair_keys(surface.corner_vertex, surface.corner_vertex[after])
-    real = np.isin(pair_keys(marks.edges[:, 0], marks.edges[:, 1]), sides)
+    real = np.isin(pair_keys(marks.edges[:, 0], marks.edges[:, 1]), pair_keys(*side_ends(surface)))
     layers = tuple(replace(layer, values=layer.values[real]) for layer in marks.layers)
     return Marks(marks.edges[real], marks.seam[real], marks.sharp[real], marks.crease[real], layers)
 

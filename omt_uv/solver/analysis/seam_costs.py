@@ -125,7 +125,7 @@ def seam_costs(
     triangles = triangles.reshape(-1, 3)
     if degenerate_triangles(surface.positions[used], triangles).all():
         raise ZeroAreaFaceError("No face has an area", kind="face", elements=np.unique(owner))
-    side = polygon_sides(len(surface.corner_vertex), surface.face_start, corners)
+    side = polygon_sides(surface.face_start, corners)
     used, triangles = _in_order(surface.positions, used, triangles)
     space, keys = surface.positions[used], np.unique(pair_keys(*(ends[side] for ends in halfedges(triangles))))
     edges = paired(keys)

@@ -15,7 +15,7 @@ from ..mesh.charts import Chart, charts_of
 from ..mesh.geometry import face_areas
 from ..mesh.gluing import orientations, turn_over
 from ..mesh.repair import repaired_gluing, with_area
-from ..mesh.surface import Surface, chosen_triangles
+from ..mesh.surface import Surface, chosen_triangles, side_ends
 from ..mesh.topology import graph_components, pair_keys
 
 # Share of its box, in space and in the map, below which an island has no area.
@@ -115,11 +115,8 @@ def _welded(surface: Surface, uv: np.ndarray) -> tuple[Surface, np.ndarray]:
 def _labels(surface: Surface) -> np.ndarray:
     """Connected part (f,) of every polygon; polygons are joined by common sides."""
     f = len(surface.face_start) - 1
-    size = np.diff(surface.face_start)
-    after = np.arange(len(surface.corner_vertex)) + 1
-    after[surface.face_start[1:][size > 0] - 1] = surface.face_start[:-1][size > 0]
-    key = pair_keys(surface.corner_vertex, surface.corner_vertex[after])
-    polygon = np.repeat(np.arange(f), size)
+    key = pair_keys(*side_ends(surface))
+    polygon = np.repeat(np.arange(f), np.diff(surface.face_start))
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order][1:] == key[order][:-1])
     a, b = polygon[order][same], polygon[order][same + 1]

@@ -45,6 +45,12 @@ def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray
     return np.linalg.norm(p[:, [1, 2, 0]] - p, axis=2).ravel()
 
 
+def places(points: np.ndarray) -> np.ndarray:
+    """A number (n,), from 0 on, for each of points (n,d): the same where they lie on one another."""
+    # Adding zero makes -0.0 and 0.0 the same.
+    return np.unique(points + 0.0, axis=0, return_inverse=True)[1].ravel()
+
+
 def edge_lengths(positions: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Length (k,) of every edge (k,2) between positions (n,2) or (n,3)."""
     return np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .topology import graph_components, halfedges, pair_keys, pair_up
+from .topology import graph_components, halfedges, next_corners, pair_keys, pair_up
 
 
 @dataclass(frozen=True)
@@ -65,17 +65,14 @@ def polygon_gluing(
 
     corner_vertex (c,) is the vertex of every corner; polygon f owns the corners face_start[f]:face_start[f+1].
     """
-    side = polygon_sides(len(corner_vertex), face_start, triangles)
+    side = polygon_sides(face_start, triangles)
     first, second = diagonal_pairs(triangles, side)
     return Gluing(triangles=triangles, owner=owner, vertex=corner_vertex, side=side, first=first, second=second)
 
 
-def polygon_sides(corner_count: int, face_start: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def polygon_sides(face_start: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Whether each halfedge of the triangles of corners (m,3) is a side of its polygon, (3m,) bool."""
-    after = np.arange(corner_count) + 1
-    filled = face_start[1:] > face_start[:-1]
-    after[face_start[1:][filled] - 1] = face_start[:-1][filled]
-    tail, head = halfedges(triangles)
+    after, (tail, head) = next_corners(face_start), halfedges(triangles)
     # A triangulation may name the corners of a polygon backwards.
     return (after[tail] == head) | (after[head] == tail)
 

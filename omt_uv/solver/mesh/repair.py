@@ -13,10 +13,21 @@ import numpy as np
 
 from ..errors import DISSOLVE, MERGE, ZeroAreaFaceError, plural
 from .charts import Chart
-from .geometry import edge_lengths
+from .geometry import edge_lengths, places
 from .gluing import Gluing, corner_classes, polygon_gluing
 from .surface import Surface, degenerate_triangles, duplicate_faces, is_seam, side_ends
-from .topology import graph_components, halfedges, order_of_pairs, pair_keys, pair_up
+from .topology import (
+    first_of,
+    graph_components,
+    halfedges,
+    joined_along,
+    only_once,
+    opposite_sides,
+    order_of_pairs,
+    pair_keys,
+    pair_up,
+    row_labels,
+)
 
 # Vertices of a triangle without area move by this share of the height of the flattest sound triangle around them:
 # it has area then, and its neighbours keep theirs to within a few thousandths.
@@ -263,8 +274,7 @@ def coincident_boundary_vertices(surface: Surface, gluing: Gluing, component: np
     open_[gluing.first] = open_[gluing.second] = False
     boundary = np.flatnonzero(open_)
     vertex, owner = np.divmod(np.unique(_keys(gluing.ends(boundary)[0], component[boundary // 3])), 1 << 32)
-    # Adding zero makes -0.0 and 0.0 the same.
-    place = np.unique(surface.positions[vertex] + 0.0, axis=0, return_inverse=True)[1].ravel()
+    place = places(surface.positions[vertex])
     apart = _more_than_one(place, vertex)
     return len(np.unique(vertex[apart & (_more_than_one(place, owner) | ~is_disk[owner])]))
 
@@ -289,32 +299,25 @@ def joined_vertices(surface: Surface, faces: np.ndarray) -> np.ndarray:
     another to have two sides.
     """
     n, owner = len(surface.positions), np.repeat(np.arange(len(faces)), np.diff(surface.face_start))
-    ends, here = side_ends(surface), faces[owner]
-    key = pair_keys(*ends[:, here])
-    _, index, count = np.unique(key, return_inverse=True, return_counts=True)
-    here[here] = (count[index.ravel()] == 1) & ~is_seam(surface, key)
+    ends, chosen = side_ends(surface), np.flatnonzero(faces[owner])
+    key = pair_keys(*ends[:, chosen])
+    once = only_once(key)
+    side = chosen[once[~is_seam(surface, key[once])]]
     # Most meshes are whole, or open in few places.
-    border = np.zeros(len(faces), dtype=bool)
-    border[owner[here]] = True
+    border, twofold = np.zeros(len(faces), dtype=bool), np.zeros(len(faces), dtype=bool)
+    border[owner[side]] = True
     corners = surface.corner_vertex[border[owner]]
-    place = np.full(n, -1)
-    used = np.unique(corners)
-    # Adding zero makes -0.0 and 0.0 the same.
-    place[used] = np.unique(surface.positions[used] + 0.0, axis=0, return_inverse=True)[1].ravel()
-    twofold = np.zeros(len(faces), dtype=bool)
+    place, used = np.full(n, -1), np.unique(corners)
+    place[used] = places(surface.positions[used])
     twofold[duplicate_faces(replace(surface, corner_vertex=place[surface.corner_vertex]), border)[:, 0]] = True
-    sides = ends[:, here & ~twofold[owner]]
-    sides = sides[:, place[sides[0]] != place[sides[1]]]
-    one, other = pair_up(pair_keys(*place[sides]))
-    against = place[sides[0, one]] == place[sides[1, other]]
-    one, other = sides[:, one[against]], sides[::-1, other[against]]
-    if not one.size:
+    sides = ends[:, side[~twofold[owner[side]]]]
+    first, second = (sides[:, k] for k in opposite_sides(place, sides))
+    if not first.size:
         return np.arange(n)
-    part = graph_components(ends[0, faces[owner]], ends[1, faces[owner]], n)[1]
-    apart = part[one[0]] != part[other[0]]
-    label = graph_components(one[:, apart].ravel(), other[:, apart].ravel(), n)[1]
+    part = graph_components(ends[0, chosen], ends[1, chosen], n)[1]
+    apart = part[first[0]] != part[second[0]]
+    label = joined_along(n, first[:, apart], second[:, apart])
     # No polygon shall have one vertex twice.
-    twice = pair_keys(owner[border[owner]] + n, label[corners])
-    _, index, count = np.unique(twice, return_inverse=True, return_counts=True)
-    spoilt = np.isin(label, label[corners][count[index.ravel()] > 1])
-    return np.where(spoilt, np.arange(n), np.unique(label, return_index=True)[1][label])
+    twice = row_labels(np.stack([owner[border[owner]], label[corners]], axis=1))
+    spoilt = np.isin(label, label[corners][np.bincount(twice)[twice] > 1])
+    return np.where(spoilt, np.arange(n), first_of(label))

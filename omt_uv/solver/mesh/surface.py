@@ -18,7 +18,7 @@ from ..errors import (
     ZeroAreaFaceError,
 )
 from .gluing import Gluing, polygon_gluing
-from .topology import pair_keys, pair_up, row_labels
+from .topology import next_corners, pair_keys, pair_up, row_labels
 
 # A triangle whose area is below this share of its longest side squared is a line.
 DEGENERATE = 1e-10
@@ -173,10 +173,14 @@ def _joined(surface: Surface, triangles: np.ndarray, owner: np.ndarray) -> Gluin
 
 def side_ends(surface: Surface) -> np.ndarray:
     """The vertices (2,c) at both ends of the side of its polygon that begins at each corner."""
-    after = np.arange(len(surface.corner_vertex)) + 1
-    filled = surface.face_start[1:] > surface.face_start[:-1]
-    after[surface.face_start[1:][filled] - 1] = surface.face_start[:-1][filled]
-    return np.stack([surface.corner_vertex, surface.corner_vertex[after]])
+    return np.stack([surface.corner_vertex, surface.corner_vertex[next_corners(surface.face_start)]])
+
+
+def with_joined_vertices(surface: Surface, same: np.ndarray) -> Surface:
+    """The surface with vertices joined: `same` (n,) is the one that stands for each."""
+    return replace(
+        surface, corner_vertex=same[surface.corner_vertex], seams=same[surface.seams], sharp=same[surface.sharp]
+    )
 
 
 def is_seam(surface: Surface, key: np.ndarray) -> np.ndarray:

@@ -21,6 +21,14 @@ def halfedges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return triangles.ravel(), triangles.take((1, 2, 0), axis=1).ravel()
 
 
+def next_corners(face_start: np.ndarray) -> np.ndarray:
+    """The corner (c,) after each one in its polygon, of polygons that begin at face_start (f+1,)."""
+    after = np.arange(int(face_start[-1])) + 1
+    filled = face_start[1:] > face_start[:-1]
+    after[face_start[1:][filled] - 1] = face_start[:-1][filled]
+    return after
+
+
 def pair_keys(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """One int64 key (k,) per unordered pair of integers a, b (k,) from 0 to 2^31 - 1."""
     a, b = a.astype(np.int64), b.astype(np.int64)
@@ -91,6 +99,31 @@ def pair_up(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     twice = np.flatnonzero(alike[1:-1] & ~alike[:-2] & ~alike[2:])
     # The order is a stable one: whichever comes first does so on every processor.
     return order[twice], order[twice + 1]
+
+
+def only_once(keys: np.ndarray) -> np.ndarray:
+    """Positions of the keys (k,) that occur once, ascending."""
+    _, first, count = np.unique(keys, return_index=True, return_counts=True)
+    return np.sort(first[count == 1])
+
+
+def opposite_sides(place: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (p,) and (p,) of pairs of sides (2,s) between vertices that lie at the same places (n,), the other way
+    round, and where no third side lies."""
+    tail, head = place[ends]
+    first, second = pair_up(pair_keys(tail, head))
+    against = (tail[first] == head[second]) & (tail[first] != head[first])
+    return first[against], second[against]
+
+
+def joined_along(n: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """A number (n,) for each of n vertices, the same where sides (2,p) are joined with others (2,p), head to tail."""
+    return graph_components(first.ravel(), second[::-1].ravel(), n)[1]
+
+
+def first_of(label: np.ndarray) -> np.ndarray:
+    """The first (n,) of those with the same label (n,), from 0 on, for each."""
+    return np.unique(label, return_index=True)[1][label]
 
 
 def twins(triangles: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh.topology import graph_components, pair_keys
+from ..mesh.topology import graph_components, next_corners, pair_keys
 from .division import Division
 
 
@@ -53,9 +53,7 @@ def face_pieces(corner_vertex: np.ndarray, face_start: np.ndarray, cell: np.ndar
 def polygon_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Tail, head and polygon (c,) of the edge that starts at every corner (c,) of polygons with face_start (f+1,)."""
     size = np.diff(face_start)
-    ahead = np.arange(len(corner_vertex)) + 1
-    ahead[face_start[1:] - 1] = face_start[:-1]
-    return corner_vertex, corner_vertex[ahead], np.repeat(np.arange(len(size)), size)
+    return corner_vertex, corner_vertex[next_corners(face_start)], np.repeat(np.arange(len(size)), size)
 
 
 def cut_along_cells(positions: np.ndarray, triangles: np.ndarray, division: Division) -> CellMesh:

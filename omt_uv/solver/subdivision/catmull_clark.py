@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, identity, vstack
 
+from ..mesh.topology import next_corners
+
 # Sharpness of what stays sharp for ever.
 SHARP = 1e6
 # Rules of a vertex, by the number of its sharp edges.
@@ -116,8 +118,7 @@ def bilinear(coarse: Cage, levels: int) -> Subdivision:
 
 def _topology(coarse: Cage) -> _Topology:
     sides = np.diff(coarse.face_start)
-    following = np.arange(len(coarse.corner_vertex)) + 1
-    following[coarse.face_start[1:] - 1] = coarse.face_start[:-1]
+    following = next_corners(coarse.face_start)
     a, b = coarse.corner_vertex, coarse.corner_vertex[following]
     key = np.minimum(a, b) * coarse.count + np.maximum(a, b)
     unique, edge = np.unique(key, return_inverse=True)

@@ -76,7 +76,7 @@ def test_diagonals_are_no_sides():
     gluing = polygon_gluing(surface.triangles, surface.triangle_face, surface.corner_vertex, surface.face_start)
     assert gluing.side.sum() == 4 * 9 and len(gluing.first) == 9
     np.testing.assert_array_equal(components(gluing), surface.triangle_face)
-    backwards = polygon_sides(len(surface.corner_vertex), surface.face_start, surface.triangles[:, ::-1])
+    backwards = polygon_sides(surface.face_start, surface.triangles[:, ::-1])
     assert backwards.sum() == gluing.side.sum()
     assert components(strict_gluing(surface)).max() == 0
 

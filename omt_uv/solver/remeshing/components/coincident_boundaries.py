@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mesh.cut_mesh import cut_open
-from ...mesh.topology import graph_components, halfedges, pair_keys, pair_up, paired
+from ...mesh.geometry import places
+from ...mesh.topology import first_of, halfedges, joined_along, only_once, opposite_sides, pair_keys, paired
 
 
 @dataclass(frozen=True)
@@ -30,25 +31,18 @@ def join_coincident(positions: np.ndarray, triangles: np.ndarray) -> JoinedBound
     """
     n, (tail, head) = len(positions), halfedges(triangles)
     none = JoinedBoundaries(triangles, np.arange(n), np.zeros((0, 2), np.int64))
-    boundary = _only_once(pair_keys(tail, head))
-    a, b = tail[boundary], head[boundary]
-    # Adding zero makes -0.0 and 0.0 the same.
-    place = np.zeros(n, np.int64)
-    used = np.union1d(a, b)
-    place[used] = np.unique(positions[used] + 0.0, axis=0, return_inverse=True)[1].ravel()
-    first, second = pair_up(pair_keys(place[a], place[b]))
-    against = (place[a[first]] == place[b[second]]) & (place[a[first]] != place[b[first]])
-    first, second = first[against], second[against]
-    if len(first) == 0:
+    ends = np.stack([tail, head])[:, only_once(pair_keys(tail, head))]
+    place, used = np.zeros(n, np.int64), np.unique(ends)
+    place[used] = places(positions[used])
+    first, second = (ends[:, k] for k in opposite_sides(place, ends))
+    if first.size == 0:
         return none
-    rows, columns = np.concatenate([a[first], b[first]]), np.concatenate([b[second], a[second]])
-    label = graph_components(rows, columns, n)[1]
-    same = np.unique(label, return_index=True)[1][label]
+    same = first_of(joined_along(n, first, second))
     result = same[triangles]
     tail, head = halfedges(result)
     if (np.unique(pair_keys(tail, head), return_counts=True)[1] > 2).any() or (tail == head).any():
         return none
-    return JoinedBoundaries(result, same, np.stack([same[a[first]], same[b[first]]], axis=1))
+    return JoinedBoundaries(result, same, same[first].T)
 
 
 def reopened(points: np.ndarray, triangles: np.ndarray, to_reopen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -66,9 +60,3 @@ def reopened_copies(ends: np.ndarray, on_boundary: np.ndarray) -> int:
     """
     meeting = np.bincount(ends, minlength=len(on_boundary))
     return int(np.maximum(meeting - ~on_boundary, 0).sum())
-
-
-def _only_once(keys: np.ndarray) -> np.ndarray:
-    """Positions of the keys that occur once."""
-    _, first, count = np.unique(keys, return_index=True, return_counts=True)
-    return np.sort(first[count == 1])
