@@ -58,6 +58,11 @@ class Elements:
     part: np.ndarray | None = None
     quads: Quads | None = None
 
+    @property
+    def owner(self) -> np.ndarray:
+        """The polygon (m,) whose triangle each is."""
+        return np.arange(len(self.triangles)) if self.polygon is None else self.polygon
+
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dw/dz and dw/dconj(z) per triangle, (m,) complex each, of a map w (n,) complex."""
         corner = 0.5 * w[self.triangles]

@@ -66,9 +66,8 @@ class MeshUnion:
 
     def of_polygons(self, faces: Elements) -> np.ndarray:
         """The chart (p,) of every polygon of the elements of the union."""
-        owner = np.arange(len(faces.area)) if faces.polygon is None else faces.polygon
         chart = np.zeros(len(faces.area), np.int64)
-        chart[owner] = self.of_vertex[faces.triangles[:, 0]]
+        chart[faces.owner] = self.of_vertex[faces.triangles[:, 0]]
         return chart
 
     def sums(self, face_values: np.ndarray) -> np.ndarray:

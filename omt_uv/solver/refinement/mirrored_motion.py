@@ -58,8 +58,7 @@ def find_symmetry(
 ) -> MirrorSymmetry | None:
     """The mirror symmetry of a mesh (n,3), (m,3) whose polygons (m,) have symmetric targets, too; None without one."""
     n, owner, target = len(vertices), _given_polygons(triangles, polygons, faces), faces.area * faces.ratio
-    corner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
-    pairs = np.unique(np.repeat(owner[corner], 3).astype(np.int64) * n + faces.triangles.ravel())
+    pairs = np.unique(np.repeat(owner[faces.owner], 3).astype(np.int64) * n + faces.triangles.ravel())
     asked = [np.bincount(owner, x) for x in ([target] if faces.region is None else [target, target * faces.region])]
     around = [np.bincount(pairs % n, values[pairs // n], n) for values in asked]
 
@@ -102,9 +101,8 @@ def halved(faces: Elements, symmetry: MirrorSymmetry | None) -> Elements:
     # All that stand for one another, or none of them.
     alike &= alike[np.maximum(found, 0)].all(axis=0)
     found = np.where(alike, found, np.arange(count))
-    owner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
     # The one with most corners that no other vertex represents; of several, the first.
-    rank = np.arange(count) - count * np.bincount(owner, (~symmetry.follows)[faces.triangles].sum(axis=1), count)
+    rank = np.arange(count) - count * np.bincount(faces.owner, (~symmetry.follows)[faces.triangles].sum(axis=1), count)
     kept = np.take_along_axis(found, rank[found].argmin(axis=0)[None], axis=0)[0] == np.arange(count)
     times = (len(found) / (found == found[0]).sum(axis=0))[kept]
     half = restricted(faces, kept, np.arange(len(symmetry.representative)))
@@ -120,9 +118,8 @@ def _image_polygons(faces: Elements, image: np.ndarray) -> np.ndarray:
     """The polygon (p,) that is the image of each triangle and quad, for the images (n,) of vertices; -1 for others."""
     count, lone, quads = len(faces.area), lone_triangles(faces), corners_of_quads(faces)
     single = np.arange(lone) if faces.alone is None else np.flatnonzero(faces.alone[:lone])
-    owner = single if faces.polygon is None else faces.polygon[single]
     found = np.full(count, -1)
-    for cells, own in ((faces.triangles[single], owner), (quads, np.arange(count - len(quads), count))):
+    for cells, own in ((faces.triangles[single], faces.owner[single]), (quads, np.arange(count - len(quads), count))):
         label = row_labels(np.sort(np.concatenate([cells, image[cells]]), axis=1))
         of, to = label[: len(cells)], label[len(cells) :]
         place = np.full(label.max(initial=-1) + 1, -1)
@@ -135,8 +132,7 @@ def _image_polygons(faces: Elements, image: np.ndarray) -> np.ndarray:
 def _alike(faces: Elements, found: np.ndarray) -> np.ndarray:
     """Polygons (p,) bool that are as large as all their images (k,p), ask for as much, and have their shape."""
     squares = (squared(faces.gradient)).sum(axis=1), (squared(faces.gradient) ** 2).sum(axis=1)
-    owner = np.arange(len(faces.triangles)) if faces.polygon is None else faces.polygon
-    values = [faces.area, faces.ratio, *(np.bincount(owner, x, len(faces.area)) for x in squares)]
+    values = [faces.area, faces.ratio, *(np.bincount(faces.owner, x, len(faces.area)) for x in squares)]
     values += [] if faces.region is None else [1 + faces.region]
     return np.all([(np.abs(x[found] - x) <= ALIKE * x).all(axis=0) for x in values], axis=0)
 

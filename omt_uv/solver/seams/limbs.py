@@ -45,7 +45,8 @@ BETWEEN = 1.15
 def sprawls(chart: Chart, uv: np.ndarray, up: Sequence[float]) -> bool:
     """Whether the map uv (n,2) of a chart, turned so that `up` (3,) of space is up, fills little of a square."""
     upright = turn_upright([chart], [uv], [up])[0]
-    return bool(_area(chart, uv) < SPRAWLING * np.ptp(upright, axis=0).max() ** 2)
+    area = np.abs(signed_areas(uv, chart.triangles)).sum()
+    return bool(area < SPRAWLING * np.ptp(upright, axis=0).max() ** 2)
 
 
 def without_limbs(
@@ -58,21 +59,22 @@ def without_limbs(
     """
     body = _Body.of(chart, uv, cost, up)
     whole = cut = np.zeros(len(body.graph.joined), dtype=bool)
-    cuts, shares, room = [cut], [body.filled(cut)], body.room(cut)
+    boxes = body.boxes(cut)
+    cuts, shares = [cut], [boxes.filled]
     while len(cuts) <= MOST_CUTS and shares[-1] < FULL:
         necks = [cut | neck for neck in body.necks(cut, image)]
         if image is not None:
             # What was symmetric stays so, as long as it can.
             alike = [neck for neck in necks if body.is_own_image(neck, image)]
             necks = alike if alike or body.is_own_image(cut, image) else necks
-        rooms = [body.room(neck) for neck in necks]
+        left = [body.boxes(neck) for neck in necks]
         # A short neck that does as much as a longer one is the better.
-        best = max(range(len(necks)), key=lambda k: rooms[k] / body.cost(necks[k]), default=-1)
-        if best < 0 or rooms[best] < LITTLE * room:
+        best = max(range(len(necks)), key=lambda k: left[k].room / body.cost(necks[k]), default=-1)
+        if best < 0 or left[best].room < LITTLE * boxes.room:
             break
-        cut, room = necks[best], rooms[best]
+        cut, boxes = necks[best], left[best]
         cuts.append(cut)
-        shares.append(body.filled(cut))
+        shares.append(boxes.filled)
     # Of a star every arm but one has to go before anything is gained; then few more cuts are worth their seams.
     cut = next(cut for cut, share in zip(cuts, shares, strict=True) if LITTLE * share >= max(shares))
     if max(shares) < HOPEFUL * shares[0] or body.packed(cut) < FULLER * body.packed(whole):
@@ -80,8 +82,23 @@ def without_limbs(
     return body.graph.pieces(~cut)[body.graph.polygon], chart.vertex_ids[body.graph.ends[cut]]
 
 
-def _area(chart: Chart, uv: np.ndarray) -> float:
-    return float(np.abs(signed_areas(uv, chart.triangles)).sum())
+@dataclass(frozen=True)
+class _Boxes:
+    """Boxes of pieces with an area `whole`: the area of all, beside one another, and the longest side."""
+
+    whole: float
+    area: float
+    longest: float
+
+    @property
+    def filled(self) -> float:
+        """What the pieces fill of a square around them, about."""
+        return self.whole / max(self.area, self.longest**2)
+
+    @property
+    def room(self) -> float:
+        """The same, but better for every box that is smaller, also where another one is as long as before."""
+        return self.whole / (np.sqrt(self.area) * self.longest)
 
 
 @dataclass(frozen=True)
@@ -101,14 +118,10 @@ class _Body:
     @staticmethod
     def of(chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float]) -> _Body:
         graph = PolygonGraph.of(chart)
-        centre = uv[chart.triangles].mean(axis=1)
-        places = np.stack([np.bincount(graph.polygon, x) for x in centre.T], axis=1)
-        places = places / np.bincount(graph.polygon)[:, None]
-        length = edge_lengths(chart.vertices, graph.ends)
-        price = cost[graph.ends].mean(axis=1) * length
-        price *= length.sum() / max(price.sum(), 1e-300)
+        places, price = graph.places(chart, uv), graph.prices(chart, cost)
+        alike = edge_lengths(chart.vertices, graph.ends).sum() / max(price.sum(), 1e-300)
         steps = np.linalg.norm(np.diff(places[graph.joined], axis=1)[:, 0], axis=1) + 1e-300
-        return _Body(chart, uv, up, graph, places, price, capacities(chart, graph, cost), steps)
+        return _Body(chart, uv, up, graph, places, alike * price, capacities(price), steps)
 
     @property
     def whole(self) -> float:
@@ -134,23 +147,14 @@ class _Body:
         charts = [part for part, _ in found]
         return charts, turn_upright(charts, [self.uv[used] for _, used in found], [self.up] * len(charts))
 
-    def filled(self, cut: np.ndarray) -> float:
-        """What the pieces that a cut (e,) bool leaves fill of a square around them, about: by their boxes."""
-        boxes, longest = self._boxes(cut)
-        return self.whole / max(boxes, longest**2)
-
-    def room(self, cut: np.ndarray) -> float:
-        """The same, but better for every box that is smaller, also where another one is as long as before."""
-        boxes, longest = self._boxes(cut)
-        return self.whole / (np.sqrt(boxes) * longest)
-
-    def _boxes(self, cut: np.ndarray) -> tuple[float, float]:
-        """The area of the boxes of all pieces that a cut (e,) bool leaves, beside one another, and the longest side."""
-        boxes = np.array([np.ptp(uv, axis=0) for uv in self.pieces(cut)[1]])
-        return (BETWEEN if len(boxes) > 1 else 1.0) * float(boxes.prod(axis=1).sum()), float(boxes.max())
+    def boxes(self, cut: np.ndarray) -> _Boxes:
+        """The boxes of all pieces that a cut (e,) bool leaves."""
+        sides = np.array([np.ptp(uv, axis=0) for uv in self.pieces(cut)[1]])
+        between = BETWEEN if len(sides) > 1 else 1.0
+        return _Boxes(self.whole, between * float(sides.prod(axis=1).sum()), float(sides.max()))
 
     def packed(self, cut: np.ndarray) -> float:
-        """The same when they are packed."""
+        """What the pieces that a cut (e,) bool leaves fill of a square when they are packed."""
         charts, maps = self.pieces(cut)
         return drain(pack(maps, [chart.triangles for chart in charts])).coverage
 

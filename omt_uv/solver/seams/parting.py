@@ -81,6 +81,15 @@ class PolygonGraph:
         """The piece (p,) that each polygon is in, joined by the edges that are kept (e,) bool."""
         return graph_components(self.joined[kept, 0], self.joined[kept, 1], len(self.area))[1]
 
+    def places(self, chart: Chart, uv: np.ndarray) -> np.ndarray:
+        """The middle (p,2) of the triangles of each polygon in a map uv (n,2) of the chart."""
+        middle = np.stack([np.bincount(self.polygon, x) for x in uv[chart.triangles].mean(axis=1).T], axis=1)
+        return middle / np.bincount(self.polygon)[:, None]
+
+    def prices(self, chart: Chart, cost: np.ndarray) -> np.ndarray:
+        """What cutting each edge (e,) costs; cost (n,) : at the vertices of the chart, per length."""
+        return cost[self.ends].mean(axis=1) * edge_lengths(chart.vertices, self.ends)
+
     def matrix(self, weight: np.ndarray) -> csr_matrix:
         """A weight (e,) > 0 for each edge as a matrix (p,p); the sum where two polygons share several."""
         rows, columns = np.concatenate([self.joined, self.joined[:, ::-1]]).T
@@ -95,7 +104,7 @@ def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray, image: np.ndarray | N
     """
     graph = PolygonGraph.of(chart)
     pairs = _covering(chart, uv, graph)
-    capacity = capacities(chart, graph, cost)
+    capacity = capacities(graph.prices(chart, cost))
     steps = graph.matrix(edge_lengths(chart.vertices, graph.ends) + 1e-300)
     cut = np.zeros(len(graph.joined), dtype=bool)
     for one, other in pairs[:MOST_CUTS]:
@@ -212,13 +221,11 @@ def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tup
     """The piece (m,) of every triangle where a long chart with map uv (n,2) is cut across in `count` of about the same
     length, and the edges (k,2) of the surface in between; cost (n,) : see `parted`."""
     graph = PolygonGraph.of(chart)
-    corners = uv[chart.triangles]
-    middle = np.stack([np.bincount(graph.polygon, x) for x in corners.mean(axis=1).T], axis=1)
-    middle = middle / np.bincount(graph.polygon)[:, None]
+    middle = graph.places(chart, uv)
     middle -= graph.area @ middle / graph.area.sum()
     along = middle @ np.linalg.eigh(middle.T @ (graph.area[:, None] * middle))[1][:, 1]
     along = (along - along.min()) / max(np.ptp(along), 1e-300)
-    capacity, cut = capacities(chart, graph, cost), np.zeros(len(graph.joined), dtype=bool)
+    capacity, cut = capacities(graph.prices(chart, cost)), np.zeros(len(graph.joined), dtype=bool)
     for k in range(1, count):
         before, after = along * count < k - NEAR_CUT, along * count > k + NEAR_CUT
         if before.any() and after.any():
@@ -227,12 +234,10 @@ def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tup
     return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
 
 
-def capacities(chart: Chart, graph: PolygonGraph, cost: np.ndarray) -> np.ndarray:
-    """What cutting an edge (e,) between polygons costs, in whole numbers; cost (n,) : at the vertices, per length."""
-    price = cost[graph.ends].mean(axis=1) * edge_lengths(chart.vertices, graph.ends)
-    return np.clip(
-        np.round(MEAN_CAPACITY * price / max(price.sum() / max(len(price), 1), 1e-300)), 1, MOST_CAPACITY
-    ).astype(np.int32)
+def capacities(price: np.ndarray) -> np.ndarray:
+    """Prices (e,) of edges in whole numbers."""
+    mean = max(float(price.mean()), 1e-300) if len(price) else 1.0
+    return np.clip(np.round(MEAN_CAPACITY * price / mean), 1, MOST_CAPACITY).astype(np.int32)
 
 
 def _images_in(chart: Chart, image: np.ndarray | None) -> np.ndarray:
@@ -290,8 +295,8 @@ def minimum_cut(graph: PolygonGraph, capacity: np.ndarray, one: np.ndarray, othe
     tail = np.concatenate([graph.joined[:, 0], graph.joined[:, 1], np.full(len(one), source), other])
     head = np.concatenate([graph.joined[:, 1], graph.joined[:, 0], one, np.full(len(other), sink)])
     room = np.concatenate([capacity, capacity, np.full(len(one) + len(other), WHOLE, np.int32)])
-    graph = csr_matrix((room, (tail, head)), shape=(count + 2,) * 2, dtype=np.int32)
-    left = graph - maximum_flow(graph, source, sink).flow
+    pipes = csr_matrix((room, (tail, head)), shape=(count + 2,) * 2, dtype=np.int32)
+    left = pipes - maximum_flow(pipes, source, sink).flow
     left.data = np.maximum(left.data, 0)
     left.eliminate_zeros()
     side = np.zeros(count + 2, dtype=bool)
