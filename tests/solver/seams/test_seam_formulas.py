@@ -1,0 +1,407 @@
+"""Parts, necks and paths of seams against plain ways: all cuts of a small chart, walks along paths, measured boxes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, product
+
+import meshes
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+
+from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.mesh.topology import twins
+from omt_uv.solver.seams import growth, limbs, parting, path_graph, predicted_scale
+from omt_uv.solver.seams.coarse_surface import coarsening
+from omt_uv.solver.seams.parting import PolygonGraph
+
+UP = (0.0, 0.0, 1.0)
+
+
+def sheet(columns=4, rows=3, quads=True):
+    """A bumpy chart of quads, shaken, and a map of it."""
+    V, F = meshes.bumpy(columns, rows)
+    V = V + 0.03 * np.random.default_rng(0).normal(size=V.shape)
+    surface = triangle_surface(V, F)
+    if quads:
+        polygons = polygons_of(F)
+        surface = meshes.polygon_surface(V, polygons)
+    (chart,) = strict_charts(surface)
+    return surface, chart, chart.vertices[:, :2] * [2, 1]
+
+
+def polygons_of(F):
+    """Quads of triangles that come in pairs with a common diagonal, as polygons."""
+    found = []
+    half = {}
+    for t, f in enumerate(F.tolist()):
+        for a, b, c in (f, f[1:] + f[:1], f[2:] + f[:2]):
+            half.setdefault(frozenset((a, b)), []).append((t, a, b, c))
+    used = set()
+    for pair in sorted(half.values(), key=lambda p: -max(np.linalg.norm(np.subtract(p[0][1], p[0][2])), 0)):
+        if len(pair) == 2 and not used & {pair[0][0], pair[1][0]} and abs(pair[0][1] - pair[0][2]) not in (1,):
+            (t, a, b, c), (s, _, _, d) = pair
+            if s == t + 1 or t == s + 1:
+                used |= {t, s}
+                found.append([a, d, b, c])
+    return found + [f for t, f in enumerate(F.tolist()) if t not in used]
+
+
+def shared_edges(chart):
+    """Of every two polygons the vertices (a, b) of the edges between them."""
+    edges = {}
+    for face, f in zip(chart.faces, chart.triangles, strict=True):
+        for a, b in zip(f, np.roll(f, -1), strict=True):
+            edges.setdefault(frozenset((int(a), int(b))), []).append(int(face))
+    return {e: tuple(sorted(p)) for e, p in edges.items() if len(p) == 2 and p[0] != p[1]}
+
+
+def test_the_graph_of_polygons_is_that_of_their_shared_edges():
+    _, chart, uv = sheet()
+    graph = PolygonGraph.of(chart)
+    names = np.unique(chart.faces)
+    found = {frozenset(e): tuple(sorted(names[p])) for e, p in zip(graph.ends.tolist(), graph.joined, strict=True)}
+    assert found == shared_edges(chart) and len(graph.ends) == len(found)
+    area, middle = face_areas(chart.vertices, chart.triangles), uv[chart.triangles].mean(axis=1)
+    cost = np.random.default_rng(0).uniform(1, 2, len(uv))
+    places, prices = graph.places(chart, uv), graph.prices(chart, cost)
+    for k, name in enumerate(names):
+        own = chart.faces == name
+        assert graph.area[k] == pytest.approx(area[own].sum())
+        np.testing.assert_allclose(places[k], middle[own].mean(axis=0))
+    for (a, b), price in zip(graph.ends, prices, strict=True):
+        assert price == pytest.approx((cost[a] + cost[b]) / 2 * np.linalg.norm(chart.vertices[a] - chart.vertices[b]))
+    matrix = graph.matrix(prices).toarray()
+    np.testing.assert_array_equal(matrix, matrix.T)
+    for i, j in zip(*np.nonzero(matrix), strict=True):
+        between = (np.sort(graph.joined, axis=1) == sorted((i, j))).all(axis=1)
+        assert matrix[i, j] == pytest.approx(prices[between].sum())
+    kept = np.random.default_rng(1).random(len(prices)) < 0.6
+    label = np.arange(len(names))
+    for _ in label:
+        for i, j in graph.joined[kept]:
+            label[[i, j]] = label[[i, j]].min()
+    piece = graph.pieces(kept)
+    np.testing.assert_array_equal(piece[:, None] == piece, label[:, None] == label)
+
+
+def test_glued_the_polygons_are_neighbours_across_seams():
+    V, F = meshes.icosphere(1)
+    seams = np.array([[F[0, 0], F[0, 1]], [F[0, 1], F[0, 2]]])
+    (chart,) = strict_charts(triangle_surface(V, F, seams))
+    graph, glued = PolygonGraph.of(chart), PolygonGraph.of(chart, glued=True)
+    assert len(glued.joined) == 3 * len(F) // 2 == len(graph.joined) + len(seams)
+    for (i, j), ends in zip(glued.joined, glued.ends, strict=True):
+        assert set(ends) == set(F[chart.faces[i]]) & set(F[chart.faces[j]])
+
+
+def test_the_minimum_cut_is_the_cheapest_of_all():
+    _, chart, _ = sheet(3, 3)
+    graph = PolygonGraph.of(chart)
+    count = len(graph.area)
+    assert count <= 18
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        capacity = parting.capacities(rng.uniform(0.1, 3, len(graph.joined)))
+        one, other = np.array([0, 1]), np.array([count - 1])
+        side = parting.minimum_cut(graph, capacity, one, other)
+        assert side[one].all() and not side[other].any()
+        free = np.setdiff1d(np.arange(count), [0, 1, count - 1])[:12]
+        best = np.inf
+        for choice in product([False, True], repeat=len(free)):
+            # What is left of the polygons is where the cut has it.
+            trial = side.copy()
+            trial[free] = choice
+            best = min(best, capacity[trial[graph.joined[:, 0]] != trial[graph.joined[:, 1]]].sum())
+        assert capacity[side[graph.joined[:, 0]] != side[graph.joined[:, 1]]].sum() == best
+
+
+def test_capacities_are_prices_in_whole_numbers():
+    price = np.array([1.0, 2.0, 3.0, 0.0, 1e9])
+    found = parting.capacities(price[:4])
+    assert found.tolist() == [6667, 13333, 20000, 1] and found.dtype == np.int32
+    assert (
+        parting.capacities(price).max() == 50_000
+        and parting.capacities(1e-3 * price).tolist() == parting.capacities(price).tolist()
+    )
+    assert parting.capacities(np.append(np.zeros(4999), 1.0)).max() == parting.MOST_CAPACITY
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 2.0])
+def test_bands_are_told_by_how_long_they_are(turn):
+    rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+
+    def pieces(length, width):
+        x, y = np.meshgrid(np.linspace(0, length, 41), np.linspace(0, width, 11))
+        return parting.pieces_of_band(np.column_stack([x.ravel(), y.ravel()]) @ rotation + 3, 1.0)
+
+    assert pieces(1.79, 0.3) == 1 and pieces(1.81, 0.3) == 2
+    assert pieces(2.4001, 0.3) == 3 and pieces(2.399, 0.3) == 2
+    # What is wider than a third of its length has to be longer.
+    assert pieces(2.9, 1.2) == 1 and pieces(3.01, 1.2) == 3
+    assert pieces(100, 1) == parting.MOST_PIECES
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_long_charts_are_cut_across_in_about_equal_pieces(count):
+    V, F = meshes.grid(30, 3, width=10.0, height=1.0)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    uv = chart.vertices[:, :2]
+    piece, edges = parting.in_pieces(chart, uv, np.ones(len(uv)), count)
+    assert len(np.unique(piece)) == count
+    area = np.bincount(piece, face_areas(chart.vertices, chart.triangles))
+    assert np.abs(area / area.mean() - 1).max() <= 2 * parting.NEAR_CUT + 0.05
+    # The shortest way across is straight: three sides for each.
+    assert len(edges) == 3 * (count - 1)
+    for k in range(count):
+        middle = chart.vertices[chart.triangles[piece == k]].mean(axis=1)[:, 0]
+        others = chart.vertices[chart.triangles[piece != k]].mean(axis=1)[:, 0]
+        assert not ((others > middle.min()) & (others < middle.max())).any()
+
+
+def test_pieces_that_cover_each_other_are_found_with_what_they_cover():
+    """A ring that goes around 1.4 times lies on itself with its first and last 0.4 turns."""
+    V, F = meshes.grid(42, 2, width=1.4, height=1.0)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    turn, radius = chart.vertices[:, 0], 2 + chart.vertices[:, 1]
+    uv = np.column_stack([radius * np.cos(2 * np.pi * turn), radius * np.sin(2 * np.pi * turn)])
+    graph = PolygonGraph.of(chart)
+    ((one, other),) = parting._covering(chart, uv, graph)
+    middle = np.bincount(graph.polygon, turn[chart.triangles].mean(axis=1)) / np.bincount(graph.polygon)
+    first, last = sorted((one, other), key=lambda part: middle[part].mean())
+    assert set(first) == set(np.flatnonzero(middle < 0.4)) and set(last) == set(np.flatnonzero(middle > 1))
+    steps = graph.matrix(np.ones(len(graph.joined)))
+    a, b = parting._enlarged(graph, steps, first[:1], last[:1])
+    assert not set(a) & set(b) and first[0] in a and last[0] in b
+    least = parting.LEAST_PART * graph.area.sum()
+    for part in (a, b):
+        assert least - graph.area.max() <= graph.area[part].sum() <= least + graph.area.max()
+
+
+def test_images_within_a_chart_are_those_of_the_surface():
+    surface, chart, _ = sheet()
+    n = len(surface.positions)
+    image = np.random.default_rng(0).permutation(n)
+    image[3] = -1
+    ids = np.where(np.arange(len(chart.vertex_ids)) == 5, -1, chart.vertex_ids)
+    found = parting._images_in(replace(chart, vertex_ids=ids), image)
+    for v, w in enumerate(found):
+        there = image[ids[v]] if ids[v] >= 0 else -1
+        at = np.flatnonzero(ids == there)
+        assert w == (at[0] if there >= 0 and len(at) else -1)
+    assert (parting._images_in(chart, None) == -1).all()
+
+
+def body_of(chart, uv, cost=None):
+    return limbs._Body.of(chart, uv, np.ones(len(uv)) if cost is None else cost, UP)
+
+
+def test_boxes_of_pieces_are_measured():
+    """Of a map that lies upright already: its pieces' extents, one beside another."""
+    V, F = meshes.grid(8, 4, width=8.0, height=4.0)
+    V = V[:, [0, 2, 1]] * [1, -1, 1]
+    (chart,) = strict_charts(triangle_surface(V, F))
+    uv = chart.vertices[:, [0, 2]]
+    body = body_of(chart, uv)
+    whole = body.boxes(np.zeros(len(body.graph.joined), bool))
+    assert whole.area == pytest.approx(32) and whole.longest == pytest.approx(8)
+    assert whole.filled == pytest.approx(0.5) and whole.room == pytest.approx(32 / (np.sqrt(32) * 8))
+    left = body.places[:, 0] < 2
+    cut = left[body.graph.joined[:, 0]] != left[body.graph.joined[:, 1]]
+    parts = body.boxes(cut)
+    assert parts.area == pytest.approx(limbs.BETWEEN * 32) and parts.longest == pytest.approx(6)
+    assert parts.filled == pytest.approx(32 / max(limbs.BETWEEN * 32, 36))
+    # The cut is 4 long, and costs as much next to the square's side; costs are relative.
+    for cost in (1.0, 7.0):
+        assert body_of(chart, uv, np.full(len(uv), cost)).cost(cut) == pytest.approx(1 + 4 / np.sqrt(32))
+    assert body.price.sum() == pytest.approx(
+        np.linalg.norm(np.diff(chart.vertices[body.graph.ends], axis=1)[:, 0], axis=1).sum()
+    )
+    middle = np.linalg.norm(np.diff(body.places[body.graph.joined], axis=1)[:, 0], axis=1)
+    np.testing.assert_allclose(body.steps, middle)
+
+
+def test_the_narrowest_level_is_the_shortest_for_what_it_takes_off():
+    """Of a bar with a neck: the cut is there, and the side it gives is that of the tip."""
+    V, F = meshes.grid(20, 6, width=20.0, height=6.0)
+    cell = V[F].mean(axis=1)
+    F = F[(np.abs(cell[:, 0] - 7.5) > 1) | (np.abs(cell[:, 1] - 3) < 1)]
+    used, F = np.unique(F, return_inverse=True)
+    (chart,) = strict_charts(triangle_surface(V[used], F.reshape(-1, 3)))
+    body = body_of(chart, chart.vertices[:, :2])
+    here, inner = np.ones(len(body.graph.area), bool), np.ones(len(body.graph.joined), bool)
+    far = np.linalg.norm(body.places - [0, 3], axis=1)
+    side = body._narrowest(here, inner, far)
+    assert side[far.argmin()] and not side[far.argmax()]
+    cut = side[body.graph.joined[:, 0]] != side[body.graph.joined[:, 1]]
+    assert body.price[cut].sum() == pytest.approx(2)
+    # Tips are each as far from those before as can be, along the body.
+    tips = list(body._from_tips(here, inner))
+    assert len(tips) == limbs.TIPS
+    steps = body.graph.matrix(body.steps).toarray()
+    first, second = (t.argmin() for t in tips[:2])
+    along = floyd(steps)
+    assert along[first, second] == pytest.approx(along[first].max())
+    for t in tips:
+        np.testing.assert_allclose(t, along[t.argmin()], atol=1e-9)
+
+
+def floyd(steps):
+    """Lengths (n,n) of all shortest paths."""
+    far = np.where(steps > 0, steps, np.inf)
+    np.fill_diagonal(far, 0)
+    for k in range(len(far)):
+        far = np.minimum(far, far[:, k : k + 1] + far[k])
+    return far
+
+
+def test_a_cut_is_its_own_image_by_most_of_its_edges():
+    surface, chart, uv = sheet()
+    body = body_of(chart, uv)
+    n = len(surface.positions)
+    cut = np.zeros(len(body.graph.joined), bool)
+    assert not body.is_own_image(cut, np.arange(n))
+    cut[:7] = True
+    ids = chart.vertex_ids[body.graph.ends[cut]]
+    keys = {frozenset(e) for e in ids.tolist()}
+    told = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        image = np.arange(n)
+        gone = rng.choice(np.unique(ids), rng.integers(1, 5), replace=False)
+        image[gone] = rng.choice([-1, (gone[0] + 1) % n], len(gone))
+        alike = [(image[e] >= 0).all() and frozenset(image[e].tolist()) in keys for e in ids]
+        told.append(np.mean(alike) > 0.5)
+        assert body.is_own_image(cut, image) == told[-1]
+    assert 5 < sum(told) < 35
+
+
+# ---- paths over a coarse surface ----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    V, F = meshes.bumpy(7, 6)
+    V = V + 0.02 * np.random.default_rng(0).normal(size=V.shape)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    return coarsening(chart.vertices, chart.triangles, 1000).ended(1000)
+
+
+def test_steps_go_along_edges_and_straight_across_them(coarse):
+    """Corners across an edge are joined by the straight line in the unfolded pair, where it crosses the edge."""
+    V, F = coarse.positions, coarse.triangles
+    factor = np.random.default_rng(1).uniform(1, 2, len(V))
+    graph = path_graph.path_graph(coarse, factor, coarse.boundary)
+    expected = {}
+    for f in F:
+        for a, b in zip(f, np.roll(f, -1), strict=True):
+            expected[frozenset((int(a), int(b)))] = np.linalg.norm(V[a] - V[b])
+    twin = twins(F)
+    for h in np.flatnonzero(twin > np.arange(len(twin))):
+        a, b, c = (F.ravel()[3 * (h // 3) + (h % 3 + k) % 3] for k in range(3))
+        d = F.ravel()[3 * (twin[h] // 3) + (twin[h] % 3 + 2) % 3]
+        z, w = unfolded(V[a], V[b], V[c]), np.conj(unfolded(V[a], V[b], V[d]))
+        crossing = z.real + (w.real - z.real) * z.imag / (z.imag - w.imag)
+        if 0 < crossing < np.linalg.norm(V[b] - V[a]):
+            expected.setdefault(frozenset((int(c), int(d))), abs(z - w))
+    assert {frozenset(e) for e in graph.ends.tolist()} == set(expected)
+    for (a, b), cost in zip(graph.ends, graph.cost, strict=True):
+        length = expected[frozenset((a, b))]
+        assert cost == pytest.approx(length * (factor[a] + factor[b]) / 2 / coarse.size, rel=1e-6)
+        assert graph.matrix[a, b] == graph.matrix[b, a] == cost
+        assert graph.steps_of(np.array([a, b]))[0] == graph.steps_of(np.array([b, a]))[0]
+        assert set(graph.ends[graph.steps_of(np.array([a, b]))[0]]) == {a, b}
+
+
+def unfolded(a, b, c):
+    """Where c lies in the plane of a, b and c, with a at 0 and b on the real axis, above."""
+    axis = (b - a) / np.linalg.norm(b - a)
+    x = (c - a) @ axis
+    return x + 1j * np.linalg.norm(c - a - x * axis)
+
+
+def test_paths_and_depths_are_shortest(coarse):
+    graph = path_graph.path_graph(coarse, np.ones(len(coarse.positions)), coarse.boundary)
+    far = floyd(graph.matrix.toarray())
+    cost, before = graph.paths_from(np.array([0, 5]))
+    np.testing.assert_allclose(cost, far[[0, 5]].min(axis=0))
+    path = path_graph.path_to(before, int(cost.argmax()))
+    assert path[0] == cost.argmax() and path[-1] in (0, 5)
+    assert graph.cost[graph.steps_of(path)].sum() == pytest.approx(cost.max())
+    # Depth goes along the steps of a cut alone, from the boundary.
+    start = np.flatnonzero(coarse.boundary)
+    cost, before = graph.paths_from(start)
+    tip = int(cost.argmax())
+    path = path_graph.path_to(before, tip)
+    steps = graph.steps_of(path)
+    depth = graph.depth(steps)
+    np.testing.assert_allclose(depth[path], cost[path])
+    assert np.isinf(depth[np.setdiff1d(np.arange(len(depth)), np.append(path, start))]).all()
+    assert graph.vertices_of(steps).tolist() == sorted(set(path) - set(start.tolist()))
+    assert graph.is_open(steps)
+
+
+def test_arcs_are_worth_what_the_spread_falls_for_their_cost(coarse):
+    """By the model cut anew, for every arc that is offered; and those come first that are worth most."""
+    from omt_uv.solver.seams.cut_tree import Task, cut_along
+
+    model = predicted_scale.ScaleModel.of(coarse)
+    graph = path_graph.path_graph(coarse, np.ones(len(coarse.positions)), coarse.boundary)
+    tips = np.random.default_rng(0).uniform(0.2, 1, len(coarse.positions))
+    task = Task(graph, model, 0.2 * model.spread, tips)
+    cut = cut_along(task, np.zeros(0, np.int64))
+    arcs = growth._arcs(task, cut, model)
+    assert arcs
+    cost, _ = graph.paths_from(np.flatnonzero(graph.boundary))
+    for arc in arcs:
+        fall = model.spread - model.cut(arc.path[:-1]).spread
+        assert arc.worth == pytest.approx(tips[arc.path[0]] * fall / cost[arc.path[0]], rel=1e-4)
+    worth = [arc.worth for arc in arcs]
+    assert all(a >= b * (1 - 2 * growth.EVEN) for a, b in pairwise(worth))
+    grown = growth.grow(task, cut, 20)
+    assert (
+        grown.spread <= task.bound
+        or growth._arcs(task, grown, model.cut(grown.vertices))[0].worth < 0.02 * grown.spread
+    )
+    # One arc more leaves just what it was promised to.
+    (one, *_) = growth.grown_by_one(task, cut, 1)
+    assert one.spread == pytest.approx(model.cut(one.vertices).spread, rel=1e-4)
+    assert one.cost == pytest.approx(graph.cost[one.steps].sum())
+
+
+def test_a_plate_answers_as_its_dense_equations(coarse):
+    """Stress, scale and spread by a dense solve of the bilaplacian with what is cut held at 0."""
+    n = len(coarse.positions)
+    density = 0.3 * np.random.default_rng(0).normal(size=n)
+    model = predicted_scale.ScaleModel.of(coarse, density)
+    L = model.laplacian.toarray()
+    area = coarse.area * np.exp(2 * density)
+    area /= area.sum()
+    load = np.where(coarse.boundary, 0, coarse.curvature + L @ density)
+    np.testing.assert_allclose(model.load, load, atol=1e-12)
+    area = np.maximum(area, predicted_scale.LEAST_AREA * area.mean())
+    plate = L.T @ np.diag(1 / area) @ L
+    cut = np.flatnonzero(~coarse.boundary)[3:6]
+    for held in (np.zeros(0, int), cut):
+        free = np.setdiff1d(np.flatnonzero(~coarse.boundary), held)
+        stress = np.zeros(n)
+        stress[free] = np.linalg.solve(plate[np.ix_(free, free)], load[free])
+        found = model.cut(held)
+        np.testing.assert_allclose(found.plate.value, stress, atol=1e-5 * np.abs(stress).max())
+        assert found.spread == pytest.approx(load @ stress, rel=1e-5)
+        assert model.spread_cut(held) == pytest.approx(load @ stress, rel=1e-5)
+        np.testing.assert_allclose(found.scale, L @ stress / area, atol=1e-4 * np.abs(L @ stress / area).max())
+    for v in free[:5]:
+        assert model.gain(np.array([v]))[0] == pytest.approx(model.spread - model.cut(np.array([v])).spread, rel=1e-5)
+
+
+def test_inverses_are_symmetric_and_nothing_elsewhere():
+    A = np.random.default_rng(0).normal(size=(5, 5))
+    A = A @ A.T + np.eye(5)
+    free = np.array([0, 2, 3, 6, 7])
+    found = predicted_scale._inverse(csr_matrix(A), free, 8)
+    np.testing.assert_allclose(found[np.ix_(free, free)], np.linalg.inv(A), rtol=1e-10)
+    assert not found[[1, 4, 5]].any() and not found[:, [1, 4, 5]].any()
