@@ -56,7 +56,8 @@ def _ply(begin: bytes, size: int) -> int | None:
                 elements[-1][2] += LEAST_TEXT if ascii_file else SIZES.get(kind, 1)
             case ["property", kind, *_] if elements:
                 elements[-1][2] += LEAST_TEXT if ascii_file else SIZES.get(kind, 1)
-    rest, faces = size - end.end() + 1, None
+    # Nothing has to part the last value of a text from others.
+    rest, faces = size - end.end() + (1 if ascii_file else 0), None
     for name, count, least in elements:
         if count < 0 or count * least > rest:
             raise _too_short(f"it declares {count} of the element {name!r} and has {rest} bytes for them")

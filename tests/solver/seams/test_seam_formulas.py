@@ -21,7 +21,7 @@ from omt_uv.solver.seams.parting import PolygonGraph
 UP = (0.0, 0.0, 1.0)
 
 
-def sheet(columns=4, rows=3, quads=True):
+def patch(columns=4, rows=3, quads=True):
     """A bumpy chart of quads, shaken, and a map of it."""
     V, F = meshes.bumpy(columns, rows)
     V = V + 0.03 * np.random.default_rng(0).normal(size=V.shape)
@@ -60,7 +60,7 @@ def shared_edges(chart):
 
 
 def test_the_graph_of_polygons_is_that_of_their_shared_edges():
-    _, chart, uv = sheet()
+    _, chart, uv = patch()
     graph = PolygonGraph.of(chart)
     names = np.unique(chart.faces)
     found = {frozenset(e): tuple(sorted(names[p])) for e, p in zip(graph.ends.tolist(), graph.joined, strict=True)}
@@ -99,7 +99,7 @@ def test_glued_the_polygons_are_neighbours_across_seams():
 
 
 def test_the_minimum_cut_is_the_cheapest_of_all():
-    _, chart, _ = sheet(3, 3)
+    _, chart, _ = patch(3, 3)
     graph = PolygonGraph.of(chart)
     count = len(graph.area)
     assert count <= 18
@@ -182,7 +182,7 @@ def test_pieces_that_cover_each_other_are_found_with_what_they_cover():
 
 
 def test_images_within_a_chart_are_those_of_the_surface():
-    surface, chart, _ = sheet()
+    surface, chart, _ = patch()
     n = len(surface.positions)
     image = np.random.default_rng(0).permutation(n)
     image[3] = -1
@@ -259,7 +259,7 @@ def floyd(steps):
 
 
 def test_a_cut_is_its_own_image_by_most_of_its_edges():
-    surface, chart, uv = sheet()
+    surface, chart, uv = patch()
     body = body_of(chart, uv)
     n = len(surface.positions)
     cut = np.zeros(len(body.graph.joined), bool)

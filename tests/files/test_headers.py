@@ -1,0 +1,94 @@
+"""Files may be as short as their headers say and no byte shorter, for every type and format."""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import pytest
+
+from omt_uv.files.formats.headers import check_header
+
+PLY_TYPES = {
+    "b": ("char", "int8"),
+    "B": ("uchar", "uint8"),
+    "h": ("short", "int16"),
+    "H": ("ushort", "uint16"),
+    "i": ("int", "int32"),
+    "I": ("uint", "uint32"),
+    "f": ("float", "float32"),
+    "d": ("double", "float64"),
+}
+
+
+def holds(path, data):
+    path.write_bytes(data)
+    return check_header(path)
+
+
+def refused(path, data, *words):
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match="cut off") as error:
+        check_header(path)
+    assert all(word in str(error.value) for word in words)
+
+
+@pytest.mark.parametrize("letter, name", [(k, name) for k, names in PLY_TYPES.items() for name in names])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_ply_holds_all_values_of_its_types(tmp_path, letter, name, end):
+    lines = ["ply", "format binary_little_endian 1.0", "element vertex 3", f"property {name} x", f"property {name} y",
+             "element face 2", f"property list {name} int vertex_indices", "end_header"]  # fmt: skip
+    # A face may be as short as the count of its vertices.
+    least = (3 * 2 + 2) * struct.calcsize("<" + letter)
+    head, path = end.join(lines).encode() + end.encode(), tmp_path / "a.ply"
+    assert holds(path, head + bytes(least)) == 2
+    refused(path, head + bytes(least - 1), "2", "'face'")
+    refused(path, head + bytes(6 * struct.calcsize("<" + letter) - 1), "3", "'vertex'")
+
+
+def test_a_value_of_text_has_a_character_and_what_parts_it_from_the_next(tmp_path):
+    lines = ["ply", "format ascii 1.0", "element vertex 2", "property float x", "element face 1",
+             "property list uchar int vertex_indices", "end_header"]  # fmt: skip
+    head, path = ("\n".join(lines) + "\n").encode(), tmp_path / "a.ply"
+    # The last one needs nothing after it.
+    assert holds(path, head + b"1\n2\n3") == 1
+    refused(path, head + b"1\n2\n")
+    refused(path, head.replace(b"vertex 2", b"vertex -1") + bytes(99), "-1")
+    # No faces are declared, or it is no PLY.
+    assert holds(path, head.replace(b"element face 1\n", b"") + bytes(99)) is None
+    assert holds(path, b"plastic") is None and holds(path, head[:-12]) is None
+
+
+def test_a_binary_stl_has_fifty_bytes_for_every_face(tmp_path):
+    path, head = tmp_path / "a.STL", bytes(80) + struct.pack("<I", 3)
+    assert holds(path, head + bytes(150)) == 3 and holds(path, head + bytes(170)) == 3
+    refused(path, head + bytes(149), "3 faces", "holds 2")
+    assert holds(path, bytes(83)) is None and holds(path, bytes(84)) == 0
+
+
+def test_a_text_of_stl_tells_its_faces_itself(tmp_path):
+    facet = b"facet normal 0 0 1\nouter loop\nendloop\nendfacet\n"
+    assert holds(tmp_path / "a.stl", b"solid a\n" + 2 * facet + b"endsolid") == 2
+
+
+def test_a_glb_is_as_long_as_it_says(tmp_path):
+    path = tmp_path / "a.glb"
+    assert holds(path, b"glTF" + struct.pack("<II", 2, 12)) is None
+    refused(path, b"glTF" + struct.pack("<II", 2, 13), "13", "12")
+    assert holds(path, b"glTF" + bytes(7)) is None and holds(path, b"none" + struct.pack("<II", 2, 99)) is None
+
+
+def test_buffers_beside_a_gltf_are_there_and_long_enough(tmp_path):
+    path = tmp_path / "a.gltf"
+
+    def text(*buffers):
+        return json.dumps({"buffers": [{"uri": uri, "byteLength": size} for uri, size in buffers]}).encode()
+
+    (tmp_path / "a b.bin").write_bytes(bytes(10))
+    assert holds(path, text(("a%20b.bin", 10), ("data:,x", 99))) is None
+    refused(path, text(("a%20b.bin", 11)), "11 bytes", "has 10")
+    with pytest.raises(ValueError, match=r"needs c\.bin, which is not there"):
+        holds(path, text(("a%20b.bin", 10), ("c.bin", 1)))
+    assert holds(path, b"{") is None and holds(path, b"{}") is None
+    (tmp_path / "a.obj").write_bytes(b"v")
+    assert check_header(tmp_path / "a.obj") is None

@@ -1,0 +1,43 @@
+"""Materials of an OBJ file get its name, and never take that of somebody else's."""
+
+from __future__ import annotations
+
+from omt_uv.files.obj_materials import place_materials
+
+
+def made_in(folder, materials=b"newmtl a\n"):
+    made = folder / "tmp.obj"
+    made.write_bytes(b"# mtllib tmp.mtl\nmtllib tmp.mtl\nv 0 0 0\n")
+    if materials is not None:
+        made.with_suffix(".mtl").write_bytes(materials)
+    return made
+
+
+def test_materials_take_the_name_of_their_file(tmp_path):
+    made, companions = made_in(tmp_path), {}
+    assert place_materials(made, tmp_path / "out.obj", companions) == []
+    assert companions == {tmp_path / "tmp.mtl": tmp_path / "out.mtl"}
+    assert b"mtllib out.mtl\n" in made.read_bytes() and made.read_bytes().count(b"tmp.mtl") == 1
+
+
+def test_what_others_have_written_stays_and_what_is_the_same_is_taken(tmp_path):
+    (tmp_path / "out.mtl").write_bytes(b"newmtl other\n")
+    (tmp_path / "out_1.mtl").write_bytes(b"newmtl third\n")
+    made, companions = made_in(tmp_path), {}
+    (told,) = place_materials(made, tmp_path / "out.obj", companions)
+    assert told.startswith("out.mtl holds other materials") and "out_2.mtl has these" in told
+    assert companions == {tmp_path / "tmp.mtl": tmp_path / "out_2.mtl"}
+    (tmp_path / "out_1.mtl").write_bytes(b"newmtl a\n")
+    made = made_in(tmp_path)
+    (told,) = place_materials(made, tmp_path / "out.obj", companions)
+    assert "out_1.mtl has these" in told
+    (tmp_path / "out.mtl").write_bytes(b"newmtl a\n")
+    assert place_materials(made_in(tmp_path), tmp_path / "out.obj", companions) == []
+    assert (tmp_path / "out_1.mtl").read_bytes() == b"newmtl a\n"
+
+
+def test_without_materials_nothing_is_named(tmp_path):
+    made, companions = made_in(tmp_path, None), {}
+    before = made.read_bytes()
+    assert place_materials(made, tmp_path / "out.obj", companions) == [] and not companions
+    assert made.read_bytes() == before
