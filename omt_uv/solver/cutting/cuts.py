@@ -22,7 +22,6 @@ from ..progress import Steps, drain, part_of
 from .component import (
     CutComponent,
     Topology,
-    boundary_vertices,
     classify,
     fingerprint,
     make_component,
@@ -34,7 +33,7 @@ from .gluing_facts import TurningLines, cost_factors, marked_triangles, total_cu
 from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes, level_parts, sieved
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
-from .steiner_points import MOST_ENDS, meeting_points
+from .steiner_points import MOST_ENDS, branching_tree
 from .symmetric_cut import symmetric_cut, symmetric_half
 
 # Tips that a surface is cut open through.
@@ -424,7 +423,7 @@ def _plain_cut(component: CutComponent, topology: Topology, k: int, extremities:
         chosen = shorten(component, chosen | path, tips, around=path)
     chosen = shorten(component, chosen, tips)
     if extremities and topology.handles[k] == 0 and 2 < len(tips) + topology.boundaries[k] <= MOST_ENDS:
-        chosen = min(chosen, _branching_tree(component, tips), key=lambda edges: component.cost[edges].sum())
+        chosen = min(chosen, branching_tree(component, tips), key=lambda edges: component.cost[edges].sum())
     return chosen, tips
 
 
@@ -432,15 +431,6 @@ def _cut_vertices(component: CutComponent, chosen: np.ndarray) -> np.ndarray:
     start = component.on_boundary()
     start[component.ends[chosen].ravel()] = True
     return np.flatnonzero(start)
-
-
-def _branching_tree(component: CutComponent, tips: np.ndarray) -> np.ndarray:
-    """Edges (e,) bool of a short tree that joins the tips (k,) and all boundaries of a component without handles."""
-    ends = [np.array([tip]) for tip in tips] + boundary_vertices(component)
-    distance = np.array([edge_distance(component, end) for end in ends])
-    between = np.array([distance[:, end].min(axis=1) for end in ends])
-    points = meeting_points(distance, between)
-    return shorten(component, greedy_arcs(component, np.union1d(tips, points)), tips)
 
 
 def _best_root(component: CutComponent) -> np.ndarray:

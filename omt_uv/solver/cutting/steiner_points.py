@@ -11,6 +11,10 @@ from itertools import combinations
 
 import numpy as np
 
+from .component import CutComponent, boundary_vertices
+from .cut_graph import greedy_arcs, shorten
+from .protrusions import edge_distance
+
 # Of k ends there are k^3 / 6 threes to try.
 MOST_ENDS = 16
 # Of the length of the tree, what three ends joined at a vertex have to save: where two parts are each other's mirror
@@ -62,3 +66,12 @@ def _tree_costs(between: np.ndarray) -> np.ndarray:
         left[every, found] = False
         near = np.minimum(near, between[every, found])
     return total
+
+
+def branching_tree(component: CutComponent, tips: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool of a short tree that joins the tips (k,) and all boundaries of a component without handles."""
+    ends = [np.array([tip]) for tip in tips] + boundary_vertices(component)
+    distance = np.array([edge_distance(component, end) for end in ends])
+    between = np.array([distance[:, end].min(axis=1) for end in ends])
+    points = meeting_points(distance, between)
+    return shorten(component, greedy_arcs(component, np.union1d(tips, points)), tips)
