@@ -34,7 +34,7 @@ from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes, level_parts, sieved
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
 from .steiner_points import MOST_ENDS, branching_tree
-from .symmetric_cut import symmetric_cut, symmetric_half
+from .symmetric_cut import outlined_cut, symmetric_cut, symmetric_halves
 
 # Tips that a surface is cut open through.
 MOST_EXTREMITIES = 8
@@ -384,18 +384,24 @@ def cut_component(
     """Edges (e,) bool that cut the component, number k of the topology, into a disk, and the tips (t,) they reach;
     symmetric ones where it is its own mirror image, and an outline that is given is not distorted more by them."""
     found = _plain_cut(component, topology, k, extremities)
-    half = symmetric_half(component)
-    if half is None:
+    halves = symmetric_halves(component)
+    if not halves:
         return found
     left = max(spread(component, log_scale(component, found[0])), UNSEEN) if extremities else np.inf
-    most = STEEPER_OUTLINED if outline else STEEPER
-    symmetric = symmetric_cut(half, extremities, min(BEARABLE, most * left), not outline)
+    if outline:
+        symmetric = outlined_cut(halves, extremities, min(BEARABLE, STEEPER_OUTLINED * left))
+    else:
+        symmetric = symmetric_cut(halves[0], extremities, min(BEARABLE, STEEPER * left))
     if symmetric is None:
         return found
+    steeper = 1.0
+    if outline:
+        steeper = outline_spread(component, symmetric[0]) / outline_spread(component, found[0])
+        if steeper > STEEPER_OUTLINED:
+            return found
+    elif extremities:
+        steeper = spread(component, log_scale(component, symmetric[0])) / left
     dearer = component.cost[symmetric[0]].sum() / component.cost[found[0]].sum()
-    if outline and outline_spread(component, symmetric[0]) > most * outline_spread(component, found[0]):
-        return found
-    steeper = spread(component, log_scale(component, symmetric[0])) / left if extremities else 1.0
     return found if dearer * np.sqrt(max(steeper, 1.0)) > DEARER else symmetric
 
 

@@ -13,6 +13,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from ..conformal.disk_map import conformal_disk
+from ..errors import PrecisionError
 from ..linalg.sparse import solve_spd
 from ..mesh.geometry import (
     LEAST_STIFFNESS,
@@ -21,9 +23,11 @@ from ..mesh.geometry import (
     face_areas,
     halfedge_lengths,
     laplacian_from_lengths,
+    signed_areas,
     vertex_areas,
 )
 from ..mesh.topology import halfedges
+from ..progress import drain
 from .component import NOISE, CutComponent
 from .cut_graph import cut_boundary, cut_classes
 
@@ -58,6 +62,22 @@ def outline_spread(component: CutComponent, cut: np.ndarray) -> float:
     u = metric.solved(curvature - curvature.mean(), np.arange(n) == 0)
     share = np.bincount(metric.classes.ravel(), np.repeat(area, 3), n) / (3 * area.sum())
     return float(share @ (u - share @ u) ** 2)
+
+
+def disk_spread(component: CutComponent, cut: np.ndarray) -> float:
+    """What `outline_spread` predicts, of the conformal map itself; infinite where that leaves double precision."""
+    classes = cut_classes(component, cut)
+    positions = np.zeros((int(classes.max()) + 1, 3))
+    positions[classes] = component.positions[component.triangles]
+    try:
+        uv = drain(conformal_disk(positions, classes)).uv
+    except PrecisionError:
+        return np.inf
+    area, mapped = face_areas(positions, classes), np.abs(signed_areas(uv, classes))
+    if not (mapped > 0).all():
+        return np.inf
+    scale, share = np.log(mapped / area) / 2, area / area.sum()
+    return float(share @ (scale - share @ scale) ** 2)
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,14 @@ from ..mesh.mirror import find_mirror
 from ..mesh.topology import graph_components, halfedges, pair_keys
 from .component import CutComponent
 from .cut_graph import MOST_STRETCHES, SWEEPS, is_disk, stretches
-from .protrusions import edge_distance, log_scale, peak, spread
+from .protrusions import disk_spread, edge_distance, log_scale, outline_spread, peak, spread
 
 # Parts of the line that are tried uncut, at most.
 MOST_PARTS = 8
-# Tips on the line count so many times as much.
+# Tips on the line count so many times as much; cuts that spread a map so many times as much do as well.
 ABOUT = 1.1
+# Predicted spreads of maps onto a disk tell two cuts apart where one is more than so many times the other.
+DOUBTFUL = 2.0
 
 
 @dataclass(frozen=True)
@@ -194,24 +196,23 @@ def _backwards(before: np.ndarray, vertex: int) -> Iterator[int]:
         vertex = int(before[vertex])
 
 
-def symmetric_half(component: CutComponent) -> SymmetricHalf | None:
-    """A half of a component that is its own mirror image; None if it is none, or if the plane crosses polygons in
-    several places between boundaries."""
+def symmetric_halves(component: CutComponent) -> list[SymmetricHalf]:
+    """A half of a component that is its own mirror image for every piece of the plane that may stay uncut, the
+    costliest first; none if it is none, or if the plane crosses polygons in several places between boundaries."""
     if (component.polygons < 0).any():
-        return None
+        return []
     found: list[SymmetricHalf] = []
 
     def accepted(image: np.ndarray) -> bool:
-        half = _half(component, image)
-        found.extend([] if half is None else [half])
+        found.extend(_halves(component, image))
         return bool(found)
 
     find_mirror(component.positions, component.triangles, component.polygons, accepted=accepted)
-    return found[0] if found else None
+    return found
 
 
-def _half(component: CutComponent, image: np.ndarray) -> SymmetricHalf | None:
-    """The half of a component with mirror images (n,)."""
+def _halves(component: CutComponent, image: np.ndarray) -> list[SymmetricHalf]:
+    """The half of a component with mirror images (n,), for every piece of the plane."""
     plane = image == np.arange(len(image))
     apart = component.positions - component.positions[image]
     normal = apart[np.argmax((apart**2).sum(axis=1))]
@@ -225,24 +226,25 @@ def _half(component: CutComponent, image: np.ndarray) -> SymmetricHalf | None:
     across = (image_edge == np.arange(len(keys))) & ~inside
     edges = np.flatnonzero(np.isfinite(cost) & (inside | across))
     boundary = np.column_stack([ends[component.boundary] for ends in halfedges(component.triangles)])
-    line = _Line.of(component, edges, image, boundary)
-    if line is None:
-        return None
+    in_plane = plane[component.ends[edges]].all(axis=1)
     ends = np.where(side[component.ends[edges]], component.ends[edges], image[component.ends[edges]])
-    return SymmetricHalf(
-        component=replace(component, cost=cost),
-        image=image,
-        side=side,
-        edges=edges,
-        image_edge=image_edge[edges],
-        ends=ends,
-        across=across[edges],
-        line=line.edges,
-        on_line=line.vertices,
-        line_ends=line.ends & side,
-        held=plane[component.ends[edges]].all(axis=1) & ~line.edges,
-        boundary=boundary[side[boundary].all(axis=1)],
-    )
+    return [
+        SymmetricHalf(
+            component=replace(component, cost=cost),
+            image=image,
+            side=side,
+            edges=edges,
+            image_edge=image_edge[edges],
+            ends=ends,
+            across=across[edges],
+            line=line.edges,
+            on_line=line.vertices,
+            line_ends=line.ends & side,
+            held=in_plane & ~line.edges,
+            boundary=boundary[side[boundary].all(axis=1)],
+        )
+        for line in _Line.all_of(component, edges, image, boundary)[:MOST_PARTS]
+    ]
 
 
 @dataclass(frozen=True)
@@ -254,9 +256,9 @@ class _Line:
     ends: np.ndarray
 
     @staticmethod
-    def of(component: CutComponent, edges: np.ndarray, image: np.ndarray, boundary: np.ndarray) -> _Line | None:
-        """The costliest piece of edges (k,) in the plane of mirror images (n,), or the one that crosses polygons, which
-        no cut does; None where several cross some."""
+    def all_of(component: CutComponent, edges: np.ndarray, image: np.ndarray, boundary: np.ndarray) -> list[_Line]:
+        """The pieces of edges (k,) in the plane of mirror images (n,), the costliest first, or the one that crosses
+        polygons, which no cut does; none where several cross some."""
         n, plane = len(image), image == np.arange(len(image))
         ends, at_boundary = component.ends[edges], np.zeros(len(image), dtype=bool)
         at_boundary[boundary] = True
@@ -277,7 +279,7 @@ class _Line:
         links = [ends[in_plane], np.column_stack([tail, polygon])[through], np.column_stack([number, polygon[over]])]
         place = np.concatenate(links)
         if not len(place):
-            return None
+            return []
         size = int(place.max()) + 1
         # Pieces end at the boundary: every link has a place of its own there.
         open_end = place[:, 0] < n
@@ -287,29 +289,82 @@ class _Line:
         label = graph_components(place[:, 0], place[:, 1], size + place.size)[1][place[:, 0]]
         of_edge, of_polygon = label[: in_plane.sum()], np.unique(label[in_plane.sum() :])
         if len(of_polygon) > 1:
-            return None
-        best = of_polygon[0] if len(of_polygon) else np.bincount(of_edge, component.cost[edges[in_plane]]).argmax()
-        found = np.zeros(len(edges), dtype=bool)
-        found[in_plane] = of_edge == best
-        vertices = np.zeros(n, dtype=bool)
-        vertices[np.concatenate(links)[(label == best) & open_end][:, 0]] = True
-        vertices[ends[found]] = True
-        last = vertices & at_boundary
+            return []
+        cost = np.bincount(of_edge, component.cost[edges[in_plane]], 1)
+        pieces = of_polygon if len(of_polygon) else np.argsort(-cost, kind="stable")[: len(np.unique(of_edge))]
         # At a boundary that the plane crosses amid an edge.
-        border = np.isin(over, component.boundary)
-        last[tail[over[border]]] = last[head[over[border]]] = True
-        return _Line(found, vertices, last)
+        border = over[np.isin(over, component.boundary)]
+        found = []
+        for piece in pieces:
+            chosen, vertices = np.zeros(len(edges), dtype=bool), np.zeros(n, dtype=bool)
+            chosen[in_plane] = of_edge == piece
+            vertices[np.concatenate(links)[(label == piece) & open_end][:, 0]] = True
+            vertices[ends[chosen]] = True
+            last = vertices & at_boundary
+            last[tail[border]] = last[head[border]] = True
+            found.append(_Line(chosen, vertices, last))
+        return found
 
 
-def symmetric_cut(
-    half: SymmetricHalf, extremities: int, bearable: float, once_more: bool = True
-) -> tuple[np.ndarray, np.ndarray] | None:
+def symmetric_cut(half: SymmetricHalf, extremities: int, bearable: float) -> tuple[np.ndarray, np.ndarray] | None:
     """Edges (e,) bool that cut a component into a disk, symmetrically, and the tips (t,) they reach; None where there
     are none, as where a half has handles.
 
-    extremities : tips that the cut reaches, at most, until its spread is `bearable`; once_more : still so when the cut
-        is as short as it can be
+    extremities : tips that the cut reaches, at most, until its spread is `bearable`
     """
+    component, begun = half.component, _begun(half)
+    while begun is not None:
+        chosen, tips = begun
+        full = len(tips) >= extremities
+        scale = np.zeros(0) if full else log_scale(component, half.whole(chosen))
+        if full or spread(component, scale) <= bearable:
+            chosen = half.shortened(half.turned(chosen, tips), tips)
+            # Shorter cuts may leave more.
+            scale = np.zeros(0) if full else log_scale(component, half.whole(chosen))
+            if full or spread(component, scale) <= bearable:
+                return (half.whole(chosen), half.both(tips)) if half.opens(chosen) else None
+        begun = _continued(half, chosen, tips, scale)
+    return None
+
+
+def outlined_cut(
+    halves: list[SymmetricHalf], extremities: int, bearable: float
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """As `symmetric_cut`, for a map onto a round disk: of all pieces that may stay uncut, and all numbers of tips, the
+    cut that spreads it least, and of about equal ones the one that leaves least where it is free."""
+    found = sorted((cut for half in halves for cut in _outlined(half, extremities, bearable)), key=lambda cut: cut[0])
+    if not found:
+        return None
+    component, best = halves[0].component, found[0]
+    others = [cut for cut in found[1:] if cut[0] <= DOUBTFUL * best[0] and (cut[2] != best[2]).any()]
+    if others:
+        # What is predicted is not told apart so closely; the map is.
+        spreads = [disk_spread(component, cut[2]) for cut in (best, others[0])]
+        near = [cut for cut, s in zip((best, others[0]), spreads, strict=True) if s <= ABOUT * min(spreads)]
+        best = min(near, key=lambda cut: cut[1])
+    return best[2:]
+
+
+def _outlined(
+    half: SymmetricHalf, extremities: int, bearable: float
+) -> Iterator[tuple[float, float, np.ndarray, np.ndarray]]:
+    """Symmetric cuts (e,) bool with more and more tips (t,), until what they spread a free map is `bearable`: what they
+    are predicted to spread one onto a disk, and a free one, the cut, and the tips."""
+    component, begun = half.component, _begun(half)
+    while begun is not None:
+        chosen, tips = begun
+        short = half.shortened(half.turned(chosen, tips), tips)
+        if half.opens(short):
+            cut = half.whole(short)
+            yield outline_spread(component, cut), spread(component, log_scale(component, cut)), cut, half.both(tips)
+        scale = log_scale(component, half.whole(chosen))
+        if len(tips) >= extremities or spread(component, scale) <= bearable:
+            return
+        begun = _continued(half, chosen, tips, scale)
+
+
+def _begun(half: SymmetricHalf) -> tuple[np.ndarray, np.ndarray] | None:
+    """The edges (k,) bool of a half with which a cut begins, and its tips (t,): of a closed one the first."""
     component, chosen = half.component, np.zeros(len(half.edges), dtype=bool)
     closed = not len(component.boundary) and not half.held.any()
     tips = np.zeros(0, np.int64)
@@ -320,26 +375,16 @@ def symmetric_cut(
     while joined is not None and closed and _is_point(component, half.both(tips)):
         tips = np.append(tips, half.peak(np.ones(component.vertex_count), joined, tips))
         joined = half.joined(joined, tips)
-    if joined is None:
-        return None
-    chosen = joined | half.held
-    while True:
-        full = len(tips) >= extremities
-        scale = np.zeros(0) if full else log_scale(component, half.whole(chosen))
-        if full or spread(component, scale) <= bearable:
-            chosen = half.shortened(half.turned(chosen, tips), tips)
-            if full or not once_more:
-                break
-            # Shorter cuts may leave more.
-            scale = log_scale(component, half.whole(chosen))
-            if spread(component, scale) <= bearable:
-                break
-        tips = np.append(tips, half.peak(scale, chosen, tips))
-        joined = half.joined(chosen, tips)
-        if joined is None:
-            return None
-        chosen = half.shortened(joined, tips, 1)
-    return (half.whole(chosen), half.both(tips)) if half.opens(chosen) else None
+    return None if joined is None else (joined | half.held, tips)
+
+
+def _continued(
+    half: SymmetricHalf, chosen: np.ndarray, tips: np.ndarray, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """The edges chosen (k,) bool with a path to one tip more, where a scale (n,) is greatest; None if there is none."""
+    tips = np.append(tips, half.peak(scale, chosen, tips))
+    joined = half.joined(chosen, tips)
+    return None if joined is None else (half.shortened(joined, tips, 1), tips)
 
 
 def _is_point(component: CutComponent, tips: np.ndarray) -> bool:

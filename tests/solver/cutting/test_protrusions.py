@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from short_cuts import component_of
 
-from omt_uv.solver.cutting.protrusions import log_scale, outline_spread, spread
+from omt_uv.solver.cutting.protrusions import disk_spread, log_scale, outline_spread, spread
 
 
 def uncut(component):
@@ -52,3 +52,19 @@ def test_round_surfaces_fill_a_disk_and_long_ones_are_distorted():
         component = component_of(V * [stretch, 1, 1], F)
         far.append(outline_spread(component, uncut(component)))
     assert far[0] < 1e-6 < far[1] < far[2]
+
+
+def test_a_hemisphere_spreads_a_disk_as_its_stereographic_projection_does():
+    """Its scale is 1 / (1 + cos) of the angle from the pole, and the cosine is uniform over the area."""
+    n = 40
+    i, k = np.divmod(np.arange(n * 6 * n), 6 * n)
+    polar, turn = np.pi / 2 * (i + 1) / n, 2 * np.pi * k / (6 * n)
+    V = np.column_stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)])
+    after = (k + 1) % (6 * n)
+    here, there, up = 1 + i * 6 * n + k, 1 + i * 6 * n + after, 1 + (i - 1) * 6 * n
+    top = np.column_stack([0 * k, here, there])[i == 0]
+    one = np.column_stack([up + k, here, there])[i > 0]
+    other = np.column_stack([up + k, there, up + after])[i > 0]
+    component = component_of(np.vstack([[0, 0, 1], V]), np.concatenate([top, one, other]))
+    mean, square = 2 * np.log(2) - 1, 2 * np.log(2) ** 2 - 4 * np.log(2) + 2
+    assert disk_spread(component, uncut(component)) == pytest.approx(square - mean**2, rel=0.01)

@@ -7,10 +7,11 @@ from meshes import polygon_surface
 from short_cuts import component_of
 
 from omt_uv.solver.cutting import cuts as cuts_module
+from omt_uv.solver.cutting.cut_graph import is_disk
 from omt_uv.solver.cutting.cuts import DEARER, STEEPER_OUTLINED, cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
-from omt_uv.solver.cutting.protrusions import outline_spread
-from omt_uv.solver.cutting.symmetric_cut import symmetric_cut, symmetric_half
+from omt_uv.solver.cutting.protrusions import disk_spread, outline_spread
+from omt_uv.solver.cutting.symmetric_cut import outlined_cut, symmetric_cut, symmetric_halves
 from omt_uv.solver.mesh.mirror import find_mirror
 from omt_uv.solver.mesh.surface import Surface
 from omt_uv.solver.mesh.topology import pair_keys
@@ -81,6 +82,35 @@ def test_symmetry_has_its_price_and_no_more(monkeypatch, holes, seams, extremiti
         assert outline_spread(component, found) <= STEEPER_OUTLINED * outline_spread(component, plain)
 
 
+def component_cut(monkeypatch, surface):
+    """The one component of a surface that is to be cut."""
+    return both_cuts(monkeypatch, surface, "auto", 8)[0]
+
+
+def test_any_piece_of_the_plane_may_stay_uncut(monkeypatch):
+    """Between the holes of the front and of the tail the plane has two pieces; each is whole in a cut of its own."""
+    component = component_cut(monkeypatch, figure("tail", "front"))
+    halves = symmetric_halves(component)
+    assert len(halves) == 2
+    cost = [half.component.cost[half.edges[half.line]].sum() for half in halves]
+    assert cost[0] >= cost[1]
+    for half, other in (halves, halves[::-1]):
+        found, _ = symmetric_cut(half, 0, 0.0)
+        assert is_disk(component, found)
+        assert not found[half.edges[half.line]].any() and found[other.edges[other.line]].all()
+
+
+@pytest.mark.parametrize("holes", [[], ["limbs"], ["tail", "front"], ["tail", "front", "limbs"]])
+def test_in_an_outline_cuts_spread_less_than_where_it_is_free(monkeypatch, holes):
+    """What the outlined cut leaves of a conformal map onto a disk is not above what the other leaves."""
+    component = component_cut(monkeypatch, figure(*holes))
+    halves = symmetric_halves(component)
+    free, _ = symmetric_cut(halves[0], 8, 0.25)
+    found, _ = outlined_cut(halves, 8, 0.25)
+    assert is_disk(component, found)
+    assert disk_spread(component, found) <= 1.1 * disk_spread(component, free)
+
+
 def test_where_the_plane_runs_through_polygons_twice_nothing_is_cut_symmetrically():
     # A tube of an odd number of quads across would have to be cut through the middle of some.
     found = cut_to_disks(meshes.polygon_surface(*open_box(3)))
@@ -103,7 +133,7 @@ def open_box(across: int) -> tuple[np.ndarray, list]:
 def test_a_closed_body_is_opened_by_one_symmetric_tree():
     V, F = meshes.icosphere(3)
     component = component_of(V * [1.0, 1.3, 3.0], F)
-    half = symmetric_half(component)
+    half = symmetric_halves(component)[0]
     cuts, tips = symmetric_cut(half, 2, 0.0)
     image = half.image[component.ends[cuts]]
     assert np.isin(pair_keys(*image.T), pair_keys(*component.ends[cuts].T)).all()
@@ -112,7 +142,7 @@ def test_a_closed_body_is_opened_by_one_symmetric_tree():
 
 def test_what_has_no_mirror_has_no_half():
     V, F = meshes.icosphere(2)
-    assert symmetric_half(component_of(V @ [[1, 0.2, 0.1], [0, 1, 0.3], [0, 0, 1]], F)) is None
+    assert symmetric_halves(component_of(V @ [[1, 0.2, 0.1], [0, 1, 0.3], [0, 0, 1]], F)) == []
 
 
 def test_symmetric_cuts_are_those_of_any_order_of_the_vertices():
