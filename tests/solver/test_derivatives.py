@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import meshes
@@ -212,7 +213,7 @@ def test_of_untangling_on_the_sphere(eps):
 
 @pytest.mark.parametrize("eps", [0.0, 0.1])
 @pytest.mark.parametrize("barred", [False, True])
-def test_of_the_map_of_a_cage(eps, barred):
+def test_of_the_map_of_a_cage(eps, barred, monkeypatch):
     k = 3
     corner = np.arange((k + 1) * k).reshape(k, k + 1)[:, :-1].ravel()
     quads = np.column_stack([corner, corner + 1, corner + k + 2, corner + k + 1])
@@ -252,6 +253,13 @@ def test_of_the_map_of_a_cage(eps, barred):
         assert second == pytest.approx((after[1] - before[1]) / (2 * H), abs=1e-4)
     bent = bend_of(lambda z: problem.energy(z, eps), w, way / np.abs(way).max(), 1e-4)
     assert promised / np.abs(way).max() ** 2 > 0.5 * bent
+    # Barriers add the squares of their rows to the equations, and nothing else.
+    solved, systems = cage_refinement.splu, []
+    monkeypatch.setattr(cage_refinement, "splu", lambda A, **given: systems.append(A.toarray()) or solved(A, **given))
+    problem.newton(w, eps), replace(problem, barriers=()).newton(w, eps)
+    rows = [cage_refinement.linear_forms(*bar.derivatives(w)[1:], len(w)) @ problem.unknowns for bar in bars]
+    added = sum((part.T @ part).toarray() for part in rows)
+    np.testing.assert_allclose(systems[0] - systems[1], added, atol=1e-6 * np.abs(systems[1]).max())
 
 
 def carried(kind):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.refinement.projected_newton import SHIFT
 from omt_uv.solver.sphere import coarsen, moser_flow, newton, refine, stream_functions
+from omt_uv.solver.sphere import sphere_map as sphere_maps
 
 
 def neighbours(F, v):
@@ -305,3 +308,18 @@ def test_weights_of_samples_put_their_mean_at_the_vertex():
     assert (weight > 0).all()
     mean = np.stack([np.bincount(F.ravel(), weight * x) for x in at.T], axis=1)
     np.testing.assert_allclose(normalized(mean), P, atol=1e-9)
+
+
+def test_triangles_as_they_were_given_stay_where_areas_are_not_much_farther_off():
+    P, F = random_sphere(60)
+    surface, area = SimpleNamespace(triangles=F), spherical_areas(P, F)
+    target = area * np.where(np.arange(len(F)) % 2, 1.2, 0.8)
+    off = np.abs(area / area.sum() - target / target.sum()).sum()
+    allowed = off / sphere_maps.AREA_KEPT
+    assert sphere_maps._as_given(P, surface, 5 * target, 1.001 * allowed)
+    assert not sphere_maps._as_given(P, surface, target, 0.999 * allowed)
+    assert sphere_maps._as_given(P, surface, area, 1e-9)
+    # No triangle may be turned over.
+    folded = P.copy()
+    folded[0] = -folded[0]
+    assert not sphere_maps._as_given(folded, surface, area, 100.0)

@@ -1,0 +1,89 @@
+"""What is lost on the way into a file is told, and nothing else is; reasons of exporters are one line."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import scenes
+from fbx_bytes import file_of, make, scene, text
+
+
+@pytest.fixture
+def saving(package):
+    return package("files.saving")
+
+
+def patch():
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    obj = scenes.add(points, [[0, 1, 2, 3]], "Patch")
+    scenes.set_uv(obj, points[:, :2])
+    return obj
+
+
+@pytest.mark.parametrize("suffix", [".fbx", ".obj", ".ply"])
+@pytest.mark.parametrize("source", ["before.fbx", "before.obj", None])
+def test_only_of_an_fbx_that_becomes_one_is_told_what_blender_does_not_read(saving, tmp_path, suffix, source):
+    obj, path = patch(), tmp_path / f"out{suffix}"
+    if source:
+        # A text, of which nobody knows what it holds.
+        (tmp_path / source).write_bytes(b"; FBX 7.4.0 project file\n")
+    told = saving._save_anew(path, [obj], True, tmp_path / source if source else None)
+    assert path.stat().st_size > 100
+    lost = "What Blender does not read of an FBX file is lost"
+    assert told.count(lost) == (suffix == ".fbx" and source == "before.fbx")
+    assert all("left out" in line for line in told if line != lost)
+
+
+def test_kinds_that_are_lost_are_counted(saving, tmp_path):
+    before, after = tmp_path / "a.fbx", tmp_path / "b.fbx"
+    records = scene(False)
+    curves = [make(False, "AnimationCurve", [text(b"c"), text(b"")]) for _ in range(3)]
+    before.write_bytes(file_of(False, [*records[:1], records[1], make(False, "Objects", [], curves)]))
+    after.write_bytes(file_of(False, [make(False, "Objects", [], [make(False, "Model", [text(b"m"), text(b"Mesh")])])]))
+    (told,) = saving._lost_kinds(before, after)
+    lost = told.partition("lost: ")[2].split(", ")
+    assert sorted(lost) == ["Geometry Mesh (2)", "Geometry Shape (1)", "Model Mesh (1)"]
+    assert saving._lost_kinds(before, before) == [] == saving._lost_kinds(after, before)
+
+
+def test_reasons_are_the_last_line_that_says_something(saving):
+    error = RuntimeError("Traceback (most recent call last):\n  File x\nError: No room\nLocation: /a/b:1\nINFO done\n")
+    assert saving._reason(error) == "No room"
+    assert saving._reason(RuntimeError("\n")) == "cannot be written"
+
+
+def test_what_a_file_names_and_is_not_beside_it_is_told(saving, tmp_path):
+    source, path = tmp_path / "in" / "a.obj", tmp_path / "out" / "a.obj"
+    for folder in (source.parent, path.parent):
+        folder.mkdir()
+    data = b"mtllib a.mtl\n  mtllib b c.mtl \nmtllib\nmtllib a.mtl\n# mtllib d.mtl\nv 0 0 0\n"
+    assert saving._left_behind(data, ".obj", source, source) == []
+    told = saving._left_behind(data, ".obj", source, path)
+    assert [line.split(" names ")[1].split(",")[0] for line in told] == ["a.mtl", "b c.mtl"]
+    (path.parent / "a.mtl").write_bytes(b"")
+    assert len(saving._left_behind(data, ".obj", source, path)) == 1
+    assert saving._left_behind(data, ".ply", source, path) == []
+    doc = {"images": [{"uri": "b%20c.png"}, {"uri": "data:image/png;base64,"}, {"bufferView": 0}, {"uri": "d.png"}]}
+    told = saving._left_behind(json.dumps(doc).encode(), ".gltf", source.with_suffix(".gltf"), path)
+    assert [line.split(" names ")[1].split(",")[0] for line in told] == ["b c.png", "d.png"]
+
+
+@pytest.mark.parametrize(
+    "begin, compressed", [(b"BLENDER-v404", False), (b"(\xb5/\xfd....", True), (b"\x1f\x8b\x08\x00", True)]
+)
+def test_compressed_files_are_known_by_their_first_bytes(saving, tmp_path, begin, compressed):
+    path = tmp_path / "a.blend"
+    path.write_bytes(begin)
+    assert saving._is_compressed(path) == compressed
+
+
+def test_a_mesh_is_handed_on_as_blender_holds_it(saving):
+    obj = patch()
+    scenes.set_uv(obj, 2 * np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]))
+    found = saving._imported(obj)
+    np.testing.assert_array_equal(found.positions, [list(v.co) for v in obj.data.vertices])
+    assert found.corner_vertex.tolist() == [loop.vertex_index for loop in obj.data.loops]
+    assert found.face_start.tolist() == [*(p.loop_start for p in obj.data.polygons), len(obj.data.loops)]
+    assert found.layer == obj.data.uv_layers.active_index and len(found.layers) == len(obj.data.uv_layers)
