@@ -8,11 +8,13 @@ from omt_uv.files import fbx_nodes
 
 
 def array(code, form, values):
+    """An array of numbers, not compressed, by the letter of its type in FBX and in `struct`."""
     data = struct.pack(f"<{len(values)}{form}", *values)
     return code + struct.pack("<III", len(values), 0, len(data)) + data
 
 
 def text(value):
+    """A string."""
     return b"S" + struct.pack("<I", len(value)) + value
 
 
@@ -30,6 +32,7 @@ def record(long, at, name, values=(), inner=()):
 
 
 def file_of(long, records):
+    """A file of records, functions of their places, with offsets of 8 bytes (long) or of 4."""
     data = fbx_nodes.MAGIC + b"\x1a\x00" + struct.pack("<I", 7500 if long else 7400)
     data = data + bytes(27 - len(data))
     for make in records:
@@ -38,6 +41,7 @@ def file_of(long, records):
 
 
 def make(long, *args):
+    """A record as a function of its place: see `record`."""
     return lambda at: record(long, at, *args)
 
 

@@ -91,6 +91,21 @@ def test_paths_follow_what_is_cheap():
     assert (row[path] == 8).sum() > 8 and (path[[0, -1]] == straight[[0, -1]]).all()
 
 
+@pytest.mark.parametrize("by", ["path", "blocked"])
+def test_a_lane_that_another_path_or_a_block_is_on_is_left_to_it(by):
+    """However cheap it is: alone, the path would take it."""
+    V, F, cost = grid_without_diagonals(12)
+    row = np.round(12 * V[:, 1]).astype(int)
+    network = network_of(V, F, np.where((row[edges_of(F)] == 8).all(axis=1), 0.2, cost))
+    straight, lane = (k * 13 + np.arange(13) for k in (6, 8))
+    blocked = np.zeros(len(V), bool)
+    blocked[lane] = by == "blocked"
+    paths = [straight] if by == "blocked" else [straight, lane]
+    found = straighten(network, paths, blocked)
+    assert not set(found[0]) & set(lane) and (found[0][[0, -1]] == straight[[0, -1]]).all()
+    assert (row[straighten(network, [straight])[0]] == 8).any()
+
+
 def test_paths_stay_apart_and_off_what_is_blocked():
     V, F, cost = grid_without_diagonals(8)
     first = staircase(8)
