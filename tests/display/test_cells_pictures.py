@@ -43,11 +43,11 @@ def test_cells_of_the_plane_have_their_tints(domain):
         room = np.cross(sides, middle - corners) / np.linalg.norm(sides, axis=1)
         if len(corners) > 2 and room.min() > 0.03 * extent:
             np.testing.assert_allclose(picture[pixel(middle, extent)], tint(cell), atol=1e-6)
-            # Along its sides there is ink, less within.
+            # Along its sides there is ink.
             half = (corners + np.roll(corners, -1, axis=0)) / 2
-            side = half[np.linalg.norm(sides, axis=1).argmax()]
-            side = side + (middle - side) / np.linalg.norm(middle - side) * 0.5 * extent / (0.47 * SIZE)
-            assert np.abs(picture[pixel(side, extent)] - INK).sum() < np.abs(tint(cell) - INK).sum()
+            row, column = pixel(half[np.linalg.norm(sides, axis=1).argmax()], extent)
+            around = picture[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3].reshape(-1, 3)
+            assert np.abs(around - INK).sum(axis=1).min() < 0.7 * np.abs(tint(cell) - INK).sum()
     np.testing.assert_array_equal(picture[0, 0], PAPER)
 
 

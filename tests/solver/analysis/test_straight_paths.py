@@ -136,6 +136,20 @@ def test_a_loop_around_a_tube_goes_around_it_still(minor):
     assert length_of(V, better) <= length_of(V, loop) * 1.001
 
 
+def test_a_loop_leaves_a_circle_to_the_path_that_is_on_it():
+    V, F = meshes.torus(36, 24)
+    k = np.arange(24)
+    corners = (np.round(3 * np.sin(np.pi * k / 24)).astype(int) * 24 + k).tolist()
+    pieces = shortest_paths(V, F, zip(corners, corners[1:] + corners[:1], strict=True))
+    loop = np.concatenate([*(p[:-1] for p in pieces), pieces[0][:1]])
+    circle = k[4:-4]
+    assert not set(loop) & set(circle)
+    network = network_of(V, F)
+    assert set(straighten(network, [loop])[0]) & set(circle)
+    better, same = straighten(network, [loop, circle])
+    assert not set(better) & set(same) and better[0] == better[-1] == loop[0]
+
+
 def test_short_paths_stay():
     V, F = meshes.grid(3, 3)
     network = network_of(V, F)
