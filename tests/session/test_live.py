@@ -74,3 +74,22 @@ def test_figures_of_several_islands_are_those_of_all_their_faces(package, sessio
     )
     for name in ("area_l1", "area_sd", "angle_mean", "folds"):
         assert getattr(found, name) == pytest.approx(getattr(asked, name)), name
+
+
+@pytest.mark.parametrize("left_out", [(), ("A",), ("B",), ("A", "B")], ids=str)
+def test_islands_are_packed_where_they_are_all_that_the_objects_have(package, session, left_out):
+    objects = plain("A"), plain("B")
+    chosen = [np.arange(len(obj.data.polygons)) > 2 * (obj.name in left_out) - 1 for obj in objects]
+    pairs = [(obj, package("blender.mesh").read(obj)) for obj in objects]
+    for (_, reading), faces in zip(pairs, chosen, strict=True):
+        reading.faces[:] = faces
+    live = package("session.live").Session(bpy.context, pairs)
+    before = [scenes.uv_of(obj) for obj in objects]
+    assert live.pack(package("settings").Settings()) == (not left_out)
+    after = [scenes.uv_of(obj) for obj in objects]
+    changed = [not np.array_equal(a, b) for a, b in zip(before, after, strict=True)]
+    assert any(changed) == (not left_out)
+    if not left_out:
+        every = np.concatenate([uv.reshape(-1, 2) for uv in after])
+        assert every.min() >= 0 and every.max() <= 1
+    live.close()
