@@ -30,6 +30,31 @@ def test_values_beyond_are_refused_by_what_they_are(package, name, text):
         getattr(package("commands.options"), name)(text)
 
 
+OWN = [("volumes.flow", "_count", ["1", "1000"], ["0", "1001", "-1"]), ("shapes.match", "_weight", ["0", "3"], ["-1e-9"]),
+       ("compare", "_count", ["1", "7"], ["0", "-1"]), ("remesh", "_positive", ["1"], ["0"]),
+       ("remesh", "_growth", ["0", "0.5"], ["-0.1"]), ("remesh", "_ratio", ["1e-9", "0.999"], ["0", "1", "2", "-1"]),
+       ("magnify", "times", ["1", "9"], ["0"]), ("batches.batch", "_count", ["1"], ["0"]),
+       ("shapes.partition", "rounds", ["0", "5"], ["-1"])]  # fmt: skip
+
+
+@pytest.mark.parametrize("module, name, good, bad", OWN, ids=[f"{m}.{n}" for m, n, *_ in OWN])
+def test_values_of_single_commands_at_their_ends(package, module, name, good, bad):
+    found = getattr(package(f"commands.{module}"), name)
+    assert [found(text) for text in good] == [float(text) for text in good]
+    for text in bad:
+        with pytest.raises(argparse.ArgumentTypeError, match=f"^{text} "):
+            found(text)
+
+
+@pytest.mark.parametrize("text, part", [("1/1", (1, 1)), ("2/5", (2, 5)), ("5/5", (5, 5))])
+def test_parts_of_a_folder_are_one_of_several(package, text, part):
+    found = package("commands.batches.batch")._part
+    assert found(text) == part
+    for none in ("0/5", "6/5", "1/0"):
+        with pytest.raises(argparse.ArgumentTypeError, match="is no part"):
+            found(none)
+
+
 def test_as_little_memory_as_blender_starts_with_is_taken(package):
     """Or, where nothing holds a program to it, refused as any other."""
     options = package("commands.options")
@@ -84,3 +109,17 @@ def test_every_command_has_the_options_of_input_and_limits(package):
     for name, command in commands(package):
         have = {text for action in command._actions for text in action.option_strings}
         assert have >= {"--object", "--scene", "--skip-linked", "--strict", "--timeout", "--memory"}, name
+
+
+def test_lists_of_names_are_taken_apart_at_commas(package):
+    kinds = package("commands.shapes.match").kinds_of
+    known = package("commands.options").names(package("settings").TRANSFERS)
+    assert kinds(f" {known[0]} ,{known[1]},") == (known[0], known[1])
+    for text in ("", " , ", "nothing", f"{known[0]},x"):
+        with pytest.raises(argparse.ArgumentTypeError, match="is none of"):
+            kinds(text)
+    pair = package("commands.shapes.distance").pair_of_markers
+    assert pair(" a , b ") == ("a", "b")
+    for text in ("a", "a,", ",b", "a,b,c", ""):
+        with pytest.raises(argparse.ArgumentTypeError, match="two names"):
+            pair(text)
