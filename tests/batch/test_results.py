@@ -45,6 +45,16 @@ def test_a_table_has_a_line_for_every_file_and_no_formulas(package):
     assert second["message"] == 'has "quotes", and commas' and second["area_l1"] == ""
 
 
+def test_a_column_has_values_of_one_kind(package):
+    same = package("batch.tables")._same_kind
+    for values in ([1, 2], [None, "a"], [0.5, None, 1.5], [True, False], [None], []):
+        assert same(values) is values
+    for values, kind in (([1, 0.5, None], float), ([1, "a", None, 0.5], str), ([True, 2], float), ([True, "a"], str)):
+        found = same(values)
+        assert found == [None if v is None else kind(v) for v in values]
+        assert {type(v) for v in found if v is not None} == {kind}
+
+
 def test_parquet_has_the_same_columns_with_types(package, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     rows = [row("a.obj"), row("b.obj", "failed", seconds=None, report="")]

@@ -30,11 +30,17 @@ def test_values_beyond_are_refused_by_what_they_are(package, name, text):
         getattr(package("commands.options"), name)(text)
 
 
-OWN = [("volumes.flow", "_count", ["1", "1000"], ["0", "1001", "-1"]), ("shapes.match", "_weight", ["0", "3"], ["-1e-9"]),
-       ("compare", "_count", ["1", "7"], ["0", "-1"]), ("remesh", "_positive", ["1"], ["0"]),
-       ("remesh", "_growth", ["0", "0.5"], ["-0.1"]), ("remesh", "_ratio", ["1e-9", "0.999"], ["0", "1", "2", "-1"]),
-       ("magnify", "times", ["1", "9"], ["0"]), ("batches.batch", "_count", ["1"], ["0"]),
-       ("shapes.partition", "rounds", ["0", "5"], ["-1"])]  # fmt: skip
+OWN = [
+    ("volumes.flow", "_count", ["1", "1000"], ["0", "1001", "-1"]),
+    ("shapes.match", "_weight", ["0", "3"], ["-1e-9"]),
+    ("shapes.partition", "rounds", ["0", "5"], ["-1"]),
+    ("compare", "_count", ["1", "7"], ["0", "-1"]),
+    ("remesh", "_positive", ["1"], ["0"]),
+    ("remesh", "_growth", ["0", "0.5"], ["-0.1"]),
+    ("remesh", "_ratio", ["1e-9", "0.999"], ["0", "1", "2", "-1"]),
+    ("magnify", "times", ["1", "9"], ["0"]),
+    ("batches.batch", "_count", ["1"], ["0"]),
+]
 
 
 @pytest.mark.parametrize("module, name, good, bad", OWN, ids=[f"{m}.{n}" for m, n, *_ in OWN])
@@ -113,7 +119,7 @@ def test_every_command_has_the_options_of_input_and_limits(package):
 
 def test_lists_of_names_are_taken_apart_at_commas(package):
     kinds = package("commands.shapes.match").kinds_of
-    known = package("commands.options").names(package("settings").TRANSFERS)
+    known = package("commands.options").names(package("pipelines.shapes.choices").TRANSFERS)
     assert kinds(f" {known[0]} ,{known[1]},") == (known[0], known[1])
     for text in ("", " , ", "nothing", f"{known[0]},x"):
         with pytest.raises(argparse.ArgumentTypeError, match="is none of"):
