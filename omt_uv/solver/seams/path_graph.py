@@ -43,10 +43,10 @@ class PathGraph:
         cost, before, _ = dijkstra(self.matrix, indices=start, min_only=True, return_predecessors=True)
         return cost, before
 
-    def is_whole(self) -> bool:
-        """Whether the vertices in the mirror plane can be reached from the boundary, nearly all."""
+    def is_whole(self, least: float = REACHED) -> bool:
+        """Whether the vertices in the mirror plane can be reached from the boundary, nearly all or a share of them."""
         cost, _ = self.paths_from(np.flatnonzero(self.boundary))
-        return float(np.isfinite(cost[self.in_plane]).mean()) >= REACHED
+        return float(np.isfinite(cost[self.in_plane]).mean()) >= least
 
     def depth(self, steps: np.ndarray) -> np.ndarray:
         """Cost (n,) of the way from the boundary along steps (k,) alone."""

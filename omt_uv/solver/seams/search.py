@@ -24,6 +24,7 @@ from .fine_paths import FineMirror, with_line
 from .growth import grow
 from .improvement import improved, rerouted, trimmed
 from .options import SPREAD_BY_SHEAR, SearchOptions
+from .path_graph import REACHED
 from .predicted_scale import ScaleModel
 from .rehearsal import Rehearsal
 from .symmetric_base import symmetric_base
@@ -36,6 +37,10 @@ NEARLY = 0.03
 # Seams of what is nearly its own image are symmetric unless that makes them cost so many times what others do: of a
 # body, and, with all between, of one that is hardly a mirror image any more.
 DEARER = (1.5, 1.0)
+# Share of the vertices in the plane that cuts have to be able to reach so that exactly symmetric ones are tried.
+PARTLY = 0.5
+# Exactly symmetric seams may cost so many times what such along a line by the plane do, which miss a few edges.
+EXACTLY = 1.1
 # Cuts that end in a face are worth so much less.
 BARRED = 0.3
 # What is searched again is harder than it seemed: on a coarse surface of so many times the vertices.
@@ -149,22 +154,27 @@ class SeamSearch:
 
         plain : the first of the coarse surfaces that know no mirror, where it is known
         """
-        line = mirror
+        exact: CoarseCut | None = None
+        near: CoarseCut | None = None
+        line, shorter = mirror, None
         if mirror is not None and mirror.exact:
-            best = yield from part_of(self._symmetric(component, base, bound, mirror), 0.0, 0.4)
-            if best is not None:
-                return best
-            # Where the plane runs between the vertices, there is hardly a symmetric cut without a line along it.
+            exact = yield from part_of(self._symmetric(component, base, bound, mirror), 0.0, 0.4)
+            if exact is not None and exact.task.graph.is_whole():
+                return exact
+            # Where the plane runs between the vertices, or through polygons, most go without those, along a line by it.
             line = with_line(component, mirror)
+        if line is not None:
+            near = yield from part_of(self._symmetric(component, base, bound, line), 0.4, 0.2)
+        if exact is not None and near is not None and exact.score <= EXACTLY * near.score:
+            return exact
         coarse, model = self._modelled(component) if plain is None else plain
         setting = self._setting(component, base, None, coarse, model)
         task = setting.task(bound, setting.extremity())
-        first = yield from part_of(self._grown_on(setting, task, base, None), 0.4, 0.1)
-        shorter = None
-        if line is not None:
-            best = yield from part_of(self._symmetric(component, base, bound, line), 0.5, 0.2)
+        first = yield from part_of(self._grown_on(setting, task, base, None), 0.6, 0.1)
+        if line is not None or exact is not None:
             # One of the coarse surfaces says what other cuts cost, about.
             shorter = yield from part_of(self._shortened(first), 0.7, 0.1)
+            best = exact if near is None else near
             if best is not None and best.score <= self._worth_of_symmetry() * shorter.score:
                 return best
         more = range(1, self._trials(component))
@@ -209,7 +219,7 @@ class SeamSearch:
             coarse, model = self._modelled(component, mirror, trial, finer)
             setting = self._setting(component, base, mirror, coarse, model)
             task = setting.task(bound(coarse, model) if callable(bound) else bound, setting.extremity())
-            if mirror is not None and not task.graph.is_whole():
+            if mirror is not None and not task.graph.is_whole(PARTLY if mirror.exact else REACHED):
                 # Where one cannot, hardly another can: the plane is the same.
                 break
             growing = self._grown_on(setting, task, base, mirror)

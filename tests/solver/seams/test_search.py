@@ -12,6 +12,7 @@ from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.seams import search
 from omt_uv.solver.seams.coarse_surface import coarsening
 from omt_uv.solver.seams.cut_tree import Removal, Task, cut_along, leaves, stretches
 from omt_uv.solver.seams.growth import grow
@@ -105,10 +106,37 @@ def test_what_is_cut_is_one_disk(name):
 
 
 def test_seams_of_a_symmetric_body_are_symmetric():
-    V, F = meshes.cap(16, 32, 0.9)
-    V = V * [1.0, 1.3, 1.7] + 0.3 * np.stack([0 * V[:, 0], V[:, 2] ** 2, V[:, 1] * V[:, 2]], axis=1)
+    V, F, image, _ = bent_cap()
     edges = np.sort(found(V, F, 0.005).cuts.edges, axis=1)
+    keys = set(map(tuple, edges.tolist()))
+    assert len(keys) > 8 and keys == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
+
+
+def bent_cap():
+    """A cap that is its own image in x alone, the image (n,) of every vertex, and those in the plane in order (k,)."""
+    V, F = meshes.cap(16, 32, 0.9)
+    turn = np.arctan2(V[:, 1], V[:, 2])
+    V = V * [1.0, 1.3, 1.7] + 0.3 * np.stack([0 * V[:, 0], V[:, 2] ** 2, V[:, 1] * V[:, 2]], axis=1)
     image = np.array([np.argmin(np.linalg.norm(V - p * [-1, 1, 1], axis=1)) for p in V])
+    plane = np.flatnonzero(image == np.arange(len(V)))
+    return V, F, image, plane[np.argsort(turn[plane])]
+
+
+def test_seams_are_symmetric_where_the_plane_runs_through_some_faces(monkeypatch):
+    """Edges in the plane that are turned run across it, and no cut follows it there; whatever it costs then."""
+    monkeypatch.setattr(search, "EXACTLY", np.inf)
+    V, F, image, plane = bent_cap()
+    for k in (9, 22):
+        ends = plane[[k, k + 1]]
+        pair = np.flatnonzero(np.isin(F, ends).sum(axis=1) == 2)
+        across = F[pair][~np.isin(F[pair], ends)]
+        assert len(pair) == 2
+        # As the faces beside them look, which have the edge from one end to the other.
+        first = F[pair[0]].tolist()
+        forward = first[(first.index(ends[0]) + 1) % 3] == ends[1]
+        one, other = across if forward else across[::-1]
+        F = np.concatenate([np.delete(F, pair, axis=0), [[one, ends[0], other], [other, ends[1], one]]])
+    edges = np.sort(found(V, F, 0.005).cuts.edges, axis=1)
     keys = set(map(tuple, edges.tolist()))
     assert len(keys) > 8 and keys == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
 
