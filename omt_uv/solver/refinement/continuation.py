@@ -23,6 +23,7 @@ from .continuation_rules import (
     FORESEEN,
     LOOSE,
     NEAR,
+    PROMISED,
     SQUEEZED_WEIGHT,
     STAGE_STEPS,
     UNSQUEEZED,
@@ -34,6 +35,7 @@ from .continuation_rules import (
     is_settled,
     is_squeezed,
     judge_step,
+    left_over,
     next_pressure,
     next_weight,
     planned_weights,
@@ -226,6 +228,8 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         # Its share is what a stage with a region is for.
         foreseeing=balance == 0 and not on_the_way and problem.faces.region is None,
         foreseen=FORESEEN,
+        # Maps on the way to others say what those will be: they go as far as they promise.
+        expecting=balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED,
         pressure=first_pressure(quality, balance, not problem.scale_free and problem.faces.region is None),
         shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
     )
@@ -242,8 +246,9 @@ class StageLimits:
     area_error : to reach; max_steps : of Newton's method; tolerance, loose_tolerance : as in
     `continuation_rules.Quality`; relaxed : an energy that is low enough in any case; foreseeing : it ends, too, where
     the area error is out of reach, see `continuation_rules.is_out_of_reach`, once it promises less than foreseen;
-    shear : of a map, with which it ends where that settles, see `continuation_rules.is_settled`; pressure : of the
-    first step, see `continuation_rules.FIRST_PRESSURE`
+    expecting : its promise is what the next step is expected to make, see `continuation_rules.left_over`; shear : of a
+    map, with which it ends where that settles, see `continuation_rules.is_settled`; pressure : of the first step, see
+    `continuation_rules.FIRST_PRESSURE`
     """
 
     area_error: float
@@ -253,6 +258,7 @@ class StageLimits:
     relaxed: float = 0.0
     foreseeing: bool = False
     foreseen: float = 0.0
+    expecting: bool = False
     shear: Callable[[np.ndarray], float] | None = None
     pressure: float = FIRST_PRESSURE
 
@@ -308,17 +314,18 @@ def minimise(
         step, used = problem.step(w, value, pressure), pressure
         if forbidden is not None and forbidden(step.w):
             return StageResult(w=w, steps=steps + 1, residual=residual, energy=value, status="crossed")
-        pressure = float(next_pressure(used, step.share, value - step.energy, step.decrement))
+        gained = step.share, value - step.energy, step.decrement
+        pressure = float(next_pressure(used, *gained))
         w, value, steps = step.w, step.energy, steps + 1
         residual = float(promised(step.decrement, value))
+        left = float(left_over(value, *gained)) if limits.expecting else residual
         # How many stages and steps there will be is not known: every stage covers half of what is left.
         yield Progress("Refinement", 1 - 0.5 ** (stage + 1 - 0.5**steps))
-        met = value < limits.relaxed or (
-            residual < limits.loose_tolerance and problem.area_error(w) <= limits.area_error
-        )
-        if limits.foreseeing and not met and residual < max(limits.foreseen, limits.loose_tolerance):
+        met = value < limits.relaxed or (left < limits.loose_tolerance and problem.area_error(w) <= limits.area_error)
+        if limits.foreseeing and not met:
             before, error = error, problem.area_error(w)
-            met = bool(is_out_of_reach(error, before, limits.area_error))
+            nearly = residual < max(limits.foreseen, limits.loose_tolerance)
+            met = nearly and bool(is_out_of_reach(error, before, limits.area_error))
         if limits.shear is not None and not met:
             last, figures = figures, (limits.shear(w), problem.area_error(w))
             met = bool(is_settled(step.share, figures, last, limits.area_error))

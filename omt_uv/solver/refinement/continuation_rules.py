@@ -5,14 +5,14 @@ Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entr
 
     start a stage            `planned_weights`, `spare_weight`, `is_squeezed`, `next_weight`
     within a stage           `first_pressure`, `next_pressure`
-    end a stage              `stage_tolerances`, `judge_step`, `is_out_of_reach`, `is_settled`
+    end a stage              `stage_tolerances`, `left_over`, `judge_step`, `is_out_of_reach`, `is_settled`
     end the refinement       `is_enough`, `is_futile`
 
-A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, nor one that `is_settled` or
-`is_out_of_reach`, since its steps are those of all charts. It does not tell `is_futile` of regions: a chart with a
-region that has no exact areas uses up its steps, is given back, and says alone what it did not reach. It knows no
-barrier and no sweeps, and gives a chart back that would need them. It relaxes a squeezed start to the end, not to
-UNSQUEEZED. And it starts cold.
+A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, nor one by what is `left_over`,
+that `is_settled` or `is_out_of_reach`, since its steps are those of all charts. It does not tell `is_futile` of
+regions: a chart with a region that has no exact areas uses up its steps, is given back, and says alone what it did not
+reach. It knows no barrier and no sweeps, and gives a chart back that would need them. It relaxes a squeezed start to
+the end, not to UNSQUEEZED. And it starts cold.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ Truth = bool | np.ndarray
 LOOSE = 3e-2
 # One on the way ends sooner where the boundary is free; vertices on a circle or on sides do not make up for it later.
 ON_THE_WAY = 0.1
-# One that has missed its goal is told by the steps before it promises less than this: see `is_out_of_reach`.
-FORESEEN = 0.1
+# One that will miss its goal is told by its areas where a step promises less than this: see `is_out_of_reach`.
+FORESEEN = 0.05
 # One that has reached it ends, too, where a whole step changes the shear by less than this share, and the area error by
 # less than this share of the goal.
 SETTLED = 0.02
@@ -86,6 +86,13 @@ SPARE = 0.25
 MARGIN = 1.05
 # A stage cannot reach an area error that is less than this share of its own and takes more than another step as good.
 WITHIN_REACH = 0.95
+# A full step that gained what it promised leaves little to the next one where the boundary is free. Along itself, where
+# the energy is cubic, that is 9/4 of the square of what it missed of its promise, in all several times as much; and
+# some share of it in any case.
+BENT = 11.0
+LEFT = 0.1
+# Up to this energy: a map that is sheared more gains for many steps, each promising a little.
+EASY = 1.0
 # A full step keeps its promise where it gains more than this share of it, and a poor one gains less than that.
 KEPT_PROMISE = 0.7
 # One that gains this share of it to that has a Hessian that is true.
@@ -185,6 +192,16 @@ def spare_weight(planned: Number, weight: Number, error: Number, quality: Qualit
 def promised(decrement: Number, energy: Number) -> Number:
     """Residual: the decrease that Newton's method promises, over the energy."""
     return decrement / np.maximum(energy, NO_ENERGY)
+
+
+def left_over(energy: Number, share: Number, gain: Number, decrement: Number) -> np.ndarray:
+    """Residual after a step to this energy: what the next one can be expected to promise, over the energy; see LEFT.
+
+    share, gain, decrement: as in `next_pressure`
+    """
+    missed = 1 - gain / np.maximum(decrement, NO_ENERGY)
+    expected = np.clip(BENT * np.square(missed), LEFT, 1)
+    return promised(decrement, energy) * np.where((share == 1) & (energy < EASY), expected, 1)
 
 
 def first_pressure(quality: Quality, balance: float, free: bool) -> float:

@@ -11,6 +11,7 @@ PRESSURE = RANDOM.choice([0, 0.005, 0.01, 0.03, 0.3, 1.0], 300)
 SHARE = RANDOM.choice([0, 0.1, 0.5, 0.9, 1.0], 300)
 GAIN, DECREMENT = RANDOM.random((2, 300))
 GAIN[SHARE == 0] = 0
+ENERGY = 2 * RANDOM.random(300)
 
 
 def each(rule, *columns):
@@ -25,6 +26,8 @@ def test_one_chart_is_a_batch_of_one():
     single = each(lambda *x: rules.judge_step(*x, 0.3), SHARE, PRESSURE, DECREMENT, met)
     np.testing.assert_array_equal(np.column_stack(verdict), single)
     np.testing.assert_array_equal(rules.promised(GAIN, DECREMENT), each(rules.promised, GAIN, DECREMENT))
+    left = rules.left_over(ENERGY, SHARE, GAIN, DECREMENT)
+    np.testing.assert_array_equal(left, each(rules.left_over, ENERGY, SHARE, GAIN, DECREMENT))
     quality = QUALITIES["standard"]
     enough = rules.is_enough(quality, 0.0, 0.02 * GAIN, 1e7 * DECREMENT)
     np.testing.assert_array_equal(
@@ -109,6 +112,22 @@ def test_a_map_is_settled_where_a_whole_step_changes_neither_shear_nor_areas():
     for share, now in ((0.5, (0.300, 0.0051)), (1.0, (0.280, 0.0051)), (1.0, (0.300, 0.0030)), (1.0, (0.300, 0.0081))):
         assert not rules.is_settled(share, now, (0.302, 0.0053 if now[1] < goal else 0.0082), goal)
     assert not rules.is_settled(1.0, (0.300, 0.0051), (np.inf, np.inf), goal)
+
+
+def test_only_a_whole_step_that_kept_its_promise_leaves_less_than_it_promised():
+    residual, left = rules.promised(DECREMENT, ENERGY), rules.left_over(ENERGY, SHARE, GAIN, DECREMENT)
+    assert (left <= residual).all() and (left >= rules.LEFT * residual).all()
+    np.testing.assert_array_equal(left[SHARE < 1], residual[SHARE < 1])
+    np.testing.assert_array_equal(left[ENERGY > rules.EASY], residual[ENERGY > rules.EASY])
+    far = np.abs(GAIN - DECREMENT) > DECREMENT
+    np.testing.assert_array_equal(left[far], residual[far])
+    # Newton's method for the energy x^2 / 2 + c x^3: what is left to the next step is less than what is said.
+    for c in (0.0, 0.01, -0.02, 0.03):
+        x, energy = 1.0, lambda x, c=c: x * x / 2 + c * x**3
+        decrement, y = (x + 3 * c) ** 2 / (2 + 12 * c), x - (x + 3 * c) / (1 + 6 * c)
+        following = (y + 3 * c * y * y) ** 2 / (2 + 12 * c * y)
+        said = rules.left_over(0.5, 1.0, energy(x) - energy(y), decrement)
+        assert following <= 0.5 * said and said < 2 * decrement
 
 
 def test_only_free_boundaries_with_areas_about_right_begin_with_soft_areas():
