@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+import numpy as np
 import pytest
 
 GOOD = [("share", "0", 0.0), ("share", "1", 1.0), ("shear", "1.01", 1.01), ("shear", "0", 0.0), ("margin", "0", 0.0),
@@ -129,3 +130,12 @@ def test_lists_of_names_are_taken_apart_at_commas(package):
     for text in ("a", "a,", ",b", "a,b,c", ""):
         with pytest.raises(argparse.ArgumentTypeError, match="two names"):
             pair(text)
+
+
+def test_up_in_files_becomes_up_in_the_world(package):
+    """A rotation, that keeps what is right and takes Y, up in files, to Z, up in Blender."""
+    turn = np.array(package("commands.common").Y_TO_Z, float)
+    np.testing.assert_array_equal(turn @ turn.T, np.eye(3))
+    assert np.linalg.det(turn) == pytest.approx(1)
+    np.testing.assert_array_equal(turn @ [1, 0, 0], [1, 0, 0])
+    assert (turn @ [0, 1, 0]).tolist() == [0, 0, 1]

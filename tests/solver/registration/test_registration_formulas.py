@@ -10,6 +10,7 @@ from sphere_shapes import blob
 
 from omt_uv.solver.mesh.geometry import cotangent_laplacian, vertex_areas
 from omt_uv.solver.registration import functional_maps, landmark_flow, suggestions
+from omt_uv.solver.registration.alignment import MoebiusMap, moebius_of_pairs
 from omt_uv.solver.registration.straight_walks import StraightWalks, _within
 
 
@@ -137,3 +138,22 @@ def test_fields_take_landmarks_where_they_go_and_fade(count):
     factor = np.linalg.solve(kernel, move)
     expected = np.exp(-((np.linalg.norm(positions[:, None] - at, axis=2) / width) ** 2)) @ factor
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_moebius_maps_keep_the_circle_and_cross_ratios(mirrored):
+    """And take their centre to 0, and what lies inside to inside."""
+    rng = np.random.default_rng(0)
+    moved = MoebiusMap(0.4 - 0.5j, complex(np.exp(0.7j)), mirrored)
+    circle, inside = (r * np.exp(2j * np.pi * rng.random(40)) for r in (1.0, rng.random(40)))
+    np.testing.assert_allclose(np.abs(moved(circle)), 1, atol=1e-12)
+    assert (np.abs(moved(inside)) < 1).all()
+    assert abs(moved(np.array([0.4 + 0.5j if mirrored else 0.4 - 0.5j]))[0]) < 1e-12
+
+    def ratio(z):
+        return (z[0] - z[2]) * (z[1] - z[3]) / ((z[1] - z[2]) * (z[0] - z[3]))
+
+    before = ratio(inside)
+    assert ratio(moved(inside)) == pytest.approx(before.conjugate() if mirrored else before)
+    pairs = moebius_of_pairs(inside[:6], moved(inside[:6]), mirrored)
+    np.testing.assert_allclose(pairs(inside), moved(inside), atol=1e-3)
