@@ -9,12 +9,13 @@ import meshes
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
+from short_cuts import component_of
 
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import twins
-from omt_uv.solver.seams import growth, limbs, parting, path_graph, predicted_scale
+from omt_uv.solver.seams import fine_paths, growth, limbs, parting, path_graph, predicted_scale
 from omt_uv.solver.seams.coarse_surface import coarsening
 from omt_uv.solver.seams.parting import PolygonGraph
 
@@ -405,3 +406,23 @@ def test_inverses_are_symmetric_and_nothing_elsewhere():
     found = predicted_scale._inverse(csr_matrix(A), free, 8)
     np.testing.assert_allclose(found[np.ix_(free, free)], np.linalg.inv(A), rtol=1e-10)
     assert not found[[1, 4, 5]].any() and not found[:, [1, 4, 5]].any()
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7, 1.0])
+def test_a_forest_joins_all_that_can_be_joined_to_its_start_once(share):
+    component = component_of(*meshes.icosphere(1))
+    chosen = np.random.default_rng(0).random(len(component.pair)) < share
+    start = np.isin(np.arange(component.vertex_count), [3, 4, 17])
+    found = fine_paths._forest(component, chosen, start)
+    assert (chosen | ~found).all()
+
+    def reached(edges):
+        group = set(np.flatnonzero(start).tolist())
+        for _ in range(component.vertex_count):
+            group |= {int(v) for e in component.ends[edges] for v in e if group & set(e.tolist())}
+        return group
+
+    assert reached(found) == reached(chosen)
+    # So many edges join so many vertices without a loop.
+    assert found.sum() == len(reached(chosen)) - start.sum()
+    assert set(component.ends[found].ravel().tolist()) <= reached(chosen)
