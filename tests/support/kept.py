@@ -39,7 +39,8 @@ class Recorder:
 
     def __getattr__(self, name):
         if name in ("column", "row", "split", "box", "grid_flow", "column_flow"):
-            return lambda *_, **__: Recorder(self.record, self.state)
+            # What is drawn without a gap is marked.
+            return lambda *_, align=False, **__: Recorder(self.record, self.state + "~" * align)
         if name in ("emboss", "operator_context", "ui_units_x"):
             return ""
         return lambda *given, **named: self._written(name, given, named)
