@@ -17,7 +17,7 @@ from omt_uv.solver.mesh.topology import twins
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.refinement.projected_newton import SHIFT
-from omt_uv.solver.sphere import coarsen, moser_flow, newton, refine, stream_functions
+from omt_uv.solver.sphere import coarsen, moser_flow, multilevel, newton, refine, stream_functions
 from omt_uv.solver.sphere import sphere_map as sphere_maps
 
 
@@ -323,3 +323,12 @@ def test_triangles_as_they_were_given_stay_where_areas_are_not_much_farther_off(
     folded = P.copy()
     folded[0] = -folded[0]
     assert not sphere_maps._as_given(folded, surface, area, 100.0)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_coarsest_mesh_is_a_regular_tetrahedron_with_its_outside_out(turned):
+    triangles = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    triangles = triangles[:, ::-1] if turned else triangles
+    found = multilevel._tetrahedron(SimpleNamespace(triangles=triangles))
+    np.testing.assert_allclose(found @ found.T, np.where(np.eye(4), 1, -1 / 3), atol=1e-12)
+    assert (np.linalg.det(found[triangles]) > 0).all()
