@@ -49,6 +49,21 @@ def test_no_face_folds_on_the_way_back(name):
     np.testing.assert_array_equal(uv[coarse.kept], flat[coarse.kept])
 
 
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_whole_boundary_stays_where_it_is_asked_to(name):
+    """However few inner vertices are left beside it; otherwise some of it goes, too."""
+    V, F, flat, mass, less = coarse_of(name, 40)
+    loop = boundary_loops(F)[0]
+    coarse = drain(coarsen_disk(V, F, flat, mass, len(V) // 40, whole_boundary=True))
+    assert np.isin(loop, coarse.kept).all() and not np.isin(loop, less.kept).all()
+    kept = coarse.kept[boundary_loops(coarse.triangles)[0]]
+    np.testing.assert_array_equal(np.roll(kept, -int(np.argmax(kept == loop[0]))), loop)
+    assert coarse.mass.sum() == pytest.approx(mass.sum()) and len(coarse.kept) < len(V)
+    uv = drain(coarse.prolonged(flat[coarse.kept], len(V)))
+    assert (signed_areas(uv, F) > 0).all()
+    np.testing.assert_array_equal(uv[loop], flat[loop])
+
+
 @pytest.mark.parametrize("name", ["head", "random_disk", "grid"])
 def test_vertices_are_left_where_the_density_asks_for_them(name):
     """Of a part that is to have eight times as many vertices for its area a greater share stays than of the rest."""

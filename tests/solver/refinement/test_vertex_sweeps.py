@@ -4,7 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.maps.energy import elements, energies, energy
+from omt_uv.solver.maps.energy import area_error, elements, energies, energy
 from omt_uv.solver.maps.tutte import arc_length_parameters, tutte
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -35,6 +35,20 @@ def test_sweeps_lower_the_energy_and_leave_the_boundary(chart):
         assert after < before
         np.testing.assert_array_equal(smooth[loop], w[loop])
         before = after
+
+
+def test_sweeps_end_at_the_first_map_that_has_its_areas(chart):
+    faces, w, _ = chart
+    maps = [drain(smoothing.smoothed(faces, w, WEIGHT, k)) for k in range(1, 7)]
+    errors = [area_error(faces, one) for one in maps]
+    assert (np.diff(errors) < 0).all()
+    for k, error in enumerate(errors):
+        goal = error * (1 + 1e-9)
+        steps = list(smoothing.smoothed(faces, w, WEIGHT, len(maps), goal=goal))
+        assert len(steps) == k + 1
+        np.testing.assert_array_equal(drain(smoothing.smoothed(faces, w, WEIGHT, len(maps), goal=goal)), maps[k])
+    far = drain(smoothing.smoothed(faces, w, WEIGHT, len(maps), goal=errors[-1] / 2))
+    np.testing.assert_array_equal(far, maps[-1])
 
 
 def test_boundaries_move_and_do_not_come_to_cross_themselves(chart):
