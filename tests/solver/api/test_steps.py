@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -32,3 +34,30 @@ def test_seams_that_were_cut_are_returned():
     # A tetrahedron comes open along a tree that reaches its four vertices.
     assert result.seams.shape == (3, 2) and len(np.unique(result.seams)) == 4
     assert result.figures.folds == 0 and result.figures.overlap == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_islands_laid_side_by_side_keep_their_shapes_in_rows_of_a_square(seed):
+    rng = np.random.default_rng(seed)
+    sizes = rng.uniform(0.2, 2, (9, 2)) * ([4, 0.2] if seed == 4 else [1, 1])
+    uv = np.concatenate([rng.uniform(0, 1, (5, 2)) * size + rng.normal(size=2) for size in sizes])
+    islands = np.array_split(rng.permutation(45).reshape(9, 5).ravel(), 9)
+    found = steps._side_by_side(uv, islands)
+    low, high = (np.array([f(found[i], axis=0) for i in islands]) for f in (np.min, np.max))
+    given = np.array([np.ptp(uv[i], axis=0) for i in islands])
+    for i in islands:
+        np.testing.assert_allclose(found[i] - found[i[0]], uv[i] - uv[i[0]], atol=1e-12)
+    side = np.sqrt(given.prod(axis=1).sum())
+    for j in range(9):
+        for k in range(j):
+            apart = np.maximum(low[j] - high[k], low[k] - high[j]).max()
+            assert apart >= steps.GAP * side * (1 - 1e-9)
+    # Rows are as wide as the square, or as the widest island, at most, and the next island had no room in one.
+    wide = max(side, given[:, 0].max())
+    assert (low >= 0).all() and high[:, 0].max() <= wide * (1 + 1e-9)
+    order = np.argsort(-given[:, 1], kind="stable")
+    for one, other in itertools.pairwise(order):
+        if low[other, 0] == 0:
+            assert high[one, 0] + steps.GAP * side + given[other, 0] > wide
+        else:
+            assert low[other, 1] == low[one, 1]
