@@ -2,6 +2,7 @@
 
 import meshes
 import numpy as np
+import pytest
 
 from omt_uv.solver.mesh.cut_mesh import are_across_seams, cut_open, descend, on_seam, seam_points
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -41,6 +42,20 @@ def test_points_along_seams_are_on_them():
     b[np.arange(len(h)), (h + 2) % 3] = 0
     assert on_seam(mesh, faces, b).all()
     assert not on_seam(mesh, faces, np.full((len(h), 3), 1 / 3)).any()
+
+
+@pytest.mark.parametrize("spacing", [0.01, 0.07, 5.0])
+def test_points_along_seams_are_as_many_as_their_spacing_asks_for(spacing):
+    """Evenly along each edge, half a step from its ends, and no farther apart than is asked."""
+    V, F, seams = strip()
+    mesh = cut_open(V, F, seams)
+    points, h = seam_points(mesh, spacing)
+    for edge in np.unique(h):
+        a, b = V[F.ravel()[edge]], V[F.ravel()[edge + 1 - 3 * (edge % 3 == 2)]]
+        count = max(int(np.ceil(np.linalg.norm(b - a) / spacing)), 1)
+        expected = a + (np.arange(count)[:, None] + 0.5) / count * (b - a)
+        np.testing.assert_allclose(points[h == edge], expected, atol=1e-12)
+    assert set(h) == set(np.flatnonzero(mesh.seam))
 
 
 def test_walks_do_not_cross_seams():
