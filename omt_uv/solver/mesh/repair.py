@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -41,6 +42,8 @@ PERTURBATION_ROUNDS = 12
 NEEDLE = 1e-7
 # With less than this share, the height of a triangle is no measure of what is around it.
 THIN = 1e-4
+# A chart of less than this share of the extent of its mesh has no size.
+TINY = 1e-9
 # Vertices of nothing but bad triangles take the height from so many triangles away.
 ACROSS_BAD = 8
 # Share of the extent of the mesh that stands for the size of a chart which has none.
@@ -198,6 +201,8 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     ------
     ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to its chart's)
     """
+    if len(chart.disk) == 1 and len(chart.vertices) == 3 and charts_without_area([chart])[0]:
+        return replace(chart, vertices=_lone_triangle() * _size(chart.vertices, extent)), 1
     vertices, count = perturbed(chart.vertices, chart.disk, extent, chart.faces)
     if not count:
         return chart, 0
@@ -227,12 +232,10 @@ def perturbed(
     if not bad.any():
         return vertices, 0
     count = int(bad.sum())
-    low = vertices.min(axis=0)
-    size = 2 * float((vertices.max(axis=0) / 2 - low / 2).max())
+    low, scale = vertices.min(axis=0), _size(vertices, extent)
     rng = np.random.default_rng(0)
     # A chart without any area, or without a size that counts, has no shape to keep.
-    shapeless = bad.all() or size < 1e-9 * extent
-    scale = (extent if size < 1e-9 * extent else size) or 1.0
+    shapeless = bad.all() or np.ptp(vertices / 2, axis=0).max() < TINY / 2 * extent
     moving = SHAPELESS_SIZE * rng.random((len(vertices), 3)) if shapeless else vertices / scale - low / scale
     # Of the mesh as it came: next to what has moved already, heights say nothing.
     reach = _least_height(moving, triangles)
@@ -244,6 +247,19 @@ def perturbed(
         moving[moved] += PERTURBATION * 4.0**k * reach[moved, None] * rng.uniform(-1, 1, (len(moved), 3))
     names = np.arange(len(triangles)) if faces is None else faces
     raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(names[bad[: len(names)]]))
+
+
+def _size(vertices: np.ndarray, extent: float) -> float:
+    """How large a chart (n,3) of a mesh of some extent is, or as that where its own size is none next to it."""
+    size = 2 * float(np.ptp(vertices / 2, axis=0).max())
+    return (extent if size < TINY * extent else size) or 1.0
+
+
+@cache
+def _lone_triangle() -> np.ndarray:
+    """What becomes of the corners (3,3) of a triangle without area that is a chart of its own, in a unit of its size:
+    decimated meshes have them by the thousand."""
+    return perturbed(np.zeros((3, 3)), np.array([[0, 1, 2]]), 1.0)[0]
 
 
 def _least_height(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import MarginError
 from ..mesh.geometry import signed_areas
 from ..progress import Progress, Steps, part_of
+from .crumbs import gathered
 from .outline_raster import IslandOutline, grown_cells, outlines_of, side_by_side
 from .placement import Item, Place, place, turned_masks
 from .raster_grid import RasterGrid
@@ -151,12 +152,14 @@ def pack(
     exponent = int(np.frexp(max(np.abs(p).max(initial=0.0) for p in points))[1])
     exponent = exponent if abs(exponent) > MOST_EXPONENT else 0
     points = [np.ldexp(p, -exponent) for p in points] if exponent else points
-    if len(points) == 1 and not len(around):
+    heaped = gathered(points, faces, float(_areas(points, faces).sum()), margin, texture_size)
+    if len(heaped.points) == 1 and not len(around):
         placed, scale = _alone(points[0], (texture_size - margin) / texture_size)
     else:
-        task = _task(points, faces, margin, texture_size, around)
+        task = _task(heaped.points, heaped.triangles, margin, texture_size, around)
         found = yield from _search(task)
-        placed, scale = _filled(_placed(points, found), found.task, found.scale)
+        placed, scale = _filled(_placed(heaped.points, found), found.task, found.scale)
+    placed = heaped.apart(placed)
     whole = [_spread(p, u, len(i)) for p, u, i in zip(placed, used, islands, strict=True)]
     return Packing(whole, float(np.ldexp(scale, -exponent)), "raster", covered_area(placed, faces))
 

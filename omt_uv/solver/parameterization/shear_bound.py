@@ -212,7 +212,7 @@ def bound_shear(
             promised[:] = np.inf
         if not last.searched:
             break
-        is_stuck, best = rounds > 1 and last.is_hardly_better(best), last
+        is_stuck, best = rounds > 1 and last is not best and last.is_hardly_better(best), last
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
         parting = _apart(search, last, crossing, rounds > 1 or any(found.gave_up for found in last.memory.values()))

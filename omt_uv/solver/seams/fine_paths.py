@@ -21,6 +21,8 @@ REACH = 6.0
 ASIDE = 3.0
 # At one coarse edge from the coarse path, an edge counts so many times more.
 ASTRAY = 0.5
+# So many times as far where no path is found there, at first and then: costs say little of the lengths of needles.
+WIDER = (8.0, 64.0, np.inf)
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,9 @@ def carried(
         if len(path) == 0 and in_plane:
             # A line along the plane may take diagonals of polygons, where there is none of edges: near to it, then.
             path = fine.path(used, end, along, spacing, np.ones_like(allowed))
+        if len(path) == 0:
+            wider = (fine.path(used, end, along, spacing, allowed, reach=REACH * more) for more in WIDER)
+            path = next((found for found in wider if len(found)), path)
         missed = fine.missed(path, along[1:-1], ASIDE * spacing)
         if missed is not None:
             waiting = [stretch[: missed + 2], stretch[missed + 1 :], *waiting]
@@ -176,12 +181,21 @@ class FineGraph:
         beyond = np.flatnonzero(np.isinf(dijkstra(self.length, indices=path, min_only=True, limit=reach)[along]))
         return int(beyond[len(beyond) // 2]) if len(beyond) else None
 
-    def path(self, start: np.ndarray, end: int, along: np.ndarray, spacing: float, allowed: np.ndarray) -> np.ndarray:
+    def path(
+        self,
+        start: np.ndarray,
+        end: int,
+        along: np.ndarray,
+        spacing: float,
+        allowed: np.ndarray,
+        reach: float = REACH,
+    ) -> np.ndarray:
         """Vertices (k,) of the cheapest path from `end` to any of `start` (n,) bool, near the vertices `along` (a,).
 
-        spacing: length of a coarse edge; allowed (n,) bool: vertices that it may run over. Empty if there is none.
+        spacing: length of a coarse edge; allowed (n,) bool: vertices that it may run over; reach: how far from `along`,
+        in lengths of coarse edges. Empty if there is none.
         """
-        astray = dijkstra(self.length, indices=along, min_only=True, limit=REACH * spacing)
+        astray = dijkstra(self.length, indices=along, min_only=True, limit=reach * spacing)
         near = np.flatnonzero(np.isfinite(astray) & allowed)
         if not start[near].any() or not allowed[end]:
             return np.zeros(0, np.int64)

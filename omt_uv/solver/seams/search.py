@@ -45,6 +45,7 @@ EXACTLY = 1.1
 BARRED = 0.3
 # What is searched again is harder than it seemed: on a coarse surface of so many times the vertices.
 FINER = 1.5
+FINEST = 2.5
 # A cut grows on where this share of its spread is asked for, at least.
 NEARLY_THERE = 0.6
 # Where this share is, it is reached by a little more of the same: another cut can miss the bound by as much.
@@ -290,7 +291,9 @@ class SeamSearch:
             cut = cut[~coarse.boundary[cut]]
             return max(share * model.cut(cut[:1]).spread_cut(cut[1:]), FLAT)
 
-        cuts = yield from self._several_grown(component, found.base, found.mirror, bound, trials, FINER)
+        before_this = len(found.coarse.positions) / self.options.vertices
+        finer = min(FINER * max(before_this, 1.0), FINEST)
+        cuts = yield from self._several_grown(component, found.base, found.mirror, bound, trials, finer)
         if not cuts:
             return (yield from self._grown_finer(component, replace(found, mirror=None), share))
         return best_of(cuts)

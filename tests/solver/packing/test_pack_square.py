@@ -117,6 +117,23 @@ def test_specks_do_not_make_the_others_smaller():
     assert least_distance(more.islands) >= 4 / 1024
 
 
+def test_thousands_of_islands_that_no_texture_shows_take_no_room():
+    # Remains of faces without area: a margin around each would fill the square.
+    rng = np.random.default_rng(3)
+    large, crumbs = corners(5), [1e-7 * rng.uniform(0.5, 1) * corner(1, 1) for _ in range(4000)]
+    alone = pack(large, [FAN] * 5, 4, 1024)
+    mixed = pack([*crumbs[:2000], *large, *crumbs[2000:]], [FAN] * 4005, 4, 1024)
+    assert mixed.scale > 0.97 * alone.scale
+    placed = [*mixed.islands[:2000], *mixed.islands[2005:]]
+    for given, found in zip(crumbs, placed, strict=True):
+        assert np.ptp(found, axis=0).max() == pytest.approx(mixed.scale * np.ptp(given, axis=0).max(), rel=1e-5)
+    # Each has a place of its own in single precision, and these lie within a few pixels of each other.
+    middle = np.array([p.mean(axis=0) for p in placed], np.float32)
+    assert len(np.unique(middle, axis=0)) == len(middle)
+    assert np.ptp(middle, axis=0).max() < 4 / 1024
+    assert np.linalg.norm(middle - middle[0], axis=1).max() < least_distance([*mixed.islands[2000:2005], placed[0]])
+
+
 def test_a_folded_island_is_placed_all_the_same():
     points = corner(2, 3)
     points[3] = [5, 5]

@@ -12,7 +12,7 @@ from omt_uv.solver.mesh.topology import boundary_loops, graph_components
 from omt_uv.solver.seams import coarse_cut
 from omt_uv.solver.seams.coarse_surface import coarsening
 from omt_uv.solver.seams.fine_paths import FineMirror, carried
-from omt_uv.solver.seams.path_graph import Mirrored, path_graph
+from omt_uv.solver.seams.path_graph import Mirrored, path_graph, path_to
 from omt_uv.solver.seams.search import SeamSearch
 
 
@@ -48,6 +48,21 @@ def test_a_path_around_a_tip_takes_no_short_cut_around_the_limb():
     way = _places(component, coarse, V, around[: -len(around) // 6])
     chosen = carried(component, coarse, graph, graph.steps_of(way), start, None)
     assert set(coarse.kept[way].tolist()) <= set(np.unique(component.ends[chosen]).tolist())
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e-2, 1e-4])
+def test_a_path_is_led_along_edges_however_little_a_cut_costs_there(factor):
+    # The reach is measured in costs: where these are small, ways of edges lie beyond it, and seams were lost.
+    V, F = _finger()
+    component = _component(V, F)
+    start = component.on_boundary()
+    coarse = coarsening(component.positions, component.triangles, len(V), None).ended(len(V) // 6)
+    graph = path_graph(coarse, np.full(len(coarse.kept), factor), start[coarse.kept])
+    before = graph.paths_from(np.flatnonzero(graph.boundary))[1]
+    way = path_to(before, int(np.argmax(coarse.positions[:, 2])))
+    chosen = carried(component, coarse, graph, graph.steps_of(way), start, None)
+    assert coarse.kept[way[0]] in component.ends[chosen]
+    assert start[component.ends[chosen]].any()
 
 
 def test_a_line_along_a_mirror_plane_that_is_none_of_edges_is_cut_all_the_same():
