@@ -50,8 +50,9 @@ MOST_STEEP = 0.01
 LEAST_REHEARSED = 1.2
 # Of a surface in one piece the largest chart has this share of the area, but for crumbs.
 ONE_PIECE = 0.97
-# So many times what is steep beyond that share is slit.
+# So many times what is steep beyond that share is slit, and this share of a chart more every time that was no help.
 SLIT = 1.5
+MORE_SLIT = 0.003
 # What misses the bound by less after a second search is slit where it shears more than that.
 NEARLY = 0.03
 SHEARED = 2.0
@@ -215,7 +216,7 @@ def bound_shear(
         is_stuck, best = rounds > 1 and last is not best and last.is_hardly_better(best), last
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        parting = _apart(search, last, crossing, rounds > 1 or any(found.gave_up for found in last.memory.values()))
+        parting = _apart(search, last, crossing, rounds)
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
         if parts is None or (is_stuck and not parts[0]):
             break
@@ -324,13 +325,14 @@ def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float
 
 
 def _apart(
-    search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None, late: bool
+    search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None, rounds: int
 ) -> Steps[tuple[dict[int, np.ndarray], list[int]]]:
     """Edges (e,2), by the number of a chart, that part it where it keeps the bound but for lying in its own way, or
     around its flat sides; and the numbers of the latter, whose other cuts are not needed any more."""
     found: dict[int, np.ndarray] = {}
     flat: list[int] = []
     least = np.sqrt(CROWDED) * np.log(search.shear.bound)
+    late = rounds > 1 or any(found.gave_up for found in last.memory.values())
     if not last.searched:
         return found, flat
     # Hardly any chart misses its bound.
@@ -349,13 +351,14 @@ def _apart(
                 edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
         if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
             # No other cut is needed, but one into what shears that much.
-            edges = _slit(search, last, k)
+            edges = _slit(search, last, k, rounds)
         found |= {k: edges} if len(edges) else {}
     return found, flat
 
 
-def _slit(search: ShearSearch, last: _Round, k: int) -> np.ndarray:
-    """Edges (e,2) from the seams around chart k into what is steep, or, where its mean misses the bound, sheared."""
+def _slit(search: ShearSearch, last: _Round, k: int, rounds: int) -> np.ndarray:
+    """Edges (e,2) from the seams around chart k into what is steep, or, where its mean misses the bound, sheared; more
+    than the last time."""
     from ..seams.parting import slits
 
     chart = last.charts[k]
@@ -364,8 +367,8 @@ def _slit(search: ShearSearch, last: _Round, k: int) -> np.ndarray:
     steep = shear > (STEEP if missed == 0 else SHEARED)
     excess = float(area[steep].sum() / area.sum() - MOST_STEEP) if missed == 0 else missed
     costs, here = search.costs(), chart.vertex_ids
-    least, barred = SLIT * excess * area.sum(), costs.in_face[here]
-    return slits(chart, steep, least, costs.vertex_cost[here], barred, search.images)
+    least, barred = (SLIT * excess + MORE_SLIT * (rounds - 1)) * area.sum(), costs.in_face[here]
+    return slits(chart, steep, least, costs.vertex_cost[here], barred, search.images, rounds)
 
 
 def _cuts(prepared: DiskCharts) -> Cuts:

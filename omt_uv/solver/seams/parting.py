@@ -25,7 +25,7 @@ POINTS = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3],
 LEAST_COVER = 3e-3
 # What is taken off has this share of the chart at least.
 LEAST_PART = 0.03
-# Slits at once at most: small ones far from a seam cost more than they are worth.
+# Slits at once at most, the first time: small ones far from a seam cost more than they are worth.
 MOST_SLITS = 4
 # Pairs of parts that are cut from one another at most.
 MOST_CUTS = 12
@@ -173,11 +173,13 @@ def slits(
     cost: np.ndarray,
     barred: np.ndarray,
     image: np.ndarray | None = None,
+    rounds: int = 1,
 ) -> np.ndarray:
     """Edges (k,2) of the surface from the boundary of a chart into what shears too much, the largest parts first.
 
     steep (m,) bool : triangles that do; least : area of what is to be slit at least; barred (n,) bool : vertices that
-    no slit passes through, unless there is not as much to be slit elsewhere; cost, image : see `parted`
+    no slit passes through, unless there is not as much to be slit elsewhere; cost, image : see `parted`; rounds : which
+    time it is
     """
     graph = PolygonGraph.of(chart)
     bad, free = np.zeros(len(graph.area), dtype=bool), ~barred
@@ -187,7 +189,7 @@ def slits(
     piece = graph.pieces(bad[graph.joined].all(axis=1))
     size = np.bincount(piece, np.where(bad, graph.area, 0.0))
     order = np.argsort(-size, kind="stable")
-    chosen = order[: min(int(np.searchsorted(np.cumsum(size[order]), least)) + 1, MOST_SLITS)]
+    chosen = order[: min(int(np.searchsorted(np.cumsum(size[order]), least)) + 1, rounds * MOST_SLITS)]
     n, ends = len(chart.vertices), graph.ends[free[graph.ends].all(axis=1)]
     price = cost[ends].mean(axis=1) * edge_lengths(chart.vertices, ends) + 1e-300
     ways = csr_matrix((np.tile(price, 2), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n))

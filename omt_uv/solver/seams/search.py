@@ -43,7 +43,8 @@ PARTLY = 0.5
 EXACTLY = 1.1
 # Cuts that end in a face are worth so much less.
 BARRED = 0.3
-# What is searched again is harder than it seemed: on a coarse surface of so many times the vertices.
+# What is searched again is harder than it seemed: on a coarse surface of so many times the vertices, every time, and up
+# to so many times as many as at first.
 FINER = 1.5
 FINEST = 2.5
 # A cut grows on where this share of its spread is asked for, at least.
