@@ -52,7 +52,7 @@ LEAST_REHEARSED = 1.2
 ONE_PIECE = 0.97
 # So many times what is steep beyond that share is slit, and this share of a chart more every time that was no help.
 SLIT = 1.5
-MORE_SLIT = 0.003
+MORE_SLIT = 0.001
 # What misses the bound by less after a second search is slit where it shears more than that.
 NEARLY = 0.03
 SHEARED = 2.0

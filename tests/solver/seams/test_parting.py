@@ -14,7 +14,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.seams.parting import LEAST_PART, flat_sides, parted, slits
+from omt_uv.solver.seams.parting import LEAST_PART, MOST_SLITS, flat_sides, parted, slits
 
 
 def ramp(turns, steps=60, rings=6, rise=0.2):
@@ -190,6 +190,21 @@ def test_slits_go_where_they_should_not_only_where_nothing_else_helps():
     assert len(edges) and (V[edges, 0] >= 0.5).all()
     everywhere = slits(chart, steep, 2.5 * there, cost, barred)
     assert (V[everywhere, 0] < 0.5).any() and (V[everywhere, 0] > 0.5).any()
+
+
+def test_more_is_slit_every_time():
+    V, F = meshes.grid(30, 30)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    spots = [(x, y, 0.0) for x in (0.2, 0.4, 0.6, 0.8) for y in (0.2, 0.5, 0.8)]
+    steep = steep_spots(chart.vertices, chart.triangles, *spots, radius=0.06)
+    cost, barred = np.ones(len(V)), np.zeros(len(V), dtype=bool)
+    reached = []
+    for rounds in (1, 2, 3):
+        edges = slits(chart, steep, np.inf, cost, barred, rounds=rounds)
+        tips, degree = np.unique(edges, return_counts=True)
+        outer = (np.abs(V[:, :2] - 0.5) > 0.5 - 1e-9).any(axis=1)
+        reached.append(int(((degree == 1) & ~outer[tips]).sum()))
+    assert 0 < reached[0] <= MOST_SLITS < reached[1] <= 2 * MOST_SLITS < reached[2] <= len(spots)
 
 
 def test_nothing_steep_nothing_slit():

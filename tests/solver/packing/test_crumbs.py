@@ -1,0 +1,53 @@
+"""Crumbs: islands that no texture shows lie in one heap, and come out of it as they went in."""
+
+import numpy as np
+import pytest
+
+from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.packing.crumbs import gathered
+
+TRIANGLE, QUAD = np.array([[0, 1, 2]]), np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def mixed(count, seed=0, size=1e-7):
+    """Islands of which every third is large, and all triangles."""
+    rng = np.random.default_rng(seed)
+    points, triangles = [], []
+    for k in range(count):
+        unit = 1.0 if k % 3 == 0 else size
+        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])[: 4 if k % 2 else 3]
+        points.append(unit * corners * rng.uniform(0.5, 1, 2) + rng.normal(size=2))
+        triangles.append(QUAD if k % 2 else TRIANGLE)
+    return points, triangles
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_island_comes_out_in_its_place_moved_alone(seed):
+    points, triangles = mixed(1200, seed)
+    heaped = gathered(points, triangles, 100.0, 4, 1024)
+    assert len(heaped.points) == 401 and heaped.crumb.sum() == 800
+    found = heaped.apart(heaped.points)
+    for before, after in zip(points, found, strict=True):
+        np.testing.assert_allclose(after - after[0], before - before[0], rtol=0, atol=1e-13)
+    heap, index = heaped.points[-1], heaped.triangles[-1]
+    assert (signed_areas(heap, index) > 0).all() and index.max() == len(heap) - 1
+    small = [found[k] for k in np.flatnonzero(heaped.crumb)]
+    low, high = (np.array([f(p, axis=0) for p in small]) for f in (np.min, np.max))
+    # No box meets another.
+    apart = (low[:, None] > high[None]) | (low[None] > high[:, None])
+    assert (apart.any(axis=2) | np.eye(len(small), dtype=bool)).all()
+
+
+@pytest.mark.parametrize("count, size, margin", [(1200, 1e-2, 4), (30, 1e-7, 4), (1200, 1e-7, 0)])
+def test_what_shows_or_whose_margins_take_little_stays_by_itself(count, size, margin):
+    points, triangles = mixed(count, size=size)
+    heaped = gathered(points, triangles, 100.0, margin, 1024)
+    assert not heaped.crumb.any() and heaped.points == points and heaped.triangles == triangles
+    assert heaped.apart(points) == points
+
+
+def test_crumbs_alone_are_islands_as_any_others():
+    points, triangles = mixed(1200)
+    small = [k for k in range(1200) if k % 3]
+    heaped = gathered([points[k] for k in small], [triangles[k] for k in small], 100.0, 4, 1024)
+    assert not heaped.crumb.any() and len(heaped.points) == 800
