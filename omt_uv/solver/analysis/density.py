@@ -100,6 +100,16 @@ def from_polygons(values: np.ndarray, triangle_face: np.ndarray) -> np.ndarray:
     return np.asarray(values, float)[triangle_face]
 
 
+def means_of_polygons(values: np.ndarray, triangle_face: np.ndarray, count: int) -> np.ndarray:
+    """Mean (f,) of what the triangles (m,) of each of `count` polygons have, 0 for one without triangles.
+
+    >>> means_of_polygons(np.array([1.0, 3.0, 5.0]), np.array([0, 0, 1]), 2)
+    array([2., 5.])
+    """
+    size = np.maximum(np.bincount(triangle_face, minlength=count), 1)
+    return np.bincount(triangle_face, values, count) / size
+
+
 def checked_density(values: np.ndarray) -> np.ndarray:
     """Any positive numbers (m,) as a density.
 

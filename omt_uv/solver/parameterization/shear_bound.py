@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.density import Target
+from ..analysis.density import Target, means_of_polygons
 from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
@@ -53,6 +53,8 @@ ONE_PIECE = 0.97
 # So many times what is steep beyond that share is slit, and this share of a chart more every time that was no help.
 SLIT = 1.5
 MORE_SLIT = 0.001
+# What is steep alone is slit so many times before it may come apart.
+SLIT_AT_FIRST = 2
 # What misses the bound by less after a second search is slit where it shears more than that.
 NEARLY = 0.03
 SHEARED = 2.0
@@ -178,7 +180,9 @@ class ShearSearch:
 
     @cached_property
     def _density(self) -> np.ndarray | None:
-        return _polygon_density(self.surface, self.target)
+        if self.target is None:
+            return None
+        return means_of_polygons(self.target.density, self.surface.triangle_face, self.count)
 
     @property
     def count(self) -> int:
@@ -204,12 +208,12 @@ def bound_shear(
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     tried = {_as_a_set(last.cuts.edges)}
-    rehearsed, apart = dict[str, Any](), dict[int, np.ndarray]()
+    rehearsed, crossed = dict[str, Any](), False
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
             # What coarse maps tell does not hold here, or it is no use to part what lies on itself.
             last, rehearsed = best, {"rehearse": None}
-            crossing = None if apart else crossing
+            crossing = None if crossed else crossing
             promised[:] = np.inf
         if not last.searched:
             break
@@ -220,7 +224,7 @@ def bound_shear(
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
         if parts is None or (is_stuck and not parts[0]):
             break
-        apart, flat = parts
+        apart, flat, crossed = parts
         missed = [k for k in last.searched if k not in apart]
         share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
@@ -326,15 +330,16 @@ def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float
 
 def _apart(
     search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None, rounds: int
-) -> Steps[tuple[dict[int, np.ndarray], list[int]]]:
+) -> Steps[tuple[dict[int, np.ndarray], list[int], bool]]:
     """Edges (e,2), by the number of a chart, that part it where it keeps the bound but for lying in its own way, or
-    around its flat sides; and the numbers of the latter, whose other cuts are not needed any more."""
+    around its flat sides, or slit it; the numbers of those with flat sides, whose other cuts are not needed any more;
+    and whether what lies in its own way is among them."""
     found: dict[int, np.ndarray] = {}
-    flat: list[int] = []
+    flat, crossed = list[int](), False
     least = np.sqrt(CROWDED) * np.log(search.shear.bound)
     late = rounds > 1 or any(found.gave_up for found in last.memory.values())
     if not last.searched:
-        return found, flat
+        return found, flat, crossed
     # Hardly any chart misses its bound.
     from ..seams.parting import flat_sides, parted
 
@@ -343,17 +348,20 @@ def _apart(
         edges = flat_sides(chart) if mean > last.bound else np.zeros((0, 2), np.int64)
         if len(edges):
             flat.append(k)
-        elif crossing is not None and mean > (1 + HARDLY) * last.bound and (late or np.log(mean) >= least):
+        elif crossing is not None and (
+            rounds > SLIT_AT_FIRST or (mean > (1 + HARDLY) * last.bound and (late or np.log(mean) >= least))
+        ):
             uv = yield from crossing(chart, last.maps[k])
             shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
-            without = float(area @ shear / area.sum())
-            if without <= last.bound + late * ROOM * (mean - last.bound):
+            without = _pressing(area @ shear / area.sum(), area[shear > STEEP].sum() / area.sum(), last.bound)
+            if without <= last.bound + late * ROOM * (last.pressing[k] - last.bound):
                 edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
+                crossed |= len(edges) > 0
         if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
             # No other cut is needed, but one into what shears that much.
             edges = _slit(search, last, k, rounds)
         found |= {k: edges} if len(edges) else {}
-    return found, flat
+    return found, flat, crossed
 
 
 def _slit(search: ShearSearch, last: _Round, k: int, rounds: int) -> np.ndarray:
@@ -408,15 +416,6 @@ def _within(chart: Chart) -> np.ndarray:
 def is_marked(surface: Surface, chart: Chart) -> bool:
     """Whether seams of the surface bound a chart."""
     return bool(is_seam(surface, outline(chart)).any())
-
-
-def _polygon_density(surface: Surface, target: Target | None) -> np.ndarray | None:
-    """Mean density (f,) of the triangles of every polygon."""
-    if target is None:
-        return None
-    count = len(surface.face_start) - 1
-    size = np.maximum(np.bincount(surface.triangle_face, minlength=count), 1)
-    return np.bincount(surface.triangle_face, target.density, count) / size
 
 
 def _mapped(charts, old_charts, old_maps, map_charts) -> Steps[list[ChartMap]]:

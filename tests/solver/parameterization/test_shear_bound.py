@@ -1,5 +1,6 @@
 """The shear bound: more seam, less shear, and charts that stay disks."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import hard_meshes
@@ -14,6 +15,7 @@ from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import shear_bound
+from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.options import ShearBound, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -200,3 +202,36 @@ def test_a_folded_corner_is_not_what_its_polygon_shears():
     assert (signed_areas(uv, chart.triangles) <= 0).any()
     local, area = shear_bound._shear(chart, SimpleNamespace(uv=uv, folds=1), True)
     assert area @ local / area.sum() < 1.5
+
+
+@pytest.mark.parametrize("rounds, comes_apart", [(1, False), (2, False), (3, True)])
+def test_what_stays_steep_after_slits_comes_apart_where_it_lies_in_its_own_way(rounds, comes_apart):
+    # A flat ring of more than a turn, whose map is steep in one place.
+    angle, radius = np.meshgrid(2 * np.pi * 1.3 * np.linspace(0, 1, 60), np.linspace(1, 2, 6), indexing="ij")
+    flat = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=2).reshape(-1, 2)
+    V = np.column_stack([flat, 0.03 * angle.ravel()])
+    F = meshes.grid(5, 59)[1]
+    (chart,) = strict_charts(triangle_surface(V, F))
+    area = face_areas(chart.vertices, chart.triangles)
+    squeezed = chart.vertices[:, :2].copy()
+    place = chart.vertices[:, 2] / 0.03
+    radial = np.linalg.norm(squeezed, axis=1)
+    squeezed *= np.where(np.abs(place - 2) < 0.4, (1.5 + 0.1 * (radial - 1.5)) / radial, 1)[:, None]
+    chart_map = replace(drain(map_chart(chart)), uv=squeezed, angle_mean=1.3, area_l1=0.1)
+    nothing = np.zeros(len(V), dtype=bool)
+    costs = SimpleNamespace(vertex_cost=np.ones(len(V)), in_face=nothing)
+    shear = SimpleNamespace(bound=1.35)
+    search = SimpleNamespace(shear=shear, target=None, costs=lambda: costs, images=None)
+    last = SimpleNamespace(
+        searched=[0], charts=[chart], maps=[chart_map], mean=[1.3], pressing=[1.37], bound=1.35, memory={}
+    )
+
+    def crossing(chart, chart_map):
+        yield from ()
+        return chart.vertices[:, :2]
+
+    steep = shear_bound._shear(chart, chart_map, True)[0] > shear_bound.STEEP
+    assert area[steep].sum() > shear_bound.MOST_STEEP * area.sum()
+    found, flat_sides, crossed = drain(shear_bound._apart(search, last, crossing, rounds))
+    parts = strict_charts(triangle_surface(V, F, found.get(0, np.zeros((0, 2), int))))
+    assert not flat_sides and crossed == comes_apart and len(parts) == (2 if comes_apart else 1)
