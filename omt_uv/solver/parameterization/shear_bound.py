@@ -340,8 +340,7 @@ def _apart(
     late = rounds > 1 or any(found.gave_up for found in last.memory.values())
     if not last.searched:
         return found, flat, crossed
-    # Hardly any chart misses its bound.
-    from ..seams.parting import flat_sides, parted
+    from ..seams.parting import flat_sides, parted  # Hardly any chart misses its bound.
 
     for k in last.searched:
         chart, mean = last.charts[k], last.mean[k]
@@ -353,8 +352,10 @@ def _apart(
         ):
             uv = yield from crossing(chart, last.maps[k])
             shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
-            without = _pressing(area @ shear / area.sum(), area[shear > STEEP].sum() / area.sum(), last.bound)
-            if without <= last.bound + late * ROOM * (last.pressing[k] - last.bound):
+            both = float(area @ shear / area.sum()), float(area[shear > STEEP].sum() / area.sum())
+            mild = mean <= last.bound
+            missed, without = (last.pressing[k], _pressing(*both, last.bound)) if mild else (mean, both[0])
+            if without <= last.bound + late * ROOM * (missed - last.bound):
                 edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
                 crossed |= len(edges) > 0
         if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
