@@ -201,8 +201,8 @@ def with_area(chart: Chart, extent: float) -> tuple[Chart, int]:
     ------
     ZeroAreaFaceError : a triangle has no area wherever its vertices move (its size is nothing next to its chart's)
     """
-    if len(chart.disk) == 1 and len(chart.vertices) == 3 and charts_without_area([chart])[0]:
-        return replace(chart, vertices=_lone_triangle() * _size(chart.vertices, extent)), 1
+    if len(chart.vertices) == 3 and degenerate_triangles(chart.vertices, chart.disk, NEEDLE).all():
+        return replace(chart, vertices=_lone_triangle() * _scale(_size(chart.vertices), extent)), 1
     vertices, count = perturbed(chart.vertices, chart.disk, extent, chart.faces)
     if not count:
         return chart, 0
@@ -232,10 +232,11 @@ def perturbed(
     if not bad.any():
         return vertices, 0
     count = int(bad.sum())
-    low, scale = vertices.min(axis=0), _size(vertices, extent)
+    low, size = vertices.min(axis=0), _size(vertices)
+    scale = _scale(size, extent)
     rng = np.random.default_rng(0)
     # A chart without any area, or without a size that counts, has no shape to keep.
-    shapeless = bad.all() or np.ptp(vertices / 2, axis=0).max() < TINY / 2 * extent
+    shapeless = bad.all() or size < TINY * extent
     moving = SHAPELESS_SIZE * rng.random((len(vertices), 3)) if shapeless else vertices / scale - low / scale
     # Of the mesh as it came: next to what has moved already, heights say nothing.
     reach = _least_height(moving, triangles)
@@ -249,9 +250,13 @@ def perturbed(
     raise ZeroAreaFaceError("Faces have no area", kind="face", elements=np.unique(names[bad[: len(names)]]))
 
 
-def _size(vertices: np.ndarray, extent: float) -> float:
-    """How large a chart (n,3) of a mesh of some extent is, or as that where its own size is none next to it."""
-    size = 2 * float(np.ptp(vertices / 2, axis=0).max())
+def _size(vertices: np.ndarray) -> float:
+    """How large a chart (n,3) is. Halves: the difference of two huge numbers may be infinite."""
+    return 2 * float(np.ptp(vertices / 2, axis=0).max())
+
+
+def _scale(size: float, extent: float) -> float:
+    """The unit of a chart of this size in a mesh of some extent: that one where its own is none next to it."""
     return (extent if size < TINY * extent else size) or 1.0
 
 

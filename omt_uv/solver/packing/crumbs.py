@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .outline_raster import side_by_side
+from .outline_raster import island_areas, side_by_side
 
 # Islands smaller than this share of a pixel are crumbs.
 SHOWN = 0.1
@@ -40,16 +40,22 @@ class Gathered:
 
 
 def gathered(
-    points: Sequence[np.ndarray], triangles: Sequence[np.ndarray], area: float, margin: float, texture_size: int
+    points: Sequence[np.ndarray], triangles: Sequence[np.ndarray], margin: float, texture_size: int
 ) -> Gathered:
     """Islands (n_i,2) with those that no texture of so many pixels shows side by side in one, where they are many.
 
-    area : of all islands, which are taken to fill the texture
+    The islands are taken to fill the texture.
     """
+    alone = Gathered(list(points), list(triangles), np.zeros(len(points), dtype=bool), np.zeros(0, np.int64))
+    matter = NO_MATTER * texture_size**2
+    # Nearly always there are too few islands, crumbs or not.
+    if len(points) * margin**2 <= matter:
+        return alone
+    area = float(island_areas(points, triangles).sum())
     size = np.array([float((p.max(axis=0) - p.min(axis=0)).max()) for p in points])
     crumb = size * texture_size < SHOWN * np.sqrt(area)
-    if crumb.sum() * margin**2 <= NO_MATTER * texture_size**2 or crumb.all():
-        return Gathered(list(points), list(triangles), np.zeros(len(points), dtype=bool), np.zeros(0, np.int64))
+    if crumb.sum() * margin**2 <= matter:
+        return alone
     small, large = np.flatnonzero(crumb), np.flatnonzero(~crumb)
     step = SPACING * max(float(size[small].max()), LEAST_STEP * np.sqrt(area) / texture_size)
     across = int(np.ceil(np.sqrt(len(small))))

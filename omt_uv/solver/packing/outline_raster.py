@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..mesh.geometry import signed_areas
 from ..mesh.topology import boundary_edges, expand
 
 # Cells between two points that stand for the outline.
@@ -38,6 +39,13 @@ def side_by_side(points: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) 
     first = np.cumsum([0, *map(len, points)])[:-1]
     shifted = np.concatenate(triangles) + np.repeat(first, list(map(len, triangles)))[:, None]
     return np.concatenate(points), shifted
+
+
+def island_areas(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> np.ndarray:
+    """Area (k,) of every island (n_i,2) with triangles (m_i,3)."""
+    points, index = side_by_side(islands, triangles)
+    owner = np.repeat(np.arange(len(islands)), list(map(len, triangles)))
+    return np.bincount(owner, np.abs(signed_areas(points, index)), len(islands))
 
 
 def outlines_of(points: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> list[IslandOutline]:

@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import MarginError
-from ..mesh.geometry import signed_areas
 from ..progress import Progress, Steps, part_of
 from .crumbs import gathered
-from .outline_raster import IslandOutline, grown_cells, outlines_of, side_by_side
+from .outline_raster import IslandOutline, grown_cells, island_areas, outlines_of
 from .placement import Item, Place, place, turned_masks
 from .raster_grid import RasterGrid
 from .shelves import Block, blocks_of
@@ -152,7 +151,7 @@ def pack(
     exponent = int(np.frexp(max(np.abs(p).max(initial=0.0) for p in points))[1])
     exponent = exponent if abs(exponent) > MOST_EXPONENT else 0
     points = [np.ldexp(p, -exponent) for p in points] if exponent else points
-    heaped = gathered(points, faces, float(_areas(points, faces).sum()), margin, texture_size)
+    heaped = gathered(points, faces, margin, texture_size)
     if len(heaped.points) == 1 and not len(around):
         placed, scale = _alone(points[0], (texture_size - margin) / texture_size)
     else:
@@ -173,14 +172,7 @@ def stack(islands: Sequence[np.ndarray]) -> Packing:
 
 def covered_area(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> float:
     """Share of the unit square that islands (n_i,2) without overlap cover."""
-    return float(_areas(islands, triangles).sum())
-
-
-def _areas(islands: Sequence[np.ndarray], triangles: Sequence[np.ndarray]) -> np.ndarray:
-    """Area (k,) of every island."""
-    points, index = side_by_side(islands, triangles)
-    owner = np.repeat(np.arange(len(islands)), list(map(len, triangles)))
-    return np.bincount(owner, np.abs(signed_areas(points, index)), len(islands))
+    return float(island_areas(islands, triangles).sum())
 
 
 def _spread(points: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
@@ -204,7 +196,7 @@ def _task(points, faces, margin: float, texture_size: int, around) -> _PackTask:
     staying = outlines_of([p * COARSE for p, _ in around], [t for _, t in around])
     return _PackTask(
         outlines=outlines_of(points, faces),
-        areas=_areas(points, faces),
+        areas=island_areas(points, faces),
         low=low,
         sizes=np.array([p.max(axis=0) for p in points]) - low,
         margin=margin,

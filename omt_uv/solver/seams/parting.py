@@ -190,8 +190,8 @@ def slits(
     size = np.bincount(piece, np.where(bad, graph.area, 0.0))
     order = np.argsort(-size, kind="stable")
     chosen = order[: min(int(np.searchsorted(np.cumsum(size[order]), least)) + 1, rounds * MOST_SLITS)]
-    n, ends = len(chart.vertices), graph.ends[free[graph.ends].all(axis=1)]
-    price = cost[ends].mean(axis=1) * edge_lengths(chart.vertices, ends) + 1e-300
+    open_ = free[graph.ends].all(axis=1)
+    n, ends, price = len(chart.vertices), graph.ends[open_], graph.prices(chart, cost)[open_] + 1e-300
     ways = csr_matrix((np.tile(price, 2), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n))
     known, image_here = pair_keys(*ends.T), _images_in(chart, image)
     start, found = np.unique(boundary_edges(chart.triangles)), []

@@ -24,7 +24,7 @@ def mixed(count, seed=0, size=1e-7):
 @pytest.mark.parametrize("seed", range(5))
 def test_every_island_comes_out_in_its_place_moved_alone(seed):
     points, triangles = mixed(1200, seed)
-    heaped = gathered(points, triangles, 100.0, 4, 1024)
+    heaped = gathered(points, triangles, 4, 1024)
     assert len(heaped.points) == 401 and heaped.crumb.sum() == 800
     found = heaped.apart(heaped.points)
     for before, after in zip(points, found, strict=True):
@@ -41,7 +41,7 @@ def test_every_island_comes_out_in_its_place_moved_alone(seed):
 @pytest.mark.parametrize("count, size, margin", [(1200, 1e-2, 4), (30, 1e-7, 4), (1200, 1e-7, 0)])
 def test_what_shows_or_whose_margins_take_little_stays_by_itself(count, size, margin):
     points, triangles = mixed(count, size=size)
-    heaped = gathered(points, triangles, 100.0, margin, 1024)
+    heaped = gathered(points, triangles, margin, 1024)
     assert not heaped.crumb.any() and heaped.points == points and heaped.triangles == triangles
     assert heaped.apart(points) == points
 
@@ -49,5 +49,5 @@ def test_what_shows_or_whose_margins_take_little_stays_by_itself(count, size, ma
 def test_crumbs_alone_are_islands_as_any_others():
     points, triangles = mixed(1200)
     small = [k for k in range(1200) if k % 3]
-    heaped = gathered([points[k] for k in small], [triangles[k] for k in small], 100.0, 4, 1024)
+    heaped = gathered([points[k] for k in small], [triangles[k] for k in small], 4, 1024)
     assert not heaped.crumb.any() and len(heaped.points) == 800
