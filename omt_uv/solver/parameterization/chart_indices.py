@@ -10,7 +10,8 @@ from ..analysis.density import Target
 from ..analysis.order_of_places import lowest_first, order_of_places
 from ..errors import MeshError
 from ..mesh.charts import Chart, triangle_rows
-from ..mesh.surface import Surface
+from ..mesh.surface import Surface, is_seam
+from ..mesh.topology import boundary_edges, pair_keys
 
 
 def chart_target(target: Target | None, surface: Surface, chart: Chart) -> Target | None:
@@ -103,3 +104,19 @@ def cut_as_given(chart: Chart, cut: Surface, given: Surface) -> Chart:
     at = known[np.searchsorted(chart.corners.ravel()[known], corners)]
     triangles[changed], every[changed] = chart.triangles.ravel()[at], corners
     return replace(chart, triangles=triangles, corners=every)
+
+
+def outline(chart: Chart) -> np.ndarray:
+    """Keys (e,) of the edges around a chart."""
+    return pair_keys(*chart.vertex_ids[boundary_edges(chart.triangles)].T)
+
+
+def within(chart: Chart) -> np.ndarray:
+    """Keys (e,) of the edges that a chart lies on both sides of, cut all the same."""
+    keys, count = np.unique(outline(chart), return_counts=True)
+    return keys[count > 1]
+
+
+def is_marked(surface: Surface, chart: Chart) -> bool:
+    """Whether seams of the surface bound a chart."""
+    return bool(is_seam(surface, outline(chart)).any())

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis.density import Target, area_error_warnings
 from ..canonical.markers import ChartMarkers
-from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, positive_density
+from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, plural, positive_density
 from ..maps.distortion import Distortion, distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
@@ -45,9 +45,12 @@ INITIAL = (0.0, 0.4)
 REFINEMENT = (0.4, 0.6)
 # Boundaries with four corners.
 RECTANGLES = ("square", "rectangle")
-# What is said, after their number, of faces of a map that is returned all the same.
+# Errors of charts that have no map in double precision.
+WITHOUT_MAP = (FoldedUVError, PrecisionError, TransportError)
+ANOTHER_SEAM = "Cut this part further, with automatic seams or another one along it"
 # Share of its area below which a face is nothing in single precision: a disk, a square or a rectangle has no room then.
 NO_ROOM = 1e-7
+# What is said, after their number, of faces of a map that is returned all the same.
 FOLDED = "faces are folded or without area in the map"
 
 
@@ -65,6 +68,7 @@ class ChartMap:
     newton_refinement, residual_refinement, status, area_weight : see `refine.Refinement`
     area_l1, area_sd, angle_mean, folds : see `distortion.Distortion`
     warnings : what was replaced and why; seconds : wall-clock time per stage
+    failure : why there is no map, where the chart is to be cut instead; its uv are all 0 then
     """
 
     uv: np.ndarray
@@ -83,10 +87,11 @@ class ChartMap:
     seconds: dict[str, float]
     pinned: bool = False
     area_weight: float = 0.0
+    failure: MeshError | None = None
 
     def report(self, chart: Chart) -> dict:
         """Everything but the coordinates, for a JSON file."""
-        figures = {k: v for k, v in vars(self).items() if k not in ("uv", "area_weight")}
+        figures = {k: v for k, v in vars(self).items() if k not in ("uv", "area_weight", "failure")}
         size = {"vertices": len(chart.vertices), "faces": len(np.unique(chart.faces))}
         counts = {**size, "triangles": len(chart.triangles)}
         return {**counts, **figures, "warnings": list(self.warnings), "weight": self.area_weight}
@@ -204,6 +209,37 @@ def _chart_map(
         pinned=pinned,
         area_weight=refined.area_weight,
     )
+
+
+def no_map(chart: Chart, failure: MeshError) -> ChartMap:
+    """What stands for the map of a chart that has none in double precision, until it is cut further."""
+    return ChartMap(
+        uv=np.zeros((len(chart.vertices), 2)),
+        newton_conformal=None,
+        residual_conformal=None,
+        newton_transport=None,
+        residual_transport=None,
+        newton_refinement=0,
+        residual_refinement=0.0,
+        status="failed",
+        area_l1=np.inf,
+        area_sd=np.inf,
+        angle_mean=np.inf,
+        folds=len(np.unique(chart.faces)),
+        warnings=(),
+        seconds={},
+        failure=failure,
+    )
+
+
+def cut_for_a_map(first: list[ChartMap], maps: list[ChartMap]) -> list[str]:
+    """What is to be said of charts that had no map at first; their error where that is so at last, too."""
+    failure = next((one.failure for one in maps if one.failure is not None), None)
+    if failure is not None:
+        raise failure
+    count = sum(one.failure is not None for one in first)
+    who = plural(count, "An island along its seams has", "{} islands along their seams have")
+    return [f"{who} no map in double precision; cut further"] if count else []
 
 
 def _stages(uv: np.ndarray, conformal, cells, figures: Distortion, log: RunLog, warnings: tuple[str, ...]) -> ChartMap:
@@ -336,7 +372,7 @@ def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: 
         cause = "faces stay squeezed to nothing"
     except (FoldedUVError, PrecisionError) as error:
         if domain == "free":
-            raise
+            raise type(error)(error.cause, ANOTHER_SEAM, error.kind, error.elements) from error
         cause = error.cause
     log.warnings.append(f"The {domain} has no room for this chart ({cause}); its boundary is free instead")
     uv = mean_value_sites(disk.vertices, disk.triangles, disk.loop, None, Disk())

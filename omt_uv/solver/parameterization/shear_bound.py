@@ -18,10 +18,11 @@ from ..maps.distortion import RATIO_FLOOR, face_distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
 from ..mesh.polygon_areas import polygon_areas
-from ..mesh.surface import Surface, is_seam
-from ..mesh.topology import boundary_edges, pair_keys
+from ..mesh.surface import Surface
+from ..mesh.topology import pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import SPREAD_BY_SHEAR
+from .chart_indices import is_marked, within
 from .chart_map import ChartMap
 from .options import ShearBound
 
@@ -66,6 +67,8 @@ LEAST_AREA = 1e-4
 NO_EXCESS = 0.005
 # Shear of what has no area to speak of.
 VANISHED = 50.0
+# What has no map is asked for this share of what cuts have left.
+UNKNOWN = 0.5
 # Mean shear above 1, and area error, of maps that have no shear to speak of: what is unrolled.
 UNROLLED = 1e-4
 # Where the time goes, roughly: seams take this share of every round.
@@ -277,7 +280,9 @@ class _Round:
         steep = np.array([area[local > STEEP].sum() / area.sum() for local, area in shear])
         pressing = np.array([_pressing(*pair, bound) for pair in zip(mean, steep, strict=True)])
         missed = np.flatnonzero(pressing > bound)
-        searched = [int(k) for k in missed if search.shear.further or not is_marked(search.surface, charts[k])]
+        # What has no map at all is cut further without being asked: otherwise there would be nothing to look at.
+        asked = [search.shear.further or one.failure is not None for one in maps]
+        searched = [int(k) for k in missed if asked[k] or not is_marked(search.surface, charts[k])]
         return _Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched)
 
     @property
@@ -321,6 +326,10 @@ def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float
     share, promised = np.ones(len(promised)), promised.copy()
     for k in missed:
         faces, reached = last.charts[k].faces, np.log(last.pressing[k]) ** 2
+        if last.maps[k].failure is not None:
+            # How far it is from a map nobody knows.
+            share[faces] = UNKNOWN
+            continue
         # What the last search has promised and its map has not kept is asked for on top.
         kept_part = min(float(promised[faces].min()) / reached, 1.0)
         share[faces] = margin * kept_part * np.log(last.bound) ** 2 / reached
@@ -343,6 +352,8 @@ def _apart(
     from ..seams.parting import flat_sides, parted  # Hardly any chart misses its bound.
 
     for k in last.searched:
+        if last.maps[k].failure is not None:
+            continue
         chart, mean = last.charts[k], last.mean[k]
         edges = flat_sides(chart) if mean > last.bound else np.zeros((0, 2), np.int64)
         if len(edges):
@@ -389,8 +400,8 @@ def _cuts(prepared: DiskCharts) -> Cuts:
 
 def _around(last: _Round, cut_anew: tuple[int, ...]) -> np.ndarray:
     """Edges (k,2) that were cut, but those within charts that are cut anew."""
-    within = np.concatenate([np.zeros(0, np.int64), *(_within(last.charts[k]) for k in cut_anew)])
-    return last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), within)]
+    inner = np.concatenate([np.zeros(0, np.int64), *(within(last.charts[k]) for k in cut_anew)])
+    return last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), inner)]
 
 
 def _as_a_set(edges: np.ndarray) -> bytes:
@@ -401,22 +412,6 @@ def _as_a_set(edges: np.ndarray) -> bytes:
 def _joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
     """The same cuts, but along the edges (e,2)."""
     return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
-
-
-def outline(chart: Chart) -> np.ndarray:
-    """Keys (e,) of the edges around a chart."""
-    return pair_keys(*chart.vertex_ids[boundary_edges(chart.triangles)].T)
-
-
-def _within(chart: Chart) -> np.ndarray:
-    """Keys (e,) of the edges that a chart lies on both sides of, cut all the same."""
-    keys, count = np.unique(outline(chart), return_counts=True)
-    return keys[count > 1]
-
-
-def is_marked(surface: Surface, chart: Chart) -> bool:
-    """Whether seams of the surface bound a chart."""
-    return bool(is_seam(surface, outline(chart)).any())
 
 
 def _mapped(charts, old_charts, old_maps, map_charts) -> Steps[list[ChartMap]]:
@@ -438,6 +433,8 @@ def _shear(chart: Chart, chart_map: ChartMap, kept: bool) -> tuple[np.ndarray, n
     kept : areas are to be kept; then it is the shear that has the symmetric Dirichlet energy of their polygons
     """
     area = polygon_areas(chart.vertices, chart.triangles, chart.faces)
+    if chart_map.failure is not None:
+        return np.full(len(area), VANISHED), area
     if not chart_map.folds and max(chart_map.angle_mean - 1, chart_map.area_l1) <= UNROLLED:
         return np.ones(len(area)), area
     octaves, shear = face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles], chart.faces)

@@ -25,8 +25,8 @@ from ..mesh.topology import on_boundary, pair_keys
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import PROMISED, QUALITIES
 from ..refinement.initial_maps import NEARLY_FLAT, inner_curvature
-from .chart_indices import chart_target, cut_as_given, in_order_of_places, located
-from .chart_map import ChartMap, map_chart, measured_map, refined_again
+from .chart_indices import chart_target, cut_as_given, in_order_of_places, is_marked, located, outline
+from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, map_chart, measured_map, no_map, refined_again
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons, with_figures, with_folds_counted
 from .mirrored_charts import (
@@ -38,7 +38,7 @@ from .mirrored_charts import (
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
-from .shear_bound import ShearSearch, bound_shear, is_marked, outline
+from .shear_bound import ShearSearch, bound_shear
 from .small_charts import is_small, map_together
 
 # Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps.
@@ -135,15 +135,17 @@ def unwrap(
         begin = CUTTING
         cutting = cut_charts(surface, faces, options=options, pins=pins, target=target, avoid=avoid)
         cut = yield from part_of(cutting, 0.0, begin)
-    task = _Task(cut.surface, options, pins, target, markers)
+    # A draft leaves shear that Standard takes away: it shows the seams that are predicted, and no others.
+    search = None if options.quality == "draft" else cut.search
+    task = _Task(cut.surface, options, pins, target, markers, cut_anew=search is not None)
     prepared, width = cut.prepared, (1 - begin) * (1 if cut.search is None else MAPPING)
     maps = yield from part_of(task.map_symmetric(cut), begin, width)
-    # A draft leaves shear that Standard takes away: it shows the seams that are predicted, and no others.
-    if cut.search is not None and task.options.quality != "draft":
+    if search is not None:
         crossing = task.crossing if pins is None and task.options.boundary == "free" else None
-        further = bound_shear(cut.search, prepared, maps, task.map_charts, crossing)
+        further = bound_shear(search, prepared, maps, task.map_charts, crossing)
         found = yield from part_of(further, begin + width, 1 - begin - width)
-        prepared, maps = replace(found.prepared, warnings=(*prepared.warnings, *found.warnings)), found.maps
+        warnings = (*prepared.warnings, *cut_for_a_map(maps, found.maps), *found.warnings)
+        prepared, maps = replace(found.prepared, warnings=warnings), found.maps
     charts, maps = yield from task.finished(prepared.charts, maps, surface)
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, prepared.charts, maps, surface)
@@ -331,13 +333,14 @@ def map_small_charts(several: Sequence[CutCharts], options: UnwrapOptions) -> St
 
 @dataclass(frozen=True)
 class _Task:
-    """What all charts of a surface have in common."""
+    """What all charts of a surface have in common; cut_anew : those without a map will be cut further."""
 
     surface: Surface
     options: UnwrapOptions
     pins: CornerPins | None
     target: Target | None
     markers: MapMarkers | None = None
+    cut_anew: bool = False
 
     def map_one(self, chart: Chart) -> Steps[ChartMap]:
         """The map of one chart; errors have the element indices of the surface."""
@@ -348,7 +351,10 @@ class _Task:
             given: dict[str, Any] = {"options": self.options, "target": target, "pins": pins, "markers": marked}
             return (yield from map_chart(chart, **given))
         except MeshError as error:
-            raise located(error, chart) from error
+            failure = located(error, chart)
+            if self.cut_anew and pins is None and isinstance(error, WITHOUT_MAP):
+                return no_map(chart, failure)
+            raise failure from error
 
     def map_charts(self, charts: list[Chart]) -> Steps[list[ChartMap]]:
         """Maps of charts by themselves."""
@@ -381,7 +387,8 @@ class _Task:
         goal = QUALITIES[self.options.quality].area_error if self.options.balance == 0 else np.inf
         for k in changed:
             target = chart_target(self.target, self.surface, charts[k])
-            found = as_given(charts[k], maps[k], None if target is None else target.density, goal)
+            density, missing = None if target is None else target.density, maps[k].failure is not None
+            found = None if missing else as_given(charts[k], maps[k], density, goal)
             if found is None:
                 targets = [chart_target(self.target, self.surface, chart) for chart in charts]
                 pairs = mirror_partners(charts, targets)

@@ -8,13 +8,14 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS
+from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, FoldedUVError
 from omt_uv.solver.maps.distortion import face_distortion
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import shear_bound
+from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.options import ShearBound, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -112,6 +113,41 @@ def first_edges_from_boundary(F):
     return np.array([[loop[0], inner[0]]])
 
 
+def test_a_hose_with_a_marked_cap_is_cut_along_where_it_has_no_map_otherwise():
+    V, F = meshes.annulus(sectors=12, rings=200)
+    radius = np.hypot(V[:, 0], V[:, 1])
+    height = 600 * (radius - radius.min()) / np.ptp(radius)
+    V = np.column_stack([V[:, :2] / radius[:, None], height])
+    low, high = (ends[np.argsort(np.arctan2(*V[ends, 1::-1].T))] for ends in map(np.flatnonzero, at_ends(height)))
+    caps = [[[low[0], low[k + 1], low[k]], [high[0], high[k], high[k + 1]]] for k in range(1, 11)]
+    surface = triangle_surface(V, np.concatenate([F[:, ::-1], *caps]), np.column_stack([low, np.roll(low, -1)]))
+    with pytest.raises(FoldedUVError, match="another one along it"):
+        unwrapped(surface, 0.0)
+    result = unwrapped(surface, 1.35)
+    assert max(mean_shear(result)) <= 1.35
+    assert sum(m.folds for m in result.maps) == 0
+    assert len(result.charts) == 2
+    assert any("no map in double precision; cut further" in text for text in result.warnings)
+
+
+def test_what_has_no_map_with_any_seams_says_why(monkeypatch):
+    V, F = meshes.cap(rings=6, sectors=12)
+    wrong = FoldedUVError("Nothing helps", kind="face", elements=np.arange(2))
+    monkeypatch.setattr(unwrap_module, "map_chart", lambda *args, **options: failing(wrong))
+    with pytest.raises(FoldedUVError, match="Nothing helps"):
+        unwrapped(triangle_surface(V, F), 1.35)
+
+
+def at_ends(height):
+    """Whether vertices are at the lower end of what stands upright, and at the upper."""
+    return height < 1e-6, height > height.max() - 1e-6
+
+
+def failing(error):
+    raise error
+    yield
+
+
 def test_what_misses_the_bound_says_so(monkeypatch):
     V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
     # A search that is content with anything, and no other.
@@ -200,7 +236,7 @@ def test_a_folded_corner_is_not_what_its_polygon_shears():
     middle = uv[ear].mean(axis=0)
     uv[ear] = middle + (uv[ear] - middle) @ np.diag([1, -1e-3])
     assert (signed_areas(uv, chart.triangles) <= 0).any()
-    local, area = shear_bound._shear(chart, SimpleNamespace(uv=uv, folds=1), True)
+    local, area = shear_bound._shear(chart, SimpleNamespace(uv=uv, folds=1, failure=None), True)
     assert area @ local / area.sum() < 1.5
 
 
