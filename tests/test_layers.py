@@ -51,7 +51,7 @@ ARROWS: dict[str, str] = {
     "solver.registration": "solver solver.mesh solver.linalg solver.analysis solver.maps solver.refinement "
     "solver.parameterization solver.sphere",
     "solver.registration.charts": "solver solver.mesh solver.linalg solver.registration",
-    "solver.remeshing.components": "solver solver.mesh",
+    "solver.remeshing.components": "solver solver.mesh solver.analysis",
     "solver.remeshing.edits": "solver solver.mesh solver.remeshing.components",
     "solver.remeshing.relaxation": "solver solver.mesh solver.linalg solver.remeshing.edits",
     "solver.remeshing.fitting": "solver solver.mesh solver.linalg solver.remeshing.edits solver.remeshing.relaxation",

@@ -41,24 +41,44 @@ def order_of_places(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return order
 
 
+def own_axes(points: np.ndarray) -> np.ndarray | None:
+    """The principal axes of points (n,3), the columns of a rotation (3,3); None where these are not told apart.
+
+    They turn with the points: of two axes the sign is that of the third moments, the last one is across them.
+    """
+    centred = _centred(points)
+    return None if centred is None else _axes(centred)
+
+
 def _in_own_frame(points: np.ndarray) -> np.ndarray:
     """Points (n,3) along their principal axes, as they are where these are not told apart: a pose plays no part."""
+    centred = _centred(points)
+    axes = None if centred is None else _axes(centred)
+    return points if centred is None or axes is None else centred @ axes
+
+
+def _centred(points: np.ndarray) -> np.ndarray | None:
+    """Points (n,3) about their mean, in units of their extent; None where they are in one place."""
     extent = float(np.ptp(points / 2, axis=0).max())
     if not extent > 0:
-        return points
+        return None
     # By a power of two, which rounds nothing: sums of huge coordinates are infinite.
     power = np.frexp(extent)[1]
     p = np.ldexp(points, -power)
-    p = (p - p.mean(axis=0)) / (2 * np.ldexp(extent, -power))
+    return np.asarray((p - p.mean(axis=0)) / (2 * np.ldexp(extent, -power)))
+
+
+def _axes(p: np.ndarray) -> np.ndarray | None:
+    """`own_axes` of centred points (n,3)."""
     values, axes = np.linalg.eigh(p.T @ p / len(p))
     skew = ((p @ axes) ** 3).mean(axis=0)
     if np.diff(values).min() < DISTINCT * values[-1] or np.sort(np.abs(skew))[1] < DISTINCT * values[-1] ** 1.5:
-        return points
+        return None
     axes = axes * np.where(skew < 0, -1, 1)
     # The least lopsided one is across the others: a mirror image of the points is no pose of them.
     k = int(np.abs(skew).argmin())
     axes[:, k] = np.cross(axes[:, (k + 1) % 3], axes[:, (k + 2) % 3])
-    return p @ axes
+    return np.asarray(axes)
 
 
 def _spread(x: np.ndarray) -> np.ndarray:

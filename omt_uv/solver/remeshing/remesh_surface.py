@@ -15,7 +15,7 @@ import numpy as np
 from ..analysis.density import graded_density
 from ..errors import CountError, positive_density
 from ..progress import Progress, Steps, part_of
-from .components.components import Component, Components
+from .components.components import Component
 from .edits.vertex_count import apportion, min_face_count, min_vertex_count
 from .initial.component_maps import ComponentMaps, RemeshSource
 from .initial.options import RemeshOptions
@@ -29,6 +29,8 @@ BATCH_BELOW = 500
 # Mean step of a relaxation that has settled, in edge lengths.
 CONVERGED = 0.01
 DEFAULTS = RemeshOptions()
+# Names of where points lie on a surface.
+WHERE = ("faces", "barycentric")
 
 
 @dataclass(frozen=True)
@@ -69,10 +71,16 @@ def remesh(
     """
     yield Progress("Parts", 0.0)
     level = _checked_density(density, len(source.triangles))
-    found = source.components
+    with source.frame.named():
+        return (yield from _in_frame(source, count, options, source.frame.density(level)))
+
+
+def _in_frame(source: RemeshSource, count: int, options: RemeshOptions, level: np.ndarray) -> Steps[Remesh]:
+    """`remesh` with a density (m,) of the triangles in the surface's own frame; errors name these."""
+    frame, found = source.frame, source.components
     if options.grading > 0 and np.ptp(level) > 0:
         samples = count if options.counts_vertices else max(count // 2, 1)
-        level = graded_density(level, source.vertices, source.triangles, options.grading, samples)
+        level = graded_density(level, frame.vertices, frame.triangles, options.grading, samples)
     warnings = list(found.warnings)
     if count > MAX_REFINEMENT * len(source.vertices if options.counts_vertices else source.triangles):
         warnings.append(
@@ -84,7 +92,7 @@ def remesh(
     made = sum(len(r.triangles) for r in results)
     if not options.counts_vertices and made != count:
         warnings.append(f"Closed surfaces have an even number of triangles: {made} instead of {count}")
-    return _joined(results, found, warnings, options.rounds)
+    return _joined(results, source, warnings, options.rounds)
 
 
 def _checked_density(density: np.ndarray | None, m: int) -> np.ndarray:
@@ -165,14 +173,17 @@ def summed_up(texts: list[str]) -> list[str]:
     return [text if (k := texts.count(text)) == 1 else f"{text} ({k} times)" for text in dict.fromkeys(texts)]
 
 
-def _joined(results: list[RemeshedComponent], found: Components, warnings: list[str], rounds: int) -> Remesh:
+def _joined(results: list[RemeshedComponent], source: RemeshSource, warnings: list[str], rounds: int) -> Remesh:
+    frame, found = source.frame, source.components
     first = np.cumsum([0] + [len(r.points) for r in results])
     residual = max((r.residual for r in results), default=0.0)
+    points = np.concatenate([r.points for r in results]) * found.size + found.centre
+    faces, barycentric = frame.on_given(*(np.concatenate([getattr(r, x) for r in results]) for x in WHERE))
     return Remesh(
-        vertices=np.concatenate([r.points for r in results]) * found.size + found.centre,
+        vertices=frame.places(points),
         triangles=np.concatenate([r.triangles + k for r, k in zip(results, first[:-1], strict=True)]),
-        faces=np.concatenate([r.faces for r in results]),
-        barycentric=np.concatenate([r.barycentric for r in results]),
+        faces=faces,
+        barycentric=barycentric,
         iterations=rounds,
         residual=residual,
         status="converged" if residual < CONVERGED else "rounds",

@@ -101,3 +101,44 @@ def test_figures_are_those_of_the_same_mesh_told_otherwise(way):
     for name, value in vars(before).items():
         if isinstance(value, (int, float)):
             assert getattr(after, name) == pytest.approx(value, rel=1e-9), name
+
+
+def two_bodies():
+    """A body, a smaller one beside it, and a patch: components apart, as a batch, and with a boundary."""
+    (V, F), (W, G) = body(), patch()
+    quads = G + 2 * len(V)
+    parts = [V, 0.3 * V[:, [2, 0, 1]] + [3.0, 0.2, 0.1], W + [0.1, 3.0, 0.4]]
+    return np.vstack(parts), np.vstack([F, F + len(V), quads[:, :3], quads[:, [0, 2, 3]]])
+
+
+REMESHES = {
+    "body": (body, lambda V, F: {}),
+    "patch": (lambda: (patch()[0], np.vstack([patch()[1][:, :3], patch()[1][:, [0, 2, 3]]])), lambda V, F: {}),
+    "parts": (two_bodies, lambda V, F: {}),
+    "density": (body, lambda V, F: {"density": ramp(V, F, 1, 4), "grading": 0.5}),
+    "faces": (two_bodies, lambda V, F: {"count_of": "faces"}),
+    "app-cfp": (body, lambda V, F: {"strategy": "app-cfp", "rounds": 0, "fit": False}),
+}
+
+
+@functools.cache
+def remeshed(name):
+    """What comes of a mesh as it is, and how it is told."""
+    mesh, options = REMESHES[name]
+    V, F = mesh()
+    return V, F, omt.remesh(V, F, 150, **options(V, F))
+
+
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+@pytest.mark.parametrize("name", REMESHES)
+def test_remeshes_are_those_of_the_same_mesh_told_otherwise(name, way):
+    """Vertex for vertex: the way a mesh is told decides about nothing, not even where two edges are as long."""
+    V, F, before = remeshed(name)
+    told = way(V, F)
+    after = omt.remesh(told.vertices, told.faces, 150, **REMESHES[name][1](told.vertices, told.faces))
+    assert np.array_equal(after.triangles, before.triangles) and after.warnings == before.warnings
+    assert np.array_equal(np.arange(len(F))[told.order][after.faces], before.faces)
+    bary = np.roll(after.barycentric, -told.rolled, axis=1)
+    np.testing.assert_allclose(bary, before.barycentric, atol=1e-6)
+    expected = lengths(before.vertices[None])
+    assert np.abs(lengths(after.vertices[None]) / told.size - expected).max() <= 1e-9 * expected.max()

@@ -14,13 +14,13 @@ from omt_uv.solver.remeshing.remesh_component import remesh_component
 @pytest.mark.parametrize("count", [60, 200])
 def test_the_vertices_are_counted_and_lie_where_they_say(count):
     V, F = meshes.bumpy(10, 10)
-    (maps,) = RemeshSource(V, F).maps
+    source = RemeshSource(V, F)
+    (maps,) = source.maps
     found = drain(remesh_component(maps, count, np.ones(len(maps.component.triangles)), RemeshOptions()))
     assert len(found.points) == count
     np.testing.assert_allclose(found.barycentric.sum(axis=1), 1, atol=1e-9)
-    # In the common unit box, up to its centre.
-    on = np.einsum("kc,kcd->kd", found.barycentric, V[F[found.faces]])
-    scale = np.ptp(found.points, axis=0).max() / np.ptp(on, axis=0).max()
-    on = scale * (on - on.mean(axis=0)) + found.points.mean(axis=0)
+    # In the common unit box of the surface's own frame.
+    corners = source.frame.vertices[source.frame.triangles[found.faces]]
+    on = (np.einsum("kc,kcd->kd", found.barycentric, corners) - source.components.centre) / source.components.size
     edge = np.linalg.norm(found.points[found.triangles[:, 0]] - found.points[found.triangles[:, 1]], axis=1).mean()
     assert np.linalg.norm(on - found.points, axis=1).max() < 0.2 * edge

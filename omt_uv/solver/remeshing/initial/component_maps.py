@@ -15,6 +15,7 @@ from ...progress import Steps, part_of
 from ...sphere.conformal import ConformalSphere, conformal_sphere
 from ..components.component_batch import batched
 from ..components.components import Component, Components, split_components
+from ..components.own_frame import OwnFrame, in_own_frame
 from ..edits.long_edges import refine_for_maps
 from .disk_images import DiskImage, conformal_image, preserving_image
 from .sphere_samples import sphere_image
@@ -106,7 +107,7 @@ class RemeshSource:
     """A surface to be remeshed once or several times: vertices (n,3), triangles (m,3), and features (e,2), pairs of
     vertices whose edges are to be lines of the new mesh.
 
-    Its components and their maps are made when they are first asked for, and kept.
+    Its frame, its components and their maps are made when they are first asked for, and kept.
     """
 
     def __init__(self, vertices: np.ndarray, triangles: np.ndarray, features: np.ndarray | None = None):
@@ -117,9 +118,14 @@ class RemeshSource:
         self._batches: dict[bytes, ComponentMaps] = {}
 
     @cached_property
+    def frame(self) -> OwnFrame:
+        """The surface in its own frame."""
+        return in_own_frame(self.vertices, self.triangles, self.features)
+
+    @cached_property
     def components(self) -> Components:
-        """What the surface consists of; for errors see `components.split_components`."""
-        return split_components(self.vertices, self.triangles, self.features)
+        """What the surface consists of, in its own frame; for errors see `components.split_components`."""
+        return split_components(self.frame.vertices, self.frame.triangles, self.frame.features)
 
     @cached_property
     def maps(self) -> list[ComponentMaps]:
