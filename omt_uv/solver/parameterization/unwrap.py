@@ -47,7 +47,7 @@ MAPPING = 0.7
 
 # Charts that are no longer than a square of the whole area by so many times stay in one piece, and of bodies with limbs
 # those that are not that share of the whole.
-COMPACT = 1.8
+COMPACT = 1.4
 MOSTLY = 0.5
 
 # Charts and their maps.
@@ -187,10 +187,11 @@ def _pieces(
 
     cost, uv, axes = search.costs().vertex_cost[chart.vertex_ids], chart_map.uv, search.shear.preferences.axes
     up = (axes or SceneAxes()).up
-    count = pieces_of_band(uv, np.sqrt(whole))
+    share = face_areas(chart.vertices, chart.triangles).sum() / whole
+    count = pieces_of_band(uv, np.sqrt(whole), share)
     if count > 1:
         piece, between = in_pieces(chart, uv, cost, count)
-    elif face_areas(chart.vertices, chart.triangles).sum() > MOSTLY * whole and sprawls(chart, uv, up):
+    elif share > MOSTLY and sprawls(chart, uv, up):
         piece, between = without_limbs(chart, uv, cost, up, search.images)
     else:
         return [(chart, chart_map)], np.zeros((0, 2), np.int64)

@@ -41,8 +41,11 @@ LEAST_OUTLINE = 6
 LEAST_SIDE = 0.05
 MOSTLY = 0.4
 # A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
-# length or whatever it is, is a band, cut across in so many times as long pieces, at most so many.
+# length or whatever it is, is a band, cut across in so many times as long pieces, at most so many. A narrow one with
+# less than this share of the area is one earlier: all others would be small for its sake.
 LONG_AND_NARROW = 1.8
+LONG_AND_SMALL = 1.4
+SMALL = 0.4
 NARROW = 1 / 3
 LONG = 3.0
 PIECE = 1.2
@@ -210,12 +213,13 @@ def slits(
     return chart.vertex_ids[np.concatenate(found)] if found else np.zeros((0, 2), np.int64)
 
 
-def pieces_of_band(uv: np.ndarray, side: float) -> int:
-    """In how many pieces a chart with map uv (n,2) is to be cut across, next to a square with such a side: 1 where it
-    is no band."""
+def pieces_of_band(uv: np.ndarray, side: float, share: float = 1.0) -> int:
+    """In how many pieces a chart with map uv (n,2) is to be cut across, next to a square with such a side, of which it
+    fills a share: 1 where it is no band."""
     centred = uv - uv.mean(axis=0)
     width, length = np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
-    longest = (LONG_AND_NARROW if width <= NARROW * length else LONG) * side
+    narrow = LONG_AND_SMALL if share < SMALL else LONG_AND_NARROW
+    longest = (narrow if width <= NARROW * length else LONG) * side
     return min(int(np.ceil(length / (PIECE * side))), MOST_PIECES) if length > longest else 1
 
 

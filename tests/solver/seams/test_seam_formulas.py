@@ -135,11 +135,13 @@ def test_capacities_are_prices_in_whole_numbers():
 def test_bands_are_told_by_how_long_they_are(turn):
     rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
 
-    def pieces(length, width):
+    def pieces(length, width, share=0.4):
         x, y = np.meshgrid(np.linspace(0, length, 41), np.linspace(0, width, 11))
-        return parting.pieces_of_band(np.column_stack([x.ravel(), y.ravel()]) @ rotation + 3, 1.0)
+        return parting.pieces_of_band(np.column_stack([x.ravel(), y.ravel()]) @ rotation + 3, 1.0, share)
 
     assert pieces(1.79, 0.3) == 1 and pieces(1.81, 0.3) == 2
+    # What is little of the surface is not to make the rest small.
+    assert pieces(1.39, 0.3, 0.39) == 1 and pieces(1.41, 0.3, 0.39) == 2
     assert pieces(2.4001, 0.3) == 3 and pieces(2.399, 0.3) == 2
     # What is wider than a third of its length has to be longer.
     assert pieces(2.9, 1.2) == 1 and pieces(3.01, 1.2) == 3
