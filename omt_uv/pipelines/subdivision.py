@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +30,7 @@ from ..solver.subdivision.catmull_clark import (
     straight_corners,
     subdivide,
 )
+from ..solver.subdivision.quad_areas import HALVES, half_areas, quad_areas
 from .reading import Reading, SubdivisionModifier
 
 # Quads of the subdivided surface at most: fewer levels stand for all where there are more.
@@ -45,6 +47,12 @@ GOAL = 0.01
 WORTHWHILE = 0.75
 # Area error on the subdivided surface that is worth a warning.
 INEXACT = 0.02
+# Where its triangles miss that by no more than the first factor, weights grow by the second, then as that says is
+# needed to reach AIM of it, up to the third in all: what is out of reach, or dear, stays as it is.
+CLOSE = 1.2
+NUDGE = 1.5
+MOST_NUDGE = 4.0
+AIM = 0.995
 COARSE = (
     "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface; {}"
 )
@@ -52,8 +60,6 @@ COARSE = (
 AREA_WARNING = "Areas are"
 # Corners of one vertex closer than this have one UV, as for Blender.
 SAME_UV = 1e-4
-# Triangles of a quad.
-HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 SMOOTH_UV = "SMOOTH_ALL"
 LINEAR_UV = "NONE"
 STRAIGHT_UV = "PRESERVE_BOUNDARIES"
@@ -69,7 +75,7 @@ class SubdividedSurface:
 
     def polygon_areas(self, count: int) -> np.ndarray:
         """Areas (f,) of the polygons of the cage on the subdivided surface."""
-        return np.bincount(self.subdivision.polygon, _quad_areas(self.corners), count)
+        return np.bincount(self.subdivision.polygon, quad_areas(self.corners), count)
 
 
 def evaluated(reading: Reading) -> Reading:
@@ -107,7 +113,7 @@ def polygon_uv_areas(surface: Surface, uv: np.ndarray, modifier: SubdivisionModi
     """Areas (f,) of the polygons of a cage in the UVs that the modifier makes of its own, (c,2)."""
     fine = subdivided_surface(surface, modifier, MOST_QUADS)
     quads = _quad_uvs(surface, uv, modifier, fine.levels)
-    areas = _quad_areas(np.pad(quads, ((0, 0), (0, 0), (0, 1))))
+    areas = quad_areas(np.pad(quads, ((0, 0), (0, 0), (0, 1))))
     return np.bincount(fine.subdivision.polygon, areas, len(surface.face_start) - 1)
 
 
@@ -139,7 +145,9 @@ def subdivided_uv(
     ids (n,): vertices of the surface that the UVs' are at. Creases count as they do for the surface.
     """
     ends, sharpness = _creases(vertex, face_start, ids, modifier)
-    cage = Cage(vertex, face_start, len(ids), ends, sharpness, _corner_sharpness(ids, modifier))
+    given = modifier.corner_sharpness
+    corners = np.zeros(len(ids)) if given is None else np.where(ids >= 0, given[ids], 0.0)
+    cage = Cage(vertex, face_start, len(ids), ends, sharpness, corners)
     smooth = modifier.uv_smooth
     if modifier.simple or smooth == LINEAR_UV:
         return bilinear(cage, levels)
@@ -200,11 +208,13 @@ def refined_on_subdivision(
     pins: CornerPins | None,
     boundary: str,
     density: np.ndarray | None = None,
+    areas_first: bool = False,
 ) -> Steps[SurfaceMap]:
     """The maps of the charts of a cage refined for the areas of the subdivided surface, with its figures.
 
     Pinned vertices stay, and so do the outlines of disks and squares. density (m,): of the cage's triangles, which
-    multiplies the area on the subdivided surface that their polygons ask for
+    multiplies the area on the subdivided surface that their polygons ask for; areas_first: whether a little shear is
+    paid where that brings its triangles to INEXACT
     """
     if not refinable(surface):
         return found
@@ -220,7 +230,7 @@ def refined_on_subdivision(
     found = part.resized(found, fixed)
     uv = np.concatenate([m.uv for m in found.maps])
     asked = max(m.area_weight for m in found.maps)
-    refined = yield from _refined_in_stages(part, found, uv, fixed, asked)
+    refined = yield from _refined_in_stages(part, found, uv, fixed, asked, areas_first)
     maps, fine_uv = [], part.mapping.matrix @ refined
     for k, old in enumerate(found.maps):
         mine = part.chart == k
@@ -232,22 +242,49 @@ def refined_on_subdivision(
 
 
 def _refined_in_stages(
-    part: _MappedQuads, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray, asked: float
+    part: _MappedQuads, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray, asked: float, areas_first: bool
 ) -> Steps[np.ndarray]:
     """UVs (n,2) of all charts refined with growing weights of the area, as far as these are asked for and of use."""
     elements, weight = part.elements(found, uv, fixed), min(AREA_WEIGHT, asked)
     uv, symmetry = part.symmetry(found, uv, fixed)
     outlines = [boundary_loops(c.disk)[0] + k for c, k in zip(found.charts, part.first, strict=False)]
+
+    def stage(start: np.ndarray, weight: float) -> Steps[np.ndarray]:
+        steps = refine_cage(elements, part.mapping.matrix, start, fixed, weight, symmetry, outlines)
+        return (yield from steps).uv
+
     refined, error = uv, np.inf
     while True:
-        steps = refine_cage(elements, part.mapping.matrix, refined, fixed, weight, symmetry, outlines)
-        new = (yield from steps).uv
+        new = yield from stage(refined, weight)
         before, error = error, part.area_error(new)
         if error > WORTHWHILE * before:
-            return refined
+            break
         refined, weight = new, weight * GROWTH
         if error <= GOAL or weight > min(MOST_WEIGHT, asked) or part.inner_error(new) > WORTHWHILE * error:
+            break
+    return (yield from _nudged(part, refined, weight / GROWTH, stage)) if areas_first else refined
+
+
+def _nudged(
+    part: _MappedQuads, refined: np.ndarray, weight: float, stage: Callable[[np.ndarray, float], Steps[np.ndarray]]
+) -> Steps[np.ndarray]:
+    """UVs (n,2) whose triangles miss their areas by INEXACT at most, where those of an area weight nearly do and a
+    few times as much weight gets there; as they are elsewhere. stage: refines UVs with a weight."""
+    new, error, factor, most = refined, part.triangle_error(refined), NUDGE, MOST_NUDGE * weight
+    if not INEXACT < error <= CLOSE * INEXACT:
+        return refined
+    while factor * weight <= most:
+        weight *= factor
+        new = yield from stage(new, weight)
+        before, error = error, part.triangle_error(new)
+        if error <= INEXACT:
+            return new
+        if error >= before:
             return refined
+        # Errors fall about evenly with the logarithm of the weight.
+        needed = (error - AIM * INEXACT) / (before - error) * np.log(factor)
+        factor = float(np.exp(min(needed, MOST_NUDGE)))
+    return refined
 
 
 @dataclass(frozen=True)
@@ -266,7 +303,7 @@ class _MappedQuads:
     @property
     def areas(self) -> np.ndarray:
         """Areas (q,) that the quads ask for."""
-        return _quad_areas(self.corners) * self.density
+        return quad_areas(self.corners) * self.density
 
     def resized(self, found: SurfaceMap, fixed: np.ndarray) -> SurfaceMap:
         """The maps with the area of the subdivided surface, where no vertex (n,) bool is fixed."""
@@ -283,6 +320,12 @@ class _MappedQuads:
         area, space = self._shares(uv)
         return float(np.abs(area - space).sum())
 
+    def triangle_error(self, uv: np.ndarray) -> float:
+        """That share by the triangles of the quads, as they are drawn."""
+        area = half_areas(self._mapped(uv))
+        space = half_areas(self.corners) * np.repeat(self.density, 2)
+        return float(np.abs(area / area.sum() - space / space.sum()).sum())
+
     def inner_error(self, uv: np.ndarray) -> float:
         """What is left of that if every polygon of the cage gets its share."""
         area, space = self._shares(uv)
@@ -291,9 +334,12 @@ class _MappedQuads:
 
     def _shares(self, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Shares (q,) that quads have of the area in UVs (n,2) of the cage, and in space."""
-        mapped = (self.mapping.matrix @ uv)[self.mapping.quads]
-        area, space = _quad_areas(np.pad(mapped, ((0, 0), (0, 0), (0, 1)))), self.areas
+        area, space = quad_areas(self._mapped(uv)), self.areas
         return area / area.sum(), space / space.sum()
+
+    def _mapped(self, uv: np.ndarray) -> np.ndarray:
+        """Corners (q,4,3) of the quads in UVs (n,2) of the cage, at height 0."""
+        return np.pad((self.mapping.matrix @ uv)[self.mapping.quads], ((0, 0), (0, 0), (0, 1)))
 
     def symmetry(
         self, found: SurfaceMap, uv: np.ndarray, fixed: np.ndarray
@@ -395,21 +441,8 @@ def _creases(
     return ends[known], modifier.sharpness[order][at][known]
 
 
-def _corner_sharpness(ids: np.ndarray, modifier: SubdivisionModifier) -> np.ndarray:
-    """Sharpness (n,) of the vertices of UVs, that of the surface's vertices they are at."""
-    if modifier.corner_sharpness is None:
-        return np.zeros(len(ids))
-    return np.where(ids >= 0, modifier.corner_sharpness[ids], 0.0)
-
-
 def _uv_vertices(corner_vertex: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The UV vertex (c,) of every corner, and the first corner (n,) of each: equal vertex, and UVs that agree."""
     key = np.column_stack([corner_vertex, np.round(uv / SAME_UV)]).astype(np.int64)
     _, first, vertex = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return vertex.ravel(), first
-
-
-def _quad_areas(corners: np.ndarray) -> np.ndarray:
-    """Areas (q,) of quads (q,4,3)."""
-    points = corners[:, HALVES].reshape(-1, 3)
-    return face_areas(points, np.arange(len(points)).reshape(-1, 3)).reshape(-1, 2).sum(axis=1)

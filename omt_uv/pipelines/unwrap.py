@@ -170,7 +170,8 @@ def _unwrapped(job: UnwrapJob, options: UnwrapOptions, cut: CutCharts | None = N
     from .subdivision import refined_on_subdivision
 
     density = None if job.target is None else job.target.density
-    rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary, density)
+    areas_first = options.balance == 0
+    rest = refined_on_subdivision(job.surface, found, modifier, job.pins, options.boundary, density, areas_first)
     return (yield from part_of(rest, share, 1 - share))
 
 
