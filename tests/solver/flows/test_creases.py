@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import meshes
 import numpy as np
+import pytest
 from bodies import icosphere
 
 from omt_uv.solver.contact.new_crossings import NewCrossings, new_intersections
 from omt_uv.solver.contact.self_intersections import FaceCrossings
+from omt_uv.solver.flows import creases
 from omt_uv.solver.flows.creases import FlowRegion, march, regions_around
 from omt_uv.solver.flows.flow_map import flow
 from omt_uv.solver.flows.handles import FlowHandle
@@ -75,3 +78,27 @@ def test_regions_that_have_nothing_to_do_with_one_another_are_apart():
     pairs = np.array([[0, 1], [far, np.flatnonzero((F[far][0] == F).any(axis=1))[0]]])
     found = regions_around((V, V), F, pairs, np.zeros(len(V), bool), np.ones(len(V), bool))
     assert len(found) == 2 and not np.intersect1d(found[0].rows, found[1].rows).size
+
+
+@pytest.mark.parametrize("seeds", [[220], [220, 221], [0, 440]])
+@pytest.mark.parametrize("stretch", [0.0, 2.0])
+def test_what_is_near_is_around_or_within_reach_of_one_of_about_its_size(seeds, stretch):
+    """Before or after the move; the size of a seed is the mean side at its corners, sizes are rounded to octaves."""
+    V, F = meshes.grid(20, 20)
+    V = V * [1 + 3 * stretch, 1, 1] + 0.1 * stretch * V[:, :1] ** 2
+    after = V + np.array([0.4, 0, 0]) * (V[:, 1:2] > 0.7)
+    chosen = np.zeros(len(V), bool)
+    chosen[seeds] = True
+    size = {}
+    for v in seeds:
+        sides = [np.linalg.norm(V[f[k]] - V[f[k - 1]]) for f in F if v in f for k in range(3) if v in (f[k], f[k - 1])]
+        size[v] = np.mean(sides)
+    octave = {v: int(np.round(np.log2(s / max(size.values())))) for v, s in size.items()}
+    near = chosen.copy()
+    near[F[[k for k, f in enumerate(F) if chosen[f].any()]]] = True
+    for at in (V, after):
+        for v in seeds:
+            reach = creases.REACH * np.mean([size[w] for w in seeds if octave[w] == octave[v]])
+            near |= np.linalg.norm(at - at[v], axis=1) < reach
+    assert np.array_equal(creases._near((V, after), F, chosen), near)
+    assert chosen.sum() < near.sum() < len(V)

@@ -1,10 +1,13 @@
 """Cells on the triangles of a plane are those of the plane's power diagram, and change as Newton's method believes."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.partition import cells
 from omt_uv.solver.partition.cells import DivisionProblem, GeodesicDual, geodesic_cells
 from omt_uv.solver.partition.clipping import clip, whole_triangles
 from omt_uv.solver.partition.polar_coordinates import WindowMesh, polar_coordinates
@@ -77,3 +80,13 @@ def test_halves_of_a_triangle():
         [-3, -2, -1, 1],
         [-3, -2, -1],
     ]
+
+
+def test_sides_between_cells_that_tell_no_difference_conduct_nothing():
+    """Where two sites are as near all over a face their side has no slope: no infinity, and no number that is none."""
+    squared = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [4.0, 2.0, 3.0]])
+    pairs = SimpleNamespace(face=np.array([0, 0, 0]), site=np.array([0, 1, 2]), squared=squared)
+    side = np.array([[0, 1], [1, 0], [0, 2], [2, 1]])
+    i, j, found = cells._against(pairs, np.zeros(3), side, np.array([2.0, 0.0, 6.0, 12.0]), np.arange(3))
+    assert (i.tolist(), j.tolist()) == ([0, 1, 0, 2], [1, 0, 2, 1])
+    assert found == pytest.approx([0, 0, 6 / (2 * 3), 12 / (2 * 3)])
