@@ -120,3 +120,13 @@ def within(chart: Chart) -> np.ndarray:
 def is_marked(surface: Surface, chart: Chart) -> bool:
     """Whether seams of the surface bound a chart."""
     return bool(is_seam(surface, outline(chart)).any())
+
+
+def identity(chart: Chart) -> tuple[bytes, bytes]:
+    """Equal for charts of the same corners that are joined in the same way."""
+    return chart.corners.tobytes(), chart.disk.tobytes()
+
+
+def edge_set(edges: np.ndarray) -> bytes:
+    """Equal for the same edges (e,2) in any order: from the same cut, these may come out again, whose map is known."""
+    return np.unique(pair_keys(*edges.T)).tobytes()

@@ -22,7 +22,7 @@ from ..mesh.surface import Surface
 from ..mesh.topology import pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import SPREAD_BY_SHEAR
-from .chart_indices import is_marked, within
+from .chart_indices import edge_set, identity, is_marked, within
 from .chart_map import ChartMap
 from .options import ShearBound
 
@@ -210,7 +210,7 @@ def bound_shear(
     early = EarlyEnd()
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
-    tried = {_as_a_set(last.cuts.edges)}
+    tried = {edge_set(last.cuts.edges)}
     rehearsed, crossed = dict[str, Any](), False
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
@@ -241,7 +241,7 @@ def bound_shear(
         if again is None:
             break
         edges = np.concatenate([kept, _cuts(again).edges])
-        if (name := _as_a_set(edges)) in tried:
+        if (name := edge_set(edges)) in tried:
             # It has not kept what it promised, and so more is asked for.
             continue
         tried.add(name)
@@ -340,40 +340,53 @@ def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float
 def _apart(
     search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None, rounds: int
 ) -> Steps[tuple[dict[int, np.ndarray], list[int], bool]]:
-    """Edges (e,2), by the number of a chart, that part it where it keeps the bound but for lying in its own way, or
-    around its flat sides, or slit it; the numbers of those with flat sides, whose other cuts are not needed any more;
-    and whether what lies in its own way is among them."""
+    """Edges (e,2), by the number of a chart, that part it around its flat sides, or where it lies in its own way, or
+    slit it; the numbers of those with flat sides, which need no other cuts; and whether any lies in its own way."""
     found: dict[int, np.ndarray] = {}
     flat, crossed = list[int](), False
-    least = np.sqrt(CROWDED) * np.log(search.shear.bound)
     late = rounds > 1 or any(found.gave_up for found in last.memory.values())
-    if not last.searched:
+    # What has no map is cut further, and nothing else helps.
+    chosen = [k for k in last.searched if last.maps[k].failure is None]
+    if not chosen:
         return found, flat, crossed
-    from ..seams.parting import flat_sides, parted  # Hardly any chart misses its bound.
+    from ..seams.parting import flat_sides  # Hardly any chart misses its bound.
 
-    for k in last.searched:
-        if last.maps[k].failure is not None:
-            continue
-        chart, mean = last.charts[k], last.mean[k]
-        edges = flat_sides(chart) if mean > last.bound else np.zeros((0, 2), np.int64)
+    for k in chosen:
+        mean = last.mean[k]
+        edges = flat_sides(last.charts[k]) if mean > last.bound else np.zeros((0, 2), np.int64)
         if len(edges):
             flat.append(k)
-        elif crossing is not None and (
-            rounds > SLIT_AT_FIRST or (mean > (1 + HARDLY) * last.bound and (late or np.log(mean) >= least))
-        ):
-            uv = yield from crossing(chart, last.maps[k])
-            shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
-            both = float(area @ shear / area.sum()), float(area[shear > STEEP].sum() / area.sum())
-            mild = mean <= last.bound
-            missed, without = (last.pressing[k], _pressing(*both, last.bound)) if mild else (mean, both[0])
-            if without <= last.bound + late * ROOM * (missed - last.bound):
-                edges = parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
-                crossed |= len(edges) > 0
+        elif crossing is not None and _may_cross(last, k, late, rounds):
+            uv = yield from crossing(last.charts[k], last.maps[k])
+            edges = _uncrossed(search, last, k, uv, late)
+            crossed |= len(edges) > 0
         if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
             # No other cut is needed, but one into what shears that much.
             edges = _slit(search, last, k, rounds)
         found |= {k: edges} if len(edges) else {}
     return found, flat, crossed
+
+
+def _may_cross(last: _Round, k: int, late: bool, rounds: int) -> bool:
+    """Whether chart k misses the bound by so much that it may lie in its own way, or was slit in vain."""
+    missed = last.mean[k] > (1 + HARDLY) * last.bound
+    much = np.log(last.mean[k]) >= np.sqrt(CROWDED) * np.log(last.bound)
+    return rounds > SLIT_AT_FIRST or bool(missed and (late or much))
+
+
+def _uncrossed(search: ShearSearch, last: _Round, k: int, uv: np.ndarray, late: bool) -> np.ndarray:
+    """Edges (e,2) that part chart k between what lies on itself in a map uv (n,2) that may, where that is what it
+    misses the bound for."""
+    from ..seams.parting import parted
+
+    chart, mean = last.charts[k], last.mean[k]
+    shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
+    both = float(area @ shear / area.sum()), float(area[shear > STEEP].sum() / area.sum())
+    mild = mean <= last.bound
+    missed, without = (last.pressing[k], _pressing(*both, last.bound)) if mild else (mean, both[0])
+    if without > last.bound + late * ROOM * (missed - last.bound):
+        return np.zeros((0, 2), np.int64)
+    return parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
 
 
 def _slit(search: ShearSearch, last: _Round, k: int, rounds: int) -> np.ndarray:
@@ -404,11 +417,6 @@ def _around(last: _Round, cut_anew: tuple[int, ...]) -> np.ndarray:
     return last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), inner)]
 
 
-def _as_a_set(edges: np.ndarray) -> bytes:
-    """Equal for the same edges (e,2): from the same cut, these may come out again, whose map is known."""
-    return np.unique(pair_keys(*edges.T)).tobytes()
-
-
 def _joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
     """The same cuts, but along the edges (e,2)."""
     return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
@@ -416,15 +424,10 @@ def _joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
 
 def _mapped(charts, old_charts, old_maps, map_charts) -> Steps[list[ChartMap]]:
     """Maps of the charts; those that are as they were keep theirs."""
-    known = {_name(chart): chart_map for chart, chart_map in zip(old_charts, old_maps, strict=True)}
-    new = yield from map_charts([chart for chart in charts if _name(chart) not in known])
+    known = {identity(chart): chart_map for chart, chart_map in zip(old_charts, old_maps, strict=True)}
+    new = yield from map_charts([chart for chart in charts if identity(chart) not in known])
     rest = iter(new)
-    return [known[_name(chart)] if _name(chart) in known else next(rest) for chart in charts]
-
-
-def _name(chart: Chart) -> tuple[bytes, bytes]:
-    """Equal for charts of the same corners that are joined in the same way."""
-    return chart.corners.tobytes(), chart.disk.tobytes()
+    return [known[identity(chart)] if identity(chart) in known else next(rest) for chart in charts]
 
 
 def _shear(chart: Chart, chart_map: ChartMap, kept: bool) -> tuple[np.ndarray, np.ndarray]:
