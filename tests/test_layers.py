@@ -56,7 +56,7 @@ ARROWS: dict[str, str] = {
     "solver.remeshing.relaxation": "solver solver.mesh solver.linalg solver.remeshing.edits",
     "solver.remeshing.fitting": "solver solver.mesh solver.linalg solver.remeshing.edits solver.remeshing.relaxation",
     "solver.remeshing.initial": "solver solver.mesh solver.maps solver.transport solver.cutting solver.conformal "
-    "solver.parameterization solver.sphere solver.remeshing.components solver.remeshing.edits",
+    "solver.refinement solver.parameterization solver.sphere solver.remeshing.components solver.remeshing.edits",
     "solver.remeshing": "solver solver.mesh solver.analysis solver.remeshing.components solver.remeshing.edits "
     "solver.remeshing.relaxation solver.remeshing.fitting solver.remeshing.initial",
     "solver.partition": "solver solver.mesh solver.linalg solver.transport",

@@ -23,6 +23,8 @@ from .relaxation.vertex_balance import balance_vertices
 
 # Rounds of relaxation before, and between, carrying vertices to where the measure asks for them.
 SHORT_ROUNDS = 10
+# Rounds before where the first mesh is uneven.
+UNEVEN_ROUNDS = 40
 # How often vertices are carried at most.
 MAX_BALANCES = 6
 # How often boundaries and features are sampled more sparsely to reach a count, before faces may fold.
@@ -76,7 +78,7 @@ def _settled(
     mesh, residual = start.mesh, 0.0
     if options.rounds:
         carrier = SurfaceCarrier(index, level, start.vertex_count)
-        mesh, residual = yield from _relaxed(mesh, start.vertex_count, carrier, sizing, options, allow_folds)
+        mesh, residual = yield from _relaxed(start, carrier, sizing, options, allow_folds)
     mesh = reach_vertex_count(mesh, start.vertex_count, sizing, allow_folds)
     if options.fit:
         mesh = yield from part_of(fit_to_surface(mesh, index, level), 0.57, 0.43)
@@ -93,16 +95,12 @@ def _settled(
 
 
 def _relaxed(
-    mesh: WorkingMesh,
-    vertex_count: int,
-    carrier: SurfaceCarrier,
-    sizing: SizingField,
-    options: RemeshOptions,
-    allow_folds: bool,
+    start: InitialMesh, carrier: SurfaceCarrier, sizing: SizingField, options: RemeshOptions, allow_folds: bool
 ) -> Steps[tuple[WorkingMesh, float]]:
     """Relax a mesh and carry vertices in turns, until they are where the measure asks for them; and the last step."""
-    mesh, _ = yield from part_of(relax_cvt(mesh, SHORT_ROUNDS, carrier), 0.0, 0.07)
-    mesh = reach_vertex_count(mesh, vertex_count, sizing, allow_folds)
+    rounds = UNEVEN_ROUNDS if start.uneven else SHORT_ROUNDS
+    mesh, _ = yield from part_of(relax_cvt(start.mesh, rounds, carrier), 0.0, 0.07)
+    mesh = reach_vertex_count(mesh, start.vertex_count, sizing, allow_folds)
     demand, balanced = None, True
     for k in range(MAX_BALANCES):
         mesh, _ = yield from part_of(relax_cvt(mesh, SHORT_ROUNDS, carrier), 0.07 + 0.038 * k, 0.038)

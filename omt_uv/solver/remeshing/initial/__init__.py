@@ -1,7 +1,7 @@
 """The first mesh of a component: samples on one map, triangles of another (B. Gu 2018), or its own edges decimated.
 
-Imports solver, solver.mesh, solver.maps, solver.transport, solver.cutting, solver.conformal, solver.parameterization,
-solver.sphere, solver.remeshing.components and solver.remeshing.edits.
+Imports solver, solver.mesh, solver.maps, solver.transport, solver.cutting, solver.conformal, solver.refinement,
+solver.parameterization, solver.sphere, solver.remeshing.components and solver.remeshing.edits.
 Main names: RemeshSource, RemeshOptions, STRATEGIES, ComponentMaps, make_initial_mesh, decimated.
 """
 

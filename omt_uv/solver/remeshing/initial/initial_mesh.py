@@ -14,6 +14,7 @@ from ...progress import Progress, Steps, part_of
 from ..edits.vertex_count import edge_length
 from ..edits.working_mesh import WorkingMesh
 from .arc_network import ArcSamples, ChartBoundary, chart_boundary
+from .coarse_component import coarse_component
 from .component_maps import ComponentMaps
 from .decimation import decimated, decimated_between_lines
 from .disk_samples import ChartMesh, even_image, triangulate_chart
@@ -37,7 +38,8 @@ class InitialMesh:
     """A mesh of a component with about the target count, samples on boundaries and features fixed, edges there locked.
 
     vertex_count: to reach exactly; size: edge length at density 1; line_spacing: that of the samples on boundaries and
-    features, in edges; to_reopen: sorted keys of the edges to cut at the end; reopened_copies: vertices that adds
+    features, in edges; to_reopen: sorted keys of the edges to cut at the end; reopened_copies: vertices that adds;
+    uneven: it comes from a coarse mesh, and takes longer to settle
     """
 
     mesh: WorkingMesh
@@ -47,6 +49,7 @@ class InitialMesh:
     warnings: tuple[str, ...]
     to_reopen: np.ndarray
     reopened_copies: int
+    uneven: bool = False
 
 
 def make_initial_mesh(
@@ -60,8 +63,8 @@ def make_initial_mesh(
     """Sample a component with density (m,), and at_vertices (n,), of mean 1, and triangulate by the options' strategy.
 
     Closed components of genus 0 without features or limbs go by way of the sphere, open disks without features by way
-    of a chart, and all others, or where that fails, by collapses of their own edges. On boundaries and features samples
-    are `line_spacing` edges apart, or more where there would be too many.
+    of a chart, and all others, disks of very many vertices, or where that fails, by collapses of their own edges. On
+    boundaries and features samples are `line_spacing` edges apart, or more where there would be too many.
 
     There may be more vertices than the count, where boundaries and features take as many. Raises PrecisionError where a
     chart cannot be triangulated.
@@ -131,6 +134,12 @@ def _by_charts(
 ) -> Steps[InitialMesh]:
     """The component by way of charts; by its own triangles where some of them have no maps, and relaxation follows."""
     yield Progress("Charts", 0.0)
+    if options.any_mesh_will_do and maps.component.is_disk:
+        vertex_count = count if options.counts_vertices else count // 2
+        coarse = yield from coarse_component(maps, vertex_count, density, at_vertices)
+        if coarse is not None:
+            plan = plan_samples(coarse.maps, count, coarse.density, coarse.at_vertices, options, line_spacing)
+            return replace(_by_decimation_between_lines(coarse.maps, plan, coarse.density), uneven=True)
     plan = plan_samples(maps, count, density, at_vertices, options, line_spacing)
     network, component = plan.network, maps.component
     if options.any_mesh_will_do and not (component.is_disk and component.openness > BAG):

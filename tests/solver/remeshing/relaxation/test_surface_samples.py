@@ -8,6 +8,7 @@ import pytest
 
 from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.mesh.geometry import face_areas, face_normals
+from omt_uv.solver.remeshing.relaxation import surface_samples
 from omt_uv.solver.remeshing.relaxation.surface_samples import (
     BLUNT,
     area_samples,
@@ -79,3 +80,13 @@ def test_samples_are_joined_and_selected_by_rows():
     again = select_samples(both, len(one.area) + np.arange(len(one.area)))
     np.testing.assert_array_equal(again.points, one.points)
     np.testing.assert_array_equal(again.faces, one.faces)
+
+
+def test_sharpness_is_the_same_by_gradients(monkeypatch):
+    """Large surfaces are diffused without factors, small ones with."""
+    V, F = meshes.bumpy()
+    index = index_of(V, F)
+    factored = sharpness(index)
+    monkeypatch.setattr(surface_samples, "LARGE", 0)
+    assert factored.max() > 0.01
+    np.testing.assert_allclose(sharpness(index), factored, atol=1e-5)
