@@ -45,7 +45,7 @@ def rectangle(V: np.ndarray, quads: np.ndarray, areas: np.ndarray) -> GridRectan
     (2, [1.0, 3.0])
     """
     ends = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2)
-    keys, edge = np.unique(pair_keys(ends[:, 0], ends[:, 1]), return_inverse=True)
+    keys, first, edge = np.unique(pair_keys(ends[:, 0], ends[:, 1]), return_index=True, return_inverse=True)
     edge = edge.reshape(-1, 4)
     low, high = ends.min(axis=1), ends.max(axis=1)
     way = _directions(edge, len(keys))
@@ -57,9 +57,10 @@ def rectangle(V: np.ndarray, quads: np.ndarray, areas: np.ndarray) -> GridRectan
     if len(np.unique(cell, axis=0)) != len(quads) or columns * rows != len(quads) or n != (columns + 1) * (rows + 1):
         raise GridError("The quads of an island are not in rows and columns")
     total = float(areas.sum())
-    length = np.linalg.norm(V[low] - V[high], axis=1)
+    # Every edge once, whether one quad has it or two.
+    length = np.linalg.norm(V[low[first]] - V[high[first]], axis=1)
     # Edges of a way, along which the other coordinate grows.
-    wide, tall = (max(float(length[mine].sum()), 1e-300) for mine in (~across, across))
+    wide, tall = (max(float(length[mine].sum()), 1e-300) for mine in (way != 0, way == 0))
     aspect = (wide / (rows + 1)) / (tall / (columns + 1))
     size = np.sqrt(total * np.array([aspect, 1 / aspect]))
     uv = np.empty((n, 2))

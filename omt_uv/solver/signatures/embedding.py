@@ -14,8 +14,8 @@ def classical_scaling(distances: np.ndarray, dimensions: int = 2) -> np.ndarray:
     >>> import numpy as np
     >>> from omt_uv.solver.signatures.embedding import classical_scaling
     >>> line = np.array([0, 1, 3.0])
-    >>> np.ptp(classical_scaling(abs(line[:, None] - line))[:, 0]).round(9)
-    np.float64(3.0)
+    >>> float(np.ptp(classical_scaling(abs(line[:, None] - line))[:, 0]).round(9))
+    3.0
     """
     n = len(distances)
     centre = np.eye(n) - 1 / n

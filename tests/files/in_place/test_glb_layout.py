@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from omt_uv.files.in_place import glb_data, glb_layout
+from omt_uv.files.in_place import glb, glb_data, glb_layout
 from omt_uv.files.in_place.glb_data import COMPONENTS, WIDTHS, Glb
 
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -168,3 +168,42 @@ def test_what_others_read_is_not_overwritten():
     change = glb_layout.GlbChange(Glb(doc, table.tobytes(), []))
     assert not change.overwrite(1, new[:3]) and change.overwrite(1, new)
     np.testing.assert_array_equal(read(change.result(), 0), table[:, :3])
+
+
+@pytest.mark.parametrize(("most", "code", "given"), [(65534, 5123, None), (65536, 5123, 5125), (9, 5125, 5125)])
+def test_numbers_of_vertices_are_as_wide_as_the_largest_takes(most, code, given):
+    """Of all primitives together; what was wide stays so, and what keeps its vertices is not written."""
+    written = {}
+
+    class Change:
+        doc = {"accessors": [{"componentType": code}, {"componentType": code}]}
+
+        def replace(self, index, values, owned, like, target):
+            written[index] = (values, owned)
+            return index
+
+    corners = np.arange(6).reshape(2, 3)
+    parts = [glb.Part({"indices": k}, corners[k], corners[k], None) for k in (0, 1)]
+    parts.append(glb.Part({"indices": 1, "mode": 4}, corners[0], corners[0], None))
+    new = np.array([[0, 1, 2], [3, 4, most], [0, 1, 2]])
+    new[0, 0] = 7
+    glb._write_indices(Change(), parts, new.ravel(), {0: 1, 1: 2})
+    assert set(written) == {0, 1}
+    for k in (0, 1):
+        values, owned = written[k]
+        assert np.array_equal(values[:, 0], new[k]) and owned == (k == 0)
+        assert values.dtype == (np.uint32 if given else np.uint16)
+
+
+@pytest.mark.parametrize("change", ["another buffer", "a buffer elsewhere"])
+def test_values_in_other_files_are_refused(change):
+    file, values = random_file(3)
+    view = file.doc["accessors"][0]["bufferView"]
+    assert np.array_equal(glb_data.accessor(file, 0), values[0])
+    if change == "another buffer":
+        file.doc["bufferViews"][view]["buffer"] = 1
+        file.doc["buffers"].append({"byteLength": 3})
+    else:
+        file.doc["buffers"][0]["uri"] = "cube.bin"
+    with pytest.raises(glb_data.InPlaceError, match="in other files"):
+        glb_data.accessor(file, 0)

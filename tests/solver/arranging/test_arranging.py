@@ -131,3 +131,19 @@ def test_what_is_no_grid_is_refused():
     ring = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]])
     with pytest.raises(GridError, match="ring"):
         rectangle(np.random.default_rng(0).normal(size=(6, 3)), ring, np.ones(3))
+
+
+@pytest.mark.parametrize(("wide", "tall"), [([1.0, 3.0], [0.5]), ([0.2, 0.7, 1.1], [2.0, 1.0]), ([4.0], [0.1, 5.0])])
+def test_a_grid_that_is_a_rectangle_stays_as_it_is(wide, tall):
+    """Every side as long as it was: the proportions are those of the lengths along both ways."""
+    x, y = np.concatenate([[0], np.cumsum(wide)]), np.concatenate([[0], np.cumsum(tall)])
+    V = np.array([[a, b, 0.0] for b in y for a in x])
+    n = len(x)
+    quads = np.array([[n * r + c, n * r + c + 1, n * r + c + n + 1, n * r + c + n]
+                      for r in range(len(tall)) for c in range(len(wide))])  # fmt: skip
+    found = rectangle(V, quads, np.array([a * b for b in tall for a in wide]))
+    for one in (quads, np.roll(quads, 1, axis=1)):
+        before = np.linalg.norm(V[one[:, 0]] - V[one[:, 1]], axis=1)
+        after = np.linalg.norm(found.uv[one[:, 0]] - found.uv[one[:, 1]], axis=1)
+        np.testing.assert_allclose(after, before, rtol=1e-9)
+    assert sorted((found.columns, found.rows)) == sorted((len(wide), len(tall)))

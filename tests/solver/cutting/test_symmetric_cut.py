@@ -1,5 +1,7 @@
 """Cuts of bodies that are their own mirror image: symmetric, and into one disk."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from meshes import polygon_surface
 from short_cuts import component_of
 
 from omt_uv.solver.cutting import cuts as cuts_module
+from omt_uv.solver.cutting import symmetric_cut as symmetric_cuts
 from omt_uv.solver.cutting.cut_graph import is_disk
 from omt_uv.solver.cutting.cuts import DEARER, STEEPER_OUTLINED, cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
@@ -153,3 +156,29 @@ def test_symmetric_cuts_are_those_of_any_order_of_the_vertices():
     other = polygon_surface(surface.positions[back], polygons)
     one, two = (np.sort(pair_keys(*e.T)) for e in (order[cut(surface).edges], cut(other).edges))
     assert np.array_equal(one, two)
+
+
+CUTS = [(1.0, 9.0, "a"), (1.5, 2.0, "b"), (1.9, 1.0, "c"), (2.1, 0.0, "d")]
+
+
+@pytest.mark.parametrize(
+    ("spread", "chosen"),
+    [((1.0, 1.05), "b"), ((1.05, 1.0), "b"), ((1.0, 1.2), "a"), ((1.2, 1.0), "b")],
+    ids=["about equal", "about equal, too", "the first is better", "the second is better"],
+)
+def test_of_about_equal_outlines_the_one_that_leaves_least_where_it_is_free(monkeypatch, spread, chosen):
+    """The two best predicted ones are measured; what is predicted more than twice as steep is not looked at."""
+    made = [(a, b, np.array([k]), np.array([k + 10])) for k, (a, b, _) in enumerate(CUTS)]
+    monkeypatch.setattr(symmetric_cuts, "_outlined", lambda half, extremities, bearable: iter(made[::-1]))
+    looked = []
+    monkeypatch.setattr(symmetric_cuts, "disk_spread", lambda part, cut: looked.append(int(cut[0])) or spread[cut[0]])
+    cut, tips = symmetric_cuts.outlined_cut([SimpleNamespace(component=None)], 3, 2.0)
+    assert CUTS[int(cut[0])][2] == chosen and tips[0] == cut[0] + 10 and looked == [0, 1]
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_without_a_choice_there_is_none_or_the_only_one(monkeypatch, count):
+    made = [(1.0, 1.0, np.array([4]), np.array([5]))] * count
+    monkeypatch.setattr(symmetric_cuts, "_outlined", lambda half, extremities, bearable: iter(made))
+    found = symmetric_cuts.outlined_cut([SimpleNamespace(component=None)], 3, 2.0)
+    assert (found is None) == (count == 0) and (not count or [int(x[0]) for x in found] == [4, 5])
