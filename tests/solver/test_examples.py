@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = [".".join(path.relative_to(ROOT).with_suffix("").parts)
-           for path in sorted((ROOT / "omt_uv" / "solver").rglob("*.py")) if ">>>" in path.read_text(encoding="utf-8")]  # fmt: skip
+PATHS = [path for path in sorted((ROOT / "omt_uv" / "solver").rglob("*.py")) if ">>>" in path.read_text("utf-8")]
+MODULES = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in PATHS]
 
 
 @pytest.mark.parametrize("module", MODULES)
