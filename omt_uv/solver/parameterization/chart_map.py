@@ -12,7 +12,7 @@ import numpy as np
 from ..analysis.density import Target, area_error_warnings
 from ..canonical.markers import ChartMarkers
 from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, plural, positive_density
-from ..maps.distortion import Distortion, distortion
+from ..maps.distortion import RATIO_FLOOR, Distortion, distortion, face_distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_areas
@@ -48,6 +48,10 @@ RECTANGLES = ("square", "rectangle")
 # Errors of charts that have no map in double precision.
 WITHOUT_MAP = (FoldedUVError, PrecisionError, TransportError)
 ANOTHER_SEAM = "Cut this part further, with automatic seams or another one along it"
+# Shear of what has no area to speak of.
+VANISHED = 50.0
+# Mean shear above 1, and area error, of maps that have no shear to speak of: what is unrolled.
+UNROLLED = 1e-4
 # Share of its area below which a face is nothing in single precision: a disk, a square or a rectangle has no room then.
 NO_ROOM = 1e-7
 # What is said, after their number, of faces of a map that is returned all the same.
@@ -389,6 +393,26 @@ def measured_chart(vertices: np.ndarray, chart: Chart, uv: np.ndarray, density: 
 def measured_map(chart: Chart, uv: np.ndarray, density: np.ndarray | None) -> Distortion:
     """Figures of a map (n,2) of a chart, of any size, against a density (m,)."""
     return measured_chart(in_unit_box(chart.vertices)[0], chart, in_unit_box(uv)[0], density)
+
+
+def local_shear(chart: Chart, chart_map: ChartMap, kept: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The shear s1/s2 (m,) of triangles, and the areas (m,) of these.
+
+    kept : areas are to be kept; then it is the shear that has the symmetric Dirichlet energy of their polygons
+    """
+    area = polygon_areas(chart.vertices, chart.triangles, chart.faces)
+    if chart_map.failure is not None:
+        return np.full(len(area), VANISHED), area
+    if not chart_map.folds and max(chart_map.angle_mean - 1, chart_map.area_l1) <= UNROLLED:
+        return np.ones(len(area)), area
+    octaves, shear = face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles], chart.faces)
+    if kept:
+        # A corner of a polygon that folds is mended at last, too: what the rest of it shears is what a seam can help.
+        ratio = np.where(octaves > np.log2(2 * RATIO_FLOOR), 2.0 ** np.clip(octaves, -20, 20), 1.0)
+        energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
+        # Quads that fold or vanish, also along the other diagonal, are mended at last: no seam helps against them.
+        shear = np.minimum(energy + np.sqrt(energy**2 - 1), VANISHED)
+    return shear, area
 
 
 def placed_chart(

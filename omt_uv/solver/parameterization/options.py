@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from ..analysis.seam_costs import SeamPreferences
 from ..cutting.disk_charts import SEAMS
+from ..errors import CUT_FURTHER, percent, plural
 from ..refinement.continuation_rules import QUALITIES
 from ..refinement.refine import BOUNDARIES
 
@@ -29,6 +33,23 @@ class ShearBound:
     def __post_init__(self):
         if not self.bound > 1:
             raise ValueError(f"no map shears less than 1; the bound must be greater, not {self.bound}")
+
+    def missed(self, mean: np.ndarray, area: np.ndarray, by_hand: np.ndarray, why: str) -> Iterator[str]:
+        """Warnings of charts of such areas (k,) and mean shear (k,) above the bound, those with seams marked by hand
+        (k,) bool apart; why others are."""
+        # "1.35, above 1.35" helps nobody.
+        missed = np.round(mean, 2) > self.bound
+        for chosen, what in (
+            (missed & by_hand, f"its seams were marked by hand. {CUT_FURTHER}"),
+            (missed & ~by_hand, why),
+        ):
+            if chosen.any():
+                count, share = int(chosen.sum()), area[chosen].sum() / area.sum()
+                # Of a whole surface there is no share to tell.
+                part = "" if share == 1 else f", {percent(share)} of the surface,"
+                who = plural(count, f"An island{part} shears", f"{{}} islands{part} shear")
+                what = what if count == 1 else what.replace("its seams", "their seams")
+                yield f"{who} {mean[chosen].max():.3g} in the mean, above {self.bound:.3g}: {what}"
 
 
 @dataclass(frozen=True)

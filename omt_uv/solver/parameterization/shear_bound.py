@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,17 +14,15 @@ from ..analysis.density import Target, means_of_polygons
 from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
-from ..errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, percent, plural
-from ..maps.distortion import RATIO_FLOOR, face_distortion
+from ..errors import ENDED_EARLY, MORE_SEAMS
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
-from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface
 from ..mesh.topology import pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import SPREAD_BY_SHEAR
-from .chart_indices import edge_set, identity, is_marked, within
-from .chart_map import ChartMap
+from .chart_indices import edge_set, identity, is_marked, outline, within
+from .chart_map import ChartMap, local_shear
 from .options import ShearBound
 
 if TYPE_CHECKING:
@@ -65,12 +64,8 @@ LITTLE = 0.1
 LEAST_AREA = 1e-4
 # A mean excess of the shear up to this is not worse than none: what was parted is cut further.
 NO_EXCESS = 0.005
-# Shear of what has no area to speak of.
-VANISHED = 50.0
 # What has no map is asked for this share of what cuts have left.
 UNKNOWN = 0.5
-# Mean shear above 1, and area error, of maps that have no shear to speak of: what is unrolled.
-UNROLLED = 1e-4
 # Where the time goes, roughly: seams take this share of every round.
 SEARCHING = 0.25
 # Where charts lie on themselves that may, before that.
@@ -142,7 +137,7 @@ class ShearSearch:
             target = Target(np.exp(2 * log_density[surface.corner_vertex[surface.triangles]].mean(axis=1)))
         prepared = yield from disk_charts(surface, extremities=0)
         maps = yield from self.map_surface(surface, prepared.charts, target)
-        shear = [_shear(chart, one, target is None) for chart, one in zip(prepared.charts, maps, strict=True)]
+        shear = [local_shear(chart, one, target is None) for chart, one in zip(prepared.charts, maps, strict=True)]
         size = np.array([area.sum() for _, area in shear])
         if size.max() < ONE_PIECE * size.sum():
             return None
@@ -211,7 +206,7 @@ def bound_shear(
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     tried = {edge_set(last.cuts.edges)}
-    rehearsed, crossed = dict[str, Any](), False
+    rehearsed, crossed, worse = dict[str, Any](), False, set[tuple[bytes, bytes]]()
     for rounds in range(1, MOST_ROUNDS):
         if last.excess > max(best.excess, NO_EXCESS):
             # What coarse maps tell does not hold here, or it is no use to part what lies on itself.
@@ -223,7 +218,7 @@ def bound_shear(
         is_stuck, best = rounds > 1 and last is not best and last.is_hardly_better(best), last
         begin = 1 - 0.5 ** (rounds - 1)
         width = (1 - begin) / 2
-        parting = _apart(search, last, crossing, rounds)
+        parting = _apart(search, last, crossing, rounds, worse)
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
         if parts is None or (is_stuck and not parts[0]):
             break
@@ -250,9 +245,11 @@ def bound_shear(
         mapped = yield from unless_ended(further, early)
         if mapped is None:
             break
-        last = _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
+        new = _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
+        last, failed = last.with_what_is_better(search, new)
+        worse |= failed
     best = last if last.excess <= best.excess else best
-    return best.result(first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
+    return best.result(search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
 
 
 @dataclass(frozen=True)
@@ -272,7 +269,7 @@ class _Round:
 
     @staticmethod
     def of(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: Cuts, memory: dict) -> _Round:
-        shear = [_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
+        shear = [local_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
         mean = np.array([area @ local / area.sum() for local, area in shear])
         area, bound = np.array([area.sum() for _, area in shear]), search.shear.bound
         # Slivers between sides have a shear, and nobody sees it.
@@ -288,29 +285,45 @@ class _Round:
     @property
     def excess(self) -> float:
         """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
-        return float(self.area[self.searched] @ (self.pressing[self.searched] - self.bound) / self.area.sum())
+        return float(self.missing.sum() / self.area.sum())
+
+    def with_what_is_better(self, search: ShearSearch, new: _Round) -> tuple[_Round, set[tuple[bytes, bytes]]]:
+        """The new round made of this one, but for charts that became worse while others became better, which are as
+        they are here; and the identities of these."""
+        region = np.full(search.count, -1)
+        for k, chart in enumerate(self.charts):
+            region[chart.faces] = k
+        of = np.array([region[chart.faces[0]] for chart in new.charts])
+        now = np.bincount(of, new.missing, len(self.charts))
+        stay = now > self.missing + NO_EXCESS * self.area
+        if not stay.any() or (stay | (now >= self.missing))[self.searched].all():
+            return new, set()
+        charts = [*itertools.compress(self.charts, stay), *itertools.compress(new.charts, ~stay[of])]
+        maps = [*itertools.compress(self.maps, stay), *itertools.compress(new.maps, ~stay[of])]
+        edges = np.unique(np.concatenate([self.cuts.edges, new.cuts.edges]), axis=0)
+        edges = edges[np.isin(pair_keys(*edges.T), np.concatenate([outline(chart) for chart in charts]))]
+        # What was found for parts that are as they were is forgotten.
+        memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
+        memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
+        merged = _Round.of(search, charts, maps, _joined(search, self.cuts, edges), memory)
+        return merged, {identity(self.charts[k]) for k in np.flatnonzero(stay)}
+
+    @property
+    def missing(self) -> np.ndarray:
+        """By how much each chart (k,) misses the bound, times its area; 0 where it is not searched."""
+        missing = np.zeros(len(self.charts))
+        missing[self.searched] = (self.area * (self.pressing - self.bound))[self.searched]
+        return missing
 
     def is_hardly_better(self, before: _Round) -> bool:
         """Whether hardly more of it keeps the bound than before, and much does not."""
         return self.excess > max((1 - LITTLE) * before.excess, NEARLY * self.bound)
 
-    def result(self, warnings: tuple[str, ...], why: str) -> BoundedShear:
+    def result(self, shear: ShearBound, warnings: tuple[str, ...], why: str) -> BoundedShear:
         """Its charts and maps, with warnings of how they were made and of those that miss the bound; why they do."""
-        return BoundedShear(DiskCharts(self.charts, self.cuts, warnings), self.maps, tuple(self.warnings(why)))
-
-    def warnings(self, why: str) -> Iterator[str]:
-        """Warnings of charts that shear more than the bound, those with seams marked by hand apart; why others do."""
-        # "1.35, above 1.35" helps nobody.
-        missed = np.flatnonzero(np.round(self.mean, 2) > self.bound)
-        mean, by_hand = self.mean[missed], ~np.isin(missed, self.searched)
-        for chosen, what in ((by_hand, f"its seams were marked by hand. {CUT_FURTHER}"), (~by_hand, why)):
-            if chosen.any():
-                count, share = int(chosen.sum()), self.area[missed[chosen]].sum() / self.area.sum()
-                # Of a whole surface there is no share to tell.
-                part = "" if share == 1 else f", {percent(share)} of the surface,"
-                who = plural(count, f"An island{part} shears", f"{{}} islands{part} shear")
-                what = what if count == 1 else what.replace("its seams", "their seams")
-                yield f"{who} {mean[chosen].max():.3g} in the mean, above {self.bound:.3g}: {what}"
+        by_hand = ~np.isin(np.arange(len(self.charts)), self.searched)
+        missed = tuple(shear.missed(self.mean, self.area, by_hand, why))
+        return BoundedShear(DiskCharts(self.charts, self.cuts, warnings), self.maps, missed)
 
 
 def _pressing(mean: float, steep: float, bound: float) -> float:
@@ -338,10 +351,17 @@ def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float
 
 
 def _apart(
-    search: ShearSearch, last: _Round, crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None, rounds: int
+    search: ShearSearch,
+    last: _Round,
+    crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None,
+    rounds: int,
+    worse: set[tuple[bytes, bytes]],
 ) -> Steps[tuple[dict[int, np.ndarray], list[int], bool]]:
     """Edges (e,2), by the number of a chart, that part it around its flat sides, or where it lies in its own way, or
-    slit it; the numbers of those with flat sides, which need no other cuts; and whether any lies in its own way."""
+    slit it; the numbers of those with flat sides, which need no other cuts; and whether any lies in its own way.
+
+    worse : the identities of charts whose parts were worse than they are
+    """
     found: dict[int, np.ndarray] = {}
     flat, crossed = list[int](), False
     late = rounds > 1 or any(found.gave_up for found in last.memory.values())
@@ -352,11 +372,11 @@ def _apart(
     from ..seams.parting import flat_sides  # Hardly any chart misses its bound.
 
     for k in chosen:
-        mean = last.mean[k]
-        edges = flat_sides(last.charts[k]) if mean > last.bound else np.zeros((0, 2), np.int64)
+        mean, whole = last.mean[k], identity(last.charts[k]) in worse
+        edges = np.zeros((0, 2), np.int64) if whole or mean <= last.bound else flat_sides(last.charts[k])
         if len(edges):
             flat.append(k)
-        elif crossing is not None and _may_cross(last, k, late, rounds):
+        elif crossing is not None and not whole and _may_cross(last, k, late, rounds):
             uv = yield from crossing(last.charts[k], last.maps[k])
             edges = _uncrossed(search, last, k, uv, late)
             crossed |= len(edges) > 0
@@ -380,7 +400,7 @@ def _uncrossed(search: ShearSearch, last: _Round, k: int, uv: np.ndarray, late: 
     from ..seams.parting import parted
 
     chart, mean = last.charts[k], last.mean[k]
-    shear, area = _shear(chart, replace(last.maps[k], uv=uv), search.target is None)
+    shear, area = local_shear(chart, replace(last.maps[k], uv=uv), search.target is None)
     both = float(area @ shear / area.sum()), float(area[shear > STEEP].sum() / area.sum())
     mild = mean <= last.bound
     missed, without = (last.pressing[k], _pressing(*both, last.bound)) if mild else (mean, both[0])
@@ -395,7 +415,7 @@ def _slit(search: ShearSearch, last: _Round, k: int, rounds: int) -> np.ndarray:
     from ..seams.parting import slits
 
     chart = last.charts[k]
-    shear, area = _shear(chart, last.maps[k], search.target is None)
+    shear, area = local_shear(chart, last.maps[k], search.target is None)
     missed = max(last.mean[k] / last.bound - 1, 0.0)
     steep = shear > (STEEP if missed == 0 else SHEARED)
     excess = float(area[steep].sum() / area.sum() - MOST_STEEP) if missed == 0 else missed
@@ -428,23 +448,3 @@ def _mapped(charts, old_charts, old_maps, map_charts) -> Steps[list[ChartMap]]:
     new = yield from map_charts([chart for chart in charts if identity(chart) not in known])
     rest = iter(new)
     return [known[identity(chart)] if identity(chart) in known else next(rest) for chart in charts]
-
-
-def _shear(chart: Chart, chart_map: ChartMap, kept: bool) -> tuple[np.ndarray, np.ndarray]:
-    """The shear s1/s2 (m,) of triangles, and the areas (m,) of these.
-
-    kept : areas are to be kept; then it is the shear that has the symmetric Dirichlet energy of their polygons
-    """
-    area = polygon_areas(chart.vertices, chart.triangles, chart.faces)
-    if chart_map.failure is not None:
-        return np.full(len(area), VANISHED), area
-    if not chart_map.folds and max(chart_map.angle_mean - 1, chart_map.area_l1) <= UNROLLED:
-        return np.ones(len(area)), area
-    octaves, shear = face_distortion(chart.vertices, chart.triangles, chart_map.uv[chart.triangles], chart.faces)
-    if kept:
-        # A corner of a polygon that folds is mended at last, too: what the rest of it shears is what a seam can help.
-        ratio = np.where(octaves > np.log2(2 * RATIO_FLOOR), 2.0 ** np.clip(octaves, -20, 20), 1.0)
-        energy = (ratio + 1 / ratio) * (shear + 1 / shear) / 4
-        # Quads that fold or vanish, also along the other diagonal, are mended at last: no seam helps against them.
-        shear = np.minimum(energy + np.sqrt(energy**2 - 1), VANISHED)
-    return shear, area

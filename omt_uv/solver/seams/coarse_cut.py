@@ -34,6 +34,7 @@ class Found:
     mirror : if the others are symmetric
     coarse, steps (k,), root : where and along what they were found, and where on a closed surface they begin
     rehearsed : the square of log(shear) of a map of the coarse surface that is cut so; None where there is none
+    polygons (k,) : of the part
     gave_up : no longer cut seemed to be worth what it costs, though that is more than was asked for
     """
 
@@ -43,6 +44,7 @@ class Found:
     coarse: CoarseSurface
     steps: np.ndarray
     root: int
+    polygons: np.ndarray
     rehearsed: float | None = None
     gave_up: bool = False
 
@@ -70,7 +72,8 @@ class CoarseCut:
             start[coarse.kept[self.task.graph.boundary]] = True
         edges = carried(component, coarse, self.task.graph, self.cut.steps, start, self.mirror)
         root = int(np.argmax(self.task.graph.boundary))
-        return Found(self.base | edges, self.base, self.mirror, coarse, self.cut.steps, root)
+        polygons = component.polygons[component.polygons >= 0]
+        return Found(self.base | edges, self.base, self.mirror, coarse, self.cut.steps, root, polygons)
 
 
 @dataclass(frozen=True)

@@ -38,11 +38,12 @@ def test_hard_edges_stay_straight_and_corners_where_they_are():
     found = drain(remesh(RemeshSource(V, F, edges), 500))
     new = sharp_edges(found.vertices, found.triangles, np.radians(30))
     points = found.vertices[new]
-    assert off_lines(points.mean(axis=1), V, edges).max() < 1e-12
+    # Surfaces are remeshed with coordinates rounded to 2^-32 of their extent, which single precision does not see.
+    assert off_lines(points.mean(axis=1), V, edges).max() < 1e-9
     length = np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1).sum()
-    assert np.linalg.norm(points[:, 0] - points[:, 1], axis=1).sum() == pytest.approx(length, rel=1e-12)
+    assert np.linalg.norm(points[:, 0] - points[:, 1], axis=1).sum() == pytest.approx(length, rel=1e-9)
     for corner in V[:64]:
-        assert np.linalg.norm(found.vertices - corner, axis=1).min() < 1e-12
+        assert np.linalg.norm(found.vertices - corner, axis=1).min() < 1e-9
 
 
 def island(scale=1.0):

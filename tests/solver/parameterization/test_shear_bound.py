@@ -8,6 +8,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.errors import CUT_FURTHER, ENDED_EARLY, MORE_SEAMS, FoldedUVError
 from omt_uv.solver.maps.distortion import face_distortion
 from omt_uv.solver.mesh.charts import strict_charts
@@ -16,7 +17,8 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization import shear_bound
 from omt_uv.solver.parameterization import unwrap as unwrap_module
-from omt_uv.solver.parameterization.chart_map import map_chart
+from omt_uv.solver.parameterization.chart_indices import identity
+from omt_uv.solver.parameterization.chart_map import local_shear, map_chart
 from omt_uv.solver.parameterization.options import ShearBound, UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -236,7 +238,7 @@ def test_a_folded_corner_is_not_what_its_polygon_shears():
     middle = uv[ear].mean(axis=0)
     uv[ear] = middle + (uv[ear] - middle) @ np.diag([1, -1e-3])
     assert (signed_areas(uv, chart.triangles) <= 0).any()
-    local, area = shear_bound._shear(chart, SimpleNamespace(uv=uv, folds=1, failure=None), True)
+    local, area = local_shear(chart, SimpleNamespace(uv=uv, folds=1, failure=None), True)
     assert area @ local / area.sum() < 1.5
 
 
@@ -266,8 +268,59 @@ def test_what_stays_steep_after_slits_comes_apart_where_it_lies_in_its_own_way(r
         yield from ()
         return chart.vertices[:, :2]
 
-    steep = shear_bound._shear(chart, chart_map, True)[0] > shear_bound.STEEP
+    steep = local_shear(chart, chart_map, True)[0] > shear_bound.STEEP
     assert area[steep].sum() > shear_bound.MOST_STEEP * area.sum()
-    found, flat_sides, crossed = drain(shear_bound._apart(search, last, crossing, rounds))
+    found, flat_sides, crossed = drain(shear_bound._apart(search, last, crossing, rounds, set()))
     parts = strict_charts(triangle_surface(V, F, found.get(0, np.zeros((0, 2), int))))
     assert not flat_sides and crossed == comes_apart and len(parts) == (2 if comes_apart else 1)
+
+
+def test_what_became_worse_stays_where_others_became_better():
+    """Of three flat grids the first is cut for nothing, the second with success, the third is left alone."""
+    V, F = meshes.grid(4, 4)
+    n = len(V)
+    surface = triangle_surface(
+        np.concatenate([V, V + [9, 0, 0], V + [18, 0, 0]]), np.concatenate([F, F + n, F + 2 * n])
+    )
+    search = shear_bound.ShearSearch(surface, None, ShearBound(1.2), None, {})
+    middle = (V[:, 0] == 0.5).nonzero()[0]
+    across = np.column_stack([middle[:-1], middle[1:]])
+    before = made_round(search, across[:1], (1.6, 1.6, 1.1), "old")
+    new = made_round(search, np.concatenate([across, across + n]), (1.9, 1.9, 1.3, 1.1, 1.1), "new")
+    assert [len(r.searched) for r in (before, new)] == [2, 3]
+    merged, worse = before.with_what_is_better(search, new)
+    assert merged.excess < min(before.excess, new.excess)
+    found = [[int(k) for k in chart.faces] for chart in merged.charts]
+    assert sorted(np.concatenate(found).tolist()) == list(range(3 * len(F))) and sorted(map(len, found)) == [
+        16,
+        16,
+        32,
+        32,
+    ]
+    assert {tuple(sorted(edge)) for edge in merged.cuts.edges.tolist()} == {
+        tuple(sorted(edge)) for edge in np.concatenate([across[:1], across + n]).tolist()
+    }
+    assert {name: found.found for name, found in merged.memory.items()} == {b"first": "old", b"second": "new"}
+    assert worse == {identity(before.charts[0])}
+    # Where all of it became worse, or nothing did, there is nothing to choose.
+    assert new.with_what_is_better(search, new) == (new, set())
+    bad = made_round(search, before.cuts.edges, (1.9, 1.9, 1.1), "bad")
+    assert before.with_what_is_better(search, bad) == (bad, set())
+
+
+def made_round(search, edges, shear, found):
+    """A round along edges (k,2), its charts mapped flat with such a shear."""
+    surface = search.surface
+    charts = strict_charts(replace(surface, seams=edges))
+    maps = [
+        SimpleNamespace(
+            uv=c.vertices[:, :2] * [np.sqrt(s), 1 / np.sqrt(s)], angle_mean=s, area_l1=0, folds=0, failure=None
+        )
+        for c, s in zip(charts, shear, strict=True)
+    ]
+    half = len(surface.triangles) // 3
+    memory = {
+        name: SimpleNamespace(polygons=np.arange(k * half, (k + 1) * half), found=found)
+        for k, name in enumerate((b"first", b"second"))
+    }
+    return shear_bound._Round.of(search, charts, maps, Cuts(edges, 0.0, (), edges[:0], ()), memory)

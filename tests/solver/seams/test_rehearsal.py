@@ -8,8 +8,9 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import halfedges, pair_keys, twins
+from omt_uv.solver.parameterization.chart_map import local_shear
 from omt_uv.solver.parameterization.options import UnwrapOptions
-from omt_uv.solver.parameterization.shear_bound import ShearSearch, _shear
+from omt_uv.solver.parameterization.shear_bound import ShearSearch
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.seams import search as search_module
@@ -50,7 +51,7 @@ def silent():
 
 
 def mean_shear(found):
-    parts = [_shear(chart, one, True) for chart, one in zip(found.charts, found.maps, strict=True)]
+    parts = [local_shear(chart, one, True) for chart, one in zip(found.charts, found.maps, strict=True)]
     return sum(a @ s for s, a in parts) / sum(a.sum() for _, a in parts)
 
 
