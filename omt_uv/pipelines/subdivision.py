@@ -11,6 +11,7 @@ from ..solver.analysis.density import Target
 from ..solver.errors import APPLY_LEVEL, plural
 from ..solver.maps.distortion import distortion
 from ..solver.maps.mirror_symmetry import MirrorSymmetry
+from ..solver.mesh.charts import turned_polygons
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_loops, next_corners
@@ -233,9 +234,8 @@ def refined_on_subdivision(
     refined = yield from _refined_in_stages(part, found, uv, fixed, asked, areas_first)
     maps, fine_uv = [], part.mapping.matrix @ refined
     for k, old in enumerate(found.maps):
-        mine = part.chart == k
-        new = refined[part.first[k] : part.first[k + 1]]
-        maps.append(_with_figures(old, new, part.corners[mine], fine_uv[part.mapping.quads[mine]]))
+        mine, own = part.chart == k, slice(part.first[k], part.first[k + 1])
+        maps.append(_with_figures(old, refined[own], part.corners[mine], fine_uv[part.mapping.quads[mine]]))
     error = part.area_error(refined)
     more = (COARSE.format(100 * error, APPLY_LEVEL),) if asked >= AREA_WEIGHT and error > INEXACT else ()
     return replace(found, maps=maps, warnings=(*found.warnings, *more))
@@ -250,8 +250,7 @@ def _refined_in_stages(
     outlines = [boundary_loops(c.disk)[0] + k for c, k in zip(found.charts, part.first, strict=False)]
 
     def stage(start: np.ndarray, weight: float) -> Steps[np.ndarray]:
-        steps = refine_cage(elements, part.mapping.matrix, start, fixed, weight, symmetry, outlines)
-        return (yield from steps).uv
+        return (yield from refine_cage(elements, part.mapping.matrix, start, fixed, weight, symmetry, outlines)).uv
 
     refined, error = uv, np.inf
     while True:
@@ -277,10 +276,8 @@ def _nudged(
         weight *= factor
         new = yield from stage(new, weight)
         before, error = error, part.triangle_error(new)
-        if error <= INEXACT:
-            return new
-        if error >= before:
-            return refined
+        if error <= INEXACT or error >= before:
+            return new if error <= INEXACT else refined
         # Errors fall about evenly with the logarithm of the weight.
         needed = (error - AIM * INEXACT) / (before - error) * np.log(factor)
         factor = float(np.exp(min(needed, MOST_NUDGE)))
@@ -391,7 +388,12 @@ def _mapped_part(
     chart = owner[vertex[start[:-1]]][mapping.polygon]
     mine = whole[fine.subdivision.polygon]
     polygon = fine.subdivision.polygon[mine]
-    return _MappedQuads(fine.corners[mine], polygon, chart, np.ones(len(polygon)), mapping, first)
+    # What looks to the other side than its chart is turned over, as it is there.
+    turned = turned_polygons(found.charts, len(sides))[polygon]
+    order = np.where(turned[:, None], [0, 3, 2, 1], [0, 1, 2, 3])
+    mapping = replace(mapping, quads=np.take_along_axis(mapping.quads, order, axis=1))
+    corners = np.take_along_axis(fine.corners[mine], order[:, :, None], axis=1)
+    return _MappedQuads(corners, polygon, chart, np.ones(len(polygon)), mapping, first)
 
 
 def _with_figures(old: ChartMap, uv: np.ndarray, corners: np.ndarray, mapped: np.ndarray) -> ChartMap:

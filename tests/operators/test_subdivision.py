@@ -95,6 +95,17 @@ def test_areas_that_nearly_come_within_two_percent_do():
     assert steep(0.0) <= 0.02 < steep(0.1)
 
 
+def test_polygons_that_look_to_the_other_side_are_mapped_with_those_around():
+    obj = bump()
+    for k in (9, 27, 28):
+        obj.data.polygons[k].flip()
+    obj.data.update()
+    unwrap()
+    space, uv = applied(obj)
+    assert (uv < 0).sum() == 3 * 32
+    assert np.abs(np.abs(uv) / np.abs(uv).sum() - space / space.sum()).sum() < 0.02
+
+
 def test_without_the_modifier_the_box_does_nothing():
     obj = scenes.bump(columns=8, rows=8)
     unwrap()

@@ -44,6 +44,18 @@ class Chart:
         return np.concatenate([self.triangles, self.patches]) if len(self.patches) else self.triangles
 
 
+def turned_polygons(charts: Sequence[Chart], count: int) -> np.ndarray:
+    """Which of `count` polygons have their corners in the opposite order in the triangles of their charts: (f,) bool.
+
+    Those look to the other side than what is around them.
+    """
+    turned = np.zeros(count, bool)
+    for chart in charts:
+        backward = (chart.corners > np.roll(chart.corners, -1, axis=1)).sum(axis=1) == 2
+        turned[chart.faces[backward]] = True
+    return turned
+
+
 def strict_charts(surface: Surface, faces: np.ndarray | None = None) -> list[Chart]:
     """Charts of the polygons `faces` (f,) bool (all by default), each a topological disk.
 
