@@ -199,8 +199,7 @@ def bound_shear(
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts;
     crossing : refines a map so that it may lie on itself; charts that then keep the bound are parted where they do.
-    Progress offers an early end: with the maps of the last round. Errors are those of `disk_charts.disk_charts` and of
-    `map_charts`.
+    Progress offers an early end: with the maps of the last round. Errors: see `disk_charts.disk_charts`, `map_charts`.
     """
     early = EarlyEnd()
     best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
@@ -246,8 +245,7 @@ def bound_shear(
         if mapped is None:
             break
         new = _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
-        last, failed = last.with_what_is_better(search, new)
-        worse |= failed
+        last, worse = last.with_what_is_better(search, new, worse)
     best = last if last.excess <= best.excess else best
     return best.result(search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
 
@@ -287,9 +285,11 @@ class _Round:
         """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
         return float(self.missing.sum() / self.area.sum())
 
-    def with_what_is_better(self, search: ShearSearch, new: _Round) -> tuple[_Round, set[tuple[bytes, bytes]]]:
+    def with_what_is_better(
+        self, search: ShearSearch, new: _Round, worse: set[tuple[bytes, bytes]]
+    ) -> tuple[_Round, set[tuple[bytes, bytes]]]:
         """The new round made of this one, but for charts that became worse while others became better, which are as
-        they are here; and the identities of these."""
+        they are here; and the identities `worse` with those of these."""
         region = np.full(search.count, -1)
         for k, chart in enumerate(self.charts):
             region[chart.faces] = k
@@ -297,7 +297,7 @@ class _Round:
         now = np.bincount(of, new.missing, len(self.charts))
         stay = now > self.missing + NO_EXCESS * self.area
         if not stay.any() or (stay | (now >= self.missing))[self.searched].all():
-            return new, set()
+            return new, worse
         charts = [*itertools.compress(self.charts, stay), *itertools.compress(new.charts, ~stay[of])]
         maps = [*itertools.compress(self.maps, stay), *itertools.compress(new.maps, ~stay[of])]
         edges = np.unique(np.concatenate([self.cuts.edges, new.cuts.edges]), axis=0)
@@ -306,7 +306,7 @@ class _Round:
         memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
         memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
         merged = _Round.of(search, charts, maps, _joined(search, self.cuts, edges), memory)
-        return merged, {identity(self.charts[k]) for k in np.flatnonzero(stay)}
+        return merged, worse | {identity(chart) for chart in itertools.compress(self.charts, stay)}
 
     @property
     def missing(self) -> np.ndarray:

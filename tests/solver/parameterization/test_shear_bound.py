@@ -288,7 +288,7 @@ def test_what_became_worse_stays_where_others_became_better():
     before = made_round(search, across[:1], (1.6, 1.6, 1.1), "old")
     new = made_round(search, np.concatenate([across, across + n]), (1.9, 1.9, 1.3, 1.1, 1.1), "new")
     assert [len(r.searched) for r in (before, new)] == [2, 3]
-    merged, worse = before.with_what_is_better(search, new)
+    merged, worse = before.with_what_is_better(search, new, {(b"", b"")})
     assert merged.excess < min(before.excess, new.excess)
     found = [[int(k) for k in chart.faces] for chart in merged.charts]
     assert sorted(np.concatenate(found).tolist()) == list(range(3 * len(F))) and sorted(map(len, found)) == [
@@ -301,11 +301,11 @@ def test_what_became_worse_stays_where_others_became_better():
         tuple(sorted(edge)) for edge in np.concatenate([across[:1], across + n]).tolist()
     }
     assert {name: found.found for name, found in merged.memory.items()} == {b"first": "old", b"second": "new"}
-    assert worse == {identity(before.charts[0])}
+    assert worse == {(b"", b""), identity(before.charts[0])}
     # Where all of it became worse, or nothing did, there is nothing to choose.
-    assert new.with_what_is_better(search, new) == (new, set())
+    assert new.with_what_is_better(search, new, set()) == (new, set())
     bad = made_round(search, before.cuts.edges, (1.9, 1.9, 1.1), "bad")
-    assert before.with_what_is_better(search, bad) == (bad, set())
+    assert before.with_what_is_better(search, bad, set()) == (bad, set())
 
 
 def made_round(search, edges, shear, found):
