@@ -21,6 +21,7 @@ from ..errors import (
     SeveralComponentsError,
     plural,
 )
+from .geometry import bounding_box
 from .repair import faces_without_area, perturbed
 from .topology import graph_components, halfedges, next_halfedge, pair_keys, paired
 
@@ -56,10 +57,9 @@ def closed_surface(vertices: np.ndarray, triangles: np.ndarray, polygons: np.nda
     _check_edges(triangles)
     _check_components(triangles, len(vertices))
     _check_genus(triangles)
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    # Halves first: the difference of two huge numbers may be infinite.
-    extent = 2 * float((high / 2 - low / 2).max()) or 1.0
-    given = (vertices - (low / 2 + high / 2)) / extent
+    middle, extent = bounding_box(vertices)
+    extent = extent or 1.0
+    given = (vertices - middle) / extent
     sound, moved = perturbed(given, triangles, 1.0)
     warnings: tuple[str, ...] = ()
     faces = np.arange(len(triangles)) if polygons is None else polygons

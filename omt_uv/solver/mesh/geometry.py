@@ -51,6 +51,17 @@ def places(points: np.ndarray) -> np.ndarray:
     return np.unique(points + 0.0, axis=0, return_inverse=True)[1].ravel()
 
 
+def bounding_box(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Middle (3,) and greatest extent of the bounding box of points (n,3).
+
+    >>> bounding_box(np.array([[0.0, 0.0, 0.0], [2.0, 4.0, 1.0]]))
+    (array([1. , 2. , 0.5]), 4.0)
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    # Halves first: the difference of two huge numbers may be infinite.
+    return low / 2 + high / 2, 2 * float((high / 2 - low / 2).max())
+
+
 def edge_lengths(positions: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Length (k,) of every edge (k,2) between positions (n,2) or (n,3)."""
     return np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)

@@ -14,7 +14,7 @@ from ..canonical.markers import ChartMarkers
 from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, plural, positive_density
 from ..maps.distortion import RATIO_FLOOR, Distortion, distortion, face_distortion
 from ..mesh.charts import Chart
-from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.geometry import bounding_box, face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_areas
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
@@ -439,7 +439,5 @@ def _about_zero(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def in_unit_box(positions: np.ndarray) -> tuple[np.ndarray, float]:
     """Positions (n,3) moved to 0 and divided by their extent, so that no unit over- or underflows; the extent."""
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    # Halves first: the difference of two huge numbers may be infinite.
-    extent = 2 * float((high / 2 - low / 2).max())
-    return (positions - (low / 2 + high / 2)) / extent, extent
+    middle, extent = bounding_box(positions)
+    return (positions - middle) / extent, extent

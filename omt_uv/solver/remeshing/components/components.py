@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import MERGING, OrientationError, ZeroAreaFaceError, plural
 from ...mesh.charts import Chart, charts_of
-from ...mesh.geometry import face_areas
+from ...mesh.geometry import bounding_box, face_areas
 from ...mesh.gluing import orientations, turn_over
 from ...mesh.repair import repaired_gluing
 from ...mesh.surface import chosen_triangles, triangle_surface
@@ -111,11 +111,8 @@ def split_components(vertices: np.ndarray, triangles: np.ndarray, features: np.n
     joined = join_coincident(vertices, triangles)
     surface = triangle_surface(vertices, joined.triangles)
     faces, corners, owner = chosen_triangles(surface, None)
-    used = surface.positions[np.unique(surface.corner_vertex)]
-    low, high = used.min(axis=0), used.max(axis=0)
-    # Halves first: the difference of two huge numbers may be infinite.
-    size = 2 * float((high / 2 - low / 2).max()) or 1.0
-    centre = low / 2 + high / 2
+    centre, extent = bounding_box(surface.positions[np.unique(surface.corner_vertex)])
+    size = extent or 1.0
     boxed = surface.positions / size - centre / size
     area = face_areas(boxed, surface.corner_vertex[corners])
     if not area.sum() > 1e-20:

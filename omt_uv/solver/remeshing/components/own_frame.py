@@ -14,6 +14,7 @@ import numpy as np
 
 from ...analysis.order_of_places import lowest_first, order_of_places, own_axes
 from ...errors import MeshError
+from ...mesh.geometry import bounding_box
 
 # Places are multiples of this share of the extent: more than what turning and moving a mesh rounds, far less than the
 # last digit of single precision.
@@ -83,11 +84,11 @@ def in_own_frame(vertices: np.ndarray, triangles: np.ndarray, features: np.ndarr
         return _as_given(vertices, triangles, features, used)
     order = order_of_places(points, triangles)
     place, used, points = np.argsort(order), used[order], points[order]
-    box_centre, box_size = _box(points)
+    box_centre, box_size = bounding_box(points)
     axes = own_axes(points)
     axes = np.eye(3) if axes is None else axes
     turned = _turned(points / box_size - box_centre / box_size, axes)
-    centre, size = _box(turned)
+    centre, size = bounding_box(turned)
     triangles, turn = lowest_first(place[triangles])
     rows = np.lexsort(triangles.T[::-1])
     return OwnFrame(
@@ -134,10 +135,3 @@ def _numbered(pairs: np.ndarray, used: np.ndarray) -> np.ndarray:
 def _turned(points: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Points (n,3) along axes (3,3); what is in one place stays so, as it would not in products of matrices."""
     return points[:, :1] * axes[0] + points[:, 1:2] * axes[1] + points[:, 2:] * axes[2]
-
-
-def _box(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Middle (3,) and greatest extent of the bounding box of points (n,3)."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    # Halves first: the difference of two huge numbers may be infinite.
-    return low / 2 + high / 2, 2 * float((high / 2 - low / 2).max())
