@@ -234,10 +234,6 @@ def _as_chart_map(refinement: Refinement, mirror: np.ndarray) -> ChartMap:
     """A refinement as the map of a chart, to refine it further."""
     return ChartMap(
         uv=refinement.uv * mirror,
-        newton_conformal=None,
-        residual_conformal=None,
-        newton_transport=None,
-        residual_transport=None,
         newton_refinement=refinement.iterations,
         residual_refinement=refinement.residual,
         status=refinement.status,
@@ -245,8 +241,6 @@ def _as_chart_map(refinement: Refinement, mirror: np.ndarray) -> ChartMap:
         area_sd=0.0,
         angle_mean=0.0,
         folds=0,
-        warnings=(),
-        seconds={},
         area_weight=refinement.area_weight,
     )
 

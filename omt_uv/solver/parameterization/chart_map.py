@@ -5,7 +5,7 @@ Each stage may be replaced by a milder one where its mathematics leaves double p
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -58,7 +58,7 @@ NO_ROOM = 1e-7
 FOLDED = "faces are folded or without area in the map"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ChartMap:
     """Texture coordinates of one chart.
 
@@ -76,19 +76,19 @@ class ChartMap:
     """
 
     uv: np.ndarray
-    newton_conformal: int | None
-    residual_conformal: float | None
-    newton_transport: int | None
-    residual_transport: float | None
-    newton_refinement: int
-    residual_refinement: float
-    status: str
+    newton_conformal: int | None = None
+    residual_conformal: float | None = None
+    newton_transport: int | None = None
+    residual_transport: float | None = None
+    newton_refinement: int = 0
+    residual_refinement: float = 0.0
+    status: str = ""
     area_l1: float
     area_sd: float
     angle_mean: float
     folds: int
-    warnings: tuple[str, ...]
-    seconds: dict[str, float]
+    warnings: tuple[str, ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
     pinned: bool = False
     area_weight: float = 0.0
     failure: MeshError | None = None
@@ -219,19 +219,11 @@ def no_map(chart: Chart, failure: MeshError) -> ChartMap:
     """What stands for the map of a chart that has none in double precision, until it is cut further."""
     return ChartMap(
         uv=np.zeros((len(chart.vertices), 2)),
-        newton_conformal=None,
-        residual_conformal=None,
-        newton_transport=None,
-        residual_transport=None,
-        newton_refinement=0,
-        residual_refinement=0.0,
         status="failed",
         area_l1=np.inf,
         area_sd=np.inf,
         angle_mean=np.inf,
         folds=len(np.unique(chart.faces)),
-        warnings=(),
-        seconds={},
         failure=failure,
     )
 
@@ -254,9 +246,6 @@ def _stages(uv: np.ndarray, conformal, cells, figures: Distortion, log: RunLog, 
         residual_conformal=conformal.residual if conformal else None,
         newton_transport=cells.iterations if cells else None,
         residual_transport=cells.residual if cells else None,
-        newton_refinement=0,
-        residual_refinement=0.0,
-        status="",
         area_l1=figures.area_l1,
         area_sd=figures.area_sd,
         angle_mean=figures.angle_mean,

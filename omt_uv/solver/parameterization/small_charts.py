@@ -104,10 +104,6 @@ def _side_by_side(targets: list[Target | None]) -> dict:
 def _of_many(maps: BatchMaps, k: int, uv: np.ndarray, seconds: float) -> ChartMap:
     return ChartMap(
         uv=uv,
-        newton_conformal=None,
-        residual_conformal=None,
-        newton_transport=None,
-        residual_transport=None,
         newton_refinement=int(maps.steps[k]),
         residual_refinement=float(maps.residual[k]),
         status="converged",
@@ -115,7 +111,6 @@ def _of_many(maps: BatchMaps, k: int, uv: np.ndarray, seconds: float) -> ChartMa
         area_sd=float(maps.area_sd[k]),
         angle_mean=float(maps.angle_mean[k]),
         folds=0,
-        warnings=(),
         seconds={"refinement": seconds},
         area_weight=float(maps.area_weight[k]),
     )
