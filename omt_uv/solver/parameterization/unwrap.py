@@ -25,6 +25,7 @@ from ..mesh.topology import on_boundary, pair_keys
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import PROMISED, QUALITIES
 from ..refinement.initial_maps import NEARLY_FLAT, inner_curvature
+from ..seams.options import COMPACT
 from .chart_indices import chart_target, cut_as_given, in_order_of_places, is_marked, located, outline
 from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, map_chart, measured_map, no_map, refined_again
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
@@ -45,9 +46,7 @@ from .small_charts import is_small, map_together
 CUTTING = 0.15
 MAPPING = 0.7
 
-# Charts that are no longer than a square of the whole area by so many times stay in one piece, and of bodies with limbs
-# those that are not that share of the whole.
-COMPACT = 1.4
+# Of bodies with limbs, charts that are not this share of the whole stay in one piece.
 MOSTLY = 0.5
 
 # Charts and their maps.

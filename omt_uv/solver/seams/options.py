@@ -10,6 +10,8 @@ COARSE_VERTICES = 1200
 TRIALS = 3
 # The spread that cuts leave goes with this power of the square of log(shear) that maps have.
 SPREAD_BY_SHEAR = 1.7
+# What is no longer than a square of the whole area by so many times stays in one piece.
+COMPACT = 1.4
 # Arcs that one component gets at most.
 MOST_ARCS = 160
 

@@ -17,6 +17,7 @@ from ..maps.overlap import cover_pairs
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths, face_areas, unit
 from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up, paired
+from .options import COMPACT
 from .path_graph import path_to
 
 # Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
@@ -42,9 +43,8 @@ LEAST_SIDE = 0.05
 MOSTLY = 0.4
 # A chart that is longer than a square of the whole area by so many times, if its width is at most that share of its
 # length or whatever it is, is a band, cut across in so many times as long pieces, at most so many. A narrow one with
-# less than this share of the area is one earlier: all others would be small for its sake.
+# less than this share of the area is one from COMPACT on: all others would be small for its sake.
 LONG_AND_NARROW = 1.8
-LONG_AND_SMALL = 1.4
 SMALL = 0.4
 NARROW = 1 / 3
 LONG = 3.0
@@ -218,7 +218,7 @@ def pieces_of_band(uv: np.ndarray, side: float, share: float = 1.0) -> int:
     fills a share: 1 where it is no band."""
     centred = uv - uv.mean(axis=0)
     width, length = np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
-    narrow = LONG_AND_SMALL if share < SMALL else LONG_AND_NARROW
+    narrow = COMPACT if share < SMALL else LONG_AND_NARROW
     longest = (narrow if width <= NARROW * length else LONG) * side
     return min(int(np.ceil(length / (PIECE * side))), MOST_PIECES) if length > longest else 1
 
