@@ -233,14 +233,9 @@ def operated(folder):
     """What an operator leaves, with some objects selected."""
 
     def made(name, objects, arguments):
-        bpy.ops.wm.open_mainfile(filepath=str(folder / "rich.blend"))
-        scenes.select([bpy.data.objects[obj] for obj in objects.split()])
-        module, operator = name.split(".")
-        try:
-            assert getattr(getattr(bpy.ops, module), operator)(**arguments) == {"FINISHED"}
-        except RuntimeError as error:
-            return {"refused": str(error)}
-        return twin_scenes.left()
+        twin_scenes.begin(folder, objects)
+        why = twin_scenes.refusal(name, arguments)
+        return twin_scenes.left() if why is None else {"refused": why}
 
     return made
 

@@ -98,15 +98,12 @@ def at(folder):
     """What an operator leaves with arguments, or why it left nothing."""
 
     def made(name, objects, arguments):
-        bpy.ops.wm.open_mainfile(filepath=str(folder / "rich.blend"))
-        scenes.select([bpy.data.objects[obj] for obj in objects.split()])
-        module, verb = name.split(".")
+        twin_scenes.begin(folder, objects)
         before = twin_scenes.left()
-        try:
-            assert getattr(getattr(bpy.ops, module), verb)(**arguments) == {"FINISHED"}
-        except RuntimeError as error:
+        why = twin_scenes.refusal(name, arguments)
+        if why is not None:
             assert twin_scenes.left() == before, "refused, and something is changed"
-            return str(error)
+            return why
         for obj in (o for o in bpy.data.objects if o.type == "MESH"):
             points = np.array([v.co[:] for v in obj.data.vertices])
             assert np.isfinite(points).all(), obj.name

@@ -124,6 +124,22 @@ def prepare(folder: Path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "rich.blend"))
 
 
+def begin(folder: Path, objects: str) -> None:
+    """Open rich.blend with some objects selected."""
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "rich.blend"))
+    scenes.select([bpy.data.objects[obj] for obj in objects.split()])
+
+
+def refusal(name: str, arguments: dict) -> str | None:
+    """Run an operator: why it refused, None where it did not."""
+    module, operator = name.split(".")
+    try:
+        assert getattr(getattr(bpy.ops, module), operator)(**arguments) == {"FINISHED"}
+    except RuntimeError as error:
+        return str(error)
+    return None
+
+
 def left() -> dict:
     """Everything about the mesh objects of the file that is open, and its images."""
     found = {image.name: {"size": tuple(image.size), "pixels": _pixels(image)} for image in bpy.data.images}
