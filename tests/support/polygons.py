@@ -38,3 +38,17 @@ def wavy_mixed(columns=6, rows=5):
         points += list(np.column_stack([i + 0.45 * np.cos(angle), j + 0.45 * np.sin(angle)]) / columns)
     surface, uv = wavy(np.array(points))
     return surface, polygons, uv
+
+
+def slit_across(count: int = 6):
+    """Quads of a strip of 7 x `count` on a bump, those in the middle across the plane x = 0. The first two of these
+    hang on the right alone; their corners to the left are the last three vertices."""
+    x, y = np.meshgrid(np.arange(8) - 3.5, np.arange(count + 1.0), indexing="ij")
+    V = np.stack([x, y, np.exp(-(x**2) / 8)], axis=-1).reshape(-1, 3)
+    corner = ((count + 1) * np.arange(7)[:, None] + np.arange(count)).ravel()
+    Q = np.column_stack([corner, corner + count + 1, corner + count + 2, corner + 1])
+    n, first = len(V), 3 * count
+    V = np.concatenate([V, V[3 * (count + 1) + np.arange(3)]])
+    Q[first, [0, 3]] = n, n + 1
+    Q[first + 1, [0, 3]] = n + 1, n + 2
+    return V, Q

@@ -1,8 +1,8 @@
 """Find the mirror image of a mesh in itself, by matching polygons across candidate planes.
 
 Vertices of a chart that was cut open lie on one another along its seams, so positions alone do not tell a vertex from
-its neighbour across the seam. Polygons do: the centre of each has one place. A plane is kept if it takes every polygon
-to a polygon and, corner by corner, every vertex to one vertex.
+its neighbour across the seam. Polygons do: the centre of each has one place, and of two in one place their neighbours
+tell. A plane is kept if it takes every polygon to a polygon and, corner by corner, every vertex to one vertex.
 """
 
 from __future__ import annotations
@@ -72,6 +72,44 @@ def find_mirror(
     return None
 
 
+@dataclass(frozen=True)
+class PartialMirror:
+    """A reflection that takes every polygon of a mesh to one, and most of them corner by corner.
+
+    image (n,) : of every vertex, -1 for those that only polygons across the plane have; own (m,) bool : triangles of
+    polygons that it takes to themselves; reflected (n,3) : the mirror images of the positions
+    """
+
+    image: np.ndarray
+    own: np.ndarray
+    reflected: np.ndarray
+
+
+def partial_mirror(positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray) -> PartialMirror | None:
+    """The first mirror of a mesh (n,3), (m,3), with polygons faces (m,), but for what lies across its plane; or None.
+
+    Polygons across a plane are their own images in space. Where a cut goes around them, they hang on one side, and on
+    the other side there is none. See `find_mirror`, which finds a mirror of all.
+    """
+    low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
+    extent = float((high - low).max())
+    if not (extent > 0 and np.isfinite(extent)):
+        return None
+    polygons = _Polygons((positions / 2 - low) / extent, triangles, faces)
+    number = np.unique(faces, return_inverse=True)[1]
+    # Vertices along the cut are not symmetric; the centres of polygons are.
+    for normal in _candidates(polygons.centres, np.arange(len(polygons.centres))):
+        other = polygons.images_of_polygons(normal)
+        if other is None:
+            continue
+        own = other == np.arange(len(other))
+        image = polygons.images_of_corners(other, normal, ~own) if own.sum() <= FEW * len(own) else None
+        if image is not None:
+            points = _reflected(polygons.points, normal) + polygons.middle
+            return PartialMirror(image, own[number], 2 * (points * extent + low))
+    return None
+
+
 class _Polygons:
     """Corners (c,) of polygons, by polygon, and trees to find polygons and their corners by place."""
 
@@ -80,39 +118,83 @@ class _Polygons:
         pairs = np.unique(np.repeat(faces, 3).astype(np.int64) * len(positions) + triangles.ravel())
         self.polygon, self.vertex = pairs // len(positions), pairs % len(positions)
         self.sides = np.bincount(self.polygon)
-        self.points = positions - positions.mean(axis=0)
         self.extent = float(np.ptp(positions, axis=0).max())
-        corner = self.points[self.vertex]
-        sums = [np.bincount(self.polygon, corner[:, k]) for k in range(3)]
-        self.centres = np.stack(sums, axis=1) / self.sides[:, None]
+        sums = [np.bincount(self.polygon, positions[self.vertex, k]) for k in range(3)]
+        centres = np.stack(sums, axis=1) / self.sides[:, None]
+        self.middle = centres.mean(axis=0)
+        self.points, self.centres = positions - self.middle, centres - self.middle
         self.centre_tree = cKDTree(self.centres)
-        self._corner = corner
         self.probes = np.random.default_rng(0).permutation(len(self.sides))[:PROBES]
 
     @cached_property
     def corner_tree(self) -> cKDTree:
         """Of all corners: most meshes have no mirror, which their centres tell."""
         # A polygon's number, scaled beyond all distances, keeps its corners apart from those of others.
-        return cKDTree(np.column_stack([self._corner, 2 * self.extent * self.polygon]))
+        return cKDTree(np.column_stack([self.points[self.vertex], 2 * self.extent * self.polygon]))
+
+    @cached_property
+    def twins(self) -> np.ndarray:
+        """The polygon (p,) in the place of each, -1 for most."""
+        own = np.arange(len(self.sides))
+        if len(own) < 2:
+            return np.full(len(own), -1)
+        far, two = self.centre_tree.query(self.centres, k=2)
+        twin = np.where(two[:, 0] == own, two[:, 1], two[:, 0])
+        there = (far[:, 1] <= MIRROR_TOLERANCE * self.extent) & (twin[twin] == own)
+        return np.where(there, twin, -1)
 
     def image(self, normal: np.ndarray) -> np.ndarray | None:
         """The image (n,) of every vertex in the plane through the mean with this normal (3,); None if there is none."""
+        other = self.images_of_polygons(normal)
+        if other is None:
+            return None
+        image = self.images_of_corners(other, normal, np.ones(len(other), bool))
+        if image is None or (image < 0).any() or (image == np.arange(len(image))).all():
+            return None  # the plane of a flat mesh: it moves nothing
+        return image
+
+    def images_of_polygons(self, normal: np.ndarray) -> np.ndarray | None:
+        """The image (p,) of every polygon in the plane through the mean with this normal (3,); None if one has none."""
         if self._matched(self.probes, normal) is None:
             return None
         other = self._matched(np.arange(len(self.sides)), normal)
-        if other is None or (other[other] != np.arange(len(other))).any():
+        if other is None:
             return None
-        corner = _reflected(self.points[self.vertex], normal)
-        far, found = self.corner_tree.query(np.column_stack([corner, 2 * self.extent * other[self.polygon]]))
-        if far.max() > MIRROR_TOLERANCE * self.extent:
+        unsure = self.twins[other] >= 0
+        if unsure.any():
+            other = self._told_apart(other, unsure, normal)
+        return None if (other[other] != np.arange(len(other))).any() else other
+
+    def _told_apart(self, other: np.ndarray, unsure: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """The images (p,) of polygons, of those `unsure` (p,) bool, two in one place, by what is around them."""
+        image = self._found_corners(other, normal, ~unsure)[0]
+        corner = unsure[self.polygon] & (image[self.vertex] >= 0)
+        polygon, to = self.polygon[corner], image[self.vertex[corner]]
+        shared = []
+        for candidate in (other, self.twins[other]):
+            there = np.isin(candidate[polygon] * len(image) + to, self.polygon * len(image) + self.vertex)
+            shared.append(np.bincount(polygon, there, len(other)))
+        return np.where(unsure & (shared[1] > shared[0]), self.twins[other], other)
+
+    def images_of_corners(self, other: np.ndarray, normal: np.ndarray, used: np.ndarray) -> np.ndarray | None:
+        """The image (n,) of every vertex of the polygons `used` (p,) bool, whose images are `other` (p,), -1 for the
+        rest; None where there is no such image."""
+        image, corner, to = self._found_corners(other, normal, used)
+        if corner is None or (image[self.vertex[corner]] != to).any():
             return None
-        image = np.full(len(self.points), -1)
-        image[self.vertex] = self.vertex[found]
-        if (image[self.vertex] != self.vertex[found]).any() or (image[image] != np.arange(len(image))).any():
-            return None
-        if (image == np.arange(len(image))).all():
-            return None  # the plane of a flat mesh: it moves nothing
-        return image
+        known = np.flatnonzero(image >= 0)
+        return None if (image[image[known]] != known).any() else image
+
+    def _found_corners(self, other: np.ndarray, normal: np.ndarray, used: np.ndarray):
+        """An image (n,) of every vertex of the polygons `used` (p,) bool, -1 for the others, their corners (k,), and
+        the vertex (k,) that is the image of each; None for the corners where one is too far."""
+        corner, image = np.flatnonzero(used[self.polygon]), np.full(len(self.points), -1)
+        place = _reflected(self.points[self.vertex[corner]], normal)
+        polygon = other[self.polygon[corner]]
+        far, found = self.corner_tree.query(np.column_stack([place, 2 * self.extent * polygon]))
+        image[self.vertex[corner]] = self.vertex[found]
+        close = far.max(initial=0) <= MIRROR_TOLERANCE * self.extent
+        return image, corner if close else None, self.vertex[found]
 
     def _matched(self, polygons: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
         """The polygons (p,) where the images of `polygons` (p,) lie, None unless each has one of as many sides."""

@@ -12,14 +12,20 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..analysis.density import Target
+from ..canonical.markers import ChartMarkers
 from ..cutting.cuts import Cuts
-from ..mesh.charts import Chart
+from ..errors import MeshError
+from ..mesh.charts import Chart, sound_disks
 from ..mesh.geometry import edge_lengths, signed_areas
-from ..mesh.mirror import Mirror, find_mirror, mirrored_quads
+from ..mesh.mirror import Mirror, find_mirror, mirrored_quads, partial_mirror
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import graph_components, on_boundary, pair_keys
-from .chart_map import ChartMap, in_unit_box, measured_chart
+from ..progress import Steps
+from .chart_map import ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
+from .chart_pins import ChartPins
+from .convex_maps import with_figures
+from .options import MapOptions
 
 # Relative difference of densities of mirror images up to which they are the same.
 SAME_DENSITY = 1e-4
@@ -260,6 +266,67 @@ def as_given(chart: Chart, found: ChartMap, density: np.ndarray | None, goal: fl
     if figures.folds or figures.area_l1 > max(AREA_KEPT * goal, found.area_l1):
         return None
     return replace(found, area_l1=figures.area_l1, area_sd=figures.area_sd, angle_mean=figures.angle_mean)
+
+
+def with_missing_images(chart: Chart) -> Chart | None:
+    """A chart that is its own mirror image but for polygons across the plane, with those images of them that are
+    missing after its own vertices and triangles; None for all others.
+
+    Bodies that are modelled in one half have faces across the plane, and no edges in it: a cut along it goes around
+    them, and they hang on one side.
+    """
+    mirror = None if len(chart.patches) else partial_mirror(chart.vertices, chart.triangles, chart.faces)
+    if mirror is None:
+        return None
+    n, number = len(chart.vertices), np.unique(chart.faces, return_inverse=True)[1]
+    image = mirror.image[chart.triangles]
+    keys = number[:, None] * n + chart.triangles
+    elsewhere = (image >= 0) & ~np.isin(number[:, None] * n + image, keys)
+    rows = np.flatnonzero(mirror.own & (np.bincount(number, elsewhere.any(axis=1)) > 0)[number])
+    if not len(rows) or find_mirror(chart.vertices, chart.triangles, chart.faces) is not None:
+        return None
+    lone = np.unique(chart.triangles[rows][image[rows] < 0])
+    place = mirror.image.copy()
+    place[lone] = n + np.arange(len(lone))
+    if (place[chart.triangles[rows]] < 0).any():
+        return None
+    whole = Chart(
+        np.concatenate([chart.vertices, mirror.reflected[lone]]),
+        np.concatenate([chart.triangles, place[chart.triangles[rows]][:, ::-1]]),
+        np.concatenate([chart.corners, chart.corners[rows][:, ::-1]]),
+        np.concatenate([chart.faces, chart.faces[rows] + int(chart.faces.max()) + 1]),
+        np.concatenate([chart.vertex_ids, np.full(len(lone), -1)]),
+    )
+    return whole if sound_disks([whole])[0] else None
+
+
+def map_completed(
+    chart: Chart,
+    *,
+    options: MapOptions,
+    target: Target | None = None,
+    pins: ChartPins | None = None,
+    markers: ChartMarkers | None = None,
+) -> Steps[ChartMap]:
+    """`map_chart`, with a free boundary of the chart `with_missing_images`: the map is symmetric but for them."""
+    plain = options.boundary == "free" and options.kind == "authalic" and target is None and pins is None
+    whole = with_missing_images(chart) if plain else None
+    if whole is not None:
+        try:
+            found = yield from map_chart(whole, options=options, markers=markers)
+            if not found.folds:
+                return _without_images(chart, found)
+        except MeshError:
+            pass  # the chart alone has the error, too, and says where
+    return (yield from map_chart(chart, options=options, target=target, pins=pins, markers=markers))
+
+
+def _without_images(chart: Chart, found: ChartMap) -> ChartMap:
+    """The map of a chart from one of it `with_missing_images`."""
+    vertices, unit = in_unit_box(chart.vertices)
+    uv = found.uv[: len(vertices)] / unit
+    figures = measured_chart(vertices, chart, uv, None)
+    return with_figures(found, placed_chart(uv, vertices, chart, None, unit, None, True), figures)
 
 
 def _same_targets(charts, targets, j: int, k: int, image: np.ndarray) -> bool:

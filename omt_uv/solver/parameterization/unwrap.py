@@ -27,12 +27,13 @@ from ..refinement.continuation_rules import PROMISED, QUALITIES
 from ..refinement.initial_maps import NEARLY_FLAT, inner_curvature
 from ..seams.options import COMPACT
 from .chart_indices import chart_target, cut_as_given, in_order_of_places, is_marked, located, outline
-from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, map_chart, measured_map, no_map, refined_again
+from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, measured_map, no_map, refined_again
 from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons, with_figures, with_folds_counted
 from .mirrored_charts import (
     as_given,
     equal_chart_map,
+    map_completed,
     mirror_partners,
     mirrored_map,
     with_images,
@@ -349,7 +350,7 @@ class _Task:
         marked = markers_of_chart(self.markers, chart)
         try:
             given: dict[str, Any] = {"options": self.options, "target": target, "pins": pins, "markers": marked}
-            return (yield from map_chart(chart, **given))
+            return (yield from map_completed(chart, **given))
         except MeshError as error:
             failure = located(error, chart)
             if self.cut_anew and pins is None and isinstance(error, WITHOUT_MAP):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import meshes
 import numpy as np
 import pytest
+from polygons import slit_across
 
-from omt_uv.solver.mesh.mirror import find_mirror, mirrored_quads
+from omt_uv.solver.mesh.mirror import find_mirror, mirrored_quads, partial_mirror
 
 
 def bump(count=8):
@@ -89,3 +90,15 @@ def test_triangles_cut_along_other_diagonals_than_their_images_are_found():
     assert len(pairs) == 6 and (faces[pairs[:, 0]] == faces[pairs[:, 1]]).all()
     assert not len(mirrored_quads(turned(V, 1), cut(Q, x > 0)[0]))
     assert not len(mirrored_quads(turned(V, 1) + 0.01 * np.sin(V), T))
+
+
+def test_what_hangs_on_one_side_of_the_plane_has_no_image_but_its_own():
+    V, Q = slit_across()
+    T, faces = cut(Q, np.zeros(len(Q), bool))
+    assert find_mirror(V, T, faces) is None
+    found = partial_mirror(V, T, faces)
+    np.testing.assert_array_equal(np.flatnonzero(found.image < 0), len(V) - 3 + np.arange(3))
+    known = np.flatnonzero(found.image >= 0)
+    np.testing.assert_allclose(V[found.image[known]], found.reflected[known], atol=1e-9)
+    np.testing.assert_allclose(found.reflected, V * [-1, 1, 1], atol=1e-9)
+    np.testing.assert_array_equal(np.unique(faces[found.own]), np.arange(18, 24))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import meshes
 import numpy as np
 import pytest
-from polygons import wavy_quads
+from polygons import slit_across, wavy_quads
 from sphere_shapes import random_rotation
 
 from omt_uv.solver.analysis.density import Target
@@ -13,10 +13,15 @@ from omt_uv.solver.analysis.facing import SceneAxes
 from omt_uv.solver.cutting.cuts import Cuts
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import edge_lengths, signed_areas
-from omt_uv.solver.mesh.mirror import find_mirror
+from omt_uv.solver.mesh.mirror import find_mirror, partial_mirror
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import unwrap as unwrap_module
-from omt_uv.solver.parameterization.mirrored_charts import images_of_cuts, motion_between, with_images
+from omt_uv.solver.parameterization.mirrored_charts import (
+    images_of_cuts,
+    motion_between,
+    with_images,
+    with_missing_images,
+)
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import predicted_cuts, unwrap
 from omt_uv.solver.progress import drain
@@ -85,10 +90,10 @@ def test_equal_charts_are_solved_once(monkeypatch):
 
     def counted(chart, **given):
         solved.append(chart)
-        return map_chart(chart, **given)
+        return map_completed(chart, **given)
 
-    map_chart = unwrap_module.map_chart
-    monkeypatch.setattr(unwrap_module, "map_chart", counted)
+    map_completed = unwrap_module.map_completed
+    monkeypatch.setattr(unwrap_module, "map_completed", counted)
     surface, charts = charts_of(body, moved(*body, 1), moved(*body, 2, mirrored=True), moved(body[0] * 1.1, body[1], 3))
     found = drain(unwrap(surface, options=DRAFT))
     assert len(charts) == 4 and len(solved) == 2
@@ -180,3 +185,31 @@ def test_cuts_get_their_images_and_the_length_of_both():
     for edges, count in ((slit, 4), (np.concatenate([slit, [[at(4, 2), at(3, 2)]]]), 4)):
         found = with_images(surface, None, Cuts(edges, float(edge_lengths(V, edges).sum()), (), edges[:0], ()))
         assert len(found.edges) == count and found.length == pytest.approx(edge_lengths(V, found.edges).sum())
+
+
+def test_what_hangs_on_one_side_of_the_plane_leaves_the_rest_symmetric():
+    V, Q = slit_across()
+    surface = meshes.polygon_surface(V, Q.tolist(), [])
+    (chart,) = strict_charts(surface)
+    n, whole = len(chart.vertices), with_missing_images(chart)
+    assert whole is not None and find_mirror(whole.vertices, whole.triangles, whole.faces) is not None
+    # What there is comes first, as it was; its images have vertices of their own, and nothing else lies there.
+    np.testing.assert_array_equal(whole.vertices[:n], chart.vertices)
+    np.testing.assert_array_equal(whole.triangles[: len(chart.triangles)], chart.triangles)
+    assert len(whole.vertices) == n + 3 and len(whole.triangles) == len(chart.triangles) + 4
+    found = drain(unwrap(surface, options=UnwrapOptions()))
+    (one,), uv = found.charts, found.maps[0].uv
+    mirror = partial_mirror(one.vertices, one.triangles, one.faces)
+    known = np.flatnonzero(mirror.image >= 0)
+    z, image = uv[known] @ [1, 1j], uv[mirror.image[known]] @ [1, 1j]
+    # A reflection in the map, too: |z_j - z_k| is that of the images, for all pairs.
+    far, as_far = (np.abs(w[:, None] - w) for w in (z, image))
+    assert np.abs(far - as_far).max() <= 1e-6 * far.max()
+    assert found.maps[0].folds == 0
+
+
+def test_charts_with_a_mirror_of_all_or_of_nothing_miss_no_images():
+    V, Q = slit_across()
+    for body in (wavy_quads()[:2], (V + 0.05 * np.sin(5 * V + 1), Q.tolist())):
+        (chart,) = strict_charts(meshes.polygon_surface(*body, []))
+        assert with_missing_images(chart) is None

@@ -135,7 +135,7 @@ def test_a_hose_with_a_marked_cap_is_cut_along_where_it_has_no_map_otherwise():
 def test_what_has_no_map_with_any_seams_says_why(monkeypatch):
     V, F = meshes.cap(rings=6, sectors=12)
     wrong = FoldedUVError("Nothing helps", kind="face", elements=np.arange(2))
-    monkeypatch.setattr(unwrap_module, "map_chart", lambda *args, **options: failing(wrong))
+    monkeypatch.setattr(unwrap_module, "map_completed", lambda *args, **options: failing(wrong))
     with pytest.raises(FoldedUVError, match="Nothing helps"):
         unwrapped(triangle_surface(V, F), 1.35)
 
