@@ -34,6 +34,9 @@ OVERLAP = 2
 MOST_NEIGHBOURS = 100
 # Iterations at most; the equations are factored where these are not enough.
 MOST = 100
+# Parts whose equations are factored by one call. SuperLU asks for several times the memory that it fills: of large arrays
+# what is not touched is never taken, and all is given back, where those of one part leave holes between each other.
+TOGETHER = 32
 # Added to the diagonal of the coarse equations, relative to its greatest entry: a part may have hardly a free vertex.
 SHIFT = 1e-12
 
@@ -82,16 +85,19 @@ class AdditiveSchwarz:
                 return x
         place = np.full(len(b), -1, np.int64)
         self._order(matrix, place)
-        factors = [_part_factor(_block(matrix, d, place)) for d in self._unknowns]
+        # First, while there are no other factors: the product takes as much memory as they do.
         spread = self._affine(w, axes)
         gather = spread.T
         coarse = (gather @ (matrix @ spread)).tocsc()
         coarse = Factor(coarse + SHIFT * coarse.diagonal().max() * sp.identity(coarse.shape[0]))
+        factors = self._factors(matrix, place)
 
         def precondition(r):
             x = spread @ coarse.solve(gather @ r)
-            for d, factor in zip(self._unknowns, factors, strict=True):
-                x[d] += factor.solve(r[d])
+            for parts, factor in factors:
+                y = factor.solve(r[np.concatenate(parts)])
+                for d, of_part in zip(parts, np.split(y, np.cumsum([len(d) for d in parts])[:-1]), strict=True):
+                    x[d] += of_part
             return x
 
         self._kept = precondition if self._keep else None
@@ -108,6 +114,18 @@ class AdditiveSchwarz:
             self._unknowns[k] = d.reshape(-1, 2)[vertices].ravel()
         self._ordered = True
 
+    def _factors(self, matrix: sp.csr_matrix, place: np.ndarray) -> list[tuple[list[np.ndarray], Factor]]:
+        """The unknowns of some parts each, and the factors of their equations one after the other."""
+        found = []
+        for k in range(0, self._count, TOGETHER):
+            parts = self._unknowns[k : k + TOGETHER]
+            blocks = [_block(matrix, d, place) for d in parts]
+            try:
+                found.append((parts, Factor(sp.block_diag(blocks, format="csc"), "natural", single=True)))
+            except PrecisionError:
+                found += [([d], _part_factor(block)) for d, block in zip(parts, blocks, strict=True)]
+        return found
+
     def _affine(self, w, axes) -> sp.csr_matrix:
         """The affine motions of every part, (2n, 6 parts)."""
         part, count = self._part, self._count
@@ -120,7 +138,7 @@ class AdditiveSchwarz:
         for k, motion in enumerate((np.ones(len(z)), z, z.conj())):
             for turn in range(2):
                 entries[:, :, k + 3 * turn] = (along * (1j**turn * motion)[:, None]).real
-        columns = (6 * np.repeat(part, 2)[:, None] + np.arange(6)).astype(np.int32)
+        columns = 6 * np.repeat(part.astype(np.int32), 2)[:, None] + np.arange(6, dtype=np.int32)
         n = len(columns)
         return sp.csr_matrix((entries.ravel(), columns.ravel(), 6 * np.arange(n + 1)), shape=(n, 6 * count))
 
