@@ -63,7 +63,7 @@ def with_convex_polygons(
         chart, old = given[k], maps[k]
         (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
         figures = measured_chart(vertices, chart, flat, density[k])
-        if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and not figures.folds:
+        if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and figures.folds <= old.folds:
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
             new[k] = with_figures(old, uv, figures)

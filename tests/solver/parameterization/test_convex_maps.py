@@ -61,6 +61,22 @@ def test_pins_stay_to_the_bit():
     np.testing.assert_array_equal(found.uv[at], chart_map.uv[at])
 
 
+def test_what_stays_folded_does_not_keep_the_rest_from_being_opened():
+    surface, chart, chart_map = darts()
+    uv = chart_map.uv.copy()
+    uv[np.isin(chart.vertex_ids, [40])] += [0.18, 0.0]
+    around = np.flatnonzero(np.isin(chart.vertex_ids, [32, 33, 34, 39, 40, 41, 46, 47, 48]))
+    pins = ChartPins(around, uv[around], uv[chart.triangles])
+    folds = np.unique(chart.faces[signed_areas(uv, chart.triangles) <= 0]).size
+    (found,) = drain(
+        with_convex_polygons(
+            surface, [chart], [replace(chart_map, uv=uv, folds=folds, area_l1=0.3)], [pins], MapOptions()
+        )
+    )
+    assert 0 < found.folds <= folds
+    assert 0 < reflex(surface, chart, found.uv) < reflex(surface, chart, uv)
+
+
 def test_triangles_are_left_alone():
     surface = meshes.polygon_surface(*meshes.grid(3, 3))
     (chart,) = strict_charts(surface)
