@@ -34,8 +34,8 @@ OVERLAP = 2
 MOST_NEIGHBOURS = 100
 # Iterations at most; the equations are factored where these are not enough.
 MOST = 100
-# Parts whose equations are factored by one call. SuperLU asks for several times the memory that it fills: of large arrays
-# what is not touched is never taken, and all is given back, where those of one part leave holes between each other.
+# Parts whose equations are factored by one call. SuperLU asks for several times the memory that it fills: of large
+# arrays what is not touched is never taken, and all is given back, where those of single parts leave holes.
 TOGETHER = 32
 # Added to the diagonal of the coarse equations, relative to its greatest entry: a part may have hardly a free vertex.
 SHIFT = 1e-12
