@@ -85,19 +85,17 @@ class AdditiveSchwarz:
                 return x
         place = np.full(len(b), -1, np.int64)
         self._order(matrix, place)
-        # First, while there are no other factors: the product takes as much memory as they do.
+        factors = self._factors(matrix, place)
         spread = self._affine(w, axes)
         gather = spread.T
         coarse = (gather @ (matrix @ spread)).tocsc()
         coarse = Factor(coarse + SHIFT * coarse.diagonal().max() * sp.identity(coarse.shape[0]))
-        factors = self._factors(matrix, place)
 
         def precondition(r):
             x = spread @ coarse.solve(gather @ r)
-            for parts, factor in factors:
-                y = factor.solve(r[np.concatenate(parts)])
-                for d, of_part in zip(parts, np.split(y, np.cumsum([len(d) for d in parts])[:-1]), strict=True):
-                    x[d] += of_part
+            for d, factor in factors:
+                # Parts overlap: an unknown may be there several times.
+                np.add.at(x, d, factor.solve(r[d]))
             return x
 
         self._kept = precondition if self._keep else None
@@ -114,16 +112,18 @@ class AdditiveSchwarz:
             self._unknowns[k] = d.reshape(-1, 2)[vertices].ravel()
         self._ordered = True
 
-    def _factors(self, matrix: sp.csr_matrix, place: np.ndarray) -> list[tuple[list[np.ndarray], Factor]]:
+    def _factors(self, matrix: sp.csr_matrix, place: np.ndarray) -> list[tuple[np.ndarray, Factor]]:
         """The unknowns of some parts each, and the factors of their equations one after the other."""
         found = []
         for k in range(0, self._count, TOGETHER):
             parts = self._unknowns[k : k + TOGETHER]
             blocks = [_block(matrix, d, place) for d in parts]
             try:
-                found.append((parts, Factor(sp.block_diag(blocks, format="csc"), "natural", single=True)))
+                found.append(
+                    (np.concatenate(parts), Factor(sp.block_diag(blocks, format="csc"), "natural", single=True))
+                )
             except PrecisionError:
-                found += [([d], _part_factor(block)) for d, block in zip(parts, blocks, strict=True)]
+                found += [(d, _part_factor(block)) for d, block in zip(parts, blocks, strict=True)]
         return found
 
     def _affine(self, w, axes) -> sp.csr_matrix:

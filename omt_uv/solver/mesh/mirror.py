@@ -54,12 +54,10 @@ def find_mirror(
     symmetric. Every vertex belongs to a triangle. Mirror images agree to `MIRROR_TOLERANCE` of the extent. The plane in
     which a flat mesh lies is none.
     """
-    # Halves first: the difference of two huge numbers may be infinite.
-    low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
-    extent = float((high - low).max())
-    if not (extent > 0 and np.isfinite(extent)):
+    box = _boxed(positions)
+    if box is None:
         return None
-    positions = (positions / 2 - low) / extent
+    positions = box[0]
     polygons = _Polygons(positions, triangles, faces)
     for normal in _candidates(positions, triangles):
         if across is not None and abs(normal @ across.normal) > MIRROR_TOLERANCE:
@@ -91,12 +89,11 @@ def partial_mirror(positions: np.ndarray, triangles: np.ndarray, faces: np.ndarr
     Polygons across a plane are their own images in space. Where a cut goes around them, they hang on one side, and on
     the other side there is none. See `find_mirror`, which finds a mirror of all.
     """
-    low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
-    extent = float((high - low).max())
-    if not (extent > 0 and np.isfinite(extent)):
+    box = _boxed(positions)
+    if box is None:
         return None
-    polygons = _Polygons((positions / 2 - low) / extent, triangles, faces)
-    number = np.unique(faces, return_inverse=True)[1]
+    boxed, low, extent = box
+    polygons = _Polygons(boxed, triangles, faces)
     # Vertices along the cut are not symmetric; the centres of polygons are.
     for normal in _candidates(polygons.centres, np.arange(len(polygons.centres))):
         other = polygons.images_of_polygons(normal)
@@ -106,15 +103,28 @@ def partial_mirror(positions: np.ndarray, triangles: np.ndarray, faces: np.ndarr
         image = polygons.images_of_corners(other, normal, ~own) if own.sum() <= FEW * len(own) else None
         if image is not None:
             points = _reflected(polygons.points, normal) + polygons.middle
-            return PartialMirror(image, own[number], 2 * (points * extent + low))
+            return PartialMirror(image, own[polygons.number], 2 * (points * extent + low))
     return None
 
 
+def _boxed(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """Positions (n,3) in a box of extent 1, and half of its lowest corner (3,) and of its extent before; None where
+    that is nothing or infinite."""
+    # Halves first: the difference of two huge numbers may be infinite.
+    low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
+    extent = float((high - low).max())
+    return ((positions / 2 - low) / extent, low, extent) if extent > 0 and np.isfinite(extent) else None
+
+
 class _Polygons:
-    """Corners (c,) of polygons, by polygon, and trees to find polygons and their corners by place."""
+    """Corners (c,) of polygons, by polygon, and trees to find polygons and their corners by place.
+
+    number (m,) : of the polygon of every triangle, from 0 on
+    """
 
     def __init__(self, positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray | None):
         faces = np.arange(len(triangles)) if faces is None else np.unique(faces, return_inverse=True)[1]
+        self.number = faces
         pairs = np.unique(np.repeat(faces, 3).astype(np.int64) * len(positions) + triangles.ravel())
         self.polygon, self.vertex = pairs // len(positions), pairs % len(positions)
         self.sides = np.bincount(self.polygon)
@@ -167,7 +177,9 @@ class _Polygons:
 
     def _told_apart(self, other: np.ndarray, unsure: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """The images (p,) of polygons, of those `unsure` (p,) bool, two in one place, by what is around them."""
-        image = self._found_corners(other, normal, ~unsure)[0]
+        corner, to = self._nearest_corners(other, normal, ~unsure)
+        image = np.full(len(self.points), -1)
+        image[self.vertex[corner]] = to
         corner = unsure[self.polygon] & (image[self.vertex] >= 0)
         polygon, to = self.polygon[corner], image[self.vertex[corner]]
         shared = []
@@ -179,22 +191,24 @@ class _Polygons:
     def images_of_corners(self, other: np.ndarray, normal: np.ndarray, used: np.ndarray) -> np.ndarray | None:
         """The image (n,) of every vertex of the polygons `used` (p,) bool, whose images are `other` (p,), -1 for the
         rest; None where there is no such image."""
-        image, corner, to = self._found_corners(other, normal, used)
-        if corner is None or (image[self.vertex[corner]] != to).any():
+        corner, to = self._nearest_corners(other, normal, used)
+        image = np.full(len(self.points), -1)
+        image[self.vertex[corner]] = to
+        if (to < 0).any() or (image[self.vertex[corner]] != to).any():
             return None
         known = np.flatnonzero(image >= 0)
         return None if (image[image[known]] != known).any() else image
 
-    def _found_corners(self, other: np.ndarray, normal: np.ndarray, used: np.ndarray):
-        """An image (n,) of every vertex of the polygons `used` (p,) bool, -1 for the others, their corners (k,), and
-        the vertex (k,) that is the image of each; None for the corners where one is too far."""
-        corner, image = np.flatnonzero(used[self.polygon]), np.full(len(self.points), -1)
+    def _nearest_corners(
+        self, other: np.ndarray, normal: np.ndarray, used: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (k,) of the polygons `used` (p,) bool, and the vertex (k,) of the polygon that is their image, where
+        the image of each lies; -1 where none does."""
+        corner = np.flatnonzero(used[self.polygon])
         place = _reflected(self.points[self.vertex[corner]], normal)
         polygon = other[self.polygon[corner]]
         far, found = self.corner_tree.query(np.column_stack([place, 2 * self.extent * polygon]))
-        image[self.vertex[corner]] = self.vertex[found]
-        close = far.max(initial=0) <= MIRROR_TOLERANCE * self.extent
-        return image, corner if close else None, self.vertex[found]
+        return corner, np.where(far <= MIRROR_TOLERANCE * self.extent, self.vertex[found], -1)
 
     def _matched(self, polygons: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
         """The polygons (p,) where the images of `polygons` (p,) lie, None unless each has one of as many sides."""

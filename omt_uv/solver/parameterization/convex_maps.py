@@ -63,7 +63,7 @@ def with_convex_polygons(
         chart, old = given[k], maps[k]
         (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
         figures = measured_chart(vertices, chart, flat, density[k])
-        if figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal) and figures.folds <= old.folds:
+        if _keeps(figures, old, goal):
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
             new[k] = with_figures(old, uv, figures)
@@ -104,10 +104,14 @@ def _opened(
             (flat, unit) = in_unit_box(uv)
             uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
         figures = measured_map(chart, uv, density[place])
-        fewer = reflex_triangles(surface, [chart], [uv])[0] < folded[k] and figures.folds <= old.folds
-        if fewer and figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal):
+        if _keeps(figures, old, goal) and reflex_triangles(surface, [chart], [uv])[0] < folded[k]:
             new[k] = with_figures(old, uv, figures)
     return new
+
+
+def _keeps(figures: Distortion, old: ChartMap, goal: float) -> bool:
+    """Whether a map with these figures folds no more than another, and has its areas, or those that are the goal."""
+    return figures.folds <= old.folds and figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal)
 
 
 def _is_isometry(chart_map: ChartMap) -> bool:

@@ -317,7 +317,7 @@ def map_completed(
             if not found.folds:
                 return _without_images(chart, found)
         except MeshError:
-            pass  # the chart alone has the error, too, and says where
+            pass  # it is that of the images, or the chart alone has it, too, and says where
     return (yield from map_chart(chart, options=options, target=target, pins=pins, markers=markers))
 
 
@@ -326,7 +326,7 @@ def _without_images(chart: Chart, found: ChartMap) -> ChartMap:
     vertices, unit = in_unit_box(chart.vertices)
     uv = found.uv[: len(vertices)] / unit
     figures = measured_chart(vertices, chart, uv, None)
-    return with_figures(found, placed_chart(uv, vertices, chart, None, unit, None, True), figures)
+    return with_figures(found, placed_chart(uv, vertices, chart, None, unit, None), figures)
 
 
 def _same_targets(charts, targets, j: int, k: int, image: np.ndarray) -> bool:
