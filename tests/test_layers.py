@@ -80,7 +80,7 @@ ARROWS: dict[str, str] = {
     "solver.parameterization pipelines",
     "pipelines.arranging": "settings solver solver.mesh solver.editing solver.arranging pipelines",
     "blender": "errors settings solver solver.mesh solver.canonical solver.analysis solver.globe "
-    "solver.parameterization pipelines",
+    "solver.parameterization solver.subdivision pipelines",
     "blender.measuring": "errors solver pipelines pipelines.measuring blender",
     "blender.shapes": "settings errors solver solver.mesh solver.analysis solver.registration solver.strain pipelines "
     "pipelines.shapes blender",

@@ -15,11 +15,10 @@ from scipy.sparse import coo_matrix, csr_matrix, hstack, identity, vstack
 
 from benchmarks.part import Part
 from benchmarks.tables import Table
-from omt_uv.pipelines.reading import SubdivisionModifier
-from omt_uv.pipelines.subdivision import subdivided_surface, subdivided_uv
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import Surface
 from omt_uv.solver.mesh.topology import graph_components
+from omt_uv.solver.subdivision.modifier import SubdivisionModifier, subdivided_surface, subdivided_uv
 
 LEVELS = 2
 MODES = ("PRESERVE_BOUNDARIES", "PRESERVE_CORNERS", "SMOOTH_ALL", "NONE")

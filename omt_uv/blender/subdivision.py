@@ -9,7 +9,8 @@ import bpy
 
 import numpy as np
 
-from ..pipelines.reading import Reading, SubdivisionModifier
+from ..pipelines.reading import Reading
+from ..solver.subdivision.modifier import SubdivisionModifier
 
 # OpenSubdiv's sharpness of a crease of 1, by its square.
 CREASE = 10.0

@@ -26,7 +26,8 @@ from ..solver.packing.single_precision import without_rounded_folds
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
-from .reading import Reading, SubdivisionModifier
+from ..solver.subdivision.modifier import SubdivisionModifier
+from .reading import Reading
 
 T = TypeVar("T")
 

@@ -38,8 +38,8 @@ from ..solver.parameterization.chart_map import map_chart
 from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.options import MapOptions
 from ..solver.progress import Steps, part_of
+from ..solver.subdivision.modifier import SubdivisionModifier
 from .layout import PlacedIsland, Refusal, UnwrapJob, corner_uvs, grown_together
-from .reading import SubdivisionModifier
 from .subdivision import polygon_uv_areas, subdivided_target
 from .unwrap import lay_out
 

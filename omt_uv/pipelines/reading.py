@@ -2,33 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..solver.analysis.facing import Z_UP, SceneAxes
 from ..solver.mesh.surface import Surface
 from ..solver.parameterization.chart_pins import CornerPins
-
-
-@dataclass(frozen=True)
-class SubdivisionModifier:
-    """What a Subdivision Surface modifier does to a mesh.
-
-    levels : how often; uv_smooth : an identifier of Blender's; keep_corners : corners of an open boundary stay;
-    simple : no smoothing; limit : vertices lie on the limit surface; ends (k,2), sharpness (k,) and corner_sharpness
-    (n,): creased edges and vertices
-    """
-
-    levels: int
-    uv_smooth: str = "PRESERVE_BOUNDARIES"
-    keep_corners: bool = False
-    simple: bool = False
-    limit: bool = True
-    ends: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    sharpness: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    corner_sharpness: np.ndarray | None = None
-
+from ..solver.subdivision.modifier import SubdivisionModifier
 
 # Of files whose coordinates are taken as they are, in formats in which Y is up by custom.
 Y_UP = SceneAxes(up=(0.0, 1.0, 0.0), viewer=(0.0, 0.0, 1.0))

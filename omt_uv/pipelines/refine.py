@@ -24,8 +24,8 @@ from ..solver.parameterization.chart_pins import ChartPins, CornerPins, pins_of_
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
 from ..solver.refinement.refine import Refinement
+from ..solver.subdivision.modifier import SubdivisionModifier
 from .layout import PACKING_FROM, PlacedIsland, Refusal, corner_uvs, grown_together, pack_islands
-from .reading import SubdivisionModifier
 from .subdivision import refined_on_subdivision, subdivided_target
 
 # Of `Distortion`, what a report says of an island before and after.

@@ -14,7 +14,7 @@ from ..solver.maps.mirror_symmetry import MirrorSymmetry
 from ..solver.mesh.charts import turned_polygons
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.surface import Surface
-from ..solver.mesh.topology import boundary_loops, next_corners
+from ..solver.mesh.topology import boundary_loops
 from ..solver.parameterization.chart_map import ChartMap
 from ..solver.parameterization.chart_pins import CornerPins, pins_of_chart
 from ..solver.parameterization.mirrored_charts import mirror_partners
@@ -22,17 +22,10 @@ from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps
 from ..solver.subdivision.cage_refinement import CageElements, refine_cage, subdivided_elements
 from ..solver.subdivision.cage_symmetry import CageChart, cage_symmetry
-from ..solver.subdivision.catmull_clark import (
-    SHARP,
-    Cage,
-    Subdivision,
-    bilinear,
-    straight_boundary,
-    straight_corners,
-    subdivide,
-)
+from ..solver.subdivision.catmull_clark import Subdivision
+from ..solver.subdivision.modifier import SubdividedSurface, SubdivisionModifier, subdivided_surface, subdivided_uv
 from ..solver.subdivision.quad_areas import HALVES, half_areas, quad_areas
-from .reading import Reading, SubdivisionModifier
+from .reading import Reading
 
 # Quads of the subdivided surface at most: fewer levels stand for all where there are more.
 MOST_QUADS = 250_000
@@ -61,22 +54,6 @@ COARSE = (
 AREA_WARNING = "Areas are"
 # Corners of one vertex closer than this have one UV, as for Blender.
 SAME_UV = 1e-4
-SMOOTH_UV = "SMOOTH_ALL"
-LINEAR_UV = "NONE"
-STRAIGHT_UV = "PRESERVE_BOUNDARIES"
-
-
-@dataclass(frozen=True)
-class SubdividedSurface:
-    """Corners (q,4,3) in space of the quads of a subdivided surface, its vertices' matrix, and the level it is of."""
-
-    corners: np.ndarray
-    subdivision: Subdivision
-    levels: int
-
-    def polygon_areas(self, count: int) -> np.ndarray:
-        """Areas (f,) of the polygons of the cage on the subdivided surface."""
-        return np.bincount(self.subdivision.polygon, quad_areas(self.corners), count)
 
 
 def evaluated(reading: Reading) -> Reading:
@@ -116,51 +93,6 @@ def polygon_uv_areas(surface: Surface, uv: np.ndarray, modifier: SubdivisionModi
     quads = _quad_uvs(surface, uv, modifier, fine.levels)
     areas = quad_areas(np.pad(quads, ((0, 0), (0, 0), (0, 1))))
     return np.bincount(fine.subdivision.polygon, areas, len(surface.face_start) - 1)
-
-
-def subdivided_surface(surface: Surface, modifier: SubdivisionModifier, most: int) -> SubdividedSurface:
-    """The subdivided surface at the level of the modifier, or at a lower one with at most so many quads."""
-    quads = 4.0 ** np.arange(modifier.levels) * len(surface.corner_vertex)
-    levels = max(1, int((quads <= most).sum()))
-    sharpness = modifier.corner_sharpness
-    cage = Cage(
-        corner_vertex=surface.corner_vertex,
-        face_start=surface.face_start,
-        count=len(surface.positions),
-        ends=modifier.ends,
-        sharpness=modifier.sharpness,
-        corner_sharpness=np.zeros(len(surface.positions)) if sharpness is None else sharpness,
-    )
-    if modifier.simple:
-        found = bilinear(cage, levels)
-    else:
-        found = subdivide(straight_corners(cage) if modifier.keep_corners else cage, levels, modifier.limit)
-    return SubdividedSurface((found.matrix @ surface.positions)[found.quads], found, levels)
-
-
-def subdivided_uv(
-    vertex: np.ndarray, face_start: np.ndarray, ids: np.ndarray, modifier: SubdivisionModifier, levels: int
-) -> Subdivision:
-    """How the modifier subdivides UVs whose vertex at each corner (c,) of polygons (f+1,) is given.
-
-    ids (n,): vertices of the surface that the UVs' are at. Creases count as they do for the surface.
-    """
-    ends, sharpness = _creases(vertex, face_start, ids, modifier)
-    given = modifier.corner_sharpness
-    corners = np.zeros(len(ids)) if given is None else np.where(ids >= 0, given[ids], 0.0)
-    cage = Cage(vertex, face_start, len(ids), ends, sharpness, corners)
-    smooth = modifier.uv_smooth
-    if modifier.simple or smooth == LINEAR_UV:
-        return bilinear(cage, levels)
-    if smooth == STRAIGHT_UV:
-        cage = straight_boundary(cage)
-    elif smooth != SMOOTH_UV:
-        cage = straight_corners(cage)
-        if smooth != "PRESERVE_CORNERS":
-            # Where three and more islands meet.
-            several = np.bincount(ids + 1)[ids + 1] > 2
-            cage = replace(cage, corner_sharpness=np.where(several, SHARP, cage.corner_sharpness))
-    return subdivide(cage, levels, modifier.limit)
 
 
 def subdivided_target(surface: Surface, modifier: SubdivisionModifier, other: Target | None = None) -> Target:
@@ -425,22 +357,6 @@ def _fixed(found: SurfaceMap, pins: CornerPins | None, boundary: str) -> np.ndar
             fixed[boundary_loops(chart.disk)[0]] = True
         every.append(fixed)
     return np.concatenate(every)
-
-
-def _creases(
-    vertex: np.ndarray, face_start: np.ndarray, ids: np.ndarray, modifier: SubdivisionModifier
-) -> tuple[np.ndarray, np.ndarray]:
-    """Creased edges (k,2) between the vertices of UVs, and their sharpness (k,), as between the surface's vertices."""
-    if not len(modifier.ends):
-        return modifier.ends, modifier.sharpness
-    n = int(max(ids.max(initial=0), modifier.ends.max())) + 1
-    ends = np.column_stack([vertex, vertex[next_corners(face_start)]])
-    low, high = np.sort(ids[ends], axis=1).T
-    creased = modifier.ends.min(axis=1) * n + modifier.ends.max(axis=1)
-    order = np.argsort(creased)
-    at = np.minimum(np.searchsorted(creased[order], low * n + high), len(order) - 1)
-    known = creased[order][at] == low * n + high
-    return ends[known], modifier.sharpness[order][at][known]
 
 
 def _uv_vertices(corner_vertex: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
