@@ -202,18 +202,17 @@ def _nudged(
     """UVs (n,2) whose triangles miss their areas by INEXACT at most, where those of an area weight nearly do and a
     few times as much weight gets there; as they are elsewhere. stage: refines UVs with a weight."""
     new, error, factor, most = refined, part.triangle_error(refined), NUDGE, MOST_NUDGE * weight
-    if not INEXACT < error <= CLOSE * INEXACT:
+    if error > CLOSE * INEXACT:
         return refined
-    while factor * weight <= most:
+    while error > INEXACT and factor * weight <= most:
         weight *= factor
         new = yield from stage(new, weight)
         before, error = error, part.triangle_error(new)
-        if error <= INEXACT or error >= before:
-            return new if error <= INEXACT else refined
-        # Errors fall about evenly with the logarithm of the weight.
-        needed = (error - AIM * INEXACT) / (before - error) * np.log(factor)
+        # Errors fall about evenly with the logarithm of the weight; where one rose, no weight is enough.
+        fallen = max(before - error, np.finfo(float).eps)
+        needed = (error - AIM * INEXACT) / fallen * np.log(factor)
         factor = float(np.exp(min(needed, MOST_NUDGE)))
-    return refined
+    return new if error <= INEXACT else refined
 
 
 @dataclass(frozen=True)

@@ -60,14 +60,13 @@ def subdivided_surface(surface: Surface, modifier: SubdivisionModifier, most: in
     """The subdivided surface at the level of the modifier, or at a lower one with at most so many quads."""
     quads = 4.0 ** np.arange(modifier.levels) * len(surface.corner_vertex)
     levels = max(1, int((quads <= most).sum()))
-    sharpness = modifier.corner_sharpness
     cage = Cage(
         corner_vertex=surface.corner_vertex,
         face_start=surface.face_start,
         count=len(surface.positions),
         ends=modifier.ends,
         sharpness=modifier.sharpness,
-        corner_sharpness=np.zeros(len(surface.positions)) if sharpness is None else sharpness,
+        corner_sharpness=_corner_sharpness(np.arange(len(surface.positions)), modifier),
     )
     if modifier.simple:
         found = bilinear(cage, levels)
@@ -84,9 +83,7 @@ def subdivided_uv(
     ids (n,): vertices of the surface that the UVs' are at. Creases count as they do for the surface.
     """
     ends, sharpness = _creases(vertex, face_start, ids, modifier)
-    given = modifier.corner_sharpness
-    corners = np.zeros(len(ids)) if given is None else np.where(ids >= 0, given[ids], 0.0)
-    cage = Cage(vertex, face_start, len(ids), ends, sharpness, corners)
+    cage = Cage(vertex, face_start, len(ids), ends, sharpness, _corner_sharpness(ids, modifier))
     smooth = modifier.uv_smooth
     if modifier.simple or smooth == LINEAR_UV:
         return bilinear(cage, levels)
@@ -99,6 +96,12 @@ def subdivided_uv(
             several = np.bincount(ids + 1)[ids + 1] > 2
             cage = replace(cage, corner_sharpness=np.where(several, SHARP, cage.corner_sharpness))
     return subdivide(cage, levels, modifier.limit)
+
+
+def _corner_sharpness(ids: np.ndarray, modifier: SubdivisionModifier) -> np.ndarray:
+    """Sharpness (k,) of vertices (k,) of the surface; 0 of those that are none of its own, -1."""
+    given = modifier.corner_sharpness
+    return np.zeros(len(ids)) if given is None else np.where(ids >= 0, given[ids], 0.0)
 
 
 def _creases(
