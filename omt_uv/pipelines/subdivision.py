@@ -209,7 +209,7 @@ def _nudged(
         new = yield from stage(new, weight)
         before, error = error, part.triangle_error(new)
         # Errors fall about evenly with the logarithm of the weight; where one rose, no weight is enough.
-        fallen = max(before - error, np.finfo(float).eps)
+        fallen = max(before - error, float(np.finfo(float).eps))
         needed = (error - AIM * INEXACT) / fallen * np.log(factor)
         factor = float(np.exp(min(needed, MOST_NUDGE)))
     return new if error <= INEXACT else refined
