@@ -208,9 +208,10 @@ def _nudged(
         weight *= factor
         new = yield from stage(new, weight)
         before, error = error, part.triangle_error(new)
-        # Errors fall about evenly with the logarithm of the weight; where one rose, no weight is enough.
-        fallen = max(before - error, float(np.finfo(float).eps))
-        needed = (error - AIM * INEXACT) / fallen * np.log(factor)
+        if error >= before:
+            return refined
+        # Errors fall about evenly with the logarithm of the weight.
+        needed = (error - AIM * INEXACT) / (before - error) * np.log(factor)
         factor = float(np.exp(min(needed, MOST_NUDGE)))
     return new if error <= INEXACT else refined
 

@@ -8,15 +8,7 @@ import numpy as np
 
 from ..mesh.surface import Surface
 from ..mesh.topology import next_corners
-from .catmull_clark import (
-    SHARP,
-    Cage,
-    Subdivision,
-    bilinear,
-    straight_boundary,
-    straight_corners,
-    subdivide,
-)
+from .catmull_clark import SHARP, Cage, Subdivision, bilinear, straight_boundary, straight_corners, subdivide
 from .quad_areas import quad_areas
 
 SMOOTH_UV = "SMOOTH_ALL"
@@ -34,7 +26,7 @@ class SubdivisionModifier:
     """
 
     levels: int
-    uv_smooth: str = "PRESERVE_BOUNDARIES"
+    uv_smooth: str = STRAIGHT_UV
     keep_corners: bool = False
     simple: bool = False
     limit: bool = True
