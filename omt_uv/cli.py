@@ -91,6 +91,7 @@ def carry_out(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return _told(f"{options.input}: stopped by SIGINT", supervision.INTERRUPTED)
     except Exception as error:
+        # The last one there is: whatever no module named is a defect, told in one line with a status of its own.
         if sys.flags.dev_mode:
             raise
         where = traceback.extract_tb(error.__traceback__)[-1]

@@ -132,6 +132,7 @@ def register() -> None:
         register_folder()
         apply_soon()
     except Exception:
+        # Whatever failed, Blender keeps no half of the extension; what it was is raised and told by Blender.
         unregister()
         raise
 

@@ -152,10 +152,13 @@ class Manifest:
         self._base.execute("BEGIN IMMEDIATE")
         try:
             yield
+            self._base.execute("COMMIT")
         except BaseException:
-            self._base.execute("ROLLBACK")
+            # Also of what stops a batch by hand: an open transaction would keep others out. On a full disk SQLite has
+            # gone back by itself, and going back once more would fail and hide why.
+            if self._base.in_transaction:
+                self._base.execute("ROLLBACK")
             raise
-        self._base.execute("COMMIT")
 
 
 def _is_over(row: sqlite3.Row, retry: bool) -> bool:

@@ -72,7 +72,7 @@ class LocalPool:
                 break
             task, record = ended
             del running[task.name]
-            if isinstance(record, Exception):
+            if isinstance(record, BaseException):
                 raise record
             yield task, record
 
@@ -99,10 +99,10 @@ class LocalPool:
 
     def _work(self, task: FileTask) -> None:
         try:
-            record: Record | Exception = run_task(self.plan, task, self.start, self._watched)
+            record: Record | BaseException = run_task(self.plan, task, self.start, self._watched)
         except OSError as error:
             record = Record(status=1, seconds=0.0, message=f"{task.path}: {error}")
-        except Exception as error:  # noqa: BLE001 - raised again by the thread that waits for it
+        except BaseException as error:  # noqa: BLE001 - raised by the thread that waits, for ever if nothing came
             record = error
         self._ended.put((task, record))
 

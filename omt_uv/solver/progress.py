@@ -102,6 +102,7 @@ def on_thread(steps: Steps[T], patience: float = 0.01) -> Steps[T]:
                 steps.close()
         except StopIteration as stop:
             results.append(stop.value)
+        # Also what is no Exception: below, whoever waits would find neither a result nor an error.
         except BaseException as error:  # noqa: BLE001, it is raised again below
             errors.append(error)
         finally:

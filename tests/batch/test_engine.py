@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sqlite3
 import threading
 
 import pytest
@@ -111,14 +112,29 @@ def test_a_pool_is_as_wide_as_memory_allows(package, work):
     assert [task.name for task in waiting] == ["2"]
 
 
-def test_a_defect_of_the_pool_is_raised(package, go, work, monkeypatch):
+def test_a_manifest_on_a_full_disk_says_that_it_is_full_and_keeps_its_rows(package, work):
+    plans = package("batch.plan")
+    plan = plans.BatchPlan("unwrap", (), work.root / "out")
+    first = plans.FileTask("first", work.root / "first", 1, 0, None)
+    many = [plans.FileTask(f"{k}" * 500, work.root / f"{k}", 1, 0, None) for k in range(1000, 2000)]
+    with package("batch.manifest").Manifest(work.root / "x.manifest.sqlite") as manifest:
+        manifest.due(plan, [first], retry=False)
+        (pages,) = manifest._base.execute("PRAGMA page_count").fetchone()
+        manifest._base.execute(f"PRAGMA max_page_count = {pages + 2}")
+        with pytest.raises(sqlite3.Error, match="full"):
+            manifest.due(plan, [first, *many], retry=False)
+        assert [row["name"] for row in manifest.rows()] == ["first"]
+
+
+@pytest.mark.parametrize("defect", [KeyError, SystemExit])
+def test_a_defect_of_the_pool_is_raised(package, go, work, monkeypatch, defect):
     work.put("a.obj")
 
     def fail(*_):
-        raise KeyError("defect")
+        raise defect("defect")
 
     monkeypatch.setattr(package("batch.pool"), "run_task", fail)
-    with pytest.raises(KeyError, match="defect"):
+    with pytest.raises(defect, match="defect"):
         go()
 
 
