@@ -101,7 +101,9 @@ class Manifest:
                 continue
             due.append(task)
             waiting.append((task.name, str(task.path), task.size, WAITING, 0 if row is None else row["tries"]))
-        with self._all_or_nothing():
+        # All or nothing, also of what is stopped by hand, or by a full disk.
+        with self._base:
+            self._base.execute("BEGIN IMMEDIATE")
             self._base.executemany("DELETE FROM runs WHERE name = ?", [(name,) for name in rows])
             self._base.executemany(
                 "INSERT INTO runs (name, path, size, state, tries) VALUES (?, ?, ?, ?, ?) ON CONFLICT (name) "
@@ -146,19 +148,6 @@ class Manifest:
     def counts(self) -> dict[str, int]:
         """How many files are in each state."""
         return dict(self._base.execute("SELECT state, COUNT(*) FROM runs GROUP BY state").fetchall())
-
-    @contextmanager
-    def _all_or_nothing(self) -> Iterator[None]:
-        self._base.execute("BEGIN IMMEDIATE")
-        try:
-            yield
-            self._base.execute("COMMIT")
-        except BaseException:
-            # Also of what stops a batch by hand: an open transaction would keep others out. On a full disk SQLite has
-            # gone back by itself, and going back once more would fail and hide why.
-            if self._base.in_transaction:
-                self._base.execute("ROLLBACK")
-            raise
 
 
 def _is_over(row: sqlite3.Row, retry: bool) -> bool:
