@@ -52,3 +52,28 @@ def slit_across(count: int = 6):
     Q[first, [0, 3]] = n, n + 1
     Q[first + 1, [0, 3]] = n + 1, n + 2
     return V, Q
+
+
+def with_limbs(seed, limbs=6, longest=4):
+    """A cube of 24 quads out of which crooked limbs were extruded, as a modeller begins: positions (n,3), quads."""
+    rng, grid = np.random.default_rng(seed), np.arange(-1, 2)
+    polygons = []
+    for axis, side in np.ndindex(3, 2):
+        for i, j in np.ndindex(2, 2):
+            square = np.array([[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]])[:: 2 * side - 1]
+            corner = np.full((4, 3), 2 * side - 1)
+            corner[:, [(axis + 1) % 3, (axis + 2) % 3]] = grid[square]
+            polygons.append(corner)
+    places, index = np.unique(np.concatenate(polygons), axis=0, return_inverse=True)
+    V, F = list(places / np.linalg.norm(places, axis=1)[:, None]), index.reshape(-1, 4).tolist()
+    for _ in range(limbs):
+        face = int(rng.integers(len(F)))
+        for _ in range(int(rng.integers(1, longest + 1))):
+            old, p, n = F[face], np.array([V[i] for i in F[face]]), len(V)
+            normal = np.cross(p[2] - p[0], p[3] - p[1])
+            way = normal / np.linalg.norm(normal) + 0.4 * rng.normal(size=3)
+            middle = p.mean(axis=0)
+            V += list(middle + (p - middle) * rng.uniform(0.6, 1.1) + way * rng.uniform(0.3, 0.9))
+            F += [[old[k], old[(k + 1) % 4], n + (k + 1) % 4, n + k] for k in range(4)]
+            F[face] = [n, n + 1, n + 2, n + 3]
+    return np.array(V), F

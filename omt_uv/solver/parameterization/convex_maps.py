@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..analysis.density import Target
-from ..errors import MeshError
+from ..errors import MeshError, plural
 from ..maps.distortion import Distortion
 from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart
@@ -48,10 +48,11 @@ def with_convex_polygons(
     drawn = surface if drawn is None else drawn
     if not (np.diff(surface.face_start) > 3).any() or all(map(_is_isometry, maps)):
         return maps
-    from .convexity import keep_convex
+    from .convexity import keep_convex, reflex_triangles
 
     targets = [chart_target(target, surface, c) for c in charts]
-    maps = yield from _opened(drawn, charts, maps, pins, options, targets)
+    folded = reflex_triangles(drawn, charts, [m.uv for m in maps])
+    maps = yield from _opened(drawn, charts, maps, pins, options, targets, folded)
     given, charts = charts, [cut_as_mapped(c, m.uv) for c, m in zip(charts, maps, strict=True)]
     fixed = [_fixed(c, p, options.boundary) for c, p in zip(charts, pins, strict=True)]
     density = [None if t is None else t.density for t in targets]
@@ -67,7 +68,20 @@ def with_convex_polygons(
             if not fixed[k].any():
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
             new[k] = with_figures(old, uv, figures)
+    for k in np.flatnonzero(folded):
+        new[k] = _with_dents_told(drawn, given[k], new[k])
     return new
+
+
+def _with_dents_told(drawn: Surface, chart: Chart, chart_map: ChartMap) -> ChartMap:
+    """The map with a warning of convex polygons that fold in it if they are cut otherwise than they are drawn."""
+    from .convexity import dented_faces
+
+    count = len(dented_faces(drawn, chart, chart_map.uv))
+    if not count:
+        return chart_map
+    text = plural(count, "1 face folds", "{} faces fold") + " in the map if cut along another diagonal"
+    return replace(chart_map, warnings=(*chart_map.warnings, text))
 
 
 def _opened(
@@ -77,11 +91,14 @@ def _opened(
     pins: Sequence[ChartPins | None],
     options: MapOptions,
     targets: Sequence[Target | None],
+    folded: np.ndarray,
 ) -> Steps[list[ChartMap]]:
-    """The maps, those in which corners are folded refined again from where they are open, if that keeps them so."""
+    """The maps, those in which corners are folded refined again from where they are open, if that keeps them so.
+
+    folded (c,) : how many corners of each chart are
+    """
     from .convexity import keep_convex, reflex_triangles
 
-    folded = reflex_triangles(surface, charts, [m.uv for m in maps])
     some = [k for k in np.flatnonzero(folded) if pins[k] is None]
     # Corners of squares and rectangles, and drafts, stay as they were chosen.
     if not some or options.quality == "draft" or options.boundary not in ("free", "disk"):

@@ -21,11 +21,15 @@ from scipy.sparse.csgraph import connected_components
 
 from ..linalg.nested_dissection import vertex_graph
 from ..linalg.sparse import minimum_degree
+from ..maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry, without_symmetry
+from ..maps.polygon_elements import polygon_elements
 from ..mesh.charts import Chart
 from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops, row_labels
 from ..refinement.boundary_barrier import crossings
+from ..refinement.mirrored_motion import find_symmetry
 from .corner_solver import CornerMesh, CornerPatches
 from .polygon_corners import CONVEX, DENTED, PolygonCorners, convex_corners, straight_share
 
@@ -37,6 +41,8 @@ ROOM = 50
 LARGEST = 800
 # Share of a chart's area in the map below which that of a triangle has lost its sign.
 ROUNDING = 1e-15
+# How far, over its extent, a map may be from its mirror image to be kept symmetric: what is rounded.
+SYMMETRIC = 1e-9
 # Tries with more and more of the outlines fixed where they would come to cross themselves.
 ATTEMPTS = 5
 
@@ -74,9 +80,11 @@ def keep_convex(
     squeezed = _squeezed(mesh, w)
     immobile = np.concatenate(fixed)
     immobile[mesh.triangles[squeezed]] = True
-    mesh = mesh.of(np.arange(len(w)), ~squeezed, np.arange(len(w)))
+    bent = np.unique(np.searchsorted(first, corners.triangles[corners.reflex(w), 0], side="right") - 1)
+    symmetry, middle = _symmetry(mesh, first, w, bent)
+    mesh, w = _without(mesh, squeezed), w - middle
     for attempt in range(ATTEMPTS):
-        moved = _relaxed(mesh, w, corners, immobile, spare is None)
+        moved = _relaxed(mesh, w, corners, immobile, spare is None, symmetry)
         changed = np.unique(np.searchsorted(first, np.flatnonzero(moved != w), side="right") - 1)
         loops = [boundary_loops(charts[k].disk)[0] + first[k] for k in changed]
         crossed = [_crossed(w, moved, loop, attempt == ATTEMPTS - 2) for loop in loops]
@@ -86,19 +94,37 @@ def keep_convex(
     new = {int(k): maps[k].copy() for k in changed}
     for k, uv in new.items():
         mine = slice(first[k], first[k + 1])
-        rows = np.flatnonzero(moved[mine] != w[mine])
-        uv[rows] = unit * np.column_stack([moved.real, moved.imag])[mine][rows]
+        rows, placed = np.flatnonzero(moved[mine] != w[mine]), (moved + middle)[mine]
+        uv[rows] = unit * np.column_stack([placed.real, placed.imag])[rows]
     return new
 
 
 def reflex_triangles(surface: Surface, charts: Sequence[Chart], maps: Sequence[np.ndarray]) -> np.ndarray:
     """How many corners of convex polygons of each chart (c,) are triangles without area, or folded, in maps (n_i,2)."""
     first = np.cumsum([0, *(len(uv) for uv in maps)])
+    folded = _folded_corners(surface, charts, maps).triangles[:, 0]
+    return np.bincount(np.searchsorted(first, folded, side="right") - 1, minlength=len(charts))
+
+
+def dented_faces(surface: Surface, chart: Chart, uv: np.ndarray) -> np.ndarray:
+    """Polygons (k,) of a chart that are convex on the surface and fold in its map (n,2), though not along the diagonals
+    by which the surface cuts them."""
+    at = np.zeros((len(surface.corner_vertex), 2))
+    at[chart.corners.ravel()] = uv[chart.triangles.ravel()]
+    area = signed_areas(at, surface.triangles)
+    # Charts may look to the other side, and so may some of their polygons.
+    whole = np.bincount(surface.triangle_face, area, len(surface.face_start) - 1)
+    folded = surface.triangle_face[area * np.sign(whole[surface.triangle_face]) <= 0]
+    return np.setdiff1d(_folded_corners(surface, [chart], [uv]).polygon, folded)
+
+
+def _folded_corners(surface: Surface, charts: Sequence[Chart], maps: Sequence[np.ndarray]) -> PolygonCorners:
+    """The corners of convex polygons that are without area, or folded, in maps (n_i,2)."""
+    first = np.cumsum([0, *(len(uv) for uv in maps)])
     w = np.concatenate(maps) @ [1, 1j]
     triangles = np.concatenate([c.triangles + k for c, k in zip(charts, first, strict=False)])
     corners = _mapped_corners(surface, charts, triangles, w)
-    folded = corners.triangles[corners.areas(w) <= 0, 0]
-    return np.bincount(np.searchsorted(first, folded, side="right") - 1, minlength=len(charts))
+    return corners.of(corners.areas(w) <= 0, np.arange(len(w)))
 
 
 def _squeezed(mesh: CornerMesh, w: np.ndarray) -> np.ndarray:
@@ -107,30 +133,70 @@ def _squeezed(mesh: CornerMesh, w: np.ndarray) -> np.ndarray:
     return area <= ROUNDING * np.bincount(mesh.chart, area)[mesh.chart]
 
 
+def _symmetry(
+    mesh: CornerMesh, first: np.ndarray, w: np.ndarray, charts: np.ndarray
+) -> tuple[MirrorSymmetry | None, np.ndarray]:
+    """The mirror symmetry of those of some charts (k,) whose maps w (n,) have it, too, if there are any; and the
+    middle (n,) of these maps, 0 for others. first (c+1,): vertices of the charts"""
+    found, middle = without_symmetry(len(w)), np.zeros(len(w), complex)
+    for k in charts:
+        vertices, rows = np.arange(first[k], first[k + 1]), np.flatnonzero(mesh.chart == k)
+        own, polygon = mesh.triangles[rows] - first[k], mesh.polygon[rows]
+        faces = polygon_elements(mesh.positions[vertices], own, mesh.target[rows], polygon)
+        shape = find_symmetry(mesh.positions[vertices], own, polygon, faces)
+        if shape is None:
+            continue
+        centred = w[vertices] - w[vertices].mean()
+        # Of two mirrors the map may have one.
+        for images in (shape.images, *shape.images[:, None]):
+            turn = (centred[images[0]] * centred).sum()
+            one = mirror_symmetry(images, turn / abs(turn) if turn else 1.0, centred)
+            if np.abs(one.averaged(centred) - centred).max() <= SYMMETRIC * np.abs(centred).max():
+                found = found.with_part(one, vertices)
+                middle[vertices] = w[vertices].mean()
+                break
+    return (found if found.follows.any() else None), middle
+
+
+def _without(mesh: CornerMesh, squeezed: np.ndarray) -> CornerMesh:
+    """The charts without some of their triangles (m,) bool; what is left of their polygons counts one by one."""
+    broken = np.isin(mesh.polygon, mesh.polygon[squeezed])
+    alone = mesh.polygon.max(initial=0) + 1 + np.arange(len(broken))
+    mesh = replace(mesh, polygon=np.where(broken, alone, mesh.polygon))
+    every = np.arange(len(mesh.positions))
+    return mesh.of(every, ~squeezed, every)
+
+
 def _union(charts, first, density, area_weights, spare, w) -> CornerMesh:
     """All charts side by side, patches over holes included; they ask for their own areas."""
     positions = np.concatenate([c.vertices for c in charts])
     low, high = positions.min(axis=0) / 2, positions.max(axis=0) / 2
     positions = (positions / 2 - low) / (high - low).max()
     triangles = np.concatenate([c.disk + k for c, k in zip(charts, first, strict=False)])
-    target = face_areas(positions, triangles)
-    covered = signed_areas(np.column_stack([w.real, w.imag]), triangles)
     begin = np.cumsum([0, *(len(c.disk) for c in charts)])
-    for k, (chart, values) in enumerate(zip(charts, density, strict=True)):
-        own = slice(begin[k], begin[k] + len(chart.triangles))
+    chart = np.repeat(np.arange(len(charts)), np.diff(begin))
+    # Patches over holes are no polygons.
+    faces = np.concatenate([np.append(c.faces, -1 - np.arange(len(c.patches))) for c in charts])
+    polygon = row_labels(np.column_stack([chart, faces - faces.min()]))
+    target, asked = face_areas(positions, triangles), polygon_areas(positions, triangles, polygon)
+    covered = signed_areas(np.column_stack([w.real, w.imag]), triangles)
+    given = np.zeros(len(charts))
+    for k, (one, values) in enumerate(zip(charts, density, strict=True)):
+        own = slice(begin[k], begin[k] + len(one.triangles))
         if values is not None:
             target[own] *= values
+            asked[own] *= values
+        given[k] = covered[own].sum()
         # Pins give a chart a scale of its own.
-        target[begin[k] : begin[k + 1]] *= covered[own].sum() / target[own].sum()
-    chart = np.repeat(np.arange(len(charts)), np.diff(begin))
-    spare = np.asarray(np.zeros(len(charts)) if spare is None else spare) * np.bincount(chart, target, len(charts))
+        target[begin[k] : begin[k + 1]] *= given[k] / asked[own].sum()
     return CornerMesh(
         positions=positions,
         triangles=triangles,
+        polygon=polygon,
         target=target,
-        area_weight=np.repeat(area_weights, np.diff(begin)),
+        area_weight=np.asarray(area_weights, float),
         chart=chart,
-        spare=spare,
+        spare=np.asarray(np.zeros(len(charts)) if spare is None else spare) * given,
     )
 
 
@@ -151,6 +217,7 @@ def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.nda
     kept_share = np.maximum(share, straight)
     found = PolygonCorners(
         triangles=ears,
+        polygon=polygon,
         target=kept_share * whole,
         whole=whole,
         least=np.where(share < straight, share - DENTED, CONVEX * kept_share) * whole,
@@ -187,31 +254,52 @@ def _crossed(w: np.ndarray, moved: np.ndarray, loop: np.ndarray, all_of_it: bool
     return loop if all_of_it else np.unique([np.roll(loop, -k)[pairs] for k in range(-2, 4)])
 
 
-def _relaxed(mesh: CornerMesh, w: np.ndarray, corners: PolygonCorners, fixed: np.ndarray, opening: bool) -> np.ndarray:
+def _relaxed(
+    mesh: CornerMesh,
+    w: np.ndarray,
+    corners: PolygonCorners,
+    fixed: np.ndarray,
+    opening: bool,
+    symmetry: MirrorSymmetry | None,
+) -> np.ndarray:
     """The map w (n,) complex with the vertices around reflex corners placed anew, those `fixed` (n,) excepted.
 
     opening: as a start of a refinement, which gives the faces their areas back
     """
     triangles = mesh.triangles
-    free = _around(corners.triangles[corners.reflex(w)], triangles, len(w)) & ~fixed
+    free = _around(corners.triangles[corners.reflex(w)], triangles, len(w))
+    if symmetry is not None:
+        free, fixed = _with_images(free, symmetry), _with_images(fixed, symmetry)
+    free &= ~fixed
     here = free[corners.triangles].any(1)
     near = free.copy()
     near[corners.triangles[here]] = True
-    faces = near[triangles].any(1)
+    # Polygons are there as a whole, since it is their areas that count.
+    faces = np.isin(mesh.polygon, mesh.polygon[near[triangles].any(1)])
     if not free.any():
         return w
     # Corners may reach to vertices of squeezed triangles alone.
     joined = np.concatenate([triangles[faces], corners.triangles[here]])
-    vertices = np.unique(joined)
+    chosen = np.zeros(len(w), bool)
+    chosen[joined] = True
+    vertices = np.flatnonzero(chosen if symmetry is None else _with_images(chosen, symmetry))
     place = np.full(len(w), -1)
     place[vertices] = np.arange(len(vertices))
     joined = place[joined]
     vertices = vertices[minimum_degree(vertex_graph(joined, len(vertices)))]
     place[vertices] = np.arange(len(vertices))
-    patches = CornerPatches(mesh.of(vertices, faces, place), corners.of(here, place), free[vertices])
+    mirrored = None if symmetry is None else symmetry.restricted(vertices, place)
+    patches = CornerPatches(mesh.of(vertices, faces, place), corners.of(here, place), free[vertices], mirrored)
     moved = w.copy()
     moved[vertices] = patches.opened(w[vertices]) if opening else patches.convexified(w[vertices])
     return moved
+
+
+def _with_images(chosen: np.ndarray, symmetry: MirrorSymmetry) -> np.ndarray:
+    """Vertices (n,) bool and all their images."""
+    either = np.zeros(len(chosen), bool)
+    either[symmetry.representative[chosen]] = True
+    return either[symmetry.representative]
 
 
 def _around(reflex: np.ndarray, triangles: np.ndarray, vertex_count: int) -> np.ndarray:

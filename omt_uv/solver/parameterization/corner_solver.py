@@ -8,10 +8,12 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..maps.energy import elements, energies, gradient
-from ..mesh.geometry import face_areas
-from ..mesh.topology import halfedges
-from ..refinement.hessian_blocks import Assembly
+from ..maps.energy import Elements, energies, gradient
+from ..maps.mirror_symmetry import MirrorSymmetry
+from ..maps.polygon_elements import polygon_elements, with_convex_quads
+from ..mesh.polygon_areas import polygon_areas
+from ..refinement.hessian_blocks import assembly_of
+from ..refinement.mirrored_motion import MirroredMotion
 from ..refinement.projected_newton import (
     ARMIJO,
     FOLD_SHARE,
@@ -24,9 +26,11 @@ from .polygon_corners import CONVEX, CornerBarrier, PolygonCorners
 
 # Strength of the barrier of a corner, per share that its polygon has of the target's area.
 STRENGTH = 30.0
-# Rounds that make corners convex, and rounds in which the barrier then weakens.
+# Rounds that make corners convex, and rounds in which the barrier then weakens: so many, and up to so many while areas
+# are further off than can be spared.
 CONVEXIFYING = 12
 SETTLING = 4
+MOST_SETTLING = 12
 # Newton steps of a round.
 STEPS = 3
 # Corners that are reflex start a round at this r, the area over the target, both with a slack.
@@ -47,14 +51,16 @@ class CornerMesh:
     Attributes
     ----------
     positions (n,3), triangles (m,3)
-    target (m,) : areas that the triangles shall have
-    area_weight (m,) : weight of the area term
+    polygon (m,) : whose triangle each is, any numbers
+    target (m,) : areas that the triangles ask for; a polygon shall have their sum
+    area_weight (c,) : weight of the area term
     chart (m,) : the chart of each triangle
     spare (c,) : by how much the areas of a chart may be further off, in sum
     """
 
     positions: np.ndarray
     triangles: np.ndarray
+    polygon: np.ndarray
     target: np.ndarray
     area_weight: np.ndarray
     chart: np.ndarray
@@ -65,8 +71,9 @@ class CornerMesh:
         return CornerMesh(
             positions=self.positions[vertices],
             triangles=place[self.triangles[faces]],
+            polygon=self.polygon[faces],
             target=self.target[faces],
-            area_weight=self.area_weight[faces],
+            area_weight=self.area_weight,
             chart=self.chart[faces],
             spare=self.spare,
         )
@@ -75,41 +82,68 @@ class CornerMesh:
 class CornerPatches:
     """Patches of a mesh, each of which goes its own way; unknowns in the order of their elimination."""
 
-    def __init__(self, mesh: CornerMesh, corners: PolygonCorners, free: np.ndarray):
-        n, triangles = len(free), mesh.triangles
-        self.faces = elements(mesh.positions, triangles, mesh.target)
-        self.assembly, self.motion = Assembly(triangles, n), FreeMotion(~free)
-        self.area_weight, self.corners = mesh.area_weight, corners
+    def __init__(
+        self,
+        mesh: CornerMesh,
+        corners: PolygonCorners,
+        free: np.ndarray,
+        symmetry: MirrorSymmetry | None = None,
+    ):
+        n, self.motion, self.corners, self.symmetry = len(free), FreeMotion(~free), corners, symmetry
+        # Areas are those that the refinement gave, and that decide whether the map is kept: of whole polygons.
+        self.faces = polygon_elements(mesh.positions, mesh.triangles, mesh.target, mesh.polygon)
+        self.assembly, count = assembly_of(self.faces, n, symmetry=symmetry), len(self.faces.area)
         self.strength = STRENGTH * corners.whole / mesh.target.sum()
-        every = np.concatenate([triangles, corners.triangles])
-        tail, head = halfedges(every)
-        joined = free[tail] & free[head]
-        graph = coo_matrix((np.ones(joined.sum()), (tail[joined], head[joined])), shape=(n, n))
-        self.count, self.of_vertex = connected_components(graph, directed=False)
-        moving = np.take_along_axis(every, free[every].argmax(1)[:, None], 1)[:, 0]
-        self.of_face, self.of_corner = np.split(self.of_vertex[moving], [len(triangles)])
+        self.count, patch = self._patches(free)
+        self.of_vertex, self.of_face, self.of_corner = np.split(patch, [n, n + count])
+        of_vertex = np.zeros(n, np.int64)
+        of_vertex[mesh.triangles] = mesh.chart[:, None]
+        of_face = np.zeros(count, np.int64)
+        of_face[self.faces.owner] = of_vertex[self.faces.triangles[:, 0]]
+        self.area_weight = mesh.area_weight[of_face]
         self.chart = np.zeros(self.count, np.int64)
-        self.chart[self.of_face] = mesh.chart
+        self.chart[self.of_face] = of_face
         # As `Elements` measures areas.
-        self.spare = mesh.spare / face_areas(mesh.positions, triangles).sum()
+        self.spare = mesh.spare / polygon_areas(mesh.positions, mesh.triangles, mesh.polygon).sum()
+
+    def _patches(self, free: np.ndarray) -> tuple[int, np.ndarray]:
+        """How many patches there are, and that of every vertex, polygon and corner: what shares one goes one way, and
+        so do mirror images."""
+        n, count = len(free), len(self.faces.area)
+        vertices = np.concatenate([self.faces.triangles, self.corners.triangles])
+        cells = n + np.concatenate([self.faces.owner, count + np.arange(len(self.corners.triangles))])
+        moving = free[vertices]
+        ends = [vertices[moving], np.repeat(cells, moving.sum(axis=1))]
+        if self.symmetry is not None:
+            ends = [np.append(ends[0], np.flatnonzero(free)), np.append(ends[1], self.symmetry.representative[free])]
+        size = n + count + len(self.corners.triangles)
+        graph = coo_matrix((np.ones(len(ends[0])), ends), shape=(size, size))
+        return connected_components(graph, directed=False)
 
     def opened(self, w: np.ndarray) -> np.ndarray:
         """The map w (n,) with corners made convex in those patches where fewer are reflex then, at whatever cost."""
-        given, w = w, self._forced(w)
+        given, w = w, self._forced(self._symmetric(w))
         w = self._stepped(w, self.area_weight, self._barrier(w, self.strength))
         return np.where((self._reflex_count(w) < self._reflex_count(given))[self.of_vertex], w, given)
 
     def convexified(self, w: np.ndarray) -> np.ndarray:
         """The map w (n,) with corners made convex in those patches where fewer are reflex then, and areas kept."""
         given, weight = w, self.area_weight
-        w = self._forced(w)
-        for k in range(SETTLING):
-            worse = (self._area_errors(w) > GROWTH * self._area_errors(given)) & (k > 1)
+        before, reflex = self._area_errors(given), self._reflex_count(given)
+        w = self._forced(self._symmetric(w))
+        for k in range(MOST_SETTLING):
+            worse = (self._area_errors(w) > GROWTH * before) & (k > 1)
             weight = np.where(worse[self.of_face], HEAVIER * weight, weight)
             w = self._stepped(w, weight, self._barrier(w, self.strength * 0.1**k))
-        gain, cost = self._reflex_count(given) - self._reflex_count(w), self._area_errors(w) - self._area_errors(given)
-        good = affordable(gain, cost, self.chart, self.spare)
+            gain = reflex - self._reflex_count(w)
+            good = affordable(gain, self._costs(given, w), self.chart, self.spare)
+            if k + 1 >= SETTLING and (good | (gain <= 0)).all():
+                break
         return np.where(good[self.of_vertex], w, given)
+
+    def _symmetric(self, w: np.ndarray) -> np.ndarray:
+        """The map w (n,), which is symmetric but for rounding, symmetric to the last bit."""
+        return w if self.symmetry is None else self.symmetry.spread(w)
 
     def _forced(self, w: np.ndarray) -> np.ndarray:
         """The map w (n,) after rounds with a barrier that grows stronger at corners while these are reflex."""
@@ -134,19 +168,32 @@ class CornerPatches:
     def _area_errors(self, w):
         return np.bincount(self.of_face, np.abs(self.faces.areas(w) - self.faces.area * self.faces.ratio), self.count)
 
+    def _costs(self, given, w):
+        """By how much the areas of every patch (p,) are further off than in another map, as shares of a chart's own
+        area: all others lose by what that grows."""
+        grown = np.bincount(self.of_face, self.faces.areas(w) - self.faces.areas(given), self.count)
+        return self._area_errors(w) - self._area_errors(given) + np.abs(grown)
+
     def _stepped(self, w, weight, barrier: CornerBarrier) -> np.ndarray:
         """The map after some Newton steps, of which every patch takes as much as it may."""
-        problem = NewtonProblem(self.faces, self.assembly, self.motion, weight, (barrier,))
-        value = self._values(w, weight, barrier)
+        # Quads that have become convex are measured along both diagonals from then on, and stay so.
+        faces = with_convex_quads(self.faces, w)
+        motion = self.motion if self.symmetry is None else MirroredMotion(self.motion, self.symmetry, w)
+        problem = NewtonProblem(faces, self.assembly, motion, weight, (barrier,), symmetry=self.symmetry)
+        value = self._values(faces, w, weight, barrier)
+        of_triangle, counts = self.of_face[faces.owner], faces.triangle_areas > 0
         for _ in range(STEPS):
-            step, _ = newton_direction(problem, w, PRESSURE)
-            down = gradient(self.faces, w, weight) + barrier.derivatives(w)[0]
+            step = motion.frame(w) * newton_direction(problem, w, PRESSURE)[0]
+            if self.symmetry is not None:
+                step = self.symmetry.spread(step)
+            down = gradient(faces, w, weight) + barrier.derivatives(w)[0]
             slope = np.bincount(self.of_vertex, (step.conj() * down).real, self.count)
             far = np.full(self.count, 1 / FOLD_SHARE)
-            np.minimum.at(far, self.of_face, fold_shares(*self.faces.derivatives(w), *self.faces.derivatives(step)))
+            folding = fold_shares(*faces.derivatives(w), *faces.derivatives(step))
+            np.minimum.at(far, of_triangle[counts], folding[counts])
             share = FOLD_SHARE * far
             for _ in range(HALVINGS):
-                trial = self._values(w + share[self.of_vertex] * step, weight, barrier)
+                trial = self._values(faces, w + share[self.of_vertex] * step, weight, barrier)
                 waiting = ~(trial <= value + ARMIJO * share * slope)
                 if not waiting.any():
                     break
@@ -155,8 +202,8 @@ class CornerPatches:
             w, value = w + share[self.of_vertex] * step, np.where(waiting, value, trial)
         return w
 
-    def _values(self, w, weight, barrier: CornerBarrier) -> np.ndarray:
-        of_faces = np.bincount(self.of_face, energies(self.faces, w, weight), self.count)
+    def _values(self, faces: Elements, w, weight, barrier: CornerBarrier) -> np.ndarray:
+        of_faces = np.bincount(self.of_face, energies(faces, w, weight), self.count)
         return of_faces + np.bincount(self.of_corner, barrier.energies(w), self.count)
 
 

@@ -28,12 +28,14 @@ class PolygonCorners:
     Attributes
     ----------
     triangles (k,3) : of vertices
+    polygon (k,) : whose corner each is
     target (k,) : areas they shall have
     whole (k,) : areas of their polygons
     least (k,) : areas below which they are reflex
     """
 
     triangles: np.ndarray
+    polygon: np.ndarray
     target: np.ndarray
     whole: np.ndarray
     least: np.ndarray
@@ -55,6 +57,7 @@ class PolygonCorners:
         """Some of the corners, (k,) bool, with the vertices renumbered, vertex v as place[v]."""
         return PolygonCorners(
             triangles=place[self.triangles[chosen]],
+            polygon=self.polygon[chosen],
             target=self.target[chosen],
             whole=self.whole[chosen],
             least=self.least[chosen],

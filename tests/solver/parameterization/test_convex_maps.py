@@ -5,6 +5,7 @@ from dataclasses import replace
 import hard_meshes
 import meshes
 import numpy as np
+import polygons
 import pytest
 
 from omt_uv.solver.mesh.charts import strict_charts
@@ -12,7 +13,7 @@ from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.chart_map import FOLDED, map_chart
 from omt_uv.solver.parameterization.chart_pins import ChartPins
 from omt_uv.solver.parameterization.convex_maps import with_convex_polygons
-from omt_uv.solver.parameterization.convexity import keep_convex
+from omt_uv.solver.parameterization.convexity import dented_faces, keep_convex
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.polygon_corners import convex_corners
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -75,6 +76,31 @@ def test_what_stays_folded_does_not_keep_the_rest_from_being_opened():
     )
     assert 0 < found.folds <= folds
     assert 0 < reflex(surface, chart, found.uv) < reflex(surface, chart, uv)
+
+
+@pytest.mark.parametrize(
+    "quality, seed", [("standard", 8), ("standard", 25), ("exact", 3), ("exact", 15), ("exact", 26), ("exact", 33)]
+)
+def test_no_polygon_of_a_body_with_limbs_folds_whichever_way_it_is_cut(quality, seed):
+    """Corners were opened by the areas of triangles, and the map thrown away by those of polygons."""
+    surface = meshes.polygon_surface(*polygons.with_limbs(seed))
+    result = drain(unwrap(surface, options=UnwrapOptions(quality=quality)))
+    for chart, chart_map in zip(result.charts, result.maps, strict=True):
+        assert chart_map.folds == 0 and not chart_map.warnings
+        assert reflex(surface, chart, chart_map.uv) == 0 and (signed_areas(chart_map.uv, chart.triangles) > 0).all()
+        assert chart_map.area_l1 <= (0.01 if quality == "standard" else 0.001)
+
+
+def test_polygons_that_fold_along_another_diagonal_are_told_where_they_stay():
+    surface, chart, chart_map = darts()
+    everything = np.arange(len(chart.vertices))
+    pins = ChartPins(everything, chart_map.uv, chart_map.uv[chart.triangles])
+    (found,) = drain(with_convex_polygons(surface, [chart], [chart_map], [pins], MapOptions()))
+    count = len(dented_faces(surface, chart, found.uv))
+    assert count == 1 and (signed_areas(found.uv, chart.triangles) > 0).all()
+    assert [text for text in found.warnings if "1 face folds" in text]
+    (opened,) = drain(with_convex_polygons(surface, [chart], [chart_map], [None], MapOptions()))
+    assert not opened.warnings
 
 
 def test_triangles_are_left_alone():

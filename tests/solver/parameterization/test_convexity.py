@@ -11,6 +11,7 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.convexity import keep_convex
 from omt_uv.solver.parameterization.polygon_corners import convex_corners
+from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 
@@ -67,6 +68,30 @@ def test_darts_open_and_what_is_fixed_stays():
         area = signed_areas(found, chart.triangles)
         assert (signed_areas(found, vertex[corner]) > 0).all() and (area > 0).all()
         np.testing.assert_array_equal(found[fixed], uv[fixed])
+
+
+@pytest.mark.parametrize("turn", [1.0, np.exp(0.7j)])
+def test_symmetric_maps_stay_symmetric(turn):
+    """All diagonals go one way, and so would the patches."""
+    surface = quads(6, 5)
+    surface = replace(surface, positions=surface.positions + (surface.positions[:, :1] - 0.5) ** 2 * [0, 0, 1])
+    (chart,) = strict_charts(surface)
+    w = chart.vertices @ [1, 1j, 0] - 0.5
+    w[chart.vertex_ids == 16] += 0.1 - 0.12j
+    w[chart.vertex_ids == 18] -= 0.1 + 0.12j
+    image = np.abs(w[:, None] + w.conj()).argmin(axis=1)
+    assert np.abs(w + w[image].conj()).max() < 1e-12
+    w = turn * w + 3
+    uv = np.column_stack([w.real, w.imag])
+    chart = cut_as_mapped(chart, uv)
+    corner, _, _ = convex_corners(surface)
+    vertex = np.empty(len(surface.corner_vertex), int)
+    vertex[chart.corners] = chart.triangles
+    assert (signed_areas(uv, vertex[corner]) < 0).any()
+    (new,) = keep_convex(surface, [chart], [uv], [np.zeros(len(uv), bool)], [None], [50.0], [np.inf]).values()
+    assert (signed_areas(new, vertex[corner]) > 0).all()
+    moved = (new @ [1, 1j] - (new @ [1, 1j]).mean()) / turn
+    np.testing.assert_allclose(moved[image], -moved.conj(), atol=1e-12)
 
 
 def test_maps_without_darts_are_left_alone():

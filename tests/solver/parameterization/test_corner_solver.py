@@ -29,13 +29,18 @@ def two_darts(spare):
     mesh = CornerMesh(
         positions=np.column_stack([both, np.zeros(8)]),
         triangles=np.concatenate([triangles, triangles + 4]),
+        polygon=np.repeat([0, 1], 2),
         target=np.full(4, 0.5),
-        area_weight=np.full(4, 10.0),
+        area_weight=np.full(2, 10.0),
         chart=np.repeat([0, 1], 2),
         spare=np.asarray(spare, float),
     )
     corners = PolygonCorners(
-        triangles=np.concatenate([ears, ears + 4]), target=np.full(8, 0.5), whole=np.ones(8), least=np.full(8, 0.01)
+        triangles=np.concatenate([ears, ears + 4]),
+        polygon=np.repeat([0, 1], 4),
+        target=np.full(8, 0.5),
+        whole=np.ones(8),
+        least=np.full(8, 0.01),
     )
     return CornerPatches(mesh, corners, np.ones(8, bool)), corners, np.concatenate([dart, dart + 3])
 
@@ -53,3 +58,15 @@ def test_charts_that_can_spare_no_area_stay_to_the_bit():
     found = patches.convexified(w)
     np.testing.assert_array_equal(found[:4], w[:4])
     assert not corners.reflex(found)[4:].any()
+
+
+def test_costs_are_what_the_figures_of_the_whole_lose():
+    """A quad that grows takes from the shares of all others."""
+    patches, _, w = two_darts([np.inf, np.inf])
+    grown = np.where(np.arange(8) < 4, 1.1 * w, w)
+    (first, second), given = patches.of_face, patches.faces
+    loss = (
+        np.abs(given.areas(w) - given.area * given.ratio)[0] - np.abs(given.areas(grown) - given.area * given.ratio)[0]
+    )
+    costs = patches._costs(w, grown)
+    assert costs[first] == pytest.approx(0.21 * given.areas(w)[0] - loss) and costs[second] == 0

@@ -26,7 +26,9 @@ def test_only_corners_of_convex_polygons_count_and_no_straight_ones():
 def test_the_barrier_is_the_integral_of_its_gradient():
     rng = np.random.default_rng(0)
     w = rng.normal(size=6) + 1j * rng.normal(size=6)
-    corners = PolygonCorners(np.array([[0, 1, 2], [2, 3, 4], [5, 1, 0]]), np.ones(3), np.ones(3), np.zeros(3))
+    corners = PolygonCorners(
+        np.array([[0, 1, 2], [2, 3, 4], [5, 1, 0]]), np.arange(3), np.ones(3), np.ones(3), np.zeros(3)
+    )
     barrier = CornerBarrier(corners, np.full(3, 9.0), np.array([1.0, 2, 3]))
     direction = rng.normal(size=6) + 1j * rng.normal(size=6)
     difference = (barrier.energy(w + 1e-6 * direction) - barrier.energy(w - 1e-6 * direction)) / 2e-6
@@ -48,6 +50,7 @@ def test_reflex_and_convex_are_told_by_the_signed_area():
     w = np.array([0, 1, 1 + 1j, 1j, 0.5 + 1e-3j])
     corners = PolygonCorners(
         triangles=np.array([[0, 1, 3], [0, 3, 1], [0, 1, 4]]),
+        polygon=np.arange(3),
         target=np.full(3, 0.5),
         whole=np.ones(3),
         least=np.zeros(3),
@@ -60,7 +63,7 @@ def test_reflex_and_convex_are_told_by_the_signed_area():
 
 
 def test_the_barrier_is_least_at_the_target_and_infinite_without_area():
-    corners = PolygonCorners(np.array([[0, 1, 2]]), np.array([0.5]), np.ones(1), np.zeros(1))
+    corners = PolygonCorners(np.array([[0, 1, 2]]), np.zeros(1, int), np.array([0.5]), np.ones(1), np.zeros(1))
     barrier = CornerBarrier(corners, np.zeros(1), np.ones(1))
     right = np.array([0, 1, 1j])
     assert barrier.energy(right) == 0 and np.abs(barrier.derivatives(right)[0]).max() == 0
