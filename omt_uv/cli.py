@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import sys
 import traceback
@@ -26,10 +27,15 @@ COMMANDS = {
 # As their modules have it, which runs of single files do not read.
 BATCH = "batch"
 SERVE = "serve"
+# What only the system, its disks and its limits decide; any other error of a file that no module named is a defect.
+OF_SYSTEM = {getattr(errno, name) for name in (
+    "ENOSPC", "EDQUOT", "EROFS", "EACCES", "EPERM", "EIO", "EFBIG", "EMFILE", "ENFILE", "ENXIO", "ESTALE", "ETXTBSY")
+    if hasattr(errno, name)}  # fmt: skip
 
 
 def script() -> None:
     """Run the command that the arguments of this process ask for, and end it; what an installed `omt-uv` calls."""
+    supervision.open_streams()
     supervision.leave(program(sys.argv[1:], [sys.executable, *sys.orig_argv[1:]]))
 
 
@@ -50,15 +56,17 @@ def program(arguments: Sequence[str], words: Sequence[str]) -> int:
     if getattr(options, "alone", False):
         return carry_out(options)
     paths = [value for value in vars(options).values() if isinstance(value, Path)]
-    return supervision.supervise(
-        supervision.Errand(
-            words=words,
-            about=str(options.input),
-            folders=tuple({path.absolute().parent for path in paths}),
-            timeout=options.timeout,
-            memory=options.memory > 0,
-        )
+    errand = supervision.Errand(
+        words=words,
+        about=str(options.input),
+        folders=tuple({path.absolute().parent for path in paths}),
+        timeout=options.timeout,
+        memory=options.memory > 0,
     )
+    try:
+        return supervision.supervise(errand)
+    except OSError as error:
+        return _told(f"{options.input}: no child process can be started: {_of_system(error)}", supervision.FAILURE)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -90,14 +98,31 @@ def carry_out(options: argparse.Namespace) -> int:
         return _told(f"{options.input}: not enough memory. {error}", supervision.MEMORY)
     except KeyboardInterrupt:
         return _told(f"{options.input}: stopped by SIGINT", supervision.INTERRUPTED)
-    except Exception as error:
-        # The last one there is: whatever no module named is a defect, told in one line with a status of its own.
-        if sys.flags.dev_mode:
-            raise
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        text = f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}: {error}"
-        return _told(f"{options.input}: a defect of this program, please report it: {text}", supervision.DEFECT)
+    except BrokenPipeError as error:
+        return supervision.lost(error)
+    except OSError as error:
+        if error.errno not in OF_SYSTEM:
+            return _defect(options, error)
+        return _told(f"{options.input}: {_of_system(error)}", supervision.FAILURE)
+    except Exception as error:  # noqa: BLE001 - told with its place, and with a status of its own
+        return _defect(options, error)
     return 0
+
+
+def _of_system(error: OSError) -> str:
+    """What the system refuses, where, and what to do."""
+    # What is printed goes to files, too.
+    where = error.filename or "what is written or printed"
+    return f"{where}: {error.strerror or error}. Look for space, rights and limits there."
+
+
+def _defect(options: argparse.Namespace, error: Exception) -> int:
+    """The last one there is: whatever no module named, in one line with a status of its own."""
+    if sys.flags.dev_mode:
+        raise error
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    text = f"{type(error).__name__} in {Path(where.filename).name}:{where.lineno}: {error}"
+    return _told(f"{options.input}: a defect of this program, please report it: {text}", supervision.DEFECT)
 
 
 def _told(text: str, status: int) -> int:

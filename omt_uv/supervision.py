@@ -30,7 +30,9 @@ TIMEOUT = 4
 MEMORY = 5
 DEFECT = 6
 INTERRUPTED = 128 + signal.SIGINT
-OWN = {0, FAILURE, USAGE, MEMORY, DEFECT, INTERRUPTED}
+# Whoever read what is printed has gone, as `head` does: 128 + the number of SIGPIPE, which Python keeps from us.
+UNREAD = 128 + 13
+OWN = {0, FAILURE, USAGE, MEMORY, DEFECT, INTERRUPTED, UNREAD}
 
 GIGABYTE = 10**9
 # Says to a process that it is the child, and which folder for temporary files the parent has made for it.
@@ -106,11 +108,42 @@ def leave(status: int) -> None:
     As a Python module, Blender may crash while the interpreter shuts down (4.2 does after a glTF export), and the
     status would be that of the crash. Its temporary files lie in a folder that the parent removes.
     """
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError as error:
+            # What is left of it would be written, and fail, once more.
+            with open(os.devnull, "wb") as nowhere:
+                os.dup2(nowhere.fileno(), stream.fileno())
+            status = status or lost(error)
     if "bpy" in sys.modules:
         os._exit(status)
     sys.exit(status)
+
+
+def lost(error: OSError) -> int:
+    """The status where something could not be printed; says so, unless its reader has gone."""
+    if isinstance(error, BrokenPipeError):
+        return UNREAD
+    tell(f"what is printed cannot be written: {error.strerror}")
+    return FAILURE
+
+
+def open_streams() -> None:
+    """Open what our caller has closed of standard input, output and errors, to nowhere.
+
+    The next file would take its number, and what anybody prints would go into that file.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            handle = os.open(os.devnull, os.O_RDWR)
+            if handle != number:
+                os.dup2(handle, number)
+                os.close(handle)
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, "w" if number else "r", closefd=False))  # noqa: SIM115 - as Python's own
 
 
 def supervise(errand: Errand) -> int:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..supervision import Errand, Outcome, watch
 from .child import Record, hash_of, run_task
-from .plan import BatchError, BatchPlan, FileTask, words_of
+from .plan import BatchError, BatchPlan, FileTask, kept, words_of
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -58,6 +58,8 @@ class Cluster:
                 self._local = _local_cluster(address)
                 address = self._local.scheduler_address
             self.client: Client = distributed.Client(address, timeout=20, set_as_default=False)
+        except BatchError:
+            raise
         except (OSError, ValueError) as error:
             raise BatchError(f"{address}: no scheduler answers ({error}). Start one: dask scheduler.") from error
 
@@ -156,8 +158,9 @@ class Cluster:
             else:
                 assert task.output is not None
                 path = task.output.parent / Path(name).name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            _write_whole(path, data)
+            with kept(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                _write_whole(path, data)
             if name != "preview":
                 outputs[str(path)] = (hash_of(path), len(data))
         preview = str(self.plan.beside(".previews") / f"{task.name}.png") if "preview" in files else ""

@@ -9,7 +9,7 @@ from ..supervision import ended_by_signals
 from .bar import shown, work_of
 from .child import Record
 from .manifest import Manifest
-from .plan import FAILURES, BatchPlan, FileTask, shell_text
+from .plan import FAILURES, BatchPlan, FileTask, kept, shell_text
 from .pool import Runner
 
 
@@ -50,8 +50,10 @@ def carry_out(
 def keep_failure(plan: BatchPlan, task: FileTask, record: Record) -> None:
     """Keep a failure's command line and message beside the results, and remove that of a file that works now."""
     path = plan.beside(FAILURES) / f"{task.name}.txt"
-    if record.status == 0:
-        path.unlink(missing_ok=True)
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(f"{shell_text(record.words)}\n\nstatus {record.status}\n{record.message}\n", errors="replace")
+    with kept(path):
+        if record.status == 0:
+            path.unlink(missing_ok=True)
+            return
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = f"{shell_text(record.words)}\n\nstatus {record.status}\n{record.message}\n"
+        path.write_text(text, errors="replace")

@@ -20,6 +20,19 @@ RUNNING = "running"
 WAITING = "waiting"
 # Of the layout of the tables.
 EDITION = 1
+# What a user can do about errors of SQLite, by the last byte of their codes.
+REMEDIES = {
+    sqlite3.SQLITE_FULL: "Make room on the disk",
+    sqlite3.SQLITE_IOERR: "Look for space, quota and rights on its disk",
+    sqlite3.SQLITE_READONLY: "Allow writing it and its folder",
+    sqlite3.SQLITE_CANTOPEN: "Allow writing into its folder, and let nothing else have its name",
+    sqlite3.SQLITE_PERM: "Allow writing it and its folder",
+    sqlite3.SQLITE_BUSY: "Close what has it open",
+    sqlite3.SQLITE_LOCKED: "Close what has it open",
+    sqlite3.SQLITE_NOTADB: "Move it away: files are done anew then",
+    sqlite3.SQLITE_CORRUPT: "Move it away: files are done anew then",
+}
+BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 COLUMNS = {
     "name": "TEXT PRIMARY KEY",
     "path": "TEXT",
@@ -45,8 +58,28 @@ COLUMNS = {
 }
 
 
+def _primary(error: sqlite3.Error) -> int:
+    """The code of an error without what SQLite adds to it; 0 where the error is not SQLite's own."""
+    return getattr(error, "sqlite_errorcode", 0) & 0xFF
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Turn errors of SQLite into one that names the file, the cause, and what to do."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        if not _primary(error):
+            # A closed manifest, or words that are no SQL: nothing that a user can mend.
+            raise
+        remedy = REMEDIES.get(_primary(error), "Look after this file")
+        raise BatchError(
+            f"{path}: cannot be used ({error}). {remedy}, and start the same command again: it goes on."
+        ) from error
+
+
 class Manifest:
-    """The manifest of a batch, in a file beside its results."""
+    """The manifest of a batch, in a file beside its results; a BatchError says why it cannot be read or written."""
 
     def __init__(self, path: Path) -> None:
         """Open it, or make one.
@@ -56,18 +89,25 @@ class Manifest:
         BatchError : the file is no manifest, of another edition, or cannot be written
         """
         self.path = path
-        try:
+        with _named(path):
             self._base = sqlite3.connect(path, timeout=60.0, isolation_level=None)
+        try:
             self._base.row_factory = sqlite3.Row
-            (edition,) = self._base.execute("PRAGMA user_version").fetchone()
+            ((edition,),) = self._ask("PRAGMA user_version")
             if edition not in (0, EDITION):
                 raise BatchError(f"{path}: a manifest of edition {edition}, and this program knows {EDITION}")
             columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
-            self._base.execute(f"CREATE TABLE IF NOT EXISTS runs ({columns})")
-            self._base.execute("CREATE TABLE IF NOT EXISTS batch (name TEXT PRIMARY KEY, value TEXT)")
-            self._base.execute(f"PRAGMA user_version = {EDITION}")
-        except sqlite3.Error as error:
-            raise BatchError(f"{path}: cannot be used as a manifest ({error})") from error
+            self._ask(f"CREATE TABLE IF NOT EXISTS runs ({columns})")
+            self._ask("CREATE TABLE IF NOT EXISTS batch (name TEXT PRIMARY KEY, value TEXT)")
+            self._ask(f"PRAGMA user_version = {EDITION}")
+        except BatchError:
+            self.close()
+            raise
+
+    def _ask(self, words: str, values: Sequence = ()) -> list[sqlite3.Row]:
+        """All rows that answer a line of SQL."""
+        with _named(self.path):
+            return self._base.execute(words, values).fetchall()
 
     def close(self) -> None:
         self._base.close()
@@ -82,17 +122,18 @@ class Manifest:
         """Keep what is asked of the files."""
         pairs = {"command": plan.command, "options": json.dumps(plan.options), "output": str(plan.output.resolve()),
                  "version": plan.version}  # fmt: skip
-        self._base.executemany("INSERT OR REPLACE INTO batch VALUES (?, ?)", list(pairs.items()))
+        with _named(self.path):
+            self._base.executemany("INSERT OR REPLACE INTO batch VALUES (?, ?)", list(pairs.items()))
 
     def description(self) -> dict[str, str]:
-        return {row["name"]: row["value"] for row in self._base.execute("SELECT * FROM batch")}
+        return {row["name"]: row["value"] for row in self._ask("SELECT * FROM batch")}
 
     def due(self, plan: BatchPlan, tasks: Sequence[FileTask], retry: bool) -> list[FileTask]:
         """Those of the tasks that are to be run, in order: new, changed, never ended, or failed and to be retried.
 
         Rows of files that are no longer there are removed; those of other parts of a batch stand in other manifests.
         """
-        rows = {row["name"]: row for row in self._base.execute("SELECT * FROM runs")}
+        rows = {row["name"]: row for row in self._ask("SELECT * FROM runs")}
         key, due, waiting = plan.key(), [], []
         for task in tasks:
             row = rows.pop(task.name, None)
@@ -102,7 +143,7 @@ class Manifest:
             due.append(task)
             waiting.append((task.name, str(task.path), task.size, WAITING, 0 if row is None else row["tries"]))
         # All or nothing, also of what is stopped by hand, or by a full disk.
-        with self._base:
+        with _named(self.path), self._base:
             self._base.execute("BEGIN IMMEDIATE")
             self._base.executemany("DELETE FROM runs WHERE name = ?", [(name,) for name in rows])
             self._base.executemany(
@@ -120,12 +161,12 @@ class Manifest:
             return True
         same = row["input_hash"] == hash_of(task.path)
         if same:
-            self._base.execute("UPDATE runs SET changed = ? WHERE name = ?", (task.changed, task.name))
+            self._ask("UPDATE runs SET changed = ? WHERE name = ?", (task.changed, task.name))
         return same
 
     def begin(self, task: FileTask) -> None:
         """Say that a run has begun; what is running when a batch begins was in flight when another was killed."""
-        self._base.execute("UPDATE runs SET state = ?, tries = tries + 1 WHERE name = ?", (RUNNING, task.name))
+        self._ask("UPDATE runs SET state = ?, tries = tries + 1 WHERE name = ?", (RUNNING, task.name))
 
     def end(self, plan: BatchPlan, task: FileTask, record: Record) -> None:
         """Keep how a run has ended."""
@@ -139,15 +180,15 @@ class Manifest:
             "preview": record.preview,
         }  # fmt: skip
         names = ", ".join(f"{name} = ?" for name in values)
-        self._base.execute(f"UPDATE runs SET {names} WHERE name = ?", (*values.values(), task.name))
+        self._ask(f"UPDATE runs SET {names} WHERE name = ?", (*values.values(), task.name))
 
     def rows(self) -> list[dict]:
         """All rows as dicts, in the order of names."""
-        return [dict(row) for row in self._base.execute("SELECT * FROM runs ORDER BY name")]
+        return [dict(row) for row in self._ask("SELECT * FROM runs ORDER BY name")]
 
     def counts(self) -> dict[str, int]:
         """How many files are in each state."""
-        return dict(self._base.execute("SELECT state, COUNT(*) FROM runs GROUP BY state").fetchall())
+        return dict(map(tuple, self._ask("SELECT state, COUNT(*) FROM runs GROUP BY state")))
 
 
 def _is_over(row: sqlite3.Row, retry: bool) -> bool:
@@ -211,15 +252,20 @@ def only_one(path: Path) -> Iterator[None]:
 
     Raises
     ------
-    BatchError : another batch is at work
+    BatchError : another batch is at work, or its lock cannot be made
     """
-    lock = sqlite3.connect(path.with_suffix(".lock"), timeout=0.0, isolation_level=None)
+    name = path.with_suffix(".lock")
+    with _named(name):
+        lock = sqlite3.connect(name, timeout=0.0, isolation_level=None)
     try:
-        try:
-            lock.execute("PRAGMA journal_mode = OFF")
-            lock.execute("BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError as error:
-            raise BatchError(f"{path}: another batch is at work on it. Wait for its end.") from error
+        with _named(name):
+            try:
+                lock.execute("PRAGMA journal_mode = OFF")
+                lock.execute("BEGIN EXCLUSIVE")
+            except sqlite3.OperationalError as error:
+                if _primary(error) in BUSY:
+                    raise BatchError(f"{path}: another batch is at work on it. Wait for its end.") from error
+                raise
         yield
     finally:
         with suppress(sqlite3.Error):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,18 @@ PREVIEWS = ".previews"
 
 class BatchError(UserError):
     """A batch that cannot begin, or go on."""
+
+
+@contextmanager
+def kept(path: Path) -> Iterator[None]:
+    """Name what cannot be kept beside the results, or among them, and why, as a BatchError."""
+    try:
+        yield
+    except OSError as error:
+        raise BatchError(
+            f"{path}: cannot be written ({error.strerror or error}). Look for space, rights and other files of these "
+            "names, and start the same command again: it goes on."
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -103,6 +116,8 @@ def _of_list(source: Path) -> list[tuple[str, Path]]:
         lines = source.read_text().splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise BatchError(f"{source}: neither a folder nor a list of files, one on each line ({error})") from error
+    if any("\0" in line for line in lines):
+        raise BatchError(f"{source}: holds what no path has, and is no list of files. Write a path on each line.")
     paths = [Path(os.path.abspath(source.parent / line.strip())) for line in lines if line.strip()]
     if not paths:
         raise BatchError(f"{source}: the list is empty. Write a path on each line.")

@@ -281,10 +281,10 @@ def main():
             return next(told) or TURN
         except StopIteration:
             story.facts["finished"] = True
-        except Exception:  # noqa: BLE001, it is told
+        except Exception:  # noqa: BLE001, whatever a story stumbles over is told, and an end that is no success
             story.facts["error"] = traceback.format_exc()
         (out / "facts.json").write_text(json.dumps(story.facts, indent=1))
-        os._exit(0)
+        os._exit(0 if "finished" in story.facts else 1)
 
     bpy.app.timers.register(go_on, first_interval=1.5)
 

@@ -6,6 +6,7 @@ import json
 import os
 import sqlite3
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -121,9 +122,65 @@ def test_a_manifest_on_a_full_disk_says_that_it_is_full_and_keeps_its_rows(packa
         manifest.due(plan, [first], retry=False)
         (pages,) = manifest._base.execute("PRAGMA page_count").fetchone()
         manifest._base.execute(f"PRAGMA max_page_count = {pages + 2}")
-        with pytest.raises(sqlite3.Error, match="full"):
+        with pytest.raises(package("batch.plan").BatchError, match=r"is full.*Make room") as told:
             manifest.due(plan, [first, *many], retry=False)
+        assert str(manifest.path) in str(told.value) and "\n" not in str(told.value)
         assert [row["name"] for row in manifest.rows()] == ["first"]
+
+
+def in_a_folder_that_takes_nothing(tmp_path):
+    if not os.path.isdir("/proc/self"):
+        pytest.skip("no folder here takes nothing, whoever asks")
+    return Path("/proc/self")
+
+
+def under_the_name_of_a_folder(tmp_path):
+    for ending in ("lock", "sqlite"):
+        (tmp_path / f"x.manifest.{ending}").mkdir()
+    return tmp_path
+
+
+def over_a_text(tmp_path):
+    for ending in ("lock", "sqlite"):
+        (tmp_path / f"x.manifest.{ending}").write_text("no data base, however long it may be " * 40)
+    return tmp_path
+
+
+@pytest.mark.parametrize("place", [in_a_folder_that_takes_nothing, under_the_name_of_a_folder, over_a_text])
+@pytest.mark.parametrize("what", ["only_one", "Manifest"])
+def test_what_sqlite_cannot_do_is_told_by_its_cause_and_never_as_another_batch(package, tmp_path, place, what):
+    path = place(tmp_path) / "x.manifest.sqlite"
+    with pytest.raises(package("batch.plan").BatchError) as told, getattr(package("batch.manifest"), what)(path):
+        pass
+    cause, text = told.value.__cause__, str(told.value)
+    assert isinstance(cause, sqlite3.Error) and str(cause) in text and "another batch" not in text
+    assert text.startswith(f"{path.with_suffix('')}.") and "start the same command again" in text
+
+
+def test_every_question_to_a_damaged_manifest_is_an_error_that_names_it(package, work):
+    """The rows are overwritten while the file is open; what is no error of SQLite, such as of a closed one, stays."""
+    plans, module = package("batch.plan"), package("batch.manifest")
+    plan, child = plans.BatchPlan("unwrap", (), work.root / "out"), package("batch.child")
+    task = plans.FileTask("first", work.root / "first", 1, 0, None)
+    path = work.root / "x.manifest.sqlite"
+    with module.Manifest(path) as manifest:
+        manifest.describe(plan)
+        manifest.due(plan, [task], retry=False)
+        path.write_bytes(path.read_bytes()[:24] + b"\xff" * (path.stat().st_size - 24))
+        asked = [
+            lambda: manifest.describe(plan),
+            manifest.description,
+            lambda: manifest.due(plan, [task], retry=False),
+            lambda: manifest.begin(task),
+            lambda: manifest.end(plan, task, child.Record(status=0, seconds=0.0)),
+            manifest.rows,
+            manifest.counts,
+        ]
+        for ask in asked:
+            with pytest.raises(plans.BatchError, match=r"x\.manifest\.sqlite: .*Move it away"):
+                ask()
+    with pytest.raises(sqlite3.ProgrammingError):
+        manifest.rows()
 
 
 @pytest.mark.parametrize("defect", [KeyError, SystemExit])

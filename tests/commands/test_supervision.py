@@ -189,3 +189,75 @@ def test_impossible_counts_are_refused_before_memory_is_asked_for(run, tmp_path,
     status, _, err = run("remesh", tmp_path / "in.off", "-o", tmp_path / "out.obj", *words)
     assert status == 1 and len(err.splitlines()) == 1 and "memory" in err
     assert not (tmp_path / "out.obj").exists()
+
+
+# Without variables that have Python write every word at once.
+LEAVER = [sys.executable, "-E", "-c", "from omt_uv import supervision; print('figures'); supervision.leave(0)"]
+# Files are opened, and everybody prints, as Blender does from C.
+PRINTER = """
+import os, sys
+from omt_uv import supervision
+supervision.open_streams()
+with open(sys.argv[1], "w") as file:
+    for number in (1, 2):
+        os.write(number, b"noise")
+    print("noise", flush=True)
+    print("noise", file=sys.stderr, flush=True)
+    assert sys.stdin.read() == ""
+    file.write("mesh")
+"""
+
+
+@posix
+def test_what_cannot_be_printed_is_no_success(tmp_path):
+    if not os.path.exists("/dev/full"):
+        pytest.skip("no disk here is full")
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(LEAVER, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and done.stderr.count("\n") == 1 and "No space left" in done.stderr
+
+
+@posix
+def test_a_reader_that_has_gone_is_a_status_of_its_own_without_a_word(package, capfd):
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        done = subprocess.run(LEAVER, cwd=ROOT, stdout=write, stderr=subprocess.PIPE, text=True)
+    finally:
+        os.close(write)
+    assert (done.returncode, done.stderr) == (141, "")
+    assert supervise(package, "import sys; sys.exit(141)") == 141
+    assert capfd.readouterr() == ("", "")
+
+
+@posix
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-", ">&- 2>&-"])
+def test_what_is_printed_to_a_closed_stream_goes_into_no_file(tmp_path, closed):
+    words = [sys.executable, "-c", PRINTER, str(tmp_path / "out")]
+    done = subprocess.run(["sh", "-c", f'"$@" {closed}', "sh", *words], cwd=ROOT, stdin=subprocess.DEVNULL)
+    assert done.returncode == 0 and (tmp_path / "out").read_text() == "mesh"
+
+
+@pytest.mark.parametrize("number, defect", [(28, False), (13, False), (30, False), (5, False), (2, True), (20, True)])
+def test_what_the_system_refuses_is_no_defect_of_ours_and_a_missing_file_nobody_named_is(
+    package, capfd, monkeypatch, number, defect
+):
+    def fail(_):
+        raise OSError(number, os.strerror(number), "/some/where")
+
+    status = package("cli").carry_out(SimpleNamespace(run=fail, input=Path("in.obj")))
+    err = capfd.readouterr().err
+    assert status == (6 if defect else 1) and err.count("\n") == 1
+    assert "/some/where" in err and os.strerror(number) in err and ("defect" in err) == defect
+
+
+def test_a_child_that_cannot_be_started_is_one_line(package, capfd, monkeypatch):
+    def fail(*_, **__):
+        raise OSError(11, os.strerror(11))
+
+    monkeypatch.setattr(package("supervision"), "begun", fail)
+    assert package("cli").main(["table", "nowhere"]) == 1
+    capfd.readouterr()
+    assert package("cli").program(["measure", "in.obj"], ["omt_uv", "measure", "in.obj"]) == 1
+    err = capfd.readouterr().err
+    assert err.startswith("omt_uv: error: in.obj: no child process") and err.count("\n") == 1

@@ -111,13 +111,14 @@ def run_batch(options: argparse.Namespace) -> None:
     """
     from ...batch.engine import carry_out
     from ...batch.manifest import Manifest, only_one
-    from ...batch.plan import MANIFEST, beside, tasks_of
+    from ...batch.plan import MANIFEST, beside, kept, tasks_of
 
     plan = _plan(options)
     tasks = tasks_of(plan, options.input, options.part)
     name = MANIFEST if options.part[1] == 1 else f".part{options.part[0]}of{options.part[1]}{MANIFEST}"
     path = beside(options.output, name)
-    plan.output.mkdir(parents=True, exist_ok=True)
+    with kept(plan.output):
+        plan.output.mkdir(parents=True, exist_ok=True)
     with only_one(path), Manifest(path) as manifest:
         runner = _runner(options, plan)
         try:

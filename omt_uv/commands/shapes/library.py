@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> None:
         for name, path in due.items():
             try:
                 found[name] = signature_of_file(options, path)
-            except ValueError as error:
+            except CommandError as error:
                 warn_of(f"{name}: {error}")
                 continue
             # What was done stays when the rest is stopped.

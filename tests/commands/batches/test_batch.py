@@ -109,3 +109,42 @@ def test_a_signal_ends_a_batch_in_one_line_and_it_goes_on(folder, number):
     assert batch.returncode == 130 and err.count("\n") == 1 and "The same command goes on" in err, err
     states = dict(sqlite3.connect(folder / "out.manifest.sqlite").execute("SELECT name, state FROM runs"))
     assert set(states.values()) <= {"running", "waiting", "done", "failed"} and len(states) == 3
+
+
+def out_is_a_file(folder):
+    (folder / "out").write_text("")
+    return folder / "in", "out: "
+
+
+def out_is_under_a_file(folder):
+    (folder / "out").write_text("")
+    return folder / "in", "out/more: "
+
+
+def failures_is_a_file(folder):
+    (folder / "out.failures").write_text("")
+    return folder / "in", "bad.obj.txt: "
+
+
+def the_lock_is_a_folder(folder):
+    (folder / "out.manifest.lock").mkdir()
+    return folder / "in", "out.manifest.lock: "
+
+
+def the_list_has_a_zero(folder):
+    (folder / "list").write_text("in/a.obj\0\n")
+    return folder / "list", "list: "
+
+
+@pytest.mark.parametrize(
+    "spoil", [out_is_a_file, out_is_under_a_file, failures_is_a_file, the_lock_is_a_folder, the_list_has_a_zero]
+)
+def test_what_is_in_the_way_of_a_batch_is_one_line_that_names_it_and_no_defect(run, folder, spoil):
+    source, named = spoil(folder)
+    # Only what fails by itself: no run needs to come to an end.
+    (folder / "in" / "a.obj").unlink()
+    (folder / "in" / "sub" / "-b $(touch x); .obj").unlink()
+    out = folder / ("out/more" if spoil is out_is_under_a_file else "out")
+    status, _, err = run("batch", "unwrap", source, "-o", out)
+    assert status == 1 and err.count("\n") == 1, err
+    assert named in err and "defect" not in err and "another batch" not in err
