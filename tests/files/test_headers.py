@@ -92,3 +92,16 @@ def test_buffers_beside_a_gltf_are_there_and_long_enough(tmp_path):
     assert holds(path, b"{") is None and holds(path, b"{}") is None
     (tmp_path / "a.obj").write_bytes(b"v")
     assert check_header(tmp_path / "a.obj") is None
+
+
+@pytest.mark.parametrize("line", ["v 0 0 0", "vt\t0 0", "f 1 2 3", "l 1 2", "# made by hand", "o body", ""])
+def test_a_line_that_blender_would_lose_behind_a_mark_is_not_lost(tmp_path, line):
+    path = tmp_path / "a.obj"
+    path.write_bytes(b"\xef\xbb\xbf" + line.encode() + b"\r\nv 1 0 0\n")
+    if line[:2].strip() in ("v", "vt", "f", "l"):
+        with pytest.raises(ValueError, match="byte order mark"):
+            check_header(path)
+    else:
+        assert check_header(path) is None
+    path.write_text(f"{line}\n")
+    assert check_header(path) is None

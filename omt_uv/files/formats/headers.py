@@ -17,6 +17,9 @@ LEAST_TEXT = 2
 MOST_HEADER = 1 << 20
 STL_HEADER = 84
 STL_FACE = 50
+# What an editor may put before a text in UTF-8, and the lines of an OBJ file of which none may be lost.
+MARK = b"\xef\xbb\xbf"
+NUMBERED = (b"v", b"vt", b"vn", b"f", b"l", b"p")
 
 
 def check_header(path: Path) -> int | None:
@@ -24,13 +27,13 @@ def check_header(path: Path) -> int | None:
 
     Raises
     ------
-    ValueError : the file is too short for what it declares. Faces of PLY may be as short as their count of vertices, so
-        that files that were cut off pass, and have fewer faces than they declare
+    ValueError : the file is too short for what it declares, or its first line would be lost. Faces of PLY may be as
+        short as their count of vertices, so that files that were cut off pass, and have fewer faces than they declare
     """
     if path.suffix.lower() == ".gltf":
         _gltf(path)
         return None
-    check = {".ply": _ply, ".stl": _stl, ".glb": _glb}.get(path.suffix.lower())
+    check = {".ply": _ply, ".stl": _stl, ".glb": _glb, ".obj": _obj}.get(path.suffix.lower())
     if check is None:
         return None
     with path.open("rb") as file:
@@ -75,6 +78,13 @@ def _stl(begin: bytes, size: int) -> int | None:
     if faces * STL_FACE > size - STL_HEADER:
         raise _too_short(f"it declares {faces} faces and holds {(size - STL_HEADER) // STL_FACE}")
     return faces
+
+
+def _obj(begin: bytes, _size: int) -> None:
+    """Blender does not know a first line with a mark before it, and takes every index for that of its neighbour."""
+    first = begin.partition(b"\n")[0].split(maxsplit=1)
+    if first and first[0].startswith(MARK) and first[0].removeprefix(MARK) in NUMBERED:
+        raise ValueError("its first line follows a byte order mark, and would be lost. Save it as UTF-8 without one.")
 
 
 def _glb(begin: bytes, size: int) -> None:

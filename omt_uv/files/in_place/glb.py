@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .glb_data import COMPRESSIONS, DRACO, Glb, accessor, normalized, read, triangles, write
+from .glb_data import COMPRESSIONS, DRACO, Glb, accessor, floats, read, triangles, write
 from .glb_layout import ATTRIBUTES, ELEMENTS, GlbChange, rows_of
 from .imported import Imported, InPlaceError, check_found, dropped_warning, find_corners, numbered
 
@@ -150,7 +150,7 @@ class _Meshes:
                 raise InPlaceError(f"its meshes are compressed ({DRACO})")
             if "POSITION" not in primitive["attributes"]:
                 continue
-            place = accessor(self.glb, primitive["attributes"]["POSITION"])
+            place = floats(self.glb, primitive["attributes"]["POSITION"])
             # Blender has the vertices that a primitive uses, in their order; those of lines and points, too.
             mode, corners = primitive.get("mode", 4), triangles(self.glb, primitive).ravel()
             if mode < 4:
@@ -167,7 +167,7 @@ class _Meshes:
         if count != len(mesh.positions) or len(ours) < len(mesh.corner_vertex):
             return None
         if index not in self.skinned:
-            x, y, z = np.concatenate([np.zeros((0, 3), np.float32), *positions]).astype(np.float32).T
+            x, y, z = np.concatenate([np.zeros((0, 3), np.float32), *positions]).T
             if not np.array_equal(np.stack([x, -z, y], axis=1), mesh.positions, equal_nan=True):
                 return None
         start = np.arange(0, len(ours) + 1, 3)
@@ -224,7 +224,7 @@ def _old_uv(glb: Glb, attributes: dict, layer: int, n: int) -> np.ndarray | None
     index = attributes.get(f"TEXCOORD_{layer}")
     if index is None:
         return None
-    values = normalized(accessor(glb, index))
+    values = floats(glb, index)
     if values.shape != (n, 2):
         raise InPlaceError(f"TEXCOORD_{layer} has not as many values as there are vertices")
     return values
@@ -328,7 +328,7 @@ def _check(old: Glb, new: Glb, meshes: Sequence[Imported]) -> None:
                 for name, index in was_table.items()
                 if name != f"TEXCOORD_{mesh.layer}"
             )
-            uv = normalized(accessor(new, primitive["attributes"][f"TEXCOORD_{mesh.layer}"]))[corners[here]]
+            uv = floats(new, primitive["attributes"][f"TEXCOORD_{mesh.layer}"])[corners[here]]
             off = np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1) - mesh.uv[part.found[here]]
             if not same or not (np.abs(off) <= TURNED * np.maximum(1, np.abs(uv))).all():
                 raise InPlaceError("the new file does not read as the mesh it was written from")

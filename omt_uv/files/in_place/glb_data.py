@@ -59,6 +59,9 @@ def read(data: bytes) -> Glb:
         binary = chunks.pop(1)[1]
     if not isinstance(doc, dict) or not isinstance(doc.get("accessors", []), list):
         raise InPlaceError("the JSON of the file is not that of glTF")
+    buffers = doc.get("buffers", [])
+    if isinstance(buffers, list) and any(isinstance(of, dict) and "uri" in of for of in buffers[:1]):
+        raise InPlaceError("its buffers are in other files, or in its text")
     return Glb(doc, binary, chunks[1:])
 
 
@@ -136,9 +139,10 @@ def mentions(value) -> Iterator[int]:
             yield from mentions(of)
 
 
-def normalized(values: np.ndarray) -> np.ndarray:
-    """UVs as floats, which whole numbers stand for as shares of the greatest."""
-    if values.dtype.kind == "f":
+def floats(glb: Glb, index: int) -> np.ndarray:
+    """Values (count, width) float32 of an accessor; whole numbers stand for shares of the greatest if it says so."""
+    values = accessor(glb, index)
+    if values.dtype.kind == "f" or not glb.doc["accessors"][index].get("normalized"):
         return values.astype(np.float32)
     return (values / np.float32(np.iinfo(values.dtype).max)).astype(np.float32).clip(-1, None)
 

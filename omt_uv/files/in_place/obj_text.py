@@ -10,7 +10,7 @@ import numpy as np
 
 from .imported import InPlaceError
 
-WORD = re.compile(rb"[^\s\\]+")
+WORD = re.compile(rb"[^\s\\#]+")
 CONTINUED = re.compile(rb"\\\r?\n")
 
 
@@ -41,7 +41,7 @@ def read(data: bytes) -> ObjText:
 
     Raises
     ------
-    InPlaceError : a line of positions or UVs has no numbers
+    InPlaceError : a line of positions has no numbers
     """
     lines = _logical_lines(data)
     vertices: list[bytes] = []
@@ -66,7 +66,7 @@ def read(data: bytes) -> ObjText:
     return ObjText(
         lines=lines,
         positions=_numbers(vertices, 3),
-        uv=_numbers([lines[i] for i in uv_line], 2),
+        uv=_uvs([lines[i] for i in uv_line]),
         uv_line=np.array(uv_line, np.int64),
         face_line=where[:, 0],
         face_start=start,
@@ -80,12 +80,9 @@ def read(data: bytes) -> ObjText:
 
 def words(line: bytes) -> list[bytes]:
     """What a line says, without its comment."""
-    found = WORD.findall(line) if b"\\" in line else line.split()
     if b"#" in line:
-        for k, word in enumerate(found):
-            if word.startswith(b"#"):
-                return found[:k]
-    return found
+        line = line[: line.index(b"#")]
+    return WORD.findall(line) if b"\\" in line else line.split()
 
 
 def _logical_lines(data: bytes) -> list[bytes]:
@@ -106,14 +103,29 @@ def _logical_lines(data: bytes) -> list[bytes]:
 
 
 def _numbers(lines: Sequence[bytes], columns: int) -> np.ndarray:
-    """The first numbers (k, columns) of lines; a UV may lack the second."""
+    """The first numbers (k, columns) of lines."""
     try:
         rows = [[float(word) for word in words(line)[1 : 1 + columns]] for line in lines]
-        if columns == 2:
-            rows = [[*row, 0.0] if len(row) == 1 else row for row in rows]
         return np.array(rows, float).reshape(len(lines), columns)
     except ValueError as error:
-        raise InPlaceError("a line of positions or UVs lacks a number") from error
+        raise InPlaceError("a line of positions lacks a number") from error
+
+
+def _uvs(lines: Sequence[bytes]) -> np.ndarray:
+    """UVs (k,2) of lines; what is missing, or no finite number, is 0."""
+    try:
+        found = _numbers(lines, 2)
+    except InPlaceError:
+        found = np.array([[_float(word) for word in (words(line)[1:3] + [b"", b""])[:2]] for line in lines], float)
+    return np.where(np.isfinite(found), found, 0.0)
+
+
+def _float(word: bytes) -> float:
+    """The number that a word says, 0 if it says none."""
+    try:
+        return float(word)
+    except ValueError:
+        return 0.0
 
 
 def _corners(lines: list[bytes], faces: list) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

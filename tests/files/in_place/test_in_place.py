@@ -12,6 +12,7 @@ import pytest
 from mesh_bytes import CUBE, QUADS, TRIANGLES
 
 from omt_uv.files.in_place import glb, glb_data, obj, obj_text, ply
+from omt_uv.files.in_place.glb_layout import GlbChange
 from omt_uv.files.in_place.imported import InPlaceError
 
 PLY_FORMS = ("ascii", "binary_little_endian", "binary_big_endian")
@@ -133,6 +134,46 @@ def test_gltf_changes_uvs_and_nothing_else(shared, mode, uvs):
     assert new.binary[picture["byteOffset"] :][:5] == b"\x89PNG!"
     # Nothing of what was replaced is left behind.
     assert sum(view["byteLength"] for view in new.doc["bufferViews"]) > new.doc["buffers"][0]["byteLength"] - 64
+
+
+@pytest.mark.parametrize("kind", ["<i2", "<u2", "|i1", "|u1"])
+@pytest.mark.parametrize("normal", [True, False])
+def test_positions_that_are_whole_numbers_are_found_and_kept(kind, normal):
+    """As gltfpack writes them: shares of the greatest number, or numbers that a node scales."""
+    most = np.iinfo(kind).max if normal else 1
+    change = GlbChange(glb_data.read(mesh_bytes.glb_bytes()))
+    primitive = change.doc["meshes"][0]["primitives"][0]
+    for name, index in [("POSITION", primitive["attributes"]["POSITION"]), ("TEXCOORD_0", None)]:
+        whole = np.abs(CUBE[:, [0, 2, 1]] if index is not None else np.arange(16).reshape(8, 2) % 2) * most
+        like = {"type": f"VEC{whole.shape[1]}"} | ({"normalized": True} if normal else {})
+        primitive["attributes"][name] = change.replace(index, whole.astype(kind), index is not None, like, 34962)
+    data = glb_data.write(change.result())
+    faces = np.append(TRIANGLES, [[0, 0, 0]], axis=0)[:-1]
+    place = CUBE * [1, -1, 1]
+    mesh = mesh_bytes.imported(faces[:-1], mesh_bytes.spread(33), place.astype(np.float32))
+    old, new = glb_data.read(data), glb_data.read(glb.put(data, [mesh])[0])
+    was, now = (g.doc["meshes"][0]["primitives"][0] for g in (old, new))
+    before, after = glb_data.triangles(old, was).ravel(), glb_data.triangles(new, now).ravel()
+    stored = [glb_data.accessor(g, p["attributes"]["POSITION"]) for g, p in ((old, was), (new, now))]
+    assert stored[0].dtype == stored[1].dtype and (stored[0][before] == stored[1][after]).all()
+    uv = glb_data.floats(new, now["attributes"]["TEXCOORD_0"])[after]
+    assert uv[:33, 0] == pytest.approx(mesh.uv[:, 0], abs=0)
+    # The face that Blender dropped keeps the UVs that the file means.
+    assert (uv[33:] == (np.arange(16).reshape(8, 2) % 2)[before[33:]]).all()
+
+
+def test_an_obj_keeps_comments_at_its_words_and_uvs_that_are_none():
+    data = mesh_bytes.obj_bytes().replace(b"f 2 4 8 6", b"f 2 4 8 6/1#glued 9/9\r\nvt nan\r\nvt x y\r\nvt")
+    new = obj.put(data, [mesh_bytes.imported(FACES, mesh_bytes.spread(24))])[0]
+    assert stripped(new) == stripped(data) and b"#glued 9/9" in new
+    assert (obj_text.read(data).uv[-3:] == 0).all()
+
+
+def test_buffers_of_a_binary_file_that_lie_elsewhere_are_the_reason_that_is_told():
+    read = glb_data.read(mesh_bytes.glb_bytes())
+    read.doc["buffers"][0]["uri"] = "cube.bin"
+    with pytest.raises(InPlaceError, match="in other files"):
+        glb_data.read(glb_data.write(read))
 
 
 def test_gltf_without_new_seams_has_only_the_bytes_of_its_uvs_changed():
