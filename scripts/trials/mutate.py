@@ -13,6 +13,7 @@ import argparse
 import ast
 import os
 import random
+import re
 import resource
 import shutil
 import subprocess
@@ -99,12 +100,22 @@ def tests_of(module: Path) -> list[str]:
 
 
 def users_of(module: Path) -> list[str]:
-    """Files of tests that import a module of the package by its own name, those of its folder first."""
+    """Files of tests that import a module of the package by its own name or have it, those of its folder first; and of
+    a command or an operator those that run it."""
     dotted = ".".join(module.with_suffix("").parts)
     package, name = dotted.rsplit(".", 1)
-    ways = (f"{dotted} import", f"import {dotted}", f'"{dotted}', f"from {package} import {name}")
+    ways = [f"{dotted} import", f"import {dotted}", f'"{dotted}', f'"{dotted.removeprefix("omt_uv.")}"']
+    among = rf"from {package} import (?:\([^)]*|.*)\b{name}\b"
+    way = re.compile("|".join([*map(re.escape, [*ways, *names_of(module)]), among]))
     some = sorted(Path("tests").rglob("test_*.py"), key=lambda path: (path.parts[1:-1] != module.parts[1:-1], path))
-    return [str(path) for path in some if any(way in path.read_text() for way in ways)]
+    return [str(path) for path in some if path.name == f"test_{name}.py" or way.search(path.read_text())]
+
+
+def names_of(module: Path) -> list[str]:
+    """How tests call the command or the operators of a module."""
+    if module.parts[1] == "commands":
+        return [f'"{module.stem.replace("_", "-")}"']
+    return [found.rpartition(".")[2] for found in re.findall(r'bl_idname = "(.*omt.*)"', module.read_text())]
 
 
 def survives(tests: list[str], seconds: int) -> bool:

@@ -22,17 +22,24 @@ def test_groups_become_markers_of_the_objects_that_have_them(package):
         markers.group_markers([first, second], "north", "south")
 
 
-def test_picked_vertices_keep_their_order(package):
+@pytest.mark.parametrize("picks", [(), (7,), (7, 2), (7, 2, 30), (9, 7, 2, 30)])
+def test_picked_vertices_keep_their_order(package, picks):
+    """Two are enough, of more than three those picked last are taken."""
     markers, obj = package("blender.markers"), ball()
     scenes.edit(obj, faces=[])
     bpy.context.tool_settings.mesh_select_mode = (True, False, False)
     mesh = bmesh.from_edit_mesh(obj.data)
     mesh.verts.ensure_lookup_table()
-    for index in (7, 2, 30):
+    for index in picks:
         mesh.verts[index].select = True
         mesh.select_history.add(mesh.verts[index])
-    found = markers.picked_markers(obj)
-    assert [int(np.argmax(x)) for x in (found.pole, found.meridian, found.side)] == [7, 2, 30]
+    if len(picks) < 2:
+        with pytest.raises(package("solver.globe.rotation").MarkerError, match="one after the other"):
+            markers.picked_markers(obj)
+    else:
+        found = markers.picked_markers(obj)
+        marks = [int(np.argmax(x)) for x in (found.pole, found.meridian, found.side) if x is not None]
+        assert tuple(marks) == picks[-3:]
     scenes.leave_edit()
 
 

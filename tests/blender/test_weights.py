@@ -58,3 +58,16 @@ def test_inverted_weights_add_up_to_one(package):
     reading = pairs_of(package, scenes.bump())[0][1]
     weigh = package("blender.weights").computed_weights
     assert np.allclose(weigh(reading, "mean") + weigh(reading, "mean", invert=True), 1)
+
+
+def test_the_largest_value_is_that_of_all_objects_wherever_it_is(package):
+    """And an object without the attribute has no part in it."""
+    tall, low = (with_attribute(lambda obj, most=most: most * weights_of(obj)) for most in (8.0, 2.0))
+    bare = scenes.bump(name="Bare")
+    for order in ([tall, low, bare], [bare, low, tall]):
+        found, warnings = package("blender.weights").attribute_weights(pairs_of(package, *order), "heat")
+        assert len(warnings) == 1 and "reaches 8;" in warnings[0][1]
+        for obj, weights in zip(order, found, strict=True):
+            share = {tall: 1.0, low: 0.25}.get(obj)
+            expected = np.zeros(len(obj.data.vertices)) if share is None else share * weights_of(obj)
+            np.testing.assert_allclose(weights.values, expected, atol=1e-6)

@@ -1,6 +1,7 @@
 """L-BFGS: descent always, and Newton's step where the Hessian is a multiple of the identity."""
 
 import numpy as np
+import pytest
 
 from omt_uv.solver.linalg.lbfgs import LBFGS, MEMORY
 
@@ -51,3 +52,18 @@ def test_reset_forgets():
         x = x + descent.direction(x, gradient(x), diagonal)
     descent.reset()
     np.testing.assert_array_equal(descent.direction(x, gradient(x), diagonal), -diagonal * gradient(x))
+
+
+@pytest.mark.parametrize("length, energy", [(1e-9, 1.0), (1e9, 1.0), (1.0, 1e-12), (1.0, 1e12), (1e-9, 1e-9)])
+def test_units_of_length_and_energy_do_not_matter(length, energy):
+    """Steps are lengths, gradients energies over lengths, and the diagonal squared lengths over energies."""
+    x0, gradient = quadratic(4)
+    plain, scaled = LBFGS(), LBFGS()
+    x, diagonal = np.zeros_like(x0), np.full((4, 1), 0.02)
+    for _ in range(6):
+        g = gradient(x)
+        step = plain.direction(x, g, diagonal)
+        other = scaled.direction(length * x, energy / length * g, length**2 / energy * diagonal)
+        np.testing.assert_allclose(other / length, step, atol=1e-9 * np.abs(step).max())
+        x = x + 0.5 * step
+    assert len(plain.pairs) == len(scaled.pairs) == 5

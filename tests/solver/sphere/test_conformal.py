@@ -11,6 +11,7 @@ from omt_uv.solver import errors
 from omt_uv.solver.mesh.geometry import angles_from_lengths, halfedge_lengths, vertex_areas
 from omt_uv.solver.mesh.spherical_geometry import signed_volumes, spherical_areas
 from omt_uv.solver.progress import drain
+from omt_uv.solver.sphere import conformal
 from omt_uv.solver.sphere.conformal import conformal_sphere
 
 
@@ -98,3 +99,29 @@ def test_faces_without_area_get_a_little():
     V[a] = V[b]
     p = drain(conformal_sphere(V, F)).positions
     assert (spherical_areas(p, F) > 0).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_equator_halves_the_mass_wherever_and_however_large_the_plane_lies(seed):
+    rng = np.random.default_rng(seed)
+    z, mass, infinite = rng.normal(size=60) + 1j * rng.normal(size=60), rng.random(60), int(rng.integers(60))
+    positions = conformal._halved_by_equator(z, infinite, mass)
+    np.testing.assert_allclose(np.linalg.norm(positions, axis=1), 1, atol=1e-14)
+    assert positions[infinite].tolist() == [0, 0, 1]
+    finite = np.arange(60) != infinite
+    above = mass[finite & (positions[:, 2] > 1e-12)].sum()
+    assert abs(above - mass[finite].sum() / 2) <= mass.max()
+    moved = conformal._halved_by_equator(1e-3 * z + 1e3 - 2e3j, infinite, mass)
+    np.testing.assert_allclose(moved, positions, atol=1e-9)
+
+
+@pytest.mark.parametrize("share, gathered", [(0.49, False), (0.51, True)])
+def test_half_of_a_surface_in_a_point_is_refused_and_less_is_not(share, gathered):
+    z, mass = np.append(np.zeros(10), np.arange(1, 12)).astype(complex), np.ones(21)
+    mass[:10] *= share / mass[:10].sum()
+    mass[10:20] *= (1 - share) / mass[10:20].sum()
+    if gathered:
+        with pytest.raises(errors.PrecisionError, match="half of the surface"):
+            conformal._halved_by_equator(z, 20, mass)
+    else:
+        assert np.isfinite(conformal._halved_by_equator(z, 20, mass)).all()

@@ -166,3 +166,18 @@ def test_sharp_edges_of_a_cube_are_its_edges():
     assert len(edges) == 12
     assert np.allclose(np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1), np.ptp(V[:, 0]))
     assert len(sharp_edges(V, F, 1.6)) == 0
+
+
+def test_values_of_any_type_come_from_the_corner_with_the_greatest_weight():
+    V, F, W, G, on = fine_and_coarse(0.1)
+    at = laid(V, F, np.zeros((0, 2), np.int64), W, G, on)
+    names = np.array([f"vertex {k}" for k in range(len(V))])
+    for k, name in enumerate(transfer.nearest_to_vertices(at, F, names)):
+        of = dict(zip(at.vertex_weights[k], names[F[at.vertex_triangle[k]]], strict=True))
+        assert name == of[max(of)]
+    corners = np.arange(F.size).reshape(-1, 3)
+    found = transfer.nearest_to_corners(at, corners, np.arange(F.size)).reshape(-1, 3)
+    for face in range(len(G)):
+        for c in range(3):
+            of = dict(zip(at.corner_weights[face, c], corners[at.corner_triangle[face, c]], strict=True))
+            assert found[face, c] == of[max(of)]

@@ -83,3 +83,19 @@ def test_masses_are_positive_and_finite():
         with pytest.raises(TransportError) as caught:
             check_mass(np.array([1, wrong, 1]))
         np.testing.assert_array_equal(caught.value.elements, [1])
+
+
+@pytest.mark.parametrize("small_step, steps", [(0.0, [1, 0.5, 0.25, 0.125]), (0.3, [1, 0.5, 0.25, 0.0625])])
+def test_steps_are_halves_and_below_the_small_one_quarters(small_step, steps):
+    dual, found = SoftMax(), []
+    dual.small_step = small_step
+    first = dual.near(np.zeros(4), None)
+    direction = dual.direction(first, MASS)
+
+    def near(site_weights, cells):
+        found.append(float((site_weights / direction).mean()))
+
+    dual.near = near
+    with pytest.raises(TransportError, match="stuck"):
+        drain(solve_dual(dual, np.zeros(4), first, MASS))
+    np.testing.assert_allclose(found[:4], steps)
