@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from .verified import FileError, check_length
 READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx", ".off")
 # Blender turns these two formats by default; their axes are taken as they are.
 AXES = {"forward_axis": "Y", "up_axis": "Z"}
+# How the last line of an error that nobody foresaw begins.
+TRACED = re.compile(r"[\w.]*(?:Error|Exception): ")
 
 
 def load(path: Path) -> list[bpy.types.Object]:
@@ -40,7 +43,7 @@ def load(path: Path) -> list[bpy.types.Object]:
     except (RuntimeError, ValueError, LookupError, TypeError, ArithmeticError, SystemError, OSError) as error:
         if isinstance(error, FileError):
             raise
-        raise FileError(f"{path}: {last_line(str(error)) or 'cannot be read'}") from error
+        raise FileError(f"{path}: {_why(str(error))}") from error
     scenes = [bpy.context.scene, *(scene for scene in bpy.data.scenes if scene != bpy.context.scene)]
     for scene in scenes:
         for layer in scene.view_layers:
@@ -70,6 +73,14 @@ def check_suffix(path: Path, known: tuple[str, ...]) -> None:
     """Raise FileError unless the suffix of a path is a known one."""
     if path.suffix.lower() not in known:
         raise FileError(f"{path}: unknown format {path.suffix!r}. Use one of {' '.join(known)}.")
+
+
+def _why(text: str) -> str:
+    """What is told of a file that Blender does not read; the errors of its readers' own programs name no cause."""
+    last = last_line(text)
+    if TRACED.match(last):
+        return f"Blender's reader fails on it ({last}). The file is damaged, or holds what that reader does not know."
+    return last or "cannot be read"
 
 
 def last_line(text: str) -> str:

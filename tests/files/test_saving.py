@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import mesh_bytes
 import numpy as np
 import pytest
 import scenes
@@ -52,6 +53,24 @@ def test_reasons_are_the_last_line_that_says_something(saving):
     error = RuntimeError("Traceback (most recent call last):\n  File x\nError: No room\nLocation: /a/b:1\nINFO done\n")
     assert saving._reason(error) == "No room"
     assert saving._reason(RuntimeError("\n")) == "cannot be written"
+
+
+@pytest.mark.parametrize("text, told", [
+    ("Traceback\n  File x\nbinascii.Error: Incorrect padding\nLocation: /a/b:1\n", "Blender's reader fails on it (b"),
+    ("Error: Bad GLB: no\n", "Bad GLB: no"), ("GLB: Error: 3", "GLB: Error: 3"), ("\n", "cannot be read"),
+])  # fmt: skip
+def test_errors_of_blenders_own_programs_are_told_as_theirs(package, text, told):
+    found = package("files.meshes")._why(text)
+    assert found.startswith(told) and "\n" not in found and ("damaged" in found) == ("reader" in told)
+
+
+def test_a_reader_that_fails_is_one_line_about_the_file(package, tmp_path):
+    path = tmp_path / "a.gltf"
+    data, _ = mesh_bytes.gltf_parts(embedded=True)
+    at = data.index(b"base64,") + 20
+    path.write_bytes(data[:at] + data[at + 1 :])
+    with pytest.raises(package("files.verified").FileError, match=r"a\.gltf: Blender's reader fails on it"):
+        package("files.meshes").load(path)
 
 
 def test_what_a_file_names_and_is_not_beside_it_is_told(saving, tmp_path):
