@@ -77,3 +77,21 @@ def test_maps_of_bodies_of_cubes_cover_nothing_twice(make):
     for chart, chart_map in zip(result.charts, result.maps, strict=True):
         assert overlap_share(chart_map.uv[chart.triangles], samples=20_000) == 0
         assert chart_map.folds == 0
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.25])
+@pytest.mark.parametrize("off, touches", [(0.0, True), (1.0, True), (-1.0, True), (1.001, False), (-1.001, False)])
+def test_a_vertex_is_on_an_edge_within_the_depth_and_no_farther(depth, off, touches):
+    """The tip of a triangle next to the middle of a side of a square, of the same outline order, all numbers exact."""
+    square = np.array([0, 4, 4 + 4j, 4j])
+    tip = 2 + 1j * depth * off
+    # It points up into the square, from below.
+    triangle = np.array([1 - 2j, 3 - 2j, tip])
+    w = np.concatenate([square, triangle])
+    tail, head = np.arange(7), np.array([1, 2, 3, 0, 5, 6, 4])
+    found = covering_contacts(w, tail, head, np.array([6]), np.array([0]), depth)
+    assert found.shape == (1,) and not found[0]
+    # The same tip, with its triangle above the side, lies on the square.
+    w[4:6] = [3 + 2j, 1 + 2j]
+    found = covering_contacts(w, tail, head, np.array([6]), np.array([0]), depth)
+    assert found[0] == (touches if depth else True)

@@ -6,6 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.maps import local_untangle
 from omt_uv.solver.maps.local_untangle import straighten_folds
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
@@ -78,3 +79,20 @@ def test_uvs_without_extent_are_left_alone():
     new, left = straighten_folds(F, values, np.zeros(len(F)))
     assert left == 0
     assert (new == values).all()
+
+
+def test_steps_to_an_area_are_the_least_that_lead_there():
+    """Areas are quadratic, so that central differences give their gradients exactly."""
+    rng = np.random.default_rng(0)
+    corners, side, missing = rng.normal(size=(20, 3, 2)), rng.choice([-1.0, 1.0], 20), rng.uniform(0.1, 1, 20)
+    found = local_untangle._area_steps(corners, side, missing)
+    area = lambda p: side * signed_areas(p.reshape(-1, 2), np.arange(60).reshape(-1, 3))  # noqa: E731
+    for k in range(20):
+        gradient = np.zeros(6)
+        for c in range(6):
+            step = np.zeros((20, 6))
+            step[k, c] = 0.5
+            gradient[c] = (area(corners + step.reshape(20, 3, 2)) - area(corners - step.reshape(20, 3, 2)))[k]
+        np.testing.assert_allclose(found[k].ravel(), missing[k] * gradient / (gradient @ gradient), rtol=1e-10)
+    # A face without an outline has no direction, and is no division by zero.
+    assert not local_untangle._area_steps(np.zeros((1, 3, 2)), np.ones(1), np.ones(1)).any()
