@@ -44,3 +44,14 @@ def test_polygons_of_the_sphere_have_the_areas_of_the_cells():
     triangles, owner = polygons.fans()
     areas = np.bincount(owner, triangle_areas(*np.moveaxis(polygons.points[triangles], 1, 0)), 200)
     assert areas == pytest.approx(spherical_cells(sites, weights, hull).area, rel=1e-6)
+
+
+@pytest.mark.parametrize("unit", [1e-5, 1e-3, 1e4])
+def test_units_do_not_matter(unit):
+    """Weights are squared lengths."""
+    rng = np.random.default_rng(5)
+    sites, weights = rng.uniform(-0.45, 0.45, (80, 2)), 0.002 * rng.random(80)
+    plain = planar_cells(sites, weights, Rectangle(1.0, 1.0))
+    found = planar_cells(unit * sites, unit**2 * weights, Rectangle(unit, unit))
+    np.testing.assert_array_equal(found.start, plain.start)
+    np.testing.assert_allclose(found.points / unit, plain.points, atol=1e-8)
