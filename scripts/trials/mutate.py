@@ -116,7 +116,9 @@ def users_of(module: Path) -> list[str]:
 
 
 def names_of(module: Path) -> list[str]:
-    """How tests call the command or the operators of a module."""
+    """How tests call the command or the operators that a module is of."""
+    if module.parts[1] == "batch":
+        return ['"batch"']
     if module.parts[1] == "commands":
         return [f'"{module.stem.replace("_", "-")}"']
     return [found.rpartition(".")[2] for found in re.findall(r'bl_idname = "(.*omt.*)"', module.read_text())]

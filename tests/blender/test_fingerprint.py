@@ -25,7 +25,27 @@ def paint(obj):
     obj.data.attributes.new("heat", "FLOAT", "POINT").data[0].value = 0.5
 
 
-@pytest.mark.parametrize("change", [move, mark, scale, paint, lambda obj: scenes.set_uv(obj, [[0.5, 0.5]] * 192)])
+def flag(obj):
+    obj.data.attributes.new("flags", "BOOLEAN", "FACE").data[1].value = True
+
+
+def mark_nothing(obj):
+    """Numbers that are all 0 are not the same as none."""
+    obj.data.attributes.new("heat", "FLOAT", "POINT")
+
+
+def choose(obj):
+    obj.data.polygons[2].select = not obj.data.polygons[2].select
+
+
+def hide(obj):
+    obj.data.polygons[2].hide = True
+
+
+@pytest.mark.parametrize(
+    "change",
+    [move, mark, scale, paint, flag, mark_nothing, choose, hide, lambda obj: scenes.set_uv(obj, [[0.5, 0.5]] * 192)],
+)
 def test_what_operators_read_counts(package, change):
     obj, fingerprint = scenes.bump(), package("blender.fingerprint").fingerprint
     before = fingerprint(obj)

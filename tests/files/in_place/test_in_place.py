@@ -176,6 +176,16 @@ def test_buffers_of_a_binary_file_that_lie_elsewhere_are_the_reason_that_is_told
         glb_data.read(glb_data.write(read))
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_chunks_of_kinds_that_nobody_knows_stay(count):
+    others = b"".join(struct.pack("<II", 4, 0x21212121 + k) + b"abc%d" % k for k in range(count))
+    data = bytearray(mesh_bytes.glb_bytes() + others)
+    struct.pack_into("<I", data, 8, len(data))
+    new = glb.put(bytes(data), [mesh_bytes.imported_triangles(mesh_bytes.spread(36))])[0]
+    assert new.endswith(others) and struct.unpack_from("<I", new, 8)[0] == len(new)
+    assert [of for _, of in glb_data.read(new).others] == [b"abc%d" % k for k in range(count)]
+
+
 def test_gltf_without_new_seams_has_only_the_bytes_of_its_uvs_changed():
     data = mesh_bytes.glb_bytes()
     mesh = mesh_bytes.imported_triangles(mesh_bytes.spread(8, 7)[TRIANGLES.ravel()])
