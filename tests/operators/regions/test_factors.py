@@ -107,3 +107,15 @@ def test_a_region_may_be_painted_on_one_of_several_objects(striped):
     for obj in (other, striped):
         obj.vertex_groups.new(name="nowhere")
     assert "nowhere" in scenes.error_of(bpy.ops.uv.omt_magnify, **GIVEN, further="nowhere=2")
+
+
+@pytest.mark.parametrize("chosen, gone, then", [(0, 0, 0), (1, 1, 1), (2, 2, 1), (7, 2, 1), (-1, 0, 0)])
+def test_the_chosen_row_goes_and_the_next_one_is_chosen(striped, chosen, gone, then):
+    """Whatever a script has chosen; rows may be of one group, and their factors tell them apart."""
+    for k in range(3):
+        bpy.ops.uv.omt_region_add()
+        striped.omt_uv_regions.rows[k].factor = 2.0 + k
+    striped.omt_uv_regions.active = chosen
+    bpy.ops.uv.omt_region_remove()
+    assert [factor - 2.0 for _, factor in rows(striped)] == [k for k in range(3) if k != gone]
+    assert striped.omt_uv_regions.active == then

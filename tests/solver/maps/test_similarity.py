@@ -54,3 +54,14 @@ def test_points_without_a_direction_are_scaled_and_not_turned():
     square = np.array([1, 1j, -1, -1j])
     assert fit_similarity(square, 2 * square.conj()).factor == pytest.approx(2)
     assert fit_similarity(square, 2 * square.conj(), rigid=True).factor == 1
+
+
+@pytest.mark.parametrize("turn", [1, np.exp(2j)])
+@pytest.mark.parametrize("share, directed", [(1e-1, True), (1e-5, True), (1e-7, False), (0.0, False)])
+def test_a_direction_is_one_down_to_a_millionth(share, directed, turn):
+    square = np.array([1, 1j, -1, -1j])
+    aim = 2 * (square.conj() + share * turn * square)
+    expected = 2 * share * turn if directed else 2
+    assert fit_similarity(square, aim).factor == pytest.approx(expected, rel=1e-4)
+    # In any unit.
+    assert fit_similarity(1e-9 * square, 1e9 * aim).factor == pytest.approx(1e18 * expected, rel=1e-4)
