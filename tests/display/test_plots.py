@@ -60,3 +60,18 @@ def test_what_is_not_positive_is_left_out(package):
     assert empty.min() < 0.5 and not np.array_equal(empty, plots.plot(good, "t"))
     # One point alone has room around it.
     assert len(coloured(plots.plot({"a": [(3, 3)]}, "t"), plots.COLOURS[0])) > 5
+
+
+def test_discs_at_the_edge_of_a_picture_are_those_of_a_larger_one(package):
+    """Wherever their middles are, within the picture or outside."""
+    plots, rng = package("display.plots"), np.random.default_rng(0)
+    at = np.concatenate(
+        [rng.uniform(-6, 46, (60, 2)), [[0, 0], [39.5, 29.5], [0.5, 29.9], [39, 0], [-50, 10], [90, 5]]]
+    )
+    for radius in (0.8, 3.0, 5.5):
+        small, large = np.ones((30, 40, 3)), np.ones((230, 240, 3))
+        for middle in at:
+            plots.dots(small, middle[None], (0.2, 0.4, 0.1), radius)
+            plots.dots(large, middle[None] + 100, (0.2, 0.4, 0.1), radius)
+        np.testing.assert_allclose(small, large[100:130, 100:140], atol=1e-12)
+        assert small.min() < 0.5

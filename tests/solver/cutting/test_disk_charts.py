@@ -4,6 +4,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.cutting import disk_charts as disk_charts_module
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -35,3 +36,15 @@ def test_a_filled_hole_leaves_the_faces_and_adds_a_fan():
     np.testing.assert_allclose(
         chart.vertices[chart.vertex_ids == -1], [V[np.linalg.norm(V, axis=1) < 1.4].mean(0)], atol=1e-12
     )
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1.0, 1e307])
+@pytest.mark.parametrize("offset", [[0, 0, 0], [3, -1, 2]])
+def test_lines_are_no_area_wherever_they_lie_and_however_large_they_are(scale, offset):
+    way = np.array([1.0, 2.0, -0.5])
+    lines = scale * (np.array([0.0, 1.0, 3.0])[None, :, None] * way + np.array(offset))
+    lines = np.concatenate([lines, scale * np.array(offset, float) + np.zeros((1, 3, 3))])
+    assert disk_charts_module._all_lines(lines)
+    wide = lines.copy()
+    wide[0, 2, 0] += 2 * scale
+    assert not disk_charts_module._all_lines(wide)
