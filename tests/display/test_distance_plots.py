@@ -54,3 +54,19 @@ def test_every_name_class_and_point_is_drawn(plots, k):
     matrix = plots.matrix_picture(distances(), classes)
     other = plots.matrix_picture(distances(), [*classes[:k], "none", *classes[k + 1 :]])
     assert (matrix != other).any()
+
+
+def test_names_of_classes_stand_beside_their_rows(package):
+    plots = package("display.distance_plots")
+    classes = ["low"] * 2 + ["high"] * 5 + ["mid"] * 3
+    picture = plots.matrix_picture(np.ones((10, 10)), classes)
+    begin = 0
+    for k, (_, count) in enumerate(sorted([("low", 2), ("high", 5), ("mid", 3)])):
+        colour = plots.COLOURS[k]
+        right = picture[:, plots.MARGIN + plots.SIDE + 1 :]
+        rows = np.argwhere(np.abs(right - colour).max(axis=2) < 0.05)[:, 0]
+        low, high = (plots.MARGIN + x * plots.SIDE / 10 for x in (begin, begin + count))
+        begin += count
+        assert len(rows) > 10 and low < rows.min() and rows.max() < high
+        # In the middle of them.
+        assert abs((rows.min() + rows.max()) / 2 - (low + high) / 2) < 10
