@@ -219,7 +219,8 @@ def _on_subdivision(
     maps = [_as_chart_map(r.refinement, mirror) for r, mirror in zip(refined, mirrors, strict=True)]
     kept = "kept" if settings.keep_boundary else "free"
     found = SurfaceMap(charts, maps, np.zeros((0, 2), np.int64))
-    found = yield from refined_on_subdivision(surface, found, modifier, pins, kept)
+    areas_first = settings.balance == 0
+    found = yield from refined_on_subdivision(surface, found, modifier, pins, kept, areas_first=areas_first)
     better = []
     for r, mirror, chart_map in zip(refined, mirrors, found.maps, strict=True):
         uv = chart_map.uv * mirror

@@ -42,10 +42,10 @@ WORTHWHILE = 0.75
 # Area error on the subdivided surface that is worth a warning.
 INEXACT = 0.02
 # Where its triangles miss that by no more than the first factor, weights grow by the second, then as that says is
-# needed to reach AIM of it, up to the third in all: what is out of reach, or dear, stays as it is.
-CLOSE = 1.2
+# needed to reach AIM of it, up to AREA_WEIGHT times the third: what is out of reach, or dear, stays as it is.
+CLOSE = 1.3
 NUDGE = 1.5
-MOST_NUDGE = 4.0
+MOST_NUDGE = 8.0
 AIM = 0.995
 COARSE = (
     "Areas on the subdivided surface are {:.2g} % off: the mesh is too coarse for its UVs to follow that surface; {}"
@@ -146,8 +146,8 @@ def refined_on_subdivision(
     """The maps of the charts of a cage refined for the areas of the subdivided surface, with its figures.
 
     Pinned vertices stay, and so do the outlines of disks and squares. density (m,): of the cage's triangles, which
-    multiplies the area on the subdivided surface that their polygons ask for; areas_first: whether a little shear is
-    paid where that brings its triangles to INEXACT
+    multiplies the area on the subdivided surface that their polygons ask for; areas_first: whether no
+    shear was preferred to exact areas; then a little is paid where that brings its triangles to INEXACT
     """
     if not refinable(surface):
         return found
@@ -169,7 +169,7 @@ def refined_on_subdivision(
         mine, own = part.chart == k, slice(part.first[k], part.first[k + 1])
         maps.append(_with_figures(old, refined[own], part.corners[mine], fine_uv[part.mapping.quads[mine]]))
     error = part.area_error(refined)
-    more = (COARSE.format(100 * error, APPLY_LEVEL),) if asked >= AREA_WEIGHT and error > INEXACT else ()
+    more = (COARSE.format(100 * error, APPLY_LEVEL),) if areas_first and error > INEXACT else ()
     return replace(found, maps=maps, warnings=(*found.warnings, *more))
 
 
@@ -201,7 +201,7 @@ def _nudged(
 ) -> Steps[np.ndarray]:
     """UVs (n,2) whose triangles miss their areas by INEXACT at most, where those of an area weight nearly do and a
     few times as much weight gets there; as they are elsewhere. stage: refines UVs with a weight."""
-    new, error, factor, most = refined, part.triangle_error(refined), NUDGE, MOST_NUDGE * weight
+    new, error, factor, most = refined, part.triangle_error(refined), NUDGE, MOST_NUDGE * max(weight, AREA_WEIGHT)
     if error > CLOSE * INEXACT:
         return refined
     while error > INEXACT and factor * weight <= most:

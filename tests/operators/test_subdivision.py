@@ -82,6 +82,18 @@ def test_areas_of_the_applied_mesh_are_kept_and_nothing_folds():
     assert error(obj) < min(0.02, 0.7 * without)
 
 
+@pytest.mark.parametrize("columns, height, far", [(4, 1.5, True), (8, 1.0, False)])
+def test_areas_that_the_cage_cannot_follow_are_told(package, monkeypatch, columns, height, far):
+    told = []
+    monkeypatch.setattr(package("operators.unwrap"), "warn", lambda _, __, warnings: told.extend(warnings))
+    obj = scenes.bump(columns=columns, rows=columns, height=height)
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 2
+    unwrap()
+    assert (error(obj) > 0.02) == far
+    assert any(text.startswith("Areas on the subdivided surface") for _, text in told) == far
+
+
 def test_areas_that_nearly_come_within_two_percent_do():
     def steep(balance):
         obj = scenes.bump(columns=5, rows=6, height=1.2)

@@ -139,8 +139,14 @@ def _is_isometry(chart_map: ChartMap) -> bool:
 def with_figures(old: ChartMap, uv: np.ndarray, figures: Distortion) -> ChartMap:
     """A map with other UVs and their figures."""
     names = ("area_l1", "area_sd", "angle_mean", "folds")
-    warnings = tuple(text for text in old.warnings if not text.endswith(FOLDED))
+    warnings = _folds_told(old.warnings, figures.folds)
     return replace(old, uv=uv, warnings=warnings, **{name: getattr(figures, name) for name in names})
+
+
+def _folds_told(warnings: tuple[str, ...], folds: int) -> tuple[str, ...]:
+    """Warnings of a map, of as many folds as it has."""
+    others = tuple(text for text in warnings if not text.endswith(FOLDED))
+    return (*others, f"{folds} {FOLDED}") if folds else others
 
 
 def with_folds_counted(chart: Chart, chart_map: ChartMap) -> ChartMap:
@@ -150,8 +156,7 @@ def with_folds_counted(chart: Chart, chart_map: ChartMap) -> ChartMap:
     folds = len(np.unique(chart.faces[area * np.sign(area.sum()) <= 0]))
     if folds == chart_map.folds:
         return chart_map
-    warnings = tuple(text for text in chart_map.warnings if not text.endswith(FOLDED))
-    return replace(chart_map, folds=folds, warnings=(*warnings, f"{folds} {FOLDED}") if folds else warnings)
+    return replace(chart_map, folds=folds, warnings=_folds_told(chart_map.warnings, folds))
 
 
 def _fixed(chart: Chart, pins: ChartPins | None, boundary: str) -> np.ndarray:

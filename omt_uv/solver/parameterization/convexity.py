@@ -32,6 +32,7 @@ from ..refinement.boundary_barrier import crossings
 from ..refinement.mirrored_motion import find_symmetry
 from .corner_solver import CornerMesh, CornerPatches
 from .polygon_corners import CONVEX, DENTED, PolygonCorners, convex_corners, straight_share
+from .polygon_disk import with_fans
 
 # Rings of faces around a reflex corner that may move, at most.
 RINGS = 4
@@ -68,17 +69,19 @@ def keep_convex(
     area_weights : of the area term, one for each chart
     spare : by how much the area error of each chart may grow; None for a start of a refinement, whatever it costs
     """
-    first = np.cumsum([0, *(len(uv) for uv in maps)])
+    fans = [with_fans(chart, uv) for chart, uv in zip(charts, maps, strict=True)]
+    first = np.cumsum([0, *(len(uv) for _, uv, _ in fans)])
     # In units of the map, so that no area under- or overflows.
     unit = float(np.abs(np.concatenate(maps)).max())
-    w = np.concatenate([uv / unit for uv in maps]) @ [1, 1j]
+    w = np.concatenate([uv / unit for _, uv, _ in fans]) @ [1, 1j]
     triangles = np.concatenate([c.triangles + k for c, k in zip(charts, first, strict=False)])
     corners = _mapped_corners(surface, charts, triangles, w)
     if not corners.reflex(w).any():
         return {}
-    mesh = _union(charts, first, density, area_weights, spare, w)
+    density = [None if d is None else _of_polygons(d, c)[f[2]] for d, c, f in zip(density, charts, fans, strict=True)]
+    mesh = _union([chart for chart, _, _ in fans], first, density, area_weights, spare, w)
     squeezed = _squeezed(mesh, w)
-    immobile = np.concatenate(fixed)
+    immobile = np.concatenate([_longer(one, k) for one, k in zip(fixed, np.diff(first), strict=True)])
     immobile[mesh.triangles[squeezed]] = True
     bent = np.unique(np.searchsorted(first, corners.triangles[corners.reflex(w), 0], side="right") - 1)
     symmetry, middle = _symmetry(mesh, first, w, bent)
@@ -93,10 +96,21 @@ def keep_convex(
         immobile[np.concatenate(crossed)] = True
     new = {int(k): maps[k].copy() for k in changed}
     for k, uv in new.items():
-        mine = slice(first[k], first[k + 1])
+        mine = slice(first[k], first[k] + len(uv))
         rows, placed = np.flatnonzero(moved[mine] != w[mine]), (moved + middle)[mine]
         uv[rows] = unit * np.column_stack([placed.real, placed.imag])[rows]
     return new
+
+
+def _longer(values: np.ndarray, count: int) -> np.ndarray:
+    """Values (n,) bool, and False for what is added to that, (count,)."""
+    return np.append(values, np.zeros(count - len(values), bool))
+
+
+def _of_polygons(values: np.ndarray, chart: Chart) -> np.ndarray:
+    """Values per area (m,) of the triangles of a chart as means over their polygons, (m,)."""
+    owner, area = row_labels(chart.faces[:, None]), face_areas(chart.vertices, chart.triangles)
+    return (np.bincount(owner, area * values) / np.bincount(owner, area))[owner]
 
 
 def reflex_triangles(surface: Surface, charts: Sequence[Chart], maps: Sequence[np.ndarray]) -> np.ndarray:

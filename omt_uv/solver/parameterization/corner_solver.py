@@ -26,9 +26,12 @@ from .polygon_corners import CONVEX, CornerBarrier, PolygonCorners
 
 # Strength of the barrier of a corner, per share that its polygon has of the target's area.
 STRENGTH = 30.0
-# Rounds that make corners convex, and rounds in which the barrier then weakens: so many, and up to so many while areas
-# are further off than can be spared.
+# Rounds that make corners convex, so many, and up to so many while they come nearer to that; and rounds in which the
+# barrier then weakens: so many, and up to so many while areas are further off than can be spared.
 CONVEXIFYING = 12
+MOST_CONVEXIFYING = 48
+# What a round beyond the first ones has to take off from what corners lack.
+WORTHWHILE = 0.05
 SETTLING = 4
 MOST_SETTLING = 12
 # Newton steps of a round.
@@ -147,10 +150,11 @@ class CornerPatches:
 
     def _forced(self, w: np.ndarray) -> np.ndarray:
         """The map w (n,) after rounds with a barrier that grows stronger at corners while these are reflex."""
-        strength = self.strength
-        for _ in range(CONVEXIFYING):
+        strength, lacking = self.strength, np.inf
+        for k in range(MOST_CONVEXIFYING):
             reflex = self.corners.reflex(w)
-            if not reflex.any():
+            before, lacking = lacking, self._lacking(w, reflex)
+            if not reflex.any() or (k >= CONVEXIFYING and lacking > (1 - WORTHWHILE) * before):
                 break
             w = self._stepped(w, self.area_weight, self._barrier(w, strength))
             strength = np.where(reflex, 2 * strength, strength)
@@ -161,6 +165,11 @@ class CornerPatches:
         slack = np.maximum(LEAST * target - self.corners.areas(w), 0) / (1 - LEAST)
         # What is convex stays so.
         return CornerBarrier(self.corners, np.where(self.corners.convex(w), -CONVEX * target, slack), strength)
+
+    def _lacking(self, w: np.ndarray, reflex: np.ndarray) -> float:
+        """What the areas of reflex corners (k,) bool lack, over those that they shall have."""
+        corners = self.corners
+        return float(((corners.least - corners.areas(w)) / corners.target)[reflex].sum())
 
     def _reflex_count(self, w):
         return np.bincount(self.of_corner, self.corners.reflex(w), self.count)

@@ -78,6 +78,39 @@ def with_centres(uv: np.ndarray, triangles: np.ndarray, count: int) -> np.ndarra
     return np.concatenate([uv, total / np.maximum(2 * np.bincount(centre, minlength=count - n), 1)[:, None]])
 
 
+def with_fans(chart: Chart, uv: np.ndarray) -> tuple[Chart, np.ndarray, np.ndarray]:
+    """The chart with its convex polygons of five sides and more as fans about centres, as they were mapped; a map
+    (n+k,2) of it with the centres of uv (n,2) amid their corners; and the triangle (t,) of the chart whose place each
+    takes.
+
+    Those whose fan would fold in the map stay as they are. Triangles of fans have no corners of the surface, -1.
+    """
+    owner, n = _numbered(chart.faces), len(uv)
+    centres, fans, of_fans = polygon_fans(chart.vertices, chart.triangles, owner)
+    if not len(fans):
+        return chart, uv, np.arange(len(chart.triangles))
+    placed = with_centres(uv, fans, n + len(centres))
+    bad = np.unique(of_fans[signed_areas(placed, fans) <= 0])
+    sound = ~np.isin(of_fans, bad)
+    used, place = np.unique(fans[sound, 2], return_inverse=True)
+    fans, of_fans = np.column_stack([fans[sound, :2], n + place.ravel()]), of_fans[sound]
+    kept = np.flatnonzero(~np.isin(owner, of_fans))
+    _, first = np.unique(owner, return_index=True)
+    rows = np.concatenate([kept, first[of_fans]])
+    return (
+        replace(
+            chart,
+            vertices=np.concatenate([chart.vertices, centres[used - n]]),
+            vertex_ids=np.append(chart.vertex_ids, np.full(len(used), -1)),
+            triangles=np.concatenate([chart.triangles[kept], fans]),
+            corners=np.concatenate([chart.corners[kept], np.full(fans.shape, -1)]),
+            faces=chart.faces[rows],
+        ),
+        np.concatenate([uv, placed[used]]),
+        rows,
+    )
+
+
 def cut_as_mapped(chart: Chart, uv: np.ndarray) -> Chart:
     """The chart with polygons that are folded in the map uv (n,2) cut otherwise, where they are not folded then.
 

@@ -42,6 +42,9 @@ LEAST = 1e-3
 # After so many steps, triangles of the other diagonals and of the cage that are still folded are left out: a quad with
 # three corners on a straight boundary cannot be convex.
 PATIENCE = 12
+# What touches itself, as the sides of a slit in what was unrolled, is drawn in by this share of the sides there, or by
+# halves of that: a barrier is infinite at contact.
+DRAWN_IN = 0.02
 # Area over squared sides of triangles that no symmetric map opens: two quads that share two sides on the axis are
 # straight there, and what rounding leaves of their corners would be all of the energy.
 FLAT = 1e-9
@@ -232,6 +235,7 @@ def refine_cage(
         if touching:
             watched = [loop for loop in watched if not any(loop is other for other in touching)]
             strength = CONTACT_STRENGTH / len(elements.quads)
+            w = _drawn_in(problem, w, touching, strength, before)
             barriers = tuple(make_barrier(w, loop, strength) for loop in touching)
             problem = replace(problem, barriers=(*problem.barriers, *barriers))
             continue
@@ -244,6 +248,29 @@ def refine_cage(
             break
     folds = int((problem.dets(w) <= 0).sum())
     return CageMap(np.column_stack([w.real, w.imag]), iterations, folds)
+
+
+def _drawn_in(
+    problem: _CageProblem, w: np.ndarray, loops: Sequence[np.ndarray], strength: float, energy: float
+) -> np.ndarray:
+    """The map w (n,) of an energy with those of its outlines drawn in a little whose barrier would be more than that;
+    as it is where that folds a triangle or lets an outline cross itself."""
+    for loop in loops:
+        with np.errstate(all="ignore"):
+            if make_barrier(w, loop, strength).energy(w) <= energy:
+                continue
+        before, after = w[loop] - w[np.roll(loop, 1)], w[np.roll(loop, -1)] - w[loop]
+        size = np.minimum(np.abs(before), np.abs(after))
+        inwards = 0.5j * size * (before / np.abs(before) + after / np.abs(after))
+        folds, share = (problem.dets(w) <= 0).sum(), DRAWN_IN
+        for _ in range(HALVINGS):
+            new = w.copy()
+            new[loop] += share * inwards
+            if (problem.dets(new) <= 0).sum() <= folds and not len(crossings(new, loop)):
+                w = new
+                break
+            share /= 2
+    return w
 
 
 def _flat(problem: _CageProblem) -> np.ndarray:

@@ -10,10 +10,10 @@ import pytest
 
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
-from omt_uv.solver.parameterization.chart_map import FOLDED, map_chart
+from omt_uv.solver.parameterization.chart_map import FOLDED, map_chart, measured_map
 from omt_uv.solver.parameterization.chart_pins import ChartPins
-from omt_uv.solver.parameterization.convex_maps import with_convex_polygons
-from omt_uv.solver.parameterization.convexity import dented_faces, keep_convex
+from omt_uv.solver.parameterization.convex_maps import with_convex_polygons, with_figures
+from omt_uv.solver.parameterization.convexity import dented_faces, keep_convex, reflex_triangles
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.polygon_corners import convex_corners
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -140,3 +140,27 @@ def test_maps_that_are_squeezed_to_rounding_stay_as_they_are():
     first = np.flatnonzero(np.isin(charts[0].vertex_ids, corner))
     uv[first] *= [1, 1e-17]
     assert keep_convex(surface, charts, [uv], [np.zeros(len(uv), bool)], [None], [1.0], [1.0]) == {}
+
+
+def test_folds_of_a_map_that_takes_the_place_of_another_are_told():
+    surface, chart, chart_map = darts()
+    uv = chart_map.uv.copy()
+    uv[np.isin(chart.vertex_ids, [24])] += 0.3
+    folded = with_figures(chart_map, uv, measured_map(chart, uv, None))
+    assert folded.folds and folded.warnings == (f"{folded.folds} {FOLDED}",)
+    flat = measured_map(chart, chart.vertices[:, :2], None)
+    assert with_figures(folded, chart.vertices[:, :2], flat).warnings == ()
+
+
+def test_both_bottoms_of_a_cup_stay_convex():
+    """Its map is that of a disk about one of them, in which the wall squeezes the other."""
+    sides, (k, turn) = 48, np.divmod(np.arange(4 * 48), 48)
+    radius, height = np.array([1, 1, 0.88, 0.88])[k], np.array([0, 2, 2, 0.15])[k]
+    angle = 2 * np.pi * turn / sides
+    V = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    here, after = k * sides + turn, k * sides + (turn + 1) % sides
+    walls = np.column_stack([here, after, after + sides, here + sides])[k < 3].tolist()
+    surface = meshes.polygon_surface(V, [list(range(sides))[::-1], *walls, list(range(3 * sides, 4 * sides))])
+    found = drain(unwrap(surface))
+    assert not reflex_triangles(surface, found.charts, [m.uv for m in found.maps]).any()
+    assert all(m.folds == 0 and m.area_l1 <= 0.01 and not m.warnings for m in found.maps)

@@ -94,6 +94,33 @@ def test_symmetric_maps_stay_symmetric(turn):
     np.testing.assert_allclose(moved[image], -moved.conj(), atol=1e-12)
 
 
+@pytest.mark.parametrize("sides", [16, 48])
+def test_long_polygons_become_convex_and_keep_their_areas(sides):
+    """The slivers by which a long polygon is drawn are not held to areas of their own."""
+    angle, after = 2 * np.pi * np.arange(sides) / sides, (np.arange(sides) + 1) % sides
+    rings = [r * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) for r in (1, 1.3, 1.7)]
+    k = np.arange(sides)
+    strips = [np.column_stack([m + k, m + sides + k, m + sides + after, m + after]) for m in (0, sides)]
+    polygons = [list(range(sides)), *np.concatenate(strips).tolist()]
+    surface = meshes.polygon_surface(np.concatenate(rings), polygons)
+    (chart,) = strict_charts(surface)
+    # As a map that was sheared: long, with a dent at the end.
+    uv = chart.vertices[:, :2] * [2, 0.5]
+    uv[chart.vertex_ids == 0] -= [4 / sides, 0]
+    corner, _, share = convex_corners(surface, straight=True)
+    vertex = np.empty(len(surface.corner_vertex), int)
+    vertex[chart.corners] = chart.triangles
+
+    def off(uv):
+        area = np.bincount(chart.faces, signed_areas(uv, chart.triangles))
+        asked = np.bincount(chart.faces, signed_areas(chart.vertices[:, :2], chart.triangles))
+        return np.abs(area / area.sum() - asked / asked.sum()).sum()
+
+    assert (signed_areas(uv, vertex[corner]) < 0).any()
+    (new,) = keep_convex(surface, [chart], [uv], [np.zeros(len(uv), bool)], [None], [500.0], [0.01]).values()
+    assert (signed_areas(new, vertex[corner]) > 0).all() and off(new) < off(uv) + 0.01
+
+
 def test_maps_without_darts_are_left_alone():
     surface = quads(height=0.1)
     (chart,) = strict_charts(surface)

@@ -11,7 +11,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.mirrored_charts import mirror_partners, mirrored_map, with_mirrored_quads
 from omt_uv.solver.parameterization.options import UnwrapOptions
-from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped, of_polygon_disk, polygon_disk
+from omt_uv.solver.parameterization.polygon_disk import cut_as_mapped, of_polygon_disk, polygon_disk, with_fans
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement.continuation_rules import PROMISED
@@ -55,6 +55,28 @@ def test_densities_are_one_a_polygon():
     given = of_polygon_disk(values, chart.vertices, chart, disk, 1.0)
     for polygon in np.unique(disk.polygons):
         assert np.ptp(given[disk.polygons == polygon]) == 0
+
+
+def test_long_polygons_of_a_map_are_fans_about_the_middle_of_their_corners():
+    angle = 2 * np.pi * np.arange(12) / 12
+    V = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    V = np.concatenate([V, 2 * V])
+    after = (np.arange(12) + 1) % 12
+    ring = np.column_stack([np.arange(12), 12 + np.arange(12), 12 + after, after]).tolist()
+    (chart,) = strict_charts(meshes.polygon_surface(V, [list(range(12)), *ring]))
+    uv = chart.vertices[:, :2] * [1, 2] + 0.1
+    new, mapped, rows = with_fans(chart, uv)
+    np.testing.assert_array_equal(mapped[:24], uv)
+    np.testing.assert_allclose(mapped[24:], [[0.1, 0.1]], atol=1e-12)
+    fans = (new.triangles == 24).any(axis=1)
+    assert fans.sum() == 12 and ((new.corners == -1) == fans[:, None]).all()
+    np.testing.assert_array_equal(new.faces, chart.faces[rows])
+    np.testing.assert_allclose(signed_areas(mapped, new.triangles).sum(), signed_areas(uv, chart.triangles).sum())
+    # A fan that would fold is none.
+    uv[chart.vertex_ids == 0] = [-0.5, 0.1]
+    same, mapped, rows = with_fans(chart, uv)
+    np.testing.assert_array_equal(same.triangles, chart.triangles)
+    assert mapped.shape == uv.shape and (rows == np.arange(len(chart.triangles))).all()
 
 
 def test_a_dart_is_cut_so_that_no_triangle_folds():

@@ -101,8 +101,9 @@ def test_a_chart_that_is_the_image_of_another_follows_it():
     assert np.allclose(moved[len(uv) :], -moved[: len(uv)].conj())
 
 
-def test_an_outline_does_not_come_to_cross_itself():
-    # A slit that opens by nothing: its sides would pass through each other.
+def with_slit(gap):
+    """The elements, the matrix, the map and the outline of a wavy surface with a slit whose sides lie `gap` apart in
+    the map: they would pass through each other."""
     columns, rows = 8, 4
     vertex = np.arange((columns + 1) * (rows + 1)).reshape(rows + 1, columns + 1)
     corner = np.stack([vertex[:-1, :-1], vertex[:-1, 1:], vertex[1:, 1:], vertex[1:, :-1]], axis=2)
@@ -116,15 +117,33 @@ def test_an_outline_does_not_come_to_cross_itself():
     uv = np.column_stack([x, y]).astype(float)
     positions = np.column_stack([uv, 0.6 * np.sin(uv[:, 0]) * np.cos(2 * uv[:, 1])])
     positions = np.concatenate([positions, positions[vertex[rows // 2, : columns // 2]]])
-    uv = np.concatenate([uv, uv[vertex[rows // 2, : columns // 2]] + [0, 0.02]])
+    uv = np.concatenate([uv, uv[vertex[rows // 2, : columns // 2]] + [0, gap]])
     cage = cage_of(quads.ravel(), np.arange(0, 4 * len(quads) + 1, 4), count)
     mapping = subdivide(straight_boundary(cage), 2)
     loop = boundary_loops(quads[:, HALVES].reshape(-1, 3))[0]
-    elements = elements_of(cage, quads, positions, mapping)
-    none = np.zeros(count, bool)
-    free = drain(refine_cage(elements, mapping.matrix, uv, none, 1000.0)).uv
-    kept = drain(refine_cage(elements, mapping.matrix, uv, none, 1000.0, None, [loop])).uv
+    return elements_of(cage, quads, positions, mapping), mapping.matrix, uv, loop
+
+
+def test_an_outline_does_not_come_to_cross_itself():
+    elements, matrix, uv, loop = with_slit(0.02)
+    none = np.zeros(len(uv), bool)
+    free = drain(refine_cage(elements, matrix, uv, none, 1000.0)).uv
+    kept = drain(refine_cage(elements, matrix, uv, none, 1000.0, None, [loop])).uv
     assert len(crossings(free @ [1, 1j], loop)) and not len(crossings(kept @ [1, 1j], loop))
+
+
+def test_a_slit_whose_sides_lie_on_one_another_holds_nothing_up():
+    elements, matrix, uv, loop = with_slit(0.0)
+    none = np.zeros(len(uv), bool)
+    found = drain(refine_cage(elements, matrix, uv, none, 1000.0, None, [loop])).uv
+    apart = drain(refine_cage(*with_slit(0.02)[:3], none, 1000.0, None, [loop])).uv
+    assert not len(crossings(found @ [1, 1j], loop))
+
+    def off(uv):
+        quads = elements.faces.triangles[: 4 * len(elements.quads)]
+        return error(elements.faces.area[: len(quads)], signed_areas(np.concatenate([matrix @ uv, uv]), quads))
+
+    assert off(found) < 1.1 * off(apart) < 0.6 * off(uv)
 
 
 @pytest.mark.parametrize("turn", [0.3, 1.1, 2.0])
