@@ -240,3 +240,12 @@ def test_a_circle_stays_the_circle_it_is(factor, radius):
     loop = boundary_loops(F)[0]
     assert result.outline == "circle"
     np.testing.assert_allclose(np.linalg.norm(result.uv[loop], axis=1), 1, atol=1e-6)
+
+
+@pytest.mark.parametrize("factor", [0.25, 1.5, 8.0])
+def test_without_an_exact_share_the_factor_is_that_between_the_weights_after_all_steps(factor):
+    uv, F = square(14)
+    w = np.where(np.linalg.norm(uv[F].mean(axis=1) - uv.mean(axis=0), axis=1) < 0.3 * np.ptp(uv), 1.0, 0.0)
+    found = drain(magnify_region(uv, F, w, factor, exact=False))
+    ratio = np.abs(signed_areas(found.uv, F)) / np.abs(signed_areas(uv, F))
+    assert ratio[w == 1].mean() / ratio[w == 0].mean() == pytest.approx(factor, rel=0.02)

@@ -12,7 +12,15 @@ from omt_uv.solver.maps.untangle import arc_length_boundary
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.continuation import MapProblem, StageLimits, minimise, minimise_in_stages, rescaled
+from omt_uv.solver.refinement.continuation import (
+    MapProblem,
+    StageLimits,
+    StageResult,
+    is_through,
+    minimise,
+    minimise_in_stages,
+    rescaled,
+)
 from omt_uv.solver.refinement.continuation_rules import QUALITIES
 from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.refinement.projected_newton import FreeMotion, NewtonStep
@@ -112,3 +120,12 @@ def test_a_boundary_that_may_not_move_has_no_barrier(bumpy):
     with pytest.raises(ValueError, match="may not move"):
         replace(problem, loop=None).barrier(w)
     assert not replace(problem, loop=None).boundary_crosses(w)
+
+
+@pytest.mark.parametrize("balance", [0.0, 1e-9, 0.5, 1.0])
+@pytest.mark.parametrize("status", ["converged", "stalled", "steps", "crossed"])
+@pytest.mark.parametrize("share", [0.5, 0.999, 1.0, 2.0])
+def test_a_stage_on_the_way_was_the_last_where_nothing_is_traded_and_nothing_is_left(balance, status, share):
+    for quality in QUALITIES.values():
+        stage = StageResult(np.zeros(3), 3, share * quality.loose_tolerance, 1.0, status)
+        assert is_through(stage, balance, quality) == (balance == 0 and status == "converged" and share < 1)
