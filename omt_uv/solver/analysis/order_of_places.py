@@ -14,6 +14,8 @@ MASKS = (0x1F00000000FFFF, 0x1F0000FF0000FF, 0x100F00F00F00F00F, 0x10C30C30C30C3
 OFF_BORDER = 0.123
 # Relative difference of principal axes, and lopsidedness along them, by which they are told apart.
 DISTINCT = 1e-3
+# Extents of points from which on they are not summed as they are.
+FAR = 2.0**26
 # Steps in the extent of a chart by which places of triangles around vertices in one place are told apart.
 SAME_MIDDLE = 1e9
 
@@ -64,8 +66,14 @@ def _centred(points: np.ndarray) -> np.ndarray | None:
         return None
     # By a power of two, which rounds nothing: sums of huge coordinates are infinite.
     power = np.frexp(extent)[1]
-    p = np.ldexp(points, -power)
-    return np.asarray((p - p.mean(axis=0)) / (2 * np.ldexp(extent, -power)))
+    with np.errstate(over="ignore"):
+        p = np.ldexp(points, -power)
+        mean = p.mean(axis=0)
+    if not np.abs(mean).max() < FAR:
+        # The sum of what is so far away has lost the digits by which points differ, or is none.
+        p = np.ldexp(points / 2 - points.min(axis=0) / 2, 1 - power)
+        mean = p.mean(axis=0)
+    return np.asarray((p - mean) / (2 * np.ldexp(extent, -power)))
 
 
 def _axes(p: np.ndarray) -> np.ndarray | None:

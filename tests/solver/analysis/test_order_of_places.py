@@ -48,3 +48,14 @@ def test_triangles_begin_at_their_lowest_vertex():
     turned, corners = lowest_first(F)
     assert np.array_equal(turned, [[2, 7, 4], [1, 3, 2], [0, 5, 6]])
     assert np.array_equal(np.take_along_axis(F, corners, axis=1), turned)
+
+
+@pytest.mark.parametrize("far", [1e100, -1e300, 2.7e307, 1.7e308])
+def test_points_that_are_much_farther_away_than_they_are_apart_have_an_order(far):
+    """All in one place along two axes: what is left of them there plays no part."""
+    z = np.random.default_rng(0).normal(size=90)
+    triangles = np.arange(90).reshape(-1, 3)
+    near = order_of_places(np.column_stack([np.zeros(90), np.zeros(90), z]), triangles)
+    found = order_of_places(np.column_stack([np.full(90, far), np.full(90, -far), z]), triangles)
+    np.testing.assert_array_equal(found, near)
+    assert (np.diff(z[found]) >= 0).all()
