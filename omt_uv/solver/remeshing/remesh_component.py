@@ -21,10 +21,10 @@ from .relaxation.cvt import relax_cvt
 from .relaxation.surface_carrier import SurfaceCarrier
 from .relaxation.vertex_balance import balance_vertices
 
-# Rounds of relaxation before, and between, carrying vertices to where the measure asks for them.
-SHORT_ROUNDS = 10
-# Rounds before where the first mesh is uneven.
-UNEVEN_ROUNDS = 40
+# Rounds of relaxation before carrying vertices to where the measure asks for them: the first mesh is uneven,
+FIRST_ROUNDS = 24
+# and between.
+SHORT_ROUNDS = 6
 # How often vertices are carried at most.
 MAX_BALANCES = 6
 # How often boundaries and features are sampled more sparsely to reach a count, before faces may fold.
@@ -98,8 +98,7 @@ def _relaxed(
     start: InitialMesh, carrier: SurfaceCarrier, sizing: SizingField, options: RemeshOptions, allow_folds: bool
 ) -> Steps[tuple[WorkingMesh, float]]:
     """Relax a mesh and carry vertices in turns, until they are where the measure asks for them; and the last step."""
-    rounds = UNEVEN_ROUNDS if start.uneven else SHORT_ROUNDS
-    mesh, _ = yield from part_of(relax_cvt(start.mesh, rounds, carrier), 0.0, 0.07)
+    mesh, _ = yield from part_of(relax_cvt(start.mesh, FIRST_ROUNDS, carrier), 0.0, 0.07)
     mesh = reach_vertex_count(mesh, start.vertex_count, sizing, allow_folds)
     demand, balanced = None, True
     for k in range(MAX_BALANCES):

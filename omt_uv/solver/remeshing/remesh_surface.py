@@ -1,9 +1,9 @@
-"""Remesh a surface: sample its measure-preserving map, triangulate its conformal one, relax the mesh on the surface.
+"""Remesh a surface: a first mesh, relaxed there until vertices are uniform in its measure and triangles Delaunay.
 
-Samples are uniform in the measure-preserving image of the surface and triangles Delaunay in the conformal one (B. Gu,
-Geometric compression based on Ricci flow and Monge-Ampere equation, 2018). Afterwards everything happens on the surface
-itself, so that cuts between charts leave no trace. Here the vertices are shared out among the components; what is done
-with one of them is in `remesh_component`.
+That is what samples of the measure-preserving image and triangles of the conformal one are (B. Gu, Geometric
+compression based on Ricci flow and Monge-Ampere equation, 2018), and where strategies are compared the first mesh comes
+from there. Here the vertices are shared out among the components; what is done with one of them is in
+`remesh_component`.
 """
 
 from __future__ import annotations

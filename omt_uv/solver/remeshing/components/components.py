@@ -70,25 +70,6 @@ class Component:
         """Whether it is closed and has no handle."""
         return len(self.boundary_edges) == 0 and self.euler == 2
 
-    @property
-    def sphericity(self) -> float:
-        """Area of the sphere of the same volume over its own (Wadell 1935): 1 for spheres, less for limbs and plates.
-
-        Of a closed component alone.
-        """
-        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
-        volume = abs(float(np.einsum("md,md->", a, np.cross(b, c)))) / 6
-        return float(np.cbrt(36 * np.pi * volume**2) / self.area.sum())
-
-    @property
-    def openness(self) -> float:
-        """Area of the flat disk with the length of its boundaries over its own: 1 for flat disks, 1/2 for hemispheres,
-        next to nothing for a bag, and 0 for what is closed."""
-        tail, head = halfedges(self.triangles)
-        single = twins(self.triangles) < 0
-        length = np.linalg.norm(self.vertices[head[single]] - self.vertices[tail[single]], axis=1).sum()
-        return float(length**2 / (4 * np.pi * self.area.sum()))
-
 
 @dataclass(frozen=True)
 class Components:

@@ -35,33 +35,33 @@ def split_long_edges(component: Component, longest: np.ndarray, most: float = np
 
     Or until there are `most` new vertices or more.
     """
-    first = len(component.vertices)
+    first, twin = len(component.vertices), twins(component.triangles)
     for _ in range(MAX_ROUNDS):
         tail, head = halfedges(component.triangles)
         length = np.linalg.norm(component.vertices[tail] - component.vertices[head], axis=1)
         length /= (longest[tail] + longest[head]) / 2
-        twin = twins(component.triangles)
         long = np.flatnonzero((length > 1) & (twin < np.arange(len(twin))))
         if not len(long) or len(component.vertices) - first >= most:
             break
         order = np.argsort(-length[long], kind="stable")
-        chosen = independent_splits(component.triangles, long[order])
+        chosen = independent_splits(component.triangles, long[order], twin)
         longest = np.concatenate([longest, (longest[tail[chosen]] + longest[head[chosen]]) / 2])
-        component = split_component(component, chosen)
+        component, twin = split_component(component, chosen, twin)
     return component
 
 
-def split_component(component: Component, h: np.ndarray) -> Component:
-    """Put a vertex in the middle of the edges of halfedges h (k,) of a component; no two share a triangle."""
-    edit = split_edges(component.vertices, component.triangles, h)
-    both = np.concatenate([h, twins(component.triangles)[h]])
+def split_component(component: Component, h: np.ndarray, twin: np.ndarray) -> tuple[Component, np.ndarray]:
+    """Put a vertex in the middle of the edges of halfedges h (k,) of a component with opposite halfedges (3m,); no two
+    share a triangle. And the opposite halfedges then."""
+    edit = split_edges(component.vertices, component.triangles, h, twin)
+    both = np.concatenate([h, twin[h]])
     both = both[both >= 0]
     t = both // 3
     a, b, c = (component.input_barycentric[t, k % 3] for k in (both, next_halfedge(both), previous_halfedge(both)))
     middle = (a + b) / 2
     input_barycentric = np.concatenate([component.input_barycentric, np.stack([middle, b, c], axis=1)])
     input_barycentric[t] = np.stack([a, middle, c], axis=1)
-    return replace(
+    fine = replace(
         component,
         vertices=edit.points,
         triangles=edit.triangles,
@@ -71,6 +71,7 @@ def split_component(component: Component, h: np.ndarray) -> Component:
         features=_halved(component.features, edit.split_ends, len(component.vertices)),
         to_reopen=np.sort(pair_keys(*_halved(paired(component.to_reopen), edit.split_ends, len(component.vertices)).T)),
     )
+    return fine, edit.twin
 
 
 def _halved(edges: np.ndarray, split_ends: np.ndarray, n: int) -> np.ndarray:

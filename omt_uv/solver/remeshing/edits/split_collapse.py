@@ -8,16 +8,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
-from ...mesh.geometry import unit
-from ...mesh.topology import halfedges, pair_keys, previous_halfedge, twins
+from ...mesh.topology import halfedges, next_halfedge, pair_keys, previous_halfedge, twins
 
 # Cosine by which a face may turn at most when an edge at it collapses.
 MIN_COSINE = 0.3
 # Below every cosine: faces may turn as they will.
 ANY_COSINE = -2.0
-# Rounds of choosing collapses that are apart from each other; what they leave is for the next call.
+# Lengths count as the same within a factor of two to the power of one over this.
+BANDS = 4
+# Rounds of choosing collapses that are apart from each other, but for more where none was found; what they leave is for
+# the next call.
 PASSES = 8
 
 
@@ -26,7 +27,7 @@ class Edit:
     """A mesh after an edit, points (n,3) and triangles (m,3).
 
     origin (n,): the vertex each one was, -1 for new ones; split_ends (k,2): the old ends of the edges at whose middles
-    the new vertices are; new_number (old,): the vertex that each old one is now
+    the new vertices are; new_number (old,): the vertex that each old one is now; twin (3m,): opposite halfedges
     """
 
     points: np.ndarray
@@ -34,6 +35,18 @@ class Edit:
     origin: np.ndarray
     split_ends: np.ndarray
     new_number: np.ndarray
+    twin: np.ndarray
+
+
+def shortest_first(length: np.ndarray) -> np.ndarray:
+    """An order (k,) of edges of lengths (k,), those of about the same length by chance, the same each time.
+
+    Where lengths rise steadily across a mesh only the very shortest of a strict order has no shorter one beside it, and
+    nearly none could collapse at once.
+    """
+    band = np.floor(BANDS * np.log2(np.maximum(length, np.finfo(float).tiny)))
+    chance = np.random.default_rng(0).permutation(len(length))
+    return chance[np.argsort(band[chance], kind="stable")]
 
 
 def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray, twin: np.ndarray | None = None) -> Edit:
@@ -60,7 +73,29 @@ def split_edges(points: np.ndarray, triangles: np.ndarray, h: np.ndarray, twin: 
         origin=origin,
         split_ends=np.stack([tail[h], head[h]], axis=1),
         new_number=np.arange(n),
+        twin=_twin_after_splits(twin, both, np.where(twin[h] >= 0)[0], k),
     )
+
+
+def _twin_after_splits(twin: np.ndarray, both: np.ndarray, inner: np.ndarray, k: int) -> np.ndarray:
+    """Opposite halfedges of the triangles of `split_edges`, from those before (3m,).
+
+    both (b,): the halfedges that were split, the first k of one side, then those of the other side of the `inner` ones
+    """
+    m, row = len(twin) // 3, np.arange(len(both))
+    old, new = 3 * (both // 3), 3 * (m + row)
+    # Where each halfedge is now, but for those that were split.
+    place, whole = np.arange(len(twin)), np.ones(len(twin), dtype=bool)
+    place[next_halfedge(both)], place[previous_halfedge(both)] = new + 1, old + 2
+    whole[both] = False
+    result = np.full(len(twin) + 3 * len(both), -1)
+    result[place[whole]] = np.where(twin >= 0, place[twin], -1)[whole]
+    result[old + 1], result[new + 2] = new + 2, old + 1
+    result[old] = result[new] = -1
+    here, there = inner, k + np.arange(len(inner))
+    for a, b in ((here, there), (there, here)):
+        result[old[a]], result[new[a]] = new[b], old[b]
+    return result
 
 
 def independent_splits(triangles: np.ndarray, h: np.ndarray, twin: np.ndarray | None = None) -> np.ndarray:
@@ -96,103 +131,146 @@ def collapse_edges(
     fixed_ends = fixed if along else fixed | boundary
     h = h[~(fixed_ends[tail[h]] & fixed_ends[head[h]])]
     keep, gone = np.where(fixed_ends[tail[h]], tail[h], head[h]), np.where(fixed_ends[tail[h]], head[h], tail[h])
-    neighbours = csr_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n)) + csr_matrix(
-        (np.ones(len(tail)), (head, tail)), shape=(n, n)
-    )
-    neighbours.data[:] = 1
     place = np.where(fixed_ends[keep][:, None] | along, points[keep], (points[keep] + points[gone]) / 2)
-    ok = _keeps_topology(triangles, twin, h, neighbours, boundary)
-    keep, gone, place = keep[ok], gone[ok], place[ok]
-    chosen = _chosen(points, triangles, neighbours, keep, gone, place, most, min_cosine)
+    ok = _leaves_edges(triangles, twin, h, boundary)
+    keep, gone, place, single = keep[ok], gone[ok], place[ok], twin[h[ok]] < 0
+    chosen = _chosen(points, triangles, twin, _Collapses(keep, gone, place, 2 - single), most, min_cosine)
     keep, gone, place = keep[chosen], gone[chosen], place[chosen]
     moved, target = points.copy(), np.arange(n)
     moved[keep] = place
     target[gone] = keep
     result = target[triangles]
     a, b, c = result.T
-    result = result[(a != b) & (b != c) & (c != a)]
+    left = (a != b) & (b != c) & (c != a)
     stay = np.ones(n, dtype=bool)
     stay[gone] = False
     number = np.cumsum(stay) - 1
     return Edit(
         points=moved[stay],
-        triangles=number[result],
+        triangles=number[result[left]],
         origin=np.flatnonzero(stay),
         split_ends=np.zeros((0, 2), np.int64),
         new_number=number[target],
+        twin=_twin_after_collapses(result, twin, left),
     )
 
 
-def _keeps_topology(triangles, twin, h, neighbours, boundary) -> np.ndarray:
-    """Edges (k,) bool whose ends share two neighbours and no more (the link condition), none of valence three."""
+def _twin_after_collapses(collapsed: np.ndarray, twin: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Opposite halfedges of the triangles that are left, (m,) bool, from those of all (3m,); collapsed (m,3): these,
+    with one vertex twice in those that are not."""
+    gone = np.flatnonzero(~left)
+    away = 3 * gone + np.argmax(collapsed[gone] == collapsed[gone][:, [1, 2, 0]], axis=1)
+    first, second = twin[next_halfedge(away)], twin[previous_halfedge(away)]
+    joined = twin.copy()
+    for a, b in ((first, second), (second, first)):
+        joined[a[a >= 0]] = b[a >= 0]
+    place = np.repeat(3 * (np.cumsum(left) - 1), 3) + np.tile(np.arange(3), len(left))
+    kept = joined.reshape(-1, 3)[left].ravel()
+    return np.where(kept >= 0, place[kept], -1)
+
+
+@dataclass(frozen=True)
+class _Collapses:
+    """Edges (k,) between vertices `keep` and `gone`, which meet in `place` (k,3), with 1 or 2 faces, `sides`."""
+
+    keep: np.ndarray
+    gone: np.ndarray
+    place: np.ndarray
+    sides: np.ndarray
+
+    def only(self, rows: np.ndarray) -> _Collapses:
+        return _Collapses(self.keep[rows], self.gone[rows], self.place[rows], self.sides[rows])
+
+
+def _leaves_edges(triangles: np.ndarray, twin: np.ndarray, h: np.ndarray, boundary: np.ndarray) -> np.ndarray:
+    """Edges (k,) bool opposite to which no vertex has valence three, and that do not join two boundaries."""
     tail, head = halfedges(triangles)
-    common = np.asarray(neighbours[tail[h]].multiply(neighbours[head[h]]).sum(axis=1)).ravel()
-    valence = np.diff(neighbours.indptr)
+    valence = np.bincount(tail, minlength=len(boundary)) + boundary
     single = twin[h] < 0
     left = tail[previous_halfedge(h)]
     right = np.where(single, left, tail[previous_halfedge(twin[h])])
     thick = (valence[left] > 3 + ~boundary[left] - 1) & (valence[right] > 3 + ~boundary[right] - 1)
     # Between two boundaries, or two places of one, a collapse would pinch the surface.
     across = ~single & boundary[tail[h]] & boundary[head[h]]
-    return (common == 2 - single) & thick & (single | (left != right)) & ~across
+    return thick & (single | (left != right)) & ~across
 
 
-def _chosen(points, triangles, neighbours, keep, gone, place, most: int, min_cosine: float) -> np.ndarray:
-    """Choose up to `most` of the collapses (k,), in order, none of which folds, or has neighbours of another one's.
+def _chosen(
+    points: np.ndarray, triangles: np.ndarray, twin: np.ndarray, edges: _Collapses, most: int, min_cosine: float
+) -> np.ndarray:
+    """Choose up to `most` of the collapses (k,), in order, that keep the topology, fold nothing, and share no triangle.
 
-    What folds only shows when it is chosen, and others that it kept away take its place in the next pass.
+    An edge between two of them would have its triangles around both, so each leaves the other's neighbours as they are.
+    What keeps no topology only shows when it is chosen, and others that it kept away take its place in the next pass.
     """
-    owner, member = _rings(neighbours, keep, gone)
-    chosen = np.zeros(0, np.int64)
-    undecided = np.ones(len(keep), dtype=bool)
-    for _ in range(PASSES):
-        free = undecided[owner]
-        owner, member = owner[free], member[free]
-        first = np.full(len(points), len(keep))
-        np.minimum.at(first, member, owner)
-        apart = undecided.copy()
-        apart[owner[first[member] != owner]] = False
-        mine = np.flatnonzero(apart)
-        sound = _unfolded(points, triangles, keep[mine], gone[mine], place[mine], min_cosine)
-        chosen = np.concatenate([chosen, mine[sound]])
-        undecided[mine] = False
-        busy = np.zeros(len(points), dtype=bool)
-        taken = np.zeros(len(keep), dtype=bool)
-        taken[mine[sound]] = True
-        busy[member[taken[owner]]] = True
-        undecided[owner[busy[member]]] = False
-        if len(chosen) >= most or not undecided.any():
-            break
+    n, k = len(points), len(edges.keep)
+    left, chosen = np.arange(k), np.zeros(0, np.int64)
+    around = np.bincount(triangles.ravel(), minlength=n)
+    size = around[edges.keep] + around[edges.gone] - edges.sides
+    busy = np.zeros(len(triangles), dtype=bool)
+    passes = 0
+    while len(left) and len(chosen) < most and (passes < PASSES or not len(chosen)):
+        passes += 1
+        first = np.full(n, k)
+        # Of several the last one stays: the first in order.
+        first[edges.keep[left[::-1]]] = left[::-1]
+        other = np.full(n, k)
+        other[edges.gone[left[::-1]]] = left[::-1]
+        np.minimum(first, other, out=first)
+        at = first.take(triangles.T)
+        owner = np.minimum(np.minimum(at[0], at[1]), at[2])
+        owner[busy] = k
+        mine = left[np.bincount(owner, minlength=k + 1)[left] == size[left]]
+        own = np.zeros(k + 1, dtype=bool)
+        own[mine] = True
+        touched = np.flatnonzero(own[owner])
+        sound = _sound(points, triangles, twin, touched, owner[touched], edges, min_cosine)
+        own[mine[~sound[mine]]] = False
+        chosen = np.concatenate([chosen, mine[sound[mine]]])
+        taken = np.flatnonzero(own[owner])
+        busy[taken] = True
+        near = np.zeros(n, dtype=bool)
+        near[triangles[taken]] = True
+        undecided = ~(near[edges.keep[left]] | near[edges.gone[left]])
+        undecided[np.searchsorted(left, mine)] = False
+        left = left[undecided]
     return np.sort(chosen)[:most]
 
 
-def _rings(neighbours: csr_matrix, keep: np.ndarray, gone: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All pairs (p,), (p,) of an edge (k,) by its number and a vertex around one of its ends."""
-    owners, members = [], []
-    for end in (keep, gone):
-        rows = neighbours[end]
-        owners.append(np.repeat(np.arange(len(end)), np.diff(rows.indptr)))
-        members.append(rows.indices)
-    return np.concatenate(owners), np.concatenate(members)
+def _sound(
+    points: np.ndarray,
+    triangles: np.ndarray,
+    twin: np.ndarray,
+    touched: np.ndarray,
+    owner: np.ndarray,
+    edges: _Collapses,
+    min_cosine: float,
+) -> np.ndarray:
+    """Collapses (k,) bool that keep the link condition and turn no face too far, of those that own triangles.
 
-
-def _unfolded(points, triangles, keep, gone, place, min_cosine: float) -> np.ndarray:
-    """Collapses (k,) bool that fold no face around them."""
-    n = len(points)
-    moved, target, owner = points.copy(), np.arange(n), np.full(n, -1)
-    moved[keep] = moved[gone] = place
-    target[gone] = keep
-    owner[keep] = owner[gone] = np.arange(len(keep))
-    mine = owner[triangles].max(axis=1)
-    touched = np.flatnonzero(mine >= 0)
-    mine, t = mine[touched], triangles[touched]
-    stays = (np.diff(np.sort(target[t], axis=1), axis=1) > 0).all(axis=1)
-    old, new = points[t], moved[t]
-    before = unit(np.cross(old[:, 1] - old[:, 0], old[:, 2] - old[:, 0]))
-    after = unit(np.cross(new[:, 1] - new[:, 0], new[:, 2] - new[:, 0]))
-    folded = stays & (np.einsum("ij,ij->i", before, after) < min_cosine)
-    sound = np.ones(len(keep), dtype=bool)
-    sound[mine[folded]] = False
+    touched, owner (t,): these triangles, and whose they are
+    """
+    n, k, t = len(points), len(edges.keep), triangles[touched]
+    keep, gone = edges.keep[owner], edges.gone[owner]
+    at_end = (t == keep[:, None]) | (t == gone[:, None])
+    # Neighbours of both ends: those that two halfedges lead to, or one from each on a boundary.
+    row, corner = np.nonzero(at_end)
+    h = 3 * touched[row] + corner
+    ahead, back = t[row, (corner + 1) % 3], t[row, (corner + 2) % 3]
+    last = twin[previous_halfedge(h)] < 0
+    keys = np.concatenate([owner[row] * n + ahead, owner[row[last]] * n + back[last]])
+    keys.sort()
+    common = np.bincount(keys[1:][keys[1:] == keys[:-1]] // n, minlength=k)
+    sound = common == edges.sides
+    stays = at_end.sum(axis=1) == 1
+    old, mine = points[t[stays]], owner[stays]
+    new = np.where(at_end[stays][:, :, None], edges.place[mine][:, None], old)
+    before, after = (np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) for p in (old, new))
+    length = np.sqrt(np.einsum("ij,ij->i", before, before) * np.einsum("ij,ij->i", after, after))
+    turned = np.einsum("ij,ij->i", before, after)
+    if min_cosine > ANY_COSINE:
+        # What has no area, before or after, looks nowhere.
+        sound[mine[~(turned > min_cosine * length)]] = False
     return sound
 
 

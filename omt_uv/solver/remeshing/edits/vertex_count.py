@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 
 from ...mesh.closest_point import ClosestPoint
-from ...mesh.topology import boundary_loops, halfedges, twins
+from ...mesh.topology import boundary_loops, halfedges
 from ..components.components import Component
 from .delaunay_flips import make_delaunay_embedded
 from .split_collapse import (
@@ -19,6 +18,7 @@ from .split_collapse import (
     collapse_edges,
     independent_splits,
     interior_edges,
+    shortest_first,
     split_edges,
 )
 from .working_mesh import WorkingMesh
@@ -146,7 +146,7 @@ def _split(mesh: WorkingMesh, h: np.ndarray, length: np.ndarray, deficit: int) -
 
 
 def _collapse(mesh: WorkingMesh, h: np.ndarray, length: np.ndarray, surplus: int, min_cosine: float) -> WorkingMesh:
-    order = np.argsort(length, kind="stable")
+    order = shortest_first(length)
     reach = 4 * surplus + 32
     while True:
         edit = collapse_edges(
@@ -162,7 +162,7 @@ def _collapse(mesh: WorkingMesh, h: np.ndarray, length: np.ndarray, surplus: int
 def after_edit(mesh: WorkingMesh, edit: Edit) -> WorkingMesh:
     """Carry a mesh through an edit; Delaunay again if it is to be."""
     fixed = np.where(edit.origin >= 0, mesh.fixed[np.maximum(edit.origin, 0)], False)
-    triangles = edit.triangles.copy()
+    triangles, twin = edit.triangles.copy(), edit.twin.copy()
     if mesh.delaunay:
-        make_delaunay_embedded(edit.points, triangles, twins(triangles), mesh.locked, FLIP_ROUNDS)
-    return replace(mesh, points=edit.points, triangles=triangles, fixed=fixed)
+        make_delaunay_embedded(edit.points, triangles, twin, mesh.locked, FLIP_ROUNDS)
+    return mesh.turned_into(edit.points, triangles, twin, fixed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,3 +28,12 @@ class WorkingMesh:
     def twin(self) -> np.ndarray:
         """Opposite halfedges (3m,), for edits, which ask for them again and again."""
         return twins(self.triangles)
+
+    def turned_into(
+        self, points: np.ndarray, triangles: np.ndarray, twin: np.ndarray, fixed: np.ndarray | None = None
+    ) -> WorkingMesh:
+        """This mesh with other points (n,3) and triangles (m,3), whose opposite halfedges (3m,) are known, and other
+        vertices that stay, (n,) bool, if there are others."""
+        mesh = replace(self, points=points, triangles=triangles, fixed=self.fixed if fixed is None else fixed)
+        vars(mesh)["twin"] = twin
+        return mesh

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class FitState:
     ):
         self.start, self.pairing, self.index, self.density = mesh, pairing, pairing.index, density
         self.points, self.triangles = mesh.points, mesh.triangles.copy()
-        self.twin, self.outer, self._memory = twins(self.triangles), outer, memory
+        self.twin, self.outer, self._memory = mesh.twin.copy(), outer, memory
         self._locate()
 
     def _locate(self) -> None:
@@ -62,7 +62,7 @@ class FitState:
     @property
     def mesh(self) -> WorkingMesh:
         """The mesh as it is now."""
-        return replace(self.start, points=self.points, triangles=self.triangles)
+        return self.start.turned_into(self.points, self.triangles, self.twin)
 
     def pairs(self) -> ClosestPairs:
         """Pair closest points of mesh and surface."""

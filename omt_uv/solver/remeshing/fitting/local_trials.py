@@ -19,7 +19,7 @@ from .ring_patches import RingPatches
 # Nothing but the steps, one of three vertices put on the peak first, or one of three edges flipped first.
 TRIALS = 7
 # Steps with vertices held on the peaks,
-HELD_STEPS = 2
+HELD_STEPS = 1
 # and after these.
 FREE_STEPS = 2
 # Patches count by this norm of the largest distances of their triangles.

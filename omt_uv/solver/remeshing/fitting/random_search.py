@@ -22,7 +22,7 @@ COPIES = 16
 # and of all patches together about.
 COPIES_TOGETHER = 32
 # How often these are made.
-ROUNDS = 12
+ROUNDS = 8
 # Shortest and longest moves, in edges, evenly over their logarithms.
 SHORTEST = 0.02
 LONGEST = 0.15

@@ -34,7 +34,12 @@ def decimated(component: Component, count: int, density: np.ndarray, size: float
     """
     none = np.zeros((0, 2), np.int64)
     mesh = LineMesh(
-        points=component.vertices, triangles=component.triangles, lines=none, to_reopen=none, vertices=none.ravel()
+        points=component.vertices,
+        triangles=component.triangles,
+        lines=none,
+        to_reopen=none,
+        vertices=none.ravel(),
+        twin=twins(component.triangles),
     )
     return _reached(component, mesh, count, _sizing(component, density, size))[0]
 
@@ -89,5 +94,6 @@ def _working_mesh(mesh: LineMesh) -> tuple[WorkingMesh, np.ndarray]:
     number = np.argsort(order, kind="stable")
     triangles, points = number[mesh.triangles], mesh.points[order]
     locked, to_reopen = (np.sort(pair_keys(*number[pairs].T)) for pairs in (mesh.lines, mesh.to_reopen))
-    make_delaunay_embedded(points, triangles, twins(triangles), locked)
-    return WorkingMesh(points, triangles, fixed[order], locked), to_reopen
+    working = WorkingMesh(points, triangles, fixed[order], locked)
+    make_delaunay_embedded(points, triangles, working.twin, locked)
+    return working, to_reopen

@@ -10,7 +10,14 @@ import numpy as np
 from ...mesh.topology import halfedges, pair_keys, paired, twins
 from ..components.components import Component
 from ..edits.long_edges import split_component
-from ..edits.split_collapse import ANY_COSINE, MIN_COSINE, collapse_edges, independent_splits, interior_edges
+from ..edits.split_collapse import (
+    ANY_COSINE,
+    MIN_COSINE,
+    collapse_edges,
+    independent_splits,
+    interior_edges,
+    shortest_first,
+)
 from .arc_network import Arc, ArcSamples
 
 # Samples nearer than this share of an edge to its end are there.
@@ -44,18 +51,20 @@ def insert_samples(component: Component, arcs: list[Arc], samples: ArcSamples) -
     )
     sample = np.concatenate([samples.along[k] for k in kept_arcs])
     waiting = _Waiting(sample, ends, np.concatenate([samples.share[k] for k in kept_arcs]))
-    vertex = np.full(len(samples.points), -1)
+    vertex, twin = np.full(len(samples.points), -1), twins(component.triangles)
     for _ in range(MAX_ROUNDS):
         for end, near in ((0, waiting.share <= AT_END), (1, waiting.share >= 1 - AT_END)):
             vertex[waiting.sample[near]] = waiting.ends[near, end]
         waiting = waiting.only((waiting.share > AT_END) & (waiting.share < 1 - AT_END))
         if not len(waiting.sample):
             break
-        component, waiting = _split_at_middles(component, waiting)
+        component, twin, waiting = _split_at_middles(component, twin, waiting)
     return component, vertex
 
 
-def _split_at_middles(component: Component, waiting: _Waiting) -> tuple[Component, _Waiting]:
+def _split_at_middles(
+    component: Component, twin: np.ndarray, waiting: _Waiting
+) -> tuple[Component, np.ndarray, _Waiting]:
     """Split edges with samples at the middle one of each, as far as they have no triangle in common."""
     key = pair_keys(*waiting.ends.T)
     # Shares from the smaller end, so that samples from two arcs are in one order.
@@ -68,12 +77,12 @@ def _split_at_middles(component: Component, waiting: _Waiting) -> tuple[Componen
     all_keys = pair_keys(tail, head)
     by_key = np.argsort(all_keys, kind="stable")
     h = by_key[np.searchsorted(all_keys[by_key], key[middle])]
-    chosen = independent_splits(component.triangles, h)
+    chosen = independent_splits(component.triangles, h, twin)
     row = middle[np.searchsorted(key[middle], all_keys[chosen])]
     n = len(component.vertices)
     low, high = np.sort(waiting.ends[row], axis=1).T
     places = component.vertices[low] + share[row, None] * (component.vertices[high] - component.vertices[low])
-    component = split_component(component, chosen)
+    component, twin = split_component(component, chosen, twin)
     component = replace(component, vertices=np.concatenate([component.vertices[:n], places]))
     # Of every sample the edge that was split, if it was.
     found = np.argsort(key[row])
@@ -85,18 +94,20 @@ def _split_at_middles(component: Component, waiting: _Waiting) -> tuple[Componen
     along[hit] = np.where(before, share / t, (share - t) / (1 - t))[hit]
     ends[hit & before, 1] = new[hit & before]
     ends[hit & ~before, 0] = new[hit & ~before]
-    return component, _Waiting(waiting.sample, ends, along)
+    return component, twin, _Waiting(waiting.sample, ends, along)
 
 
 @dataclass(frozen=True)
 class LineMesh:
-    """A mesh (n,3), (m,3), its lines (l,2), those to be reopened (s,2) among them, and the vertices (v,) to keep."""
+    """A mesh (n,3), (m,3), its lines (l,2), those to be reopened (s,2) among them, the vertices (v,) to keep, and the
+    opposite halfedges (3m,)."""
 
     points: np.ndarray
     triangles: np.ndarray
     lines: np.ndarray
     to_reopen: np.ndarray
     vertices: np.ndarray
+    twin: np.ndarray
 
 
 def collapse_along_lines(component: Component, vertices: np.ndarray) -> LineMesh:
@@ -108,6 +119,7 @@ def collapse_along_lines(component: Component, vertices: np.ndarray) -> LineMesh
         lines=component.features,
         to_reopen=to_reopen,
         vertices=vertices,
+        twin=twins(component.triangles),
     )
     least = MIN_COSINE
     for _ in range(MAX_ROUNDS):
@@ -117,7 +129,7 @@ def collapse_along_lines(component: Component, vertices: np.ndarray) -> LineMesh
             break
         keys, index = np.unique(pair_keys(*halfedges(mesh.triangles)), return_index=True)
         on_lines = index[np.isin(keys, pair_keys(*mesh.lines.T))]
-        fewer = _collapsed(mesh, on_lines, kept, least, True, None)
+        fewer = _collapsed(mesh, on_lines, kept, least, True)
         if len(fewer.points) == len(mesh.points):
             if least == ANY_COSINE:
                 break
@@ -130,26 +142,23 @@ def collapse_short_edges(mesh: LineMesh, shortest: Callable[[np.ndarray], np.nda
     """Collapse edges between a mesh's lines that are shorter than (k,) what `shortest` gives for places (k,3)."""
     for _ in range(MAX_ROUNDS):
         tail, head = halfedges(mesh.triangles)
-        twin = twins(mesh.triangles)
-        h = interior_edges(mesh.triangles, np.sort(pair_keys(*mesh.lines.T)), twin)
+        h = interior_edges(mesh.triangles, np.sort(pair_keys(*mesh.lines.T)), mesh.twin)
         a, b = mesh.points[tail[h]], mesh.points[head[h]]
         short = np.linalg.norm(a - b, axis=1) < shortest((a + b) / 2)
         kept = np.zeros(len(mesh.points), dtype=bool)
         kept[mesh.lines] = kept[mesh.vertices] = True
-        fewer = _collapsed(mesh, h[short], kept, MIN_COSINE, False, twin)
+        fewer = _collapsed(mesh, h[short], kept, MIN_COSINE, False)
         if len(fewer.points) == len(mesh.points):
             break
         mesh = fewer
     return mesh
 
 
-def _collapsed(
-    mesh: LineMesh, h: np.ndarray, kept: np.ndarray, least: float, along: bool, twin: np.ndarray | None
-) -> LineMesh:
+def _collapsed(mesh: LineMesh, h: np.ndarray, kept: np.ndarray, least: float, along: bool) -> LineMesh:
     """Collapse edges of the halfedges h (k,), the shortest first, but for vertices `kept` (n,) bool."""
     tail, head = halfedges(mesh.triangles)
-    h = h[np.argsort(np.linalg.norm(mesh.points[tail[h]] - mesh.points[head[h]], axis=1), kind="stable")]
-    edit = collapse_edges(mesh.points, mesh.triangles, h, kept, len(h), least, along, twin)
+    h = h[shortest_first(np.linalg.norm(mesh.points[tail[h]] - mesh.points[head[h]], axis=1))]
+    edit = collapse_edges(mesh.points, mesh.triangles, h, kept, len(h), least, along, mesh.twin)
     lines, to_reopen = (
         np.unique(np.sort(edit.new_number[pairs], axis=1), axis=0) for pairs in (mesh.lines, mesh.to_reopen)
     )
@@ -160,4 +169,5 @@ def _collapsed(
         lines=lines,
         to_reopen=to_reopen,
         vertices=edit.new_number[mesh.vertices],
+        twin=edit.twin,
     )

@@ -14,7 +14,6 @@ from ...progress import Progress, Steps, part_of
 from ..edits.vertex_count import edge_length
 from ..edits.working_mesh import WorkingMesh
 from .arc_network import ArcSamples, ChartBoundary, chart_boundary
-from .coarse_component import coarse_component
 from .component_maps import ComponentMaps
 from .decimation import decimated, decimated_between_lines
 from .disk_samples import ChartMesh, even_image, triangulate_chart
@@ -25,11 +24,6 @@ from .stitching import stitch
 
 # Charts with up to so many inner samples need no maps: what relaxation makes of them is the same.
 FEW = 50
-# Bodies whose sphericity is less have limbs, which a sphere shows as points: by their own triangles they come out as
-# even, nearer to the surface, and sooner.
-LIMBED = 0.65
-# So have disks that are less open: what lies far behind the opening is a point in any map to the disk.
-BAG = 0.05
 NO_MAPS = "A part has no maps to the disk in double precision and was remeshed without"
 
 
@@ -38,8 +32,7 @@ class InitialMesh:
     """A mesh of a component with about the target count, samples on boundaries and features fixed, edges there locked.
 
     vertex_count: to reach exactly; size: edge length at density 1; line_spacing: that of the samples on boundaries and
-    features, in edges; to_reopen: sorted keys of the edges to cut at the end; reopened_copies: vertices that adds;
-    uneven: it comes from a coarse mesh, and takes longer to settle
+    features, in edges; to_reopen: sorted keys of the edges to cut at the end; reopened_copies: vertices that adds
     """
 
     mesh: WorkingMesh
@@ -49,7 +42,6 @@ class InitialMesh:
     warnings: tuple[str, ...]
     to_reopen: np.ndarray
     reopened_copies: int
-    uneven: bool = False
 
 
 def make_initial_mesh(
@@ -62,18 +54,19 @@ def make_initial_mesh(
 ) -> Steps[InitialMesh]:
     """Sample a component with density (m,), and at_vertices (n,), of mean 1, and triangulate by the options' strategy.
 
-    Closed components of genus 0 without features or limbs go by way of the sphere, open disks without features by way
-    of a chart, and all others, disks of very many vertices, or where that fails, by collapses of their own edges. On
+    Where any mesh will do it comes of collapses of the component's own edges. Otherwise closed components of genus 0
+    without features go by way of the sphere, all others by way of charts, and by collapses where that fails. On
     boundaries and features samples are `line_spacing` edges apart, or more where there would be too many.
 
     There may be more vertices than the count, where boundaries and features take as many. Raises PrecisionError where a
     chart cannot be triangulated.
     """
-    by_sphere = maps.by_sphere and not (options.any_mesh_will_do and maps.component.sphericity < LIMBED)
-    found = (yield from _by_sphere(maps, count, density, options)) if by_sphere else None
-    if found is None and options.any_mesh_will_do and not maps.component.has_lines:
+    if options.any_mesh_will_do and not maps.component.has_lines:
         yield Progress("Samples", 0.0)
         return _by_decimation(maps, count, density, options)
+    found = None
+    if maps.by_sphere and not options.any_mesh_will_do:
+        found = yield from _by_sphere(maps, count, density, options)
     return found or (yield from _by_charts(maps, count, density, at_vertices, options, line_spacing))
 
 
@@ -132,17 +125,12 @@ def _by_charts(
     options: RemeshOptions,
     line_spacing: float,
 ) -> Steps[InitialMesh]:
-    """The component by way of charts; by its own triangles where some of them have no maps, and relaxation follows."""
+    """The component by way of charts; by its own triangles where any mesh will do, or some have no maps and relaxation
+    follows."""
     yield Progress("Charts", 0.0)
-    if options.any_mesh_will_do and maps.component.is_disk:
-        vertex_count = count if options.counts_vertices else count // 2
-        coarse = yield from coarse_component(maps, vertex_count, density, at_vertices)
-        if coarse is not None:
-            plan = plan_samples(coarse.maps, count, coarse.density, coarse.at_vertices, options, line_spacing)
-            return replace(_by_decimation_between_lines(coarse.maps, plan, coarse.density), uneven=True)
     plan = plan_samples(maps, count, density, at_vertices, options, line_spacing)
     network, component = plan.network, maps.component
-    if options.any_mesh_will_do and not (component.is_disk and component.openness > BAG):
+    if options.any_mesh_will_do:
         return _by_decimation_between_lines(maps, plan, density)
     boundaries = [chart_boundary(sides, plan.samples, network.arcs) for sides in network.sides]
     left = max(plan.vertex_count, plan.initial_vertex_count) - len(plan.samples.points)
@@ -154,7 +142,7 @@ def _by_charts(
         share = len(maps.charts[k].triangles) / len(component.triangles)
         steps = _chart_mesh(maps, k, loop, boundary, int(inner_count), density, options)
         chart_mesh, warnings = yield from part_of(steps, done, share)
-        if chart_mesh is None or (warnings and options.any_mesh_will_do):
+        if chart_mesh is None:
             return _by_decimation_between_lines(maps, replace(plan, warnings=(*plan.warnings, NO_MAPS)), density)
         chart_meshes.append(chart_mesh)
         chart_warnings += warnings

@@ -8,7 +8,7 @@ go back to the surface. Crests weigh more than the rest, so that vertices line u
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,6 +30,10 @@ TRUST_FROM = 1.1
 TRUST_FULLY = 1.3
 # Weight of crests, next to the area around them.
 CREST_WEIGHT = 4.0
+# Vertices go back to the surface after so many rounds: along the tangents they hardly leave it.
+RETURN_EVERY = 2
+# Rounds of flips after each step; what they leave is for the next.
+FLIP_ROUNDS = 1
 # Relative rise of the energy at which the descent begins anew: triangles flipped.
 RISE = 1e-6
 
@@ -49,7 +53,7 @@ def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[
     points[fixed] = mesh.points[fixed]
     for k in range(rounds):
         if mesh.delaunay:
-            make_delaunay_embedded(points, triangles, twin, mesh.locked)
+            make_delaunay_embedded(points, triangles, twin, mesh.locked, FLIP_ROUNDS)
         if k % SAMPLE_EVERY == 0:
             correction = _sample_correction(points, triangles, normal, carrier)
             descent.reset()
@@ -63,14 +67,15 @@ def relax_cvt(mesh: WorkingMesh, rounds: int, carrier: SurfaceCarrier) -> Steps[
         step, residual = _bounded(step, points, triangles)
         trial = points + step
         normal = vertex_normals(trial, triangles)
-        trial, density = carrier.closest(trial, normal)
+        if k % RETURN_EVERY == 0 or k == rounds - 1:
+            trial, density = carrier.closest(trial, normal)
         # A vertex that found no place stays where it is.
         found = ~fixed & np.isfinite(trial).all(axis=1)
         points = np.where(found[:, None], trial, points)
         yield Progress("Relaxation", (k + 1) / rounds)
     if mesh.delaunay:
         make_delaunay_embedded(points, triangles, twin, mesh.locked)
-    return replace(mesh, points=points, triangles=triangles), residual
+    return mesh.turned_into(points, triangles, twin), residual
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray, fixed: np.ndarray) -> np.ndarray:

@@ -37,23 +37,31 @@ def voronoi_cells(
     p = np.take(points.T, corner, axis=1).transpose(1, 0, 2)
     side = p[[2, 0, 1]] - p[[1, 2, 0]]
     square = _dot(side, side)
-    double = np.sqrt(_cross_square(side[0], side[1]))
-    w = _circumcentre(square) if delaunay else np.full(square.shape, 1 / 3)
-    centre = sum(w[k] * p[k] for k in range(3))
-    rho = density.take(corner)
+    w, double = _circumcentre(square)
+    if not delaunay:
+        w = np.full(square.shape, 1 / 3)
+    # One number for all where it is the same everywhere.
+    rho = list(density.take(corner)) if np.ptp(density) else [density[:1]] * 3
     # Geometric means: where a long edge leads from many small cells to a few large ones, the arithmetic mean
     # would say that half of it belongs to the small ones, and these would draw vertices from the large.
-    split_ends, middle = np.sqrt(rho[[1, 2, 0]] * rho[[2, 0, 1]]), np.cbrt(rho[0] * rho[1] * rho[2])
-    half = w * (double / 4)
-    mass, moment, energy = np.zeros_like(square), np.zeros_like(p), 0.0
+    middle, half = np.cbrt(rho[0] * rho[1] * rho[2]), w * (double / 4)
+    mass, moment, energy = np.empty_like(square), np.empty_like(p), 0.0
     for i in range(3):
-        v = centre - p[i]
-        far = _dot(v, v)
-        for k, sign in (((i + 1) % 3, -0.5), ((i + 2) % 3, 0.5)):
-            u, area, total = sign * side[k], half[k], rho[i] + split_ends[k] + middle
-            mass[i] += area * total / 3
-            moment[i] += area / 12 * ((total + split_ends[k]) * u + (total + middle) * v)
-            energy += float((area / 18 * total) @ (square[k] / 4 + _dot(u, v) + far))
+        j, k = (i + 1) % 3, (i + 2) % 3
+        between = (square[j] + square[k] - square[i]) / 2
+        # Of the ways from the corner to the others and, with the shares w, to the centre: e_j, e_k, w_j e_j + w_k e_k.
+        far = w[j] ** 2 * square[k] + w[k] ** 2 * square[j] + 2 * w[j] * w[k] * between
+        along, mass[i], to_centre = [], 0, 0
+        for a, b in ((j, k), (k, j)):
+            # The part at the side to corner a, which is opposite to b.
+            split = np.sqrt(rho[i] * rho[a])
+            total = rho[i] + split + middle
+            mass[i] += half[b] * (total / 3)
+            along.append(half[b] * ((total + split) / 24))
+            to_centre = to_centre + half[b] * ((total + middle) / 12)
+            reach = square[b] * ((1 + 2 * w[a]) / 4) + w[b] / 2 * between + far
+            energy += float((half[b] * total) @ reach) / 18
+        moment[i] = (along[0] + to_centre * w[j]) * side[k] - (along[1] + to_centre * w[k]) * side[j]
     flat = corner.ravel()
     sums = [np.bincount(flat, moment[:, k].ravel(), n) for k in range(3)]
     # Where flips could not reach Delaunay cells may be small, or less than nothing: a step must not divide by that.
@@ -64,22 +72,19 @@ def voronoi_cells(
     )
 
 
-def _circumcentre(square: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (3,m) of the circumcentres, from the squares of the sides opposite to the corners."""
+def _circumcentre(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Barycentric coordinates (3,m) of the circumcentres, from the squares of the sides opposite to the corners, and
+    twice the areas (m,)."""
     w = square * (square.sum(axis=0) - 2 * square)
+    # By Heron's formula the square of four times the area.
     total = w.sum(axis=0)
+    double = np.sqrt(np.maximum(total, 0)) / 2
     # A triangle without area has no circumcentre.
     w = np.where(total > 1e-12 * square.max(axis=0) ** 2, w / np.maximum(total, 1e-300), 1 / 3)
     w = np.clip(w, -1, 2)
-    return w / w.sum(axis=0)
+    return w / w.sum(axis=0), double
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar products (..., m) of vectors (..., 3, m)."""
     return np.einsum("...im,...im->...m", a, b)
-
-
-def _cross_square(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Squared length (m,) of the cross product of vectors (3,m)."""
-    x, y, z = (a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1)))
-    return x * x + y * y + z * z

@@ -58,25 +58,3 @@ def test_one_sided_surfaces_are_refused():
     F = np.array([[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 0], [4, 0, 1]])
     with pytest.raises(OrientationError):
         split_components(V[:5], F, NONE)
-
-
-def test_sphericity_is_that_of_known_bodies():
-    cube, tetrahedron = meshes.cube(), np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
-    faces = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
-    for (V, F), known in ((cube, np.cbrt(np.pi / 6)), ((tetrahedron, faces), np.cbrt(np.pi / 6 / np.sqrt(3)))):
-        for moved in (V, 5 * V - [3, 0, 1]):
-            (component,) = split_components(moved, F, NONE).components
-            assert component.sphericity == pytest.approx(known, rel=1e-9)
-    assert split_components(*meshes.icosphere(4), NONE).components[0].sphericity == pytest.approx(1, abs=0.01)
-
-
-def test_openness_is_that_of_known_disks():
-    sector = 2 * np.pi / 256
-    outline = np.column_stack([np.cos(sector * np.arange(256)), np.sin(sector * np.arange(256)), np.zeros(256)])
-    fan = np.column_stack([np.full(256, 256), np.arange(256), np.roll(np.arange(256), -1)])
-    flat = split_components(np.vstack([outline, np.zeros(3)]), fan, NONE).components[0]
-    assert flat.openness == pytest.approx(1, abs=1e-3)
-    V, F = meshes.hemisphere(24, 96)
-    for moved in (V, 5 * V - [3, 0, 1]):
-        assert split_components(moved, F, NONE).components[0].openness == pytest.approx(0.5, abs=0.01)
-    assert split_components(*meshes.icosphere(2), NONE).components[0].openness == 0

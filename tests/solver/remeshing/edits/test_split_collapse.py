@@ -10,9 +10,11 @@ from mesh_checks import topology
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import halfedges, twins
 from omt_uv.solver.remeshing.edits.split_collapse import (
+    BANDS,
     collapse_edges,
     independent_splits,
     interior_edges,
+    shortest_first,
     split_edges,
 )
 
@@ -47,6 +49,49 @@ def test_collapses_keep_the_topology_and_what_is_fixed(name):
     assert len(F) - len(edit.triangles) == 2 * gone
     np.testing.assert_array_equal(edit.points[edit.new_number[fixed]], V[fixed])
     np.testing.assert_array_equal(edit.new_number[edit.origin], np.arange(len(edit.points)))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_edits_tell_opposite_halfedges(name):
+    V, F = CASES[name]()
+    random = np.random.default_rng(0)
+    for _ in range(3):
+        t = twins(F)
+        h = random.permutation(np.flatnonzero(t < np.arange(len(t))))
+        edit = split_edges(V, F, independent_splits(F, h, t), t)
+        np.testing.assert_array_equal(edit.twin, twins(edit.triangles))
+        h = random.permutation(interior_edges(edit.triangles, np.zeros(0, np.int64)))
+        edit = collapse_edges(edit.points, edit.triangles, h, np.zeros(len(edit.points), dtype=bool), len(h))
+        np.testing.assert_array_equal(edit.twin, twins(edit.triangles))
+        V, F = edit.points, edit.triangles
+        assert topology(F) == topology(CASES[name]()[1])
+
+
+def test_many_collapse_at_once_though_lengths_rise_steadily():
+    """In strict order every edge but the shortest has a shorter one beside it."""
+    V, F = meshes.grid(60, 60)
+    V = V.copy()
+    V[:, :2] = (1 + V[:, :2]) ** 3
+    tail, head = halfedges(F)
+    h = interior_edges(F, np.zeros(0, np.int64))
+    length = np.linalg.norm(V[tail[h]] - V[head[h]], axis=1)
+    order = shortest_first(length)
+    np.testing.assert_array_equal(np.sort(order), np.arange(len(h)))
+    assert (length[order][1:] > length[order][:-1] / 2 ** (1 / BANDS) - 1e-12).all()
+    fixed = np.zeros(len(V), dtype=bool)
+    strict = collapse_edges(V, F, h[np.argsort(length)], fixed, len(V))
+    assert len(V) - len(strict.points) < (len(V) - len(collapse_edges(V, F, h[order], fixed, len(V)).points)) / 1.5
+
+
+def test_the_only_edge_that_may_collapse_is_found():
+    """However many others come first in the order."""
+    V, F = meshes.icosphere(3)
+    h = interior_edges(F, np.zeros(0, np.int64))
+    tail, head = halfedges(F)
+    free = np.zeros(len(V), dtype=bool)
+    free[tail[h[-1]]] = free[head[h[-1]]] = True
+    edit = collapse_edges(V, F, h, ~free, 1)
+    assert len(edit.points) == len(V) - 1
 
 
 def test_a_tetrahedron_does_not_collapse():

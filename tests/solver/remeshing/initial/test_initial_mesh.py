@@ -11,7 +11,7 @@ from mesh_checks import topology
 
 from omt_uv.solver.mesh.topology import halfedges, pair_keys
 from omt_uv.solver.progress import drain
-from omt_uv.solver.remeshing.initial import coarse_component, initial_mesh
+from omt_uv.solver.remeshing.initial import initial_mesh
 from omt_uv.solver.remeshing.initial.component_maps import RemeshSource
 from omt_uv.solver.remeshing.initial.initial_mesh import make_initial_mesh
 from omt_uv.solver.remeshing.initial.options import STRATEGIES, RemeshOptions
@@ -77,20 +77,3 @@ def test_only_the_first_strategy_may_be_replaced_and_only_where_its_mesh_is_rela
         for rounds in (0, 1, 2):
             options = RemeshOptions(strategy=strategy, rounds=rounds)
             assert options.any_mesh_will_do == (strategy == STRATEGIES[0] and rounds > 0)
-
-
-@pytest.mark.parametrize("fewest, coarse", [(1000, False), (100, True)])
-@pytest.mark.parametrize("count_of", ["vertices", "faces"])
-def test_very_fine_disks_are_coarsened_and_go_by_their_own_triangles(monkeypatch, fewest, coarse, count_of):
-    """With the boundary that is asked for, and as many vertices."""
-    monkeypatch.setattr(coarse_component, "FEWEST", fewest)
-    monkeypatch.setattr(coarse_component, "PER_SAMPLE", 1)
-    V, F = meshes.bumpy(24, 24)
-    maps = RemeshSource(V, F).maps[0]
-    one, at_vertices = np.ones(len(maps.component.triangles)), np.ones(len(maps.component.vertices))
-    count = 150 if count_of == "vertices" else 250
-    found = drain(make_initial_mesh(maps, count, one, at_vertices, RemeshOptions(count_of=count_of)))
-    assert found.uneven == coarse and topology(found.mesh.triangles) == topology(F)
-    assert abs(len(found.mesh.points) - found.vertex_count) < 15
-    k = found.mesh.fixed.sum()
-    assert k > 0 and len(found.mesh.locked) == k
