@@ -82,6 +82,7 @@ ENDS = {
     ("uv.omt_unwrap", "max_shear"): (0.0, 1.0625),
     ("uv.omt_seams", "max_shear"): (0.0, 1.0625),
     ("uv.omt_magnify", "max_shear"): (0.0, 1.0625),
+    ("object.omt_remesh", "grading"): (0.0, 0.0625),
 }
 CASES = [(name, number) for name, (_, _, numbers) in NUMBERS.items() for number in numbers]
 
