@@ -195,11 +195,12 @@ class _ShrinkingMesh:
         degree = np.bincount(self.faces.ravel(), minlength=size)
         price = np.linalg.norm(self.points[tail] - self.points[head], axis=1)
         price = price * (1 + np.maximum(degree[tail] + degree[head] - HIGH_DEGREE, 0))
-        order = np.lexsort((head, price, tail))
-        first = order[np.unique(tail[order], return_index=True)[1]]
-        parent, cost = np.full(size, -1), np.full(size, np.inf)
-        parent[tail[first]], cost[tail[first]] = head[first], price[first]
-        return parent, cost
+        cost = np.full(size, np.inf)
+        np.minimum.at(cost, tail, price)
+        nearest = price == cost[tail]
+        parent = np.full(size, size)
+        np.minimum.at(parent, tail[nearest], head[nearest])
+        return np.where(parent < size, parent, -1), cost
 
     def _fans(self, parent: np.ndarray) -> _Fans:
         size = len(self.points)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..mesh.topology import graph_components
 from .path_graph import PathGraph
-from .predicted_scale import ScaleModel
+from .predicted_scale import ScaleModel, prefix_energies
 
 # A cut that leaves half the spread is a fifth longer, as a rule: cuts at different spreads are compared by this power.
 EXCHANGE = 0.3
@@ -79,13 +79,34 @@ class Removal:
         held = np.bincount(_with_images(graph, own), minlength=n)
         return Removal(graph, place, steps, held, inverse, inverse @ plate.value[cut.vertices])
 
-    def loss(self, gone: np.ndarray) -> float:
-        """The spread that is left once steps (k,) are taken back, over what is left now."""
-        vertices, count = np.unique(self.graph.ends[gone], return_counts=True)
-        let_go, count = np.unique(_with_images(self.graph, vertices[self.steps[vertices] == count]), return_counts=True)
-        free = self.place[let_go[(self.held[let_go] == count) & ~self.graph.boundary[let_go]]]
-        force = self.force[free]
-        return float(force @ np.linalg.solve(self.inverse[np.ix_(free, free)], force))
+    def losses(self, gone: np.ndarray) -> np.ndarray:
+        """The spread that is left once the first of the steps (k,) is taken back, once the first two are, and so on,
+        over what is left now (k,): all by one factor. Infinite where rounding leaves no digits of it."""
+        ends, when = self.graph.ends[gone].ravel(), np.repeat(np.arange(len(gone)), 2)
+        # A vertex is let go with the last of its steps, and held no more with the last of those that hold it.
+        let_go, when = _with_the_last(ends, when, self.steps)
+        image = self.graph.image[let_go]
+        moved = image != let_go
+        free, when = _with_the_last(
+            np.concatenate([let_go, image[moved]]), np.concatenate([when, when[moved]]), self.held
+        )
+        inner = ~self.graph.boundary[free]
+        free, when = self.place[free[inner]], when[inner]
+        order = np.argsort(when, kind="stable")
+        free, when = free[order], when[order]
+        if not len(free):
+            return np.zeros(len(gone))
+        total = np.concatenate([[0.0], prefix_energies(self.inverse[np.ix_(free, free)], self.force[free])])
+        return total[np.searchsorted(when, np.arange(len(gone)), side="right")]
+
+
+def _with_the_last(vertices: np.ndarray, when: np.ndarray, needed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (k,) that are named (m,) as often as is needed (n,), and when (k,) that is so: with the last."""
+    named, place, count = np.unique(vertices, return_inverse=True, return_counts=True)
+    last = np.zeros(len(named), np.int64)
+    np.maximum.at(last, place, when)
+    enough = needed[named] == count
+    return named[enough], last[enough]
 
 
 def _with_images(graph: PathGraph, vertices: np.ndarray) -> np.ndarray:

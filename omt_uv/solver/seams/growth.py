@@ -71,19 +71,29 @@ def _arcs(task: Task, cut: Cut, model: ScaleModel) -> list[_Arc]:
         # From the first vertex that is near enough, or where a cut may end as anywhere; the last is on the cut already.
         begins = {int(np.argmax(reach <= stop * reach[0] + 1e-12)) for stop in STOPS}
         begins.add(int(np.argmax(task.tip_factor[path] > BARRED)))
-        for begin in sorted(begins):
-            part = path[begin:]
-            new = np.union1d(part[:-1], graph.image[part[:-1]])
-            if len(new) == 0:
-                continue
-            fall = cut.spread - model.spread_cut(new)
-            worth = task.tip_factor[part[0]] * fall / cost[part[0]]
+        new, count = _from_cut_on(path, graph.image)
+        if not len(new):
+            continue
+        fall = cut.spread - model.spread + model.falls(new)
+        for begin in sorted(begins - {len(path) - 1}):
+            worth = task.tip_factor[path[begin]] * fall[count[begin] - 1] / cost[path[begin]]
             if worth > 0 and (best is None or worth > best.worth * (1 + EVEN)):
-                best = _Arc(part, worth)
+                best = _Arc(path[begin:], worth)
         found += [] if best is None else [best]
     # Where two are worth the same, rounding does not choose between them.
     worth = np.round(np.log([arc.worth for arc in found]) / EVEN)
     return [found[k] for k in np.argsort(-worth, kind="stable")]
+
+
+def _from_cut_on(path: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (v,) off the cut of a path (k,) that ends on it, each with its image (n,), those near the cut first; and
+    how many of them (k-1,) are on the path from each of its vertices on."""
+    onwards = path[-2::-1]
+    both = np.column_stack([onwards, image[onwards]])
+    apart = both[:, 0] != both[:, 1]
+    kept = np.ones(both.shape, dtype=bool)
+    kept[:, 1] = apart
+    return both[kept], np.cumsum(1 + apart)[::-1]
 
 
 def _tips(task: Task, model: ScaleModel, cost: np.ndarray) -> np.ndarray:

@@ -44,7 +44,7 @@ def improved(task: Task, cut: Cut, trials: int) -> Iterator[Cut]:
 def _taken_back(task: Task, cut: Cut, found: list[np.ndarray], in_vain: int, rng: np.random.Generator) -> Cut:
     """The cut without the leaf that is worth least for its length, or, where those were in vain, without some."""
     without = Removal.of(task, cut)
-    worth = [without.loss(leaf) / task.graph.cost[leaf].sum() for leaf in found]
+    worth = [without.losses(leaf)[-1] / task.graph.cost[leaf].sum() for leaf in found]
     order = np.argsort(worth, kind="stable")
     if in_vain < len(found):
         gone = [found[order[in_vain]]]
@@ -59,11 +59,11 @@ def trimmed(task: Task, cut: Cut) -> Cut:
         without, room = Removal.of(task, cut), task.bound - cut.spread
         shorter = []
         for leaf in leaves(task.graph, cut.steps):
+            losses, cost = without.losses(leaf), np.cumsum(task.graph.cost[leaf])
             for part in PARTS:
-                gone = leaf[: max(int(part * len(leaf)), 1)]
-                loss = without.loss(gone)
-                if loss <= room:
-                    shorter.append((loss / task.graph.cost[gone].sum(), gone))
+                count = max(int(part * len(leaf)), 1)
+                if losses[count - 1] <= room:
+                    shorter.append((losses[count - 1] / cost[count - 1], leaf[:count]))
         if not shorter:
             return cut
         gone = min(shorter, key=lambda pair: pair[0])[1]

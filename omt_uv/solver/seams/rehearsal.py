@@ -95,14 +95,24 @@ class Rehearsal:
         """The cut that costs least for what it shears, where a square of log(shear) is asked for."""
         if len(cuts) == 1:
             return cuts[0]
-        scores = []
-        for k, found in enumerate(cuts):
+        tried = yield from self._worth_trying(cuts, asked)
+        prices = [np.inf if sheared is None else _price(found, sheared, asked) for found, sheared in tried]
+        if not np.isfinite(prices).all():
+            return best_of(cuts)
+        good = [found for (found, _), price in zip(tried, prices, strict=True) if price <= min(prices) * (1 + EVEN)]
+        return next(found for found in cuts if any(found is one for one in good))
+
+    def _worth_trying(self, cuts: list[CoarseCut], asked: float) -> Steps[list[tuple[CoarseCut, float | None]]]:
+        """Cuts, the cheapest first, and the square of log(shear) of each, None where it has no map; without those that
+        would be too dear if they kept what is asked for."""
+        tried, least = list[tuple[CoarseCut, float | None]](), np.inf
+        for k, found in enumerate(sorted(cuts, key=lambda one: one.cut.cost)):
+            if _price(found, asked, asked) > least * (1 + EVEN):
+                break
             sheared = yield from part_of(self.of(found), k / len(cuts), 1 / len(cuts), STAGE)
-            if sheared is None:
-                return best_of(cuts)
-            scores.append(_price(found, sheared, asked))
-        least = min(scores)
-        return next(cut for cut, score in zip(cuts, scores, strict=True) if score <= least * (1 + EVEN))
+            tried.append((found, sheared))
+            least = min(least, np.inf if sheared is None else _price(found, sheared, asked))
+        return tried
 
     def kept(self, found: CoarseCut, asked: float) -> Steps[tuple[CoarseCut, float | None]]:
         """A cut made longer or shorter until it keeps the square of log(shear) asked for, and that of its map; None
@@ -112,7 +122,7 @@ class Rehearsal:
             if sheared is None or sheared <= asked:
                 break
             bound = found.cut.spread * (asked * NEAR_ENOUGH / sheared) ** SPREAD_BY_SHEAR
-            longer = yield from part_of(self._longer(found, bound), 0.1 + 0.6 * k / LONGER, 0.6 / LONGER)
+            longer = yield from part_of(self._longer(found, bound, asked), 0.1 + 0.6 * k / LONGER, 0.6 / LONGER)
             if not longer:
                 # None has a map: then predictions have to do.
                 return replace(found, cut=grow(replace(found.task, bound=bound), found.cut, MOST_REGROWN)), None
@@ -122,14 +132,11 @@ class Rehearsal:
             found, sheared = best
         return (yield from part_of(self._shorter(found, sheared, asked), 0.7, 0.3))
 
-    def _longer(self, found: CoarseCut, bound: float) -> Steps[list[tuple[CoarseCut, float]]]:
+    def _longer(self, found: CoarseCut, bound: float, asked: float) -> Steps[list[tuple[CoarseCut, float]]]:
         """Longer cuts that have a map, and the square of log(shear) of each."""
-        tried, cuts = [], _longer(replace(found.task, bound=bound), found.cut)
-        for k, cut in enumerate(cuts):
-            other = replace(found, cut=cut)
-            value = yield from part_of(self.of(other), k / len(cuts), 1 / len(cuts), STAGE)
-            tried += [] if value is None else [(other, value)]
-        return tried
+        cuts = [replace(found, cut=cut) for cut in _longer(replace(found.task, bound=bound), found.cut)]
+        tried = yield from self._worth_trying(cuts, asked)
+        return [(other, sheared) for other, sheared in tried if sheared is not None]
 
     def _shorter(self, found: CoarseCut, sheared: float | None, asked: float) -> Steps[tuple[CoarseCut, float | None]]:
         """A cut without what it does not need, and the square of log(shear) of its map."""

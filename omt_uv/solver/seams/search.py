@@ -41,6 +41,8 @@ DEARER = (1.5, 1.0)
 PARTLY = 0.5
 # Exactly symmetric seams may cost so many times what such along a line by the plane do, which miss a few edges.
 EXACTLY = 1.1
+# What a cut that was grown has to win by being made shorter, at most, as a rule a third of it.
+SHORTENED = 0.1
 # Cuts that end in a face are worth so much less.
 BARRED = 0.3
 # What is searched again is harder than it seemed: on a coarse surface of so many times the vertices, every time, and up
@@ -173,12 +175,16 @@ class SeamSearch:
         setting = self._setting(component, base, None, coarse, model)
         task = setting.task(bound, setting.extremity())
         first = yield from part_of(self._grown_on(setting, task, base, None), 0.6, 0.1)
-        if line is not None or exact is not None:
+        best = exact if near is None else near
+        if best is not None:
             # One of the coarse surfaces says what other cuts cost, about.
-            shorter = yield from part_of(self._shortened(first), 0.7, 0.1)
-            best = exact if near is None else near
-            if best is not None and best.score <= self._worth_of_symmetry() * shorter.score:
+            most = self._worth_of_symmetry() * first.score
+            if best.score <= (1 - SHORTENED) * most:
                 return best
+            if best.score <= most:
+                shorter = yield from part_of(self._shortened(first), 0.7, 0.1)
+                if best.score <= self._worth_of_symmetry() * shorter.score:
+                    return best
         more = range(1, self._trials(component))
         others = yield from part_of(self._several_grown(component, base, None, bound, more), 0.8, 0.05)
         choosing = self._rehearsal(component).best_of([first, *others], self.asked)

@@ -84,9 +84,16 @@ def test_what_a_cut_loses_is_told_without_a_new_solve(cap):
     without, found = Removal.of(task, cut), leaves(task.graph, cut.steps)
     assert len(found) > 1
     for leaf in found:
-        for gone in (leaf, leaf[: len(leaf) // 2 + 1]):
-            other = cut_along(task, np.setdiff1d(cut.steps, gone))
-            assert np.isclose(cut.spread + without.loss(gone), other.spread, rtol=1e-6)
+        for count, loss in enumerate(without.losses(leaf), start=1):
+            other = cut_along(task, np.setdiff1d(cut.steps, leaf[:count]))
+            assert np.isclose(cut.spread + loss, other.spread, rtol=1e-6)
+
+
+def test_what_every_part_of_a_path_saves_is_told_at_once(cap):
+    model = task_of(cap, 0.01).model
+    vertices = np.random.default_rng(0).permutation(np.flatnonzero(~cap.boundary))[:12]
+    each = [model.spread - model.spread_cut(vertices[:count]) for count in range(1, 13)]
+    assert np.allclose(model.falls(vertices), each, rtol=1e-6)
 
 
 def found(V, F, spread=0.03):
