@@ -82,9 +82,14 @@ NAMES = Option("bodies", tuple(BODIES), "default all", {"nargs": "+", "metavar":
 
 def mirror_error(surface: Surface, uv: np.ndarray) -> float:
     """Mean relative difference between UV lengths, corners (c,2), of mirrored sides, weighted by the sides; nan where
-    the surface is no mirror image of itself."""
+    the surface, with its seams, is no mirror image of itself."""
     start, vertex = surface.face_start, surface.corner_vertex
-    mirror = find_mirror(surface.positions, vertex[surface.triangles], surface.triangle_face)
+    seams = pair_keys(*surface.seams.T)
+
+    def cut_alike(image: np.ndarray) -> bool:
+        return np.array_equal(np.sort(pair_keys(*image[surface.seams].T)), np.sort(seams))
+
+    mirror = find_mirror(surface.positions, vertex[surface.triangles], surface.triangle_face, accepted=cut_alike)
     if mirror is None:
         return np.nan
     after = np.arange(len(vertex)) + 1

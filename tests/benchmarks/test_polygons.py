@@ -5,7 +5,9 @@ from __future__ import annotations
 import meshes
 import numpy as np
 
-from benchmarks.parts.polygons import BODIES, mirror_error, ring, terrain
+from benchmarks.parts.polygons import BODIES, corner_uv, mirror_error, ring, terrain
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
 
 
 def test_a_symmetric_map_is_off_by_nothing_and_a_lopsided_one_by_its_stretch():
@@ -27,3 +29,9 @@ def test_a_ring_has_two_seams_and_a_body_of_quads():
     surface = ring(12, 6)
     assert len(surface.seams) == 12 + 6 and len(surface.face_start) == 12 * 6 + 1
     assert np.ptp(BODIES["cap"]().positions[:, 2]) > 1.7
+
+
+def test_planes_that_move_the_seams_are_none():
+    # The first plane takes the ring's seam to the other side of it, where its map is not cut.
+    surface = ring(12, 6)
+    assert mirror_error(surface, corner_uv(surface, drain(unwrap(surface)))) < 1e-6
