@@ -290,6 +290,25 @@ def shear_of(V, F, a, b):
 
 def uv_charts(F, uv):
     """Number of charts and chart (m,) of every face: faces are joined by edges with equal UVs at both ends."""
+    T = F if _is_one_to_a_vertex(F, uv) else _welded_corners(F, uv)
+    i, j = T.ravel(), T[:, [1, 2, 0]].ravel()
+    edge = np.minimum(i, j) * F.size + np.maximum(i, j)
+    order = np.argsort(edge)
+    same = edge[order][1:] == edge[order][:-1]
+    face = np.repeat(np.arange(len(F)), 3)[order]
+    return graph_components(face[1:][same], face[:-1][same], len(F))
+
+
+def _is_one_to_a_vertex(F, uv) -> bool:
+    """Whether all corners of a vertex have the same UVs (m,3,2)."""
+    flat, corner = F.ravel(), uv.reshape(-1, 2)
+    of = np.empty((int(flat.max(initial=-1)) + 1, 2))
+    of[flat] = corner
+    return bool((of[flat] == corner).all())
+
+
+def _welded_corners(F, uv):
+    """A number (m,3) for each place of a vertex in UVs (m,3,2): the same for corners that lie on one another."""
     corner = uv.reshape(-1, 2)
     extent = np.ptp(corner, axis=0).max() + np.finfo(float).tiny
     u, v = np.round(corner / extent / WELD).T
@@ -297,13 +316,7 @@ def uv_charts(F, uv):
     rows = np.stack([F.ravel()[order], u[order], v[order]])
     index = np.empty(F.size, np.int64)
     index[order] = np.concatenate([[0], np.cumsum((rows[:, 1:] != rows[:, :-1]).any(0))])
-    T = index.reshape(-1, 3)
-    i, j = T.ravel(), T[:, [1, 2, 0]].ravel()
-    edge = np.minimum(i, j) * F.size + np.maximum(i, j)
-    order = np.argsort(edge)
-    same = edge[order][1:] == edge[order][:-1]
-    face = np.repeat(np.arange(len(F)), 3)[order]
-    return graph_components(face[1:][same], face[:-1][same], len(F))
+    return index.reshape(-1, 3)
 
 
 def _weighted_quantile(values, weights, q):

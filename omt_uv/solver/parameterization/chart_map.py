@@ -141,6 +141,7 @@ def map_chart(
             balance=options.balance,
             quality=options.quality,
             warm_start=initial.warm and places is None,
+            prolonged=initial.prolonged and places is None,
             multiplier=initial.multiplier,
         )
         asked = None if target is None else disk.target
@@ -148,8 +149,7 @@ def map_chart(
         refined = good_enough(disk, start, draft, initial.apart, goal) if plain else None
         if refined is None:
             refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
-        # Centres of polygons were there for the map alone.
-        refined = replace(refined, uv=refined.uv[: len(vertices)])
+        refined = replace(refined, uv=refined.uv[: len(vertices)])  # centres of polygons were there for the map alone
     with log.timed("measure"):
         figures = measured_chart(vertices, chart, refined.uv, density)
     if target is not None and options.balance == 0:

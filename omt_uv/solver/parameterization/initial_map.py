@@ -59,16 +59,15 @@ EVENED_ABOVE = 1500
 # That has the vertices divided by this, and at most this share of them: otherwise it does not pay.
 COARSER = 8
 COARSE_ENOUGH = 0.25
-# Where the target is far from the surface's areas, coarser meshes say less: they are taken in smaller steps, and mapped
-# at once up to a larger number of vertices.
+# Where the target is far from the surface's areas, coarser meshes say less: smaller steps, and more vertices at once.
 COARSER_FAR = 5
 COARSE_ENOUGH_FAR = 0.4
 DIRECT_FAR = 20000
 # A disk whose log scale spreads less than this over the surface, flattened with the boundary as it comes, is as near to
 # the map looked for as the transport would bring it.
 LITTLE_SPREAD = 0.5
-# Mean energy of a mean value map above which a large chart starts from a flat map with the boundary as it comes: where
-# slivers make the former so bad, coarser meshes say nothing, and the way from it is long.
+# Mean energy of a mean value map above which a large chart starts from a flat one: where slivers make it so bad,
+# coarser meshes say nothing, and the way from it is long.
 HOPELESS = 50.0
 # Energy below which a map is an isometry, but for rounding, and nothing is left to refine.
 ISOMETRY = 1e-8
@@ -150,9 +149,8 @@ class InitialChartMap:
     Attributes
     ----------
     uv (n,2) : coordinates
-    conformal, cells : the conformal map and the transport they come from, on the coarsest mesh; None where there is
-        none
-    warm : the map comes from a refined one, and is smooth
+    conformal, cells : the conformal map and the transport they come from, on the coarsest mesh, if any
+    warm : the map comes from a refined one, and is smooth; prolonged : it comes from a coarser mesh
     multiplier : of that, see `refine.Refinement`
     apart : it is known to cover no place twice
     """
@@ -161,6 +159,7 @@ class InitialChartMap:
     conformal: ConformalMap | None = None
     cells: Transport | None = None
     warm: bool = False
+    prolonged: bool = False
     multiplier: float = 0.0
     apart: bool = False
 
@@ -241,7 +240,7 @@ def coarse_initial_map(
         # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
         if not (far or draft) and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(flat)
-    return InitialChartMap(uv, found.conformal, found.cells, far, refined.multiplier)
+    return InitialChartMap(uv, found.conformal, found.cells, far, True, refined.multiplier)
 
 
 def _even_start(disk: DiskMesh, flat: np.ndarray) -> np.ndarray | None:
@@ -259,6 +258,7 @@ def _coarse_refined(disk: DiskMesh, initial: InitialChartMap, balance: float, qu
         balance=balance,
         quality=quality,
         warm_start=initial.warm,
+        prolonged=initial.prolonged,
         multiplier=initial.multiplier,
     )
     return refine(disk.vertices, disk.triangles, initial.uv, options, target=disk.target, region=disk.region)

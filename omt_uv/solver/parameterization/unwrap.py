@@ -24,7 +24,7 @@ from ..mesh.surface import Surface
 from ..mesh.topology import on_boundary, pair_keys
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import PROMISED, QUALITIES
-from ..refinement.initial_maps import NEARLY_FLAT, inner_curvature
+from ..refinement.initial_maps import is_curved
 from ..seams.options import COMPACT
 from .chart_indices import chart_target, cut_as_given, in_order_of_places, is_marked, located, outline
 from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, measured_map, no_map, refined_again
@@ -302,7 +302,7 @@ def _cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts,
 def _is_flat(chart: Chart) -> bool:
     """Whether a chart without holes unrolls."""
     boundary = np.flatnonzero(on_boundary(chart.triangles, len(chart.vertices)))
-    return inner_curvature(chart.vertices, chart.triangles, boundary) <= NEARLY_FLAT
+    return not is_curved(chart.vertices, chart.triangles, boundary)
 
 
 def _to_be_mapped(surface: Surface, prepared: DiskCharts, pins: CornerPins | None, target: Target | None) -> CutCharts:

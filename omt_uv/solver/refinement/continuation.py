@@ -29,6 +29,7 @@ from .continuation_rules import (
     UNSQUEEZED,
     Quality,
     first_pressure,
+    is_ahead,
     is_enough,
     is_futile,
     is_out_of_reach,
@@ -149,16 +150,16 @@ def minimise_in_stages(
     quality: Quality,
     warm_start: bool = False,
     multiplier: float = 0.0,
+    prolonged: bool = False,
 ) -> Steps[ContinuationResult]:
     """Newton in stages of growing area weight from a map w (n,) complex, until the area error is small enough.
 
-    warm_start: w is nearly the map that is looked for; the least weight would lead away from it.
-    multiplier: that of a coarser map, see `ContinuationResult`. The shear pulls all faces of a region one way, and a
-        weight at which its share came out all the same would take many more steps. So its targets lead: a method of
-        multipliers (Hestenes 1969), with one for the share.
+    warm_start: w is nearly what is looked for; the least weight would lead away. prolonged: see `RefinementOptions`
+    multiplier: that of a coarser map, see `ContinuationResult`. The shear pulls all faces of a region one way, and its
+        share would take many more steps. So its targets lead: a method of multipliers (Hestenes 1969).
     As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
     """
-    weights, squeezed = _first_weights(problem, w, balance, quality, warm_start)
+    weights, squeezed = _first_weights(problem, w, balance, quality, (warm_start, prolonged))
     overlap, with_barrier = problem.boundary_crosses(w), problem.with_barrier
     steps, k, before, last = 0, 0, np.inf, weights[0]
     while True:
@@ -205,14 +206,19 @@ def minimise_in_stages(
 
 
 def _first_weights(
-    problem: MapProblem, w: np.ndarray, balance: float, quality: Quality, warm_start: bool
+    problem: MapProblem, w: np.ndarray, balance: float, quality: Quality, start: tuple[bool, bool]
 ) -> tuple[list[float], bool]:
-    """The first area weights, and whether the first of them is there for a squeezed start alone."""
-    weights = planned_weights(balance, quality)
-    if warm_start and len(weights) > 1:
+    """The first area weights, and whether the first of them is there for a squeezed start alone; start: whether that
+    is warm, and prolonged."""
+    weights, (warm, prolonged) = planned_weights(balance, quality), start
+    if warm and len(weights) > 1:
         return [NEAR * weight for weight in weights[1:]], False
-    if is_squeezed(problem.newton_problem(w, weights[0], False).energy(w), weights[0]):
+    first = problem.newton_problem(w, weights[0], False).energy(w)
+    if is_squeezed(first, weights[0]):
         return [SQUEEZED_WEIGHT, *weights], True
+    if prolonged and balance == 0 and len(weights) > 1:
+        second = problem.newton_problem(w, weights[1], False).energy(w)
+        return weights[1 if is_ahead(first, second) else 0 :], False
     return weights, False
 
 

@@ -3,7 +3,7 @@
 A refinement minimises shear + area weight * area error, in stages of growing area weight (a penalty method: Nocedal,
 Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entry a chart:
 
-    start a stage            `planned_weights`, `spare_weight`, `is_squeezed`, `next_weight`
+    start a stage            `planned_weights`, `spare_weight`, `is_squeezed`, `is_ahead`, `next_weight`
     within a stage           `first_pressure`, `next_pressure`
     end a stage              `stage_tolerances`, `left_over`, `judge_step`, `is_out_of_reach`, `is_settled`
     end the refinement       `is_enough`, `is_futile`
@@ -54,6 +54,9 @@ SQUEEZED_WEIGHT = 1.0
 SQUEEZED = 50.0
 # The mean energy at which it is squeezed no longer: what is left of the shear does not hold up the areas.
 UNSQUEEZED = 0.3
+# What comes from a coarser mesh has the little shear and about the areas that the first weight is for, where its energy
+# at the second weight is less than so many times that at the first.
+AHEAD = 3.0
 # Where the error is not reached, the weight grows by a factor of at least and at most so much.
 LEAST_GROWTH = 1.3
 MOST_GROWTH = 10.0
@@ -171,6 +174,11 @@ def final_weight(balance: float, quality: Quality) -> float:
 def is_squeezed(energy: Number, first_weight: Number) -> Truth:
     """Whether a start of this energy at the first area weight needs a stage at SQUEEZED_WEIGHT before it."""
     return (energy > SQUEEZED) & (first_weight > SQUEEZED_WEIGHT)
+
+
+def is_ahead(first: Number, second: Number) -> Truth:
+    """Whether a start with these energies at the first area weight and at the second needs no stage at the first."""
+    return second < AHEAD * first
 
 
 def weight_growth(excess: Number) -> Number:

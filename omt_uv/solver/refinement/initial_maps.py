@@ -27,6 +27,8 @@ SPREAD = "The boundary of the start is not in order; it was spread over the doma
 SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by the length of the boundary"
 # Curvature, summed without sign over the inner vertices, below which a chart may be unrolled at once, in radians.
 NEARLY_FLAT = 0.5
+# In meshes of more than so many vertices an eighth of them is looked at before all.
+SAMPLED = 1000
 # Triangles of a chart that is developed may disagree about a vertex by this share of its size; by more, it is curved.
 EXACT = 1e-10
 # Solutions of normal equations have half of the digits, and each further one of what is left has as many more: on a
@@ -208,7 +210,7 @@ def unroll(vertices, triangles, loop) -> np.ndarray | None:
 
     Developable charts are developed, others mapped by least squares conformal (Levy et al. 2002). None for any other.
     """
-    if inner_curvature(vertices, triangles, loop) > NEARLY_FLAT:
+    if is_curved(vertices, triangles, loop):
         return None
     w, gap = developed(vertices, triangles)
     first, second = farthest_from_first(vertices, loop[:, None], np.zeros(len(loop), np.int64))
@@ -347,6 +349,18 @@ def _released(triangles, loop, side, corner, n, quads=NO_QUADS):
         left = ~(released[i] | released[j])
         i, j = i[left], j[left]
     return released
+
+
+def is_curved(vertices: np.ndarray, triangles: np.ndarray, boundary: np.ndarray) -> bool:
+    """Whether triangles (m,3) of vertices (n,3) with this boundary (b,) are too curved to be unrolled: most that are
+    show it in a part of them."""
+    n = len(vertices)
+    if n > SAMPLED:
+        inside = np.arange(n) < n // 8
+        around = triangles[inside[triangles].any(axis=1)]
+        if inner_curvature(vertices, around, np.concatenate([boundary, np.flatnonzero(~inside)])) > NEARLY_FLAT:
+            return True
+    return inner_curvature(vertices, triangles, boundary) > NEARLY_FLAT
 
 
 def inner_curvature(vertices: np.ndarray, triangles: np.ndarray, boundary: np.ndarray) -> float:

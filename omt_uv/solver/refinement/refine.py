@@ -75,6 +75,7 @@ class RefinementOptions:
     balance : 0 for exact areas to 1 for the least shear
     quality : "draft", "standard" or "exact"; "relaxed" or "rough" for the initial map of a finer mesh
     warm_start : the initial map is nearly the one that is looked for, and needs no detour through small area weights
+    prolonged : it comes from a coarser mesh, see `continuation_rules.is_ahead`
     multiplier : of a coarser mesh, see `Refinement`
     crossing : a free boundary may come to cross itself, which shears less
 
@@ -87,6 +88,7 @@ class RefinementOptions:
     balance: float = 0.0
     quality: str = "standard"
     warm_start: bool = False
+    prolonged: bool = False
     multiplier: float = 0.0
     crossing: bool = False
 
@@ -243,7 +245,8 @@ def _refined(
         w = yield from part_of(
             _smoothed_if_tense(problem, by_triangle, w, planned_weights(balance, quality)[0]), *SMOOTHING
         )
-    way = minimise_in_stages(problem, w, balance, quality, warm, options.multiplier)
+    ahead = options.prolonged and boundary == "free"
+    way = minimise_in_stages(problem, w, balance, quality, warm, options.multiplier, ahead)
     found = yield from part_of(way, *STAGES)
     error = area_error(faces, found.w)
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):

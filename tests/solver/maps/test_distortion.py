@@ -13,7 +13,7 @@ import polygons
 import pytest
 
 from omt_uv.solver.errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from omt_uv.solver.maps.distortion import RATIO_FLOOR, distortion, face_distortion
+from omt_uv.solver.maps.distortion import RATIO_FLOOR, distortion, face_distortion, uv_charts
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.polygon_areas import polygon_areas
@@ -328,3 +328,19 @@ def test_a_density_of_polygons_changes_what_is_due():
     assert found.area_l1 == pytest.approx(0, abs=1e-12) and found.area_max == pytest.approx(0, abs=1e-12)
     with pytest.raises(ValueError, match="polygons"):
         distortion(V, F, uv[F], polygons=owner[1:])
+
+
+def test_charts_are_told_alike_whether_corners_of_a_vertex_have_one_place_to_the_last_digit():
+    """Two pieces side by side, one that is drawn twice at one vertex, and the same with rounding at every corner."""
+    V, F = meshes.grid(6, 6)
+    uv = V[:, :2][F]
+    apart = uv + np.where(F.min(axis=1) < 14, 0.0, 3.0)[:, None, None]
+    for drawn in (uv, apart):
+        count, chart = uv_charts(F, drawn)
+        rounded = drawn + 1e-12 * np.random.default_rng(0).standard_normal(drawn.shape)
+        again, same = uv_charts(F, rounded)
+        assert count == again
+        assert len(np.unique(np.stack([chart, same]), axis=1).T) == count
+    assert uv_charts(F, uv)[0] == 1 and uv_charts(F, apart)[0] > 1
+    split = np.concatenate([F, F + len(V)])
+    assert uv_charts(split, np.concatenate([uv, uv]))[0] == 2

@@ -88,6 +88,14 @@ def test_more_area_error_is_futile_only_where_it_hardly_falls():
     assert not rules.is_futile(quality, near, quality.area_error, 10.0, with_region=True)
 
 
+def test_a_start_is_ahead_where_its_second_weight_costs_little_more_than_its_first():
+    """In any unit of energy; what is far from its areas costs as much more as the weight is greater."""
+    shear, areas = 1.2, np.array([0.0, 0.004, 0.04, 0.4])
+    first, second = (shear + weight * areas for weight in QUALITIES["standard"].area_weights)
+    assert rules.is_ahead(first, second).tolist() == [True, True, False, False]
+    assert (rules.is_ahead(7 * first, 7 * second) == rules.is_ahead(first, second)).all()
+
+
 def test_stages_on_the_way_end_sooner():
     quality = QUALITIES["standard"]
     for swept in (False, True):

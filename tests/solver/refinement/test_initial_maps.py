@@ -13,9 +13,12 @@ from omt_uv.solver.maps.untangle import arc_length_boundary, count_folds
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.refinement.initial_maps import (
+    NEARLY_FLAT,
     check_initial_map,
     disk_initial_map,
     free_initial_map,
+    inner_curvature,
+    is_curved,
     is_far,
     notched_disk,
     square_initial_map,
@@ -85,6 +88,20 @@ def test_developable_charts_are_unrolled_without_any_change_of_length():
     np.testing.assert_allclose(np.linalg.norm(uv[a] - uv[b], axis=1), np.linalg.norm(V[a] - V[b], axis=1), rtol=1e-9)
     V, F = MESHES["cap"]
     assert unroll(V, F, boundary_loops(F)[0]) is None
+
+
+@pytest.mark.parametrize("name", ["grid", "bumpy", "head", "hemisphere"])
+@pytest.mark.parametrize("lifted", ["", "start", "end"])
+def test_a_part_of_a_surface_tells_no_more_curvature_than_all_of_it(name, lifted):
+    """Wherever the curved vertices come in the order of all."""
+    V, F = getattr(meshes, name)()
+    if lifted:
+        V = V * [1, 1, 0]
+        (loop,) = boundary_loops(F)
+        inner = np.setdiff1d(np.arange(len(V)), loop)
+        V[inner[0] if lifted == "start" else inner[-1], 2] += np.ptp(V[:, 0])
+    loop = boundary_loops(F)[0]
+    assert is_curved(V, F, loop) == (inner_curvature(V, F, loop) > NEARLY_FLAT)
 
 
 def test_unrolling_follows_the_scale_of_the_surface():
