@@ -130,7 +130,9 @@ def seam_costs(
     space, keys = surface.positions[used], np.unique(pair_keys(*(ends[side] for ends in halfedges(triangles))))
     edges = paired(keys)
     positions = unit_size(space, triangles)
-    plane = symmetry_plane(positions, triangles, owner)
+    axes = preferences.axes
+    side = None if axes is None else np.cross(axes.up, axes.viewer)
+    plane = symmetry_plane(positions, triangles, owner, side=side)
     seen, at_vertices = _vertex_reasons(positions, triangles, plane, preferences.axes)
     if plane is not None:
         _symmetrise(positions, triangles, plane, at_vertices)

@@ -15,7 +15,9 @@ from scipy.spatial import cKDTree
 
 from ..mesh.geometry import face_areas, face_normals
 from ..mesh.mirror import find_mirror
+from ..mesh.topology import expand
 from .occlusion import half_sphere
+from .order_of_places import order_of_places, own_axes
 from .saliency import unit_size
 
 # Surfaces whose images lie this far from them, over the size, are still their own mirror images.
@@ -25,17 +27,23 @@ DIRECTIONS = 200
 # Candidates that are refined; they differ by more than a tenth of a right angle.
 REFINED = 4
 APART = np.cos(np.pi / 20)
-# Points of the surface that nearest ones are looked up among, and those that are looked up: to compare, and at last.
+# Points of the surface that nearest ones are looked up among, about and at most, and those that are looked up: to
+# compare, and at last.
 SAMPLES = 12_000
+MOST_SAMPLES = 48_000
 COMPARED = 250
-PAIRED = 2000
-# Distance to the nearest of samples drawn at random, 95 of 100 times, where there is one for every unit of area.
+PAIRED = 4000
+# Sides of triangles are divided to the nearest number of cells, ties apart.
+EVENLY = 0.5 - 1e-6
+# Distance to the nearest of samples at most, where there is one for every unit of area.
 RANDOM = 1.0
+# Planes whose residuals differ by less are as good as each other.
+EVEN = 0.1 * NEAR
 # Share of the pairs that count.
 KEPT = 0.85
 # Rounds of pairing at most, for each candidate and for the best one, and the turn and shift that end them.
 ROUNDS = 6
-LAST_ROUNDS = 12
+LAST_ROUNDS = 40
 CONVERGED = 1e-7
 # Against planes of bodies of revolution, of which any will do.
 DAMPING = 1e-6
@@ -102,11 +110,16 @@ class SymmetryPlane:
 
 
 def symmetry_plane(
-    positions: np.ndarray, triangles: np.ndarray, faces: np.ndarray | None = None, near: float = NEAR
+    positions: np.ndarray,
+    triangles: np.ndarray,
+    faces: np.ndarray | None = None,
+    near: float = NEAR,
+    side: np.ndarray | None = None,
 ) -> SymmetryPlane | None:
     """The mirror plane of a surface (n,3), (m,3), an exact one before near ones; None if there is none.
 
-    faces (m,): polygon of every triangle. near: greatest residual of the images over the size of the surface.
+    faces (m,): polygon of every triangle. near: greatest residual of the images over the size of the surface. side (3,):
+    of near planes that are as good, the one most across it is taken, that of left and right.
     """
     used, compact = np.unique(triangles, return_inverse=True)
     compact = compact.reshape(-1, 3)
@@ -116,33 +129,32 @@ def symmetry_plane(
         image = np.arange(len(positions))
         image[used] = used[mirror.image]
         return SymmetryPlane(mirror.normal, float(mirror.normal @ corners.mean(axis=0)), 0.0, image)
-    return _near_plane(corners, compact, near)
+    return _near_plane(corners, compact, near, np.zeros(3) if side is None else side)
 
 
 class _Samples:
-    """Points (s,3) spread evenly over a surface, with the normals (s,3) of their faces."""
+    """Points (s,3) spread evenly over a surface, with the normals (s,3) of their faces.
+
+    Places alone decide which they are: of a scan, samples drawn by chance turn the plane by half a degree.
+    """
 
     def __init__(self, positions: np.ndarray, triangles: np.ndarray):
-        draw = np.random.default_rng(0)
-        # Stratified along the areas, so that no face has more than its share.
-        along = (np.arange(SAMPLES) + draw.random(SAMPLES)) / SAMPLES
-        below = np.cumsum(face_areas(positions, triangles))
-        self.spacing = RANDOM * float(np.sqrt(below[-1] / SAMPLES))
-        face = np.minimum(np.searchsorted(below / below[-1], along), len(triangles) - 1)[draw.permutation(SAMPLES)]
-        u, v = draw.random((2, SAMPLES, 1))
-        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-        a, b, c = (positions[triangles[face, k]] for k in range(3))
-        self.points = a + u * (b - a) + v * (c - a)
-        self.normals = face_normals(positions, triangles)[face]
+        areas = face_areas(positions, triangles)
+        face, corners, area = _cells(areas)
+        points = (corners[:, :, None] * positions[triangles[face]]).sum(axis=1)
+        order = order_of_places(points, np.zeros((0, 3), np.int64))
+        order = order[_evenly(area[order], MOST_SAMPLES)] if len(order) > MOST_SAMPLES else order
+        self.points, self.normals = points[order], face_normals(positions, triangles)[face[order]]
+        self.few, self.many = (self.points[_evenly(area[order], count)] for count in (COMPARED, PAIRED))
+        self.spacing = RANDOM * float(np.sqrt(areas.sum() / SAMPLES))
         self.tree = cKDTree(self.points)
 
-    def distances(self, normal: np.ndarray, offset: float, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the images of the first `count` points: distances (count,) from the surface, signed distances (count,)
-        from the planes of the nearest samples, and the normals (count,3) of these planes.
+    def distances(self, normal: np.ndarray, offset: float, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the images of points (p,3): distances (p,) from the surface, signed distances (p,) from the planes of the
+        nearest samples, and the normals (p,3) of these planes.
 
         Samples lie apart, the surface does not: beside its plane an image may be as far from a sample as these are.
         """
-        p = self.points[:count]
         image = p - 2 * (p @ normal - offset)[:, None] * normal
         far, found = self.tree.query(image)
         facing = self.normals[found]
@@ -152,9 +164,35 @@ class _Samples:
 
     def compared(self, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
         """Trimmed root mean square (k,) of the distances of a few images in planes (k,3), (k,)."""
-        p = self.points[:COMPARED]
+        p = self.few
         image = p - 2 * (p @ normals.T - offsets).T[:, :, None] * normals[:, None]
         return _trimmed(self.tree.query(image.reshape(-1, 3))[0].reshape(len(normals), -1))
+
+    def is_flat(self, normal: np.ndarray, offset: float, residual: float) -> bool:
+        """Whether the samples lie in a plane, more or less, so that a small residual says nothing."""
+        depth = float(np.sqrt(((self.points @ normal - offset) ** 2).mean()))
+        return residual >= FLAT * depth
+
+
+def _cells(areas: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles with areas (m,) divided into about `SAMPLES` like cells, and at least one each: the triangle (s,) of each,
+    the weights (s,3) of its corners at the middle, and its area (s,)."""
+    side = np.maximum((np.sqrt(areas * SAMPLES / areas.sum()) + EVENLY).astype(np.int64), 1)
+    face, place = expand(side**2)
+    k = side[face]
+    # Row by row: 2 r + 1 cells in row r, every other of which stands on its head.
+    row = np.sqrt(place).astype(np.int64)
+    column = place - row**2
+    turned = column % 2
+    b = (column // 2 + (1 + turned) / 3) / k
+    a = 1 - (row + (2 - turned) / 3) / k
+    return face, np.column_stack([a, b, 1 - a - b]), areas[face] / k**2
+
+
+def _evenly(areas: np.ndarray, count: int) -> np.ndarray:
+    """Numbers (c,) of at most `count` cells with areas (s,), one for every like share of all."""
+    below = np.cumsum(areas)
+    return np.unique(np.searchsorted(below, below[-1] * (np.arange(count) + 0.5) / count).clip(max=len(areas) - 1))
 
 
 def _trimmed(distance: np.ndarray) -> np.ndarray:
@@ -163,19 +201,30 @@ def _trimmed(distance: np.ndarray) -> np.ndarray:
     return np.sqrt((kept**2).mean(axis=1))
 
 
-def _near_plane(positions: np.ndarray, triangles: np.ndarray, near: float) -> SymmetryPlane | None:
+def _near_plane(
+    positions: np.ndarray, triangles: np.ndarray, near: float, side: np.ndarray
+) -> SymmetryPlane | None:
     """The best plane of a surface without an exact one; None if it is not good enough."""
     scaled = unit_size(positions, triangles)
-    samples = _Samples(scaled, triangles)
+    # In the frame of the body, so that its pose does not choose between planes that are as good.
+    axes = own_axes(scaled)
+    axes = np.eye(3) if axes is None else axes
+    samples = _Samples(scaled @ axes, triangles)
     normals = np.concatenate([np.eye(3), _principal(samples.points), half_sphere(DIRECTIONS)])
     offsets = normals @ samples.points.mean(axis=0)
     worth = samples.compared(normals, offsets)
-    found = [_refined(samples, normals[k], offsets[k], COMPARED, ROUNDS) for k in _chosen(normals, worth)]
-    best = min(found, key=lambda plane: plane[2])
-    normal, offset, residual = _refined(samples, *best[:2], PAIRED, LAST_ROUNDS)
-    depth = float(np.sqrt(((samples.points @ normal - offset) ** 2).mean()))
-    if residual > near or residual >= FLAT * depth:
+    side = side @ axes
+    chosen = _chosen(normals, worth, side)
+    found = [_refined(samples, normals[k], offsets[k], samples.few, ROUNDS) for k in chosen]
+    found = [plane for plane in found if not samples.is_flat(*plane)]
+    if not found:
         return None
+    even = min(residual for *_, residual in found) + EVEN
+    best = min(found, key=lambda plane: (plane[2] > even, -round(abs(plane[0] @ side), 2), plane[2]))
+    normal, offset, residual = _refined(samples, *best[:2], samples.many, LAST_ROUNDS)
+    if residual > near or samples.is_flat(normal, offset, residual):
+        return None
+    normal = axes @ normal
     sign = np.sign(normal[np.abs(normal).argmax()])
     normal, offset = sign * normal, sign * offset
     plane = _between_pairs(scaled, SymmetryPlane(normal, offset, residual, None))
@@ -206,9 +255,9 @@ def _principal(points: np.ndarray) -> np.ndarray:
     return np.linalg.eigh(moved.T @ moved)[1].T
 
 
-def _chosen(normals: np.ndarray, worth: np.ndarray) -> Iterator[int]:
-    """The best candidates that are not close to a better one."""
-    left = np.argsort(worth, kind="stable")
+def _chosen(normals: np.ndarray, worth: np.ndarray, side: np.ndarray) -> Iterator[int]:
+    """The best candidates that are not close to a better one; of even ones, those most across a direction (3,) first."""
+    left = np.lexsort((-np.abs(normals @ side), np.round(worth / EVEN)))
     for _ in range(REFINED):
         if not len(left):
             return
@@ -217,15 +266,14 @@ def _chosen(normals: np.ndarray, worth: np.ndarray) -> Iterator[int]:
 
 
 def _refined(
-    samples: _Samples, normal: np.ndarray, offset: float, count: int, rounds: int
+    samples: _Samples, normal: np.ndarray, offset: float, p: np.ndarray, rounds: int
 ) -> tuple[np.ndarray, float, float]:
-    """A plane after `rounds` of pairing the images of `count` samples with the surface, and its residual.
+    """A plane after `rounds` of pairing the images of points (p,3) with the surface, and its residual.
 
     Gauss and Newton's steps on the distances of the images from the planes of their nearest points.
     """
-    p = samples.points[:count]
     for _ in range(rounds):
-        far, off, facing = samples.distances(normal, offset, count)
+        far, off, facing = samples.distances(normal, offset, p)
         kept = far <= np.quantile(far, KEPT)
         depth = p @ normal - offset
         # An image moves by -2 (t @ p) n - 2 depth t when the normal turns by t, by 2 n per offset.
@@ -241,4 +289,4 @@ def _refined(
         normal, offset = turned / length, float((offset + step[2]) / length)
         if np.abs(step).max() < CONVERGED:
             break
-    return normal, offset, float(_trimmed(samples.distances(normal, offset, count)[0][None])[0])
+    return normal, offset, float(_trimmed(samples.distances(normal, offset, p)[0][None])[0])
