@@ -131,8 +131,8 @@ def seam_costs(
     edges = paired(keys)
     positions = unit_size(space, triangles)
     axes = preferences.axes
-    side = None if axes is None else np.cross(axes.up, axes.viewer)
-    plane = symmetry_plane(positions, triangles, owner, side=side)
+    left = None if axes is None else np.cross(axes.up, axes.viewer)
+    plane = symmetry_plane(positions, triangles, owner, side=left)
     seen, at_vertices = _vertex_reasons(positions, triangles, plane, preferences.axes)
     if plane is not None:
         _symmetrise(positions, triangles, plane, at_vertices)

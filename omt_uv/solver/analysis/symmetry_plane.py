@@ -118,8 +118,8 @@ def symmetry_plane(
 ) -> SymmetryPlane | None:
     """The mirror plane of a surface (n,3), (m,3), an exact one before near ones; None if there is none.
 
-    faces (m,): polygon of every triangle. near: greatest residual of the images over the size of the surface. side (3,):
-    of near planes that are as good, the one most across it is taken, that of left and right.
+    faces (m,): polygon of every triangle. near: greatest residual of the images over the size of the surface.
+    side (3,): of near planes that are as good, the one most across it is taken, that of left and right.
     """
     used, compact = np.unique(triangles, return_inverse=True)
     compact = compact.reshape(-1, 3)
@@ -175,8 +175,8 @@ class _Samples:
 
 
 def _cells(areas: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles with areas (m,) divided into about `SAMPLES` like cells, and at least one each: the triangle (s,) of each,
-    the weights (s,3) of its corners at the middle, and its area (s,)."""
+    """Triangles with areas (m,) divided into about `SAMPLES` like cells, and at least one each: the triangle (s,) of
+    each, the weights (s,3) of its corners at the middle, and its area (s,)."""
     side = np.maximum((np.sqrt(areas * SAMPLES / areas.sum()) + EVENLY).astype(np.int64), 1)
     face, place = expand(side**2)
     k = side[face]
@@ -201,9 +201,7 @@ def _trimmed(distance: np.ndarray) -> np.ndarray:
     return np.sqrt((kept**2).mean(axis=1))
 
 
-def _near_plane(
-    positions: np.ndarray, triangles: np.ndarray, near: float, side: np.ndarray
-) -> SymmetryPlane | None:
+def _near_plane(positions: np.ndarray, triangles: np.ndarray, near: float, side: np.ndarray) -> SymmetryPlane | None:
     """The best plane of a surface without an exact one; None if it is not good enough."""
     scaled = unit_size(positions, triangles)
     # In the frame of the body, so that its pose does not choose between planes that are as good.
@@ -256,7 +254,7 @@ def _principal(points: np.ndarray) -> np.ndarray:
 
 
 def _chosen(normals: np.ndarray, worth: np.ndarray, side: np.ndarray) -> Iterator[int]:
-    """The best candidates that are not close to a better one; of even ones, those most across a direction (3,) first."""
+    """The best candidates that are not close to a better one; of even ones, those most across `side` (3,) first."""
     left = np.lexsort((-np.abs(normals @ side), np.round(worth / EVEN)))
     for _ in range(REFINED):
         if not len(left):

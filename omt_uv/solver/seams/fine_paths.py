@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
+from ..analysis.straight_paths import EdgeNetwork, edge_network, straighten
 from ..cutting.component import CutComponent
 from ..mesh.geometry import edge_lengths
 from ..mesh.topology import graph_components, halfedges, pair_keys
@@ -21,6 +22,8 @@ REACH = 6.0
 ASIDE = 3.0
 # At one coarse edge from the coarse path, an edge counts so many times more.
 ASTRAY = 0.5
+# A line of edges by the plane of a mirror that is none of edges may be left by so many edges to be straight.
+ALONG = 3.0
 # So many times as far where no path is found there, at first and then: costs say little of the lengths of needles.
 WIDER = (8.0, 64.0, np.inf)
 
@@ -68,6 +71,9 @@ def carried(
     half = FineGraph.of(component, mirror.image) if mirror is not None and mirror.exact else fine
     used = start.copy()
     spacing = coarse.size * float(np.median(graph.cost)) if len(graph.cost) else 0.0
+    # What the coarse surface does not tell: where it is the fine one, paths are there already.
+    unsure = spacing * max(1 - np.sqrt(len(coarse.kept) / component.vertex_count), 0.0)
+    edge = float(np.median(component.length)) if len(component.length) else 0.0
     paths = []
     waiting = _outwards(graph, steps)
     while waiting:
@@ -91,6 +97,10 @@ def carried(
         if missed is not None:
             waiting = [stretch[: missed + 2], stretch[missed + 1 :], *waiting]
             continue
+        if not in_plane:
+            path = half.straightened(path, used | ~allowed, unsure)
+        elif mirror is not None and not mirror.exact:
+            path = fine.straightened(path, used, ALONG * edge)
         used[path] = True
         paths.append(path)
         if mirror is not None and not in_plane and len(path):
@@ -99,6 +109,7 @@ def carried(
             if not (fine.joined(image) and used[image[-1]]):
                 allowed = ~(mirror.side | mirror.plane) | used
                 image = fine.path(used, int(image[0]), image, spacing / 2, allowed)
+                image = fine.straightened(image, used | ~allowed, unsure)
             used[image] = True
             paths.append(image)
     chosen = np.zeros(len(component.pair), dtype=bool)
@@ -140,10 +151,12 @@ def _outwards(graph: PathGraph, steps: np.ndarray) -> list[np.ndarray]:
 
 @dataclass(frozen=True)
 class FineGraph:
-    """Edges of a component that can be cut, and those of its boundary: what they cost, and their length, (n,n)."""
+    """Edges of a component that can be cut, and those of its boundary: what they cost, and their length, (n,n), and the
+    same as a network along which paths are straightened."""
 
     cost: csr_matrix
     length: csr_matrix
+    network: EdgeNetwork
 
     @staticmethod
     def of(component: CutComponent, image: np.ndarray | None = None) -> FineGraph:
@@ -166,7 +179,16 @@ class FineGraph:
         return FineGraph(
             csr_matrix((np.tile(cost, 2), (rows, columns)), shape=shape),
             csr_matrix((np.tile(length, 2), (rows, columns)), shape=shape),
+            edge_network(component.positions, component.triangles, ends, cost / length),
         )
+
+    def straightened(self, path: np.ndarray, blocked: np.ndarray, limit: float) -> np.ndarray:
+        """A path (k,) that turns less, past blocked vertices (n,) bool, if it passes all of the given one (k,) within a
+        limit; the given one otherwise."""
+        if len(path) < 3 or limit <= 0:
+            return path
+        (found,) = straighten(self.network, [path], blocked)
+        return path if self.missed(found, path, limit) is not None else found
 
     def joined(self, path: np.ndarray) -> bool:
         """Whether there is an edge between all vertices (k,) that follow each other, or they are one."""

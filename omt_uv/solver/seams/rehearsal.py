@@ -41,7 +41,7 @@ MOST_CHANGE = 4.0
 LONGER = 2
 FURTHER = 0.6
 # How often it is tried to make one shorter, and the share of what is asked for that is near enough.
-SHORTER = 2
+SHORTER = 4
 NEAR_ENOUGH = 0.88
 # What the search is doing meanwhile.
 STAGE = "Seams"

@@ -7,11 +7,12 @@ from scipy.spatial import cKDTree
 
 from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
+from omt_uv.solver.mesh.geometry import unit
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops, graph_components
 from omt_uv.solver.seams import coarse_cut
 from omt_uv.solver.seams.coarse_surface import coarsening
-from omt_uv.solver.seams.fine_paths import FineMirror, carried
+from omt_uv.solver.seams.fine_paths import FineGraph, FineMirror, carried
 from omt_uv.solver.seams.path_graph import Mirrored, path_graph, path_to
 from omt_uv.solver.seams.search import SeamSearch
 
@@ -81,6 +82,51 @@ def test_a_line_along_a_mirror_plane_that_is_none_of_edges_is_cut_all_the_same()
     mirror = FineMirror(image, height, plane, exact=False)
     chosen = carried(component, coarse, graph, graph.steps_of(way), start, mirror)
     assert component.length[chosen].sum() > 0.9 * np.linalg.norm(np.diff(coarse.positions[way], axis=0), axis=1).sum()
+
+
+def _slanting(columns=40, rows=24):
+    """A bent grid, and a path of coarse edges over it that runs between its rows and its diagonals."""
+    V, F = meshes.bumpy(columns, rows, 0.1, 1.0)
+    component = _component(V, F)
+    start = component.on_boundary()
+    coarse = coarsening(component.positions, component.triangles, 80, None).ended(80)
+    graph = path_graph(coarse, np.ones(len(coarse.kept)), start[coarse.kept])
+    low, high = component.positions.min(axis=0), component.positions.max(axis=0)
+    tip = int(cKDTree(coarse.positions).query(low + (high - low) * [0.5, 0.6, 0])[1])
+    way = path_to(graph.paths_from(np.flatnonzero(graph.boundary))[1], tip)
+    return component, coarse, graph, way, start
+
+
+def test_a_path_that_is_carried_is_straight():
+    component, coarse, graph, way, start = _slanting()
+    chosen = carried(component, coarse, graph, graph.steps_of(way), start, None)
+    ends = component.ends[chosen]
+    degree = np.bincount(ends.ravel(), minlength=component.vertex_count)
+    assert degree[coarse.kept[way[0]]] == 1 and (degree <= 2).all()
+    inner = np.flatnonzero(degree == 2)
+    beside = [
+        component.positions[np.setdiff1d(ends[(ends == v).any(axis=1)], v)] - component.positions[v] for v in inner
+    ]
+    turns = [np.degrees(np.arccos(-np.clip(unit(pair)[0] @ unit(pair)[1], -1, 1))) for pair in beside]
+    assert max(turns) < 60
+
+
+def test_a_straighter_path_stays_near_the_one_that_was_found_and_off_what_is_blocked():
+    component, coarse, _, way, _ = _slanting()
+    graph = FineGraph.of(component)
+    path = graph.path(
+        component.on_boundary(), int(coarse.kept[way[0]]), coarse.kept[way], 0.1, np.ones(component.vertex_count, bool)
+    )
+    free = np.zeros(component.vertex_count, dtype=bool)
+    spacing = 3 * float(np.median(component.length))
+    straight = graph.straightened(path, free, spacing)
+    assert straight[0] == path[0] and straight[-1] == path[-1] and graph.joined(straight)
+    far = cKDTree(component.positions[straight]).query(component.positions[path])[0]
+    assert far.max() <= spacing
+    np.testing.assert_array_equal(graph.straightened(path, free, 0.0), path)
+    blocked = free.copy()
+    blocked[np.setdiff1d(straight, path)] = True
+    assert not blocked[graph.straightened(path, blocked, spacing)].any()
 
 
 def _finger():
