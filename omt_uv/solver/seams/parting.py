@@ -192,7 +192,9 @@ def slits(
     piece = graph.pieces(bad[graph.joined].all(axis=1))
     size = np.bincount(piece, np.where(bad, graph.area, 0.0))
     order = np.argsort(-size, kind="stable")
-    chosen = order[: min(int(np.searchsorted(np.cumsum(size[order]), least)) + 1, rounds * MOST_SLITS)]
+    enough = int(np.searchsorted(np.cumsum(size[order]), least)) + 1
+    # One more every time, at least: the same slits would be in vain again.
+    chosen = order[: min(max(enough, rounds), rounds * MOST_SLITS)]
     open_ = free[graph.ends].all(axis=1)
     n, ends, price = len(chart.vertices), graph.ends[open_], graph.prices(chart, cost)[open_] + 1e-300
     ways = csr_matrix((np.tile(price, 2), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n))
