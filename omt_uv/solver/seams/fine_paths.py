@@ -84,15 +84,8 @@ def carried(
         if mirror is not None:
             # Off the plane nothing comes back to it: that would, with its mirror image, close a loop.
             allowed = mirror.plane if in_plane else (mirror.side & ~mirror.plane) | used
-        path = half.path(used, end, along, spacing, allowed)
-        if mirror is not None and len(path) == 0:
-            path = fine.path(used, end, along, spacing, allowed)
-        if len(path) == 0 and in_plane:
-            # A line along the plane may take diagonals of polygons, where there is none of edges: near to it, then.
-            path = fine.path(used, end, along, spacing, np.ones_like(allowed))
-        if len(path) == 0:
-            wider = (fine.path(used, end, along, spacing, allowed, reach=REACH * more) for more in WIDER)
-            path = next((found for found in wider if len(found)), path)
+        graphs = [half] if mirror is None else [half, fine]
+        path = _led(graphs, used, end, along, spacing, allowed, in_plane)
         missed = fine.missed(path, along[1:-1], ASIDE * spacing)
         if missed is not None:
             waiting = [stretch[: missed + 2], stretch[missed + 1 :], *waiting]
@@ -117,6 +110,28 @@ def carried(
         keys = pair_keys(np.concatenate([p[:-1] for p in paths]), np.concatenate([p[1:] for p in paths]))
         chosen = np.isin(pair_keys(*component.ends.T), keys)
     return _forest(component, chosen, start)
+
+
+def _led(
+    graphs: list[FineGraph],
+    used: np.ndarray,
+    end: int,
+    along: np.ndarray,
+    spacing: float,
+    allowed: np.ndarray,
+    in_plane: bool,
+) -> np.ndarray:
+    """Vertices (k,) of the cheapest path in the first of the graphs that has one, see `FineGraph.path`; from farther
+    away where none has."""
+    for graph in graphs:
+        path = graph.path(used, end, along, spacing, allowed)
+        if len(path):
+            return path
+    fine = graphs[-1]
+    # A line along the plane may take diagonals of polygons, where there is none of edges: near to it, then.
+    path = fine.path(used, end, along, spacing, np.ones_like(allowed)) if in_plane else np.zeros(0, np.int64)
+    wider = (fine.path(used, end, along, spacing, allowed, reach=REACH * more) for more in WIDER)
+    return path if len(path) else next((found for found in wider if len(found)), path)
 
 
 def _forest(component: CutComponent, chosen: np.ndarray, start: np.ndarray) -> np.ndarray:
