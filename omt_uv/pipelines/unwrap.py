@@ -99,8 +99,9 @@ def lay_out(
 def _upright(islands: Sequence[PlacedIsland], jobs: Sequence[UnwrapJob]) -> list[np.ndarray]:
     """UVs (n,2) of islands turned upright, but for those whose markers say how they lie."""
     turned = [k for k, island in enumerate(islands) if jobs[island.owner].markers is None]
-    charts, ups = [islands[k].chart for k in turned], [jobs[islands[k].owner].axes.up for k in turned]
-    upright = turn_upright(charts, [islands[k].uv for k in turned], ups)
+    charts, axes = [islands[k].chart for k in turned], [jobs[islands[k].owner].axes for k in turned]
+    ups, viewers = [scene.up for scene in axes], [scene.viewer for scene in axes]
+    upright = turn_upright(charts, [islands[k].uv for k in turned], ups, viewers)
     found = dict(zip(turned, upright, strict=True))
     return [found.get(k, island.uv) for k, island in enumerate(islands)]
 

@@ -46,26 +46,31 @@ class _Islands:
 
 
 def turn_upright(
-    charts: Sequence[Chart], maps: Sequence[np.ndarray], up: Sequence[Sequence[float]]
+    charts: Sequence[Chart],
+    maps: Sequence[np.ndarray],
+    up: Sequence[Sequence[float]],
+    viewers: Sequence[Sequence[float]] | None = None,
 ) -> list[np.ndarray]:
     """Maps (n_i,2) of charts, each turned about the origin so that it lies straight, with `up` (3,) upwards.
 
-    Where most of the heights cancel or the island lies level, the second and third axis of space stand for `up`. An
-    island without a direction of edges is turned until its mean `up` is upright; one without either keeps its turn up
-    to quarters.
+    Where most of the heights cancel or the island lies level, away from the viewer and to his right stand for `up`;
+    viewers: the direction (3,) to that of each, by default along an axis of space. An island without a direction of
+    edges is turned until its mean `up` is upright; one without either keeps its turn up to quarters.
     """
     if not maps:
         return []
-    angle = upright_angles(_together(charts, maps), np.asarray(up, dtype=float))
+    seen = None if viewers is None else np.asarray(viewers, dtype=float)
+    angle = upright_angles(_together(charts, maps), np.asarray(up, dtype=float), seen)
     c, s = np.cos(angle), np.sin(angle)
     turns = np.stack([np.stack([c, s], axis=1), np.stack([-s, c], axis=1)], axis=1)
     return [uv @ turn for uv, turn in zip(maps, turns, strict=True)]
 
 
-def upright_angles(islands: _Islands, up: np.ndarray) -> np.ndarray:
-    """Angle (k,) by which to turn each island counterclockwise, for its direction `up` (k,3) in space."""
+def upright_angles(islands: _Islands, up: np.ndarray, viewers: np.ndarray | None = None) -> np.ndarray:
+    """Angle (k,) by which to turn each island counterclockwise, for its direction `up` (k,3) in space and those to the
+    viewers (k,3)."""
     share, edges = _edge_directions(islands)
-    upward = _upward(islands, up)
+    upward = _upward(islands, up, viewers)
     defined = np.isfinite(upward)
     straight = share >= DOMINANT
     # From the edges' direction to the vertical, by the number of quarters that leaves up nearest to it.
@@ -135,7 +140,7 @@ def _main_direction(islands: _Islands, tail, head, side: np.ndarray) -> tuple[np
     return share, np.arctan2(y, x) / 4
 
 
-def _upward(islands: _Islands, up: np.ndarray) -> np.ndarray:
+def _upward(islands: _Islands, up: np.ndarray, viewers: np.ndarray | None) -> np.ndarray:
     """Direction (k,) in the map in which the islands rise in space; nan for those that do not rise anywhere."""
     corner = islands.uv[islands.triangles]
     area = signed_areas(islands.uv, islands.triangles)
@@ -145,7 +150,7 @@ def _upward(islands: _Islands, up: np.ndarray) -> np.ndarray:
     whole = np.maximum(np.bincount(islands.owner, np.abs(area), islands.count), np.finfo(float).tiny)
     upward = np.full(islands.count, np.nan)
     # A wall rises by 1 per length where the map is as large as the surface.
-    for axis in (up, *_level(up)):
+    for axis in (up, *_level(up, viewers)):
         height = np.einsum("mkd,md->mk", islands.points[islands.triangles], axis[islands.owner])
         rise = np.einsum("mk,mkd->md", height, normal) * np.sign(area)[:, None]
         total = np.stack([np.bincount(islands.owner, rise[:, d], islands.count) for d in range(2)], axis=1)
@@ -155,9 +160,9 @@ def _upward(islands: _Islands, up: np.ndarray) -> np.ndarray:
     return upward
 
 
-def _level(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _level(up: np.ndarray, viewers: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Two level directions (k,3) each, away from the viewer and to the right, as seen from above with `up` (k,3)."""
-    away = np.eye(3)[np.where(np.abs(up[:, 1]) < np.abs(up).max(axis=1), 1, 2)]
+    away = np.eye(3)[np.where(np.abs(up[:, 1]) < np.abs(up).max(axis=1), 1, 2)] if viewers is None else -viewers
     right = np.cross(away, up)
     size = np.linalg.norm(right, axis=1, keepdims=True)
     right /= np.where(size > 0, size, 1)

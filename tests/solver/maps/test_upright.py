@@ -76,6 +76,19 @@ def test_without_a_direction_of_edges_the_mean_rise_is_upright():
     np.testing.assert_allclose(found, flat, atol=1e-9)
 
 
+@pytest.mark.parametrize("scene", [((0, 0, 1), (0, -1, 0)), ((0, 1, 0), (0, 0, 1)), ((1, 0, 0), (0, 1, 0))])
+def test_what_lies_level_is_seen_from_above_by_the_viewer(scene):
+    """Away from him is up in the map, whichever axes of space these are."""
+    up, viewer = np.array(scene, dtype=float)
+    flat = meshes.random_disk(count=200, height=0.0)[0][:, :2]
+    F = meshes.random_disk(count=200, height=0.0)[1]
+    space = flat[:, :1] * np.cross(up, viewer) - flat[:, 1:] * viewer
+    (chart,) = strict_charts(triangle_surface(space, F))
+    laid = np.column_stack([chart.vertices @ np.cross(up, viewer), -(chart.vertices @ viewer)])
+    (found,) = turn_upright([chart], [laid @ rotation(1.2).T], [up], [viewer])
+    np.testing.assert_allclose(found, laid, atol=1e-9)
+
+
 def test_mirror_images_are_laid_out_mirrored():
     V, F = meshes.random_disk(count=200, height=0.3)
     space = np.stack([V[:, 0], V[:, 2], V[:, 1]], axis=1)
