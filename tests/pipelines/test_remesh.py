@@ -1,10 +1,13 @@
 """Series of remeshes: counts, densities and errors as the settings have them."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 from bodies import hourglass
 
+from omt_uv.pipelines import remesh as remeshing
 from omt_uv.pipelines.remesh import RemeshJob, density_of, oriented, remesh_series
 from omt_uv.settings import DENSITIES, RemeshSettings
 from omt_uv.solver.errors import CountError, DensityError, MeshError
@@ -135,3 +138,27 @@ def test_what_looks_outwards_stays_outside_where_it_is_joined_the_wrong_way_roun
     side = np.where(P[:, :, 2].mean(axis=1) > 0, 0.5, -0.5)[:, None] * [0, 0, 1]
     volume = np.einsum("md,md->m", P[:, 0] - side, np.cross(P[:, 1] - side, P[:, 2] - side))
     assert (volume > 0).mean() > 0.9
+
+
+@pytest.mark.parametrize("first", [False, True])
+@pytest.mark.parametrize("second", [False, True])
+@pytest.mark.parametrize("inside", [False, True])
+def test_parts_keep_their_sides_where_both_of_a_joint_look_outwards_as_given(monkeypatch, first, second, inside):
+    """Two triangles joined the wrong way round, and two joined the right way, which nothing is to be said of."""
+    given = np.array([[0, 1, 2], [1, 2, 3], [4, 5, 6], [6, 5, 7]])
+    gluing = SimpleNamespace(first=np.array([1, 7]), second=np.array([3, 9]))
+    turned = np.array([False, True, False, False])
+    hidden = np.stack([np.zeros(4), np.ones(4)])
+
+    def looks_out(sides, _area, part):
+        # Of the parts as they are given, and seen from behind.
+        by_triangle = [first, second, True, True] if sides[0, 0] == 0 else [inside] * 4
+        found = np.zeros(part.max() + 1, bool)
+        found[part] = by_triangle
+        return found
+
+    monkeypatch.setattr(remeshing, "hidden_sides", lambda *_: hidden)
+    monkeypatch.setattr(remeshing, "looks_out", looks_out)
+    kept = remeshing._sides_back(np.random.default_rng(0).normal(size=(8, 3)), given, gluing, turned)
+    odd = first and second
+    assert kept.tolist() == [odd and inside, odd, False, False]
