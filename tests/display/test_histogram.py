@@ -1,11 +1,14 @@
 """Histograms and their colours: as many percent as there is surface, pale in the middle, dark at the ends."""
 
+from types import SimpleNamespace
+
 import meshes
 import numpy as np
 import pytest
 from readings import reading
 
 from omt_uv.display import canvas
+from omt_uv.display import histogram as histograms
 from omt_uv.display.colormaps import AREA_OCTAVES, SHEAR_TOP, area_colours, shear_colours
 from omt_uv.display.histogram import HEIGHT, WIDTH, area_axis, histogram, shear_axis, thumbnail
 from omt_uv.solver.errors import EmptyMeshError
@@ -74,3 +77,24 @@ def test_ends_and_middle_of_the_scales_have_their_colours():
     # Half an octave of shear, an octave of area: the anchors between.
     np.testing.assert_allclose(shear_colours(np.array([2**0.5]))[0], np.array([59, 81, 139]) / 255)
     np.testing.assert_allclose(area_colours(np.array([-1.0, 1.0])) * 255, [[67, 147, 195], [214, 96, 77]])
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.03])
+def test_bars_are_as_high_as_their_shares_of_the_top(monkeypatch, unit):
+    """And the numbers at the left are those of the lines."""
+    told = []
+    monkeypatch.setattr(histograms, "write", lambda _picture, text, x, y, *_: told.append((text, x, y)))
+    axis = SimpleNamespace(places=lambda x: x, scale=lambda x: np.full((len(x), 3), 0.2), ticks=[], name="name")
+    places = (np.arange(histograms.BINS) + 0.5) / histograms.BINS
+    share = unit * np.linspace(0, 7, histograms.BINS)
+    picture = np.ones((500, 900, 3))
+    histograms._plot(picture, places, share, axis, "title")
+    lines = {float(text): y - 5 for text, x, y in told if x == 70}
+    assert max(lines) == pytest.approx(8 * unit if unit == 1.0 else 0.4) and min(lines) == 0 and len(lines) == 5
+    high, low = lines[max(lines)], lines[0.0]
+    edges = np.round(np.linspace(80, 870, histograms.BINS + 1)).astype(int)
+    for k, part in enumerate(share):
+        column = picture[high - 5 : low, (edges[k] + edges[k + 1]) // 2, 0]
+        assert abs((column < 0.5).sum() - part / max(lines) * (low - high)) <= 1
+    for value, y in lines.items():
+        assert abs((low - y) - value / max(lines) * (low - high)) <= 1
