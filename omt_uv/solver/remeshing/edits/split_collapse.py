@@ -15,6 +15,8 @@ from ...mesh.topology import halfedges, next_halfedge, pair_keys, previous_halfe
 MIN_COSINE = 0.3
 # Below every cosine: faces may turn as they will.
 ANY_COSINE = -2.0
+# Twice the area of a triangle without one, over the squares of its sides: lines of edges are straight up to rounding.
+NO_AREA = 1e-9
 # Lengths count as the same within a factor of two to the power of one over this.
 BANDS = 4
 # Rounds of choosing collapses that are apart from each other, but for more where none was found; what they leave is for
@@ -269,8 +271,10 @@ def _sound(
     length = np.sqrt(np.einsum("ij,ij->i", before, before) * np.einsum("ij,ij->i", after, after))
     turned = np.einsum("ij,ij->i", before, after)
     if min_cosine > ANY_COSINE:
-        # What has no area, before or after, looks nowhere.
-        sound[mine[~(turned > min_cosine * length)]] = False
+        # What has no area, before or after, looks nowhere: its normal is rounding.
+        sides = np.einsum("tkj,tkj->t", new - new[:, [1, 2, 0]], new - new[:, [1, 2, 0]])
+        flat = np.einsum("ij,ij->i", after, after) <= (NO_AREA * sides) ** 2
+        sound[mine[~(turned > min_cosine * length) | flat]] = False
     return sound
 
 

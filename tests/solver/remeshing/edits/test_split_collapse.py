@@ -6,6 +6,8 @@ import meshes
 import numpy as np
 import pytest
 from mesh_checks import topology
+from scipy.spatial import Delaunay
+from scipy.spatial.transform import Rotation
 
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import halfedges, twins
@@ -92,6 +94,24 @@ def test_the_only_edge_that_may_collapse_is_found():
     free[tail[h[-1]]] = free[head[h[-1]]] = True
     edit = collapse_edges(V, F, h, ~free, 1)
     assert len(edit.points) == len(V) - 1
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_collapse_leaves_a_triangle_along_a_straight_line(seed):
+    """A vertex over three of a line, drawn to the first of them, would lay a triangle on it, whose normal is rounding."""
+    places = np.array([(x, y) for y in (0, 1, 3) for x in range(7)] + [(x, 2) for x in (1, 3, 5)], dtype=float)
+    F = Delaunay(places * [1, 0.7]).simplices.astype(np.int64)
+    a, b = places[F[:, 1]] - places[F[:, 0]], places[F[:, 2]] - places[F[:, 0]]
+    flipped = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
+    F[flipped] = F[flipped][:, ::-1]
+    V = np.column_stack([places, np.zeros(len(places))]) @ Rotation.random(random_state=seed).as_matrix()
+    fixed = places[:, 1] == 1
+    tail, head = halfedges(F)
+    h = np.flatnonzero((twins(F) >= 0) & fixed[tail] & (places[head, 1] == 2))
+    assert len(h) >= 6
+    for one in h:
+        edit = collapse_edges(V, F, np.array([one]), fixed, 1)
+        assert face_areas(edit.points, edit.triangles).min() > 0.05
 
 
 def test_a_tetrahedron_does_not_collapse():
