@@ -98,7 +98,7 @@ def test_the_only_edge_that_may_collapse_is_found():
 
 @pytest.mark.parametrize("seed", range(12))
 def test_no_collapse_leaves_a_triangle_along_a_straight_line(seed):
-    """A vertex over three of a line, drawn to the first of them, would lay a triangle on it, whose normal is rounding."""
+    """A vertex over three of a line, drawn to the first one, would lay a triangle on it, whose normal is rounding."""
     places = np.array([(x, y) for y in (0, 1, 3) for x in range(7)] + [(x, 2) for x in (1, 3, 5)], dtype=float)
     F = Delaunay(places * [1, 0.7]).simplices.astype(np.int64)
     a, b = places[F[:, 1]] - places[F[:, 0]], places[F[:, 2]] - places[F[:, 0]]
