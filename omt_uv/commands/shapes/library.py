@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ... import __version__
 from ...batch.plan import READABLE
-from ...errors import UserError
+from ...files.verified import FileError
 from ..common import CommandError, check_paths, require_blender, warn_of
 from ..options import add_input, vertices
 from .distance import add_markers, add_points, signature_of_file
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> None:
         for name, path in due.items():
             try:
                 found[name] = signature_of_file(options, path)
-            except UserError as error:
+            except (CommandError, FileError) as error:
                 warn_of(f"{name}: {error}")
                 continue
             # What was done stays when the rest is stopped.
