@@ -133,7 +133,7 @@ def seam_costs(
     axes = preferences.axes
     left = None if axes is None else np.cross(axes.up, axes.viewer)
     plane = symmetry_plane(positions, triangles, owner, side=left)
-    seen, at_vertices = _vertex_reasons(positions, triangles, plane, preferences.axes)
+    seen, at_vertices = _vertex_reasons(positions, triangles, plane, axes)
     if plane is not None:
         _symmetrise(positions, triangles, plane, at_vertices)
         plane = _among_all(plane.carried(positions, space), used, len(surface.positions))

@@ -35,8 +35,6 @@ COMPARED = 250
 PAIRED = 4000
 # Sides of triangles are divided to the nearest number of cells, ties apart.
 EVENLY = 0.5 - 1e-6
-# Distance to the nearest of samples at most, where there is one for every unit of area.
-RANDOM = 1.0
 # Planes whose residuals differ by less are as good as each other.
 EVEN = 0.1 * NEAR
 # Share of the pairs that count.
@@ -146,7 +144,7 @@ class _Samples:
         order = order[_evenly(area[order], MOST_SAMPLES)] if len(order) > MOST_SAMPLES else order
         self.points, self.normals = points[order], face_normals(positions, triangles)[face[order]]
         self.few, self.many = (self.points[_evenly(area[order], count)] for count in (COMPARED, PAIRED))
-        self.spacing = RANDOM * float(np.sqrt(areas.sum() / SAMPLES))
+        self.spacing = float(np.sqrt(areas.sum() / SAMPLES))
         self.tree = cKDTree(self.points)
 
     def distances(self, normal: np.ndarray, offset: float, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -166,12 +167,12 @@ def _outwards(graph: PathGraph, steps: np.ndarray) -> list[np.ndarray]:
 
 @dataclass(frozen=True)
 class FineGraph:
-    """Edges of a component that can be cut, and those of its boundary: what they cost, and their length, (n,n), and the
-    same as a network along which paths are straightened."""
+    """Edges (e,2) of a component that can be cut, and those of its boundary: their cost and their length, (n,n)."""
 
+    component: CutComponent
+    ends: np.ndarray
     cost: csr_matrix
     length: csr_matrix
-    network: EdgeNetwork
 
     @staticmethod
     def of(component: CutComponent, image: np.ndarray | None = None) -> FineGraph:
@@ -192,10 +193,18 @@ class FineGraph:
         rows, columns = np.concatenate([ends, ends[:, ::-1]]).T
         shape = (component.vertex_count,) * 2
         return FineGraph(
+            component,
+            ends,
             csr_matrix((np.tile(cost, 2), (rows, columns)), shape=shape),
             csr_matrix((np.tile(length, 2), (rows, columns)), shape=shape),
-            edge_network(component.positions, component.triangles, ends, cost / length),
         )
+
+    @cached_property
+    def network(self) -> EdgeNetwork:
+        """The same for straightening; many graphs never ask for it."""
+        a, b = self.ends.T
+        rate = np.asarray(self.cost[a, b] / self.length[a, b]).ravel()
+        return edge_network(self.component.positions, self.component.triangles, self.ends, rate)
 
     def straightened(self, path: np.ndarray, blocked: np.ndarray, limit: float) -> np.ndarray:
         """A path (k,) that turns less, past blocked vertices (n,) bool, if it passes all of the given one (k,) within a
