@@ -28,6 +28,7 @@ from .continuation_rules import (
     STAGE_STEPS,
     UNSQUEEZED,
     Quality,
+    eased,
     first_pressure,
     is_ahead,
     is_enough,
@@ -157,7 +158,7 @@ def minimise_in_stages(
     warm_start: w is nearly what is looked for; the least weight would lead away. prolonged: see `RefinementOptions`
     multiplier: that of a coarser map, see `ContinuationResult`. The shear pulls all faces of a region one way, and its
         share would take many more steps. So its targets lead: a method of multipliers (Hestenes 1969).
-    As soon as a step would let the boundary cross itself, it goes on with a barrier from where it was.
+    As soon as a step would let the boundary cross itself, it goes on with a barrier from short of there.
     """
     weights, squeezed = _first_weights(problem, w, balance, quality, (warm_start, prolonged))
     overlap, with_barrier = problem.boundary_crosses(w), problem.with_barrier
@@ -175,7 +176,7 @@ def minimise_in_stages(
         stage = yield from minimise(newton, w, limits, k, forbidden)
         w, steps = stage.w, steps + stage.steps
         if stage.status == "crossed":
-            with_barrier = True
+            w, with_barrier = as_far_as_apart(problem, newton, stage), True
             continue
         k += 1
         error, rest = target_error(problem.faces, w), target_error_but_share(problem.faces, w)
@@ -205,6 +206,16 @@ def minimise_in_stages(
     )
 
 
+def as_far_as_apart(problem: MapProblem, newton: NewtonProblem, stage: StageResult) -> np.ndarray:
+    """The map (n,) complex before a stage that ended "crossed", moved by its last step most of the way to where the
+    boundary touches itself: what was solved for once need not be solved for again. Unmoved where that lowers no energy.
+    """
+    step = np.zeros(len(stage.w)) if stage.ahead is None else stage.ahead - stage.w
+    near = stage.w + problem.barrier(stage.w).limit(stage.w, step) * step
+    lower = np.isfinite(near).all() and newton.energy(near) < stage.energy
+    return near if lower and not problem.boundary_crosses(near) else stage.w
+
+
 def _first_weights(
     problem: MapProblem, w: np.ndarray, balance: float, quality: Quality, start: tuple[bool, bool]
 ) -> tuple[list[float], bool]:
@@ -225,6 +236,7 @@ def _first_weights(
 def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, steps_left: int) -> StageLimits:
     """Limits of a stage; ahead: less than 0 while planned weights are still to come."""
     on_the_way, swept = ahead < 0, problem.smoother is not None
+    expecting = balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED
     tolerance, loose = stage_tolerances(quality, balance, on_the_way, not problem.scale_free, swept)
     return StageLimits(
         area_error=np.inf if on_the_way else quality.area_error,
@@ -235,7 +247,9 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         foreseeing=balance == 0 and not on_the_way and problem.faces.region is None,
         foreseen=FORESEEN,
         # Maps on the way to others say what those will be: they go as far as they promise.
-        expecting=balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED,
+        expecting=expecting,
+        # Where areas have to be exact, what is left on the way holds up the last stage.
+        eased=expecting and on_the_way and quality.tolerance >= LOOSE,
         pressure=first_pressure(quality, balance, not problem.scale_free and problem.faces.region is None),
         shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
     )
@@ -252,7 +266,8 @@ class StageLimits:
     area_error : to reach; max_steps : of Newton's method; tolerance, loose_tolerance : as in
     `continuation_rules.Quality`; relaxed : an energy that is low enough in any case; foreseeing : it ends, too, where
     the area error is out of reach, see `continuation_rules.is_out_of_reach`, once it promises less than foreseen;
-    expecting : its promise is what the next step is expected to make, see `continuation_rules.left_over`; shear : of a
+    expecting : its promise is what the next step is expected to make, see `continuation_rules.left_over`; eased : it
+    ends more easily where the energy is little, see `continuation_rules.eased`; shear : of a
     map, with which it ends where that settles, see `continuation_rules.is_settled`; pressure : of the first step, see
     `continuation_rules.FIRST_PRESSURE`
     """
@@ -265,6 +280,7 @@ class StageLimits:
     foreseeing: bool = False
     foreseen: float = 0.0
     expecting: bool = False
+    eased: bool = False
     shear: Callable[[np.ndarray], float] | None = None
     pressure: float = FIRST_PRESSURE
 
@@ -273,7 +289,7 @@ class StageLimits:
 class StageResult:
     """What one stage found, as in `ContinuationResult`.
 
-    status "crossed": the next step would let the boundary cross itself.
+    status "crossed": the next step would let the boundary cross itself, to the map `ahead` (n,).
     """
 
     w: np.ndarray
@@ -281,6 +297,7 @@ class StageResult:
     residual: float
     energy: float
     status: str
+    ahead: np.ndarray | None = None
 
 
 class Minimisable(Protocol):
@@ -319,7 +336,7 @@ def minimise(
     while steps < max(limits.max_steps, 1):
         step, used = problem.step(w, value, pressure), pressure
         if forbidden is not None and forbidden(step.w):
-            return StageResult(w=w, steps=steps + 1, residual=residual, energy=value, status="crossed")
+            return StageResult(w, steps + 1, residual, value, "crossed", ahead=step.w)
         gained = step.share, value - step.energy, step.decrement
         pressure = float(next_pressure(used, *gained))
         w, value, steps = step.w, step.energy, steps + 1
@@ -327,8 +344,9 @@ def minimise(
         left = float(left_over(value, *gained)) if limits.expecting else residual
         # How many stages and steps there will be is not known: every stage covers half of what is left.
         yield Progress("Refinement", 1 - 0.5 ** (stage + 1 - 0.5**steps))
-        met = value < limits.relaxed or (left < limits.loose_tolerance and problem.area_error(w) <= limits.area_error)
-        nearly = residual < max(limits.foreseen, limits.loose_tolerance)
+        loose = float(eased(limits.loose_tolerance, value)) if limits.eased else limits.loose_tolerance
+        met = value < limits.relaxed or (left < loose and problem.area_error(w) <= limits.area_error)
+        nearly = residual < max(limits.foreseen, loose)
         # Limbs on a sphere trade their areas late: there only the last steps tell.
         if limits.foreseeing and not met and (nearly or limits.expecting):
             before, error = error, problem.area_error(w)

@@ -16,6 +16,7 @@ from omt_uv.solver.refinement.continuation import (
     MapProblem,
     StageLimits,
     StageResult,
+    as_far_as_apart,
     is_through,
     minimise,
     minimise_in_stages,
@@ -57,7 +58,7 @@ def test_a_stage_ends_when_its_steps_are_used_up_or_help_no_more():
 
 def test_a_step_to_where_it_is_forbidden_is_not_taken():
     stage = drain(minimise(Parabola(), np.ones(3), StageLimits(0.1, 50), 0, lambda w: not w.any()))
-    assert stage.status == "crossed" and stage.w.all()
+    assert stage.status == "crossed" and stage.w.all() and not stage.ahead.any()
 
 
 def problem_of(V, F, target=None, region=None):
@@ -69,6 +70,32 @@ def problem_of(V, F, target=None, region=None):
     )
     w = tutte(V, F, loop, arc_length_boundary(V, loop, np.sqrt(area.sum() / np.pi))) @ [1, 1j]
     return problem, w
+
+
+def ramp(turns):
+    """A strip that winds around an axis so many times, flat but where it would lie on itself: vertices and triangles,
+    and a map in which it winds less than once."""
+    V, F = meshes.bumpy(60, 3, height=0.0)
+    along, across = V[:, 0] / V[:, 0].max(), 1.5 - 0.5 * V[:, 1] / V[:, 1].max()
+    angle = 2 * np.pi * turns * along
+    V = np.column_stack([across * np.cos(angle), across * np.sin(angle), 0.01 * along])
+    return V, F, 1.3 * across * np.exp(1.8j * np.pi * along)
+
+
+def test_what_would_cross_goes_most_of_the_way_to_there():
+    V, F, w = ramp(1.3)
+    problem, _ = problem_of(V, F)
+    newton = problem.newton_problem(w, 1.0, False)
+    stage = drain(minimise(newton, w, StageLimits(0.0, 50), 0, problem.boundary_crosses))
+    assert stage.status == "crossed" and problem.boundary_crosses(stage.ahead)
+    near = as_far_as_apart(problem, newton, stage)
+    assert not problem.boundary_crosses(near) and newton.energy(near) < stage.energy
+    far = (near - stage.w) @ (stage.ahead - stage.w).conj() / np.linalg.norm(stage.ahead - stage.w) ** 2
+    np.testing.assert_allclose(near, stage.w + far * (stage.ahead - stage.w))
+    touching = stage.w + far / 0.8 * (stage.ahead - stage.w)
+    assert 0 < far.real < 1 and problem.boundary_crosses(touching + 1e-6 * (stage.ahead - stage.w))
+    # Where nothing is won on the way, nothing moves.
+    np.testing.assert_array_equal(as_far_as_apart(problem, newton, replace(stage, energy=0.0)), stage.w)
 
 
 @pytest.fixture(scope="module")
