@@ -18,8 +18,11 @@ from .energy import Elements, Quads, elements, hat_gradients
 
 # Triangles of a polygon with one area, at most: a row of the Hessian joins all its corners, and long rows fill it.
 MOST_TRIANGLES = 8
-# Share of a quad's area that each of its four triangles needs, on the surface and in the map, for both triangulations.
+# Share of a quad's area that each of its four triangles needs on the surface for both triangulations to count.
 CONVEX = 0.03
+# Share of what it has there that each needs in the map for that. Below it corners are reflex, and opened
+# (`parameterization.polygon_corners`): quads between two bounds would be neither, and sheared without a word.
+OPEN = 0.02
 
 
 @dataclass(frozen=True)
@@ -148,7 +151,8 @@ def with_convex_quads_of(faces: Elements, area: np.ndarray) -> Elements:
     if faces.quads is None or faces.part is None or not len(faces.quads.convex):
         return faces
     first = len(faces.triangles) - 4 * len(faces.quads.convex)
-    both = faces.quads.convex & (area > CONVEX * area[:, :2].sum(axis=1)[:, None]).all(axis=1)
+    whole = area[:, :2].sum(axis=1)
+    both = faces.quads.convex & (area > OPEN * faces.quads.size * whole[:, None]).all(axis=1)
     if faces.quads.crossed is not None:
         both |= faces.quads.crossed
     part = faces.part.copy()

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..maps.polygon_elements import OPEN
 from ..mesh.surface import Surface
 
 # A corner counts where it has this share of its polygon's area on the surface.
 SHARP = 1e-3
-# It is convex in the map where it has more than this share of its target area.
-CONVEX = 0.02
+# It is convex in the map where it has more than this share of its target area, as the energy of quads takes it.
+CONVEX = OPEN
 # Straight ones, and slightly reflex ones, of less than this share of the polygon, shall be convex as if they had it.
 STRAIGHT = 0.02
 # Corners of polygons with many sides have less than that, and are straight below this part of what those of a regular

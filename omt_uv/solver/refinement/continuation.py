@@ -224,12 +224,17 @@ def _first_weights(
     weights, (warm, prolonged) = planned_weights(balance, quality), start
     if warm and len(weights) > 1:
         return [NEAR * weight for weight in weights[1:]], False
-    first = problem.newton_problem(w, weights[0], False).energy(w)
-    if is_squeezed(first, weights[0]):
+    least = weights[0]
+    first = problem.newton_problem(w, least, False).energy(w)
+    if is_squeezed(first, least):
         return [SQUEEZED_WEIGHT, *weights], True
     if prolonged and balance == 0 and len(weights) > 1:
         second = problem.newton_problem(w, weights[1], False).energy(w)
-        return weights[1 if is_ahead(first, second) else 0 :], False
+        if is_ahead(first, second):
+            weights = weights[1:]
+            if problem.faces.polygon is not None:
+                # As after a stage at the first weight, which it takes the place of.
+                weights[0] = float(spare_weight(weights[0], least, target_error(problem.faces, w), quality))
     return weights, False
 
 

@@ -8,6 +8,7 @@ import pytest
 from omt_uv.solver.maps.energy import area_error, elements, energy, gradient
 from omt_uv.solver.maps.polygon_elements import polygon_elements, polygon_mesh, restricted, with_convex_quads
 from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.parameterization.polygon_corners import CONVEX
 
 
 def quads(count=5, seed=0):
@@ -87,6 +88,19 @@ def test_only_convex_quads_have_both_triangulations():
     assert (with_convex_quads(faces, square).part == 0.5 * faces.quads.size.ravel()).all()
     assert with_convex_quads(faces, dart) is faces
     assert np.isfinite(energy(faces, dart, 1.0))
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_quads_count_along_both_diagonals_as_soon_as_no_corner_is_reflex(share):
+    V = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+    Q, square = np.array([[0, 1, 2, 3]]), np.array([0, 1, 1 + 1j, 1j])
+    w = square.copy()
+    # The quad has an area of x, and its corner one of x - 1/2.
+    x = 0.5 / (1 - 0.5 * CONVEX * share)
+    w[2] = x * (1 + 1j)
+    faces = of(V, Q, np.array([True]))
+    both = with_convex_quads(faces, w).part > 0
+    assert both.all() == (share > 1)
 
 
 def test_polygons_are_found_by_their_triangles_in_any_order():

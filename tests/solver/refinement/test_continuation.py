@@ -4,9 +4,11 @@ from dataclasses import dataclass, replace
 
 import meshes
 import numpy as np
+import polygons
 import pytest
 
 from omt_uv.solver.maps.energy import area_error, elements
+from omt_uv.solver.maps.polygon_elements import polygon_elements
 from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary
 from omt_uv.solver.mesh.geometry import face_areas
@@ -23,7 +25,7 @@ from omt_uv.solver.refinement.continuation import (
     rescaled,
 )
 from omt_uv.solver.refinement.continuation_rules import QUALITIES
-from omt_uv.solver.refinement.hessian_blocks import Assembly
+from omt_uv.solver.refinement.hessian_blocks import Assembly, assembly_of
 from omt_uv.solver.refinement.projected_newton import FreeMotion, NewtonStep
 
 
@@ -130,6 +132,19 @@ def test_a_warm_start_begins_with_the_second_weight(bumpy):
     near = drain(minimise_in_stages(problem, w, 0.0, QUALITIES["standard"])).w
     again = drain(minimise_in_stages(problem, near, 0.0, QUALITIES["standard"], warm_start=True))
     assert again.area_weight == 2 * QUALITIES["standard"].area_weights[1] and again.steps < 10
+
+
+def test_polygons_of_a_finer_mesh_begin_with_no_more_weight_than_leaves_them_what_they_may_be_off():
+    V, Q, _ = polygons.wavy_quads(20, 16)
+    F, face = polygons.cut(Q)
+    problem, w = problem_of(V, F)
+    faces = polygon_elements(V, F, face_areas(V, F), face)
+    problem = replace(problem, faces=faces, assembly=assembly_of(faces, len(V)))
+    standard = QUALITIES["standard"]
+    near = drain(minimise_in_stages(problem, w, 0.0, standard)).w
+    again = drain(minimise_in_stages(problem, near, 0.0, standard, prolonged=True))
+    assert standard.area_weights[0] <= again.area_weight < standard.area_weights[1]
+    assert area_error(faces, again.w) <= standard.area_error
 
 
 def test_a_multiplier_gives_a_region_its_share():
