@@ -67,8 +67,11 @@ class LiveMap:
         motion = FreeMotion(np.zeros(len(given), bool))
         # Large islands by parts, and all by factors of steps before: a step that is nearly right, and there sooner, is
         # what a slider wants.
-        solver = schwarz_solver(mesh.vertices, mesh.triangles, keep=True) or KeptFactor()
-        assembly = assembly_of(faces, len(given), solver)
+        parts = schwarz_solver(mesh.vertices, mesh.triangles, keep=True)
+        assembly = assembly_of(faces, len(given), parts or KeptFactor())
+        if parts is not None:
+            # Not while the slider is being moved.
+            parts.prepare(assembly.pattern().tocsr())
         self._task = MapProblem(faces, assembly, motion, guard, False)
         self._w, self._pins, self._guarded = start, mesh.pins, False
         self._balance = -1.0

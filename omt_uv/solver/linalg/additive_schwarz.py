@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import PrecisionError
-from .kept_factor import KEPT_ENOUGH, MOST_KEPT, by_gradients
+from .kept_factor import ENOUGH, KEPT_ENOUGH, by_gradients, nearly
 from .nested_dissection import kd_parts, vertex_graph
 from .sparse import Factor, fill, minimum_degree
 
@@ -30,6 +30,14 @@ COUNTED = 250_000
 PART_SIZE = 1000
 # Rings of vertices that parts overlap by.
 OVERLAP = 2
+# The same where factors are kept: from so many vertices on, parts of that size that overlap less are factored in half of
+# the time of all at once.
+LARGE_KEPT = 7000
+KEPT_SIZE = 500
+KEPT_OVERLAP = 1
+# Iterations at most by factors that were kept. What these come to is a step all the same, and the next has new ones:
+# both in one would take twice as long.
+MOST_KEPT = 12
 # Neighbours of a vertex beyond which it is no part of any overlap.
 MOST_NEIGHBOURS = 100
 # Iterations at most; the equations are factored where these are not enough.
@@ -44,10 +52,18 @@ SHIFT = 1e-12
 class AdditiveSchwarz:
     """Parts of a mesh (n,d), (m,3), and where they overlap.
 
-    Unknown 2 i and 2 i + 1 are those of vertex i. keep: factors, for the next matrices, as long as they will do.
+    Unknown 2 i and 2 i + 1 are those of vertex i. keep: factors, for the next matrices, as long as they will do; steps
+    take about as long one as the other then, and some are less nearly right.
     """
 
-    def __init__(self, points: np.ndarray, triangles: np.ndarray, size: int = PART_SIZE, keep: bool = False):
+    def __init__(
+        self,
+        points: np.ndarray,
+        triangles: np.ndarray,
+        size: int = PART_SIZE,
+        keep: bool = False,
+        overlap: int = OVERLAP,
+    ):
         n = len(points)
         self._keep = keep
         self._kept: Callable[[np.ndarray], np.ndarray] | None = None
@@ -61,7 +77,7 @@ class AdditiveSchwarz:
         spreading = (quiet @ graph @ quiet + sp.identity(n)).tocsr()
         spreading.eliminate_zeros()
         member = sp.csr_matrix((np.ones(n), self._part, np.arange(n + 1)), shape=(n, self._count))
-        for _ in range(OVERLAP):
+        for _ in range(overlap):
             member = spreading @ member
         member = member.tocsc()
         self._unknowns: list[np.ndarray] = []
@@ -79,13 +95,11 @@ class AdditiveSchwarz:
         # Its transpose is itself, by rows.
         matrix = matrix.T if sp.issparse(matrix) and matrix.format == "csc" else sp.csr_matrix(matrix)
         if self._kept is not None:
-            x = by_gradients(matrix, b, self._kept, MOST_KEPT, KEPT_ENOUGH, self._last)
-            if x is not None:
-                self._last = x
-                return x
-        place = np.full(len(b), -1, np.int64)
-        self._order(matrix, place)
-        factors = self._factors(matrix, place)
+            self._last, done = nearly(matrix, b, self._kept, MOST_KEPT, KEPT_ENOUGH, self._last)
+            self._kept = self._kept if done else None
+            return self._last
+        self.prepare(matrix)
+        factors = self._factors(matrix, np.full(len(b), -1, np.int64))
         spread = self._affine(w, axes)
         gather = spread.T
         coarse = (gather @ (matrix @ spread)).tocsc()
@@ -99,14 +113,15 @@ class AdditiveSchwarz:
             return x
 
         self._kept = precondition if self._keep else None
-        x = by_gradients(matrix, b, precondition, MOST)
+        x = by_gradients(matrix, b, precondition, MOST, KEPT_ENOUGH if self._keep else ENOUGH)
         x = Factor(matrix, "natural").solve(b) if x is None else x
         self._last = x if self._keep else None
         return x
 
-    def _order(self, matrix: sp.csr_matrix, place: np.ndarray) -> None:
-        """Order the unknowns of every part for little fill, by the first matrix: all corners of a quad are neighbours
-        there, and what a vertex follows, which no triangle says."""
+    def prepare(self, matrix: sp.csr_matrix) -> None:
+        """Order the unknowns of every part for little fill, by the first matrix (2n,2n), symmetric: all corners of a quad
+        are neighbours there, and what a vertex follows, which no triangle says."""
+        place = np.full(matrix.shape[0], -1, np.int64)
         for k, d in enumerate(self._unknowns if not self._ordered else []):
             vertices = minimum_degree(_block(matrix, d, place)[::2, ::2])
             self._unknowns[k] = d.reshape(-1, 2)[vertices].ravel()
@@ -157,9 +172,11 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False
     The order of the vertices is that of their elimination.
     """
     n = len(points)
-    if n < LARGE or (n < COUNTED and fill(vertex_graph(triangles, n)) < LITTLE_FILL * n):
+    # Factors of smaller meshes have fewer entries for a vertex: these grow with the logarithm of their number.
+    little = LITTLE_FILL * min(1.0, np.log(n) / np.log(LARGE))
+    if n < (LARGE_KEPT if keep else LARGE) or (n < COUNTED and fill(vertex_graph(triangles, n)) < little * n):
         return None
-    return AdditiveSchwarz(points, triangles, keep=keep)
+    return AdditiveSchwarz(points, triangles, KEPT_SIZE, True, KEPT_OVERLAP) if keep else AdditiveSchwarz(points, triangles)
 
 
 def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:

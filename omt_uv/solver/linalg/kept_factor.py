@@ -64,7 +64,22 @@ def by_gradients(
     guess: np.ndarray | None = None,
 ) -> np.ndarray | None:
     """Conjugate gradients for matrix x = b (n,) until x.matrix.x / 2 - b.x hardly falls any more; None where that takes
-    more than `most` iterations.
+    more than `most` iterations. guess : see `nearly`
+    """
+    x, done = nearly(matrix, b, precondition, most, enough, guess)
+    return x if done else None
+
+
+def nearly(
+    matrix: sp.spmatrix,
+    b: np.ndarray,
+    precondition: Callable[[np.ndarray], np.ndarray],
+    most: int,
+    enough: float = ENOUGH,
+    guess: np.ndarray | None = None,
+) -> tuple[np.ndarray, bool]:
+    """What conjugate gradients for matrix x = b (n,) have come to when x.matrix.x / 2 - b.x hardly falls any more or
+    `most` iterations are over, and whether these were enough; b.x > 0 in any case.
 
     guess (n,): a direction in which they look before: a slider goes on as it went.
     """
@@ -77,5 +92,5 @@ def by_gradients(
     for x, _, fallen in islice(gradient_steps(matrix, left, precondition), most + 1):
         falls.append(won + fallen)
         if len(falls) > WINDOW and falls[-1] - falls[-1 - WINDOW] <= enough * falls[-1]:
-            return begin + x
-    return begin + x if len(falls) <= most else None
+            return begin + x, True
+    return begin + x, len(falls) <= most

@@ -92,6 +92,10 @@ class Assembly:
             data[self._slot + p + q * self._stride] = np.bincount(self._block, values, len(self._slot))
         return self._with_diagonal(data, diagonal)
 
+    def pattern(self) -> sp.csc_matrix:
+        """A matrix (2n,2n) with the entries that there may be, all of them 1."""
+        return sp.csc_matrix((np.ones(len(self._indices)), self._indices, self._indptr), shape=(self._size,) * 2)
+
     def _every_slot(self, cells: list[np.ndarray]) -> np.ndarray:
         """Where each entry of all blocks belongs: four times the memory of `_block`, and a third of the time."""
         axis, parts = np.arange(2), np.split(self._block, np.cumsum([c.shape[1] * c.size for c in cells])[:-1])

@@ -67,6 +67,15 @@ def test_long_and_narrow_meshes_are_factored_at_once(monkeypatch):
     assert schwarz.schwarz_solver(V[order], np.argsort(order)[F]) is not None
 
 
+def test_steps_of_a_slider_are_solved_by_smaller_parts_from_fewer_vertices_on():
+    for side, parted in ((80, False), (100, True)):
+        V, F = meshes.head(side)
+        order = mesh_order(V, F)
+        given = V[order], np.argsort(order)[F]
+        assert schwarz.schwarz_solver(*given) is None
+        assert (schwarz.schwarz_solver(*given, keep=True) is not None) == parted
+
+
 def test_what_takes_too_long_is_factored(monkeypatch):
     whole, parted, w = flattened("free")
     monkeypatch.setattr(schwarz, "MOST", 2)

@@ -81,6 +81,29 @@ def test_parts_keep_their_factors_where_they_are_told_to(systems):
         assert fall(like, b, x) >= 0.85 * fall(like, b, exact)
 
 
+def test_parts_whose_factors_will_not_do_take_a_step_and_new_ones_for_the_next(systems):
+    V, F, first, _, other, b = systems
+    w, axes = V[:, 0] + 1j * V[:, 1], np.tile([1, 1j], (len(V), 1))
+    far = other + sp.diags(np.geomspace(1, 1e6, len(b)) * other.diagonal())
+    exact, falls = KeptFactor().solve(far, b, b, b), []
+    parts = AdditiveSchwarz(V, F, 200, True)
+    parts.solve(first, b, w, axes)
+    for factored in (False, True, False):
+        with counted_work() as work:
+            x = parts.solve(far, b, w, axes)
+        assert (work.factorisations > 0) == factored and b @ x > 0
+        falls.append(fall(far, b, x) / fall(far, b, exact))
+    assert 0 < falls[0] < min(falls[1:]) and min(falls[1:]) >= 1 - KEPT_ENOUGH
+
+
+def test_an_order_that_is_found_before_changes_no_solution(systems):
+    V, F, first, _, _, b = systems
+    w, axes = V[:, 0] + 1j * V[:, 1], np.tile([1, 1j], (len(V), 1))
+    ready, late = AdditiveSchwarz(V, F, 200), AdditiveSchwarz(V, F, 200)
+    ready.prepare(first.tocsr())
+    np.testing.assert_allclose(ready.solve(first, b, w, axes), late.solve(first, b, w, axes))
+
+
 def test_a_guess_that_is_the_solution_needs_the_fewest_iterations(systems):
     _, _, first, _, other, b = systems
     exact, used = KeptFactor().solve(other, b, b, b), []

@@ -102,6 +102,8 @@ def test_gradients_end_where_the_window_says_or_tell_that_they_did_not():
         x = kept_factor.by_gradients(A, b, lambda r: r, end, enough)
         assert 2 * (b @ x) - x @ A @ x == pytest.approx(fall[end], rel=1e-9)
         assert kept_factor.by_gradients(A, b, lambda r: r, end - 1, enough) is None
+        short, done = kept_factor.nearly(A, b, lambda r: r, end - 1, enough)
+        assert not done and 2 * (b @ short) - short @ A @ short == pytest.approx(fall[end - 1], rel=1e-9)
     # A guess adds what it wins by itself.
     guess = np.linalg.solve(A.toarray(), b) + 0.1 * np.random.default_rng(1).normal(size=200)
     x = kept_factor.by_gradients(A, b, lambda r: r, 60, 1e-3, guess)
