@@ -30,8 +30,8 @@ COUNTED = 250_000
 PART_SIZE = 1000
 # Rings of vertices that parts overlap by.
 OVERLAP = 2
-# The same where factors are kept: from so many vertices on, parts of that size that overlap less are factored in half of
-# the time of all at once.
+# The same where factors are kept: from so many vertices on, parts of that size that overlap less are factored in half
+# of the time of all at once.
 LARGE_KEPT = 7000
 KEPT_SIZE = 500
 KEPT_OVERLAP = 1
@@ -119,8 +119,8 @@ class AdditiveSchwarz:
         return x
 
     def prepare(self, matrix: sp.csr_matrix) -> None:
-        """Order the unknowns of every part for little fill, by the first matrix (2n,2n), symmetric: all corners of a quad
-        are neighbours there, and what a vertex follows, which no triangle says."""
+        """Order the unknowns of every part for little fill, by the first matrix (2n,2n), symmetric: all corners of a
+        quad are neighbours there, and what a vertex follows, which no triangle says."""
         place = np.full(matrix.shape[0], -1, np.int64)
         for k, d in enumerate(self._unknowns if not self._ordered else []):
             vertices = minimum_degree(_block(matrix, d, place)[::2, ::2])
@@ -176,7 +176,9 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False
     little = LITTLE_FILL * min(1.0, np.log(n) / np.log(LARGE))
     if n < (LARGE_KEPT if keep else LARGE) or (n < COUNTED and fill(vertex_graph(triangles, n)) < little * n):
         return None
-    return AdditiveSchwarz(points, triangles, KEPT_SIZE, True, KEPT_OVERLAP) if keep else AdditiveSchwarz(points, triangles)
+    if keep:
+        return AdditiveSchwarz(points, triangles, KEPT_SIZE, True, KEPT_OVERLAP)
+    return AdditiveSchwarz(points, triangles)
 
 
 def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:
