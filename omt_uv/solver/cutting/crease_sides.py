@@ -107,7 +107,7 @@ def _has_clear_net(component: CutComponent) -> bool:
     # Corners of bevels do not lie flat, and what covers itself for that is little.
     flat, corners, _ = _laid_out(component, found.cut, np.ones(len(component.triangles), dtype=bool))
     area, (wide, high) = face_areas(component.positions, component.triangles).sum(), _boxes(flat)
-    return _covered(flat, corners) <= MUCH and area >= SPRAWLING * float(np.maximum(wide, high).max()) ** 2
+    return area >= SPRAWLING * float(np.maximum(wide, high).max()) ** 2 and _covered(flat, corners) <= MUCH
 
 
 def hard_sides(component: CutComponent) -> tuple[np.ndarray, np.ndarray] | None:

@@ -12,13 +12,15 @@ CHUNK = 2_000_000  # pairs of a sample and a face tested at once, for memory
 MOST_PAIRS = 100_000_000  # a map that lies many times over itself is judged by fewer samples, for time
 ENTRIES_PER_FACE = 40  # the grid is coarsened until its lists are no longer than this on average
 INSIDE = 1e-9  # a point this close to a face's border, relative to the squared extent, is not inside
+PAIR_WORK = 12  # comparisons of a point and a face that take as long as one of two faces, and half of them again
 
 
 def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> float:
     """Share of the area of the triangles `uv` (m,3,2) that lies inside more than one of them.
 
     Points are drawn uniformly by area, so the standard error is sqrt(share / samples); the same seed gives the same
-    points. 0 where no triangle has an area. Time and memory stay bounded on maps that are mere noise.
+    points. 0 where no triangle has an area, and where a few triangles have less in common, pair by pair, than one
+    point stands for. Time and memory stay bounded on maps that are mere noise.
     """
     uv = np.asarray(uv, float)
     area = np.abs(cross2(uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0])) / 2
@@ -26,6 +28,8 @@ def overlap_share(uv: np.ndarray, *, samples: int = SAMPLES, seed: int = 0) -> f
     if not len(tri):
         return 0.0
     grid = _Grid(tri)
+    if PAIR_WORK * grid.pair_count() < samples and 2 * grid.common_area() * samples < area.sum():
+        return 0.0
     points = _draw(tri, area, samples, seed)
     pairs = np.cumsum(grid.candidates(points))
     points = points[: max(1, int(np.searchsorted(pairs, MOST_PAIRS)))]
@@ -93,6 +97,30 @@ class _Grid:
         """Number (k,) of the cell of points (k,2)."""
         column, row = self._cells(points).T
         return column * self.side + row
+
+    def pair_count(self) -> int:
+        """Pairs of triangles in the same cell."""
+        inside = np.diff(self.start)
+        return int(inside @ (inside - 1) // 2)
+
+    def common_area(self) -> float:
+        """No less than the areas that two of the triangles have in common, summed over all pairs.
+
+        What a triangle has beyond the line of a side of another, its own side of it, is no wider than its farthest
+        corner is from there, and within the other no longer than that side.
+        """
+        inside = np.diff(self.start)
+        entry, k = expand(np.repeat(inside, inside))
+        one, other = self.owner[entry], self.owner[np.repeat(self.start[:-1], inside)[entry] + k]
+        pairs = np.unique(one * len(self.tri) + other)
+        one, other = np.divmod(pairs, len(self.tri))
+        sides = np.roll(self.tri, -1, axis=1) - self.tri
+        turn = np.sign(cross2(sides[:, 0], sides[:, 1]))
+        a, b = self.tri[one][:, :, None], sides[one][:, :, None]
+        reach = (turn[one, None, None] * cross2(b, self.tri[other][:, None] - a)).max(axis=2).min(axis=1)
+        # Every pair is there both ways: the better bound of the two, of those of different triangles.
+        back = reach[np.searchsorted(pairs, other * len(self.tri) + one)]
+        return float(np.maximum(np.minimum(reach, back), 0)[one < other].sum())
 
     def candidates(self, points):
         """With how many triangles each point (k,2) has to be compared."""

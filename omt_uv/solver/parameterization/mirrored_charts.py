@@ -20,9 +20,10 @@ from ..mesh.geometry import edge_lengths, signed_areas
 from ..mesh.mirror import Mirror, find_mirror, mirrored_quads, partial_mirror
 from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
-from ..mesh.topology import graph_components, on_boundary, pair_keys
+from ..mesh.topology import boundary_loops, graph_components, on_boundary, pair_keys
 from ..progress import Steps
-from .chart_map import ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
+from ..refinement.initial_maps import unroll
+from .chart_map import UNROLLED, ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
 from .chart_pins import ChartPins
 from .convex_maps import with_figures
 from .options import MapOptions
@@ -310,7 +311,7 @@ def map_completed(
 ) -> Steps[ChartMap]:
     """`map_chart`, with a free boundary of the chart `with_missing_images`: the map is symmetric but for them."""
     plain = options.boundary == "free" and options.kind == "authalic" and target is None and pins is None
-    whole = with_missing_images(chart) if plain else None
+    whole = with_missing_images(chart) if plain and not _unrolls(chart) else None
     if whole is not None:
         try:
             found = yield from map_chart(whole, options=options, markers=markers)
@@ -319,6 +320,16 @@ def map_completed(
         except MeshError:
             pass  # it is that of the images, or the chart alone has it, too, and says where
     return (yield from map_chart(chart, options=options, target=target, pins=pins, markers=markers))
+
+
+def _unrolls(chart: Chart) -> bool:
+    """Whether a chart unrolls without distortion: then its map is as symmetric as it is, whatever hangs on it."""
+    vertices, _ = in_unit_box(chart.vertices)
+    flat = unroll(vertices, chart.triangles, boundary_loops(chart.triangles)[0])
+    if flat is None:
+        return False
+    figures = measured_chart(vertices, chart, flat, None)
+    return max(figures.angle_mean - 1, figures.area_l1) <= UNROLLED
 
 
 def _without_images(chart: Chart, found: ChartMap) -> ChartMap:

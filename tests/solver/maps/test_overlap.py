@@ -37,5 +37,31 @@ def test_the_same_seed_gives_the_same_share():
     assert 0 < overlap_share(uv, samples=1000) <= 1
 
 
+def strips(gap):
+    """Triangles of a square and of one `gap` to its right, turned, every other one mirrored, as a file has them."""
+    uv = np.concatenate([square(), square() + [1 + gap, 0]]) @ np.array([[0.8, -0.6], [0.6, 0.8]])
+    uv[::2] = uv[::2, ::-1]
+    return uv.astype(np.float32)
+
+
+def test_triangles_that_touch_need_no_samples(monkeypatch):
+    expected = overlap_share(strips(-1e-3))
+    monkeypatch.setattr("omt_uv.solver.maps.overlap._draw", None)
+    assert overlap_share(strips(0.0)) == 0 and overlap_share(strips(1e-3)) == 0
+    with pytest.raises(TypeError):
+        overlap_share(strips(-1e-3))
+    assert expected == pytest.approx(1e-3, rel=0.2)
+
+
+@pytest.mark.parametrize("width", [1e-4, 1e-3, 0.03, 0.1, 0.3])
+def test_pairs_say_what_samples_say(monkeypatch, width):
+    """Of triangles by chance, small ones apart and larger ones over one another."""
+    rng = np.random.default_rng(1)
+    uv = rng.random((30, 1, 2)) + width * rng.normal(size=(30, 3, 2))
+    found = overlap_share(uv)
+    monkeypatch.setattr("omt_uv.solver.maps.overlap.PAIR_WORK", np.inf)
+    assert found == overlap_share(uv) and (found > 0) == (width > 0.01)
+
+
 def test_a_map_without_area():
     assert overlap_share(np.zeros((4, 3, 2))) == 0

@@ -208,6 +208,15 @@ def test_what_hangs_on_one_side_of_the_plane_leaves_the_rest_symmetric():
     assert found.maps[0].folds == 0
 
 
+def test_what_unrolls_needs_no_images():
+    V, Q = slit_across()
+    surface = meshes.polygon_surface(V * [1, 1, 0], Q.tolist(), [])
+    (chart,) = strict_charts(surface)
+    assert with_missing_images(chart) is not None
+    found = drain(unwrap(surface, options=UnwrapOptions()))
+    assert found.maps[0].newton_refinement == 0 and found.maps[0].angle_mean == pytest.approx(1, abs=1e-7)
+
+
 def test_charts_with_a_mirror_of_all_or_of_nothing_miss_no_images():
     V, Q = slit_across()
     for body in (wavy_quads()[:2], (V + 0.05 * np.sin(5 * V + 1), Q.tolist())):
