@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import PrecisionError
+from ..freed_memory import give_back
 from .kept_factor import ENOUGH, KEPT_ENOUGH, by_gradients, nearly
 from .nested_dissection import kd_parts, vertex_graph
 from .sparse import Factor, fill, minimum_degree
@@ -45,6 +46,8 @@ MOST = 100
 # Parts whose equations are factored by one call. SuperLU asks for several times the memory that it fills: of large
 # arrays what is not touched is never taken, and all is given back, where those of single parts leave holes.
 TOGETHER = 32
+# In so many turns what the matrix makes of the motions of all parts is found.
+IN_TURN = 8
 # Added to the diagonal of the coarse equations, relative to its greatest entry: a part may have hardly a free vertex.
 SHIFT = 1e-12
 
@@ -98,11 +101,25 @@ class AdditiveSchwarz:
             self._last, done = nearly(matrix, b, self._kept, MOST_KEPT, KEPT_ENOUGH, self._last)
             self._kept = self._kept if done else None
             return self._last
+        x = self._solved_anew(matrix, b, w, axes)
+        self._last = x if self._keep else None
+        self._give_back()
+        return x
+
+    def _give_back(self) -> None:
+        """Give back what is free, unless the next matrix is waited for."""
+        if not self._keep:
+            give_back()
+
+    def _solved_anew(self, matrix: sp.csr_matrix, b: np.ndarray, w: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """As `solve`, by new factors."""
         self.prepare(matrix)
+        self._give_back()
         factors = self._factors(matrix, np.full(len(b), -1, np.int64))
+        self._give_back()
         spread = self._affine(w, axes)
         gather = spread.T
-        coarse = (gather @ (matrix @ spread)).tocsc()
+        coarse = self._coarse(matrix, spread)
         coarse = Factor(coarse + SHIFT * coarse.diagonal().max() * sp.identity(coarse.shape[0]))
 
         def precondition(r):
@@ -114,9 +131,7 @@ class AdditiveSchwarz:
 
         self._kept = precondition if self._keep else None
         x = by_gradients(matrix, b, precondition, MOST, KEPT_ENOUGH if self._keep else ENOUGH)
-        x = Factor(matrix, "natural").solve(b) if x is None else x
-        self._last = x if self._keep else None
-        return x
+        return Factor(matrix, "natural").solve(b) if x is None else x
 
     def prepare(self, matrix: sp.csr_matrix) -> None:
         """Order the unknowns of every part for little fill, by the first matrix (2n,2n), symmetric: all corners of a
@@ -141,21 +156,36 @@ class AdditiveSchwarz:
                 found += [(d, _part_factor(block)) for d, block in zip(parts, blocks, strict=True)]
         return found
 
+    def _coarse(self, matrix: sp.csr_matrix, spread: sp.csr_matrix) -> sp.csc_matrix:
+        """The equations (6 parts, 6 parts) of the motions spread (2n, 6 parts): some parts after the others, since what
+        the matrix makes of all motions takes more memory than all else."""
+        gather, columns, moved = spread.T, [], np.diff(spread.indptr)
+        turns = min(1 if self._keep else IN_TURN, self._count)
+        for some in np.array_split(np.arange(self._count), turns):
+            here = np.repeat(np.isin(self._part, some), 2)
+            rows, count = here[moved > 0], np.concatenate([[0], np.cumsum(moved * here)])
+            entries, place = (x.reshape(-1, 6)[rows].ravel() for x in (spread.data, spread.indices - 6 * some[0]))
+            motions = sp.csr_matrix((entries, place, count), shape=(spread.shape[0], 6 * len(some)))
+            columns.append(gather @ (matrix @ motions))
+        return sp.hstack(columns, format="csc")
+
     def _affine(self, w, axes) -> sp.csr_matrix:
-        """The affine motions of every part, (2n, 6 parts)."""
+        """The affine motions of every part, (2n, 6 parts), with no entries for unknowns that stay 0."""
         part, count = self._part, self._count
         size = np.bincount(part, minlength=count)
         middle = (np.bincount(part, w.real, count) + 1j * np.bincount(part, w.imag, count)) / size
         z = w - middle[part]
         z /= np.sqrt(np.bincount(part, np.abs(z) ** 2, count) / size)[part]
+        moves = (axes != 0).ravel()
+        part, z, along = np.repeat(part.astype(np.int32), 2)[moves], np.repeat(z, 2)[moves], axes.ravel()[moves].conj()
         # Column by column: all of them as complex numbers take more memory than the matrix.
-        entries, along = np.empty((len(z), 2, 6)), axes.conj()
+        entries = np.empty((len(z), 6))
         for k, motion in enumerate((np.ones(len(z)), z, z.conj())):
             for turn in range(2):
-                entries[:, :, k + 3 * turn] = (along * (1j**turn * motion)[:, None]).real
-        columns = 6 * np.repeat(part.astype(np.int32), 2)[:, None] + np.arange(6, dtype=np.int32)
-        n = len(columns)
-        return sp.csr_matrix((entries.ravel(), columns.ravel(), 6 * np.arange(n + 1)), shape=(n, 6 * count))
+                entries[:, k + 3 * turn] = (along * (1j**turn * motion)).real
+        columns = 6 * part[:, None] + np.arange(6, dtype=np.int32)
+        start = np.concatenate([[0], np.cumsum(6 * moves)])
+        return sp.csr_matrix((entries.ravel(), columns.ravel(), start), shape=(len(moves), 6 * count))
 
 
 def _part_factor(block: sp.csc_matrix) -> Factor:

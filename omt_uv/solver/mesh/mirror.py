@@ -30,6 +30,10 @@ SAME_DISTANCE = 1e-3
 NEAR_CENTRE = 0.1
 # Share of the triangles whose images may be cut along the other diagonal.
 FEW = 0.2
+# Polygons with more sides are matched corner by corner in a tree.
+FEW_SIDES = 8
+# Pairs of corners that are compared at once.
+AT_ONCE = 2**19
 
 
 @dataclass(frozen=True)
@@ -128,6 +132,7 @@ class _Polygons:
         pairs = np.unique(np.repeat(faces, 3).astype(np.int64) * len(positions) + triangles.ravel())
         self.polygon, self.vertex = pairs // len(positions), pairs % len(positions)
         self.sides = np.bincount(self.polygon)
+        self.first = np.cumsum(self.sides) - self.sides
         self.extent = float(np.ptp(positions, axis=0).max())
         sums = [np.bincount(self.polygon, positions[self.vertex, k]) for k in range(3)]
         centres = np.stack(sums, axis=1) / self.sides[:, None]
@@ -204,11 +209,27 @@ class _Polygons:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Corners (k,) of the polygons `used` (p,) bool, and the vertex (k,) of the polygon that is their image, where
         the image of each lies; -1 where none does."""
+        found = np.full(len(self.vertex), -1)
+        sides = np.stack([self.sides, self.sides[other]])
+        few = used & (sides.max(axis=0) <= FEW_SIDES)
+        # Pairs of all their corners are compared faster than a tree of these is built.
+        for own, theirs in np.unique(sides[:, few], axis=1).T:
+            rows = np.flatnonzero(few & (sides[0] == own) & (sides[1] == theirs))
+            for some in np.array_split(rows, len(rows) * own * theirs // AT_ONCE + 1):
+                corners = self.first[some][:, None] + np.arange(own)
+                among = self.vertex[self.first[other[some]][:, None] + np.arange(theirs)]
+                place = _reflected(self.points[self.vertex[corners]], normal)
+                far = np.linalg.norm(place[:, :, None] - self.points[among][:, None], axis=3)
+                near = np.take_along_axis(among, far.argmin(axis=2), axis=1)
+                found[corners] = np.where(far.min(axis=2) <= MIRROR_TOLERANCE * self.extent, near, -1)
+        corner = np.flatnonzero((used & ~few)[self.polygon])
+        if len(corner):
+            place = _reflected(self.points[self.vertex[corner]], normal)
+            polygon = other[self.polygon[corner]]
+            far, at = self.corner_tree.query(np.column_stack([place, 2 * self.extent * polygon]))
+            found[corner] = np.where(far <= MIRROR_TOLERANCE * self.extent, self.vertex[at], -1)
         corner = np.flatnonzero(used[self.polygon])
-        place = _reflected(self.points[self.vertex[corner]], normal)
-        polygon = other[self.polygon[corner]]
-        far, found = self.corner_tree.query(np.column_stack([place, 2 * self.extent * polygon]))
-        return corner, np.where(far <= MIRROR_TOLERANCE * self.extent, self.vertex[found], -1)
+        return corner, found[corner]
 
     def _matched(self, polygons: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
         """The polygons (p,) where the images of `polygons` (p,) lie, None unless each has one of as many sides."""
@@ -277,8 +298,8 @@ def _among(rows: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _reflected(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Points (k,3) reflected in the plane through 0 with a unit normal (3,)."""
-    return points - 2 * (points @ normal)[:, None] * normal
+    """Points (...,3) reflected in the plane through 0 with a unit normal (3,)."""
+    return points - 2 * (points @ normal)[..., None] * normal
 
 
 def _candidates(positions: np.ndarray, triangles: np.ndarray) -> Iterator[np.ndarray]:

@@ -41,7 +41,7 @@ def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     if len(np.unique(chart.faces)) == len(chart.faces):
         # Triangles alone are there as they were.
         numbers = np.arange(len(chart.faces)), -1 - np.arange(len(chart.patches))
-        return PolygonDisk(vertices, np.concatenate([chart.triangles, chart.patches]), np.concatenate(numbers))
+        return PolygonDisk(vertices, chart.disk, np.concatenate(numbers))
     faces = _numbered(chart.faces)
     cut = polygon_mesh(chart.triangles, faces, most=len(faces))
     quads = shorter_diagonals(vertices, cut.quads, chart.disk)

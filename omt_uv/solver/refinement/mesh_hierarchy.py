@@ -49,7 +49,7 @@ class RemovalRound:
     vertex, into : (k,) each went to the place of another
     corner, share : (k,3) it returns to the mean of these vertices with these weights
     row, after, before : (s,) its star was the triangles (vertex[row], after, before)
-    faces : these, with their target areas
+    mass : (s,) target areas of these
     """
 
     vertex: np.ndarray
@@ -59,7 +59,11 @@ class RemovalRound:
     row: np.ndarray
     after: np.ndarray
     before: np.ndarray
-    faces: Elements
+    mass: np.ndarray
+
+    def faces(self, vertices: np.ndarray) -> Elements:
+        """The triangles of the stars, of the fine mesh (n,3); kept, they would take as much memory as all else."""
+        return elements(vertices, np.column_stack([self.vertex[self.row], self.after, self.before]), self.mass)
 
     @property
     def on_boundary(self) -> np.ndarray:
@@ -78,6 +82,7 @@ class CoarseMesh:
     mass : (t,) target area of the triangles
     region : (t,) weights of a region, if there is one
     rounds : of collapses that led there
+    vertices : (n,3) of the fine mesh
     """
 
     kept: np.ndarray
@@ -85,6 +90,7 @@ class CoarseMesh:
     mass: np.ndarray
     region: np.ndarray | None
     rounds: list[RemovalRound]
+    vertices: np.ndarray
 
     def prolonged(self, uv: np.ndarray, n: int) -> Steps[np.ndarray]:
         """A map uv (c,2) of the coarse mesh without folds, carried to all n vertices, without folds."""
@@ -94,7 +100,8 @@ class CoarseMesh:
             yield Progress("Coarser mesh", k / len(self.rounds))
             w[removal.vertex] = _returned(removal, w)
             # Boundary vertices stay on the chords: where the coarse boundary does not cross itself, neither does this.
-            relax(removal.vertex, removal.row, removal.faces, w, RELAX_WEIGHT, RELAX_STEPS, removal.on_boundary)
+            faces, fixed = removal.faces(self.vertices), removal.on_boundary
+            relax(removal.vertex, removal.row, faces, w, RELAX_WEIGHT, RELAX_STEPS, fixed)
         return np.column_stack([w.real, w.imag])
 
 
@@ -129,7 +136,9 @@ def coarsen_disk(
     place = np.full(count, -1)
     place[kept] = np.arange(len(kept))
     region = None if region is None else mass[:, 1] / mass[:, 0]
-    return CoarseMesh(kept=kept, triangles=place[triangles], mass=mass[:, 0], region=region, rounds=rounds)
+    return CoarseMesh(
+        kept=kept, triangles=place[triangles], mass=mass[:, 0], region=region, rounds=rounds, vertices=vertices
+    )
 
 
 def _heavy(V, F, density):
@@ -153,7 +162,6 @@ def _round(V, F, flat, mass, rank):
     stays = (after != into) & (before != into)
     new = np.column_stack([into, after, before])[stays]
     corner, share = _places(V, flat, vertex, row[stays], new, ahead)
-    faces = elements(V, np.column_stack([v, after, before]), mass[star, 0])
     removal = RemovalRound(
         vertex=vertex,
         into=new[np.searchsorted(row[stays], np.arange(len(vertex))), 0],
@@ -162,7 +170,7 @@ def _round(V, F, flat, mass, rank):
         row=row,
         after=after,
         before=before,
-        faces=faces,
+        mass=mass[star, 0],
     )
     size = np.sqrt(_squared(_normals(V, new)[0]))
     part = size / np.maximum(np.bincount(row[stays], size, len(vertex)), 1e-300)[row[stays]]

@@ -213,8 +213,11 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
     diagonal = 1 - free
     diagonal[:, 0] += np.maximum(problem.motion.bend(w, gradient), 0) * free[:, 0]
     matrix = problem.assembly.matrix(found.triangles, diagonal.ravel() + SHIFT * found.scale, found.quads)
-    matrix = matrix if found.rest is None else matrix + found.rest
-    return matrix if squares is None else matrix + squares, axes.ravel(), found.scale
+    rest, scale = found.rest, found.scale
+    # Blocks take more memory than their matrix.
+    del found
+    matrix = matrix if rest is None else matrix + rest
+    return matrix if squares is None else matrix + squares, axes.ravel(), scale
 
 
 def _solution(

@@ -170,10 +170,8 @@ def refine(
     target = _targets(face_areas(vertices, triangles), target)
     mesh = renumbered(vertices, triangles, uv, pins, polygons)
     faces = polygon_elements(mesh.vertices, mesh.triangles, target, polygons, region)
-    by_triangle = faces if faces.polygon is None else elements(mesh.vertices, mesh.triangles, target, region)
-    symmetry = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, polygons, faces)
     try:
-        found, warnings = yield from _refined(mesh, faces, by_triangle, options, symmetry)
+        found, warnings = yield from _refined(mesh, faces, _by_triangle(mesh, faces, target, region), options, polygons)
     except MeshError as error:
         raise mesh.original_error(error) from error
     yield Progress("Refinement", 1.0)
@@ -206,12 +204,17 @@ def _targets(area: np.ndarray, target: np.ndarray | None) -> np.ndarray:
     return target * (area.sum() / target.sum())
 
 
+def _by_triangle(mesh: Renumbered, faces: Elements, target: np.ndarray, region: np.ndarray | None) -> Elements:
+    """The elements of which each triangle is a polygon of its own."""
+    return faces if faces.polygon is None else elements(mesh.vertices, mesh.triangles, target, region)
+
+
 def _refined(
     mesh: Renumbered,
     faces: Elements,
     by_triangle: Elements,
     options: RefinementOptions,
-    symmetry: MirrorSymmetry | None,
+    polygons: np.ndarray | None,
 ) -> Steps[tuple[ContinuationResult, tuple[str, ...]]]:
     """Stages on a renumbered chart: what was found, and the warnings of the initial map it was found from."""
     boundary, balance, quality = options.boundary, options.balance, QUALITIES[options.quality]
@@ -225,7 +228,8 @@ def _refined(
     # Sweeps know of triangles alone, of no pins, and of no balance.
     swept = faces.polygon is None and faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
     smoother = Smoother(mesh.triangles, n) if swept else None
-    warm, known = options.warm_start, symmetry
+    warm = options.warm_start
+    known = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, polygons, faces)
     symmetry, w = _next_to_image(faces, initial.may_cross, known, w, by_triangle, boundary, loop)
     if known is not None and symmetry is None:
         free = _map_problem(faces, assembly_of(faces, n, parts), initial, loop, boundary, smoother)
@@ -233,6 +237,8 @@ def _refined(
         warm = warm or symmetry is not None
         if symmetry is None and boundary == "free" and not warm:
             symmetry, w = _embedded_to_image(faces, known, w, by_triangle, mesh, loop)
+    # It takes the memory of three maps.
+    del known
     half = halved(faces, symmetry)
     assembly = assembly_of(half, n, parts, symmetry)
     problem = _mirrored(_map_problem(half, assembly, initial, loop, boundary, smoother), symmetry, w, len(faces.area))
@@ -245,6 +251,7 @@ def _refined(
         w = yield from part_of(
             _smoothed_if_tense(problem, by_triangle, w, planned_weights(balance, quality)[0]), *SMOOTHING
         )
+    del by_triangle
     ahead = options.prolonged and boundary == "free"
     way = minimise_in_stages(problem, w, balance, quality, warm, options.multiplier, ahead)
     found = yield from part_of(way, *STAGES)

@@ -175,3 +175,23 @@ def test_parts_overlap_by_the_rings_around_them():
         for _ in range(schwarz.OVERLAP):
             mine = mine | near[mine].any(axis=0)
         assert np.array_equal(np.unique(unknowns // 2), np.flatnonzero(mine))
+
+
+def test_motions_are_those_of_the_parts_in_the_axes_and_their_equations_to_the_bit():
+    _, parted, w = flattened("circle", 30.0)
+    parts, rng = parted.assembly.parts, np.random.default_rng(0)
+    axes = np.exp(2j * np.pi * rng.random((len(w), 2))) * (rng.random((len(w), 2)) > 0.3)
+    spread, part = parts._affine(w, axes), parts._part
+    of_motions = rng.normal(size=spread.shape[1])
+    a, b, c = (of_motions.reshape(-1, 6)[:, k] + 1j * of_motions.reshape(-1, 6)[:, k + 3] for k in range(3))
+    for k in range(parts._count):
+        here = part == k
+        z = w[here] - w[here].mean()
+        z /= np.sqrt((np.abs(z) ** 2).mean())
+        moved = (axes[here].conj() * (a[k] + b[k] * z + c[k] * z.conj())[:, None]).real
+        np.testing.assert_allclose((spread @ of_motions).reshape(-1, 2)[here], moved, atol=1e-12)
+    matrix = sp.random(len(w) * 2, len(w) * 2, 0.002, "csr", random_state=1)
+    found, whole = parts._coarse(matrix, spread), (spread.T @ (matrix @ spread)).tocsc()
+    np.testing.assert_array_equal(found.toarray(), whole.toarray())
+    # What stays has no entries that would take memory.
+    assert spread.nnz == 6 * np.count_nonzero(axes)

@@ -102,3 +102,18 @@ def test_what_hangs_on_one_side_of_the_plane_has_no_image_but_its_own():
     np.testing.assert_allclose(V[found.image[known]], found.reflected[known], atol=1e-9)
     np.testing.assert_allclose(found.reflected, V * [-1, 1, 1], atol=1e-9)
     np.testing.assert_array_equal(np.unique(faces[found.own]), np.arange(18, 24))
+
+
+@pytest.mark.parametrize("sides", [3, 4, 8, 9, 12])
+def test_corners_of_polygons_of_any_number_of_sides_find_their_images(sides):
+    """A row of polygons of their own, beside one another and beside their images across x = 0."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    shape = np.column_stack([np.cos(angle), np.sin(angle) * (1 + 0.3 * np.cos(angle)), 0.2 * np.cos(3 * angle)])
+    right = np.concatenate([shape * [1, 1 + 0.1 * k, 1] + [2, 3.0 * k, 0.1 * k * k] for k in range(5)])
+    V = np.concatenate([right, right * [-1, 1, 1]])
+    fan = np.column_stack([np.zeros(sides - 2, int), np.arange(1, sides - 1), np.arange(2, sides)])
+    start = sides * np.repeat(np.arange(10), sides - 2)
+    F = np.tile(fan, (10, 1)) + start[:, None]
+    mirror = find_mirror(V, F, start)
+    half = sides * 5
+    np.testing.assert_array_equal(mirror.image, np.concatenate([np.arange(half) + half, np.arange(half)]))
