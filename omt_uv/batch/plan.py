@@ -101,7 +101,13 @@ def _of_folder(source: Path, output: Path) -> list[tuple[str, Path]]:
     """Names and paths of the meshes below a folder, but for the results, if they go there, too."""
     own = os.path.realpath(output)
     found = []
-    for folder, inner, files in os.walk(source):
+
+    def shut(error: OSError) -> None:
+        raise BatchError(
+            f"{error.filename}: cannot be read ({error.strerror}). Allow that, or move it away."
+        ) from error
+
+    for folder, inner, files in os.walk(source, onerror=shut):
         inner[:] = sorted(n for n in inner if not n.startswith(".") and os.path.realpath(Path(folder) / n) != own)
         found += [Path(folder) / name for name in sorted(files) if not name.startswith(".")]
     pairs = [(path.relative_to(source).as_posix(), path) for path in found if path.suffix.lower() in READABLE]

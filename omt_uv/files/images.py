@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import UserError
 from .silence import silence
-from .verified import check_writable, staged
+from .verified import FileError, check_readable, check_writable, staged
 
 # What can be written: Blender's name of the format by the suffix of the file.
 FORMATS = {
@@ -61,8 +61,10 @@ def load(path: Path) -> bpy.types.Image:
     ------
     ImageError : there is no such file, or it is no image
     """
-    if not os.path.isfile(path):
-        raise ImageError(f"{path}: there is no such file")
+    try:
+        check_readable(path)
+    except FileError as error:
+        raise ImageError(str(error)) from error
     try:
         with silence():
             image = bpy.data.images.load(str(path.resolve()))

@@ -16,7 +16,7 @@ from .formats.headers import check_header
 from .formats.off import read_off
 from .ply_uvs import add_uvs
 from .silence import silence
-from .verified import FileError, check_length
+from .verified import FileError, check_length, check_readable
 
 READABLE = (".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".fbx", ".off")
 # Blender turns these two formats by default; their axes are taken as they are.
@@ -34,8 +34,7 @@ def load(path: Path) -> list[bpy.types.Object]:
     """
     check_suffix(path, READABLE)
     check_length(path)
-    if not path.is_file():
-        raise FileError(f"{path}: there is no such file")
+    check_readable(path)
     try:
         check_header(path)
         with silence() as log:

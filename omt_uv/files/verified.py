@@ -55,6 +55,17 @@ def check_writable(path: Path) -> None:
         raise FileError(f"{path}: nothing can be written into this folder ({error.strerror})") from error
 
 
+def check_readable(path: Path) -> None:
+    """Raise FileError unless a file is there and may be read: what Blender's readers say then names no cause."""
+    try:
+        if not path.is_file():
+            raise FileError(f"{path}: there is no such file")
+        with open(path, "rb"):
+            pass
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror})") from error
+
+
 def check_length(path: Path) -> None:
     """Raise FileError if a path is longer than Blender can hold."""
     length = len(os.fsencode(os.path.abspath(path)))

@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from without_rights import folder_of_nobody, own, without_rights
 
 from omt_uv.files import verified
 from omt_uv.files.verified import FileError
@@ -114,16 +115,25 @@ def test_paths_that_lead_to_one_file_clash(tmp_path):
     assert verified.clash([("x", tmp_path / "new"), ("y", tmp_path / "d/../new")]) == ("x", "y")
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is forbidden to root")
-def test_missing_rights_are_told_beforehand(tmp_path):
-    (tmp_path / "a").write_text("")
-    (tmp_path / "a").chmod(0o400)
-    with pytest.raises(FileError, match="write-protected"):
-        verified.check_writable(tmp_path / "a")
-    tmp_path.chmod(0o500)
-    with pytest.raises(FileError, match="nothing can be written"):
-        verified.check_writable(tmp_path / "b")
-    tmp_path.chmod(0o700)
+def test_missing_rights_are_told_beforehand():
+    with folder_of_nobody() as folder:
+        (folder / "a").write_text("")
+        own(folder)
+        with without_rights():
+            (folder / "a").chmod(0o400)
+            with pytest.raises(FileError, match="write-protected"):
+                verified.check_writable(folder / "a")
+            folder.chmod(0o500)
+            with pytest.raises(FileError, match="nothing can be written"):
+                verified.check_writable(folder / "b")
+            (folder / "a").chmod(0)
+            with pytest.raises(FileError, match=r"a: cannot be read \(Permission denied\)"):
+                verified.check_readable(folder / "a")
+            folder.chmod(0)
+            with pytest.raises(FileError, match="cannot be read"):
+                verified.check_readable(folder / "a")
+    with pytest.raises(FileError, match="there is no such file"):
+        verified.check_readable(folder / "a")
 
 
 @pytest.mark.parametrize("length, fits", [(255, True), (256, False)])

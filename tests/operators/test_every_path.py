@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from without_rights import folder_of_nobody, without_rights
 
 STRANGE = "a\nb ü漢 'c\" .x"
 NOISE = np.random.default_rng(0).bytes(600)
@@ -117,12 +118,16 @@ def test_what_is_no_file_of_its_kind_is_refused_and_nothing_changes(package, tmp
 
 
 @pytest.mark.parametrize(("name", "prop"), TAKEN)
-@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is forbidden to root")
-def test_a_file_without_rights_is_refused(package, tmp_path, name, prop):
+def test_a_file_without_rights_is_refused(package, name, prop):
     scenes.bump()
-    (tmp_path / "shut").write_bytes(good(package, name))
-    (tmp_path / "shut").chmod(0)
-    assert "shut" in refused(name, prop, tmp_path / "shut")
+    whole = good(package, name)
+    with folder_of_nobody() as folder:
+        (folder / "shut").write_bytes(whole)
+        # What an operator imports, it imports with rights.
+        refused(name, prop, folder / "missing")
+        (folder / "shut").chmod(0)
+        with without_rights():
+            assert "shut" in refused(name, prop, folder / "shut")
 
 
 @pytest.mark.parametrize(("name", "prop"), TAKEN)

@@ -35,6 +35,16 @@ def add(commands) -> None:
     similar.add_argument("--top", type=vertices, default=10, metavar="K", help="how many, default 10")
 
 
+def _meshes_below(folder: Path) -> list[Path]:
+    """All mesh files of a folder and its folders. Raises CommandError where one of these cannot be read."""
+
+    def shut(error: OSError) -> None:
+        raise CommandError(f"{error.filename}: cannot be read ({error.strerror}). Allow that, or move it away.")
+
+    found = [Path(inner) / name for inner, _, names in os.walk(folder, onerror=shut) for name in names]
+    return sorted(path for path in found if path.suffix.lower() in READABLE)
+
+
 def run(options: argparse.Namespace) -> None:
     """Add what is new in a folder to its index; what has no signature is told with the reason."""
     from ...files.verified import check_writable, write_bytes
@@ -47,7 +57,7 @@ def run(options: argparse.Namespace) -> None:
     check_paths(options, [])
     check_writable(options.output)
     old = read_index(options.output) if options.output.exists() else None
-    files = sorted(p for p in options.input.rglob("*") if p.suffix.lower() in READABLE)
+    files = _meshes_below(options.input)
     known = dict(zip(old.names, old.marks, strict=True)) if old else {}
     due = {p.relative_to(options.input).as_posix(): p for p in files}
     if old and old.marked != (options.markers is not None):

@@ -116,6 +116,11 @@ def read_index(path: Path) -> SignatureIndex:
     if not os.path.isfile(path):
         raise IndexFileError(f"{path}: there is no such index. Make one by the command library.")
     try:
+        with open(path, "rb"):
+            pass
+    except OSError as error:
+        raise IndexFileError(f"{path}: cannot be read ({error.strerror})") from error
+    try:
         with np.load(path, allow_pickle=False) as data:
             parts = [data[name] for name in ("packed", "floors", "coefficients")]
             names = tuple(map(_text, data["names"].tolist()))
