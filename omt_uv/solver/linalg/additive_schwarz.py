@@ -1,10 +1,10 @@
 """Solve Newton's equations of large meshes by two-level additive Schwarz (Toselli, Widlund 2005).
 
-Conjugate gradients are preconditioned part by part. The mesh falls into parts of about a thousand vertices that overlap
-by a few rings. Their equations are factored one by one, which takes time and memory in proportion to the size of the
-mesh, and what is left, how parts move as a whole, by the affine maps of every part together (Domain Decomposition
-Methods, section 3). Stiff area terms do no harm, as they would to smoothers that see one vertex at a time: the parts
-know all of their equations.
+Conjugate gradients are preconditioned part by part. The mesh falls into parts of about 500 vertices that overlap by a
+ring. Their equations are factored one by one, which takes time and memory in proportion to the size of the mesh, and
+what is left, how parts move as a whole, by the affine maps of every part together (Domain Decomposition Methods,
+section 3). Stiff area terms do no harm, as they would to smoothers that see one vertex at a time: the parts know all of
+their equations.
 """
 
 from __future__ import annotations
@@ -28,14 +28,11 @@ LITTLE_FILL = 20
 # Vertices up to which that is found out.
 COUNTED = 250_000
 # Vertices of a part without its overlap.
-PART_SIZE = 1000
-# Rings of vertices that parts overlap by.
-OVERLAP = 2
-# The same where factors are kept: from so many vertices on, parts of that size that overlap less are factored in half
-# of the time of all at once.
+PART_SIZE = 500
+# Rings of vertices that parts overlap by: a second one saves every fifth iteration, and takes longer than these.
+OVERLAP = 1
+# Where factors are kept, parts are factored in half of the time of all at once from so many vertices on.
 LARGE_KEPT = 7000
-KEPT_SIZE = 500
-KEPT_OVERLAP = 1
 # Iterations at most by factors that were kept. What these come to is a step all the same, and the next has new ones:
 # both in one would take twice as long.
 MOST_KEPT = 12
@@ -45,7 +42,7 @@ MOST_NEIGHBOURS = 100
 MOST = 100
 # Parts whose equations are factored by one call. SuperLU asks for several times the memory that it fills: of large
 # arrays what is not touched is never taken, and all is given back, where those of single parts leave holes.
-TOGETHER = 32
+TOGETHER = 64
 # In so many turns what the matrix makes of the motions of all parts is found.
 IN_TURN = 8
 # Added to the diagonal of the coarse equations, relative to its greatest entry: a part may have hardly a free vertex.
@@ -59,14 +56,7 @@ class AdditiveSchwarz:
     take about as long one as the other then, and some are less nearly right.
     """
 
-    def __init__(
-        self,
-        points: np.ndarray,
-        triangles: np.ndarray,
-        size: int = PART_SIZE,
-        keep: bool = False,
-        overlap: int = OVERLAP,
-    ):
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, size: int = PART_SIZE, keep: bool = False):
         n = len(points)
         self._keep = keep
         self._kept: Callable[[np.ndarray], np.ndarray] | None = None
@@ -80,7 +70,7 @@ class AdditiveSchwarz:
         spreading = (quiet @ graph @ quiet + sp.identity(n)).tocsr()
         spreading.eliminate_zeros()
         member = sp.csr_matrix((np.ones(n), self._part, np.arange(n + 1)), shape=(n, self._count))
-        for _ in range(overlap):
+        for _ in range(OVERLAP):
             member = spreading @ member
         member = member.tocsc()
         self._unknowns: list[np.ndarray] = []
@@ -206,9 +196,7 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False
     little = LITTLE_FILL * min(1.0, np.log(n) / np.log(LARGE))
     if n < (LARGE_KEPT if keep else LARGE) or (n < COUNTED and fill(vertex_graph(triangles, n)) < little * n):
         return None
-    if keep:
-        return AdditiveSchwarz(points, triangles, KEPT_SIZE, True, KEPT_OVERLAP)
-    return AdditiveSchwarz(points, triangles)
+    return AdditiveSchwarz(points, triangles, keep=keep)
 
 
 def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:

@@ -170,6 +170,10 @@ class _Polygons:
 
     def images_of_polygons(self, normal: np.ndarray) -> np.ndarray | None:
         """The image (p,) of every polygon in the plane through the mean with this normal (3,); None if one has none."""
+        # What a plane takes to itself reaches as far to either side of it.
+        height = self.centres @ normal
+        if abs(height.max() + height.min()) > 2 * MIRROR_TOLERANCE * self.extent:
+            return None
         if self._matched(self.probes, normal) is None:
             return None
         other = self._matched(np.arange(len(self.sides)), normal)
