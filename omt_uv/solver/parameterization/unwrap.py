@@ -47,9 +47,6 @@ from .small_charts import is_small, map_together
 CUTTING = 0.15
 MAPPING = 0.7
 
-# Of bodies with limbs, charts that are not this share of the whole stay in one piece.
-MOSTLY = 0.5
-
 # Charts and their maps.
 _Drawn = tuple[list[Chart], list[ChartMap]]
 
@@ -146,18 +143,18 @@ def unwrap(
         found = yield from part_of(further, begin + width, 1 - begin - width)
         warnings = (*prepared.warnings, *cut_for_a_map(maps, found.maps), *found.warnings)
         prepared, maps = replace(found.prepared, warnings=warnings), found.maps
-    charts, maps = yield from task.finished(prepared.charts, maps, surface)
-    if task.options.boundary != "free" and task.options.kind == "authalic":
-        maps = yield from _with_room(task, prepared.charts, maps, surface)
-    cuts = np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
+    charts, cuts = prepared.charts, np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     if cut.search is not None and pins is None and target is None and task.options.boundary == "free":
-        charts, maps, cuts = _in_pieces(cut.search, charts, maps, cuts)
+        charts, maps, cuts = yield from _in_pieces(task, cut.search, charts, maps, cuts)
+    given, (charts, maps) = charts, (yield from task.finished(charts, maps, surface))
+    if task.options.boundary != "free" and task.options.kind == "authalic":
+        maps = yield from _with_room(task, given, maps, surface)
     return SurfaceMap(charts, maps, cuts, prepared.warnings)
 
 
 def _in_pieces(
-    search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: np.ndarray
-) -> tuple[list[Chart], list[ChartMap], np.ndarray]:
+    task: _Task, search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: np.ndarray
+) -> Steps[tuple[list[Chart], list[ChartMap], np.ndarray]]:
     """Charts, maps and cuts (k,2), those cut in pieces that leave most of a texture empty: long bands, as those of a
     gear or a cable, and bodies with limbs. Charts that were not cut at all, and those with marked seams, stay whole."""
     surface = search.surface
@@ -165,44 +162,48 @@ def _in_pieces(
     whole = float(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
     new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts]
     for chart, chart_map in zip(charts, maps, strict=True):
-        found, between = [(chart, chart_map)], cuts[:0]
+        found, between = ([chart], [chart_map]), cuts[:0]
         # Most are compact, and of thousands nothing else is asked.
         if np.hypot(*np.ptp(chart_map.uv, axis=0)) > COMPACT * np.sqrt(whole) > 0 and not len(chart.patches):
             was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
             if was_cut and not is_marked(surface, chart):
-                found, between = _pieces(search, chart, chart_map, whole)
-        new_charts += [chart for chart, _ in found]
-        new_maps += [chart_map for _, chart_map in found]
+                found, between = yield from _pieces(task, search, chart, chart_map, whole)
+        new_charts += found[0]
+        new_maps += found[1]
         edges.append(between)
     return new_charts, new_maps, np.concatenate(edges)
 
 
 def _pieces(
-    search: ShearSearch, chart: Chart, chart_map: ChartMap, whole: float
-) -> tuple[list[tuple[Chart, ChartMap]], np.ndarray]:
-    """A chart of a surface of area `whole` and its map cut in pieces, as pairs, and the edges (k,2) in between; whole
-    where it is neither long nor sprawls, or the pieces are no disks."""
-    from ..seams.limbs import sprawls, without_limbs
-    from ..seams.parting import in_pieces, pieces_of_band
+    task: _Task, search: ShearSearch, chart: Chart, chart_map: ChartMap, whole: float
+) -> Steps[tuple[_Drawn, np.ndarray]]:
+    """A chart of a surface of area `whole` and its map cut in pieces, and the edges (k,2) in between; whole where it is
+    neither long nor sprawls, or the pieces are no disks."""
+    from ..seams.limbs import pieces_of_chart
 
-    cost, uv, axes = search.costs().vertex_cost[chart.vertex_ids], chart_map.uv, search.shear.preferences.axes
+    cost, axes = search.costs().vertex_cost[chart.vertex_ids], search.shear.preferences.axes
     up = (axes or SceneAxes()).up
-    share = face_areas(chart.vertices, chart.triangles).sum() / whole
-    count = pieces_of_band(uv, np.sqrt(whole), share)
-    if count > 1:
-        piece, between = in_pieces(chart, uv, cost, count)
-    elif share > MOSTLY and sprawls(chart, uv, up):
-        piece, between = without_limbs(chart, uv, cost, up, search.images)
-    else:
-        return [(chart, chart_map)], np.zeros((0, 2), np.int64)
-    found = []
-    for k in range(int(piece.max()) + 1):
+    piece, between = pieces_of_chart(chart, chart_map.uv, cost, up, whole, search.images)
+    parts, maps = list[Chart](), list[ChartMap]()
+    for k in range(int(piece.max()) + 1 if len(between) else 0):
         part, used = part_of_chart(chart, piece == k)
-        mapped = with_figures(chart_map, uv[used], measured_map(part, uv[used], None))
-        found.append((part, with_folds_counted(part, mapped)))
-    if not sound_disks([part for part, _ in found]).all():
-        return [(chart, chart_map)], between[:0]
-    return found, between
+        parts.append(part)
+        maps.append(with_figures(chart_map, chart_map.uv[used], measured_map(part, chart_map.uv[used], None)))
+    if not parts or not sound_disks(parts).all():
+        return ([chart], [chart_map]), between[:0]
+    # What hangs on nothing any more can do with less shear.
+    again = yield from task.map_charts(parts)
+    return (parts, again if _shears_less(parts, again, maps) else maps), between
+
+
+def _shears_less(charts: list[Chart], maps: list[ChartMap], before: list[ChartMap]) -> bool:
+    """Whether all charts have maps that shear less in the mean than those before, and fold no more faces."""
+    if any(one.failure is not None or one.folds > other.folds for one, other in zip(maps, before, strict=True)):
+        return False
+    area = np.array([face_areas(chart.vertices, chart.triangles).sum() for chart in charts])
+    return bool(
+        area @ np.array([one.angle_mean - other.angle_mean for one, other in zip(maps, before, strict=True)]) < 0
+    )
 
 
 def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[list[ChartMap]]:

@@ -14,12 +14,22 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..maps.upright import turn_upright
 from ..mesh.charts import Chart, part_of_chart
-from ..mesh.geometry import edge_lengths, signed_areas
+from ..mesh.geometry import edge_lengths, face_areas, signed_areas
 from ..mesh.topology import pair_keys
 from ..packing.pack_square import pack
 from ..progress import drain
-from .parting import LEAST_PART, PolygonGraph, capacities, minimum_cut, with_images
+from .parting import (
+    LEAST_PART,
+    PolygonGraph,
+    capacities,
+    in_pieces,
+    minimum_cut,
+    pieces_of_band,
+    with_images,
+)
 
+# Charts that have not this share of a surface stay in one piece.
+MOSTLY = 0.5
 # A chart that fills less of the square around it sprawls; cuts are made where the pieces fill so many times as much
 # once they are packed, which is tried where their boxes promise so many times as much.
 SPRAWLING = 0.3
@@ -40,6 +50,23 @@ LEVELS = 24
 NEAR = 0.25
 # Boxes of pieces lie beside one another with that much between them.
 BETWEEN = 1.15
+
+
+def pieces_of_chart(
+    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float], whole: float, image: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The piece (m,) of every triangle of a chart with map uv (n,2) that leaves most of a texture empty, and the edges
+    (k,2) of the surface in between; one piece where it is neither a long band nor the sprawling most of a surface.
+
+    whole : the area of the surface; cost, image : see `parting.parted`; up (3,) : see `sprawls`
+    """
+    share = face_areas(chart.vertices, chart.triangles).sum() / whole
+    count = pieces_of_band(uv, np.sqrt(whole), share)
+    if count > 1:
+        return in_pieces(chart, uv, cost, count)
+    if share > MOSTLY and sprawls(chart, uv, up):
+        return without_limbs(chart, uv, cost, up, image)
+    return np.zeros(len(chart.triangles), np.int64), np.zeros((0, 2), np.int64)
 
 
 def sprawls(chart: Chart, uv: np.ndarray, up: Sequence[float]) -> bool:

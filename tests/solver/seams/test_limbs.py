@@ -5,11 +5,15 @@ from dataclasses import replace
 import meshes
 import numpy as np
 import pytest
+from polygons import with_limbs
 from scipy.spatial import cKDTree
 
 from omt_uv.solver.mesh.charts import part_of_chart, strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization.options import UnwrapOptions
+from omt_uv.solver.parameterization.unwrap import unwrap
+from omt_uv.solver.progress import drain
 from omt_uv.solver.seams.limbs import FULLER, LEAST_LIMB, sprawls, without_limbs
 
 UP = (0.0, 0.0, 1.0)
@@ -86,3 +90,14 @@ def test_parts_of_a_chart_know_their_vertices():
     assert np.array_equal(used[part.triangles], chart.triangles[rows])
     assert np.array_equal(part.vertex_ids, chart.vertex_ids[used])
     assert np.array_equal(part.corners, chart.corners[rows]) and np.array_equal(part.faces, chart.faces[rows])
+
+
+def test_pieces_are_mapped_as_if_their_seams_were_given():
+    """A limb that comes off for its room in the texture keeps none of the shear that it had on the body."""
+    surface = meshes.polygon_surface(*with_limbs(1))
+    found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35)))
+    given = replace(surface, seams=np.concatenate([surface.seams, found.seams]))
+    again = drain(unwrap(given, options=UnwrapOptions(seams="existing")))
+    assert len(found.charts) == len(again.charts) > 1
+    shears = [[one.angle_mean for one in maps] for maps in (found.maps, again.maps)]
+    np.testing.assert_allclose(*shears, rtol=1e-3)
