@@ -1,7 +1,7 @@
 """Turn islands as an artist lays them: edges along the axes, and up in the world up in the map.
 
 The direction of an island's edges is the one, up to quarter turns, in which most length of polygon sides lies. Up in
-the map is the mean gradient of the height over the island.
+the map is the mean gradient of the height over the island; what was opened along its belly has its back upright.
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ STRAIGHT = 0.5
 PARALLEL = 0.1
 # ... and are this steep in the mean, next to an upright wall.
 STEEP = 0.1
+# What rises from two sides does so that much more, squared, across its ridge than along it.
+RIDGED = 3.0
+# One end of a ridge is higher where heights and places along it have this correlation.
+HIGHER = 0.02
 QUARTER = np.pi / 2
 
 
@@ -53,8 +57,9 @@ def turn_upright(
 ) -> list[np.ndarray]:
     """Maps (n_i,2) of charts, each turned about the origin so that it lies straight, with `up` (3,) upwards.
 
-    Where most of the heights cancel or the island lies level, away from the viewer and to his right stand for `up`;
-    viewers: the direction (3,) to that of each, by default along an axis of space. An island without a direction of
+    Where most of the heights cancel, the ridge that the island rises to from two sides is upright, its higher end up;
+    where there is none, or the island lies level, away from the viewer and to his right stand for `up`; viewers: the
+    direction (3,) to that of each, by default along an axis of space. An island without a direction of
     edges is turned until its mean `up` is upright; one without either keeps its turn up to quarters.
     """
     if not maps:
@@ -150,14 +155,40 @@ def _upward(islands: _Islands, up: np.ndarray, viewers: np.ndarray | None) -> np
     whole = np.maximum(np.bincount(islands.owner, np.abs(area), islands.count), np.finfo(float).tiny)
     upward = np.full(islands.count, np.nan)
     # A wall rises by 1 per length where the map is as large as the surface.
-    for axis in (up, *_level(up, viewers)):
+    for k, axis in enumerate((up, *_level(up, viewers))):
         height = np.einsum("mkd,md->mk", islands.points[islands.triangles], axis[islands.owner])
         rise = np.einsum("mk,mkd->md", height, normal) * np.sign(area)[:, None]
         total = np.stack([np.bincount(islands.owner, rise[:, d], islands.count) for d in range(2)], axis=1)
         size = np.bincount(islands.owner, np.hypot(*rise.T), islands.count)
-        sure = (np.hypot(*total.T) >= PARALLEL * size) & (size >= STEEP * whole)
+        steep = size >= STEEP * whole
+        sure = (np.hypot(*total.T) >= PARALLEL * size) & steep
         upward = np.where(np.isnan(upward) & sure, np.arctan2(total[:, 1], total[:, 0]), upward)
+        if k == 0:
+            ridge = _along_ridge(islands, area, height.mean(axis=1), rise)
+            upward = np.where(np.isnan(upward) & steep, ridge, upward)
     return upward
+
+
+def _along_ridge(islands: _Islands, area: np.ndarray, height: np.ndarray, rise: np.ndarray) -> np.ndarray:
+    """Direction (k,) in the map of the ridge that islands rise to from two sides, towards its higher end; nan for those
+    that rise from all sides. area, height (m,), rise (m,2) : the gradient of the height times the area, of triangles"""
+    size = np.maximum(np.abs(area), np.finfo(float).tiny)
+
+    def total(value: np.ndarray) -> np.ndarray:
+        return np.bincount(islands.owner, value, islands.count)
+
+    xx, xy, yy = (total(rise[:, i] * rise[:, j] / size) for i, j in ((0, 0), (0, 1), (1, 1)))
+    across = 0.5 * np.arctan2(2 * xy, xx - yy)
+    mean, half = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    ridge = np.stack([-np.sin(across), np.cos(across)], axis=1)
+    place = np.einsum("md,md->m", islands.uv[islands.triangles].mean(axis=1), ridge[islands.owner])
+    whole = np.maximum(total(size), np.finfo(float).tiny)
+    place, height = (x - (total(size * x) / whole)[islands.owner] for x in (place, height))
+    higher = total(size * place * height)
+    spread = np.sqrt(total(size * place**2) * total(size * height**2))
+    ridge *= np.where(higher < 0, -1, 1)[:, None]
+    found = (mean + half >= RIDGED * (mean - half)) & (np.abs(higher) >= HIGHER * spread)
+    return np.where(found, np.arctan2(ridge[:, 1], ridge[:, 0]), np.nan)
 
 
 def _level(up: np.ndarray, viewers: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

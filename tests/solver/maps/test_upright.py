@@ -122,3 +122,31 @@ def test_an_outline_that_is_straight_in_part_decides_over_diagonals(angle):
     chart = chart_of(triangle_surface(V, np.stack([k, np.roll(k, -1), np.full(len(ring), len(ring))], axis=1)))
     (found,) = turn_upright([chart], [chart.vertices[:, :2]], [UP])
     assert np.sort(np.ptp(found, axis=0)) == pytest.approx([1.0, 2.2], abs=0.01)
+
+
+def saddled(slope=0.0, count=300, seed=3):
+    """A chart that rises to a ridge along y from two sides, the ridge by `slope`, and its map without distortion."""
+    V, F = meshes.random_disk(count=count, height=0.0, seed=seed)
+    # Mirror images on both sides: the heights cancel.
+    space = np.stack([V[:, 0], V[:, 1], slope * V[:, 1] - np.abs(V[:, 0])], axis=1)
+    (chart,) = strict_charts(triangle_surface(space, F))
+    return chart, chart.vertices[:, :2]
+
+
+@pytest.mark.parametrize("slope", [0.05, -0.05])
+@pytest.mark.parametrize("angle", [0.4, 2.0, 4.5])
+def test_what_rises_to_a_ridge_has_it_upright_with_its_higher_end_up(slope, angle):
+    """As the hide of an animal, whoever looks from where."""
+    chart, flat = saddled(slope)
+    for viewer in ((0, -1, 0), (1, 0, 0), (-1, 0, 0)):
+        (found,) = turn_upright([chart], [flat @ rotation(angle).T], [UP], [viewer])
+        expected = flat if slope > 0 else -flat
+        assert abs(np.angle(np.vdot(expected @ [1, 1j], found @ [1, 1j]))) < 0.1
+
+
+def test_a_level_ridge_lies_as_who_looks_sees_it():
+    V, quads = meshes.quad_grid(6, 4)
+    flat = np.asarray(V, float)[:, :2] - np.asarray(V, float)[:, :2].mean(axis=0)
+    chart = chart_of(meshes.polygon_surface(np.column_stack([flat, -np.abs(flat[:, 1])]), quads))
+    (found,) = turn_upright([chart], [chart.vertices[:, :2] @ rotation(0.8).T], [UP], [(0, -1, 0)])
+    np.testing.assert_allclose(found, chart.vertices[:, :2], atol=1e-9)
