@@ -30,6 +30,7 @@ from benchmarks.parts import (
     match,
     memory,
     pace,
+    packing,
     partition,
     polygons,
     profile,
@@ -64,6 +65,7 @@ MODULES = (
     cage,
     alike,
     bodies,
+    packing,
     pace,
 )
 PARTS: dict[str, Part] = {part.name: part for module in MODULES for part in module.PARTS}

@@ -43,11 +43,16 @@ LARGER = 1.04
 EXACT = 1.004
 # A scale this much below the first one that was tried is none: the margins fill the square.
 LEAST_SCALE = 1e-3
-# Orders that are tried at a scale: what found no room comes first in the next. On the finer raster, which costs eight
-# times as much, they are fewer.
-ORDERS = 3
-FINE_ORDERS = 2
-# Another order is tried if this share of all cells found a place.
+# Orders that are tried at a scale: what found no room comes first in the second and the third; others are by sizes
+# that chance has changed by about this much, as a logarithm. On the finer raster, which costs eight times as much, they
+# are fewer.
+ORDERS = 8
+FINE_ORDERS = 4
+STUCK_FIRST = 2
+CHANCE = 0.15
+# Of so many items or more, which take longer, only the first of them are, and those if this share of all cells found a
+# place before.
+MANY_ITEMS = 100
 HOPEFUL = 0.8
 # Larger scales are given up after so many that did not fit, on either raster.
 TIRED = 4
@@ -259,23 +264,29 @@ def _larger(found: _Found, most: float) -> Steps[_Found]:
 
 
 def _fit(task: _PackTask, scale: float, order: list[int]) -> tuple[_Found | None, list[int]]:
-    """The items placed at a scale, if a few orders find them a place; and the order that was tried last."""
+    """The items placed at a scale, if a few orders find them a place; and the order to begin with at the next one."""
     raster = _rasterised(task, scale)
+    sizes = np.array([item.turns[0].mask.size for item in raster.items], dtype=float)
     if len(order) != len(raster.items):
-        order = np.argsort([-np.prod(i.turns[0].mask.shape) for i in raster.items], kind="stable").tolist()
+        order = np.argsort(-sizes, kind="stable").tolist()
     widest = max(item.widest for item in raster.items)
     cells = np.array([item.cells for item in raster.items])
     if cells.sum() > task.raster**2 or widest > task.raster:
         return None, order
-    for _ in range(task.tries[0]):
-        places, stuck = place(raster.items, order, _grid(task, widest))
+    # The same draws at every scale: what has fitted at one is tried at the next.
+    rng, tried, many = np.random.default_rng(0), order, len(cells) >= MANY_ITEMS
+    for k in range(min(task.tries[0], STUCK_FIRST + 1) if many else task.tries[0]):
+        places, stuck = place(raster.items, tried, _grid(task, widest))
         if places:
-            return _Found(task, scale, raster, places, order), order
-        hopeless = cells[order[: order.index(stuck)]].sum() < HOPEFUL * cells.sum()
-        order = [stuck, *(k for k in order if k != stuck)]
-        if hopeless:
+            return _Found(task, scale, raster, places, tried), tried
+        hopeless = cells[tried[: tried.index(stuck)]].sum() < HOPEFUL * cells.sum()
+        if k < STUCK_FIRST:
+            tried = [stuck, *(item for item in tried if item != stuck)]
+        else:
+            tried = np.argsort(-sizes * np.exp(CHANCE * rng.normal(size=len(sizes))), kind="stable").tolist()
+        if many and hopeless:
             break
-    return None, order
+    return None, tried if many else order
 
 
 def _grid(task: _PackTask, widest: int) -> RasterGrid:

@@ -83,6 +83,21 @@ def test_one_scale_and_no_mirror_image():
     assert 0.25 < result.coverage < 1
 
 
+def bars(seed, count=14):
+    """Rectangles, whose places hang on their order alone."""
+    sizes = np.exp(np.random.default_rng(seed).normal(0, 0.8, (count, 2)))
+    return [np.array([[0, 0], [w, 0], [w, h], [0, h]]) for w, h in sizes]
+
+
+def test_other_orders_make_room_where_the_first_ones_do_not(monkeypatch):
+    faces = [np.array([[0, 1, 2], [0, 2, 3]])] * 14
+    more = np.array([pack(bars(seed), faces).coverage for seed in (0, 1, 5, 7)])
+    monkeypatch.setattr(pack_square, "ORDERS", pack_square.STUCK_FIRST + 1)
+    monkeypatch.setattr(pack_square, "FINE_ORDERS", pack_square.STUCK_FIRST)
+    fewer = np.array([pack(bars(seed), faces).coverage for seed in (0, 1, 5, 7)])
+    assert (more >= fewer - 1e-9).all() and more.mean() > fewer.mean() + 0.003
+
+
 def test_many_slim_islands_fill_the_square():
     """Hair cards, most of which are packed in blocks."""
     rng = np.random.default_rng(0)
