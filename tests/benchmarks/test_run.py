@@ -25,7 +25,7 @@ def test_an_option_is_one_option_wherever_it_is_taken():
 def test_without_names_all_parts_run_but_those_that_say_otherwise():
     _, parts = run.parse([])
     named = {"clicks", "flows", "hard", "invariance", "level", "limbs", "live", "match", "metric", "million", "nearest"}
-    named |= {"cage_least", "pace", "partition", "polygons", "profile", "volumes"}
+    named |= {"cage_least", "pace", "packing", "partition", "polygons", "profile", "volumes"}
     assert {p.name for p in run.PARTS.values()} - {p.name for p in parts} == named
 
 
