@@ -26,7 +26,8 @@ from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.packing.pack_square import pack
 from omt_uv.solver.progress import drain
 
-MARGIN, TEXTURE = 4, 1024  # pixels
+MARGIN = 4  # pixels
+TEXTURE = 1024
 # How models are cut: in their parts, or in charts.
 MODELS = {"ogre": "auto", "teapot": "auto", "suzanne": "auto", "bunny": "charts", "homer": "charts"}
 PRIMITIVES = {

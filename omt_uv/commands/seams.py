@@ -32,7 +32,7 @@ def run(options: argparse.Namespace) -> None:
     from ..blender.vertex_groups import avoided
     from ..files.saving import save
     from ..pipelines.subdivision import on_subdivided_surface
-    from ..solver.parameterization.chart_pins import clear_of_pins
+    from ..solver.parameterization.chart_indices import clear_of_pins
     from ..solver.parameterization.unwrap import predicted_cuts
 
     if options.output.suffix.lower() != ".blend":

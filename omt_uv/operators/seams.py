@@ -80,7 +80,7 @@ class UV_OT_omt_seams(SubdivisionSettings, SolverOperator, bpy.types.Operator):
 def _cut(reading, avoid, modifier, bound: float, options: dict):
     """The cuts of a surface, as it is or as a modifier subdivides it, for a bound of the shear or, with 0, none."""
     from ..pipelines.subdivision import on_subdivided_surface
-    from ..solver.parameterization.chart_pins import clear_of_pins
+    from ..solver.parameterization.chart_indices import clear_of_pins
     from ..solver.parameterization.unwrap import predicted_cuts
     from ..solver.progress import Progress
 

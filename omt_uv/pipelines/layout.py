@@ -23,7 +23,7 @@ from ..solver.mesh.charts import Chart
 from ..solver.mesh.surface import Surface
 from ..solver.packing.pack_square import Packing, pack, stack
 from ..solver.packing.single_precision import without_rounded_folds
-from ..solver.parameterization.chart_pins import CornerPins
+from ..solver.parameterization.chart_indices import CornerPins
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
 from ..solver.subdivision.modifier import SubdivisionModifier

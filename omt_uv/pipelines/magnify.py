@@ -33,9 +33,8 @@ from ..solver.mesh.charts import check_disk, triangle_rows
 from ..solver.mesh.geometry import signed_areas
 from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.surface import Surface
-from ..solver.parameterization.chart_indices import located
+from ..solver.parameterization.chart_indices import CornerPins, located
 from ..solver.parameterization.chart_map import map_chart
-from ..solver.parameterization.chart_pins import CornerPins
 from ..solver.parameterization.options import MapOptions
 from ..solver.progress import Steps, part_of
 from ..solver.subdivision.modifier import SubdivisionModifier

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..solver.analysis.facing import Z_UP, SceneAxes
 from ..solver.mesh.surface import Surface
-from ..solver.parameterization.chart_pins import CornerPins
+from ..solver.parameterization.chart_indices import CornerPins
 from ..solver.subdivision.modifier import SubdivisionModifier
 
 # Of files whose coordinates are taken as they are, in formats in which Y is up by custom.

@@ -18,9 +18,8 @@ from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.polygon_areas import polygon_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_edges
-from ..solver.parameterization.chart_indices import chart_target, located
+from ..solver.parameterization.chart_indices import ChartPins, CornerPins, chart_target, located, pins_of_chart
 from ..solver.parameterization.chart_map import ChartMap
-from ..solver.parameterization.chart_pins import ChartPins, CornerPins, pins_of_chart
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps, part_of
 from ..solver.refinement.refine import Refinement

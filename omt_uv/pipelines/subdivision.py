@@ -15,8 +15,8 @@ from ..solver.mesh.charts import turned_polygons
 from ..solver.mesh.geometry import face_areas, signed_areas
 from ..solver.mesh.surface import Surface
 from ..solver.mesh.topology import boundary_loops
+from ..solver.parameterization.chart_indices import CornerPins, pins_of_chart
 from ..solver.parameterization.chart_map import ChartMap
-from ..solver.parameterization.chart_pins import CornerPins, pins_of_chart
 from ..solver.parameterization.mirrored_charts import mirror_partners
 from ..solver.parameterization.unwrap import SurfaceMap
 from ..solver.progress import Steps

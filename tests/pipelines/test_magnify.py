@@ -13,7 +13,7 @@ from omt_uv.settings import MagnifySettings
 from omt_uv.solver.errors import ShareError, WeightError
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.mesh.surface import Surface
-from omt_uv.solver.parameterization.chart_pins import CornerPins
+from omt_uv.solver.parameterization.chart_indices import CornerPins
 from omt_uv.solver.progress import drain
 
 DRAFT = {"quality": "draft", "factor": 2.0}

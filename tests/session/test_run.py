@@ -196,7 +196,7 @@ def offered(package, operator):
 
 def steep(package, monkeypatch):
     """A part that several rounds of seams cut, since the first is content with anything."""
-    monkeypatch.setattr(package("solver.parameterization.shear_bound"), "SPREAD_OF_SHEAR", 1e4)
+    monkeypatch.setattr(package("solver.parameterization.shear_search"), "SPREAD_OF_SHEAR", 1e4)
     return scenes.bump(20, 16, height=1.5)
 
 

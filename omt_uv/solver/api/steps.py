@@ -20,7 +20,7 @@ from ..mesh.geometry import signed_areas
 from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface
 from ..parameterization import unwrap as unwrapping
-from ..parameterization.chart_pins import CornerPins
+from ..parameterization.chart_indices import CornerPins
 from ..parameterization.options import UnwrapOptions
 from ..progress import Steps, part_of
 from ..remeshing import Remesh

@@ -11,7 +11,7 @@ from ..lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     chart_map="ChartMap map_chart",
-    chart_pins="ChartPins CornerPins clear_of_pins",
+    chart_indices="ChartPins CornerPins clear_of_pins",
     convexity="keep_convex",
     initial_map="DiskMesh InitialChartMap",
     options="MapOptions UnwrapOptions",

@@ -22,7 +22,7 @@ from ..refinement.continuation_rules import QUALITIES
 from ..refinement.initial_maps import unroll
 from ..refinement.refine import Refinement, RefinementOptions, refine
 from ..transport.convex_domain import Disk
-from .chart_pins import ChartPins, mirrored_to_pins, moved_to_pins, refuse_pins_on_outline
+from .chart_indices import ChartPins, mirrored_to_pins, moved_to_pins, refuse_pins_on_outline
 from .initial_map import (
     COARSE_ABOVE,
     DRAFT_ABOVE,

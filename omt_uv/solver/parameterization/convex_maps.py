@@ -17,9 +17,8 @@ from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops
 from ..progress import Steps
 from ..refinement.continuation_rules import QUALITIES
-from .chart_indices import chart_target
+from .chart_indices import ChartPins, chart_target
 from .chart_map import FOLDED, ChartMap, in_unit_box, measured_chart, measured_map, refined_again
-from .chart_pins import ChartPins
 from .options import MapOptions
 from .polygon_disk import cut_as_mapped
 

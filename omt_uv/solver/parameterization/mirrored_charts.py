@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from ..analysis.density import Target
 from ..canonical.markers import ChartMarkers
 from ..cutting.cuts import Cuts
+from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..errors import MeshError
 from ..mesh.charts import Chart, sound_disks
 from ..mesh.geometry import edge_lengths, signed_areas
@@ -22,9 +23,9 @@ from ..mesh.polygon_areas import quad_corners, triangle_pairs
 from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import boundary_loops, graph_components, on_boundary, pair_keys
 from ..progress import Steps
-from ..refinement.initial_maps import unroll
+from ..refinement.initial_maps import is_curved, unroll
+from .chart_indices import ChartPins
 from .chart_map import UNROLLED, ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
-from .chart_pins import ChartPins
 from .convex_maps import with_figures
 from .options import MapOptions
 
@@ -360,3 +361,27 @@ def _at_vertices(chart: Chart, values: np.ndarray) -> np.ndarray:
     """Mean of values (m,) of a chart's triangles around its vertices, (n,)."""
     flat, n = chart.triangles.ravel(), len(chart.vertices)
     return np.bincount(flat, np.repeat(values, 3), n) / np.maximum(np.bincount(flat, minlength=n), 1)
+
+
+def cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts, given: dict) -> Steps[DiskCharts]:
+    """The charts cut along the mirror images of their cuts, too, where that leaves as many charts, all without holes;
+    as they are otherwise. given : further arguments of `disk_charts`"""
+    if prepared.cuts is None or not len(prepared.cuts.edges) or any(len(c.patches) for c in prepared.charts):
+        return prepared
+    # What unrolls has no slits that it could spare.
+    if all(_is_flat(chart) for chart in prepared.charts):
+        return prepared
+    cuts = with_images(surface, faces, prepared.cuts)
+    if cuts is prepared.cuts:
+        return prepared
+    open_there = replace(surface, seams=np.concatenate([surface.seams, cuts.edges]))
+    found = yield from disk_charts(open_there, faces, extremities=0, **given)
+    if len(found.charts) > len(prepared.charts) or found.cuts is None or len(found.cuts.edges):
+        return prepared
+    return replace(prepared, charts=found.charts, cuts=cuts)
+
+
+def _is_flat(chart: Chart) -> bool:
+    """Whether a chart without holes unrolls."""
+    boundary = np.flatnonzero(on_boundary(chart.triangles, len(chart.vertices)))
+    return not is_curved(chart.vertices, chart.triangles, boundary)

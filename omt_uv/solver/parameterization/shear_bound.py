@@ -5,34 +5,28 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.density import Target, means_of_polygons
-from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..cutting.cuts import Cuts
-from ..cutting.disk_charts import DiskCharts, disk_charts
+from ..cutting.disk_charts import DiskCharts
 from ..errors import ENDED_EARLY, MORE_SEAMS
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
-from ..mesh.surface import Surface
 from ..mesh.topology import pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import SPREAD_BY_SHEAR
 from .chart_indices import edge_set, identity, is_marked, outline, within
 from .chart_map import ChartMap, local_shear
 from .options import ShearBound
+from .shear_search import ShearSearch
 
 if TYPE_CHECKING:
-    from ..seams.search import SeamSearch
+    pass
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
-# The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
-# between 0.2 and 0.35, of limbs with fingers less.
-SPREAD_OF_SHEAR = 0.19
 # What a search that is made again aims below the bound, so that it need not be the last but one; later ones less.
 MARGIN = 0.95
 # What misses the bound by less stays in one piece at first: it has so many times the square of log(shear).
@@ -41,15 +35,9 @@ CROWDED = 1.35
 ROOM = 0.5
 # Nothing comes apart for less than this share of the bound.
 HARDLY = 0.01
-# Vertices this close to where images of others belong, over the extent, are these images.
-SAME_PLACE = 1e-3
 # What shears more than this is seen on any checker, and charts with more of it than that share are cut further.
 STEEP = 3.0
 MOST_STEEP = 0.01
-# Below this bound, what the triangles of a coarse surface shear by themselves counts more than what is cut.
-LEAST_REHEARSED = 1.2
-# Of a surface in one piece the largest chart has this share of the area, but for crumbs.
-ONE_PIECE = 0.97
 # So many times what is steep beyond that share is slit, and this share of a chart more every time that was no help.
 SLIT = 1.5
 MORE_SLIT = 0.001
@@ -86,106 +74,6 @@ class BoundedShear:
     prepared: DiskCharts
     maps: list[ChartMap]
     warnings: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ShearSearch:
-    """Where and how seams are searched so that maps keep a bound of the shear.
-
-    Attributes
-    ----------
-    surface, faces : polygons (f,) bool of a surface
-    shear : the bound
-    target : see `chart_map.map_chart`
-    cutting : further arguments of `disk_charts.disk_charts`
-    map_surface : gives the maps of the charts of a small surface, for a target of its own
-    """
-
-    surface: Surface
-    faces: np.ndarray | None
-    shear: ShearBound
-    target: Target | None
-    cutting: dict
-    map_surface: Callable[[Surface, list[Chart], Target | None], Steps[list[ChartMap]]] | None = None
-
-    def first_spread(self) -> np.ndarray:
-        """The spread (f,) to begin with, see `SeamSearch`."""
-        return np.full(self.count, SPREAD_OF_SHEAR * np.log(self.shear.bound) ** 2)
-
-    def search(self, spread: np.ndarray) -> SeamSearch:
-        """The search for a spread (f,)."""
-        from ..seams.search import SeamSearch
-
-        return SeamSearch(
-            spread,
-            self.surface,
-            self.costs,
-            density=self._density,
-            further=self.shear.further,
-            memory=self.memory,
-            asked=float(np.log(self.shear.bound) ** 2),
-            rehearse=self.rehearsed if self.shear.bound >= LEAST_REHEARSED else None,
-        )
-
-    def rehearsed(self, surface: Surface, log_density: np.ndarray | None) -> Steps[float | None]:
-        """The square of the logarithm of what maps of a small surface shear; log_density (n,) : half the logarithm of
-        the density at its vertices. None where it comes apart, since then it is another surface."""
-        if self.map_surface is None:
-            return None
-        target = None
-        if log_density is not None:
-            target = Target(np.exp(2 * log_density[surface.corner_vertex[surface.triangles]].mean(axis=1)))
-        prepared = yield from disk_charts(surface, extremities=0)
-        maps = yield from self.map_surface(surface, prepared.charts, target)
-        shear = [local_shear(chart, one, target is None) for chart, one in zip(prepared.charts, maps, strict=True)]
-        size = np.array([area.sum() for _, area in shear])
-        if size.max() < ONE_PIECE * size.sum():
-            return None
-        return float(np.log(sum(area @ local for local, area in shear) / size.sum()) ** 2)
-
-    def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, changes: dict) -> Steps[DiskCharts]:
-        """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
-        what changes in the search; the edges that others were cut along (k,2) stay."""
-        target = np.full(self.count, np.inf)
-        for chart in missed:
-            target[chart.faces] = spread[chart.faces]
-        search = replace(self.search(target), further=True, **changes)
-        surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
-        return disk_charts(surface, self.faces, search=search, **self.cutting)
-
-    def costs(self) -> SeamCosts:
-        """What cutting the edges of the surface costs."""
-        return self._costs
-
-    @cached_property
-    def memory(self) -> dict:
-        """What a first search has found."""
-        return {}
-
-    @cached_property
-    def images(self) -> np.ndarray | None:
-        """The mirror image of every vertex of the surface, -1 where none lies there; None without a mirror."""
-        plane, positions = self.costs().plane, self.surface.positions
-        if plane is None:
-            return None
-        image, far = plane.nearest_images(positions, self.surface.corner_vertex[self.surface.triangles])
-        extent = float(np.ptp(positions[self.surface.corner_vertex], axis=0).max())
-        return np.where(far <= SAME_PLACE * extent, image, -1)
-
-    @cached_property
-    def _costs(self) -> SeamCosts:
-        return seam_costs(self.surface, self.shear.preferences, self.faces)
-
-    @cached_property
-    def _density(self) -> np.ndarray | None:
-        if self.target is None:
-            return None
-        return means_of_polygons(self.target.density, self.surface.triangle_face, self.count)
-
-    @property
-    def count(self) -> int:
-        """Polygons of the surface."""
-        return len(self.surface.face_start) - 1
 
 
 def bound_shear(

@@ -21,17 +21,27 @@ from ..mesh.charts import Chart, part_of_chart, sound_disks
 from ..mesh.edge_flips import cut_along_shorter
 from ..mesh.geometry import face_areas
 from ..mesh.surface import Surface
-from ..mesh.topology import on_boundary, pair_keys
+from ..mesh.topology import pair_keys
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import PROMISED, QUALITIES
-from ..refinement.initial_maps import is_curved
 from ..seams.options import COMPACT
-from .chart_indices import chart_target, cut_as_given, in_order_of_places, is_marked, located, outline
+from .chart_indices import (
+    ChartPins,
+    CornerPins,
+    chart_target,
+    clear_of_pins,
+    cut_as_given,
+    in_order_of_places,
+    is_marked,
+    located,
+    outline,
+    pins_of_chart,
+)
 from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, measured_map, no_map, refined_again
-from .chart_pins import ChartPins, CornerPins, clear_of_pins, pins_of_chart
 from .convex_maps import with_convex_polygons, with_figures, with_folds_counted
 from .mirrored_charts import (
     as_given,
+    cut_alike,
     equal_chart_map,
     map_completed,
     mirror_partners,
@@ -40,7 +50,8 @@ from .mirrored_charts import (
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
-from .shear_bound import ShearSearch, bound_shear
+from .shear_bound import bound_shear
+from .shear_search import ShearSearch
 from .small_charts import is_small, map_together
 
 # Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps.
@@ -252,7 +263,7 @@ def cut_charts(
     finder = None if search is None else search.search(search.first_spread())
     seams = OUTLINED if options.seams == "auto" and options.boundary != "free" else options.seams
     prepared = yield from disk_charts(surface, faces, seams=seams, search=finder, **given)
-    prepared = yield from _cut_alike(surface, faces, prepared, given)
+    prepared = yield from cut_alike(surface, faces, prepared, given)
     return replace(_to_be_mapped(surface, prepared, pins, target), search=search)
 
 
@@ -280,30 +291,6 @@ def predicted_cuts(
         options |= {"search": search.search(search.first_spread())}
     cuts = cut_surface(surface, faces, **options)
     return cuts if options.get("fill") else with_images(surface, faces, cuts)
-
-
-def _cut_alike(surface: Surface, faces: np.ndarray | None, prepared: DiskCharts, given: dict) -> Steps[DiskCharts]:
-    """The charts cut along the mirror images of their cuts, too, where that leaves as many charts, all without holes;
-    as they are otherwise. given : further arguments of `disk_charts`"""
-    if prepared.cuts is None or not len(prepared.cuts.edges) or any(len(c.patches) for c in prepared.charts):
-        return prepared
-    # What unrolls has no slits that it could spare.
-    if all(_is_flat(chart) for chart in prepared.charts):
-        return prepared
-    cuts = with_images(surface, faces, prepared.cuts)
-    if cuts is prepared.cuts:
-        return prepared
-    open_there = replace(surface, seams=np.concatenate([surface.seams, cuts.edges]))
-    found = yield from disk_charts(open_there, faces, extremities=0, **given)
-    if len(found.charts) > len(prepared.charts) or found.cuts is None or len(found.cuts.edges):
-        return prepared
-    return replace(prepared, charts=found.charts, cuts=cuts)
-
-
-def _is_flat(chart: Chart) -> bool:
-    """Whether a chart without holes unrolls."""
-    boundary = np.flatnonzero(on_boundary(chart.triangles, len(chart.vertices)))
-    return not is_curved(chart.vertices, chart.triangles, boundary)
 
 
 def _to_be_mapped(surface: Surface, prepared: DiskCharts, pins: CornerPins | None, target: Target | None) -> CutCharts:

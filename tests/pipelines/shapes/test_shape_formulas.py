@@ -17,7 +17,7 @@ from omt_uv.pipelines.shapes.cell_attributes import carry_to_cells
 from omt_uv.settings import PartitionSettings
 from omt_uv.solver.mesh.geometry import face_areas, face_normals
 from omt_uv.solver.mesh.surface import chosen_triangles, triangle_surface
-from omt_uv.solver.parameterization.chart_pins import CornerPins
+from omt_uv.solver.parameterization.chart_indices import CornerPins
 from omt_uv.solver.partition.cut_mesh import cut_along_cells
 from omt_uv.solver.partition.division import DivisionOptions, divide
 from omt_uv.solver.progress import drain

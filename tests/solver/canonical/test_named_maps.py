@@ -15,8 +15,8 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
+from omt_uv.solver.parameterization.chart_indices import ChartPins
 from omt_uv.solver.parameterization.chart_map import map_chart
-from omt_uv.solver.parameterization.chart_pins import ChartPins
 from omt_uv.solver.parameterization.options import MapOptions
 from omt_uv.solver.progress import drain
 from omt_uv.solver.transport.convex_domain import Rectangle

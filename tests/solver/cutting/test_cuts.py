@@ -16,7 +16,7 @@ from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.errors import OrientationError
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.parameterization.chart_pins import CornerPins
+from omt_uv.solver.parameterization.chart_indices import CornerPins
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 

@@ -18,7 +18,7 @@ from omt_uv.solver.maps.untangle import arc_length_boundary
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_edges, boundary_loops
-from omt_uv.solver.parameterization.chart_pins import CornerPins
+from omt_uv.solver.parameterization.chart_indices import CornerPins
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain

@@ -11,8 +11,8 @@ from omt_uv.solver.errors import PinError
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization.chart_indices import ChartPins
 from omt_uv.solver.parameterization.chart_map import in_unit_box, map_chart, placed_chart
-from omt_uv.solver.parameterization.chart_pins import ChartPins
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.progress import drain
 

@@ -10,8 +10,8 @@ import pytest
 
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.parameterization.chart_indices import ChartPins
 from omt_uv.solver.parameterization.chart_map import FOLDED, map_chart, measured_map
-from omt_uv.solver.parameterization.chart_pins import ChartPins
 from omt_uv.solver.parameterization.convex_maps import with_convex_polygons, with_figures
 from omt_uv.solver.parameterization.convexity import dented_faces, keep_convex, reflex_triangles
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions

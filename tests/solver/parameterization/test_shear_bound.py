@@ -15,7 +15,7 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
-from omt_uv.solver.parameterization import shear_bound
+from omt_uv.solver.parameterization import shear_bound, shear_search
 from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.chart_indices import identity
 from omt_uv.solver.parameterization.chart_map import local_shear, map_chart
@@ -153,7 +153,7 @@ def failing(error):
 def test_what_misses_the_bound_says_so(monkeypatch):
     V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
     # A search that is content with anything, and no other.
-    monkeypatch.setattr(shear_bound, "SPREAD_OF_SHEAR", 1e4)
+    monkeypatch.setattr(shear_search, "SPREAD_OF_SHEAR", 1e4)
     monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
     result = unwrapped(triangle_surface(V, F), 1.3)
     (warning,) = result.warnings
@@ -162,7 +162,7 @@ def test_what_misses_the_bound_says_so(monkeypatch):
 
 def test_a_warning_tells_how_much_of_the_surface_it_is_about(monkeypatch):
     """A cap of a hundredth of a wide flat grid shears, and nobody shall take it for the body."""
-    monkeypatch.setattr(shear_bound, "SPREAD_OF_SHEAR", 1e4)
+    monkeypatch.setattr(shear_search, "SPREAD_OF_SHEAR", 1e4)
     monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
     V, F = meshes.cap(rings=12, sectors=24, opening=0.9)
     size = np.sqrt(face_areas(V, F).sum() * 99)
@@ -204,8 +204,8 @@ def silent():
 
 def test_an_early_end_keeps_the_last_whole_map(monkeypatch):
     """The first of several rounds, as if it had been the only one; its warning says why it shears."""
-    monkeypatch.setattr(shear_bound, "SPREAD_OF_SHEAR", 2.0)
-    monkeypatch.setattr(shear_bound.ShearSearch, "rehearsed", lambda *_: silent())
+    monkeypatch.setattr(shear_search, "SPREAD_OF_SHEAR", 2.0)
+    monkeypatch.setattr(shear_search.ShearSearch, "rehearsed", lambda *_: silent())
     surface = triangle_surface(*meshes.cap(rings=12, sectors=24, opening=0.9))
     whole = unwrapped(surface, 1.2)
     ended, offers = ended_at(surface, 1.2, when=1)
@@ -282,7 +282,7 @@ def test_what_became_worse_stays_where_others_became_better():
     surface = triangle_surface(
         np.concatenate([V, V + [9, 0, 0], V + [18, 0, 0]]), np.concatenate([F, F + n, F + 2 * n])
     )
-    search = shear_bound.ShearSearch(surface, None, ShearBound(1.2), None, {})
+    search = shear_search.ShearSearch(surface, None, ShearBound(1.2), None, {})
     middle = (V[:, 0] == 0.5).nonzero()[0]
     across = np.column_stack([middle[:-1], middle[1:]])
     before = made_round(search, across[:1], (1.6, 1.6, 1.1), "old")

@@ -14,7 +14,7 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import boundary_loops
-from omt_uv.solver.parameterization import shear_bound
+from omt_uv.solver.parameterization import shear_search
 from omt_uv.solver.parameterization.chart_map import map_chart
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
@@ -156,7 +156,7 @@ def test_progress_never_runs_backwards():
 
 def test_the_bar_rises_through_all_rounds_of_seams(monkeypatch):
     """A search that is content with anything at first, so that several rounds follow."""
-    monkeypatch.setattr(shear_bound, "SPREAD_OF_SHEAR", 2.0)
+    monkeypatch.setattr(shear_search, "SPREAD_OF_SHEAR", 2.0)
     seen: list[Progress] = []
     surface = triangle_surface(*meshes.cap(rings=8, sectors=16, opening=0.9))
     drain(unwrap(surface, options=UnwrapOptions(max_shear=1.15)), seen.append)

@@ -10,7 +10,7 @@ from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import halfedges, pair_keys, twins
 from omt_uv.solver.parameterization.chart_map import local_shear
 from omt_uv.solver.parameterization.options import UnwrapOptions
-from omt_uv.solver.parameterization.shear_bound import ShearSearch
+from omt_uv.solver.parameterization.shear_search import ShearSearch
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.seams import search as search_module

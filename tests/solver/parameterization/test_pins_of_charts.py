@@ -7,7 +7,7 @@ import pytest
 from omt_uv.solver.errors import PinError
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.parameterization.chart_pins import (
+from omt_uv.solver.parameterization.chart_indices import (
     ChartPins,
     CornerPins,
     clear_of_pins,
