@@ -39,6 +39,13 @@ class DiskCharts:
     cuts: Cuts | None
     warnings: tuple[str, ...]
 
+    @property
+    def found_cuts(self) -> Cuts:
+        """The cuts of a surface that was to be cut."""
+        if self.cuts is None:
+            raise ValueError("charts along existing seams alone have no cuts")
+        return self.cuts
+
 
 def cut_to_disks(surface: Surface, faces: np.ndarray | None = None, **options) -> DiskCharts:
     """Disk charts of the polygons `faces` (f,) bool, at once; options and errors are those of `disk_charts`."""

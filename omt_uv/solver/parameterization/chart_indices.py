@@ -120,6 +120,12 @@ def within(chart: Chart) -> np.ndarray:
     return keys[count > 1]
 
 
+def but_within(edges: np.ndarray, charts: list[Chart]) -> np.ndarray:
+    """Those of the edges (e,2) that are not within charts, which are cut anew."""
+    inner = np.concatenate([np.zeros(0, np.int64), *(within(chart) for chart in charts)])
+    return edges[~np.isin(pair_keys(*edges.T), inner)]
+
+
 def is_marked(surface: Surface, chart: Chart) -> bool:
     """Whether seams of the surface bound a chart."""
     return bool(is_seam(surface, outline(chart)).any())

@@ -5,7 +5,7 @@ Also where quads are cut otherwise: sides of polygons count, and diagonals do no
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..mesh.surface import Surface, chosen_triangles
 from ..mesh.topology import boundary_loops, graph_components, on_boundary, pair_keys
 from ..progress import Steps
 from ..refinement.initial_maps import is_curved, unroll
-from .chart_indices import ChartPins
+from .chart_indices import ChartPins, identity
 from .chart_map import UNROLLED, ChartMap, in_unit_box, map_chart, measured_chart, placed_chart
 from .convex_maps import with_figures
 from .options import MapOptions
@@ -385,3 +385,15 @@ def _is_flat(chart: Chart) -> bool:
     """Whether a chart without holes unrolls."""
     boundary = np.flatnonzero(on_boundary(chart.triangles, len(chart.vertices)))
     return not is_curved(chart.vertices, chart.triangles, boundary)
+
+
+def mapped_anew(
+    charts: list[Chart],
+    known: list[tuple[Chart, ChartMap]],
+    map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
+) -> Steps[list[ChartMap]]:
+    """Maps of the charts; those that are as known ones were have the maps of these."""
+    maps = {identity(chart): chart_map for chart, chart_map in known}
+    new = yield from map_charts([chart for chart in charts if identity(chart) not in maps])
+    rest = iter(new)
+    return [maps[identity(chart)] if identity(chart) in maps else next(rest) for chart in charts]

@@ -17,8 +17,9 @@ from ..mesh.geometry import edge_lengths
 from ..mesh.topology import pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import SPREAD_BY_SHEAR
-from .chart_indices import edge_set, identity, is_marked, outline, within
+from .chart_indices import but_within, edge_set, identity, is_marked, outline
 from .chart_map import ChartMap, local_shear
+from .mirrored_charts import mapped_anew
 from .options import ShearBound
 from .shear_search import ShearSearch
 
@@ -48,6 +49,12 @@ NEARLY = 0.03
 SHEARED = 2.0
 # Where a second search and later ones take off less than this share of what is missing, no seams are left that pay.
 LITTLE = 0.1
+# A chart with less than this share of the square of log(shear) that the bound allows may do with a shorter cut, which
+# is mapped where all are shorter by this share at least.
+SLACK = 0.85
+WORTHWHILE = 0.03
+# Where that misses the bound, one that uses up less of what is allowed may not: powers of it.
+HOPES = (1.0, 0.5)
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
 # A mean excess of the shear up to this is not worse than none: what was parted is cut further.
@@ -90,7 +97,7 @@ def bound_shear(
     Progress offers an early end: with the maps of the last round. Errors: see `disk_charts.disk_charts`, `map_charts`.
     """
     early = EarlyEnd()
-    best = last = _Round.of(search, first.charts, maps, _cuts(first), search.memory)
+    best = last = _Round.of(search, first.charts, maps, first.found_cuts, search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     tried = {edge_set(last.cuts.edges)}
     rehearsed, crossed, worse = dict[str, Any](), False, set[tuple[bytes, bytes]]()
@@ -114,28 +121,96 @@ def bound_shear(
         share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
         begin, width = begin + width * PARTING, width * (1 - PARTING)
-        kept = np.concatenate([_around(last, (*missed, *flat)), *apart.values()])
-        memory = dict(last.memory)
+        kept = but_within(last.cuts.edges, [last.charts[k] for k in (*missed, *flat)])
+        kept = np.concatenate([kept, *apart.values()])
         # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
-        changes = {"share": share, "adding": rounds > 1, "memory": memory} | rehearsed
-        cutting = search.again(kept, [last.charts[k] for k in missed], spread, changes)
-        again = yield from unless_ended(part_of(cutting, begin, width * SEARCHING), early)
-        if again is None:
+        changes = {"share": share, "adding": rounds > 1} | rehearsed
+        asked = _Asked(missed, kept, spread, changes, lambda edges: edge_set(edges) not in tried)
+        new = yield from part_of(_cut_anew(search, last, asked, map_charts, early), begin, width)
+        if new is None:
             break
-        edges = np.concatenate([kept, _cuts(again).edges])
-        if (name := edge_set(edges)) in tried:
+        if new is last:
             # It has not kept what it promised, and so more is asked for.
             continue
-        tried.add(name)
-        mapping = _mapped(again.charts, last.charts, last.maps, map_charts)
-        further = part_of(mapping, begin + width * SEARCHING, width * (1 - SEARCHING))
-        mapped = yield from unless_ended(further, early)
-        if mapped is None:
-            break
-        new = _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
+        tried.add(edge_set(new.cuts.edges))
         last, worse = last.with_what_is_better(search, new, worse)
+    else:
+        rounds = MOST_ROUNDS
     best = last if last.excess <= best.excess else best
+    if not best.excess and not early.is_asked:
+        begin = 1 - 0.5 ** (rounds - 1)
+        best = yield from part_of(_taken_back(search, best, map_charts, early), begin, 1 - begin)
     return best.result(search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """Numbers of charts to be cut anew for a spread (f,), the edges (k,2) that stay cut all the same, what changes in
+    the search, and whether edges (k,2) that it comes to are worth a map."""
+
+    charts: list[int]
+    kept: np.ndarray
+    spread: np.ndarray
+    changes: dict[str, Any]
+    is_worth: Callable[[np.ndarray], bool]
+
+
+def _cut_anew(search: ShearSearch, last: _Round, asked: _Asked, map_charts, early: EarlyEnd) -> Steps[_Round | None]:
+    """The next round; the last one where what was found is not worth a map, and None where the end was asked for."""
+    memory = dict(last.memory)
+    chosen = [last.charts[k] for k in asked.charts]
+    cutting = search.again(asked.kept, chosen, asked.spread, asked.changes | {"memory": memory})
+    again = yield from unless_ended(part_of(cutting, 0.0, SEARCHING), early)
+    if again is None:
+        return None
+    edges = np.concatenate([asked.kept, again.found_cuts.edges])
+    if not asked.is_worth(edges):
+        return last
+    mapping = mapped_anew(again.charts, list(zip(last.charts, last.maps, strict=True)), map_charts)
+    mapped = yield from unless_ended(part_of(mapping, SEARCHING, 1 - SEARCHING), early)
+    if mapped is None:
+        return None
+    return _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
+
+
+def _taken_back(search: ShearSearch, last: _Round, map_charts, early: EarlyEnd) -> Steps[_Round]:
+    """A round within the bound with shorter cuts, where rehearsals had asked for more than maps needed, if these keep
+    the bound, too; as it is otherwise."""
+    longer = [k for k in range(len(last.charts)) if _has_slack(last, k)]
+    if not longer:
+        return last
+    kept = but_within(last.cuts.edges, [last.charts[k] for k in longer])
+
+    def is_worth(edges: np.ndarray) -> bool:
+        return _joined(search, last.cuts, edges).length <= (1 - WORTHWHILE) * last.cuts.length
+
+    for k, hope in enumerate(HOPES):
+        share = np.ones(search.count)
+        for chart in longer:
+            share[last.charts[chart].faces] = _share_allowed(last, chart) ** hope
+        spread = search.first_spread() * share**SPREAD_BY_SHEAR
+        asked = _Asked(longer, kept, spread, {"share": share, "adding": True}, is_worth)
+        cutting = _cut_anew(search, last, asked, map_charts, early)
+        new = yield from part_of(cutting, k / len(HOPES), 1 / len(HOPES))
+        if new is None or new is last:
+            break
+        if not new.searched:
+            return new
+    return last
+
+
+def _share_allowed(last: _Round, k: int) -> float:
+    """How many times the square of log(shear) of chart k may be."""
+    return float(MARGIN * np.log(last.bound) ** 2 / np.log(last.pressing[k]) ** 2)
+
+
+def _has_slack(last: _Round, k: int) -> bool:
+    """Whether chart k, as it was rehearsed, shears so much less than the bound that a shorter cut may do."""
+    faces = np.unique(last.charts[k].faces)
+    known = any(
+        one.rehearsed is not None and np.array_equal(np.unique(one.polygons), faces) for one in last.memory.values()
+    )
+    return known and last.pressing[k] > 1 and SLACK * _share_allowed(last, k) > MARGIN
 
 
 @dataclass(frozen=True)
@@ -312,27 +387,6 @@ def _slit(search: ShearSearch, last: _Round, k: int, rounds: int) -> np.ndarray:
     return slits(chart, steep, least, costs.vertex_cost[here], barred, search.images, rounds)
 
 
-def _cuts(prepared: DiskCharts) -> Cuts:
-    """The cuts of charts that were searched."""
-    if prepared.cuts is None:
-        raise ValueError("charts along existing seams alone have no cuts to add to")
-    return prepared.cuts
-
-
-def _around(last: _Round, cut_anew: tuple[int, ...]) -> np.ndarray:
-    """Edges (k,2) that were cut, but those within charts that are cut anew."""
-    inner = np.concatenate([np.zeros(0, np.int64), *(within(last.charts[k]) for k in cut_anew)])
-    return last.cuts.edges[~np.isin(pair_keys(*last.cuts.edges.T), inner)]
-
-
 def _joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
     """The same cuts, but along the edges (e,2)."""
     return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
-
-
-def _mapped(charts, old_charts, old_maps, map_charts) -> Steps[list[ChartMap]]:
-    """Maps of the charts; those that are as they were keep theirs."""
-    known = {identity(chart): chart_map for chart, chart_map in zip(old_charts, old_maps, strict=True)}
-    new = yield from map_charts([chart for chart in charts if identity(chart) not in known])
-    rest = iter(new)
-    return [known[identity(chart)] if identity(chart) in known else next(rest) for chart in charts]

@@ -54,9 +54,10 @@ from .shear_bound import bound_shear
 from .shear_search import ShearSearch
 from .small_charts import is_small, map_together
 
-# Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps.
+# Where the time of a surface goes, roughly: cutting it, and, of the rest, the first maps; at last those of pieces.
 CUTTING = 0.15
 MAPPING = 0.7
+PIECES = 0.05
 
 # Charts and their maps.
 _Drawn = tuple[list[Chart], list[ChartMap]]
@@ -151,12 +152,13 @@ def unwrap(
     if search is not None:
         crossing = task.crossing if pins is None and task.options.boundary == "free" else None
         further = bound_shear(search, prepared, maps, task.map_charts, crossing)
-        found = yield from part_of(further, begin + width, 1 - begin - width)
+        found = yield from part_of(further, begin + width, 1 - begin - width - PIECES)
         warnings = (*prepared.warnings, *cut_for_a_map(maps, found.maps), *found.warnings)
         prepared, maps = replace(found.prepared, warnings=warnings), found.maps
     charts, cuts = prepared.charts, np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
     if cut.search is not None and pins is None and target is None and task.options.boundary == "free":
-        charts, maps, cuts = yield from _in_pieces(task, cut.search, charts, maps, cuts)
+        pieces = _in_pieces(task, cut.search, charts, maps, cuts)
+        charts, maps, cuts = yield from part_of(pieces, 1 - PIECES, PIECES)
     given, (charts, maps) = charts, (yield from task.finished(charts, maps, surface))
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, given, maps, surface)

@@ -40,8 +40,10 @@ MOST_CHANGE = 4.0
 # needed is taken off.
 LONGER = 2
 FURTHER = 0.6
-# How often it is tried to make one shorter, and the share of what is asked for that is near enough.
+# How often it is tried to make one shorter, and the share of what is asked for that is short enough; one that is made
+# longer aims for a little less.
 SHORTER = 4
+SHORT_ENOUGH = 0.94
 NEAR_ENOUGH = 0.88
 # What the search is doing meanwhile.
 STAGE = "Seams"
@@ -142,7 +144,7 @@ class Rehearsal:
         """A cut without what it does not need, and the square of log(shear) of its map."""
         above = found.cut.spread * MOST_CHANGE
         for k in range(SHORTER):
-            if sheared is None or sheared >= NEAR_ENOUGH * asked:
+            if sheared is None or sheared >= SHORT_ENOUGH * asked:
                 break
             # Halfway to where it was too short, at most: what is flat has no spread to go by.
             bound = float(np.sqrt(found.cut.spread * above))

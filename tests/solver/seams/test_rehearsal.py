@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from omt_uv.solver.mesh.charts import strict_charts
-from omt_uv.solver.mesh.geometry import face_areas
+from omt_uv.solver.mesh.geometry import edge_lengths, face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import halfedges, pair_keys, twins
+from omt_uv.solver.parameterization import shear_bound
 from omt_uv.solver.parameterization.chart_map import local_shear
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.shear_search import ShearSearch
@@ -130,3 +131,29 @@ def test_what_coarse_triangles_shear_by_themselves_is_not_cut_for(monkeypatch):
 def test_what_is_small_is_mapped_and_not_rehearsed(monkeypatch):
     seen, found = rehearsals(monkeypatch, triangle_surface(*bumpy(20)), 1.3)
     assert all(value is None for _, _, value in seen) and mean_shear(found) <= 1.305
+
+
+@pytest.mark.parametrize("bound", [1.3, 1.4])
+def test_what_maps_do_not_need_is_taken_back(monkeypatch, bound):
+    """Where rehearsals had told twice what the maps shear, and so asked for longer cuts than the bound does."""
+    rehearsed = ShearSearch.rehearsed
+
+    def doubled(self, *arguments):
+        told = yield from rehearsed(self, *arguments)
+        return None if told is None else 2 * told
+
+    monkeypatch.setattr(ShearSearch, "rehearsed", doubled)
+    monkeypatch.setattr("omt_uv.solver.parameterization.unwrap.COMPACT", np.inf)
+    surface, length = triangle_surface(*bumpy(60)), []
+    for slack in (0.0, shear_bound.SLACK):
+        monkeypatch.setattr(shear_bound, "SLACK", slack)
+        found = drain(unwrap(surface, options=UnwrapOptions(max_shear=bound)))
+        assert mean_shear(found) <= bound
+        length.append(edge_lengths(surface.positions, found.seams).sum())
+    assert length[1] < 0.97 * length[0]
+
+
+def test_the_bar_rises_while_cuts_are_taken_back(monkeypatch):
+    seen = []
+    drain(unwrap(triangle_surface(*bumpy(60)), options=UnwrapOptions(max_shear=1.4)), lambda p: seen.append(p.fraction))
+    assert (np.diff(seen) >= -1e-9).all() and seen[-1] <= 1
