@@ -28,7 +28,6 @@ from .continuation_rules import (
     STAGE_STEPS,
     UNSQUEEZED,
     Quality,
-    eased,
     first_pressure,
     is_ahead,
     is_enough,
@@ -253,8 +252,6 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         foreseen=FORESEEN,
         # Maps on the way to others say what those will be: they go as far as they promise.
         expecting=expecting,
-        # Where areas have to be exact, what is left on the way holds up the last stage.
-        eased=expecting and on_the_way and quality.tolerance >= LOOSE,
         pressure=first_pressure(quality, balance, not problem.scale_free and problem.faces.region is None),
         shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
     )
@@ -271,8 +268,7 @@ class StageLimits:
     area_error : to reach; max_steps : of Newton's method; tolerance, loose_tolerance : as in
     `continuation_rules.Quality`; relaxed : an energy that is low enough in any case; foreseeing : it ends, too, where
     the area error is out of reach, see `continuation_rules.is_out_of_reach`, once it promises less than foreseen;
-    expecting : its promise is what the next step is expected to make, see `continuation_rules.left_over`; eased : it
-    ends more easily where the energy is little, see `continuation_rules.eased`; shear : of a
+    expecting : its promise is what the next step is expected to make, see `continuation_rules.left_over`; shear : of a
     map, with which it ends where that settles, see `continuation_rules.is_settled`; pressure : of the first step, see
     `continuation_rules.FIRST_PRESSURE`
     """
@@ -285,7 +281,6 @@ class StageLimits:
     foreseeing: bool = False
     foreseen: float = 0.0
     expecting: bool = False
-    eased: bool = False
     shear: Callable[[np.ndarray], float] | None = None
     pressure: float = FIRST_PRESSURE
 
@@ -349,9 +344,8 @@ def minimise(
         left = float(left_over(value, *gained)) if limits.expecting else residual
         # How many stages and steps there will be is not known: every stage covers half of what is left.
         yield Progress("Refinement", 1 - 0.5 ** (stage + 1 - 0.5**steps))
-        loose = float(eased(limits.loose_tolerance, value)) if limits.eased else limits.loose_tolerance
-        met = value < limits.relaxed or (left < loose and problem.area_error(w) <= limits.area_error)
-        nearly = residual < max(limits.foreseen, loose)
+        met = value < limits.relaxed or (left < limits.loose_tolerance and problem.area_error(w) <= limits.area_error)
+        nearly = residual < max(limits.foreseen, limits.loose_tolerance)
         # Limbs on a sphere trade their areas late: there only the last steps tell.
         if limits.foreseeing and not met and (nearly or limits.expecting):
             before, error = error, problem.area_error(w)

@@ -5,14 +5,14 @@ Wright 2006, chapter 17). Every rule takes numbers, or arrays (c,) with one entr
 
     start a stage            `planned_weights`, `spare_weight`, `is_squeezed`, `is_ahead`, `next_weight`
     within a stage           `first_pressure`, `next_pressure`
-    end a stage              `stage_tolerances`, `eased`, `left_over`, `judge_step`, `is_out_of_reach`, `is_settled`
+    end a stage              `stage_tolerances`, `left_over`, `judge_step`, `is_out_of_reach`, `is_settled`
     end the refinement       `is_enough`, `is_futile`
 
-A batch differs from a chart by itself in five ways. It takes no `early` or `eased` end of a stage, nor one by what is
-`left_over`, that `is_settled` or `is_out_of_reach`, since its steps are those of all charts. It does not tell
-`is_futile` of regions: a chart with a region that has no exact areas uses up its steps, is given back, and says alone
-what it did not reach. It knows no barrier and no sweeps, and gives a chart back that would need them. It relaxes a
-squeezed start to the end, not to UNSQUEEZED. And it starts cold.
+A batch differs from a chart by itself in five ways. It takes no `early` end of a stage, nor one by what is `left_over`,
+that `is_settled` or `is_out_of_reach`, since its steps are those of all charts. It does not tell `is_futile` of
+regions: a chart with a region that has no exact areas uses up its steps, is given back, and says alone what it did not
+reach. It knows no barrier and no sweeps, and gives a chart back that would need them. It relaxes a squeezed start to
+the end, not to UNSQUEEZED. And it starts cold.
 """
 
 from __future__ import annotations
@@ -32,9 +32,6 @@ Truth = bool | np.ndarray
 LOOSE = 3e-2
 # One on the way ends sooner where the boundary is free; vertices on a circle or on sides do not make up for it later.
 ON_THE_WAY = 0.1
-# Below this energy it ends on twice as much: a map of little shear has it soon again.
-EASILY_LEFT = 0.5
-EASE = 2.0
 # One that will miss its goal is told by its areas where a step promises less than this: see `is_out_of_reach`.
 FORESEEN = 0.05
 # One that has reached it ends, too, where a whole step changes the shear by less than this share, and the area error by
@@ -246,11 +243,6 @@ def stage_tolerances(
     if swept:
         return max(quality.tolerance, SWEPT_TOLERANCE), SWEPT_ON_THE_WAY if on_the_way else SWEPT_LOOSE
     return quality.tolerance, ON_THE_WAY if on_the_way and early else quality.loose_tolerance
-
-
-def eased(tolerance: float, energy: Number) -> np.ndarray:
-    """The tolerance of a stage on the way with a free boundary, at a map of this energy: see EASILY_LEFT."""
-    return tolerance * np.where(energy < EASILY_LEFT, EASE, 1)
 
 
 class Verdict(NamedTuple):

@@ -107,13 +107,6 @@ def test_stages_on_the_way_end_sooner():
     assert rules.stage_tolerances(quality, 0.5, True, early=True) == (rules.STRICT, rules.LOOSE)
 
 
-def test_a_map_of_little_energy_is_left_on_a_greater_promise():
-    eased = rules.eased(rules.ON_THE_WAY, ENERGY)
-    np.testing.assert_array_equal(eased, each(lambda e: rules.eased(rules.ON_THE_WAY, e), ENERGY))
-    order = np.argsort(ENERGY)
-    assert (np.diff(eased[order]) <= 0).all() and eased.min() == rules.ON_THE_WAY < eased.max() < 1
-
-
 def test_a_goal_is_out_of_reach_where_steps_gain_less_than_is_missing():
     assert rules.is_out_of_reach(0.010, 0.0105, 0.008) and not rules.is_out_of_reach(0.010, 0.013, 0.008)
     # Nearly there, there already, or after the first step that says anything: the stage goes on.
