@@ -185,7 +185,7 @@ def _along_ridge(islands: _Islands, area: np.ndarray, height: np.ndarray, rise: 
     whole = np.maximum(total(size), np.finfo(float).tiny)
     place, height = (x - (total(size * x) / whole)[islands.owner] for x in (place, height))
     higher = total(size * place * height)
-    spread = np.sqrt(total(size * place**2) * total(size * height**2))
+    spread = np.sqrt(total(size * place**2)) * np.sqrt(total(size * height**2))
     ridge *= np.where(higher < 0, -1, 1)[:, None]
     found = (mean + half >= RIDGED * (mean - half)) & (np.abs(higher) >= HIGHER * spread)
     return np.where(found, np.arctan2(ridge[:, 1], ridge[:, 0]), np.nan)
