@@ -67,7 +67,10 @@ class _Grid:
     """Triangles listed by the cells of a square grid that their bounding boxes touch."""
 
     def __init__(self, tri):
-        self.tri = tri
+        turned = cross2(tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0]) < 0
+        # All counter-clockwise.
+        self.tri = np.where(turned[:, None, None], tri[:, ::-1], tri)
+        self.sides = np.roll(self.tri, -1, axis=1) - self.tri
         low, high = tri.min(1), tri.max(1)
         self.origin = low.min(0)
         self.extent = (high.max(0) - self.origin).max()
@@ -114,10 +117,8 @@ class _Grid:
         one, other = self.owner[entry], self.owner[np.repeat(self.start[:-1], inside)[entry] + k]
         pairs = np.unique(one * len(self.tri) + other)
         one, other = np.divmod(pairs, len(self.tri))
-        sides = np.roll(self.tri, -1, axis=1) - self.tri
-        turn = np.sign(cross2(sides[:, 0], sides[:, 1]))
-        a, b = self.tri[one][:, :, None], sides[one][:, :, None]
-        reach = (turn[one, None, None] * cross2(b, self.tri[other][:, None] - a)).max(axis=2).min(axis=1)
+        a, b = self.tri[one][:, :, None], self.sides[one][:, :, None]
+        reach = cross2(b, self.tri[other][:, None] - a).max(axis=2).min(axis=1)
         # Every pair is there both ways: the better bound of the two, of those of different triangles.
         back = reach[np.searchsorted(pairs, other * len(self.tri) + one)]
         return float(np.maximum(np.minimum(reach, back), 0)[one < other].sum())
@@ -137,9 +138,9 @@ class _Grid:
         begin = self.start[cell]
         query, k = expand(self.start[cell + 1] - begin)
         triangle = self.owner[begin[query] + k]
-        t = self.tri[triangle]
-        x = points[query]
-        sides = np.stack([cross2(t[:, (i + 1) % 3] - t[:, i], x - t[:, i]) for i in range(3)])
         limit = INSIDE * self.extent**2
-        inside = (sides.min(0) > limit) | (sides.max(0) < -limit)
-        return query[inside], triangle[inside]
+        for i in range(3):
+            # What is outside of one side needs no other: most of what a cell lists.
+            beyond = cross2(self.sides[triangle, i], points[query] - self.tri[triangle, i]) > limit
+            query, triangle = query[beyond], triangle[beyond]
+        return query, triangle
