@@ -36,24 +36,35 @@ class ProjectedFaces:
 
     def change(self, vectors: np.ndarray) -> np.ndarray:
         """How the corners (m,3) complex change when those on the sphere move by vectors (m,3,3)."""
-        part = np.einsum("mad,mkd->mka", self.axes, vectors)
-        return np.einsum("mkl,ml->mk", self.mixing, part[..., 0] + 1j * part[..., 1])
+        # Products of small matrices take a half to a third of the time of einsum.
+        part = np.matmul(vectors, self.axes.swapaxes(1, 2))
+        return np.matmul(self.mixing, part).view(complex)[..., 0]
 
 
 def project_faces(positions: np.ndarray, triangles: np.ndarray) -> ProjectedFaces:
     """Project the faces (m,3) of unit vectors (n,3) along their middles."""
     p = positions[triangles]
+    axes, corner, up, size = _projected(p)
+    height = np.einsum("md,mkd->mk", up, p)
+    mixing = np.eye(3) - (height / np.maximum(size, 1e-300))[:, :, None]
+    return ProjectedFaces(axes=axes, corner=corner, mixing=mixing, least_cosine=height.min(axis=1))
+
+
+def projected_corners(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The corners (m,3) complex of `project_faces` alone."""
+    return _projected(positions[triangles])[1]
+
+
+def _projected(p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Axes (m,2,3), corners (m,3) complex in them, middles (m,3) and lengths (m,1) of the sums of corners (m,3,3)."""
     total = p.sum(axis=1)
     size = np.linalg.norm(total, axis=1, keepdims=True)
     up = total / np.maximum(size, 1e-300)
     side = p[:, 1] - p[:, 0]
     first = normalized(side - np.einsum("md,md->m", side, up)[:, None] * up)
     axes = np.stack([first, np.cross(up, first)], axis=1)
-    part = np.einsum("mad,mkd->mka", axes, p - p[:, :1])
-    height = np.einsum("md,mkd->mk", up, p)
-    mixing = np.eye(3) - (height / np.maximum(size, 1e-300))[:, :, None]
-    corner = part[..., 0] + 1j * part[..., 1]
-    return ProjectedFaces(axes=axes, corner=corner, mixing=mixing, least_cosine=height.min(axis=1))
+    part = np.matmul(p - p[:, :1], axes.swapaxes(1, 2))
+    return axes, part.view(complex)[..., 0], up, size
 
 
 def derivatives(faces: Elements, corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -104,14 +115,14 @@ class SphereProblem:
 
     def projected_areas(self, positions: np.ndarray) -> np.ndarray:
         """Areas (p,) of the polygons' projections over those of the surface."""
-        a, b = derivatives(self.faces, project_faces(positions, self.faces.triangles).corner)
+        a, b = derivatives(self.faces, projected_corners(positions, self.faces.triangles))
         return self.faces.sums(squared(a) - squared(b))
 
     def energy(self, positions: np.ndarray) -> float:
         """The energy of unit vectors (n,3); infinity where a face is folded."""
         if self.faces.folded(signed_volumes(positions, self.faces.triangles)).any():
             return np.inf
-        corner = project_faces(positions, self.faces.triangles).corner
+        corner = projected_corners(positions, self.faces.triangles)
         return energy_of(self.faces, *derivatives(self.faces, corner), self.area_weight)
 
     def area_error(self, positions: np.ndarray) -> float:
@@ -165,11 +176,10 @@ def newton_direction(
     """
     n, triangles = len(positions), faces.triangles
     # How the tangents of the corners lie in the frames of the faces: (m, corner, frame axis, tangent).
-    turn = np.einsum("mfd,mkad->mkfa", face.axes, axes[triangles])
+    turn = np.matmul(face.axes[:, None], axes[triangles].swapaxes(2, 3))
     rows = _tangential(local.rows, face, turn)
-    corner = np.einsum("mk,mkl->ml", local.gradient, face.mixing)
-    corner = np.stack([corner.real, corner.imag], axis=2)
-    pull = np.einsum("mkf,mfd->mkd", corner, face.axes).reshape(-1, 3)
+    corner = np.matmul(local.gradient[:, None], face.mixing).reshape(-1, 3).view(float).reshape(-1, 3, 2)
+    pull = np.matmul(corner, face.axes).reshape(-1, 3)
     gradient = np.column_stack([np.bincount(triangles.ravel(), pull[:, d], n) for d in range(3)])
     # Moving along a great circle bends inwards: the pull along the radius adds to the Hessian.
     bend = np.maximum(-np.einsum("nd,nd->n", gradient, positions), 0)
@@ -196,5 +206,6 @@ def newton_direction(
 def _tangential(forms: np.ndarray, face: ProjectedFaces, turn: np.ndarray) -> np.ndarray:
     """Linear forms (m,r,3) complex of the faces' corners as rows (m,r,6) by the tangents of these, see `turn`."""
     mixed = np.matmul(forms, face.mixing)
-    rows = mixed.real[..., None] * turn[:, None, :, 0] - mixed.imag[..., None] * turn[:, None, :, 1]
-    return np.ascontiguousarray(rows.reshape(*forms.shape[:2], 6))
+    rows = mixed.real[..., None] * turn[:, None, :, 0]
+    rows -= mixed.imag[..., None] * turn[:, None, :, 1]
+    return rows.reshape(*forms.shape[:2], 6)

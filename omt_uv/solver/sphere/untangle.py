@@ -17,7 +17,7 @@ from ..mesh.topology import vertices_around
 from ..progress import Progress, Steps
 from ..refinement.hessian_blocks import Assembly
 from ..refinement.projected_newton import ARMIJO
-from .newton import derivatives, newton_direction, project_faces, retract, tangents
+from .newton import derivatives, newton_direction, project_faces, projected_corners, retract, tangents
 
 # Newton steps.
 MAX_STEPS = 40
@@ -74,7 +74,7 @@ def _step(faces: Elements, assembly: Assembly, positions: np.ndarray, fixed, eps
     share = min(1.0, LONGEST_MOVE / max(float(np.linalg.norm(direction, axis=1).max()), LONGEST_MOVE))
     for _ in range(MAX_HALVINGS):
         trial = retract(positions, axes, share * direction)
-        there = derivatives(faces, project_faces(trial, faces.triangles).corner)
+        there = derivatives(faces, projected_corners(trial, faces.triangles))
         if _energy(faces, *there, eps) <= value + ARMIJO * share * slope:
             return trial
         share /= 2

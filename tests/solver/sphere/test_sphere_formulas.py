@@ -122,6 +122,7 @@ def test_projected_corners_change_as_differences_say():
     slope = (area(face.corner + h * change) - area(face.corner - h * change)) / (2 * h)
     np.testing.assert_allclose(slope, (area(ends[0]) - area(ends[1])) / (2 * h), atol=1e-7)
     middle = normalized(P[F].sum(axis=1))
+    np.testing.assert_array_equal(newton.projected_corners(P, F), face.corner)
     np.testing.assert_allclose(face.least_cosine, np.einsum("mkd,md->mk", P[F], middle).min(axis=1))
 
 
