@@ -43,6 +43,8 @@ LITTLE = 1.05
 NECK = 0.5
 LEAST_LIMB = 0.05
 MOST_CUTS = 8
+# A neck along the mirror plane costs so many times as much: a head that is cut in halves there is cut through its face.
+HALVES = 6.0
 # So many tips of a piece, and lengths around each, are looked at; necks are looked for within that share of the side of
 # a square with the area of the smaller part.
 TIPS = 8
@@ -84,7 +86,7 @@ def without_limbs(
 
     cost, image : see `parting.parted`; up (3,) : see `sprawls`
     """
-    body = _Body.of(chart, uv, cost, up)
+    body = _Body.of(chart, uv, cost, up, image)
     whole = cut = np.zeros(len(body.graph.joined), dtype=bool)
     boxes = body.boxes(cut)
     cuts, shares = [cut], [boxes.filled]
@@ -143,9 +145,15 @@ class _Body:
     steps: np.ndarray
 
     @staticmethod
-    def of(chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float]) -> _Body:
+    def of(
+        chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float], image: np.ndarray | None = None
+    ) -> _Body:
+        """image: see `parting.parted`; what lies in the mirror plane is dear, since it is the middle of one picture."""
         graph = PolygonGraph.of(chart)
         places, price = graph.places(chart, uv), graph.prices(chart, cost)
+        if image is not None:
+            ends = chart.vertex_ids[graph.ends]
+            price = np.where((image[ends] == ends).all(axis=1), HALVES * price, price)
         alike = edge_lengths(chart.vertices, graph.ends).sum() / max(price.sum(), 1e-300)
         steps = np.linalg.norm(np.diff(places[graph.joined], axis=1)[:, 0], axis=1) + 1e-300
         return _Body(chart, uv, up, graph, places, alike * price, capacities(price), steps)

@@ -106,3 +106,19 @@ def test_pieces_are_mapped_as_if_their_seams_were_given(monkeypatch, seed):
     assert len(found.charts) == len(again.charts) > 1
     shears = [sorted(one.angle_mean for one in maps) for maps in (found.maps, again.maps)]
     np.testing.assert_allclose(*shears, rtol=1e-3)
+
+
+def test_halves_of_one_picture_are_not_parted():
+    """Two long bars with a bridge between them in the mirror plane: they do not come apart there."""
+    V, F = meshes.grid(50, 4, width=50, height=4)
+    cell = V[F].mean(axis=1) - [25, 2, 0]
+    F = F[(np.abs(cell[:, 0]) > 1) | (np.abs(cell[:, 1]) < 1)]
+    used, F = np.unique(F, return_inverse=True)
+    flat = V[used, :2] - [25, 2]
+    surface = triangle_surface(np.column_stack([flat[:, 0], 0 * flat[:, 0], flat[:, 1]]), F.reshape(-1, 3))
+    (chart,) = strict_charts(surface)
+    uv, cost = flat[chart.vertex_ids], np.ones(len(chart.vertices))
+    image = cKDTree(surface.positions).query(surface.positions * [-1, 1, 1])[1]
+    middle = np.abs(surface.positions[:, 0]) < 0.5
+    assert middle[without_limbs(chart, uv, cost, UP)[1]].any()
+    assert not middle[without_limbs(chart, uv, cost, UP, image)[1]].any()
