@@ -1,9 +1,9 @@
 """Make elements of polygons: one area each, whichever way it is cut, and shear without a diagonal.
 
-In space a quad has the mean area of both its triangulations, and its shear is the mean over both, each triangle by its
-area; other polygons have the area that `mesh.polygon_areas` gives them. Both triangulations of a quad need all four
-triangles positive in the map, so that only quads that are convex, on the surface and in the map, have it; others are
-measured on the triangulation given until they have become convex (`with_convex_quads`).
+In space a quad has the mean area of both its triangulations, a flat dart its own, and its shear is the mean over both,
+each triangle by its area; other polygons have the area that `mesh.polygon_areas` gives them. Both triangulations of a
+quad need all four triangles positive in the map, so that only quads that are convex, on the surface and in the map,
+have it; others are measured on the triangulation given until they have become convex (`with_convex_quads`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..mesh.geometry import face_areas
-from ..mesh.polygon_areas import BOTH, polygon_areas, quad_corners, triangle_pairs
+from ..mesh.polygon_areas import BOTH, polygon_areas, quad_areas, quad_corners, triangle_pairs
 from .energy import Elements, Quads, elements, hat_gradients
 
 # Triangles of a polygon with one area, at most: a row of the Hessian joins all its corners, and long rows fill it.
@@ -107,6 +107,7 @@ def polygon_elements(
     share[len(every) - 4 * q :] = 0.5
     whole = np.bincount(polygon, share * area, mesh.count)
     whole[: len(whole) - q] *= _bent(positions, triangles, faces, mesh)[: len(whole) - q]
+    whole[len(whole) - q :] *= _dented(positions, mesh.quads)
     given = mesh.given(_areas(positions, triangles))
     # Per area of the triangulation given, so that a density of 1 asks for a polygon's own area.
     asked = mesh.given(target) * whole / given
@@ -133,6 +134,12 @@ def _bent(positions, triangles, faces, mesh: PolygonMesh) -> np.ndarray:
     sums = mesh.given(face_areas(positions, triangles))
     own = mesh.given(polygon_areas(positions, triangles, faces))
     return np.divide(own, sums, out=np.ones(len(sums)), where=sums > 0)
+
+
+def _dented(positions, quads: np.ndarray) -> np.ndarray:
+    """Areas (q,) of quads (q,4) over the means of both triangulations: not 1 of flat darts."""
+    mean = face_areas(positions, quads[:, BOTH].reshape(-1, 3)).reshape(-1, 4).sum(axis=1) / 2
+    return np.divide(quad_areas(positions, quads), mean, out=np.ones(len(quads)), where=mean > 0)
 
 
 def with_convex_quads(faces: Elements, w: np.ndarray) -> Elements:

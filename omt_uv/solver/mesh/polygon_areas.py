@@ -2,7 +2,8 @@
 
 In space the corners of a polygon need not lie in a plane, so that its area depends on the triangles. A quad has the
 mean area of both its triangulations, any other polygon that of a fan around the mean of its corners, which knows no
-diagonal either. Where the fan turns back on itself, as in deep concave polygons, its triangles count.
+diagonal either. Where the fan turns back on itself, as in deep concave polygons, its triangles count. Of a flat dart
+one triangulation lies partly outside of it: what is turned there is taken off.
 """
 
 from __future__ import annotations
@@ -13,6 +14,11 @@ from .geometry import face_areas
 
 # Corners of a quad's four triangles: those of the diagonal given, then the others.
 BOTH = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
+# Cosine between the normals of a quad and of a triangle of it, from which on the triangle counts less, and less than
+# nothing where they are opposite: 26 degrees from there the quad is not flat, and no triangulation is outside of it.
+TURNED = -0.9
+# The largest triangle of what is so flat over all others: more than this.
+FLAT = 0.7
 # Sine, squared, of the angle by which a corner of a fan may turn inwards and count as straight.
 STRAIGHT = -1e-9
 
@@ -31,13 +37,38 @@ def polygon_areas(positions: np.ndarray, triangles: np.ndarray, polygons: np.nda
         return area
     whole = given.copy()
     corners = quads(triangles, owner)
-    both = face_areas(positions, triangles.ravel()[corners][:, BOTH].reshape(-1, 3))
-    whole[owner[corners[:, 0] // 3]] = both.reshape(-1, 4).sum(axis=1) / 2
+    whole[owner[corners[:, 0] // 3]] = quad_areas(positions, triangles.ravel()[corners])
     several = np.flatnonzero(np.bincount(owner)[owner] > 2)
     if len(several):
         fan, looks_out = _fans(positions, triangles[several], owner[several], len(whole))
         whole[looks_out] = fan[looks_out]
     return area * np.divide(whole, given, out=np.ones(len(whole)), where=(given > 0) & np.isfinite(given))[owner]
+
+
+def quad_areas(positions: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Areas (q,) of quads (q,4) of a surface (n,3): the mean of both triangulations, flat darts as they are."""
+    area = face_areas(positions, corners[:, BOTH].reshape(-1, 3)).reshape(-1, 4)
+    total, largest = area.sum(axis=1), area.max(axis=1)
+    # In a plane the largest triangle of a dart is as large as the others, of which one is turned, together.
+    darts = np.flatnonzero(largest > FLAT * (total - largest))
+    if len(darts):
+        turned = _alignment(positions[corners[darts]])
+        counted = np.where(turned < TURNED, 1 - 2 * (TURNED - turned) / (1 + TURNED), 1)
+        total[darts] = (area[darts] * counted).sum(axis=1)
+    return total / 2
+
+
+def _alignment(points: np.ndarray) -> np.ndarray:
+    """Cosines (q,4) between the normals of quads (q,4,3) and those of their triangles, as in BOTH."""
+    # Halves first, so that nothing overflows; the extent, so that nothing vanishes.
+    p = points / 2 - points[:, :1] / 2
+    p /= np.maximum(np.abs(p).max(axis=(1, 2), keepdims=True), np.finfo(float).tiny)
+    one, two, three = (p[:, BOTH[:, k]] for k in range(3))
+    normal = np.cross(two - one, three - one)
+    own = normal[:, :2].sum(axis=1)
+    size = np.linalg.norm(normal, axis=2) * np.linalg.norm(own, axis=1)[:, None]
+    along = np.einsum("qtd,qd->qt", normal, own)
+    return np.divide(along, size, out=np.ones_like(size), where=size > 0)
 
 
 def quads(triangles: np.ndarray, polygons: np.ndarray) -> np.ndarray:

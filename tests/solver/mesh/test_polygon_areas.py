@@ -5,7 +5,15 @@ import polygons
 import pytest
 
 from omt_uv.solver.mesh.geometry import face_areas
-from omt_uv.solver.mesh.polygon_areas import polygon_areas, polygon_fans, quad_corners, quads, triangle_pairs
+from omt_uv.solver.mesh.polygon_areas import (
+    BOTH,
+    polygon_areas,
+    polygon_fans,
+    quad_areas,
+    quad_corners,
+    quads,
+    triangle_pairs,
+)
 
 
 def of_each(V, faces, turn=0):
@@ -32,6 +40,21 @@ def test_a_quad_has_the_mean_of_both_triangulations():
     both = [face_areas(V, np.array(t)).sum() for t in ([[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]])]
     assert both[0] != pytest.approx(both[1])
     assert of_each(V, [np.arange(4)]) == pytest.approx([np.mean(both)])
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_a_flat_dart_has_its_own_area_and_a_bent_one_the_mean(turn):
+    """Bent by more and more its area has no jump."""
+    Q = np.roll([np.arange(4)], turn, axis=1)
+
+    def area(height):
+        V = np.array([[0, 0, height], [2, 0, 0], [0.3, 0.3, 0], [0, 2, 0]])
+        mean = face_areas(V, Q[:, BOTH].reshape(-1, 3)).sum() / 2
+        return quad_areas(V, Q)[0], mean
+
+    assert area(0.0)[0] == pytest.approx(0.6) and area(0.0)[1] > 1.3
+    own, mean = np.array([area(h) for h in np.linspace(0, 3, 3001)]).T
+    assert np.abs(np.diff(own)).max() < 0.02 and own[-1] == mean[-1] and (own <= mean).all()
 
 
 def test_a_deep_concave_polygon_is_the_sum_of_its_triangles():

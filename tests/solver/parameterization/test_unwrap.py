@@ -300,3 +300,14 @@ def test_sizes_of_which_squares_are_no_numbers_come_out_as_others(size):
     found = [drain(unwrap(triangle_surface(s * V, F), options=options)) for s in (1.0, size)]
     assert len(found[0].maps) == len(found[1].maps)
     assert all(np.isfinite(chart_map.uv).all() for chart_map in found[1].maps)
+
+
+@pytest.mark.parametrize("depth", [0.6, 0.9])
+def test_a_flat_plane_with_a_dart_is_laid_down_as_it_is(depth):
+    V, Q = meshes.quad_grid(6, 6)
+    V = V[:, :2].copy()
+    # The middle vertex beyond a diagonal of the quad that follows it.
+    V[24] += depth * (V[32] - V[24])
+    surface = meshes.polygon_surface(np.column_stack([V, 0 * V[:, 0]]), Q)
+    (found,) = drain(unwrap(surface)).maps
+    assert found.area_l1 < 1e-9 and found.angle_mean == pytest.approx(1, abs=1e-7) and not found.folds
