@@ -2,8 +2,8 @@
 
 usage: matrix.py [VERSION...]     versions as below, all by default
 
-Each version has an environment .venv-VERSION with bpy, the numpy that this Blender ships and pytest: scipy and
-xatlas can only come out of the zip.
+Each version has an environment .venv-VERSION with bpy, the numpy that this Blender ships, TetGen, which users install
+by themselves, and pytest: scipy and xatlas can only come out of the zip.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ VERSIONS = {
 FOLDERS = ("blender", "commands", "display", "extension", "operators", "panels", "session")
 BLENDER_TESTS = [f"tests/{name}" for name in FOLDERS]
 PYTEST = "pytest==9.2.0"
+TETGEN = next(line for line in (ROOT / "requirements-dev.txt").read_text().splitlines() if line.startswith("tetgen"))
 
 
 def environment(version: str) -> Path | None:
@@ -41,7 +42,7 @@ def environment(version: str) -> Path | None:
         if found.returncode:
             return None
         subprocess.run([found.stdout.strip(), "-m", "venv", str(python.parent.parent)], check=True)
-    packages = [f"bpy=={bpy}", f"numpy=={numpy}", PYTEST]
+    packages = [f"bpy=={bpy}", f"numpy=={numpy}", PYTEST, TETGEN]
     subprocess.run([python, "-m", "pip", "install", "-q", "--disable-pip-version-check", *packages], check=True)
     return python
 
