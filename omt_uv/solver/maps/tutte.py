@@ -55,7 +55,7 @@ def tutte(
         total = np.asarray(rows.sum(axis=1)).ravel()
         rows = csr_matrix((rows.data / np.repeat(total, np.diff(rows.indptr)), rows.indices, rows.indptr), rows.shape)
         matrix = csr_matrix((np.ones(inside.sum()), (np.arange(inside.sum()),) * 2)) - rows[:, inside]
-        order = "colamd" if n < LARGE else _inner_order(positions, triangles, inside)
+        order = "mmd" if n < LARGE else _inner_order(positions, triangles, inside)
         uv[inside] = solve_general(matrix.tocsc(), rows[:, loop] @ boundary, order)
     return uv
 
