@@ -195,7 +195,7 @@ def _pieces(
     from ..seams.limbs import pieces_of_chart
 
     cost, axes = search.costs().vertex_cost[chart.vertex_ids], search.shear.preferences.axes
-    up = (axes or SceneAxes()).up
+    up = None if axes is None else axes.up
     piece, between = pieces_of_chart(chart, chart_map.uv, cost, up, whole, search.images)
     parts, maps = list[Chart](), list[ChartMap]()
     for k in range(int(piece.max()) + 1 if len(between) else 0):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import ConvexHull
 
 from ..maps.upright import turn_upright
 from ..mesh.charts import Chart, part_of_chart
@@ -30,6 +31,8 @@ from .parting import (
 
 # Charts that have not this share of a surface stay in one piece.
 MOSTLY = 0.5
+# What is up in space, (3,); None where nobody knows.
+Up = Sequence[float] | None
 # A chart that fills less of the square around it sprawls; cuts are made where the pieces fill so many times as much
 # once they are packed, which is tried where their boxes promise so many times as much.
 SPRAWLING = 0.3
@@ -55,7 +58,7 @@ BETWEEN = 1.15
 
 
 def pieces_of_chart(
-    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float], whole: float, image: np.ndarray | None = None
+    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, whole: float, image: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The piece (m,) of every triangle of a chart with map uv (n,2) that leaves most of a texture empty, and the edges
     (k,2) of the surface in between; one piece where it is neither a long band nor the sprawling most of a surface.
@@ -71,15 +74,16 @@ def pieces_of_chart(
     return np.zeros(len(chart.triangles), np.int64), np.zeros((0, 2), np.int64)
 
 
-def sprawls(chart: Chart, uv: np.ndarray, up: Sequence[float]) -> bool:
-    """Whether the map uv (n,2) of a chart, turned so that `up` (3,) of space is up, fills little of a square."""
-    upright = turn_upright([chart], [uv], [up])[0]
+def sprawls(chart: Chart, uv: np.ndarray, up: Up) -> bool:
+    """Whether the map uv (n,2) of a chart, turned so that `up` (3,) of space is up, fills little of a square; where
+    nobody knows what is up, turned so that a box around it is smallest."""
+    upright = _laid([chart], [uv], up)[0]
     area = np.abs(signed_areas(uv, chart.triangles)).sum()
     return bool(area < SPRAWLING * np.ptp(upright, axis=0).max() ** 2)
 
 
 def without_limbs(
-    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float], image: np.ndarray | None = None
+    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, image: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The piece (m,) of every triangle of a chart with map uv (n,2) without its limbs, and the edges (k,2) of the
     surface in between; one piece where the pieces would fill a square little better.
@@ -111,6 +115,25 @@ def without_limbs(
     return body.graph.pieces(~cut)[body.graph.polygon], chart.vertex_ids[body.graph.ends[cut]]
 
 
+def _laid(charts: Sequence[Chart], maps: Sequence[np.ndarray], up: Up) -> list[np.ndarray]:
+    """Maps (n_i,2) of charts turned upright, or, without an `up`, as the smallest box around each lies."""
+    if up is not None:
+        return turn_upright(charts, maps, [up] * len(charts))
+    return [_in_smallest_box(uv) for uv in maps]
+
+
+def _in_smallest_box(uv: np.ndarray) -> np.ndarray:
+    """A map (n,2) turned so that the box around it is smallest: along a side of its convex hull."""
+    # Joggled, since slivers have no hull in double precision.
+    hull = uv[ConvexHull(uv, qhull_options="QJ").vertices]
+    side = np.roll(hull, -1, axis=0) - hull
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    across = np.stack([-side[:, 1], side[:, 0]], axis=1)
+    extents = [np.ptp(hull @ direction.T, axis=0) for direction in (side, across)]
+    best = int(np.argmin(extents[0] * extents[1]))
+    return uv @ np.stack([side[best], across[best]], axis=1)
+
+
 @dataclass(frozen=True)
 class _Boxes:
     """Boxes of pieces with an area `whole`: the area of all, beside one another, and the longest side."""
@@ -137,7 +160,7 @@ class _Body:
 
     chart: Chart
     uv: np.ndarray
-    up: Sequence[float]
+    up: Up
     graph: PolygonGraph
     places: np.ndarray
     price: np.ndarray
@@ -145,9 +168,7 @@ class _Body:
     steps: np.ndarray
 
     @staticmethod
-    def of(
-        chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Sequence[float], image: np.ndarray | None = None
-    ) -> _Body:
+    def of(chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, image: np.ndarray | None = None) -> _Body:
         """image: see `parting.parted`; what lies in the mirror plane is dear, since it is the middle of one picture."""
         graph = PolygonGraph.of(chart)
         places, price = graph.places(chart, uv), graph.prices(chart, cost)
@@ -180,7 +201,7 @@ class _Body:
         piece = self.graph.pieces(~cut)[self.graph.polygon]
         found = [part_of_chart(self.chart, piece == k) for k in range(int(piece.max()) + 1)]
         charts = [part for part, _ in found]
-        return charts, turn_upright(charts, [self.uv[used] for _, used in found], [self.up] * len(charts))
+        return charts, _laid(charts, [self.uv[used] for _, used in found], self.up)
 
     def boxes(self, cut: np.ndarray) -> _Boxes:
         """The boxes of all pieces that a cut (e,) bool leaves."""

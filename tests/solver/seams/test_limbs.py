@@ -122,3 +122,12 @@ def test_halves_of_one_picture_are_not_parted():
     middle = np.abs(surface.positions[:, 0]) < 0.5
     assert middle[without_limbs(chart, uv, cost, UP)[1]].any()
     assert not middle[without_limbs(chart, uv, cost, UP, image)[1]].any()
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.1, 2.9])
+def test_where_nobody_knows_what_is_up_the_turn_of_a_map_plays_no_part(angle):
+    _, chart, uv = cross(lean=(1, 3))
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    given, turned = (without_limbs(chart, flat, np.ones(len(uv)), None) for flat in (uv, uv @ turn))
+    assert len(given[1]) and sprawls(chart, uv, None) == sprawls(chart, uv @ turn, None)
+    np.testing.assert_array_equal(*(np.unique(np.sort(edges, axis=1), axis=0) for _, edges in (given, turned)))
