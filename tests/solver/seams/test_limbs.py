@@ -108,8 +108,8 @@ def test_pieces_are_mapped_as_if_their_seams_were_given(monkeypatch, seed):
     np.testing.assert_allclose(*shears, rtol=1e-3)
 
 
-def test_halves_of_one_picture_are_not_parted():
-    """Two long bars with a bridge between them in the mirror plane: they do not come apart there."""
+def bars():
+    """Two long bars with a bridge between them, upright in x and z: the surface, its chart, and the map of that."""
     V, F = meshes.grid(50, 4, width=50, height=4)
     cell = V[F].mean(axis=1) - [25, 2, 0]
     F = F[(np.abs(cell[:, 0]) > 1) | (np.abs(cell[:, 1]) < 1)]
@@ -117,7 +117,13 @@ def test_halves_of_one_picture_are_not_parted():
     flat = V[used, :2] - [25, 2]
     surface = triangle_surface(np.column_stack([flat[:, 0], 0 * flat[:, 0], flat[:, 1]]), F.reshape(-1, 3))
     (chart,) = strict_charts(surface)
-    uv, cost = flat[chart.vertex_ids], np.ones(len(chart.vertices))
+    return surface, chart, flat[chart.vertex_ids]
+
+
+def test_halves_of_one_picture_are_not_parted():
+    """The bridge lies in the mirror plane: bars do not come apart there."""
+    surface, chart, uv = bars()
+    cost = np.ones(len(chart.vertices))
     image = cKDTree(surface.positions).query(surface.positions * [-1, 1, 1])[1]
     middle = np.abs(surface.positions[:, 0]) < 0.5
     assert middle[without_limbs(chart, uv, cost, UP)[1]].any()
@@ -126,7 +132,7 @@ def test_halves_of_one_picture_are_not_parted():
 
 @pytest.mark.parametrize("angle", [0.3, 1.1, 2.9])
 def test_where_nobody_knows_what_is_up_the_turn_of_a_map_plays_no_part(angle):
-    _, chart, uv = cross(lean=(1, 3))
+    _, chart, uv = bars()
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     given, turned = (without_limbs(chart, flat, np.ones(len(uv)), None) for flat in (uv, uv @ turn))
     assert len(given[1]) and sprawls(chart, uv, None) == sprawls(chart, uv @ turn, None)
