@@ -279,12 +279,12 @@ def _fit(task: _PackTask, scale: float, order: list[int]) -> tuple[_Found | None
         places, stuck = place(raster.items, tried, _grid(task, widest))
         if places:
             return _Found(task, scale, raster, places, tried), tried
-        hopeless = cells[tried[: tried.index(stuck)]].sum() < HOPEFUL * cells.sum()
+        hopeless = many and cells[tried[: tried.index(stuck)]].sum() < HOPEFUL * cells.sum()
         if k < STUCK_FIRST:
             tried = [stuck, *(item for item in tried if item != stuck)]
         else:
             tried = np.argsort(-sizes * np.exp(CHANCE * rng.normal(size=len(sizes))), kind="stable").tolist()
-        if many and hopeless:
+        if hopeless:
             break
     return None, tried if many else order
 

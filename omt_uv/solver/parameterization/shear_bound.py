@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from .chart_map import ChartMap, local_shear
 from .mirrored_charts import mapped_anew
 from .options import ShearBound
 from .shear_search import ShearSearch
-
-if TYPE_CHECKING:
-    pass
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
@@ -210,7 +207,7 @@ def _has_slack(last: _Round, k: int) -> bool:
     known = any(
         one.rehearsed is not None and np.array_equal(np.unique(one.polygons), faces) for one in last.memory.values()
     )
-    return known and last.pressing[k] > 1 and SLACK * _share_allowed(last, k) > MARGIN
+    return known and 0 < np.log(last.pressing[k]) ** 2 < SLACK * np.log(last.bound) ** 2
 
 
 @dataclass(frozen=True)

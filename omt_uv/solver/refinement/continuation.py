@@ -240,7 +240,6 @@ def _first_weights(
 def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, steps_left: int) -> StageLimits:
     """Limits of a stage; ahead: less than 0 while planned weights are still to come."""
     on_the_way, swept = ahead < 0, problem.smoother is not None
-    expecting = balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED
     tolerance, loose = stage_tolerances(quality, balance, on_the_way, not problem.scale_free, swept)
     return StageLimits(
         area_error=np.inf if on_the_way else quality.area_error,
@@ -251,7 +250,7 @@ def _limits(problem: MapProblem, balance: float, quality: Quality, ahead: int, s
         foreseeing=balance == 0 and not on_the_way and problem.faces.region is None,
         foreseen=FORESEEN,
         # Maps on the way to others say what those will be: they go as far as they promise.
-        expecting=expecting,
+        expecting=balance == 0 and not problem.scale_free and not swept and quality.area_error <= PROMISED,
         pressure=first_pressure(quality, balance, not problem.scale_free and problem.faces.region is None),
         shear=_shear_of(problem.faces) if balance == 0 and not on_the_way else None,
     )
