@@ -1,4 +1,4 @@
-"""Keep convex polygons convex in the maps of a surface, where that costs no area."""
+"""Keep convex polygons convex in the maps of a surface, where that costs no area, and none folded as they are drawn."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..errors import MeshError, plural
 from ..maps.distortion import Distortion
 from ..maps.similarity import fit_similarity
 from ..mesh.charts import Chart
-from ..mesh.geometry import signed_areas
+from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops
 from ..progress import Steps
@@ -26,6 +26,12 @@ from .polygon_disk import cut_as_mapped
 AREA_KEPT = 1.1
 # Mean shear above 1, and area error, of what is no more than rounded.
 ISOMETRIC = 1e-7
+# How warnings of polygons that fold if they are cut otherwise than they are drawn end.
+OTHERWISE = "in the map if cut along another diagonal"
+# How often polygons that fold are mapped by their triangles, with those that fold then.
+ROUNDS = 3
+# Share of its polygon's area of a triangle that has one on the surface.
+SOLID = 1e-9
 
 
 def with_convex_polygons(
@@ -68,19 +74,18 @@ def with_convex_polygons(
                 uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
             new[k] = with_figures(old, uv, figures)
     for k in np.flatnonzero(folded):
-        new[k] = _with_dents_told(drawn, given[k], new[k])
+        new[k] = with_dents_told(drawn, given[k], new[k])
     return new
 
 
-def _with_dents_told(drawn: Surface, chart: Chart, chart_map: ChartMap) -> ChartMap:
+def with_dents_told(drawn: Surface, chart: Chart, chart_map: ChartMap) -> ChartMap:
     """The map with a warning of convex polygons that fold in it if they are cut otherwise than they are drawn."""
     from .convexity import dented_faces
 
     count = len(dented_faces(drawn, chart, chart_map.uv))
-    if not count:
-        return chart_map
-    text = plural(count, "1 face folds", "{} faces fold") + " in the map if cut along another diagonal"
-    return replace(chart_map, warnings=(*chart_map.warnings, text))
+    others = tuple(text for text in chart_map.warnings if not text.endswith(OTHERWISE))
+    told = (f"{plural(count, '1 face folds', '{} faces fold')} {OTHERWISE}",) if count else ()
+    return replace(chart_map, warnings=(*others, *told))
 
 
 def _opened(
@@ -123,6 +128,69 @@ def _opened(
         if _keeps(figures, old, goal) and reflex_triangles(surface, [chart], [uv])[0] < folded[k]:
             new[k] = with_figures(old, uv, figures)
     return new
+
+
+def with_drawn_triangles(
+    surface: Surface,
+    charts: Sequence[Chart],
+    maps: list[ChartMap],
+    pins: Sequence[ChartPins | None],
+    options: MapOptions,
+    target: Target | None = None,
+) -> Steps[list[ChartMap]]:
+    """The maps, those without pins refined again in which polygons fold as they are drawn, if fewer do then.
+
+    A polygon of many sides is mapped as a fan, and where no map makes it convex its fan alone is sound. So it is
+    mapped by the triangles that it is drawn with, which no step folds, from where it is open as far as may be.
+    surface and charts : with the triangles of who draws them
+    """
+    new = list(maps)
+    for k, chart in enumerate(charts):
+        if not maps[k].folds or pins[k] is not None:
+            continue
+        aim, found, alone = chart_target(target, surface, chart), maps[k].uv, np.zeros(len(chart.faces), bool)
+        for _ in range(ROUNDS):
+            dented = _dented(chart, found) & ~alone
+            if not dented.any():
+                break
+            alone |= dented
+            try:
+                found = yield from _by_triangles(surface, chart, maps[k], alone, options, aim)
+            except MeshError:
+                # The map that there is has no error.
+                break
+            figures = measured_map(chart, found, None if aim is None else aim.density)
+            if figures.folds < new[k].folds and _keeps(figures, maps[k], QUALITIES[options.quality].area_error):
+                new[k] = with_dents_told(surface, chart, with_figures(maps[k], found, figures))
+    return new
+
+
+def _dented(chart: Chart, uv: np.ndarray) -> np.ndarray:
+    """Triangles (m,) bool of polygons that have an area in a map (n,2), and so have their triangles on the surface,
+    though some of these fold."""
+    _, owner = np.unique(chart.faces, return_inverse=True)
+    area, solid = signed_areas(uv, chart.triangles), face_areas(chart.vertices, chart.triangles)
+    area *= np.sign(area.sum())
+    flat = solid <= SOLID * np.bincount(owner, solid)[owner]
+    folded = np.bincount(owner, area <= 0) > 0
+    return (folded & (np.bincount(owner, area) > 0) & (np.bincount(owner, flat) == 0))[owner]
+
+
+def _by_triangles(
+    surface: Surface, chart: Chart, old: ChartMap, alone: np.ndarray, options: MapOptions, target: Target | None
+) -> Steps[np.ndarray]:
+    """The map (n,2) of a chart refined again with some of its triangles (m,) bool as polygons of their own."""
+    from .convexity import keep_convex
+
+    fixed, density = _fixed(chart, None, options.boundary), None if target is None else target.density
+    given = [cut_as_mapped(chart, old.uv)], [old.uv], [fixed], [density], [old.area_weight], None
+    start = keep_convex(surface, *given).get(0, old.uv)
+    own = chart.faces.max(initial=0) + 1 + np.arange(len(alone))
+    uv = yield from refined_again(replace(chart, faces=np.where(alone, own, chart.faces)), start, options, target)
+    if options.boundary != "free":
+        return uv
+    flat, unit = in_unit_box(uv)
+    return _as_before(flat, old.uv / unit, chart.triangles) * unit
 
 
 def _keeps(figures: Distortion, old: ChartMap, goal: float) -> bool:

@@ -38,7 +38,7 @@ from .chart_indices import (
     pins_of_chart,
 )
 from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, measured_map, no_map, refined_again
-from .convex_maps import with_convex_polygons, with_figures, with_folds_counted
+from .convex_maps import with_convex_polygons, with_drawn_triangles, with_figures, with_folds_counted
 from .mirrored_charts import (
     as_given,
     cut_alike,
@@ -363,7 +363,10 @@ class _Task:
         recut = np.zeros(len(given.face_start) - 1, bool)
         recut[given.triangle_face[(self.surface.triangles != given.triangles).any(axis=1)]] = True
         drawn = [cut_as_given(c, self.surface, given) if recut[c.faces].any() else c for c in charts]
-        return drawn, [with_folds_counted(chart, chart_map) for chart, chart_map in zip(drawn, maps, strict=True)]
+        maps = [with_folds_counted(chart, chart_map) for chart, chart_map in zip(drawn, maps, strict=True)]
+        if self.options.kind == "authalic":
+            maps = yield from with_drawn_triangles(given, drawn, maps, pins, self.options, self.target)
+        return drawn, maps
 
     def crossing(self, chart: Chart, chart_map: ChartMap) -> Steps[np.ndarray]:
         """A map (n,2) from another one on that may come to lie on itself."""

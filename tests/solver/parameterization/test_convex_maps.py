@@ -12,7 +12,12 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
 from omt_uv.solver.parameterization.chart_indices import ChartPins
 from omt_uv.solver.parameterization.chart_map import FOLDED, map_chart, measured_map
-from omt_uv.solver.parameterization.convex_maps import with_convex_polygons, with_figures
+from omt_uv.solver.parameterization.convex_maps import (
+    OTHERWISE,
+    with_convex_polygons,
+    with_dents_told,
+    with_figures,
+)
 from omt_uv.solver.parameterization.convexity import dented_faces, keep_convex, reflex_triangles
 from omt_uv.solver.parameterization.options import MapOptions, UnwrapOptions
 from omt_uv.solver.parameterization.polygon_corners import convex_corners
@@ -164,3 +169,34 @@ def test_both_bottoms_of_a_cup_stay_convex():
     found = drain(unwrap(surface))
     assert not reflex_triangles(surface, found.charts, [m.uv for m in found.maps]).any()
     assert all(m.folds == 0 and m.area_l1 <= 0.01 and not m.warnings for m in found.maps)
+
+
+@pytest.mark.parametrize(("sides", "first"), [(32, 8), (32, 16), (48, 24)])
+@pytest.mark.parametrize("top", [0.0, 1.0])
+def test_long_polygons_do_not_fold_as_they_are_drawn(sides, first, top):
+    """One seam leaves both ends of a turned body to a map that makes neither convex; 1 or 2 of them folded.
+
+    first : the corner from which the polygons are cut into triangles
+    """
+    (k, turn), rings = np.divmod(np.arange(4 * sides), sides), sides * np.arange(4)
+    radius, height = np.array([1, 1, 0.7, 0.7])[k], np.array([-0.5, 0.5, 0.5, top])[k]
+    angle = 2 * np.pi * turn / sides
+    V = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    here, after = k * sides + turn, k * sides + (turn + 1) % sides
+    walls = np.column_stack([here, after, after + sides, here + sides])[k < 3].tolist()
+    ends = [np.roll(x, first).tolist() for x in (np.arange(sides)[::-1], np.arange(3 * sides, 4 * sides))]
+    surface = meshes.polygon_surface(V, [ends[0], *walls, ends[1]], np.column_stack([rings[:-1], rings[1:]]))
+    found = drain(unwrap(surface))
+    for chart, one in zip(found.charts, found.maps, strict=True):
+        assert one.folds == 0 and not any(text.endswith(FOLDED) for text in one.warnings)
+        assert (signed_areas(one.uv, chart.triangles) > 0).all()
+        assert one.area_l1 <= 0.01
+
+
+def test_warnings_of_other_diagonals_are_those_of_the_map_that_is_kept():
+    surface, chart, chart_map = darts()
+    told = with_dents_told(surface, chart, chart_map)
+    assert sum(text.endswith(OTHERWISE) for text in told.warnings) == 1
+    assert with_dents_told(surface, chart, told).warnings == told.warnings
+    flat = replace(told, uv=chart.vertices[:, :2])
+    assert not any(text.endswith(OTHERWISE) for text in with_dents_told(surface, chart, flat).warnings)
