@@ -53,17 +53,20 @@ def hidden_sides(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     points = (points - centre) * ((PIXELS / 2 - 1) / radius)
     owner, samples = spread_points(points, triangles, SPACING)
     normal = face_normals(points, triangles).astype(np.float32)
-    samples = samples.T.astype(np.float32)
+    samples = np.ascontiguousarray(samples.T, np.float32)
     weight = np.zeros(len(triangles))
     # Of the front of every face, and of its back.
     seen = np.zeros((2, len(triangles)))
-    count = np.maximum(np.bincount(owner, minlength=len(triangles)), 1)
+    # The samples of a triangle come one after the other.
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    count, shares = np.diff(first, append=len(owner)), np.zeros((2, len(triangles)))
     for frame in _frames(VIEWS):
         slant = normal @ frame[2]
         near, far = _visible(frame @ samples, slant, owner)
         lit = np.abs(slant)
         weight += lit
-        shares = [np.bincount(owner, v, len(triangles)) / count for v in (near, far)]
+        for share, visible in zip(shares, (near, far), strict=True):
+            share[owner[first]] = np.add.reduceat(visible, first, dtype=np.int64) / count
         towards = slant < 0
         seen[0] += lit * np.where(towards, *shares)
         seen[1] += lit * np.where(towards, *shares[::-1])
