@@ -18,11 +18,12 @@ from omt_uv.solver.contact.self_intersections import FaceCrossings
 from omt_uv.solver.globe import exact_areas
 from omt_uv.solver.globe.projections import EQUIRECT, PROJECTIONS
 from omt_uv.solver.globe.unfolding import Polygons, unfold
+from omt_uv.solver.maps.contacts import crossings
 from omt_uv.solver.maps.energy import elements
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.spherical_geometry import normalized
 from omt_uv.solver.mesh.topology import boundary_loops
-from omt_uv.solver.refinement.boundary_barrier import BoundaryBarrier, crossings, make_barrier
+from omt_uv.solver.refinement.boundary_barrier import BoundaryBarrier, make_barrier
 from omt_uv.solver.refinement.hessian_blocks import Assembly
 from omt_uv.solver.refinement.pins import PinEnergy, Pins
 from omt_uv.solver.registration import surface_newton

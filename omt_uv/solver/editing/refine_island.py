@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import FoldedUVError, MeshError, positive_density
 from ..linalg.additive_schwarz import schwarz_solver
+from ..maps.contacts import crossings
 from ..maps.energy import Elements, area_error
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import polygon_elements
@@ -19,7 +20,7 @@ from ..maps.untangle import count_folds
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import boundary_edges, boundary_loops, halfedges
 from ..progress import Progress, Steps
-from ..refinement.boundary_barrier import crossings, make_barrier
+from ..refinement.boundary_barrier import make_barrier
 from ..refinement.continuation import ContinuationResult, MapProblem, minimise_in_stages
 from ..refinement.continuation_rules import QUALITIES, Quality
 from ..refinement.elimination_order import Renumbered, renumbered

@@ -1,4 +1,4 @@
-"""Tell where an outline that touches itself covers itself there, which no two of its edges need to cross for.
+"""Tell where an outline crosses itself, and where it touches itself and covers what is there, which needs no crossing.
 
 Maps of bodies of equal cubes lie on a grid: two of their squares may coincide to the last digit, with edges on edges
 and corners on corners. What tells them from neighbours is the angle that the map takes up on each side of a contact.
@@ -8,8 +8,80 @@ from __future__ import annotations
 
 import numpy as np
 
+from .boxes import box_pairs
+
 # Angles in radians by which two sectors have to overlap: the two sides of a slit meet in less, for rounding.
 OVERLAPPING = 1e-3
+# Edges that reach past each other by less than this share of the map only touch: the two sides of a cut through a flat
+# surface lie on one another, and rounding shall not decide whether they cross.
+TOUCH = 1e-9
+
+
+def loop_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tails and heads (b,) of the edges of a boundary: a loop (b,) of vertices, or edges (b,2) of several loops."""
+    return (loop[:, 0], loop[:, 1]) if loop.ndim == 2 else (loop, np.roll(loop, -1))
+
+
+def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Pairs (k,2) of edges of a boundary that cross: edge i goes from loop[i] to the next; see `loop_edges`.
+
+    Touching at a common vertex is no crossing, and neither are edges that only touch, unless the map covers itself
+    there: see `covering_contacts`.
+    """
+    tail, head = loop_edges(loop)
+    low, high = box_of(np.stack([w[tail], w[head]]))
+    depth = _touch(low, high)
+    i, j = box_pairs(low - depth, high + depth, low, high)
+    apart = (j > i) & (tail[i] != head[j]) & (head[i] != tail[j])
+    i, j = i[apart], j[apart]
+    hit = _cross_at(w, tail, head, i, j, depth)
+    return np.column_stack([i[hit], j[hit]])
+
+
+def crossings_on_the_way(w: np.ndarray, step: np.ndarray, loop: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
+    """Pairs (k,2) of edges of a boundary that cross where vertices have gone these shares of a step (n,) complex.
+
+    Of a map w (n,) complex in which none do: pairs of edges that stay are not looked at.
+    """
+    tail, head = loop_edges(loop)
+    moves = np.flatnonzero((step[tail] != 0) | (step[head] != 0))
+    if not len(moves):
+        return np.zeros((0, 2), np.int64)
+    maps = [w + share * step for share in shares]
+    low, high = box_of(np.stack([x for moved in maps for x in (moved[tail], moved[head])]))
+    depth = _touch(low, high)
+    i, j = box_pairs(low[moves] - depth, high[moves] + depth, low, high)
+    i = moves[i]
+    apart = (i != j) & (tail[i] != head[j]) & (head[i] != tail[j])
+    i, j = i[apart], j[apart]
+    hit = np.zeros(len(i), bool)
+    for moved in maps:
+        hit |= _cross_at(moved, tail, head, i, j, depth)
+    return np.column_stack([i[hit], j[hit]])
+
+
+def _touch(low: np.ndarray, high: np.ndarray) -> float:
+    """How far edges with boxes (b,2) may reach past each other and only touch."""
+    return TOUCH * float((high.max(0) - low.min(0)).max())
+
+
+def _cross_at(w, tail, head, i, j, depth: float) -> np.ndarray:
+    """Which pairs i, j (k,) of the edges from tail to head cross in a map w (n,)."""
+    a, b = w[tail], w[head]
+    hit = _passes(a[i], b[i], a[j], b[j], depth) & _passes(a[j], b[j], a[i], b[i], depth)
+    return hit | covering_contacts(w, tail, head, i, j, depth) | covering_contacts(w, tail, head, j, i, depth)
+
+
+def covers_itself(w: np.ndarray, loop: np.ndarray) -> bool:
+    """Whether a map w (n,) without folds of a disk with the boundary loop (b,) covers any place twice."""
+    return int(turns(w, *loop_edges(loop))[0]) > 1 or len(crossings(w, loop)) > 0
+
+
+def _passes(a, b, p, q, depth: float) -> np.ndarray:
+    """Whether p and q (k,) lie on either side of the lines from a to b (k,), both farther than `depth` from them."""
+    along = b - a
+    left, right = _cross(along, p - a), _cross(along, q - a)
+    return (left * right < 0) & (np.minimum(np.abs(left), np.abs(right)) > depth * np.abs(along))
 
 
 def covering_contacts(
@@ -66,3 +138,15 @@ def _before(tail: np.ndarray, head: np.ndarray) -> np.ndarray:
     before = np.empty(len(tail), np.int64)
     before[np.argsort(tail)] = np.argsort(head)
     return before
+
+
+def box_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest coordinates (b,2) of the boxes around points (k,b) complex, k in each."""
+    return (
+        np.column_stack([points.real.min(0), points.imag.min(0)]),
+        np.column_stack([points.real.max(0), points.imag.max(0)]),
+    )
+
+
+def _cross(a, b):
+    return a.real * b.imag - a.imag * b.real

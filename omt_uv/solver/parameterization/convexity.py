@@ -21,6 +21,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..linalg.nested_dissection import vertex_graph
 from ..linalg.sparse import minimum_degree
+from ..maps.contacts import crossings
 from ..maps.mirror_symmetry import MirrorSymmetry, mirror_symmetry, without_symmetry
 from ..maps.polygon_elements import polygon_elements
 from ..mesh.charts import Chart
@@ -28,7 +29,6 @@ from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.polygon_areas import polygon_areas
 from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops, row_labels
-from ..refinement.boundary_barrier import crossings
 from ..refinement.mirrored_motion import find_symmetry
 from .corner_solver import CornerMesh, CornerPatches
 from .polygon_corners import CONVEX, DENTED, PolygonCorners, convex_corners, straight_share

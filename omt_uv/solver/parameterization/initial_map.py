@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from ..analysis.density import graded_density
 from ..conformal.boundary_first import FlatDisk, boundary_first
 from ..errors import PrecisionError, TransportError
+from ..maps.contacts import covers_itself
 from ..maps.energy import Elements, area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
 from ..maps.tutte import arc_length_parameters, evened_tutte, tutte
@@ -23,7 +24,6 @@ from ..maps.untangle import count_folds, map_energy
 from ..mesh.geometry import face_areas, halfedge_lengths
 from ..mesh.topology import boundary_loops
 from ..progress import RunLog, Steps, part_of
-from ..refinement.boundary_barrier import covers_itself
 from ..refinement.continuation_rules import QUALITIES, UNSQUEEZED, is_squeezed
 from ..refinement.initial_maps import is_far
 from ..refinement.mesh_hierarchy import coarsen_disk

@@ -9,7 +9,7 @@ from ..lazy import lazy
 __getattr__, __all__ = lazy(
     __name__,
     batch_refine="BatchMaps refine_batch",
-    boundary_barrier="BoundaryBarrier crossings make_barrier",
+    boundary_barrier="BoundaryBarrier make_barrier",
     continuation="ContinuationResult MapProblem minimise_in_stages",
     continuation_rules="QUALITIES Quality",
     initial_maps="InitialMap unroll",

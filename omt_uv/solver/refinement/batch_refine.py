@@ -14,7 +14,7 @@ import numpy as np
 
 from ..linalg.nested_dissection import vertex_graph
 from ..linalg.sparse import minimum_degree
-from ..maps.contacts import turns
+from ..maps.contacts import crossings, turns
 from ..maps.development import developed
 from ..maps.energy import FACE_ERROR, SHARE_ERROR, Elements, energies, gradient
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
@@ -24,7 +24,6 @@ from ..mesh.geometry import angle_defects, angles_from_lengths, halfedge_lengths
 from ..mesh.topology import vertices_along_boundary
 from ..progress import Progress, Steps
 from .batch_continuation import AreaErrors, BatchContinuation
-from .boundary_barrier import crossings
 from .hessian_blocks import assembly_of
 from .initial_maps import EXACT, NEARLY_FLAT, farthest_from_first, least_squares_conformal
 from .mirrored_motion import MirroredMotion, find_symmetry, symmetric_start

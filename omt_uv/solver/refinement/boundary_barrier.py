@@ -14,82 +14,12 @@ from typing import Any
 import numpy as np
 
 from ..maps.boxes import box_pairs
-from ..maps.contacts import covering_contacts, turns
+from ..maps.contacts import box_of, loop_edges
 
 # Reach of the barrier, relative to the shorter of the boundary edges involved.
 REACH = 0.5
 # A step goes at most this share of the way to the first contact.
 CONTACT_SHARE = 0.8
-# Edges that reach past each other by less than this share of the map only touch: the two sides of a cut through a flat
-# surface lie on one another, and rounding shall not decide whether they cross.
-TOUCH = 1e-9
-
-
-def loop_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tails and heads (b,) of the edges of a boundary: a loop (b,) of vertices, or edges (b,2) of several loops."""
-    return (loop[:, 0], loop[:, 1]) if loop.ndim == 2 else (loop, np.roll(loop, -1))
-
-
-def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Pairs (k,2) of edges of a boundary that cross: edge i goes from loop[i] to the next; see `loop_edges`.
-
-    Touching at a common vertex is no crossing, and neither are edges that only touch, unless the map covers itself
-    there: see `contacts.covering_contacts`.
-    """
-    tail, head = loop_edges(loop)
-    low, high = _box(np.stack([w[tail], w[head]]))
-    depth = _touch(low, high)
-    i, j = box_pairs(low - depth, high + depth, low, high)
-    apart = (j > i) & (tail[i] != head[j]) & (head[i] != tail[j])
-    i, j = i[apart], j[apart]
-    hit = _cross_at(w, tail, head, i, j, depth)
-    return np.column_stack([i[hit], j[hit]])
-
-
-def crossings_on_the_way(w: np.ndarray, step: np.ndarray, loop: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
-    """Pairs (k,2) of edges of a boundary that cross where vertices have gone these shares of a step (n,) complex.
-
-    Of a map w (n,) complex in which none do: pairs of edges that stay are not looked at.
-    """
-    tail, head = loop_edges(loop)
-    moves = np.flatnonzero((step[tail] != 0) | (step[head] != 0))
-    if not len(moves):
-        return np.zeros((0, 2), np.int64)
-    maps = [w + share * step for share in shares]
-    low, high = _box(np.stack([x for moved in maps for x in (moved[tail], moved[head])]))
-    depth = _touch(low, high)
-    i, j = box_pairs(low[moves] - depth, high[moves] + depth, low, high)
-    i = moves[i]
-    apart = (i != j) & (tail[i] != head[j]) & (head[i] != tail[j])
-    i, j = i[apart], j[apart]
-    hit = np.zeros(len(i), bool)
-    for moved in maps:
-        hit |= _cross_at(moved, tail, head, i, j, depth)
-    return np.column_stack([i[hit], j[hit]])
-
-
-def _touch(low: np.ndarray, high: np.ndarray) -> float:
-    """How far edges with boxes (b,2) may reach past each other and only touch."""
-    return TOUCH * float((high.max(0) - low.min(0)).max())
-
-
-def _cross_at(w, tail, head, i, j, depth: float) -> np.ndarray:
-    """Which pairs i, j (k,) of the edges from tail to head cross in a map w (n,)."""
-    a, b = w[tail], w[head]
-    hit = _passes(a[i], b[i], a[j], b[j], depth) & _passes(a[j], b[j], a[i], b[i], depth)
-    return hit | covering_contacts(w, tail, head, i, j, depth) | covering_contacts(w, tail, head, j, i, depth)
-
-
-def covers_itself(w: np.ndarray, loop: np.ndarray) -> bool:
-    """Whether a map w (n,) without folds of a disk with the boundary loop (b,) covers any place twice."""
-    return int(turns(w, *loop_edges(loop))[0]) > 1 or len(crossings(w, loop)) > 0
-
-
-def _passes(a, b, p, q, depth: float) -> np.ndarray:
-    """Whether p and q (k,) lie on either side of the lines from a to b (k,), both farther than `depth` from them."""
-    along = b - a
-    left, right = _cross(along, p - a), _cross(along, q - a)
-    return (left * right < 0) & (np.minimum(np.abs(left), np.abs(right)) > depth * np.abs(along))
 
 
 @dataclass(frozen=True)
@@ -136,7 +66,7 @@ class BoundaryBarrier:
         tail, head = self.tail, self.head
         p, a, b = w[tail], w[tail], w[head]
         dp, da, db = step[tail], step[tail], step[head]
-        i, j = box_pairs(*_box(np.stack([p, p + dp])), *_box(np.stack([a, b, a + da, b + db])))
+        i, j = box_pairs(*box_of(np.stack([p, p + dp])), *box_of(np.stack([a, b, a + da, b + db])))
         apart = (tail[i] != tail[j]) & (tail[i] != head[j])
         i, j = i[apart], j[apart]
         times = _contact_times(p[i] - a[j], dp[i] - da[j], b[j] - a[j], db[j] - da[j])
@@ -150,9 +80,9 @@ class BoundaryBarrier:
     def _near_in(self, w: np.ndarray) -> _Near:
         tail, head = self.tail, self.head
         p, a, b = w[tail], w[tail], w[head]
-        low, high = _box(p[None])
+        low, high = box_of(p[None])
         grown = self.vertex_reach[:, None]
-        i, j = box_pairs(low - grown, high + grown, *_box(np.stack([a, b])))
+        i, j = box_pairs(low - grown, high + grown, *box_of(np.stack([a, b])))
         apart = (tail[i] != tail[j]) & (tail[i] != head[j])
         i, j = i[apart], j[apart]
         along, to = b[j] - a[j], p[i] - a[j]
@@ -223,13 +153,6 @@ def _contact_times(p, dp, e, de):
     # A little more than the segment, lest rounding lets a vertex slip past an end.
     hit = (times > 0) & (times <= 1 / CONTACT_SHARE) & (share > -1e-9) & (share < 1 + 1e-9)
     return np.where(hit, times, np.inf).min(0, initial=np.inf) if len(p) else np.zeros(0)
-
-
-def _box(points):
-    return (
-        np.column_stack([points.real.min(0), points.imag.min(0)]),
-        np.column_stack([points.real.max(0), points.imag.max(0)]),
-    )
 
 
 def _cross(a, b):

@@ -13,11 +13,12 @@ from typing import Protocol
 
 import numpy as np
 
+from ..maps.contacts import crossings
 from ..maps.energy import Elements, energies, missing_tilt, target_error, target_error_but_share, tilted
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import with_convex_quads
 from ..progress import Progress, Steps
-from .boundary_barrier import BoundaryBarrier, crossings, make_barrier
+from .boundary_barrier import BoundaryBarrier, make_barrier
 from .continuation_rules import (
     FIRST_PRESSURE,
     FORESEEN,
@@ -60,7 +61,7 @@ class MapProblem:
     Attributes
     ----------
     faces, assembly, motion, smoother : see `NewtonProblem`
-    loop : a boundary, see `boundary_barrier.loop_edges`, that may not cross itself, or None
+    loop : a boundary, see `contacts.loop_edges`, that may not cross itself, or None
     with_barrier : from the beginning
     scale_free : the scale of the targets follows the map
     symmetry : of the maps, or None

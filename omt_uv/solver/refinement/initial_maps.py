@@ -14,13 +14,13 @@ import numpy as np
 from ..analysis.density import relative_entropy
 from ..errors import FoldedUVError
 from ..linalg.sparse import Factor
+from ..maps.contacts import covers_itself
 from ..maps.development import developed
 from ..maps.energy import elements
 from ..maps.tutte import arc_length_parameters, tutte
 from ..maps.untangle import USABLE, arc_length_boundary, circle_boundary, count_folds, map_energy, untangle
 from ..mesh.geometry import face_areas, signed_areas
 from ..mesh.topology import expand, halfedges, twins
-from .boundary_barrier import covers_itself
 from .projected_newton import CircleMotion, FreeMotion, LineMotion, Motion, linear_forms
 
 SPREAD = "The boundary of the start is not in order; it was spread over the domain by its length"

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import MeshError, positive_density
 from ..linalg.additive_schwarz import schwarz_solver
+from ..maps.contacts import crossings
 from ..maps.energy import Elements, area_error, elements, has_folds
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import polygon_elements
@@ -20,7 +21,6 @@ from ..maps.untangle import arc_length_boundary
 from ..mesh.geometry import face_areas
 from ..mesh.topology import boundary_loops
 from ..progress import Progress, Steps, part_of
-from .boundary_barrier import crossings
 from .continuation import ContinuationResult, MapProblem, minimise_in_stages
 from .continuation_rules import QUALITIES, planned_weights
 from .elimination_order import Renumbered, renumbered

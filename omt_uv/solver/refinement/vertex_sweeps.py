@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..maps.contacts import crossings_on_the_way, loop_edges
 from ..maps.energy import Elements, area_error, energies, squared
 from ..mesh.topology import halfedges, order_of_numbers, runs, twins
 from ..progress import Progress, Steps
-from .boundary_barrier import crossings_on_the_way, loop_edges
 
 # Least eigenvalue of a vertex's Hessian over the greatest.
 CONVEX = 0.01
@@ -37,7 +37,7 @@ def smoothed(
 ) -> Steps[np.ndarray]:
     """A map w (n,) complex without folds after sweeps over all its vertices, without folds.
 
-    loop: a boundary, see `boundary_barrier.loop_edges`, that moves, too, and does not come to cross itself. Without it
+    loop: a boundary, see `contacts.loop_edges`, that moves, too, and does not come to cross itself. Without it
     the boundary stays. goal: area error at which the sweeps end
     """
     w = w.copy()

@@ -15,11 +15,12 @@ import numpy as np
 from scipy.sparse import csr_matrix, identity, kron, vstack
 from scipy.sparse.linalg import splu
 
+from ..maps.contacts import crossings
 from ..maps.energy import Elements, face_derivatives_of, hat_gradients, squared, sum_at_vertices
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
 from ..mesh.polygon_areas import BOTH
 from ..progress import Progress, Steps
-from ..refinement.boundary_barrier import BoundaryBarrier, crossings, make_barrier
+from ..refinement.boundary_barrier import BoundaryBarrier, make_barrier
 from ..refinement.continuation import CONTACT_STRENGTH
 from ..refinement.hessian_blocks import Assembly
 from ..refinement.projected_newton import linear_forms

@@ -12,6 +12,7 @@ from omt_uv.solver.editing.live_map import LiveMap
 from omt_uv.solver.editing.refine_island import STRAIGHTENED, refine_island, signed_area_of
 from omt_uv.solver.editing.uv_islands import uv_islands
 from omt_uv.solver.errors import FoldedUVError, PinError
+from omt_uv.solver.maps.contacts import crossings
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.tutte import tutte
 from omt_uv.solver.maps.untangle import arc_length_boundary
@@ -22,7 +23,7 @@ from omt_uv.solver.parameterization.chart_indices import CornerPins
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.boundary_barrier import crossings, make_barrier
+from omt_uv.solver.refinement.boundary_barrier import make_barrier
 
 
 def head(count=16):

@@ -5,13 +5,12 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.maps.contacts import covering_contacts, turns
+from omt_uv.solver.maps.contacts import covering_contacts, covers_itself, crossings, loop_edges, turns
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.boundary_barrier import covers_itself, crossings, loop_edges
 
 STEPS = [1, 1j, -1, -1j]
 

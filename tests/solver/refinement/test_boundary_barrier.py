@@ -5,13 +5,8 @@ import pytest
 
 from omt_uv.solver.maps import boxes
 from omt_uv.solver.maps.boxes import box_pairs
-from omt_uv.solver.refinement.boundary_barrier import (
-    BoundaryBarrier,
-    crossings,
-    crossings_on_the_way,
-    loop_edges,
-    make_barrier,
-)
+from omt_uv.solver.maps.contacts import crossings, crossings_on_the_way, loop_edges
+from omt_uv.solver.refinement.boundary_barrier import BoundaryBarrier, make_barrier
 
 
 def test_crossings_of_a_bow_tie_and_of_a_polygon():

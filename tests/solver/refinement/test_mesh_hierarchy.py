@@ -6,6 +6,7 @@ import pytest
 
 from omt_uv.solver.analysis.density import Target, region_share
 from omt_uv.solver.analysis.region_density import exact_density
+from omt_uv.solver.maps.contacts import crossings
 from omt_uv.solver.maps.energy import elements, energy
 from omt_uv.solver.mesh.charts import triangle_rows
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
@@ -16,7 +17,6 @@ from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import mesh_hierarchy
-from omt_uv.solver.refinement.boundary_barrier import crossings
 from omt_uv.solver.refinement.mesh_hierarchy import coarsen_disk
 from omt_uv.solver.refinement.vertex_sweeps import smoothed
 from omt_uv.solver.transport.convex_domain import Disk

@@ -4,13 +4,13 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.maps.contacts import crossings
 from omt_uv.solver.maps.energy import area_error, elements, energies, energy
 from omt_uv.solver.maps.tutte import arc_length_parameters, tutte
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
 from omt_uv.solver.refinement import vertex_sweeps as smoothing
-from omt_uv.solver.refinement.boundary_barrier import crossings
 
 WEIGHT = 30.0
 

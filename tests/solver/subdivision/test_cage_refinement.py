@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from omt_uv.solver.maps.contacts import crossings
 from omt_uv.solver.mesh.geometry import face_areas, signed_areas
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.progress import drain
-from omt_uv.solver.refinement.boundary_barrier import crossings
 from omt_uv.solver.subdivision.cage_refinement import refine_cage, subdivided_elements
 from omt_uv.solver.subdivision.cage_symmetry import CageChart, cage_symmetry
 from omt_uv.solver.subdivision.catmull_clark import cage_of, straight_boundary, subdivide
