@@ -31,7 +31,7 @@ OTHERWISE = "in the map if cut along another diagonal"
 # How often polygons that fold are mapped by their triangles, with those that fold then.
 ROUNDS = 3
 # Share of its polygon's area of a triangle that has one on the surface.
-SOLID = 1e-9
+SOLID = 1e-12
 
 
 def with_convex_polygons(
