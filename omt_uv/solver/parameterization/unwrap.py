@@ -192,10 +192,13 @@ def _pieces(
 ) -> Steps[tuple[_Drawn, np.ndarray]]:
     """A chart of a surface of area `whole` and its map cut in pieces, and the edges (k,2) in between; whole where it is
     neither long nor sprawls, or the pieces are no disks."""
-    from ..seams.limbs import pieces_of_chart
+    from ..seams.limbs import may_come_apart, pieces_of_chart
 
-    cost, axes = search.costs().vertex_cost[chart.vertex_ids], search.shear.preferences.axes
+    axes = search.shear.preferences.axes
     up = None if axes is None else axes.up
+    if not may_come_apart(chart, chart_map.uv, up, whole):
+        return ([chart], [chart_map]), np.zeros((0, 2), np.int64)
+    cost = search.costs().vertex_cost[chart.vertex_ids]
     piece, between = pieces_of_chart(chart, chart_map.uv, cost, up, whole, search.images)
     parts, maps = list[Chart](), list[ChartMap]()
     for k in range(int(piece.max()) + 1 if len(between) else 0):

@@ -266,3 +266,9 @@ class _Body:
             return None
         side = minimum_cut(self.graph, np.where(inner, self.capacity, 1), np.flatnonzero(near), np.flatnonzero(beyond))
         return side & here
+
+
+def may_come_apart(chart: Chart, uv: np.ndarray, up: Up, whole: float) -> bool:
+    """Whether `pieces_of_chart` looks for pieces at all, which needs no costs: these may take longer than all else."""
+    share = face_areas(chart.vertices, chart.triangles).sum() / whole
+    return bool(pieces_of_band(uv, np.sqrt(whole), share) > 1 or (share > MOSTLY and sprawls(chart, uv, up)))
