@@ -19,6 +19,6 @@ __getattr__, __all__ = lazy(
     region_density="RegionDensity exact_density target_density",
     seam_costs="SeamCosts SeamPreferences",
     straight_paths="EdgeNetwork edge_network straighten turning_angles",
-    symmetry_plane="SymmetryPlane",
+    symmetry_plane="MirrorImages SymmetryPlane",
     vertex_scores="distance scaled_vertex_areas soft_weights vertex_score",
 )

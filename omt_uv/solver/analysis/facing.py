@@ -1,8 +1,9 @@
 """Tell the front of a body from its back: the front is where a face has its eyes, nose and mouth.
 
 The most salient parts near the mirror plane of a head or a body lie to its front. Ears, on the sides, count little, and
-what lies to both sides of the plane cancels out. Where that says little, the front is where the scene is seen from:
-artists model what looks at them in the front view.
+what lies to both sides of the plane cancels out. What stands high counts, too: a beast has its head above its feet and
+its rump. Where that says little, the front is where the scene is seen from: artists model what looks at them in the
+front view.
 """
 
 from __future__ import annotations
@@ -22,7 +23,14 @@ SALIENT = (0.9, 0.99)
 CLEAR = 0.06
 NONE = 0.02
 # How far off the middle, over the size, salient parts would have to lie to speak against the front view.
-FRONT_VIEW = 0.03
+FRONT_VIEW = 0.045
+# Share of the area that stands high, and what its place counts next to that of salient parts.
+HIGH = 0.25
+HEAD = 0.4
+# How far ahead of the middle, over the size, high parts lie of a body that holds its head up and ahead, and of others;
+# and the shares of the area below where such a head begins, and where all is head.
+BEAST = (0.06, 0.11)
+NECK = (0.5, 0.75)
 # Certainty that a body without a mirror plane has at most.
 UNSURE = 0.5
 # A mirror plane whose normal rises more than this sine is no upright one: what was told to be up is not.
@@ -55,11 +63,13 @@ class Facing:
     front (3,) : unit vector, 0 where there is no telling
     up (3,) : unit vector, 0 where it is not known
     certainty : in [0, 1], of the front
+    beast : in [0, 1], whether its head is all that has a face, held up and ahead, as beasts do
     """
 
     front: np.ndarray
     up: np.ndarray
     certainty: float
+    beast: float = 0.0
 
 
 def facing(
@@ -83,7 +93,8 @@ def facing(
         depth = (positions - area @ positions / area.sum()) @ plane.normal
         near = area * np.exp(-0.5 * depth**2 * area.sum() / (area @ depth**2))
     eyes = near * salient_weights(saliency, area, SALIENT)
-    off = FRONT_VIEW * viewer
+    high = _off_the_middle(positions, area, up)
+    off = FRONT_VIEW * viewer + HEAD * high
     if eyes.sum() > 0:
         off = off + eyes @ positions / eyes.sum() - near @ positions / near.sum()
     if plane is not None:
@@ -91,7 +102,35 @@ def facing(
     if up.any():
         off -= (off @ up) * up
     certainty = float(np.clip((np.linalg.norm(off) - NONE) / (CLEAR - NONE), 0, 1 if plane is not None else UNSURE))
-    return Facing(unit(off) if certainty else np.zeros(3), up, certainty)
+    front = unit(off) if certainty else np.zeros(3)
+    return Facing(front, up, certainty, float(np.clip((high @ front - BEAST[0]) / (BEAST[1] - BEAST[0]), 0, 1)))
+
+
+def with_a_face(positions: np.ndarray, triangles: np.ndarray, seen: Facing) -> np.ndarray:
+    """How far the vertices (n,) of a surface (n,3), (m,3) are on a part that has a face, in [0, 1]: all of a body, and
+    of a beast its head."""
+    if not seen.beast:
+        return np.ones(len(positions))
+    head = np.clip(
+        (_below(positions, vertex_areas(positions, triangles), seen.up) - NECK[0]) / (NECK[1] - NECK[0]), 0, 1
+    )
+    return 1 - seen.beast * (1 - head)
+
+
+def _below(positions: np.ndarray, area: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """The share (n,) of the areas (n,) of vertices (n,3) that is below each."""
+    order = np.argsort(positions @ up, kind="stable")
+    below = np.empty(len(order))
+    below[order] = np.cumsum(area[order]) / area.sum()
+    return below
+
+
+def _off_the_middle(positions: np.ndarray, area: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """From the middle of vertices (n,3) with areas (n,) to that of what stands high among them; 0 without an `up`."""
+    if not up.any():
+        return np.zeros(3)
+    high = area * np.clip((_below(positions, area, up) - 1) / HIGH + 1, 0, 1)
+    return high @ positions / max(high.sum(), np.finfo(float).tiny) - area @ positions / area.sum()
 
 
 def towards(positions: np.ndarray, triangles: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from ..mesh.geometry import halfedge_lengths, vertex_areas
 from ..mesh.gluing import polygon_sides
 from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
 from ..mesh.topology import halfedges, pair_keys, pair_up, paired
-from .facing import Facing, SceneAxes, ahead, facing, salient_weights, towards
+from .facing import Facing, SceneAxes, ahead, facing, salient_weights, towards, with_a_face
 from .feature_edges import fold_angles
 from .occlusion import vertex_occlusion
 from .order_of_places import order_of_places
@@ -183,7 +183,8 @@ def _vertex_reasons(
     saliency = saliency_of(means, triangles)
     seen = facing(positions, triangles, saliency, plane, axes)
     occlusion = vertex_occlusion(positions, triangles)
-    forwards = seen.certainty * towards(positions, triangles, seen.front)
+    sure = seen.certainty * with_a_face(positions, triangles, seen)
+    forwards = sure * towards(positions, triangles, seen.front)
     below = towards(positions, triangles, -seen.up)
     # Sockets and nostrils are hidden from most sides, but not from the front, from where a face is looked at.
     front = _step(forwards, SIDE) * (1 - _step(occlusion, BURIED))
@@ -192,12 +193,12 @@ def _vertex_reasons(
         "hidden": hidden,
         "crease": _step(-means[CREASE_SCALE], CREASE) * (1 - front),
         "underside": _step(below, SIDE),
-        "back": _step(-forwards, SIDE),
+        "back": _step(-seen.certainty * towards(positions, triangles, seen.front), SIDE),
         "front": front,
         "salient": salient_weights(saliency, area, SALIENT) * (1 - hidden),
         "mirror": np.zeros(n),
         # Within, too: whoever cuts in a mouth has come across the lips.
-        "face": np.maximum(front, _step(seen.certainty * ahead(positions, triangles, seen.front), SIDE)),
+        "face": np.maximum(front, _step(sure * ahead(positions, triangles, seen.front), SIDE)),
     }
     return seen, reasons
 

@@ -48,9 +48,38 @@ DAMPING = 1e-6
 # Vertices this close to images of others, over the size, are pairs, and so many of all make a mirror of vertices.
 PAIR = 1e-3
 MOST_PAIRS = 0.9
+# Images of vertices this far from vertices, over the extent, lie on these; where fewer than that share do, nearest ones
+# have to do, and vertices within this distance of the plane, over the extent, are in it.
+SAME_PLACE = 1e-3
+MOSTLY_EXACT = 0.9
+IN_PLANE = 0.02
 # What is flat is nearly its own image in the plane in which it lies: residuals are to be less than this share of the
 # distances of the surface from the plane.
 FLAT = 0.1
+
+
+@dataclass(frozen=True)
+class MirrorImages:
+    """Mirror images of the vertices of a surface.
+
+    Attributes
+    ----------
+    exact (n,) : the vertex on which the image of each lies, -1 where there is none
+    nearest (n,) : the vertex nearest to the image of each
+    in_plane (n,) bool : vertices that are their own images, or about
+    are_exact : most have exact ones
+    """
+
+    exact: np.ndarray
+    nearest: np.ndarray
+    in_plane: np.ndarray
+    are_exact: bool
+
+    @staticmethod
+    def of(image: np.ndarray) -> MirrorImages:
+        """Those of vertices with exact images (n,), -1 where there is none."""
+        own = np.arange(len(image))
+        return MirrorImages(image, np.where(image >= 0, image, own), image == own, True)
 
 
 @dataclass(frozen=True)
@@ -105,6 +134,16 @@ class SymmetryPlane:
             far[used], found = cKDTree(positions[used]).query(self.reflected(positions[used]))
             image[used] = used[found]
         return image, far
+
+    def images(self, positions: np.ndarray, triangles: np.ndarray) -> MirrorImages:
+        """The images of the vertices of a surface (n,3), (m,3), as exact as they are."""
+        image, far = self.nearest_images(positions, triangles)
+        extent, used = float(np.ptp(positions[np.unique(triangles)], axis=0).max()), np.isfinite(far)
+        is_exact = far <= SAME_PLACE * extent
+        exact = np.where(is_exact, image, -1)
+        if is_exact[used].mean() >= MOSTLY_EXACT:
+            return MirrorImages(exact, image, exact == np.arange(len(exact)), True)
+        return MirrorImages(exact, image, np.abs(self.distance(positions)) <= IN_PLANE * extent, False)
 
 
 def symmetry_plane(

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.density import Target, means_of_polygons
 from ..analysis.seam_costs import SeamCosts, seam_costs
+from ..analysis.symmetry_plane import MirrorImages
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..mesh.charts import Chart
 from ..mesh.surface import Surface
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
 # between 0.2 and 0.35, of limbs with fingers less.
 SPREAD_OF_SHEAR = 0.19
-# Vertices this close to where images of others belong, over the extent, are these images.
-SAME_PLACE = 1e-3
 # Below this bound, what the triangles of a coarse surface shear by themselves counts more than what is cut.
 LEAST_REHEARSED = 1.2
 # Of a surface in one piece the largest chart has this share of the area, but for crumbs.
@@ -107,14 +106,12 @@ class ShearSearch:
         return {}
 
     @cached_property
-    def images(self) -> np.ndarray | None:
-        """The mirror image of every vertex of the surface, -1 where none lies there; None without a mirror."""
-        plane, positions = self.costs().plane, self.surface.positions
+    def images(self) -> MirrorImages | None:
+        """The mirror images of the vertices of the surface; None without a mirror."""
+        plane = self.costs().plane
         if plane is None:
             return None
-        image, far = plane.nearest_images(positions, self.surface.corner_vertex[self.surface.triangles])
-        extent = float(np.ptp(positions[self.surface.corner_vertex], axis=0).max())
-        return np.where(far <= SAME_PLACE * extent, image, -1)
+        return plane.images(self.surface.positions, self.surface.corner_vertex[self.surface.triangles])
 
     @cached_property
     def _costs(self) -> SeamCosts:

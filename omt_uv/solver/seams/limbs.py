@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import ConvexHull
 
+from ..analysis.symmetry_plane import MirrorImages
 from ..maps.upright import turn_upright
 from ..mesh.charts import Chart, part_of_chart
 from ..mesh.geometry import edge_lengths, face_areas, signed_areas
@@ -24,6 +25,7 @@ from .parting import (
     PolygonGraph,
     capacities,
     in_pieces,
+    lies_on_its_image,
     minimum_cut,
     pieces_of_band,
     with_images,
@@ -58,19 +60,19 @@ BETWEEN = 1.15
 
 
 def pieces_of_chart(
-    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, whole: float, image: np.ndarray | None = None
+    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, whole: float, images: MirrorImages | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The piece (m,) of every triangle of a chart with map uv (n,2) that leaves most of a texture empty, and the edges
     (k,2) of the surface in between; one piece where it is neither a long band nor the sprawling most of a surface.
 
-    whole : the area of the surface; cost, image : see `parting.parted`; up (3,) : see `sprawls`
+    whole : the area of the surface; cost, images : see `parting.parted`; up (3,) : see `sprawls`
     """
     share = face_areas(chart.vertices, chart.triangles).sum() / whole
     count = pieces_of_band(uv, np.sqrt(whole), share)
     if count > 1:
         return in_pieces(chart, uv, cost, count)
     if share > MOSTLY and sprawls(chart, uv, up):
-        return without_limbs(chart, uv, cost, up, image)
+        return without_limbs(chart, uv, cost, up, images)
     return np.zeros(len(chart.triangles), np.int64), np.zeros((0, 2), np.int64)
 
 
@@ -83,23 +85,23 @@ def sprawls(chart: Chart, uv: np.ndarray, up: Up) -> bool:
 
 
 def without_limbs(
-    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, image: np.ndarray | None = None
+    chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, images: MirrorImages | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The piece (m,) of every triangle of a chart with map uv (n,2) without its limbs, and the edges (k,2) of the
     surface in between; one piece where the pieces would fill a square little better.
 
-    cost, image : see `parting.parted`; up (3,) : see `sprawls`
+    cost, images : see `parting.parted`; up (3,) : see `sprawls`
     """
-    body = _Body.of(chart, uv, cost, up, image)
+    body = _Body.of(chart, uv, cost, up, images)
     whole = cut = np.zeros(len(body.graph.joined), dtype=bool)
     boxes = body.boxes(cut)
     cuts, shares = [cut], [boxes.filled]
     while len(cuts) <= MOST_CUTS and shares[-1] < FULL:
-        necks = [cut | neck for neck in body.necks(cut, image)]
-        if image is not None:
+        necks = [cut | neck for neck in body.necks(cut, images)]
+        if images is not None:
             # What was symmetric stays so, as long as it can.
-            alike = [neck for neck in necks if body.is_own_image(neck, image)]
-            necks = alike if alike or body.is_own_image(cut, image) else necks
+            alike = [neck for neck in necks if body.is_own_image(neck, images)]
+            necks = alike if alike or body.is_own_image(cut, images) else necks
         left = [body.boxes(neck) for neck in necks]
         # A short neck that does as much as a longer one is the better.
         best = max(range(len(necks)), key=lambda k: left[k].room / body.cost(necks[k]), default=-1)
@@ -168,13 +170,12 @@ class _Body:
     steps: np.ndarray
 
     @staticmethod
-    def of(chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, image: np.ndarray | None = None) -> _Body:
-        """image: see `parting.parted`; what lies in the mirror plane is dear, since it is the middle of one picture."""
+    def of(chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, images: MirrorImages | None = None) -> _Body:
+        """images: see `parting.parted`; what lies in the mirror plane is dear: it is the middle of one picture."""
         graph = PolygonGraph.of(chart)
         places, price = graph.places(chart, uv), graph.prices(chart, cost)
-        if image is not None:
-            ends = chart.vertex_ids[graph.ends]
-            price = np.where((image[ends] == ends).all(axis=1), HALVES * price, price)
+        if images is not None:
+            price = np.where(images.in_plane[chart.vertex_ids[graph.ends]].all(axis=1), HALVES * price, price)
         alike = edge_lengths(chart.vertices, graph.ends).sum() / max(price.sum(), 1e-300)
         steps = np.linalg.norm(np.diff(places[graph.joined], axis=1)[:, 0], axis=1) + 1e-300
         return _Body(chart, uv, up, graph, places, alike * price, capacities(price), steps)
@@ -188,13 +189,16 @@ class _Body:
         """Of a cut (e,) bool, next to the side of a square with the area of the chart, and of that square's side."""
         return 1 + float(self.price[cut].sum() / np.sqrt(self.whole))
 
-    def is_own_image(self, cut: np.ndarray, image: np.ndarray) -> bool:
+    def is_own_image(self, cut: np.ndarray, images: MirrorImages) -> bool:
         """Whether a cut (e,) bool is its own mirror image, for the most part: the nearest image of an image may be
         another vertex."""
         ends = self.chart.vertex_ids[self.graph.ends[cut]]
-        images = image[ends]
-        alike = (images >= 0).all(axis=1) & np.isin(pair_keys(*images.T), pair_keys(*ends.T))
-        return len(ends) > 0 and bool(alike.mean() > 0.5)
+        if not len(ends):
+            return False
+        if not images.are_exact:
+            return lies_on_its_image(self.chart, self.graph.ends[cut], images)
+        image = images.exact[ends]
+        return bool(((image >= 0).all(axis=1) & np.isin(pair_keys(*image.T), pair_keys(*ends.T))).mean() > 0.5)
 
     def pieces(self, cut: np.ndarray) -> tuple[list[Chart], list[np.ndarray]]:
         """The pieces that a cut (e,) bool leaves, and their maps, upright."""
@@ -214,8 +218,8 @@ class _Body:
         charts, maps = self.pieces(cut)
         return drain(pack(maps, [chart.triangles for chart in charts])).coverage
 
-    def necks(self, cut: np.ndarray, image: np.ndarray | None) -> Iterator[np.ndarray]:
-        """Edges (e,) bool across necks of the pieces that a cut (e,) bool leaves; image: see `parting.parted`."""
+    def necks(self, cut: np.ndarray, images: MirrorImages | None) -> Iterator[np.ndarray]:
+        """Edges (e,) bool across necks of the pieces that a cut (e,) bool leaves; images: see `parting.parted`."""
         piece = self.graph.pieces(~cut)
         size = np.bincount(piece, self.graph.area)
         for k in np.flatnonzero(size > 2 * LEAST_LIMB * self.whole):
@@ -229,7 +233,10 @@ class _Body:
                 smaller = min(float(self.graph.area[side].sum()), float(self.graph.area[here & ~side].sum()))
                 if self.price[neck].sum() > NECK * np.sqrt(smaller):
                     continue
-                both = neck if image is None else with_images(self.chart, self.graph, neck, image)
+                both = neck
+                if images is not None:
+                    room = np.where(cut, 1, self.capacity)
+                    both = with_images(self.chart, self.graph, neck, images, [side], room)
                 parts = np.bincount(self.graph.pieces(~(cut | both)), self.graph.area)
                 if parts.min() >= LEAST_PART * self.whole:
                     yield both

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
+from scipy.spatial import cKDTree
 
+from ..analysis.symmetry_plane import MirrorImages
 from ..maps.overlap import cover_pairs
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths, face_areas, unit
@@ -30,6 +32,11 @@ LEAST_PART = 0.03
 MOST_SLITS = 4
 # Pairs of parts that are cut from one another at most.
 MOST_CUTS = 12
+# The image of a part whose vertices have none ends within this share of the side of a square with its area of where
+# that of its outline lies.
+NEAR_IMAGE = 0.2
+# A cut lies on its own image within so many of its edges.
+BESIDE = 2.0
 # Rounds in which crumbs between a cut and its mirror image join what is beside them.
 MOST_CRUMBS = 3
 # Polygons whose normals turn by less, in radians, are of one side, which is flat if they all do about.
@@ -84,6 +91,10 @@ class PolygonGraph:
         """The piece (p,) that each polygon is in, joined by the edges that are kept (e,) bool."""
         return graph_components(self.joined[kept, 0], self.joined[kept, 1], len(self.area))[1]
 
+    def around(self, side: np.ndarray) -> np.ndarray:
+        """The edges (e,) bool between polygons on a side (p,) bool and others."""
+        return side[self.joined[:, 0]] != side[self.joined[:, 1]]
+
     def places(self, chart: Chart, uv: np.ndarray) -> np.ndarray:
         """The middle (p,2) of the triangles of each polygon in a map uv (n,2) of the chart."""
         middle = np.stack([np.bincount(self.polygon, x) for x in uv[chart.triangles].mean(axis=1).T], axis=1)
@@ -99,37 +110,91 @@ class PolygonGraph:
         return csr_matrix((np.tile(weight, 2), (rows, columns)), shape=(len(self.area),) * 2)
 
 
-def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray, image: np.ndarray | None = None) -> np.ndarray:
+def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray, images: MirrorImages | None = None) -> np.ndarray:
     """Edges (k,2) of the surface along which a chart comes apart where its map uv (n,2) lies on itself.
 
-    cost (n,): of a cut through its vertices, per length; image: mirror image of every vertex of the surface, which the
-    cuts then have, too, -1 where there is none. No edges where it does not, or is in one piece all the same.
+    cost (n,): of a cut through its vertices, per length; images: of the vertices of the surface, which the cuts then
+    have, too, as near as can be. No edges where it does not, or is in one piece all the same.
     """
     graph = PolygonGraph.of(chart)
     pairs = _covering(chart, uv, graph)
     capacity = capacities(graph.prices(chart, cost))
     steps = graph.matrix(edge_lengths(chart.vertices, graph.ends) + 1e-300)
-    cut = np.zeros(len(graph.joined), dtype=bool)
+    cut, sides = np.zeros(len(graph.joined), dtype=bool), list[np.ndarray]()
     for one, other in pairs[:MOST_CUTS]:
         part = graph.pieces(~cut)
         if part[one[0]] == part[other[0]]:
             side = minimum_cut(graph, capacity, *_enlarged(graph, steps, one, other))
-            cut |= side[graph.joined[:, 0]] != side[graph.joined[:, 1]]
-    return chart.vertex_ids[graph.ends[cut if image is None else with_images(chart, graph, cut, image)]]
+            cut |= graph.around(side)
+            sides.append(side)
+    if images is not None:
+        cut = with_images(chart, graph, cut, images, sides, capacity)
+    return chart.vertex_ids[graph.ends[cut]]
 
 
-def with_images(chart: Chart, graph: PolygonGraph, cut: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """The cut (e,) bool with its mirror image, if that is one, and crumbs between both can be left out; else as it
-    is."""
-    ends = chart.vertex_ids[graph.ends]
-    images = image[ends[cut]]
-    if not len(images) or (images < 0).any():
-        return cut
-    mine, theirs = pair_keys(*ends.T), pair_keys(*images.T)
-    both = cut | np.isin(mine, theirs)
-    length = edge_lengths(chart.vertices, graph.ends)
-    if not np.isin(theirs, mine).all():
-        return cut
+def with_images(
+    chart: Chart,
+    graph: PolygonGraph,
+    cut: np.ndarray,
+    images: MirrorImages,
+    sides: list[np.ndarray],
+    capacity: np.ndarray,
+) -> np.ndarray:
+    """The cut (e,) bool around `sides` (p,) bool with its mirror image, if that is one, and crumbs between both can be
+    left out; else as it is. Where vertices have no exact images, that of a side ends where it is cheap nearby."""
+    parts, ends = int(graph.pieces(~cut).max()), chart.vertex_ids[graph.ends]
+    image = images.exact[ends[cut]]
+    if images.are_exact and len(image) and (image >= 0).all():
+        mine, theirs = pair_keys(*ends.T), pair_keys(*image.T)
+        alike = np.isin(mine, theirs)
+        if np.isin(theirs, mine).all():
+            both = _without_crumbs(chart, graph, cut, cut | alike)
+            if graph.pieces(~both).max() > parts or np.array_equal(alike, cut):
+                return both
+    room = np.where(cut, 1, capacity)
+    there = [_image_of(chart, graph, side, images.nearest, room) for side in sides]
+    both = np.any([cut, *(graph.around(side) for side in there)], axis=0)
+    both = _without_crumbs(chart, graph, cut, both)
+    # An image takes off as much as what it is of, or it is none.
+    return both if parts < graph.pieces(~both).max() <= 2 * parts else cut
+
+
+def _image_of(
+    chart: Chart, graph: PolygonGraph, side: np.ndarray, nearest: np.ndarray, capacity: np.ndarray
+) -> np.ndarray:
+    """The polygons (p,) bool that are about the mirror image of those of a side (p,) bool, within the cheapest cut near
+    its outline; itself where that is its own image, about. nearest (n,): to the images of vertices of the surface."""
+    count, corner = np.bincount(graph.polygon, minlength=len(side)), chart.vertex_ids[chart.triangles]
+    inside = np.bincount(corner.ravel(), np.repeat(side[graph.polygon], 3).astype(float), len(nearest))
+    inside /= np.maximum(np.bincount(corner.ravel(), minlength=len(nearest)), 1)
+    there = np.bincount(graph.polygon, inside[nearest[corner]].mean(axis=1), len(side)) > 0.5 * count
+    other = float(graph.area[there != side].sum())
+    whole = float(graph.area.sum())
+    if min(other, whole - other) < LEAST_PART * whole or not graph.around(there).any():
+        return side
+    steps = graph.matrix(edge_lengths(chart.vertices, graph.ends) + 1e-300)
+    beside = np.unique(graph.joined[graph.around(there)])
+    far = dijkstra(steps, indices=beside, min_only=True)
+    smaller = min(float(graph.area[there].sum()), float(graph.area[~there].sum()))
+    inner = far > NEAR_IMAGE * np.sqrt(smaller)
+    if not (inner & there).any() or not (inner & ~there).any():
+        return side
+    return minimum_cut(graph, capacity, np.flatnonzero(inner & there), np.flatnonzero(inner & ~there))
+
+
+def lies_on_its_image(chart: Chart, ends: np.ndarray, images: MirrorImages) -> bool:
+    """Whether most vertices of a cut along edges of a chart (e,2) have images beside it, where these are not exact."""
+    places = chart.vertices[np.unique(ends)]
+    at = np.full(len(images.in_plane), -1)
+    at[chart.vertex_ids] = np.arange(len(chart.vertex_ids))
+    there = at[images.nearest[chart.vertex_ids[np.unique(ends)]]]
+    far = cKDTree(places).query(chart.vertices[there])[0]
+    return bool(((there >= 0) & (far <= BESIDE * edge_lengths(chart.vertices, ends).mean())).mean() > 0.5)
+
+
+def _without_crumbs(chart: Chart, graph: PolygonGraph, cut: np.ndarray, both: np.ndarray) -> np.ndarray:
+    """A cut with its image `both` (e,) bool, without crumbs between them; `cut` (e,) bool where some stay."""
+    length, both = edge_lengths(chart.vertices, graph.ends), both.copy()
     for _ in range(MOST_CRUMBS):
         piece = graph.pieces(~both)
         crumb = np.bincount(piece, graph.area) < LEAST_PART / 2 * graph.area.sum()
@@ -175,14 +240,14 @@ def slits(
     least: float,
     cost: np.ndarray,
     barred: np.ndarray,
-    image: np.ndarray | None = None,
+    images: MirrorImages | None = None,
     rounds: int = 1,
 ) -> np.ndarray:
     """Edges (k,2) of the surface from the boundary of a chart into what shears too much, the largest parts first.
 
     steep (m,) bool : triangles that do; least : area of what is to be slit at least; barred (n,) bool : vertices that
-    no slit passes through, unless there is not as much to be slit elsewhere; cost, image : see `parted`; rounds : which
-    time it is
+    no slit passes through, unless there is not as much to be slit elsewhere; cost, images : see `parted`; rounds :
+    which time it is
     """
     graph = PolygonGraph.of(chart)
     bad, free = np.zeros(len(graph.area), dtype=bool), ~barred
@@ -198,7 +263,7 @@ def slits(
     open_ = free[graph.ends].all(axis=1)
     n, ends, price = len(chart.vertices), graph.ends[open_], graph.prices(chart, cost)[open_] + 1e-300
     ways = csr_matrix((np.tile(price, 2), np.concatenate([ends, ends[:, ::-1]]).T), shape=(n, n))
-    known, image_here = pair_keys(*ends.T), _images_in(chart, image)
+    known, image_here = pair_keys(*ends.T), _images_in(chart, None if images is None else images.exact)
     start, found = np.unique(boundary_edges(chart.triangles)), []
     for k in chosen[bad[np.unique(piece, return_index=True)[1]][chosen]]:
         around = np.unique(chart.triangles[steep & (piece[graph.polygon] == k)])
@@ -206,10 +271,10 @@ def slits(
         end = around[np.argmax(np.where(np.isfinite(far[around]), far[around], 0.0))]
         path = path_to(before, int(end))
         edges = np.stack([path[:-1], path[1:]], axis=1)
-        images = image_here[edges]
-        apart = len(np.intersect1d(path, images)) == 0
-        if len(edges) and apart and np.isin(pair_keys(*images.T), known).all():
-            edges = np.concatenate([edges, images])
+        there = image_here[edges]
+        apart = len(np.intersect1d(path, there)) == 0
+        if len(edges) and apart and np.isin(pair_keys(*there.T), known).all():
+            edges = np.concatenate([edges, there])
         found.append(edges)
         start = np.union1d(start, edges)
     return chart.vertex_ids[np.concatenate(found)] if found else np.zeros((0, 2), np.int64)
@@ -238,7 +303,7 @@ def in_pieces(chart: Chart, uv: np.ndarray, cost: np.ndarray, count: int) -> tup
         before, after = along * count < k - NEAR_CUT, along * count > k + NEAR_CUT
         if before.any() and after.any():
             side = minimum_cut(graph, capacity, np.flatnonzero(before), np.flatnonzero(after))
-            cut |= side[graph.joined[:, 0]] != side[graph.joined[:, 1]]
+            cut |= graph.around(side)
     return graph.pieces(~cut)[graph.polygon], chart.vertex_ids[graph.ends[cut]]
 
 

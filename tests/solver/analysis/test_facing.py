@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from omt_uv.solver.analysis.facing import UNSURE, SceneAxes, facing, towards
+from omt_uv.solver.analysis.facing import UNSURE, SceneAxes, facing, towards, with_a_face
 from omt_uv.solver.analysis.saliency import saliency, unit_size
 from omt_uv.solver.analysis.symmetry_plane import symmetry_plane
 
@@ -43,6 +43,22 @@ def test_what_says_little_looks_at_the_viewer_and_a_head_where_its_nose_is():
     assert seen.front @ axes.viewer > 0.99 and 0 < seen.certainty <= UNSURE
     V, F = meshes.head(30)
     assert looks_to(V, F, axes).front @ axes.viewer < -0.99
+
+
+@pytest.mark.parametrize("ahead", [1, -1])
+def test_a_beast_looks_where_its_head_is_held_up_and_its_chest_is_no_face(ahead):
+    """A long body that rises at one end, towards the viewer or away."""
+    V, F = meshes.icosphere(4)
+    rise = np.clip((V[:, 1] - 0.5) / 0.3, 0, 1)
+    V = V * [0.35, 1, 0.3] + np.outer(rise**2 * (3 - 2 * rise), [0, 0, 0.5])
+    V[:, 1] *= ahead
+    seen = looks_to(V, F, SceneAxes(up=(0.0, 0.0, 1.0), viewer=(0.0, -1.0, 0.0)))
+    assert seen.front @ [0, ahead, 0] > 0.99 and seen.beast == 1
+    has_face = with_a_face(unit_size(V, F), F, seen)
+    assert has_face[V[:, 2].argmax()] == 1 and (has_face[V[:, 2] < 0] == 0).all()
+    # Of what stands upright everything has a face.
+    upright = looks_to(*meshes.head(30), SceneAxes(up=(0.0, 0.0, 1.0), viewer=(1.0, 0.0, 0.0)))
+    assert upright.beast == 0 and (with_a_face(*meshes.head(30), upright) == 1).all()
 
 
 def test_towards_is_one_at_the_nearest_end_and_minus_one_at_the_other():

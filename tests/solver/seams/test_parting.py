@@ -6,6 +6,7 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.analysis.symmetry_plane import MirrorImages
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.overlap import cover_pairs, overlap_share
 from omt_uv.solver.mesh.charts import strict_charts
@@ -63,11 +64,16 @@ def test_cuts_have_images_and_leave_no_crumbs_between(row, pieces):
     uv = flat[chart.vertex_ids]
     alone = parted(chart, uv, cost)
     assert (step[alone] == row).all()
-    both = parted(chart, uv, cost, image)
+    both = parted(chart, uv, cost, MirrorImages.of(image))
     assert set(np.unique(step[both])) <= {row, 89 - row}
     assert len(strict_charts(triangle_surface(V, F, both))) == pieces
+    # By images that are only near, about there.
+    near = replace(MirrorImages.of(image), exact=np.full(len(V), -1), are_exact=False)
+    both = parted(chart, uv, cost, near)
+    assert len(strict_charts(triangle_surface(V, F, both))) == pieces
+    assert row in step[both] and np.abs(np.abs(step[both] - 44.5) - np.abs(row - 44.5)).max() < 5
     # Where there is no image, a cut stays as it is.
-    assert np.array_equal(parted(chart, uv, cost, np.full(len(V), -1)), alone)
+    assert np.array_equal(parted(chart, uv, cost, MirrorImages.of(np.full(len(V), -1))), alone)
 
 
 def test_what_lies_beside_itself_stays_whole():
@@ -161,12 +167,13 @@ def test_slits_run_from_the_boundary_into_what_is_steep(mirrored):
     spots = [(0.3, 0.55, 0.0), (0.7, 0.55, 0.0)]
     steep = steep_spots(chart.vertices, chart.triangles, *(spots if mirrored else spots[:1]))
     assert steep.any()
-    image = None
+    image, images = None, None
     if mirrored:
         there = V * [-1, 1, 1] + [1, 0, 0]
         image = np.linalg.norm(V[None] - there[:, None], axis=2).argmin(axis=1)
+        images = MirrorImages.of(image)
     n = len(chart.vertices)
-    edges = slits(chart, steep, 1e-6, np.ones(n), np.zeros(n, dtype=bool), image)
+    edges = slits(chart, steep, 1e-6, np.ones(n), np.zeros(n, dtype=bool), images)
     tips, degree = np.unique(edges, return_counts=True)
     outer = (np.abs(V[:, :2] - 0.5) > 0.5 - 1e-9).any(axis=1)
     ends = tips[degree == 1]

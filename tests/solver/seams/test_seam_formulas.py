@@ -11,6 +11,7 @@ import pytest
 from scipy.sparse import csr_matrix
 from short_cuts import component_of
 
+from omt_uv.solver.analysis.symmetry_plane import MirrorImages
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -266,7 +267,7 @@ def test_a_cut_is_its_own_image_by_most_of_its_edges():
     body = body_of(chart, uv)
     n = len(surface.positions)
     cut = np.zeros(len(body.graph.joined), bool)
-    assert not body.is_own_image(cut, np.arange(n))
+    assert not body.is_own_image(cut, MirrorImages.of(np.arange(n)))
     cut[:7] = True
     ids = chart.vertex_ids[body.graph.ends[cut]]
     keys = {frozenset(e) for e in ids.tolist()}
@@ -278,7 +279,7 @@ def test_a_cut_is_its_own_image_by_most_of_its_edges():
         image[gone] = rng.choice([-1, (gone[0] + 1) % n], len(gone))
         alike = [(image[e] >= 0).all() and frozenset(image[e].tolist()) in keys for e in ids]
         told.append(np.mean(alike) > 0.5)
-        assert body.is_own_image(cut, image) == told[-1]
+        assert body.is_own_image(cut, MirrorImages.of(image)) == told[-1]
     assert 5 < sum(told) < 35
 
 
