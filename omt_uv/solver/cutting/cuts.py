@@ -331,7 +331,10 @@ class _Cutter:
         base = np.zeros(len(component.pair), dtype=bool)
         closed = topology.boundaries[k] == 0 and topology.handles[k] == 0
         if not (closed or topology.is_disk[k]):
-            base = cut_component(search.priced(component), topology, k, 0)[0]
+            priced = search.priced(component)
+            # Each is the cheapest near where it began: the shortest can turn out cheaper.
+            cuts = [cut_component(one, topology, k, 0)[0] for one in (priced, component)]
+            base = min(cuts, key=lambda cut: float(priced.cost[cut].sum()))
         chosen = yield from search(component, base)
         # A slit of a single edge would not open anything.
         if closed and chosen.sum() < 2:
