@@ -92,6 +92,9 @@ def facing(
     if plane is not None:
         depth = (positions - area @ positions / area.sum()) @ plane.normal
         near = area * np.exp(-0.5 * depth**2 * area.sum() / (area @ depth**2))
+    if up.any():
+        # Feet and tails are salient, too.
+        near = near * _below(positions, area, up)
     eyes = near * salient_weights(saliency, area, SALIENT)
     high = _off_the_middle(positions, area, up)
     off = FRONT_VIEW * viewer + HEAD * high
