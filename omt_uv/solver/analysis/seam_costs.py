@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import ZeroAreaFaceError
-from ..mesh.geometry import halfedge_lengths, vertex_areas
+from ..mesh.geometry import halfedge_lengths, unit, vertex_areas
 from ..mesh.gluing import polygon_sides
 from ..mesh.surface import Surface, chosen_triangles, degenerate_triangles
 from ..mesh.topology import halfedges, pair_keys, pair_up, paired
@@ -41,6 +41,9 @@ SIDE = (0.1, 0.6)
 SALIENT = (0.5, 0.95)
 # Distance from the mirror plane, over the size, at which a seam no longer lies on it.
 ON_PLANE = 0.02
+# A mirror plane that is level, by the cosine of its normal and what is up, has to be so exact.
+LEVEL = 0.95
+CHANCE = NEAR / 2
 # A vertex is in a face if it is so with more than this certainty.
 IN_FACE = 0.5
 # Triangles that pair up to quads across their longest sides, of all: so many come from quads and not by chance.
@@ -133,6 +136,8 @@ def seam_costs(
     axes = preferences.axes
     left = None if axes is None else np.cross(axes.up, axes.viewer)
     plane = symmetry_plane(positions, triangles, owner, side=left)
+    if plane is not None and axes is not None and _is_chance(plane, axes):
+        plane = None
     seen, at_vertices = _vertex_reasons(positions, triangles, plane, axes)
     if plane is not None:
         _symmetrise(positions, triangles, plane, at_vertices)
@@ -155,6 +160,11 @@ def seam_costs(
     face = np.zeros(n)
     face[used] = in_face
     return SeamCosts(ends, cost, reasons, vertex_cost, face, plane, seen)
+
+
+def _is_chance(plane: SymmetryPlane, axes: SceneAxes) -> bool:
+    """Whether a body is alike above and below, and not quite: no symmetry that anyone would see in it."""
+    return plane.residual > CHANCE and abs(float(plane.normal @ unit(np.array(axes.up, float)))) > LEVEL
 
 
 def _in_order(positions: np.ndarray, used: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
