@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..cutting.disk_charts import DiskCharts
 from ..errors import ENDED_EARLY, MORE_SEAMS
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
-from ..mesh.topology import pair_keys
+from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import SPREAD_BY_SHEAR
 from .chart_indices import but_within, edge_set, identity, is_marked, outline
@@ -22,6 +22,9 @@ from .chart_map import ChartMap, local_shear
 from .mirrored_charts import mapped_anew
 from .options import ShearBound
 from .shear_search import ShearSearch
+
+if TYPE_CHECKING:
+    from ..seams.coarse_cut import Found
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
@@ -52,6 +55,8 @@ SLACK = 0.85
 WORTHWHILE = 0.03
 # Where that misses the bound, one that uses up less of what is allowed may not: powers of it.
 HOPES = (1.0, 0.5)
+# Of what came apart parts with this share of the area are searched anew.
+LARGE_PART = 0.03
 # Charts of less than this share of the area count for nothing.
 LEAST_AREA = 1e-4
 # A mean excess of the shear up to this is not worse than none: what was parted is cut further.
@@ -136,7 +141,9 @@ def bound_shear(
     best = last if last.excess <= best.excess else best
     if not best.excess and not early.is_asked:
         begin = 1 - 0.5 ** (rounds - 1)
-        best = yield from part_of(_taken_back(search, best, map_charts, early), begin, 1 - begin)
+        half = (1 - begin) / 2
+        best = yield from part_of(_taken_back(search, best, map_charts, early), begin, half)
+        best = yield from part_of(_parts_cut_anew(search, best, map_charts, early), begin + half, half)
     return best.result(search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
 
 
@@ -196,6 +203,35 @@ def _taken_back(search: ShearSearch, last: _Round, map_charts, early: EarlyEnd) 
     return last
 
 
+def _parts_cut_anew(search: ShearSearch, last: _Round, map_charts, early: EarlyEnd) -> Steps[_Round]:
+    """A round within the bound whose parts have cuts of their own, where these are shorter than what was cut of the
+    whole before it came apart, and keep the bound, too."""
+    large = last.area >= LARGE_PART * last.area.sum()
+    parts = [
+        k
+        for k in np.flatnonzero(large & last.has_room).tolist()
+        if not last.found_for(k) and (search.shear.further or not is_marked(search.surface, last.charts[k]))
+    ]
+    if len(last.charts) < 2 or not parts:
+        return last
+    kept = but_within(last.cuts.edges, [last.charts[k] for k in parts])
+    asked = _Asked(parts, kept, search.first_spread(), {}, lambda edges: len(edges) > 0)
+    new = yield from _cut_anew(search, last, asked, map_charts, early)
+    if new is None or new is last:
+        return last
+    of = last.chart_of(search, new)
+    missed = np.bincount(of, new.pressing > new.bound, len(last.charts)) > 0
+    # The outline of a part is there before and after.
+    length = np.array([_outline_length(chart) for chart in last.charts])
+    shorter = np.bincount(of, [_outline_length(chart) for chart in new.charts], len(length)) < length
+    stay = missed | ~shorter
+    return last if stay.all() else last.merged(search, new, of, stay)
+
+
+def _outline_length(chart: Chart) -> float:
+    return float(edge_lengths(chart.vertices, boundary_edges(chart.triangles)).sum())
+
+
 def _share_allowed(last: _Round, k: int) -> float:
     """How many times the square of log(shear) of chart k may be."""
     return float(MARGIN * np.log(last.bound) ** 2 / np.log(last.pressing[k]) ** 2)
@@ -203,11 +239,7 @@ def _share_allowed(last: _Round, k: int) -> float:
 
 def _has_slack(last: _Round, k: int) -> bool:
     """Whether chart k, as it was rehearsed, shears so much less than the bound that a shorter cut may do."""
-    faces = np.unique(last.charts[k].faces)
-    known = any(
-        one.rehearsed is not None and np.array_equal(np.unique(one.polygons), faces) for one in last.memory.values()
-    )
-    return known and 0 < np.log(last.pressing[k]) ** 2 < SLACK * np.log(last.bound) ** 2
+    return bool(last.has_room[k]) and any(one.rehearsed is not None for one in last.found_for(k))
 
 
 @dataclass(frozen=True)
@@ -250,23 +282,48 @@ class _Round:
     ) -> tuple[_Round, set[tuple[bytes, bytes]]]:
         """The new round made of this one, but for charts that became worse while others became better, which are as
         they are here; and the identities `worse` with those of these."""
-        region = np.full(search.count, -1)
-        for k, chart in enumerate(self.charts):
-            region[chart.faces] = k
-        of = np.array([region[chart.faces[0]] for chart in new.charts])
+        of = self.chart_of(search, new)
         now = np.bincount(of, new.missing, len(self.charts))
         stay = now > self.missing + NO_EXCESS * self.area
         if not stay.any() or (stay | (now >= self.missing))[self.searched].all():
             return new, worse
+        merged = self.merged(search, new, of, stay)
+        return merged, worse | {identity(chart) for chart in itertools.compress(self.charts, stay)}
+
+    def _region(self, search: ShearSearch) -> np.ndarray:
+        """The chart (f,) that polygons of the surface are in, -1 for none."""
+        region = np.full(search.count, -1)
+        for k, chart in enumerate(self.charts):
+            region[chart.faces] = k
+        return region
+
+    def chart_of(self, search: ShearSearch, new: _Round) -> np.ndarray:
+        """The chart (k,) of this round that those of a new one are parts of."""
+        region = self._region(search)
+        return np.array([region[chart.faces[0]] for chart in new.charts])
+
+    def merged(self, search: ShearSearch, new: _Round, of: np.ndarray, stay: np.ndarray) -> _Round:
+        """A new round, but for the charts of this one that stay (k,) bool as they are; of: see `chart_of`."""
         charts = [*itertools.compress(self.charts, stay), *itertools.compress(new.charts, ~stay[of])]
         maps = [*itertools.compress(self.maps, stay), *itertools.compress(new.maps, ~stay[of])]
         edges = np.unique(np.concatenate([self.cuts.edges, new.cuts.edges]), axis=0)
         edges = edges[np.isin(pair_keys(*edges.T), np.concatenate([outline(chart) for chart in charts]))]
         # What was found for parts that are as they were is forgotten.
+        region = self._region(search)
         memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
         memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
-        merged = _Round.of(search, charts, maps, _joined(search, self.cuts, edges), memory)
-        return merged, worse | {identity(chart) for chart in itertools.compress(self.charts, stay)}
+        return _Round.of(search, charts, maps, _joined(search, self.cuts, edges), memory)
+
+    @property
+    def has_room(self) -> np.ndarray:
+        """Charts (k,) bool that shear so much less than the bound that less of a cut may do."""
+        squares = np.log(self.pressing) ** 2
+        return (squares > 0) & (squares < SLACK * np.log(self.bound) ** 2)
+
+    def found_for(self, k: int) -> list[Found]:
+        """What searches have found for chart k as a whole."""
+        faces = np.unique(self.charts[k].faces)
+        return [one for one in self.memory.values() if np.array_equal(np.unique(one.polygons), faces)]
 
     @property
     def missing(self) -> np.ndarray:

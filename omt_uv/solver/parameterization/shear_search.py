@@ -15,7 +15,7 @@ from ..analysis.symmetry_plane import MirrorImages
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..mesh.charts import Chart
 from ..mesh.surface import Surface
-from ..progress import Steps
+from ..progress import Steps, part_of
 from .chart_map import ChartMap, local_shear
 from .options import ShearBound
 
@@ -88,13 +88,41 @@ class ShearSearch:
 
     def again(self, kept: np.ndarray, missed: list[Chart], spread: np.ndarray, changes: dict) -> Steps[DiskCharts]:
         """Charts that missed the bound cut anew, for a spread (f,) or, where the same parts were searched before, by
-        what changes in the search; the edges that others were cut along (k,2) stay."""
-        target = np.full(self.count, np.inf)
-        for chart in missed:
-            target[chart.faces] = spread[chart.faces]
+        what changes in the search; the edges that others were cut along (k,2) stay. Of two charts that are each other's
+        mirror image one is searched."""
+        target, twin = np.full(self.count, np.inf), self._twins(missed)
+        for k, chart in enumerate(missed):
+            target[chart.faces] = spread[chart.faces] if twin[k] < 0 else np.inf
         search = replace(self.search(target), further=True, **changes)
+        found = yield from part_of(self._cut(kept, search), 0.0, 0.9)
+        if (twin < 0).all():
+            return found
+        known = found.found_cuts.edges
+        originals = [missed[k].vertex_ids for k in twin[twin >= 0]]
+        inner = known[np.any([np.isin(known, ids).all(axis=1) for ids in originals], axis=0)]
+        known = np.concatenate([known, self.images.exact[inner]]) if self.images is not None else known
+        none = replace(search, spread=np.full(self.count, np.inf))
+        found = yield from part_of(self._cut(np.concatenate([kept, known]), none), 0.9, 0.1)
+        cuts = found.found_cuts
+        return replace(found, cuts=replace(cuts, edges=np.concatenate([known, cuts.edges])))
+
+    def _cut(self, kept: np.ndarray, search: SeamSearch) -> Steps[DiskCharts]:
+        """Charts with edges (k,2) that stay cut, and those that a search finds."""
         surface = replace(self.surface, seams=np.concatenate([self.surface.seams, kept]))
         return disk_charts(surface, self.faces, search=search, **self.cutting)
+
+    def _twins(self, charts: list[Chart]) -> np.ndarray:
+        """The number (k,) of the chart before each of which it is the mirror image, vertex by vertex; -1 for none."""
+        twin = np.full(len(charts), -1)
+        if self.images is None or not self.images.are_exact or len(charts) < 2:
+            return twin
+        sets = [np.unique(chart.vertex_ids) for chart in charts]
+        number = {vertices.tobytes(): k for k, vertices in enumerate(sets)}
+        for k, vertices in enumerate(sets):
+            other = number.get(np.sort(self.images.exact[vertices]).tobytes(), k)
+            if other < k and twin[other] < 0:
+                twin[k] = other
+        return twin
 
     def costs(self) -> SeamCosts:
         """What cutting the edges of the surface costs."""

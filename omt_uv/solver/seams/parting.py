@@ -166,7 +166,7 @@ def _image_of(
     its outline; itself where that is its own image, about. nearest (n,): to the images of vertices of the surface."""
     count, corner = np.bincount(graph.polygon, minlength=len(side)), chart.vertex_ids[chart.triangles]
     inside = np.bincount(corner.ravel(), np.repeat(side[graph.polygon], 3).astype(float), len(nearest))
-    inside /= np.maximum(np.bincount(corner.ravel(), minlength=len(nearest)), 1)
+    inside = inside / np.maximum(np.bincount(corner.ravel(), minlength=len(nearest)), 1)
     there = np.bincount(graph.polygon, inside[nearest[corner]].mean(axis=1), len(side)) > 0.5 * count
     other = float(graph.area[there != side].sum())
     whole = float(graph.area.sum())

@@ -39,7 +39,9 @@ def steepness(result):
     return np.concatenate([shear for _, shear in each])
 
 
-def test_seams_bring_the_shear_under_the_bound():
+def test_seams_bring_the_shear_under_the_bound(monkeypatch):
+    # Whether it fills a texture is another question.
+    monkeypatch.setattr(unwrap_module, "COMPACT", np.inf)
     V, F = meshes.cap(rings=12, sectors=24, opening=0.85)
     surface = triangle_surface(V, F)
     assert max(mean_shear(unwrapped(surface, 0))) > 1.3
@@ -324,3 +326,61 @@ def made_round(search, edges, shear, found):
         for k, name in enumerate((b"first", b"second"))
     }
     return shear_bound._Round.of(search, charts, maps, Cuts(edges, 0.0, (), edges[:0], ()), memory)
+
+
+def bumpy(n):
+    """A square with two bumps, its own mirror image across x = 1/2, also by its triangles; n is even."""
+    x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
+    z = sum(0.7 * np.exp(-40 * ((x - a) ** 2 + (y - 0.5) ** 2)) for a in (0.28, 0.72))
+    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    quads = np.stack([i, i + n + 1, i + n + 2, i + 1], axis=1)
+    left = (quads // (n + 1))[:, 0] < n // 2
+    one, other = quads[left], quads[~left]
+    F = np.concatenate([one[:, [0, 1, 2]], one[:, [0, 2, 3]], other[:, [0, 1, 3]], other[:, [1, 2, 3]]])
+    return np.stack([x, y, z], axis=2).reshape(-1, 3), F
+
+
+def edges_along(points):
+    """Edges (k,2) between vertices (k+1,) one after another."""
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def halves(n, bound):
+    """The bumpy square with a seam along its mirror plane, the search for a bound, and the seam (n,2)."""
+    V, F = bumpy(n)
+    surface = triangle_surface(V, F)
+    search = shear_search.ShearSearch(
+        surface, None, ShearBound(bound), None, {}, unwrap_module.rehearsal(UnwrapOptions())
+    )
+    return surface, search, edges_along(n // 2 * (n + 1) + np.arange(n + 1))
+
+
+def test_of_two_charts_that_are_mirror_images_both_are_cut_alike():
+    surface, search, seam = halves(24, 1.2)
+    charts = strict_charts(replace(surface, seams=seam))
+    found = drain(search.again(seam, charts, search.first_spread(), {}))
+    edges = np.setdiff1d(found.found_cuts.edges, np.zeros(0)).astype(int)
+    assert len(edges) and len(found.charts) == 2
+    cut = {frozenset(edge) for edge in found.found_cuts.edges.tolist()}
+    row, column = np.divmod(found.found_cuts.edges, 25)
+    assert cut == {frozenset(edge) for edge in ((24 - row) * 25 + column).tolist()}
+
+
+def test_parts_of_what_came_apart_have_cuts_of_their_own_where_these_are_shorter():
+    n = 24
+    surface, search, seam = halves(n, 1.3)
+    # A slit around each bump and over it, and back again.
+    slits = [edges_along(row * (n + 1) + np.arange(n // 2 + 6)) for row in (4, 7, n - 7, n - 4)]
+    edges = np.concatenate([seam, *slits])
+    charts = strict_charts(replace(surface, seams=edges))
+    map_charts = unwrap_module._Task(surface, UnwrapOptions(), None, None).map_charts
+    cuts = Cuts(
+        edges, float(np.linalg.norm(np.diff(surface.positions[edges], axis=1), axis=2).sum()), (), edges[:0], ()
+    )
+    before = shear_bound._Round.of(search, charts, drain(map_charts(charts)), cuts, {})
+    assert len(charts) == 2 and before.has_room.all() and not before.found_for(0)
+    after = drain(shear_bound._parts_cut_anew(search, before, map_charts, shear_bound.EarlyEnd()))
+    assert after.cuts.length < 0.9 * before.cuts.length and (after.pressing <= 1.3).all() and len(after.charts) == 2
+    assert {frozenset(e) for e in seam.tolist()} <= {frozenset(e) for e in after.cuts.edges.tolist()}
+    # Parts whose own cuts are no shorter, and what is in one piece, stay as they are.
+    assert drain(shear_bound._parts_cut_anew(search, after, map_charts, shear_bound.EarlyEnd())) is after
