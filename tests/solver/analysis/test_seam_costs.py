@@ -7,8 +7,10 @@ import meshes
 import numpy as np
 import pytest
 
+from omt_uv.solver.analysis import seam_costs as seam_costs_module
 from omt_uv.solver.analysis.facing import SceneAxes
 from omt_uv.solver.analysis.seam_costs import LEAST, MOST, SeamPreferences, seam_costs
+from omt_uv.solver.analysis.symmetry_plane import SymmetryPlane
 from omt_uv.solver.errors import ZeroAreaFaceError
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import pair_keys
@@ -111,3 +113,17 @@ def test_what_lies_nowhere_and_in_no_face_does_not_count():
     assert costs.vertex_cost[0] == 1 and not costs.face[0]
     with pytest.raises(ZeroAreaFaceError):
         seam_costs(triangle_surface(0 * V, F))
+
+
+@pytest.mark.parametrize(
+    ("normal", "residual", "chance"),
+    [((0, 0, 1), 0.008, True), ((0, 0, 1), 0.002, False), ((0, 0.6, 0.8), 0.008, False), ((1, 0, 0), 0.008, False)],
+)
+def test_what_is_only_about_the_same_above_and_below_has_no_mirror(monkeypatch, normal, residual, chance):
+    V, F = meshes.head(20)
+    plane = SymmetryPlane(np.array(normal, float), 0.0, residual, None)
+    monkeypatch.setattr(seam_costs_module, "symmetry_plane", lambda *_, **__: plane)
+    surface = triangle_surface(V, F)
+    assert (seam_costs(surface, SeamPreferences(axes=SceneAxes())).plane is None) == chance
+    # Where nobody knows what is up, nothing is level.
+    assert seam_costs(surface, SeamPreferences()).plane is not None
