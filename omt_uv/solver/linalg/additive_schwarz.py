@@ -62,7 +62,8 @@ class AdditiveSchwarz:
         self._kept: Callable[[np.ndarray], np.ndarray] | None = None
         self._last: np.ndarray | None = None
         self._ordered = False
-        self._part = kd_parts(points, max(0, round(np.log2(n / size))))
+        # Numbers that are kept take half of the memory that they are computed in.
+        self._part = kd_parts(points, max(0, round(np.log2(n / size)))).astype(np.int32)
         self._count = int(self._part.max()) + 1
         graph = vertex_graph(triangles, n).tocsr()
         # A vertex with thousands of neighbours would bring all of them into every part.
@@ -76,14 +77,15 @@ class AdditiveSchwarz:
         self._unknowns: list[np.ndarray] = []
         for k in range(self._count):
             v = np.sort(member.indices[member.indptr[k] : member.indptr[k + 1]])
-            self._unknowns.append((2 * v[:, None] + np.arange(2)).ravel())
+            self._unknowns.append((2 * v[:, None] + np.arange(2)).ravel().astype(np.int32))
 
-    def solve(self, matrix: sp.spmatrix, b: np.ndarray, w: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    def solve(self, matrix: sp.spmatrix, b: np.ndarray, w: np.ndarray, axes: Callable[[], np.ndarray]) -> np.ndarray:
         """About the solution x (2n,) of matrix x = b, symmetric positive definite; b.x > 0.
 
         The decrease b.x / 2 that x promises as a Newton step is within some percent of the most there is; where that
-        takes too long, x is the solution. w (n,) complex: the map; axes (n,2) complex: the direction that each unknown
-        of a vertex stands for, 0 for one that stays 0. Raises PrecisionError.
+        takes too long, x is the solution. w (n,) complex: the map; axes() (n,2) complex: the direction that each
+        unknown of a vertex stands for, 0 for one that stays 0, made when it is asked for since it takes as much memory
+        as two maps. Raises PrecisionError.
         """
         # Its transpose is itself, by rows.
         matrix = matrix.T if sp.issparse(matrix) and matrix.format == "csc" else sp.csr_matrix(matrix)
@@ -101,16 +103,20 @@ class AdditiveSchwarz:
         if not self._keep:
             give_back()
 
-    def _solved_anew(self, matrix: sp.csr_matrix, b: np.ndarray, w: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    def _solved_anew(
+        self, matrix: sp.csr_matrix, b: np.ndarray, w: np.ndarray, axes: Callable[[], np.ndarray]
+    ) -> np.ndarray:
         """As `solve`, by new factors."""
         self.prepare(matrix)
         self._give_back()
-        factors = self._factors(matrix, np.full(len(b), -1, np.int64))
+        spread = self._affine(w, axes())
         self._give_back()
-        spread = self._affine(w, axes)
+        factors = self._factors(matrix, np.diff(spread.indptr) > 0)
+        self._give_back()
         gather = spread.T
         coarse = self._coarse(matrix, spread)
         coarse = Factor(coarse + SHIFT * coarse.diagonal().max() * sp.identity(coarse.shape[0]))
+        self._give_back()
 
         def precondition(r):
             x = spread @ coarse.solve(gather @ r)
@@ -126,17 +132,20 @@ class AdditiveSchwarz:
     def prepare(self, matrix: sp.csr_matrix) -> None:
         """Order the unknowns of every part for little fill, by the first matrix (2n,2n), symmetric: all corners of a
         quad are neighbours there, and what a vertex follows, which no triangle says."""
-        place = np.full(matrix.shape[0], -1, np.int64)
+        place = np.full(matrix.shape[0], -1, np.int32)
         for k, d in enumerate(self._unknowns if not self._ordered else []):
             vertices = minimum_degree(_block(matrix, d, place)[::2, ::2])
             self._unknowns[k] = d.reshape(-1, 2)[vertices].ravel()
         self._ordered = True
 
-    def _factors(self, matrix: sp.csr_matrix, place: np.ndarray) -> list[tuple[np.ndarray, Factor]]:
-        """The unknowns of some parts each, and the factors of their equations one after the other."""
-        found = []
+    def _factors(self, matrix: sp.csr_matrix, moves: np.ndarray) -> list[tuple[np.ndarray, Factor]]:
+        """The unknowns of some parts each, and the factors of their equations one after the other; without parts of
+        which no unknown moves (2n,) bool: vertices that follow their images are half of a mesh, or more."""
+        found, place = [], np.full(matrix.shape[0], -1, np.int32)
         for k in range(0, self._count, TOGETHER):
             parts = self._unknowns[k : k + TOGETHER]
+            if not any(moves[d].any() for d in parts):
+                continue
             blocks = [_block(matrix, d, place) for d in parts]
             try:
                 found.append(
@@ -167,7 +176,7 @@ class AdditiveSchwarz:
         z = w - middle[part]
         z /= np.sqrt(np.bincount(part, np.abs(z) ** 2, count) / size)[part]
         moves = (axes != 0).ravel()
-        part, z, along = np.repeat(part.astype(np.int32), 2)[moves], np.repeat(z, 2)[moves], axes.ravel()[moves].conj()
+        part, z, along = np.repeat(part, 2)[moves], np.repeat(z, 2)[moves], axes.ravel()[moves].conj()
         # Column by column: all of them as complex numbers take more memory than the matrix.
         entries = np.empty((len(z), 6))
         for k, motion in enumerate((np.ones(len(z)), z, z.conj())):
@@ -196,7 +205,10 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False
     little = LITTLE_FILL * min(1.0, np.log(n) / np.log(LARGE))
     if n < (LARGE_KEPT if keep else LARGE) or (n < COUNTED and fill(vertex_graph(triangles, n)) < little * n):
         return None
-    return AdditiveSchwarz(points, triangles, keep=keep)
+    parts = AdditiveSchwarz(points, triangles, keep=keep)
+    if not keep:
+        give_back()
+    return parts
 
 
 def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:

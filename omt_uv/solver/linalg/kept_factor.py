@@ -33,16 +33,16 @@ class KeptFactor:
         self._factor: Factor | None = None
         self._last: np.ndarray | None = None
 
-    def solve(self, matrix: sp.spmatrix, b: np.ndarray, w: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    def solve(self, matrix: sp.spmatrix, b: np.ndarray, w: np.ndarray, axes: Callable[[], np.ndarray]) -> np.ndarray:
         """About the solution x (n,) of matrix x = b (n,), symmetric positive definite; b.x > 0.
 
         The decrease b.x / 2 that x promises as a Newton step is within some percent of the most there is. w, axes: as
         in `AdditiveSchwarz.solve`; they play no part. Raises PrecisionError.
 
         >>> solver, b = KeptFactor(), np.ones(3)
-        >>> solver.solve(sp.identity(3, format="csc"), b, b, b)
+        >>> solver.solve(sp.identity(3, format="csc"), b, b, lambda: b)
         array([1., 1., 1.])
-        >>> solver.solve(sp.identity(3, format="csc") * 2, b, b, b)
+        >>> solver.solve(sp.identity(3, format="csc") * 2, b, b, lambda: b)
         array([0.5, 0.5, 0.5])
         """
         if self._factor is not None:

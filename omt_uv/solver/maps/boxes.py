@@ -26,7 +26,10 @@ def box_pairs(
     if pairs is None:
         pairs = _in_grid(low1, high1, low2, high2, low, float(extents.max()))
     i, j = pairs
-    meet = (low1[i] <= high2[j]).all(1) & (low2[j] <= high1[i]).all(1)
+    meet = np.ones(len(i), bool)
+    # Axis by axis: millions of edges have many millions of pairs.
+    for axis in range(2):
+        meet &= (low1[:, axis][i] <= high2[:, axis][j]) & (low2[:, axis][j] <= high1[:, axis][i])
     key = np.sort(i[meet] * len(low2) + j[meet])
     key = key[np.append(True, key[1:] != key[:-1])] if len(key) else key
     return key // len(low2), key % len(low2)
@@ -43,9 +46,15 @@ def _swept(low1, high1, low2, high2, axis: int) -> tuple[np.ndarray, np.ndarray]
     count1, count2 = np.maximum(last2 - first2, 0), np.maximum(last1 - first1, 0)
     if count1.sum() + count2.sum() > SWEPT_PER_BOX * (len(low1) + len(low2)):
         return None
-    one, k = expand(count1)
-    other, m = expand(count2)
-    return np.concatenate([one, order1[first1[other] + m]]), np.concatenate([order2[first2[one] + k], other])
+    # Pairs of a million edges take more memory than all else: what they come from is no longer needed.
+    del sorted1, sorted2, last1, last2
+    middle = int(count1.sum())
+    i, j = np.empty((2, middle + int(count2.sum())), np.int64)
+    i[:middle], k = expand(count1)
+    j[:middle] = order2[first2[i[:middle]] + k]
+    j[middle:], k = expand(count2)
+    i[middle:] = order1[first1[j[middle:]] + k]
+    return i, j
 
 
 def _in_grid(low1, high1, low2, high2, low, extent: float) -> tuple[np.ndarray, np.ndarray]:

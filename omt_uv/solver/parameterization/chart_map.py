@@ -148,14 +148,14 @@ def map_chart(
         given = {"target": asked, "region": disk.region, "pins": places, "polygons": disk.polygons}
         refined = good_enough(disk, start, draft, initial.apart, goal) if plain else None
         if refined is None:
+            disk = replace(disk)  # without the maps that were made of it on the way
             refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
         refined = replace(refined, uv=refined.uv[: len(vertices)])  # centres of polygons were there for the map alone
     with log.timed("measure"):
         figures = measured_chart(vertices, chart, refined.uv, density)
     if target is not None and options.balance == 0:
         log.warnings += area_error_warnings(figures.area_l1, QUALITIES[options.quality].area_error)
-    if figures.folds:
-        log.warnings.append(f"{figures.folds} {FOLDED}")
+    log.warnings += [f"{figures.folds} {FOLDED}"] if figures.folds else []
     uv = refined.uv
     if places is None:
         uv = placed_chart(uv, vertices, chart, density, unit, pins, disk.boundary == "free")

@@ -62,14 +62,15 @@ class Assembly:
         # The diagonal, too: a vertex may follow another, and be in no cell.
         pairs = [_pairs(c, n) for c in cells]
         key = np.unique(np.concatenate([*pairs, np.arange(n, dtype=np.int64) * (n + 1)]))
-        self._block = np.concatenate([np.searchsorted(key, k) for k in pairs])
+        # What is kept between steps takes half of the memory that it is computed in.
+        self._block = np.concatenate([np.searchsorted(key, k).astype(np.int32) for k in pairs])
         column, row = np.divmod(key, n)
         degree = np.bincount(column, minlength=n)
         start = np.cumsum(degree) - degree
         # Within column 2 j + q the rows 2 i + p follow each other; `stride` is from one of these columns to the next.
         self._stride = (2 * degree[column]).astype(np.int32)
-        self._slot = 4 * start[column] + 2 * (np.arange(len(key)) - start[column])
-        self._indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))])
+        self._slot = (4 * start[column] + 2 * (np.arange(len(key)) - start[column])).astype(np.int32)
+        self._indptr = np.concatenate([[0], np.cumsum(np.repeat(2 * degree, 2))]).astype(np.int32)
         self._indices = np.empty(4 * len(key), np.int32)
         for p, q in AXES:
             self._indices[self._slot + p + q * self._stride] = 2 * row + p
@@ -86,10 +87,10 @@ class Assembly:
             data: np.ndarray = np.bincount(self._every, every, len(self._indices))
             return self._with_diagonal(data, diagonal)
         cells = [b.reshape(len(b), b.shape[1] // 2, 2, b.shape[1] // 2, 2) for b in given]
-        data = np.empty(len(self._indices))
+        data, block = np.empty(len(self._indices)), self._block.astype(np.intp)
         for p, q in AXES:
             values = np.concatenate([c[:, :, p, :, q].ravel() for c in cells])
-            data[self._slot + p + q * self._stride] = np.bincount(self._block, values, len(self._slot))
+            data[self._slot + p + q * self._stride] = np.bincount(block, values, len(self._slot))
         return self._with_diagonal(data, diagonal)
 
     def pattern(self) -> sp.csc_matrix:

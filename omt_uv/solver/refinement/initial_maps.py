@@ -29,6 +29,8 @@ SQUEEZED = "The corners of the start squeeze or fold faces; they were spread by 
 NEARLY_FLAT = 0.5
 # In meshes of more than so many vertices an eighth of them is looked at before all.
 SAMPLED = 1000
+# Triangles whose angles are found at a time: what is found on the way takes ten times their memory.
+AT_ONCE = 100_000
 # Triangles of a chart that is developed may disagree about a vertex by this share of its size; by more, it is curved.
 EXACT = 1e-10
 # Solutions of normal equations have half of the digits, and each further one of what is left has as many more: on a
@@ -365,9 +367,12 @@ def is_curved(vertices: np.ndarray, triangles: np.ndarray, boundary: np.ndarray)
 
 def inner_curvature(vertices: np.ndarray, triangles: np.ndarray, boundary: np.ndarray) -> float:
     """Sum of |angle defect|, in radians, over the vertices (n,3) of triangles (m,3) but those of the boundary (b,)."""
-    p = vertices[triangles]
-    after, before = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
-    angle = np.arctan2(np.linalg.norm(np.cross(after, before), axis=2), (after * before).sum(2))
+    angle = np.empty(triangles.shape)
+    for begin in range(0, len(triangles), AT_ONCE):
+        p = vertices[triangles[begin : begin + AT_ONCE]]
+        after, before = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
+        sine = np.linalg.norm(np.cross(after, before), axis=2)
+        angle[begin : begin + AT_ONCE] = np.arctan2(sine, (after * before).sum(2))
     defect = 2 * np.pi - np.bincount(triangles.ravel(), angle.ravel(), len(vertices))
     defect[boundary] = 0
     return float(np.abs(defect).sum())

@@ -61,6 +61,8 @@ def find_symmetry(
     pairs = np.unique(np.repeat(owner[faces.owner], 3).astype(np.int64) * n + faces.triangles.ravel())
     asked = [np.bincount(owner, x) for x in ([target] if faces.region is None else [target, target * faces.region])]
     around = [np.bincount(pairs % n, values[pairs // n], n) for values in asked]
+    # What is no longer needed takes as much memory as the search.
+    del pairs, asked, owner, target
 
     def accepted(image: np.ndarray) -> bool:
         return all((np.abs(x - x[image]) <= SAME_TARGET * around[0]).all() for x in around)

@@ -186,11 +186,10 @@ def newton_direction(
     problem: NewtonProblem, w: np.ndarray, pressure: float | np.ndarray = 1.0
 ) -> tuple[np.ndarray, float]:
     """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
-    frame, free = problem.motion.frame(w), problem.motion.free.astype(float)
-    matrix, slopes, scale = _equations(problem, w, pressure, frame, free)
+    frame, free = problem.motion.frame(w), problem.motion.free
+    matrix, slopes, scale = _equations(problem, w, pressure, frame, free.astype(float))
     parts = problem.assembly.parts if np.max(problem.area_weight) <= STIFF else None
-    axes = frame[:, None] * [1, 1j] * free
-    step = -_solution(matrix, slopes, scale, parts, w, axes, problem.assembly.order)
+    step = -_solution(matrix, slopes, scale, parts, w, lambda: frame[:, None] * [1, 1j] * free, problem.assembly.order)
     return step.view(complex), float(step @ slopes)
 
 

@@ -6,6 +6,7 @@ growing area weight (`continuation`). The weight ends where the area error is sm
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -169,9 +170,14 @@ def refine(
     yield Progress("Refinement", 0.0)
     target = _targets(face_areas(vertices, triangles), target)
     mesh = renumbered(vertices, triangles, uv, pins, polygons)
-    faces = polygon_elements(mesh.vertices, mesh.triangles, target, polygons, region)
+
+    def make() -> Elements:
+        return polygon_elements(mesh.vertices, mesh.triangles, target, polygons, region)
+
     try:
-        found, warnings = yield from _refined(mesh, faces, _by_triangle(mesh, faces, target, region), options, polygons)
+        found, faces, warnings = yield from _refined(
+            mesh, make, lambda faces: _by_triangle(mesh, faces, target, region), options, polygons
+        )
     except MeshError as error:
         raise mesh.original_error(error) from error
     yield Progress("Refinement", 1.0)
@@ -211,25 +217,22 @@ def _by_triangle(mesh: Renumbered, faces: Elements, target: np.ndarray, region: 
 
 def _refined(
     mesh: Renumbered,
-    faces: Elements,
-    by_triangle: Elements,
+    make: Callable[[], Elements],
+    triangle_by_triangle: Callable[[Elements], Elements],
     options: RefinementOptions,
     polygons: np.ndarray | None,
-) -> Steps[tuple[ContinuationResult, tuple[str, ...]]]:
-    """Stages on a renumbered chart: what was found, and the warnings of the initial map it was found from."""
+) -> Steps[tuple[ContinuationResult, Elements, tuple[str, ...]]]:
+    """Stages on a renumbered chart, from what makes its elements, and from these those of which each triangle is a
+    polygon: what was found, the elements, and the warnings of the initial map it was found from."""
     boundary, balance, quality = options.boundary, options.balance, QUALITIES[options.quality]
     pins, loop, n = mesh.pins, boundary_loops(mesh.triangles)[0], len(mesh.vertices)
-    # A map to areas far from the surface's is sheared by right.
-    far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
-    given = (mesh.vertices, mesh.triangles, mesh.uv, loop)
-    initial = INITIAL_MAPS[boundary](*given, **_start_options(boundary, faces, far))
-    w = initial.uv @ [1, 1j]
-    parts = schwarz_solver(mesh.vertices, mesh.triangles)
-    # Sweeps know of triangles alone, of no pins, and of no balance.
-    swept = faces.polygon is None and faces.region is not None and pins is None and balance == 0 and n > SWEPT_ABOVE
-    smoother = Smoother(mesh.triangles, n) if swept else None
+    faces = make()
+    by_triangle = triangle_by_triangle(faces)
+    initial, w = _start(mesh, faces, boundary, loop)
+    smoother = _smoother(mesh, faces, balance)
     warm = options.warm_start
     known = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, polygons, faces)
+    parts = schwarz_solver(mesh.vertices, mesh.triangles)
     symmetry, w = _next_to_image(faces, initial.may_cross, known, w, by_triangle, boundary, loop)
     if known is not None and symmetry is None:
         free = _map_problem(faces, assembly_of(faces, n, parts), initial, loop, boundary, smoother)
@@ -241,7 +244,8 @@ def _refined(
     del known
     half = halved(faces, symmetry)
     assembly = assembly_of(half, n, parts, symmetry)
-    problem = _mirrored(_map_problem(half, assembly, initial, loop, boundary, smoother), symmetry, w, len(faces.area))
+    count = len(faces.area)
+    problem = _mirrored(_map_problem(half, assembly, initial, loop, boundary, smoother), symmetry, w, count)
     if options.crossing:
         problem = replace(problem, loop=None, with_barrier=False)
     several_pins = pins is not None and len(pins.vertices) > 1
@@ -251,23 +255,43 @@ def _refined(
         w = yield from part_of(
             _smoothed_if_tense(problem, by_triangle, w, planned_weights(balance, quality)[0]), *SMOOTHING
         )
-    del by_triangle
+    # All of them take the memory of four maps, and are made in less time than a step takes.
+    del by_triangle, faces
     ahead = options.prolonged and boundary == "free"
     way = minimise_in_stages(problem, w, balance, quality, warm, options.multiplier, ahead)
     found = yield from part_of(way, *STAGES)
+    faces = half if symmetry is None else make()
     error = area_error(faces, found.w)
     if boundary == "disk" and balance == 0 and error > max(NO_ROOM, 2 * quality.area_error):
         notched = notched_disk(initial, mesh.triangles, loop)
         if notched is not None:
             again = _map_problem(half, assembly, notched, loop, boundary, smoother)
-            problem = _mirrored(again, symmetry, w, len(faces.area))
+            problem = _mirrored(again, symmetry, w, count)
             with_notches = yield from minimise_in_stages(problem, w, balance, quality)
             if area_error(faces, with_notches.w) < error:
                 found, initial = with_notches, notched
     if boundary == "free" and not several_pins:
         area = faces.area @ faces.ratio if pins is None else None
         found = replace(found, w=placed_like(found.w, mesh.uv @ [1, 1j], faces, pins, area))
-    return found, initial.warnings
+    return found, faces, initial.warnings
+
+
+def _start(mesh: Renumbered, faces: Elements, boundary: str, loop: np.ndarray) -> tuple[InitialMap, np.ndarray]:
+    """How the boundary may move, and the map (n,) complex to start from, which notches of disks ask for once more."""
+    # A map to areas far from the surface's is sheared by right.
+    far = boundary == "free" and is_far(faces.area * faces.ratio, faces.area)
+    given = (mesh.vertices, mesh.triangles, mesh.uv, loop)
+    initial = INITIAL_MAPS[boundary](*given, **_start_options(boundary, faces, far))
+    w = initial.uv @ [1, 1j]
+    return initial if boundary == "disk" else replace(initial, uv=np.zeros((0, 2))), w
+
+
+def _smoother(mesh: Renumbered, faces: Elements, balance: float) -> Smoother | None:
+    """Sweeps that follow every step, of large meshes with a region; they know of triangles alone, of no pins, and of no
+    balance."""
+    n = len(mesh.vertices)
+    swept = faces.polygon is None and faces.region is not None and mesh.pins is None and balance == 0
+    return Smoother(mesh.triangles, n) if swept and n > SWEPT_ABOVE else None
 
 
 def _next_to_image(

@@ -95,7 +95,7 @@ def test_singular_parts_are_named():
     _, parted, w = flattened("free")
     matrix = sp.csc_matrix((2 * len(w), 2 * len(w)))
     with pytest.raises(PrecisionError):
-        parted.assembly.parts.solve(matrix, np.ones(2 * len(w)), w, np.ones((len(w), 2), complex))
+        parted.assembly.parts.solve(matrix, np.ones(2 * len(w)), w, lambda: np.ones((len(w), 2), complex))
 
 
 @pytest.mark.parametrize("boundary", ["free", "disk"])
@@ -147,7 +147,7 @@ def test_parts_of_quads_have_the_fill_of_their_equations():
     for triangles in (every.reshape(-1, 4, 3)[:, :2].reshape(-1, 3), every):
         parts = AdditiveSchwarz(V, triangles, 1000)
         with counted_work() as tally:
-            parts.solve(matrix, np.ones(2 * len(w)), w, axes)
+            parts.solve(matrix, np.ones(2 * len(w)), w, lambda: axes)
         counts.append(tally.nonzeros)
     assert counts[0] <= 1.1 * counts[1]
 
@@ -195,3 +195,30 @@ def test_motions_are_those_of_the_parts_in_the_axes_and_their_equations_to_the_b
     np.testing.assert_array_equal(found.toarray(), whole.toarray())
     # What stays has no entries that would take memory.
     assert spread.nnz == 6 * np.count_nonzero(axes)
+
+
+def test_parts_that_stay_are_not_factored_and_the_others_as_before(monkeypatch):
+    """Vertices that follow their images are half of a symmetric mesh: identities, and of no use."""
+    V, F = meshes.bumpy(30, 30)
+    n, parts = len(V), AdditiveSchwarz(V, F, 50)
+    stays = V[:, 0] < np.median(V[:, 0])
+    moves = np.repeat(~stays, 2)
+    i, j = np.repeat(F, 3, axis=1).ravel(), np.tile(F, (1, 3)).ravel()
+    graph = sp.kron(sp.csr_matrix((np.ones(len(i)), (i, j)), shape=(n, n)), np.ones((2, 2)))
+    free = sp.diags(moves.astype(float))
+    matrix = (sp.diags(np.asarray(abs(graph).sum(axis=1)).ravel()) - 0.1 * free @ graph @ free).tocsr()
+    monkeypatch.setattr(schwarz, "TOGETHER", 1)
+    parts.prepare(matrix)
+    every, some = parts._factors(matrix, np.ones(2 * n, bool)), parts._factors(matrix, moves)
+    expected = [(d, factor) for d, factor in every if moves[d].any()]
+    assert 0 < len(some) == len(expected) < len(every) == parts._count
+    r = np.random.default_rng(0).normal(size=2 * n) * moves
+    for (d, factor), (e, other) in zip(some, expected, strict=True):
+        np.testing.assert_array_equal(d, e)
+        np.testing.assert_array_equal(factor.solve(r[d]), other.solve(r[e]))
+    w, axes = V[:, 0] + 1j * V[:, 1], np.array([1, 1j]) * ~stays[:, None]
+    x = parts.solve(matrix, r, w, lambda: axes)
+    assert not x[~moves].any()
+    # As good a step as there is, within some percent.
+    best = sp.linalg.spsolve(matrix.tocsc(), r)
+    assert 0.9 * (r @ best) <= r @ x <= (1 + 1e-9) * (r @ best)

@@ -210,7 +210,7 @@ def test_a_solve_by_parts_is_preconditioned_by_their_sum():
 
     before, additive_schwarz.by_gradients = additive_schwarz.by_gradients, steps
     try:
-        parts.solve(sp.csr_matrix(A), b, w, axes)
+        parts.solve(sp.csr_matrix(A), b, w, lambda: axes)
     finally:
         additive_schwarz.by_gradients = before
     spread = parts._affine(w, axes).toarray()
