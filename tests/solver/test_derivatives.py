@@ -308,6 +308,21 @@ def test_of_maps_from_surface_to_surface(kind, features):
         assert more.energy(placed, F) == pytest.approx(0.5 * (share * square / (1 + square)).sum())
         without = surface_newton.deformation(V, F, carrier, None, None).energy(placed)
         assert problem.energy(placed) > without + more.energy(placed, F)
+        # Their pull is the slope of their energy, within the faces that places lie in.
+        pull, forms = more.rows(placed, carrier)
+        walk = rng.normal(size=pull.shape)
+        across = np.cross(*np.moveaxis(V[F[placed.faces]][:, 1:] - V[F[placed.faces]][:, :1], 1, 0))
+        across = normalized(across)
+        walk -= (walk * across).sum(axis=1, keepdims=True) * across
+        step = 1e-4 * np.ptp(V, axis=0).max() / len(V)
+        ahead, back = (carrier.move(placed, sign * step * walk) for sign in (1, -1))
+        same = (ahead.faces == placed.faces) & (back.faces == placed.faces)
+        own = replace(more, share=np.where(same, more.share, 0))
+        numeric = (own.energy(ahead, F) - own.energy(back, F)) / (2 * step)
+        assert same.mean() > 0.8 and (pull * walk)[same].sum() == pytest.approx(numeric, rel=1e-3)
+        # The squares of the forms are what is left of its bend where residuals are held: convex, and of the same slope.
+        square = np.einsum("ncd,nc->nd", forms, off * np.sqrt(share)[:, None] / (1 + square)[:, None])
+        np.testing.assert_allclose(square, pull, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("domain", ["ball", "cube", "held"])

@@ -45,3 +45,17 @@ def test_boxes_do_not_overlap():
         for other in boxes[:i]:
             gap = np.maximum(one.min(axis=0) - other.max(axis=0), other.min(axis=0) - one.max(axis=0)).max()
             assert gap > extent
+
+
+def test_batches_of_eight_lie_about_the_origin():
+    """Coordinates are as short as they can be: digits are lost far from it."""
+    (V, F) = meshes.icosphere(1)
+    alone = split_components(
+        np.concatenate([V + 5 * k for k in range(8)]), np.concatenate([F + k * len(V) for k in range(8)]), NONE
+    )
+    batch = batched(alone.components)
+    extent = max(np.ptp(p.vertices, axis=0).max() for p in alone.components)
+    low, high = batch.vertices.min(axis=0), batch.vertices.max(axis=0)
+    # Boxes begin at the places of a grid that is about 0.
+    np.testing.assert_allclose(low, -1.5 * extent, rtol=0.1)
+    np.testing.assert_allclose(high, 2.5 * extent, rtol=0.1)
