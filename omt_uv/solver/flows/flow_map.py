@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import EmptyMeshError, HandleError, NonFiniteError, plural
-from ..progress import Progress, Steps
+from ..progress import Progress, Steps, part_of
 from .creases import MOST_HELD, PIECES, march, regions_around
 from .domain import FlowDomain
 from .handles import FlowHandle, check_handles, farthest_points, joined, sampled_handles
@@ -30,6 +30,9 @@ PROBES = 300
 WALL_SPACING = 0.35
 # What moves by less than this share of the tolerance stays: the field falls like exp(-(distance / radius)^2).
 UNMOVED = 1e-3
+# Where the time goes, roughly, as start and width: points are carried, then bodies get their volumes back.
+CARRYING = (0.0, 0.5)
+SOUNDING = (0.5, 0.5)
 # Handle points that are missed by more than this share of the diagonal before they are set are worth a warning,
 MISSED = 1e-3
 # and volumes that change by more.
@@ -129,13 +132,13 @@ def flow(
     journey = _Journey(way, everything, options, len(points), size)
     plan, surge = journey.plan(frames)
     reached = _reached(everything, way, UNMOVED * options.tolerance)
-    merged = yield from _carry_all(everything, plan, way.domain, reached)
+    merged = yield from part_of(_carry_all(everything, plan, way.domain, reached), *CARRYING)
     ends = np.concatenate([h.end for h in handles]) / size
     missed = float(np.abs(merged[-1][len(points) :] - ends).max(initial=0.0))
     moved = np.isin(np.arange(len(points)), reached)[:, None]
     positions = [np.where(moved, at[: len(points)] * size, points) for at in merged]
     _set_handles(positions[-1], points, handles)
-    rough = yield from _sound(positions, _shape(points, triangles, handles), journey)
+    rough = yield from part_of(_sound(positions, _shape(points, triangles, handles), journey), *SOUNDING)
     crossing = way.passing.warning([h.name or f"number {k}" for k, h in enumerate(handles)], surge, rough.intersecting)
     warnings = _warnings(missed, rough.volumes, len(rough.intersecting)) + crossing
     return replace(rough, steps=sum(map(len, plan)), missed=missed, surge=surge, warnings=warnings)

@@ -60,6 +60,9 @@ def turned_masks(mask: np.ndarray, quarters: Sequence[int]) -> Item:
             cells = np.column_stack([height - 1 - cells[:, 1], cells[:, 0]])
             height, width = width, height
         turned = np.ascontiguousarray(np.rot90(mask, -number))
+        if any(np.array_equal(turned, other.mask) for other in turns):
+            # It fits where that one does, which comes first: rectangles have two turns, squares one.
+            continue
         turns.append(Turned(turned, number, runs_of(turned), cells))
     return Item(tuple(turns))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,8 +26,9 @@ def test_turns_have_the_cells_of_the_mask_and_what_lies_beside(seed):
         mask = random_mask(rng)
         item = turned_masks(mask, (0, 1, 2, 3))
         assert item.widest == max(mask.shape) and item.cells == mask.sum()
-        for quarters, turned in enumerate(item.turns):
-            assert turned.quarters == quarters and (turned.mask == np.rot90(mask, -quarters)).all()
+        assert item.turns[0].quarters == 0
+        for turned in item.turns:
+            assert (turned.mask == np.rot90(mask, -turned.quarters)).all()
             taken = {(x, y) for y, x in np.argwhere(turned.mask)}
             h, w = turned.mask.shape
             beside = {
@@ -59,3 +62,27 @@ def test_no_item_lies_on_another_or_outside(side, seed):
         assert 0 <= x <= side - mask.shape[1] and 0 <= y <= side - mask.shape[0]
         count[y : y + mask.shape[0], x : x + mask.shape[1]] += mask
     assert count.max() <= 1 and count.sum() == sum(items[k].cells for k in order)
+
+
+@pytest.mark.parametrize(("shape", "turns"), [((3, 3), [0]), ((2, 5), [0, 1]), ((4, 4), [0, 1, 2, 3])])
+def test_turns_that_are_alike_are_tried_once(shape, turns):
+    mask = np.ones(shape, bool)
+    # A corner that is missing tells all turns apart.
+    mask[0, 0] = len(turns) < 4
+    item = turned_masks(mask, (0, 1, 2, 3))
+    assert [turned.quarters for turned in item.turns] == turns
+    for one in item.turns:
+        assert not any(np.array_equal(one.mask, other.mask) for other in item.turns if other is not one)
+
+
+def test_what_is_alike_when_turned_is_placed_as_if_all_turns_were_tried():
+    rng = np.random.default_rng(4)
+    masks = [np.ones(rng.integers(2, 9, 2), bool) for _ in range(25)]
+    items = [turned_masks(mask, (0, 1, 2, 3)) for mask in masks]
+    every = []
+    for mask in masks:
+        some = [turned_masks(np.rot90(mask, -k), (0,)).turns[0] for k in range(4)]
+        every.append(replace(items[0], turns=tuple(replace(one, quarters=k) for k, one in enumerate(some))))
+    order = np.argsort([-mask.size for mask in masks], kind="stable").tolist()
+    found, expected = (place(given, order, RasterGrid(48, 16))[0] for given in (items, every))
+    assert len(found) == 25 and found == expected

@@ -13,7 +13,7 @@ from omt_uv.solver.mesh.topology import on_boundary, twins
 from omt_uv.solver.progress import drain
 from omt_uv.solver.registration import RegistrationOptions, vertex_landmarks
 from omt_uv.solver.registration.charts import register_charts
-from omt_uv.solver.registration.charts.chart_maps import without_chords
+from omt_uv.solver.registration.charts.chart_maps import _at_vertices, without_chords
 from omt_uv.solver.registration.charts.seam_arcs import corresponding_arcs, seam_arcs
 from omt_uv.solver.registration.landmarks import split_at
 
@@ -104,3 +104,14 @@ def test_options_are_those_of_every_match(tori):
     W, G = V * [-1, 1, 1], F[:, [0, 2, 1]]
     found = drain(register_charts((V, F, seams), (W, G, seams), None, RegistrationOptions("charts", mirrored=True)))
     assert np.linalg.norm(found.forward.positions(W, G) - W, axis=1).max() < 0.05
+
+
+def test_points_at_vertices_are_those_all_of_whose_weight_is_at_one():
+    triangles = np.array([[4, 7, 9], [7, 4, 2]])
+    barycentric = np.array(
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1 - 1e-12], [0.5, 0.5, 0], [0.2, 0.3, 0.5], [0, 1 - 1e-6, 1e-6]]
+    )
+    faces = np.array([0, 1, 1, 0, 1, 0])
+    np.testing.assert_array_equal(_at_vertices(triangles, faces, barycentric), [4, 4, 2, -1, -1, -1])
+    none = _at_vertices(triangles, np.zeros(0, np.int64), np.zeros((0, 3)))
+    assert none.shape == (0,)
