@@ -32,7 +32,7 @@ MODIFIER = SubdivisionModifier(levels=2)
 
 
 def bowl(rows: int = 4, columns: int = 5) -> Surface:
-    """A curved sheet of quads of all sizes, and a vertex that nothing uses."""
+    """A curved patch of quads of all sizes, and a vertex that nothing uses."""
     x, y = (np.linspace(-1, 1, k + 1) ** 3 * 0.5 + np.linspace(-1, 1, k + 1) * 0.7 for k in (rows, columns))
     u, v = (w.ravel() for w in np.meshgrid(x, y, indexing="ij"))
     V = np.concatenate([np.column_stack([u, v, 1.5 * (u**2 + v**2) + 0.3 * u * v]), [[9.0, 9.0, 9.0]]])
@@ -151,7 +151,7 @@ def test_areas_on_the_subdivided_surface_are_kept_whether_cages_are_refined_or_a
     monkeypatch.setattr(subdivision, "REFINED_QUADS", most)
     found = drain(lay_out([UnwrapJob(surface, subdivision=MODIFIER)], given))
     assert (most == 0) == (refined_as_it_is(surface, found) is found.maps[0])
-    wanted = areas_of_polygons(evaluated(read(surface)).surface, count)
+    asked = areas_of_polygons(evaluated(read(surface)).surface, count)
 
     def error(layout):
         uv = np.zeros((len(surface.corner_vertex), 2))
@@ -162,7 +162,7 @@ def test_areas_on_the_subdivided_surface_are_kept_whether_cages_are_refined_or_a
             corners = uv[surface.triangles].reshape(-1, 2)
             signed = signed_areas(corners, np.arange(len(corners)).reshape(-1, 3))
             area = np.bincount(surface.triangle_face, np.abs(signed), count)
-        return np.abs(area / area.sum() - wanted / wanted.sum()).sum()
+        return np.abs(area / area.sum() - asked / asked.sum()).sum()
 
     assert error(found) < 0.01 < 0.5 * error(plain)
 

@@ -3,7 +3,13 @@
 import meshes
 import numpy as np
 
-from omt_uv.solver.cutting.gluing_facts import cost_factors, marked_triangles, total_curvature, turning_lines
+from omt_uv.solver.cutting.gluing_facts import (
+    TurningLines,
+    cost_factors,
+    marked_triangles,
+    total_curvature,
+    turning_lines,
+)
 from omt_uv.solver.mesh.gluing import components, corner_classes
 from omt_uv.solver.mesh.surface import strict_gluing, triangle_surface
 
@@ -42,3 +48,21 @@ def test_every_component_has_a_curvature_those_without_inner_vertices_none():
         surface, gluing = glued(points, np.concatenate([f + s for (_, f), s in zip(parts, starts, strict=False)]))
         found = total_curvature(gluing, corner_classes(gluing), components(gluing), surface.positions)
         np.testing.assert_allclose(found, [4 * np.pi if v is V else 0 for v, _ in parts], atol=1e-9)
+
+
+def test_turning_lines_have_their_lengths_and_open_their_components_alone():
+    (V, F), (W, G) = meshes.grid(3, 3), meshes.icosphere(0)
+    P = np.concatenate([V, 3 * W + 9])
+    surface, gluing = glued(P, np.concatenate([F, G + len(V)]))
+    component = components(gluing)
+    lines = np.arange(len(gluing.first)) % 4 == 0
+    found = TurningLines.of(gluing, lines, component, surface.positions)
+    np.testing.assert_array_equal(found.opened, [True, True])
+    corner = surface.corner_vertex[surface.triangles]
+    h = gluing.first[lines]
+    ends = surface.positions[corner[h // 3, h % 3]], surface.positions[corner[h // 3, (h + 1) % 3]]
+    length = np.bincount(component[h // 3], np.linalg.norm(ends[0] - ends[1], axis=1), 2)
+    np.testing.assert_allclose(found.length, length)
+    one = TurningLines.of(gluing, lines & (component[gluing.first // 3] == 1), component, surface.positions)
+    np.testing.assert_array_equal(one.opened, [False, True])
+    np.testing.assert_allclose(one.length, [0, length[1]])

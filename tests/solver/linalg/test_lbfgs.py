@@ -67,3 +67,16 @@ def test_units_of_length_and_energy_do_not_matter(length, energy):
         np.testing.assert_allclose(other / length, step, atol=1e-9 * np.abs(step).max())
         x = x + 0.5 * step
     assert len(plain.pairs) == len(scaled.pairs) == 5
+
+
+def test_a_step_that_led_nowhere_changes_nothing():
+    """What has no length says nothing of the Hessian."""
+    x0, gradient = quadratic(3)
+    diagonal, descent = np.full((3, 1), 0.02), LBFGS()
+    x = np.zeros_like(x0)
+    first = descent.direction(x, gradient(x), diagonal)
+    np.testing.assert_array_equal(descent.direction(x, gradient(x), diagonal), first)
+    assert not descent.pairs
+    # Nor does one along which the gradient falls: the Hessian would not be positive.
+    descent.direction(x + 1, gradient(x) - 1, diagonal)
+    assert not descent.pairs

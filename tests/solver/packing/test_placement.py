@@ -86,3 +86,12 @@ def test_what_is_alike_when_turned_is_placed_as_if_all_turns_were_tried():
     order = np.argsort([-mask.size for mask in masks], kind="stable").tolist()
     found, expected = (place(given, order, RasterGrid(48, 16))[0] for given in (items, every))
     assert len(found) == 25 and found == expected
+
+
+def test_what_is_as_high_or_as_wide_as_the_raster_has_a_place():
+    for shape in ((16, 3), (3, 16), (16, 16)):
+        item = turned_masks(np.ones(shape, bool), (0,))
+        (found,), stuck = place([item], [0], RasterGrid(16, 24))
+        assert stuck == -1 and (found.x if shape[1] == 16 else found.y) == 0
+    for shape in ((17, 3), (3, 17)):
+        assert place([turned_masks(np.ones(shape, bool), (0,))], [0], RasterGrid(16, 25)) == ([], 0)

@@ -18,7 +18,7 @@ from omt_uv.solver.progress import Progress, drain
 from omt_uv.solver.refinement import refine as refinement
 from omt_uv.solver.refinement.hessian_blocks import assembly_of, hessian_blocks
 from omt_uv.solver.refinement.mirrored_motion import MirroredMotion, find_symmetry, halved, symmetric_start
-from omt_uv.solver.refinement.projected_newton import FreeMotion
+from omt_uv.solver.refinement.projected_newton import CircleMotion, FreeMotion
 
 
 def hill(count=14, height=1.0):
@@ -226,3 +226,32 @@ def test_where_no_map_nearby_is_symmetric_a_mean_value_map_is_the_start(monkeypa
     centred = w - w.mean()
     turn = (centred[mirror.image] * centred).sum()
     assert np.abs(centred[mirror.image] - turn / abs(turn) * centred.conj()).max() < 1e-9
+
+
+@pytest.mark.parametrize("phase", [1.0, np.exp(0.7j)])
+def test_vertices_on_a_circle_go_along_it_by_the_length_of_their_step_and_images_with_them(phase):
+    """On its own each representative moves as without the mirror, but for those on the axis, which stay on it."""
+    turn = 2 * np.pi * np.arange(24) / 24
+    axis = np.sqrt(phase)
+    w = axis * np.concatenate([2 * np.exp(1j * turn), 1.1 * np.exp(1j * turn), [0.3, -0.4]])
+    k = np.arange(24)
+    images = np.concatenate([-k % 24, 24 + -k % 24, [48, 49]])[None]
+    symmetry = mirror_symmetry(images, phase, w)
+    circle = CircleMotion(np.arange(24), 2.0, len(w))
+    motion = MirroredMotion(circle, symmetry, w)
+    rng = np.random.default_rng(1)
+    step = 0.1 * (rng.normal(size=(len(w), 2)) * motion.free) @ [1, 1j]
+    moved = motion.move(w, step)
+    np.testing.assert_allclose(moved, phase * moved[images[0]].conj(), atol=1e-12)
+    np.testing.assert_allclose(np.abs(moved[:24]), 2)
+    own = ~symmetry.follows & ~symmetry.on_axis
+    around = own & (np.arange(len(w)) < 24)
+    length = 2 * np.angle(moved[around] / w[around])
+    assert around.sum() == 11
+    np.testing.assert_allclose(length, step[around].real, atol=1e-12)
+    inner = own & (np.arange(len(w)) >= 24)
+    np.testing.assert_allclose((moved - w)[inner], step[inner])
+    # Along the axis those upon it go by their step, too; where the circle meets it, they stay.
+    upon = np.array([24, 36, 48, 49])
+    np.testing.assert_allclose((moved - w)[upon], axis * step[upon].real, atol=1e-12)
+    np.testing.assert_allclose(moved[[0, 12]], w[[0, 12]], atol=1e-12)

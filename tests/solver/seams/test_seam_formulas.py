@@ -429,3 +429,15 @@ def test_a_forest_joins_all_that_can_be_joined_to_its_start_once(share):
     # So many edges join so many vertices without a loop.
     assert found.sum() == len(reached(chosen)) - start.sum()
     assert set(component.ends[found].ravel().tolist()) <= reached(chosen)
+
+
+def test_what_covers_is_parted_by_what_is_covered_nowhere():
+    """Also where that is one polygon: a ring whose first and last faces lie on one another."""
+    V, F = meshes.grid(13, 1, width=13 / 12, height=1.0)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    column = np.floor(12 * chart.vertices[chart.triangles][:, :, 0].mean(axis=1)).astype(int)
+    chart = replace(chart, faces=np.clip(column, 0, 1) + (column == 12))
+    turn, radius = 2 * np.pi * chart.vertices[:, 0], 2 + chart.vertices[:, 1]
+    uv = np.column_stack([radius * np.cos(turn), radius * np.sin(turn)])
+    ((one, other),) = parting._covering(chart, uv, PolygonGraph.of(chart))
+    assert sorted([one.tolist(), other.tolist()]) == [[0], [2]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import meshes
 import numpy as np
 import pytest
 from sphere_shapes import blob, lopsided, random_rotation, random_sphere
@@ -14,7 +15,7 @@ from omt_uv.solver.mesh.spherical_geometry import normalized, signed_volumes, sp
 from omt_uv.solver.progress import Progress, drain
 from omt_uv.solver.sphere import refine
 from omt_uv.solver.sphere.multilevel import multilevel_start
-from omt_uv.solver.sphere.refine import relax, sphere_refine
+from omt_uv.solver.sphere.refine import _equilateral, _renumbered, relax, sphere_refine
 from omt_uv.solver.sphere.sphere_map import sphere_map
 
 
@@ -97,3 +98,19 @@ def test_a_symmetric_map_without_its_areas_gives_way_to_a_free_one_that_has_them
     monkeypatch.setattr(refine, "MUCH_LESS", 1e9 if share == 0 else refine.MUCH_LESS)
     found = drain(sphere_refine(P, F, P, lopsided(P, F, 1.0), balance=balance))
     assert (found.status != "symmetric") == free and found.untangling >= 7
+
+
+def test_equilateral_faces_have_the_areas_and_gradients_of_such():
+    V, F = meshes.icosphere(1)
+    target = np.linspace(1, 3, len(F))
+    problem, _ = _renumbered(V * [1, 2, 3], F, target)
+    faces = _equilateral(problem)
+    share = problem.target / problem.target.sum()
+    np.testing.assert_allclose(faces.area, share)
+    # The gradient of a hat function is one over the height, root(3) / 2 times the side.
+    side = np.sqrt(problem.target)
+    np.testing.assert_allclose(np.abs(faces.gradient), np.repeat(1 / (np.sqrt(0.75) * side)[:, None], 3, axis=1))
+    np.testing.assert_allclose(faces.gradient.sum(axis=1), 0, atol=1e-12 * np.abs(faces.gradient).max())
+    turn = faces.gradient[:, 1] / faces.gradient[:, 0]
+    np.testing.assert_allclose(turn, np.exp(2j * np.pi / 3))
+    np.testing.assert_array_equal(faces.triangles, problem.faces.triangles)

@@ -10,6 +10,7 @@ from omt_uv.solver import errors
 from omt_uv.solver.conformal.disk_map import conformal_disk
 from omt_uv.solver.mesh.geometry import vertex_areas
 from omt_uv.solver.progress import drain
+from omt_uv.solver.transport import semidiscrete
 from omt_uv.solver.transport.convex_domain import ConvexPolygon, Disk, Rectangle, segment_integrals
 from omt_uv.solver.transport.power_diagram import power_diagram
 from omt_uv.solver.transport.regular_triangulation import by_flips, by_hull
@@ -235,3 +236,20 @@ def test_few_hulls_are_built():
     """One hull for the start; flips carry the triangulation through the Newton steps."""
     result = drain(transport(inside(Disk(), 2000), np.ones(2000), Disk()))
     assert result.hulls <= 2 and result.diagrams <= 20
+
+
+def test_hulls_diagrams_and_flips_are_counted(monkeypatch):
+    made = []
+    hull, flip = semidiscrete.power_diagram, semidiscrete.by_flips
+
+    def flipped(*given):
+        found = flip(*given)
+        made.extend([0] if found[0] is not None and not found[1] else [])
+        return found
+
+    monkeypatch.setattr(semidiscrete, "power_diagram", lambda *given: made.append(1) or hull(*given))
+    monkeypatch.setattr(semidiscrete, "by_flips", flipped)
+    result = drain(transport(inside(Disk(), 300), np.ones(300), Disk()))
+    # A diagram is made of a hull, or of flips of the last one.
+    assert result.diagrams == made.count(1) and result.hulls == made.count(1) - made.count(0) >= 1
+    assert result.flips > 0

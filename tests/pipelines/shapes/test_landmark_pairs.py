@@ -1,0 +1,54 @@
+"""Landmarks of two objects: paired by name, or read from a file, whole or refused by name."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from omt_uv.pipelines.shapes.landmark_pairs import LandmarkPoint, PairsError, pairs_of, read_pairs
+
+
+def point(name, vertex=0):
+    return LandmarkPoint(name, vertex=vertex)
+
+
+def test_pairs_come_in_the_order_of_the_source():
+    found = pairs_of([point("b", 1), point("a", 2)], [point("a", 3), point("b", 4)], ("one", "two"))
+    assert [p.vertex for p in found.source] == [1, 2] and [p.vertex for p in found.target] == [4, 3]
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_what_is_there_twice_or_alone_is_told_with_its_object(side):
+    both = [[point("a")], [point("a")]]
+    both[side].append(point("b"))
+    with pytest.raises(PairsError, match="Landmarks b are on") as told:
+        pairs_of(*both, ("one", "two"))
+    assert f"on {('one', 'two')[side]} alone. Add them to {('two', 'one')[side]}" in str(told.value)
+    both[side].append(point("b"))
+    with pytest.raises(PairsError, match=f"{('one', 'two')[side]} has more than one landmark b"):
+        pairs_of(*both, ("one", "two"))
+
+
+def test_files_have_vertices_and_positions(tmp_path):
+    path = tmp_path / "pairs.json"
+    path.write_text(json.dumps([[3, [0, 1, 2.5]], [[1, 1, 1], 4]]))
+    found = read_pairs(path)
+    assert [p.name for p in found.source] == [p.name for p in found.target] == ["0", "1"]
+    assert found.source[0].vertex == 3 and found.source[1].position == (1.0, 1.0, 1.0)
+    assert found.target[0].position == (0.0, 1.0, 2.5) and found.target[1].vertex == 4
+
+
+@pytest.mark.parametrize("rows", [[[1, 2, 3]], [[1]], [[]], [1], [[1, [0, 1]]], [[1, [0, 1, 2, 3]]], [[1, "abc"]], 7])
+def test_files_of_anything_else_are_refused_by_name(rows, tmp_path):
+    path = tmp_path / "pairs.json"
+    path.write_text(json.dumps(rows))
+    with pytest.raises(PairsError, match="pairs"):
+        read_pairs(path)
+
+
+def test_rows_before_the_one_that_is_none_are_counted(tmp_path):
+    path = tmp_path / "pairs.json"
+    path.write_text(json.dumps([[1, 2], [3, 4], [5, 6, 7]]))
+    with pytest.raises(PairsError, match=r"pair [23] is none"):
+        read_pairs(path)
