@@ -201,9 +201,9 @@ class _Polygons:
         """The image (n,) of every vertex of the polygons `used` (p,) bool, whose images are `other` (p,), -1 for the
         rest; None where there is no such image."""
         corner, to = self._nearest_corners(other, normal, used)
-        image = np.full(len(self.points), -1)
-        image[self.vertex[corner]] = to
-        if (to < 0).any() or (image[self.vertex[corner]] != to).any():
+        image, vertex = np.full(len(self.points), -1), self.vertex[corner]
+        image[vertex] = to
+        if (to < 0).any() or (image[vertex] != to).any():
             return None
         known = np.flatnonzero(image >= 0)
         return None if (image[image[known]] != known).any() else image
@@ -232,6 +232,8 @@ class _Polygons:
             polygon = other[self.polygon[corner]]
             far, at = self.corner_tree.query(np.column_stack([place, 2 * self.extent * polygon]))
             found[corner] = np.where(far <= MIRROR_TOLERANCE * self.extent, self.vertex[at], -1)
+        if used.all():
+            return np.arange(len(found)), found
         corner = np.flatnonzero(used[self.polygon])
         return corner, found[corner]
 
