@@ -53,7 +53,8 @@ class Place:
 
 def turned_masks(mask: np.ndarray, quarters: Sequence[int]) -> Item:
     """A mask (h,w) bool in the turns it may have, the first of which is preferred."""
-    turns, beside = [], _beside(mask)
+    turns: list[Turned] = []
+    beside = _beside(mask)
     for number in quarters:
         turned, cells, (height, width) = mask, beside, mask.shape
         for _ in range(number):

@@ -182,3 +182,43 @@ def test_without_a_choice_there_is_none_or_the_only_one(monkeypatch, count):
     monkeypatch.setattr(symmetric_cuts, "_outlined", lambda half, extremities, bearable: iter(made))
     found = symmetric_cuts.outlined_cut([SimpleNamespace(component=None)], 3, 2.0)
     assert (found is None) == (count == 0) and (not count or [int(x[0]) for x in found] == [4, 5])
+
+
+def half_of(ends, across, boundary=(), held=()):
+    """A half of 8 vertices whose line through 0 to 3 is closed, with edges by their ends."""
+    ends = np.array(ends)
+    taken = np.isin(np.arange(len(ends)), held)
+    on_line = np.arange(8) < 4
+    return symmetric_cuts.SymmetricHalf(
+        component=None,
+        image=np.arange(8),
+        side=np.ones(8, bool),
+        edges=np.arange(len(ends)),
+        image_edge=np.arange(len(ends)),
+        ends=ends,
+        across=np.array(across),
+        line=np.zeros(len(ends), bool),
+        on_line=on_line,
+        line_ends=np.zeros(8, bool),
+        held=taken,
+        boundary=np.array(boundary, np.int64).reshape(-1, 2),
+    )
+
+
+def test_a_closed_line_begins_where_it_is_cut_first_and_nowhere_else():
+    nowhere = np.zeros(0, np.int64)
+    half = half_of([[4, 5], [6, 6], [5, 7], [1, 4]], [False, True, False, False])
+    # What is cut beside the plane does not begin there, and what is cut across it, or in it, does.
+    beside = half.groups(np.array([True, False, False, False]), nowhere)
+    assert beside[4] == beside[5] > 0 and (np.delete(beside, [4, 5]) == -1).all()
+    across = half.groups(np.array([True, True, False, False]), nowhere)
+    assert across[6] == 0 and across[4] == across[5] > 0
+    inside = half.groups(np.array([True, True, False, True]), nowhere)
+    assert inside[1] == inside[4] == inside[5] == 0 and inside[6] != -1
+    # Tips are there without any edge, and so are boundaries.
+    tips = half.groups(np.array([False, False, False, False]), np.array([2, 7]))
+    assert tips[2] > 0 and tips[7] > 0 and tips[2] != tips[7] and (np.delete(tips, [2, 7]) == -1).all()
+    edged = half_of([[4, 5]], [False], boundary=[[5, 6], [6, 7]]).groups(np.array([True]), nowhere)
+    assert len(set(edged[4:])) == 1 and edged[4] > 0
+    held = half_of([[4, 5], [5, 6]], [False, False], held=[1]).groups(np.array([False, False]), nowhere)
+    assert held[5] == held[6] > 0 and held[4] == -1
