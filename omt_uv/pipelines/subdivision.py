@@ -12,9 +12,9 @@ from ..solver.errors import APPLY_LEVEL, plural
 from ..solver.maps.distortion import distortion
 from ..solver.maps.mirror_symmetry import MirrorSymmetry
 from ..solver.mesh.charts import turned_polygons
-from ..solver.mesh.geometry import face_areas, signed_areas
+from ..solver.mesh.geometry import cross2, face_areas, signed_areas
 from ..solver.mesh.surface import Surface
-from ..solver.mesh.topology import boundary_loops
+from ..solver.mesh.topology import boundary_loops, next_corners
 from ..solver.parameterization.chart_indices import CornerPins, pins_of_chart
 from ..solver.parameterization.chart_map import ChartMap
 from ..solver.parameterization.mirrored_charts import mirror_partners
@@ -82,7 +82,7 @@ def evaluated(reading: Reading) -> Reading:
 def _quad_uvs(surface: Surface, uv: np.ndarray, modifier: SubdivisionModifier, levels: int) -> np.ndarray:
     """UVs (q,4,2) of the quads of a subdivided surface whose cage has the UVs (c,2)."""
     values = np.asarray(uv, float)
-    vertex, first = _uv_vertices(surface.corner_vertex, values)
+    vertex, first = _uv_vertices(surface.corner_vertex, surface.face_start, values)
     mapped = subdivided_uv(vertex, surface.face_start, surface.corner_vertex[first], modifier, levels)
     return (mapped.matrix @ values[first])[mapped.quads]
 
@@ -293,13 +293,14 @@ class _MappedQuads:
         owner = np.repeat(np.arange(count), np.diff(self.first))
         triangles = np.concatenate([c.triangles + k for c, k in zip(found.charts, self.first, strict=False)])
         covered = np.bincount(owner[triangles[:, 0]], signed_areas(uv, triangles), count)
-        triangles = triangles[signed_areas(uv, triangles) > 0]
+        upright, polygon = signed_areas(uv, triangles) > 0, np.concatenate([c.faces for c in found.charts])
+        triangles, polygon = triangles[upright], polygon[upright]
         space = np.bincount(self.chart, self.areas, count)
         bound = np.bincount(owner, fixed, count) > 0
         scale = np.where(bound & (space > 0), covered / np.where(space > 0, space, 1), 1.0)
         positions = np.concatenate([c.vertices for c in found.charts])
         scales = np.concatenate([scale[self.chart] * self.density, scale[owner[triangles[:, 0]]]])
-        return subdivided_elements(self.corners, self.mapping.quads, positions[triangles], triangles, scales)
+        return subdivided_elements(self.corners, self.mapping.quads, positions[triangles], triangles, scales, polygon)
 
 
 def _mapped_part(
@@ -359,8 +360,11 @@ def _fixed(found: SurfaceMap, pins: CornerPins | None, boundary: str) -> np.ndar
     return np.concatenate(every)
 
 
-def _uv_vertices(corner_vertex: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The UV vertex (c,) of every corner, and the first corner (n,) of each: equal vertex, and UVs that agree."""
-    key = np.column_stack([corner_vertex, np.round(uv / SAME_UV)]).astype(np.int64)
+def _uv_vertices(corner_vertex: np.ndarray, face_start: np.ndarray, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The UV vertex (c,) of every corner, and the first corner (n,) of each: equal vertex, UVs that agree, and polygons
+    that lie the same way up, as for Blender."""
+    owner = np.repeat(np.arange(len(face_start) - 1), np.diff(face_start))
+    upright = np.bincount(owner, cross2(uv, uv[next_corners(face_start)]))[owner] > 0
+    key = np.column_stack([corner_vertex, np.round(uv / SAME_UV), upright]).astype(np.int64)
     _, first, vertex = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return vertex.ravel(), first

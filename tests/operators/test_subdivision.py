@@ -59,6 +59,44 @@ def test_the_subdivided_mesh_is_that_of_blender(package, make, uv_smooth):
     assert found.area_l1 == pytest.approx(np.abs(whole[1] / whole[1].sum() - whole[0] / whole[0].sum()).sum(), abs=2e-3)
 
 
+def test_polygons_that_are_turned_over_in_the_uvs_are_islands_as_for_blender(package):
+    obj = scenes.bump(columns=5, rows=6)
+    unwrap()
+    uv = obj.data.uv_layers.active.uv
+    at = list(obj.data.polygons[14].vertices)
+    ends = [next(uv[loop.index].vector.copy() for loop in obj.data.loops if loop.vertex_index == v) for v in at[::2]]
+    for loop in obj.data.loops:
+        if loop.vertex_index == at[0]:
+            uv[loop.index].vector = ends[1] + 0.5 * (ends[1] - ends[0])
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.render_levels = modifier.levels = 2
+    fine = package("pipelines.subdivision").evaluated(package("blender.mesh").read(obj))
+    a, b, c = np.moveaxis(fine.uv[fine.surface.triangles], 1, 0)
+    mine = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).reshape(-1, 2).sum(axis=1)
+    assert (mine < 0).any()
+    np.testing.assert_allclose(np.sort(mine), np.sort(applied(obj)[1].reshape(-1, 2).sum(axis=1)), atol=1e-6)
+
+
+@pytest.mark.parametrize("seam", [False, True])
+def test_cages_with_ends_of_many_sides_do_not_fold(seam):
+    """Their polygons were turned over on the way; what Blender makes of that is folded in hundreds of places."""
+    profile = [(1, 0), (0.9, 0.1), (0.15, 0.2), (0.15, 1.4), (0.8, 2), (0.9, 3), (0.85, 3), (0.75, 2.05), (0.1, 1.5)]
+    sides, (radius, height) = 12, np.array(profile).T
+    k, turn = np.divmod(np.arange(len(profile) * sides), sides)
+    angle = 2 * np.pi * turn / sides
+    V = np.column_stack([radius[k] * np.cos(angle), radius[k] * np.sin(angle), height[k]])
+    here, after = k * sides + turn, k * sides + (turn + 1) % sides
+    walls = np.column_stack([here, after, after + sides, here + sides])[k < len(profile) - 1]
+    ends = [range(sides)[::-1], range(len(V) - sides, len(V))]
+    along = [(sides * i, sides * (i + 1)) for i in range(len(profile) - 1)] if seam else []
+    obj = scenes.add(V, [*walls, *ends], seams=along)
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 1
+    unwrap(max_shear=0)
+    assert (applied(obj)[1] > 0).all()
+    assert error(obj) < 0.13
+
+
 def test_creases_count_as_they_do_for_blender(package):
     obj = scenes.cube()
     unwrap()

@@ -18,8 +18,9 @@ from scipy.sparse.linalg import splu
 from ..maps.contacts import crossings
 from ..maps.energy import Elements, face_derivatives_of, hat_gradients, squared, sum_at_vertices
 from ..maps.mirror_symmetry import MirrorSymmetry, without_symmetry
+from ..mesh.geometry import signed_areas
 from ..mesh.polygon_areas import BOTH
-from ..progress import Progress, Steps
+from ..progress import Progress, Steps, part_of
 from ..refinement.boundary_barrier import BoundaryBarrier, make_barrier
 from ..refinement.continuation import CONTACT_STRENGTH
 from ..refinement.hessian_blocks import Assembly
@@ -46,6 +47,8 @@ PATIENCE = 12
 # What touches itself, as the sides of a slit in what was unrolled, is drawn in by this share of the sides there, or by
 # halves of that: a barrier is infinite at contact.
 DRAWN_IN = 0.02
+# Share of the time of a first try, in which triangles of the cage may fold on the way.
+FIRST = 0.7
 # Area over squared sides of triangles that no symmetric map opens: two quads that share two sides on the axis are
 # straight there, and what rounding leaves of their corners would be all of the energy.
 FLAT = 1e-9
@@ -62,19 +65,23 @@ class CageMap:
 
 @dataclass(frozen=True)
 class CageElements:
-    """What is asked of the triangles of fine quads (q,4), four of each, and of those of the cage after them."""
+    """What is asked of the triangles of fine quads (q,4), four of each, and of those of the cage after them; polygon
+    (t,): of the cage's."""
 
     faces: Elements
     quads: np.ndarray
+    polygon: np.ndarray
 
 
 @dataclass(frozen=True)
 class _CageProblem:
-    """Elements of the fine and the cage's triangles and which of them count (m,) bool, the matrix to their vertices,
-    that from the unknowns to both coordinates (2n,k) of the map of the cage, and barriers of its outlines."""
+    """Elements of the fine and the cage's triangles, which of them count and which may not even fold on the way, (m,)
+    bool, the matrix to their vertices, that from the unknowns to both coordinates (2n,k) of the map of the cage, and
+    barriers of its outlines."""
 
     elements: CageElements
     counted: np.ndarray
+    strict: np.ndarray
     matrix: csr_matrix
     unknowns: csr_matrix
     assembly: Assembly
@@ -92,13 +99,13 @@ class _CageProblem:
         return ((squared(a) - squared(b)) / self.faces.ratio)[self.counted]
 
     def energy(self, w: np.ndarray, eps: float) -> float:
-        """The energy of a map w (n,) complex of the cage; with eps 0 infinite at a fold."""
+        """The energy of a map w (n,) complex of the cage; infinite where the cage folds, with eps 0 at any fold."""
         a, b = self.faces.derivatives(self.matrix @ w)
         outer, inner = (squared(x)[self.counted] / self.faces.ratio[self.counted] for x in (a, b))
-        det = outer - inner
-        if eps == 0 and not (det > 0).all():
+        det, eps_of = outer - inner, self._eps(eps)[self.counted]
+        if not ((det > 0) | (eps_of > 0)).all():
             return np.inf
-        chi = _chi(det, eps)[0]
+        chi = _chi(det, eps_of)[0]
         value = (outer + inner) / chi - 1 + self.area_weight * ((det**2 + 1) / (2 * chi) - 1)
         return float(self.faces.weight[self.counted] @ value + sum(part.energy(w) for part in self.barriers))
 
@@ -125,6 +132,10 @@ class _CageProblem:
         solved = factor.solve(-right)
         return (self.unknowns @ solved).view(complex), float(-right @ solved)
 
+    def _eps(self, eps: float) -> np.ndarray:
+        """The eps (m,) of every triangle: 0 of those that do not fold on the way either."""
+        return np.where(self.strict, 0.0, eps)
+
     def bounded(self, w: np.ndarray, step: np.ndarray) -> float:
         """The share of a step (n,) from a map w (n,) that lets no outline with a barrier touch itself."""
         share = 1.0
@@ -139,7 +150,7 @@ class _CageProblem:
         p, q = squared(a) / ratio, squared(b) / ratio
         # What is flat in any map has no area to divide by, and no weight.
         d = np.where(self.counted, p - q, 1.0)
-        chi, slope, bend = _chi(d, eps)
+        chi, slope, bend = _chi(d, self._eps(eps))
         h, h1, h2 = 1 / chi, -slope / chi**2, 2 * slope**2 / chi**3 - bend / chi**2
         # (d^2 + 1) h / 2, whose second derivative is kept where it is positive.
         g1 = self.area_weight * (d * h + (d**2 + 1) / 2 * h1)
@@ -155,13 +166,11 @@ class _CageProblem:
         return first, kept, (aa, ab, bb)
 
 
-def _chi(det: np.ndarray, eps: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """chi(det), and its first and second derivative."""
-    if eps == 0:
-        return det, np.ones(len(det)), np.zeros(len(det))
+def _chi(det: np.ndarray, eps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """chi(det) with an eps (m,) each, and its first and second derivative; with 0 that of a det > 0 itself."""
     root = np.sqrt(det**2 + eps**2)
     # The same without a difference of what is nearly equal, deep in a fold.
-    chi = np.where(det > 0, (det + root) / 2, eps**2 / (2 * (root - det)))
+    chi = np.where(det > 0, (det + root) / 2, eps**2 / np.where(det > 0, 1.0, 2 * (root - det)))
     return chi, chi / root, eps**2 / (2 * root**3)
 
 
@@ -172,12 +181,17 @@ def _squares(rows: np.ndarray) -> np.ndarray:
 
 
 def subdivided_elements(
-    corners: np.ndarray, quads: np.ndarray, cage_corners: np.ndarray, cage_triangles: np.ndarray, scale: np.ndarray
+    corners: np.ndarray,
+    quads: np.ndarray,
+    cage_corners: np.ndarray,
+    cage_triangles: np.ndarray,
+    scale: np.ndarray,
+    polygon: np.ndarray | None = None,
 ) -> CageElements:
     """Elements of fine quads (q,4) with corners (q,4,3) in space, and of the cage's triangles (m,3) with corners
     (m,3,3), whose vertices come after those of the quads. Each shall have scale (q+m,) times its area in the plane.
 
-    Triangles of the cage have next to no weight: they only shall not fold.
+    Triangles of the cage have next to no weight: they only shall not fold. polygon (m,): of each, by default its own
     """
     space = np.concatenate([corners[:, BOTH].reshape(-1, 3), cage_corners.reshape(-1, 3)])
     area, gradient = hat_gradients(space, np.arange(len(space)).reshape(-1, 3))
@@ -189,7 +203,8 @@ def subdivided_elements(
     share = area / area[:fine].sum()
     share[fine:] *= CAGE_WEIGHT
     ratio = np.concatenate([np.repeat(scale[: len(quads)], 4), scale[len(quads) :]])
-    return CageElements(Elements(triangles, share, gradient, ratio, share), quads)
+    own = np.arange(len(cage_triangles)) if polygon is None else polygon
+    return CageElements(Elements(triangles, share, gradient, ratio, share), quads, own)
 
 
 def refine_cage(
@@ -210,18 +225,46 @@ def refine_cage(
     problem = _CageProblem(
         elements=elements,
         counted=np.ones(len(faces.triangles), bool),
+        strict=np.zeros(len(faces.triangles), bool),
         matrix=vstack([matrix, identity(len(uv))]).tocsr(),
         unknowns=(symmetry or without_symmetry(len(uv))).unknowns(fixed),
         assembly=Assembly(faces.triangles[4 * len(elements.quads) :], matrix.shape[0] + len(uv), None, elements.quads),
         area_weight=area_weight,
     )
+    of_cage = faces.triangles.min(axis=1) >= matrix.shape[0]
+    if symmetry is not None:
+        problem = replace(problem, counted=~_flat(problem))
+    found = yield from part_of(_descended(problem, w, of_cage, outlines), 0.0, FIRST)
+    turned = len(np.setdiff1d(_turned(elements, found.uv), _turned(elements, uv)))
+    if turned:
+        # Blender takes a polygon of the cage that is turned over for an island, and smooths it without its neighbours.
+        strict = of_cage.copy()
+        strict[of_cage] = _cage_areas(elements, uv) > 0
+        again = _descended(replace(problem, strict=strict), w, of_cage, outlines)
+        kept = yield from part_of(again, FIRST, 1 - FIRST)
+        found = kept if kept.folds <= found.folds + turned else found
+    return found
+
+
+def _cage_areas(elements: CageElements, uv: np.ndarray) -> np.ndarray:
+    """Areas (t,) of the triangles of the cage in UVs (n,2)."""
+    triangles = elements.faces.triangles[4 * len(elements.quads) :]
+    return signed_areas(uv, triangles - (elements.quads.max(initial=-1) + 1))
+
+
+def _turned(elements: CageElements, uv: np.ndarray) -> np.ndarray:
+    """Polygons (k,) of the cage that are turned over in UVs (n,2)."""
+    return np.flatnonzero(np.bincount(elements.polygon, _cage_areas(elements, uv)) < 0)
+
+
+def _descended(
+    problem: _CageProblem, w: np.ndarray, of_cage: np.ndarray, outlines: Sequence[np.ndarray]
+) -> Steps[CageMap]:
+    """What Newton's method makes of a map w (n,) complex of a cage; of_cage (m,) bool: its triangles."""
     watched = [loop for loop in outlines if len(crossings(w, loop)) == 0]
     iterations, history = 0, list[float]()
     # The second of a quad's triangulations, and the cage.
-    spare = np.arange(len(faces.triangles)) % 4 > 1
-    spare |= faces.triangles.min(axis=1) >= matrix.shape[0]
-    if symmetry is not None:
-        problem = replace(problem, counted=~_flat(problem))
+    spare = of_cage | (np.arange(len(of_cage)) % 4 > 1)
     for k in range(STEPS if problem.unknowns.shape[1] else 0):
         yield Progress("Subdivision", k / STEPS)
         if k == PATIENCE:
@@ -235,7 +278,7 @@ def refine_cage(
         touching = [loop for loop in watched if new is not None and len(crossings(new, loop))]
         if touching:
             watched = [loop for loop in watched if not any(loop is other for other in touching)]
-            strength = CONTACT_STRENGTH / len(elements.quads)
+            strength = CONTACT_STRENGTH / len(problem.elements.quads)
             w = _drawn_in(problem, w, touching, strength, before)
             barriers = tuple(make_barrier(w, loop, strength) for loop in touching)
             problem = replace(problem, barriers=(*problem.barriers, *barriers))
