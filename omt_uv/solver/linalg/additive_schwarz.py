@@ -10,6 +10,7 @@ their equations.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -62,6 +63,7 @@ class AdditiveSchwarz:
         self._kept: Callable[[np.ndarray], np.ndarray] | None = None
         self._last: np.ndarray | None = None
         self._ordered = False
+        self._joined: list[_Joined] = []
         # Numbers that are kept take half of the memory that they are computed in.
         self._part = kd_parts(points, max(0, round(np.log2(n / size)))).astype(np.int32)
         self._count = int(self._part.max()) + 1
@@ -134,25 +136,29 @@ class AdditiveSchwarz:
         quad are neighbours there, and what a vertex follows, which no triangle says."""
         place = np.full(matrix.shape[0], -1, np.int32)
         for k, d in enumerate(self._unknowns if not self._ordered else []):
-            vertices = minimum_degree(_block(matrix, d, place)[::2, ::2])
+            vertices = minimum_degree(_Joined.of(matrix, [d], place).taken(matrix)[::2, ::2])
             self._unknowns[k] = d.reshape(-1, 2)[vertices].ravel()
         self._ordered = True
+        if self._keep and not self._joined:
+            self._joined = [_Joined.of(matrix, parts, place) for parts in self._together()]
+
+    def _together(self) -> list[list[np.ndarray]]:
+        """The unknowns of parts that are factored by one call."""
+        return [self._unknowns[k : k + TOGETHER] for k in range(0, self._count, TOGETHER)]
 
     def _factors(self, matrix: sp.csr_matrix, moves: np.ndarray) -> list[tuple[np.ndarray, Factor]]:
         """The unknowns of some parts each, and the factors of their equations one after the other; without parts of
         which no unknown moves (2n,) bool: vertices that follow their images are half of a mesh, or more."""
         found, place = [], np.full(matrix.shape[0], -1, np.int32)
-        for k in range(0, self._count, TOGETHER):
-            parts = self._unknowns[k : k + TOGETHER]
+        for k, parts in enumerate(self._together()):
             if not any(moves[d].any() for d in parts):
                 continue
-            blocks = [_block(matrix, d, place) for d in parts]
+            known = self._joined[k] if self._joined and self._joined[k].fits(matrix) else None
+            joined = _Joined.of(matrix, parts, place) if known is None else known
             try:
-                found.append(
-                    (np.concatenate(parts), Factor(sp.block_diag(blocks, format="csc"), "natural", single=True))
-                )
+                found.append((joined.unknowns, Factor(joined.taken(matrix), "natural", single=True)))
             except PrecisionError:
-                found += [(d, _part_factor(block)) for d, block in zip(parts, blocks, strict=True)]
+                found += [(d, _part_factor(_Joined.of(matrix, [d], place).taken(matrix))) for d in parts]
         return found
 
     def _coarse(self, matrix: sp.csr_matrix, spread: sp.csr_matrix) -> sp.csc_matrix:
@@ -211,12 +217,56 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False
     return parts
 
 
-def _block(matrix: sp.csr_matrix, d: np.ndarray, place: np.ndarray) -> sp.csc_matrix:
-    """matrix[d][:, d] of a symmetric matrix, in time that only depends on the result; place (n,) is and stays -1."""
-    place[d] = np.arange(len(d))
-    rows = matrix[d]
-    column = place[rows.indices]
-    inside = column >= 0
-    start = np.concatenate([[0], np.cumsum(inside)])[rows.indptr]
-    place[d] = -1
-    return sp.csc_matrix((rows.data[inside], column[inside], start), shape=(len(d), len(d)))
+@dataclass(frozen=True)
+class _Joined:
+    """The equations of some parts side by side, as they are taken out of a matrix of a known pattern.
+
+    unknowns (k,) : of the parts, one after the other
+    source (e,) : where the entries are in the data of the matrix; indices (e,), start (k + 1,) : of the result
+    pattern : indices and starts of the rows of the matrix
+    """
+
+    unknowns: np.ndarray
+    source: np.ndarray
+    indices: np.ndarray
+    start: np.ndarray
+    pattern: tuple[np.ndarray, np.ndarray]
+
+    @staticmethod
+    def of(matrix: sp.csr_matrix, parts: list[np.ndarray], place: np.ndarray) -> _Joined:
+        """Of a symmetric matrix, in time that only depends on the result; place (n,) is and stays -1."""
+        sources, columns, counts, begin = [], [], [], 0
+        for d in parts:
+            place[d] = np.arange(begin, begin + len(d))
+            first, count = matrix.indptr[d], matrix.indptr[d + 1] - matrix.indptr[d]
+            end = np.cumsum(count)
+            entry = np.arange(end[-1]) + np.repeat(first - (end - count), count)
+            column = place[matrix.indices[entry]]
+            inside = column >= 0
+            sources.append(entry[inside].astype(matrix.indices.dtype))
+            columns.append(column[inside])
+            kept = np.concatenate([[0], np.cumsum(inside)])
+            counts.append(kept[end] - kept[end - count])
+            place[d] = -1
+            begin += len(d)
+        start = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int32)
+        joined = sp.csc_matrix((np.concatenate(sources), np.concatenate(columns), start), shape=(begin, begin))
+        # Whoever factors them sorts them, in place.
+        joined.sort_indices()
+        return _Joined(
+            unknowns=np.concatenate(parts),
+            source=joined.data,
+            indices=joined.indices,
+            start=joined.indptr,
+            pattern=(matrix.indices, matrix.indptr),
+        )
+
+    def fits(self, matrix: sp.csr_matrix) -> bool:
+        """Whether a matrix has the pattern."""
+        given = (matrix.indices, matrix.indptr)
+        return all(a is b or np.array_equal(a, b) for a, b in zip(self.pattern, given, strict=True))
+
+    def taken(self, matrix: sp.csr_matrix) -> sp.csc_matrix:
+        """The equations (k,k), symmetric: rows of the matrix are columns."""
+        k = len(self.unknowns)
+        return sp.csc_matrix((matrix.data[self.source], self.indices, self.start), shape=(k, k))

@@ -91,6 +91,24 @@ def test_stiff_equations_are_factored():
     assert tally.factorisations == 1
 
 
+def test_parts_of_a_slider_are_taken_as_before_while_the_pattern_is_the_same():
+    """And anew where it is another one: factors sort what they are given, in place."""
+    _, parted, w = flattened("free", 30.0)
+    V, F = meshes.hemisphere(40, 96)
+    solver, b = AdditiveSchwarz(V, F, 200, keep=True), np.ones(2 * len(w))
+    axes = np.ones((len(w), 2)) * [1, 1j]
+    pattern = parted.assembly.pattern().tocsr()
+    regular = sp.csr_matrix((np.full(pattern.nnz, -0.01), pattern.indices, pattern.indptr)) + sp.identity(len(b))
+    solver.prepare(regular)
+    far = sp.coo_matrix(([0.5, 0.5], ([0, len(b) - 1], [len(b) - 1, 0])), shape=regular.shape)
+    for matrix in (regular, 2 * regular, (regular + far).tocsr(), 3 * regular):
+        # What was found goes on only from the same equations.
+        fresh = AdditiveSchwarz(V, F, 200, keep=True)
+        solver._kept = None
+        x = solver.solve(matrix, b, w, lambda: axes)
+        np.testing.assert_array_equal(x, fresh.solve(matrix, b, w, lambda: axes))
+
+
 def test_singular_parts_are_named():
     _, parted, w = flattened("free")
     matrix = sp.csc_matrix((2 * len(w), 2 * len(w)))

@@ -187,9 +187,11 @@ def test_blocks_are_those_of_the_matrix_and_leave_no_trace():
     A = positive(80, 7)
     place = np.full(80, -1, np.int64)
     for seed in range(4):
-        d = np.random.default_rng(seed).choice(80, 20, replace=False)
-        found = additive_schwarz._block(A, d, place)
-        np.testing.assert_array_equal(found.toarray(), A.toarray()[np.ix_(d, d)])
+        parts = [np.random.default_rng([seed, k]).choice(80, 20, replace=False) for k in range(seed + 1)]
+        joined = additive_schwarz._Joined.of(A, parts, place)
+        blocks = sp.block_diag([A.toarray()[np.ix_(d, d)] for d in parts])
+        np.testing.assert_array_equal(joined.taken(A).toarray(), blocks.toarray())
+        np.testing.assert_array_equal(joined.taken(3 * A).toarray(), 3 * blocks.toarray())
         assert (place == -1).all()
 
 
