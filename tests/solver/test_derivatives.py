@@ -235,6 +235,7 @@ def test_of_the_map_of_a_cage(eps, barred, monkeypatch):
     problem = cage_refinement._CageProblem(
         asked,
         np.ones(len(asked.faces.triangles), bool),
+        np.zeros(len(asked.faces.triangles), bool),
         matrix,
         without_symmetry(len(x)).unknowns(fixed),
         Assembly(asked.faces.triangles[4 * len(mapping.quads) :], matrix.shape[0], None, mapping.quads),
