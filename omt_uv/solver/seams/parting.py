@@ -184,11 +184,9 @@ def _image_of(
 
 def lies_on_its_image(chart: Chart, ends: np.ndarray, images: MirrorImages) -> bool:
     """Whether most vertices of a cut along edges of a chart (e,2) have images beside it, where these are not exact."""
-    places = chart.vertices[np.unique(ends)]
-    at = np.full(len(images.in_plane), -1)
-    at[chart.vertex_ids] = np.arange(len(chart.vertex_ids))
-    there = at[images.nearest[chart.vertex_ids[np.unique(ends)]]]
-    far = cKDTree(places).query(chart.vertices[there])[0]
+    cut = np.unique(ends)
+    there = _images_in(chart, images.nearest)[cut]
+    far = cKDTree(chart.vertices[cut]).query(chart.vertices[there])[0]
     return bool(((there >= 0) & (far <= BESIDE * edge_lengths(chart.vertices, ends).mean())).mean() > 0.5)
 
 
