@@ -13,7 +13,7 @@ from omt_uv.solver.editing import outline, refine_island
 from omt_uv.solver.flows import creases
 from omt_uv.solver.globe import projections
 from omt_uv.solver.mesh import charts
-from omt_uv.solver.parameterization import convex_maps, mirrored_charts, shear_bound, small_charts
+from omt_uv.solver.parameterization import convex_maps, mirrored_charts, shear_bound, shear_search, small_charts
 from omt_uv.solver.remeshing.initial.options import STRATEGIES, RemeshOptions
 from omt_uv.solver.remeshing.relaxation import vertex_balance
 from omt_uv.solver.seams import path_graph, rehearsal
@@ -137,7 +137,7 @@ def test_an_isometry_has_its_angles_its_areas_and_no_folds():
                                                     (0.02, 0.02, False), (0.041, 0.02, True)])  # fmt: skip
 def test_a_round_is_hardly_better_where_little_is_won_and_much_is_left(excess, before, hardly):
     of = SimpleNamespace(excess=excess, bound=1.35)
-    assert shear_bound._Round.is_hardly_better(of, SimpleNamespace(excess=before)) == hardly
+    assert shear_search.Round.is_hardly_better(of, SimpleNamespace(excess=before)) == hardly
 
 
 @pytest.mark.parametrize("late", [False, True])

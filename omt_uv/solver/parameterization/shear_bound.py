@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts
 from ..errors import ENDED_EARLY, MORE_SEAMS
 from ..mesh.charts import Chart
 from ..mesh.geometry import edge_lengths
-from ..mesh.topology import boundary_edges, pair_keys
+from ..mesh.topology import boundary_edges
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
 from ..seams.options import SPREAD_BY_SHEAR
-from .chart_indices import but_within, edge_set, identity, is_marked, outline
+from .chart_indices import but_within, edge_set, identity, is_marked
 from .chart_map import ChartMap, local_shear
 from .mirrored_charts import mapped_anew
 from .options import ShearBound
-from .shear_search import ShearSearch
-
-if TYPE_CHECKING:
-    from ..seams.coarse_cut import Found
+from .shear_search import MOST_STEEP, NEARLY, NO_EXCESS, STEEP, Round, ShearSearch, joined, pressing_shear
 
 # Maps that are made at most.
 MOST_ROUNDS = 5
@@ -36,31 +31,21 @@ CROWDED = 1.35
 ROOM = 0.5
 # Nothing comes apart for less than this share of the bound.
 HARDLY = 0.01
-# What shears more than this is seen on any checker, and charts with more of it than that share are cut further.
-STEEP = 3.0
-MOST_STEEP = 0.01
 # So many times what is steep beyond that share is slit, and this share of a chart more every time that was no help.
 SLIT = 1.5
 MORE_SLIT = 0.001
+# What misses the bound by little after a second search is slit where it shears more than this.
+SHEARED = 2.0
 # What is steep alone is slit so many times before it may come apart.
 SLIT_AT_FIRST = 2
-# What misses the bound by less after a second search is slit where it shears more than that.
-NEARLY = 0.03
-SHEARED = 2.0
-# Where a second search and later ones take off less than this share of what is missing, no seams are left that pay.
-LITTLE = 0.1
-# A chart with less than this share of the square of log(shear) that the bound allows may do with a shorter cut, which
-# is mapped where all are shorter by this share at least.
-SLACK = 0.85
+# A shorter cut is mapped where all are shorter by this share at least.
 WORTHWHILE = 0.03
 # Where that misses the bound, one that uses up less of what is allowed may not: powers of it.
 HOPES = (1.0, 0.5)
+# What misses the bound by less may keep it with areas that are no more exact than is promised.
+SPARED = 0.05
 # Of what came apart parts with this share of the area are searched anew.
 LARGE_PART = 0.03
-# Charts of less than this share of the area count for nothing.
-LEAST_AREA = 1e-4
-# A mean excess of the shear up to this is not worse than none: what was parted is cut further.
-NO_EXCESS = 0.005
 # What has no map is asked for this share of what cuts have left.
 UNKNOWN = 0.5
 # Where the time goes, roughly: seams take this share of every round.
@@ -91,15 +76,18 @@ def bound_shear(
     maps: list[ChartMap],
     map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
     crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None = None,
+    map_sparing: Callable[[list[Chart]], Steps[list[ChartMap]]] | None = None,
 ) -> Steps[BoundedShear]:
     """Cut charts anew whose maps shear more than a bound, and map them again, until all keep it or the worst stays.
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts;
     crossing : refines a map so that it may lie on itself; charts that then keep the bound are parted where they do.
+    map_sparing : a solver that shears less, for areas which are no more exact than is promised: for what misses the
+    bound after a second search.
     Progress offers an early end: with the maps of the last round. Errors: see `disk_charts.disk_charts`, `map_charts`.
     """
     early = EarlyEnd()
-    best = last = _Round.of(search, first.charts, maps, first.found_cuts, search.memory)
+    best = last = Round.of(search, first.charts, maps, first.found_cuts, search.memory)
     spread, promised = search.first_spread(), np.full(search.count, np.inf)
     tried = {edge_set(last.cuts.edges)}
     rehearsed, crossed, worse = dict[str, Any](), False, set[tuple[bytes, bytes]]()
@@ -111,8 +99,13 @@ def bound_shear(
             promised[:] = np.inf
         if not last.searched:
             break
-        is_stuck, best = rounds > 1 and last is not best and last.is_hardly_better(best), last
         begin = 1 - 0.5 ** (rounds - 1)
+        if rounds > 1 and (last.mean <= last.bound).all():
+            # What is steep alone, as single triangles of a coarse mesh are, need not be slit.
+            spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
+            if not spared.searched:
+                return _result(spared, search.shear, first.warnings, MORE_SEAMS)
+        is_stuck, best = rounds > 1 and last is not best and last.is_hardly_better(best), last
         width = (1 - begin) / 2
         parting = _apart(search, last, crossing, rounds, worse)
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
@@ -139,12 +132,10 @@ def bound_shear(
     else:
         rounds = MOST_ROUNDS
     best = last if last.excess <= best.excess else best
-    if not best.excess and not early.is_asked:
+    if not early.is_asked:
         begin = 1 - 0.5 ** (rounds - 1)
-        half = (1 - begin) / 2
-        best = yield from part_of(_taken_back(search, best, map_charts, early), begin, half)
-        best = yield from part_of(_parts_cut_anew(search, best, map_charts, early), begin + half, half)
-    return best.result(search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
+        best = yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)
+    return _result(best, search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
 
 
 @dataclass(frozen=True)
@@ -159,7 +150,7 @@ class _Asked:
     is_worth: Callable[[np.ndarray], bool]
 
 
-def _cut_anew(search: ShearSearch, last: _Round, asked: _Asked, map_charts, early: EarlyEnd) -> Steps[_Round | None]:
+def _cut_anew(search: ShearSearch, last: Round, asked: _Asked, map_charts, early: EarlyEnd) -> Steps[Round | None]:
     """The next round; the last one where what was found is not worth a map, and None where the end was asked for."""
     memory = dict(last.memory)
     chosen = [last.charts[k] for k in asked.charts]
@@ -174,10 +165,32 @@ def _cut_anew(search: ShearSearch, last: _Round, asked: _Asked, map_charts, earl
     mapped = yield from unless_ended(part_of(mapping, SEARCHING, 1 - SEARCHING), early)
     if mapped is None:
         return None
-    return _Round.of(search, again.charts, mapped, _joined(search, last.cuts, edges), memory)
+    return Round.of(search, again.charts, mapped, joined(search, last.cuts, edges), memory)
 
 
-def _taken_back(search: ShearSearch, last: _Round, map_charts, early: EarlyEnd) -> Steps[_Round]:
+def _made_shorter(search: ShearSearch, last: Round, map_charts, map_sparing, early: EarlyEnd) -> Steps[Round]:
+    """The last round with areas spared where it misses the bound, and with shorter cuts where it does not."""
+    if last.excess:
+        return (yield from _with_areas_spared(search, last, map_sparing, early))
+    last = yield from part_of(_taken_back(search, last, map_charts, early), 0.0, 0.5)
+    return (yield from part_of(_parts_cut_anew(search, last, map_charts, early), 0.5, 0.5))
+
+
+def _with_areas_spared(search: ShearSearch, last: Round, map_sparing, early: EarlyEnd) -> Steps[Round]:
+    """A round with other maps of the charts that miss the bound by little, where these do so by less: on coarse meshes
+    with limbs the last half of a hundredth of the areas shears more than a further seam takes away."""
+    if map_sparing is None or not (last.pressing[last.searched] <= (1 + SPARED) * last.bound).all():
+        return last
+    mapped = yield from unless_ended(map_sparing([last.charts[k] for k in last.searched]), early)
+    if not mapped:
+        return last
+    spared = dict(zip(last.searched, mapped, strict=True))
+    maps = [spared.get(k, one) for k, one in enumerate(last.maps)]
+    new = Round.of(search, last.charts, maps, last.cuts, last.memory)
+    return new if new.excess < last.excess else last
+
+
+def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
     """A round within the bound with shorter cuts, where rehearsals had asked for more than maps needed, if these keep
     the bound, too; as it is otherwise."""
     longer = [k for k in range(len(last.charts)) if _has_slack(last, k)]
@@ -186,7 +199,7 @@ def _taken_back(search: ShearSearch, last: _Round, map_charts, early: EarlyEnd) 
     kept = but_within(last.cuts.edges, [last.charts[k] for k in longer])
 
     def is_worth(edges: np.ndarray) -> bool:
-        return _joined(search, last.cuts, edges).length <= (1 - WORTHWHILE) * last.cuts.length
+        return joined(search, last.cuts, edges).length <= (1 - WORTHWHILE) * last.cuts.length
 
     for k, hope in enumerate(HOPES):
         share = np.ones(search.count)
@@ -203,7 +216,7 @@ def _taken_back(search: ShearSearch, last: _Round, map_charts, early: EarlyEnd) 
     return last
 
 
-def _parts_cut_anew(search: ShearSearch, last: _Round, map_charts, early: EarlyEnd) -> Steps[_Round]:
+def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
     """A round within the bound whose parts have cuts of their own, where these are shorter than what was cut of the
     whole before it came apart, and keep the bound, too."""
     large = last.area >= LARGE_PART * last.area.sum()
@@ -232,123 +245,17 @@ def _outline_length(chart: Chart) -> float:
     return float(edge_lengths(chart.vertices, boundary_edges(chart.triangles)).sum())
 
 
-def _share_allowed(last: _Round, k: int) -> float:
+def _share_allowed(last: Round, k: int) -> float:
     """How many times the square of log(shear) of chart k may be."""
     return float(MARGIN * np.log(last.bound) ** 2 / np.log(last.pressing[k]) ** 2)
 
 
-def _has_slack(last: _Round, k: int) -> bool:
+def _has_slack(last: Round, k: int) -> bool:
     """Whether chart k, as it was rehearsed, shears so much less than the bound that a shorter cut may do."""
     return bool(last.has_room[k]) and any(one.rehearsed is not None for one in last.found_for(k))
 
 
-@dataclass(frozen=True)
-class _Round:
-    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), the same
-    but above the bound where too much is steep (k,), and the numbers of those that miss it and may be cut for that."""
-
-    charts: list[Chart]
-    maps: list[ChartMap]
-    cuts: Cuts
-    memory: dict
-    area: np.ndarray
-    mean: np.ndarray
-    pressing: np.ndarray
-    bound: float
-    searched: list[int]
-
-    @staticmethod
-    def of(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: Cuts, memory: dict) -> _Round:
-        shear = [local_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
-        mean = np.array([area @ local / area.sum() for local, area in shear])
-        area, bound = np.array([area.sum() for _, area in shear]), search.shear.bound
-        # Slivers between sides have a shear, and nobody sees it.
-        mean = np.where(area > LEAST_AREA * area.sum(), mean, 1.0)
-        steep = np.array([area[local > STEEP].sum() / area.sum() for local, area in shear])
-        pressing = np.array([_pressing(*pair, bound) for pair in zip(mean, steep, strict=True)])
-        missed = np.flatnonzero(pressing > bound)
-        # What has no map at all is cut further without being asked: otherwise there would be nothing to look at.
-        asked = [search.shear.further or one.failure is not None for one in maps]
-        searched = [int(k) for k in missed if asked[k] or not is_marked(search.surface, charts[k])]
-        return _Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched)
-
-    @property
-    def excess(self) -> float:
-        """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
-        return float(self.missing.sum() / self.area.sum())
-
-    def with_what_is_better(
-        self, search: ShearSearch, new: _Round, worse: set[tuple[bytes, bytes]]
-    ) -> tuple[_Round, set[tuple[bytes, bytes]]]:
-        """The new round made of this one, but for charts that became worse while others became better, which are as
-        they are here; and the identities `worse` with those of these."""
-        of = self.chart_of(search, new)
-        now = np.bincount(of, new.missing, len(self.charts))
-        stay = now > self.missing + NO_EXCESS * self.area
-        if not stay.any() or (stay | (now >= self.missing))[self.searched].all():
-            return new, worse
-        merged = self.merged(search, new, of, stay)
-        return merged, worse | {identity(chart) for chart in itertools.compress(self.charts, stay)}
-
-    def _region(self, search: ShearSearch) -> np.ndarray:
-        """The chart (f,) that polygons of the surface are in, -1 for none."""
-        region = np.full(search.count, -1)
-        for k, chart in enumerate(self.charts):
-            region[chart.faces] = k
-        return region
-
-    def chart_of(self, search: ShearSearch, new: _Round) -> np.ndarray:
-        """The chart (k,) of this round that those of a new one are parts of."""
-        region = self._region(search)
-        return np.array([region[chart.faces[0]] for chart in new.charts])
-
-    def merged(self, search: ShearSearch, new: _Round, of: np.ndarray, stay: np.ndarray) -> _Round:
-        """A new round, but for the charts of this one that stay (k,) bool as they are; of: see `chart_of`."""
-        charts = [*itertools.compress(self.charts, stay), *itertools.compress(new.charts, ~stay[of])]
-        maps = [*itertools.compress(self.maps, stay), *itertools.compress(new.maps, ~stay[of])]
-        edges = np.unique(np.concatenate([self.cuts.edges, new.cuts.edges]), axis=0)
-        edges = edges[np.isin(pair_keys(*edges.T), np.concatenate([outline(chart) for chart in charts]))]
-        # What was found for parts that are as they were is forgotten.
-        region = self._region(search)
-        memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
-        memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
-        return _Round.of(search, charts, maps, _joined(search, self.cuts, edges), memory)
-
-    @property
-    def has_room(self) -> np.ndarray:
-        """Charts (k,) bool that shear so much less than the bound that less of a cut may do."""
-        squares = np.log(self.pressing) ** 2
-        return (squares > 0) & (squares < SLACK * np.log(self.bound) ** 2)
-
-    def found_for(self, k: int) -> list[Found]:
-        """What searches have found for chart k as a whole."""
-        faces = np.unique(self.charts[k].faces)
-        return [one for one in self.memory.values() if np.array_equal(np.unique(one.polygons), faces)]
-
-    @property
-    def missing(self) -> np.ndarray:
-        """By how much each chart (k,) misses the bound, times its area; 0 where it is not searched."""
-        missing = np.zeros(len(self.charts))
-        missing[self.searched] = (self.area * (self.pressing - self.bound))[self.searched]
-        return missing
-
-    def is_hardly_better(self, before: _Round) -> bool:
-        """Whether hardly more of it keeps the bound than before, and much does not."""
-        return self.excess > max((1 - LITTLE) * before.excess, NEARLY * self.bound)
-
-    def result(self, shear: ShearBound, warnings: tuple[str, ...], why: str) -> BoundedShear:
-        """Its charts and maps, with warnings of how they were made and of those that miss the bound; why they do."""
-        by_hand = ~np.isin(np.arange(len(self.charts)), self.searched)
-        missed = tuple(shear.missed(self.mean, self.area, by_hand, why))
-        return BoundedShear(DiskCharts(self.charts, self.cuts, warnings), self.maps, missed)
-
-
-def _pressing(mean: float, steep: float, bound: float) -> float:
-    """A mean shear, or one above the bound where too large a share is steep."""
-    return max(mean, bound * (1 + steep)) if steep > MOST_STEEP and mean > 1 else mean
-
-
-def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+def _shares(last: Round, missed: list[int], promised: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
     """Shares (f,) of what cuts have left that are asked of the next, and squares (f,) of log(shear) that these promise.
 
     promised (f,) : by the last search
@@ -369,7 +276,7 @@ def _shares(last: _Round, missed: list[int], promised: np.ndarray, margin: float
 
 def _apart(
     search: ShearSearch,
-    last: _Round,
+    last: Round,
     crossing: Callable[[Chart, ChartMap], Steps[np.ndarray]] | None,
     rounds: int,
     worse: set[tuple[bytes, bytes]],
@@ -404,14 +311,14 @@ def _apart(
     return found, flat, crossed
 
 
-def _may_cross(last: _Round, k: int, late: bool, rounds: int) -> bool:
+def _may_cross(last: Round, k: int, late: bool, rounds: int) -> bool:
     """Whether chart k misses the bound by so much that it may lie in its own way, or was slit in vain."""
     missed = last.mean[k] > (1 + HARDLY) * last.bound
     much = np.log(last.mean[k]) >= np.sqrt(CROWDED) * np.log(last.bound)
     return rounds > SLIT_AT_FIRST or bool(missed and (late or much))
 
 
-def _uncrossed(search: ShearSearch, last: _Round, k: int, uv: np.ndarray, late: bool) -> np.ndarray:
+def _uncrossed(search: ShearSearch, last: Round, k: int, uv: np.ndarray, late: bool) -> np.ndarray:
     """Edges (e,2) that part chart k between what lies on itself in a map uv (n,2) that may, where that is what it
     misses the bound for."""
     from ..seams.parting import parted
@@ -420,13 +327,13 @@ def _uncrossed(search: ShearSearch, last: _Round, k: int, uv: np.ndarray, late: 
     shear, area = local_shear(chart, replace(last.maps[k], uv=uv), search.target is None)
     both = float(area @ shear / area.sum()), float(area[shear > STEEP].sum() / area.sum())
     mild = mean <= last.bound
-    missed, without = (last.pressing[k], _pressing(*both, last.bound)) if mild else (mean, both[0])
+    missed, without = (last.pressing[k], pressing_shear(*both, last.bound)) if mild else (mean, both[0])
     if without > last.bound + late * ROOM * (missed - last.bound):
         return np.zeros((0, 2), np.int64)
     return parted(chart, uv, search.costs().vertex_cost[chart.vertex_ids], search.images)
 
 
-def _slit(search: ShearSearch, last: _Round, k: int, rounds: int) -> np.ndarray:
+def _slit(search: ShearSearch, last: Round, k: int, rounds: int) -> np.ndarray:
     """Edges (e,2) from the seams around chart k into what is steep, or, where its mean misses the bound, sheared; more
     than the last time."""
     from ..seams.parting import slits
@@ -441,6 +348,9 @@ def _slit(search: ShearSearch, last: _Round, k: int, rounds: int) -> np.ndarray:
     return slits(chart, steep, least, costs.vertex_cost[here], barred, search.images, rounds)
 
 
-def _joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
-    """The same cuts, but along the edges (e,2)."""
-    return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))
+def _result(last: Round, shear: ShearBound, warnings: tuple[str, ...], why: str) -> BoundedShear:
+    """The charts and maps of a round, with warnings of how they were made and of those that miss the bound; why they
+    do."""
+    by_hand = ~np.isin(np.arange(len(last.charts)), last.searched)
+    missed = tuple(shear.missed(last.mean, last.area, by_hand, why))
+    return BoundedShear(DiskCharts(last.charts, last.cuts, warnings), last.maps, missed)

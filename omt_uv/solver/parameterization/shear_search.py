@@ -1,7 +1,9 @@
-"""Search seams for a bound of the shear: where, at what cost, and what maps of coarse surfaces tell."""
+"""Search seams for a bound of the shear: where, at what cost, what maps of coarse surfaces tell, and what a round of
+maps has come to."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,14 +14,19 @@ import numpy as np
 from ..analysis.density import Target, means_of_polygons
 from ..analysis.seam_costs import SeamCosts, seam_costs
 from ..analysis.symmetry_plane import MirrorImages
+from ..cutting.cuts import Cuts
 from ..cutting.disk_charts import DiskCharts, disk_charts
 from ..mesh.charts import Chart
+from ..mesh.geometry import edge_lengths
 from ..mesh.surface import Surface
+from ..mesh.topology import pair_keys
 from ..progress import Steps, part_of
+from .chart_indices import identity, is_marked, outline
 from .chart_map import ChartMap, local_shear
 from .options import ShearBound
 
 if TYPE_CHECKING:
+    from ..seams.coarse_cut import Found
     from ..seams.search import SeamSearch
 
 # The spread of seams that goes with a mean shear s, times the square of log(s): of heads, animals and figures it is
@@ -27,6 +34,19 @@ if TYPE_CHECKING:
 SPREAD_OF_SHEAR = 0.19
 # Below this bound, what the triangles of a coarse surface shear by themselves counts more than what is cut.
 LEAST_REHEARSED = 1.2
+# What shears more than this is seen on any checker, and charts with more of it than that share are cut further.
+STEEP = 3.0
+MOST_STEEP = 0.01
+# Charts of less than this share of the area count for nothing.
+LEAST_AREA = 1e-4
+# A mean excess of the shear up to this is not worse than none: what was parted is cut further.
+NO_EXCESS = 0.005
+# What misses the bound by less misses it by little.
+NEARLY = 0.03
+# Where a second search and later ones take off less than this share of what is missing, no seams are left that pay.
+LITTLE = 0.1
+# A chart with less than this share of the square of log(shear) that the bound allows may do with a shorter cut.
+SLACK = 0.85
 # Of a surface in one piece the largest chart has this share of the area, but for crumbs.
 ONE_PIECE = 0.97
 
@@ -155,3 +175,108 @@ class ShearSearch:
     def count(self) -> int:
         """Polygons of the surface."""
         return len(self.surface.face_start) - 1
+
+
+@dataclass(frozen=True)
+class Round:
+    """Charts, their maps and cuts, what the search for these has found, their areas (k,) and mean shear (k,), the same
+    but above the bound where too much is steep (k,), and the numbers of those that miss it and may be cut for that."""
+
+    charts: list[Chart]
+    maps: list[ChartMap]
+    cuts: Cuts
+    memory: dict
+    area: np.ndarray
+    mean: np.ndarray
+    pressing: np.ndarray
+    bound: float
+    searched: list[int]
+
+    @staticmethod
+    def of(search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: Cuts, memory: dict) -> Round:
+        shear = [local_shear(chart, one, search.target is None) for chart, one in zip(charts, maps, strict=True)]
+        mean = np.array([area @ local / area.sum() for local, area in shear])
+        area, bound = np.array([area.sum() for _, area in shear]), search.shear.bound
+        # Slivers between sides have a shear, and nobody sees it.
+        mean = np.where(area > LEAST_AREA * area.sum(), mean, 1.0)
+        steep = np.array([area[local > STEEP].sum() / area.sum() for local, area in shear])
+        pressing = np.array([pressing_shear(*pair, bound) for pair in zip(mean, steep, strict=True)])
+        missed = np.flatnonzero(pressing > bound)
+        # What has no map at all is cut further without being asked: otherwise there would be nothing to look at.
+        asked = [search.shear.further or one.failure is not None for one in maps]
+        searched = [int(k) for k in missed if asked[k] or not is_marked(search.surface, charts[k])]
+        return Round(charts, maps, cuts, memory, area, mean, pressing, bound, searched)
+
+    @property
+    def excess(self) -> float:
+        """What is searched misses the bound by, as a mean over the surface; 0 for nothing."""
+        return float(self.missing.sum() / self.area.sum())
+
+    def with_what_is_better(
+        self, search: ShearSearch, new: Round, worse: set[tuple[bytes, bytes]]
+    ) -> tuple[Round, set[tuple[bytes, bytes]]]:
+        """The new round made of this one, but for charts that became worse while others became better, which are as
+        they are here; and the identities `worse` with those of these."""
+        of = self.chart_of(search, new)
+        now = np.bincount(of, new.missing, len(self.charts))
+        stay = now > self.missing + NO_EXCESS * self.area
+        if not stay.any() or (stay | (now >= self.missing))[self.searched].all():
+            return new, worse
+        merged = self.merged(search, new, of, stay)
+        return merged, worse | {identity(chart) for chart in itertools.compress(self.charts, stay)}
+
+    def _region(self, search: ShearSearch) -> np.ndarray:
+        """The chart (f,) that polygons of the surface are in, -1 for none."""
+        region = np.full(search.count, -1)
+        for k, chart in enumerate(self.charts):
+            region[chart.faces] = k
+        return region
+
+    def chart_of(self, search: ShearSearch, new: Round) -> np.ndarray:
+        """The chart (k,) of this round that those of a new one are parts of."""
+        region = self._region(search)
+        return np.array([region[chart.faces[0]] for chart in new.charts])
+
+    def merged(self, search: ShearSearch, new: Round, of: np.ndarray, stay: np.ndarray) -> Round:
+        """A new round, but for the charts of this one that stay (k,) bool as they are; of: see `chart_of`."""
+        charts = [*itertools.compress(self.charts, stay), *itertools.compress(new.charts, ~stay[of])]
+        maps = [*itertools.compress(self.maps, stay), *itertools.compress(new.maps, ~stay[of])]
+        edges = np.unique(np.concatenate([self.cuts.edges, new.cuts.edges]), axis=0)
+        edges = edges[np.isin(pair_keys(*edges.T), np.concatenate([outline(chart) for chart in charts]))]
+        # What was found for parts that are as they were is forgotten.
+        region = self._region(search)
+        memory = {name: found for name, found in self.memory.items() if stay[region[found.polygons[0]]]}
+        memory |= {name: found for name, found in new.memory.items() if not stay[region[found.polygons[0]]]}
+        return Round.of(search, charts, maps, joined(search, self.cuts, edges), memory)
+
+    @property
+    def has_room(self) -> np.ndarray:
+        """Charts (k,) bool that shear so much less than the bound that less of a cut may do."""
+        squares = np.log(self.pressing) ** 2
+        return (squares > 0) & (squares < SLACK * np.log(self.bound) ** 2)
+
+    def found_for(self, k: int) -> list[Found]:
+        """What searches have found for chart k as a whole."""
+        faces = np.unique(self.charts[k].faces)
+        return [one for one in self.memory.values() if np.array_equal(np.unique(one.polygons), faces)]
+
+    @property
+    def missing(self) -> np.ndarray:
+        """By how much each chart (k,) misses the bound, times its area; 0 where it is not searched."""
+        missing = np.zeros(len(self.charts))
+        missing[self.searched] = (self.area * (self.pressing - self.bound))[self.searched]
+        return missing
+
+    def is_hardly_better(self, before: Round) -> bool:
+        """Whether hardly more of it keeps the bound than before, and much does not."""
+        return self.excess > max((1 - LITTLE) * before.excess, NEARLY * self.bound)
+
+
+def pressing_shear(mean: float, steep: float, bound: float) -> float:
+    """A mean shear, or one above the bound where too large a share is steep."""
+    return max(mean, bound * (1 + steep)) if steep > MOST_STEEP and mean > 1 else mean
+
+
+def joined(search: ShearSearch, cuts: Cuts, edges: np.ndarray) -> Cuts:
+    """The same cuts, but along the edges (e,2)."""
+    return replace(cuts, edges=edges, length=float(edge_lengths(search.surface.positions, edges).sum()))

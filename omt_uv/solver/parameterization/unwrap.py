@@ -151,7 +151,7 @@ def unwrap(
     maps = yield from part_of(task.map_symmetric(cut), begin, width)
     if search is not None:
         crossing = task.crossing if pins is None and task.options.boundary == "free" else None
-        further = bound_shear(search, prepared, maps, task.map_charts, crossing)
+        further = bound_shear(search, prepared, maps, task.map_charts, crossing, task.sparing)
         found = yield from part_of(further, begin + width, 1 - begin - width - PIECES)
         warnings = (*prepared.warnings, *cut_for_a_map(maps, found.maps), *found.warnings)
         prepared, maps = replace(found.prepared, warnings=warnings), found.maps
@@ -375,6 +375,13 @@ class _Task:
         """A map (n,2) from another one on that may come to lie on itself."""
         target = chart_target(self.target, self.surface, chart)
         return (yield from refined_again(chart, chart_map.uv, self.options, target, crossing=True))
+
+    @property
+    def sparing(self) -> Callable[[list[Chart]], Steps[list[ChartMap]]] | None:
+        """Maps charts with areas that are as exact as Standard promises and no more; None for other qualities."""
+        if self.options.quality != "standard" or self.options.balance > 0:
+            return None
+        return replace(self, options=replace(self.options, quality="promised")).map_charts
 
     def map_symmetric(self, cut: CutCharts) -> Steps[list[ChartMap]]:
         """Maps of all charts, symmetric ones also where their mirror images are cut along other diagonals."""

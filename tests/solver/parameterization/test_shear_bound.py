@@ -84,10 +84,10 @@ def test_a_chart_within_the_bound_is_left_alone():
 def test_a_chart_with_much_that_is_steep_is_cut_though_its_mean_keeps_the_bound(monkeypatch):
     surface = triangle_surface(*meshes.bumpy())
     before = unwrapped(surface, 3.0)
-    monkeypatch.setattr(shear_bound, "STEEP", float(np.quantile(steepness(before), 0.9)))
+    monkeypatch.setattr(shear_search, "STEEP", float(np.quantile(steepness(before), 0.9)))
     after = unwrapped(surface, 3.0)
     assert len(before.seams) == 0 < len(after.seams) and not after.warnings
-    share = [(steepness(found) > shear_bound.STEEP).mean() for found in (before, after)]
+    share = [(steepness(found) > shear_search.STEEP).mean() for found in (before, after)]
     assert share[1] < 0.75 * share[0]
 
 
@@ -270,8 +270,8 @@ def test_what_stays_steep_after_slits_comes_apart_where_it_lies_in_its_own_way(r
         yield from ()
         return chart.vertices[:, :2]
 
-    steep = local_shear(chart, chart_map, True)[0] > shear_bound.STEEP
-    assert area[steep].sum() > shear_bound.MOST_STEEP * area.sum()
+    steep = local_shear(chart, chart_map, True)[0] > shear_search.STEEP
+    assert area[steep].sum() > shear_search.MOST_STEEP * area.sum()
     found, flat_sides, crossed = drain(shear_bound._apart(search, last, crossing, rounds, set()))
     parts = strict_charts(triangle_surface(V, F, found.get(0, np.zeros((0, 2), int))))
     assert not flat_sides and crossed == comes_apart and len(parts) == (2 if comes_apart else 1)
@@ -325,7 +325,7 @@ def made_round(search, edges, shear, found):
         name: SimpleNamespace(polygons=np.arange(k * half, (k + 1) * half), found=found)
         for k, name in enumerate((b"first", b"second"))
     }
-    return shear_bound._Round.of(search, charts, maps, Cuts(edges, 0.0, (), edges[:0], ()), memory)
+    return shear_search.Round.of(search, charts, maps, Cuts(edges, 0.0, (), edges[:0], ()), memory)
 
 
 def bumpy(n):
@@ -377,10 +377,30 @@ def test_parts_of_what_came_apart_have_cuts_of_their_own_where_these_are_shorter
     cuts = Cuts(
         edges, float(np.linalg.norm(np.diff(surface.positions[edges], axis=1), axis=2).sum()), (), edges[:0], ()
     )
-    before = shear_bound._Round.of(search, charts, drain(map_charts(charts)), cuts, {})
+    before = shear_search.Round.of(search, charts, drain(map_charts(charts)), cuts, {})
     assert len(charts) == 2 and before.has_room.all() and not before.found_for(0)
     after = drain(shear_bound._parts_cut_anew(search, before, map_charts, shear_bound.EarlyEnd()))
     assert after.cuts.length < 0.9 * before.cuts.length and (after.pressing <= 1.3).all() and len(after.charts) == 2
     assert {frozenset(e) for e in seam.tolist()} <= {frozenset(e) for e in after.cuts.edges.tolist()}
     # Parts whose own cuts are no shorter, and what is in one piece, stay as they are.
     assert drain(shear_bound._parts_cut_anew(search, after, map_charts, shear_bound.EarlyEnd())) is after
+
+
+def test_what_misses_the_bound_by_little_keeps_it_with_areas_as_exact_as_is_promised(monkeypatch):
+    """Where no further search is allowed, and not for qualities that promise more."""
+    V, F = meshes.random_disk(800, height=0)
+    far = ((V[:, :2] - V[:, :2].mean(axis=0)) ** 2).sum(axis=1)
+    surface = triangle_surface(np.column_stack([V[:, :2], np.exp(-4 * far / far.max())]), F)
+    monkeypatch.setattr(shear_bound, "MOST_ROUNDS", 1)
+    monkeypatch.setattr(shear_search, "SPREAD_OF_SHEAR", 1e4)
+    (plain,) = unwrapped(surface, 0).maps
+    bound = plain.angle_mean - 0.005
+    found = unwrapped(surface, bound)
+    assert not len(found.seams) and not found.warnings
+    (spared,) = found.maps
+    assert spared.angle_mean <= bound and plain.area_l1 < spared.area_l1 <= 0.01
+    assert unwrapped(surface, bound, quality="exact").warnings
+    # What misses it by more is not tried.
+    monkeypatch.setattr(shear_bound, "SPARED", 0.0)
+    (same,) = unwrapped(surface, bound).maps
+    assert same.area_l1 == plain.area_l1

@@ -8,7 +8,7 @@ from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import edge_lengths, face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.mesh.topology import halfedges, pair_keys, twins
-from omt_uv.solver.parameterization import shear_bound
+from omt_uv.solver.parameterization import shear_search
 from omt_uv.solver.parameterization.chart_map import local_shear
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.shear_search import ShearSearch
@@ -145,8 +145,8 @@ def test_what_maps_do_not_need_is_taken_back(monkeypatch, bound):
     monkeypatch.setattr(ShearSearch, "rehearsed", doubled)
     monkeypatch.setattr("omt_uv.solver.parameterization.unwrap.COMPACT", np.inf)
     surface, length = triangle_surface(*bumpy(60)), []
-    for slack in (0.0, shear_bound.SLACK):
-        monkeypatch.setattr(shear_bound, "SLACK", slack)
+    for slack in (0.0, shear_search.SLACK):
+        monkeypatch.setattr(shear_search, "SLACK", slack)
         found = drain(unwrap(surface, options=UnwrapOptions(max_shear=bound)))
         assert mean_shear(found) <= bound
         length.append(edge_lengths(surface.positions, found.seams).sum())
