@@ -82,8 +82,7 @@ def bound_shear(
 
     first, maps : charts whose seams were searched for the bound, and their maps; map_charts : a solver for charts;
     crossing : refines a map so that it may lie on itself; charts that then keep the bound are parted where they do.
-    map_sparing : a solver that shears less, for areas which are no more exact than is promised: for what misses the
-    bound after a second search.
+    map_sparing : a solver that shears less, for areas which are no more exact than is promised.
     Progress offers an early end: with the maps of the last round. Errors: see `disk_charts.disk_charts`, `map_charts`.
     """
     early = EarlyEnd()
@@ -97,16 +96,15 @@ def bound_shear(
             last, rehearsed = best, {"rehearse": None}
             crossing = None if crossed else crossing
             promised[:] = np.inf
+        begin, width = 1 - 0.5 ** (rounds - 1), 0.5**rounds
         if not last.searched:
             break
-        begin = 1 - 0.5 ** (rounds - 1)
         if rounds > 1 and (last.mean <= last.bound).all():
             # What is steep alone, as single triangles of a coarse mesh are, need not be slit.
             spared = yield from part_of(_with_areas_spared(search, last, map_sparing, early), begin, 0.0)
             if not spared.searched:
                 return _result(spared, search.shear, first.warnings, MORE_SEAMS)
         is_stuck, best = rounds > 1 and last is not best and last.is_hardly_better(best), last
-        width = (1 - begin) / 2
         parting = _apart(search, last, crossing, rounds, worse)
         parts = yield from unless_ended(part_of(parting, begin, width * PARTING), early)
         if parts is None or (is_stuck and not parts[0]):
@@ -115,25 +113,21 @@ def bound_shear(
         missed = [k for k in last.searched if k not in apart]
         share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
-        begin, width = begin + width * PARTING, width * (1 - PARTING)
-        kept = but_within(last.cuts.edges, [last.charts[k] for k in (*missed, *flat)])
-        kept = np.concatenate([kept, *apart.values()])
+        kept = [but_within(last.cuts.edges, [last.charts[k] for k in (*missed, *flat)]), *apart.values()]
         # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
         changes = {"share": share, "adding": rounds > 1} | rehearsed
-        asked = _Asked(missed, kept, spread, changes, lambda edges: edge_set(edges) not in tried)
-        new = yield from part_of(_cut_anew(search, last, asked, map_charts, early), begin, width)
+        asked = _Asked(missed, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
+        anew = _cut_anew(search, last, asked, map_charts, early)
+        new = yield from part_of(anew, begin + width * PARTING, width * (1 - PARTING))
         if new is None:
             break
-        if new is last:
-            # It has not kept what it promised, and so more is asked for.
-            continue
-        tried.add(edge_set(new.cuts.edges))
-        last, worse = last.with_what_is_better(search, new, worse)
+        if new is not last:  # Else it has not kept what it promised, and so more is asked for.
+            tried.add(edge_set(new.cuts.edges))
+            last, worse = last.with_what_is_better(search, new, worse)
     else:
-        rounds = MOST_ROUNDS
+        begin = 1 - 0.5 ** (MOST_ROUNDS - 1)
     best = last if last.excess <= best.excess else best
     if not early.is_asked:
-        begin = 1 - 0.5 ** (rounds - 1)
         best = yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)
     return _result(best, search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
 
