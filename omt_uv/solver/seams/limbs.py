@@ -67,13 +67,20 @@ def pieces_of_chart(
 
     whole : the area of the surface; cost, images : see `parting.parted`; up (3,) : see `sprawls`
     """
+    if not may_come_apart(chart, uv, up, whole):
+        return np.zeros(len(chart.triangles), np.int64), np.zeros((0, 2), np.int64)
+    count = _count_of_band(chart, uv, whole)
+    return in_pieces(chart, uv, cost, count) if count > 1 else without_limbs(chart, uv, cost, up, images)
+
+
+def may_come_apart(chart: Chart, uv: np.ndarray, up: Up, whole: float) -> bool:
+    """Whether `pieces_of_chart` looks for pieces at all, which needs no costs: these may take longer than all else."""
     share = face_areas(chart.vertices, chart.triangles).sum() / whole
-    count = pieces_of_band(uv, np.sqrt(whole), share)
-    if count > 1:
-        return in_pieces(chart, uv, cost, count)
-    if share > MOSTLY and sprawls(chart, uv, up):
-        return without_limbs(chart, uv, cost, up, images)
-    return np.zeros(len(chart.triangles), np.int64), np.zeros((0, 2), np.int64)
+    return _count_of_band(chart, uv, whole) > 1 or bool(share > MOSTLY and sprawls(chart, uv, up))
+
+
+def _count_of_band(chart: Chart, uv: np.ndarray, whole: float) -> int:
+    return pieces_of_band(uv, np.sqrt(whole), face_areas(chart.vertices, chart.triangles).sum() / whole)
 
 
 def sprawls(chart: Chart, uv: np.ndarray, up: Up) -> bool:
@@ -273,9 +280,3 @@ class _Body:
             return None
         side = minimum_cut(self.graph, np.where(inner, self.capacity, 1), np.flatnonzero(near), np.flatnonzero(beyond))
         return side & here
-
-
-def may_come_apart(chart: Chart, uv: np.ndarray, up: Up, whole: float) -> bool:
-    """Whether `pieces_of_chart` looks for pieces at all, which needs no costs: these may take longer than all else."""
-    share = face_areas(chart.vertices, chart.triangles).sum() / whole
-    return bool(pieces_of_band(uv, np.sqrt(whole), share) > 1 or (share > MOSTLY and sprawls(chart, uv, up)))
