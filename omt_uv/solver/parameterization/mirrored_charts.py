@@ -178,6 +178,9 @@ def motion_between(first: Chart, other: Chart) -> tuple[np.ndarray, float] | Non
     for end, sign in trials:
         rotation = _frame(b[end, :3], sign) @ _frame(a[start, :3]).T
         moved = np.concatenate([a[:, :3] @ rotation.T, a[:, 3:] @ rotation.T], axis=1) / size
+        if not np.isfinite(moved).all():
+            # Places in a row have no frame.
+            continue
         off, at = there.query(moved, distance_upper_bound=2 * SAME_PLACE)
         if not np.isfinite(off).all() or len(np.unique(at)) < n:
             continue
@@ -225,10 +228,12 @@ def _beginnings(a, sides_a, b, sides_b, size: float) -> tuple[np.ndarray, list[t
 
 
 def _frame(points: np.ndarray, sign: float = 1.0) -> np.ndarray:
-    """Axes (3,3), in columns, of two points (2,3) and the origin; sign : of the third."""
-    first = points[0] / np.linalg.norm(points[0])
-    second = points[1] - (points[1] @ first) * first
-    second /= np.linalg.norm(second)
+    """Axes (3,3), in columns, of two points (2,3) and the origin; sign : of the third. No numbers where they lie in a
+    row."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first = points[0] / np.linalg.norm(points[0])
+        second = points[1] - (points[1] @ first) * first
+        second = second / np.linalg.norm(second)
     return np.column_stack([first, second, sign * np.cross(first, second)])
 
 

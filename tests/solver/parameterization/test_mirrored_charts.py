@@ -11,7 +11,7 @@ from sphere_shapes import random_rotation
 from omt_uv.solver.analysis.density import Target
 from omt_uv.solver.analysis.facing import SceneAxes
 from omt_uv.solver.cutting.cuts import Cuts
-from omt_uv.solver.mesh.charts import strict_charts
+from omt_uv.solver.mesh.charts import Chart, strict_charts
 from omt_uv.solver.mesh.geometry import edge_lengths, signed_areas
 from omt_uv.solver.mesh.mirror import find_mirror, partial_mirror
 from omt_uv.solver.mesh.surface import triangle_surface
@@ -67,6 +67,18 @@ def test_what_differs_anywhere_is_not_equal():
         assert motion_between(first, other) is None
     _, (first, other) = charts_of((V, P), moved(V, P[:-1], 1))
     assert motion_between(first, other) is None
+
+
+def test_what_lies_in_a_row_has_no_frame_and_no_motion():
+    """Without a word, and whatever its size."""
+    row = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]], float)
+    triangles = np.array([[0, 1, 2], [1, 3, 2]])
+    for scale in (1.0, 1e-300, 1e300):
+        first, other = (
+            Chart(scale * V, triangles, np.arange(6).reshape(-1, 3), np.arange(2), np.arange(4)) for V in (row, row + 5)
+        )
+        with np.errstate(all="raise", under="ignore"):
+            assert motion_between(first, other) is None
 
 
 def test_both_sides_of_a_slit_are_told_apart():
