@@ -55,6 +55,18 @@ def bumpy(columns=16, rows=16, height=0.4, waves=2.0):
     return V, F
 
 
+def two_bumps(n=40):
+    """A square with two bumps, its own mirror image across x = 1/2, also by its triangles; n is even."""
+    x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
+    z = sum(0.7 * np.exp(-40 * ((x - a) ** 2 + (y - 0.5) ** 2)) for a in (0.28, 0.72))
+    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    quads = np.stack([i, i + n + 1, i + n + 2, i + 1], axis=1)
+    left = (quads // (n + 1))[:, 0] < n // 2
+    one, other = quads[left], quads[~left]
+    F = np.concatenate([one[:, [0, 1, 2]], one[:, [0, 2, 3]], other[:, [0, 1, 3]], other[:, [1, 2, 3]]])
+    return np.stack([x, y, z], axis=2).reshape(-1, 3), F
+
+
 def single_bump(columns=60):
     """A flat unit square but for one bump around (0.4, 0.5), and the distance (n,) of its vertices from there."""
     V, F = grid(columns, columns)

@@ -92,11 +92,12 @@ def facing(
     if plane is not None:
         depth = (positions - area @ positions / area.sum()) @ plane.normal
         near = area * np.exp(-0.5 * depth**2 * area.sum() / (area @ depth**2))
+    high = np.zeros(3)
     if up.any():
         # Feet and tails are salient, too.
-        near = near * _below(positions, area, up)
+        below = _below(positions, area, up)
+        near, high = near * below, _off_the_middle(positions, area, below)
     eyes = near * salient_weights(saliency, area, SALIENT)
-    high = _off_the_middle(positions, area, up)
     off = FRONT_VIEW * viewer + HEAD * high
     if eyes.sum() > 0:
         off = off + eyes @ positions / eyes.sum() - near @ positions / near.sum()
@@ -128,11 +129,9 @@ def _below(positions: np.ndarray, area: np.ndarray, up: np.ndarray) -> np.ndarra
     return below
 
 
-def _off_the_middle(positions: np.ndarray, area: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """From the middle of vertices (n,3) with areas (n,) to that of what stands high among them; 0 without an `up`."""
-    if not up.any():
-        return np.zeros(3)
-    high = area * np.clip((_below(positions, area, up) - 1) / HIGH + 1, 0, 1)
+def _off_the_middle(positions: np.ndarray, area: np.ndarray, below: np.ndarray) -> np.ndarray:
+    """From the middle of vertices (n,3) with areas (n,) to that of what stands high among them; below: see `_below`."""
+    high = area * np.clip((below - 1) / HIGH + 1, 0, 1)
     return high @ positions / max(high.sum(), np.finfo(float).tiny) - area @ positions / area.sum()
 
 

@@ -48,10 +48,7 @@ DAMPING = 1e-6
 # Vertices this close to images of others, over the size, are pairs, and so many of all make a mirror of vertices.
 PAIR = 1e-3
 MOST_PAIRS = 0.9
-# Images of vertices this far from vertices, over the extent, lie on these; where fewer than that share do, nearest ones
-# have to do, and vertices within this distance of the plane, over the extent, are in it.
-SAME_PLACE = 1e-3
-MOSTLY_EXACT = 0.9
+# Where fewer than that have such a pair, vertices within this distance of the plane, over the extent, are in it.
 IN_PLANE = 0.02
 # What is flat is nearly its own image in the plane in which it lies: residuals are to be less than this share of the
 # distances of the surface from the plane.
@@ -139,10 +136,10 @@ class SymmetryPlane:
         """The images of the vertices of a surface (n,3), (m,3), as exact as they are."""
         image, far = self.nearest_images(positions, triangles)
         extent, used = float(np.ptp(positions[np.unique(triangles)], axis=0).max()), np.isfinite(far)
-        is_exact = far <= SAME_PLACE * extent
+        is_exact = far <= PAIR * extent
         exact = np.where(is_exact, image, -1)
-        if is_exact[used].mean() >= MOSTLY_EXACT:
-            return MirrorImages(exact, image, exact == np.arange(len(exact)), True)
+        if is_exact[used].mean() >= MOST_PAIRS:
+            return replace(MirrorImages.of(exact), nearest=image)
         return MirrorImages(exact, image, np.abs(self.distance(positions)) <= IN_PLANE * extent, False)
 
 

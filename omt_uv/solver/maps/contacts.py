@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..mesh.geometry import complex_cross
 from .boxes import box_pairs
 
 # Angles in radians by which two sectors have to overlap: the two sides of a slit meet in less, for rounding.
@@ -80,7 +81,7 @@ def covers_itself(w: np.ndarray, loop: np.ndarray) -> bool:
 def _passes(a, b, p, q, depth: float) -> np.ndarray:
     """Whether p and q (k,) lie on either side of the lines from a to b (k,), both farther than `depth` from them."""
     along = b - a
-    left, right = _cross(along, p - a), _cross(along, q - a)
+    left, right = complex_cross(along, p - a), complex_cross(along, q - a)
     return (left * right < 0) & (np.minimum(np.abs(left), np.abs(right)) > depth * np.abs(along))
 
 
@@ -146,7 +147,3 @@ def box_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         np.column_stack([points.real.min(0), points.imag.min(0)]),
         np.column_stack([points.real.max(0), points.imag.max(0)]),
     )
-
-
-def _cross(a, b):
-    return a.real * b.imag - a.imag * b.real

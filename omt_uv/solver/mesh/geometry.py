@@ -18,6 +18,11 @@ def cross2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
+def complex_cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The same of plane vectors (...) as complex numbers."""
+    return a.real * b.imag - a.imag * b.real
+
+
 def dot2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Scalar product of plane vectors (..., 2); several times faster than a sum along an axis of two."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]

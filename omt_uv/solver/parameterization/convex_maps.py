@@ -18,7 +18,7 @@ from ..mesh.topology import boundary_loops
 from ..progress import Steps
 from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import ChartPins, chart_target
-from .chart_map import FOLDED, ChartMap, in_unit_box, measured_chart, measured_map, refined_again
+from .chart_map import FOLDED, ChartMap, in_unit_box, measured_map, refined_again
 from .options import MapOptions
 from .polygon_disk import cut_as_mapped
 
@@ -67,11 +67,10 @@ def with_convex_polygons(
     found = keep_convex(drawn, charts, [m.uv for m in maps], fixed, density, [m.area_weight for m in maps], spare)
     for k, uv in found.items():
         chart, old = given[k], maps[k]
-        (vertices, _), (flat, unit) = in_unit_box(chart.vertices), in_unit_box(uv)
-        figures = measured_chart(vertices, chart, flat, density[k])
+        figures = measured_map(chart, uv, density[k])
         if _keeps(figures, old, goal):
             if not fixed[k].any():
-                uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
+                uv = _as_before(uv, old.uv, chart.triangles)
             new[k] = with_figures(old, uv, figures)
     for k in np.flatnonzero(folded):
         new[k] = with_dents_told(drawn, given[k], new[k])
@@ -122,8 +121,7 @@ def _opened(
             # The map that there is has no error.
             continue
         if options.boundary == "free":
-            (flat, unit) = in_unit_box(uv)
-            uv = _as_before(flat, old.uv / unit, chart.triangles) * unit
+            uv = _as_before(uv, old.uv, chart.triangles)
         figures = measured_map(chart, uv, density[place])
         if _keeps(figures, old, goal) and reflex_triangles(surface, [chart], [uv])[0] < folded[k]:
             new[k] = with_figures(old, uv, figures)
@@ -187,10 +185,7 @@ def _by_triangles(
     start = keep_convex(surface, *given).get(0, old.uv)
     own = chart.faces.max(initial=0) + 1 + np.arange(len(alone))
     uv = yield from refined_again(replace(chart, faces=np.where(alone, own, chart.faces)), start, options, target)
-    if options.boundary != "free":
-        return uv
-    flat, unit = in_unit_box(uv)
-    return _as_before(flat, old.uv / unit, chart.triangles) * unit
+    return _as_before(uv, old.uv, chart.triangles) if options.boundary == "free" else uv
 
 
 def _keeps(figures: Distortion, old: ChartMap, goal: float) -> bool:
@@ -238,7 +233,9 @@ def _fixed(chart: Chart, pins: ChartPins | None, boundary: str) -> np.ndarray:
 
 def _as_before(uv: np.ndarray, given: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """A map (n,2) moved, turned and scaled to the place, direction and area of another one of the same triangles."""
+    uv, unit = in_unit_box(uv)
+    given = given / unit
     scale = np.sqrt(signed_areas(given, triangles).sum() / signed_areas(uv, triangles).sum())
     w = scale * (uv @ [1, 1j])
     w = fit_similarity(w, given @ [1, 1j], rigid=True)(w)
-    return np.column_stack([w.real, w.imag])
+    return np.column_stack([w.real, w.imag]) * unit

@@ -222,7 +222,7 @@ def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEn
     if len(last.charts) < 2 or not parts:
         return last
     kept = but_within(last.cuts.edges, [last.charts[k] for k in parts])
-    asked = _Asked(parts, kept, search.first_spread(), {}, lambda edges: len(edges) > 0)
+    asked = _Asked(parts, kept, search.first_spread(), {}, lambda edges: edge_set(edges) != edge_set(last.cuts.edges))
     new = yield from _cut_anew(search, last, asked, map_charts, early)
     if new is None or new is last:
         return last

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..maps.boxes import box_pairs
 from ..maps.contacts import box_of, loop_edges
+from ..mesh.geometry import complex_cross
 
 # Reach of the barrier, relative to the shorter of the boundary edges involved.
 REACH = 0.5
@@ -143,7 +144,7 @@ def make_barrier(w: np.ndarray, loop: np.ndarray, strength: float) -> BoundaryBa
 
 def _contact_times(p, dp, e, de):
     """Smallest t in (0, 1] at which p + t dp lies on the segment from 0 to e + t de; infinity where it never does."""
-    q2, q1, q0 = _cross(de, dp), _cross(e, dp) + _cross(de, p), _cross(e, p)
+    q2, q1, q0 = complex_cross(de, dp), complex_cross(e, dp) + complex_cross(de, p), complex_cross(e, p)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         root = np.sqrt(q1 * q1 - 4 * q2 * q0)
         half = -0.5 * (q1 + np.where(q1 >= 0, root, -root))
@@ -153,7 +154,3 @@ def _contact_times(p, dp, e, de):
     # A little more than the segment, lest rounding lets a vertex slip past an end.
     hit = (times > 0) & (times <= 1 / CONTACT_SHARE) & (share > -1e-9) & (share < 1 + 1e-9)
     return np.where(hit, times, np.inf).min(0, initial=np.inf) if len(p) else np.zeros(0)
-
-
-def _cross(a, b):
-    return a.real * b.imag - a.imag * b.real

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..maps.energy import Elements, elements
-from ..mesh.geometry import cross2, dot2, face_areas
+from ..mesh.geometry import complex_cross, cross2, dot2, face_areas
 from ..mesh.topology import boundary_loops, expand, halfedges, runs, twins
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
@@ -257,14 +257,14 @@ def _returned(removal: RemovalRound, w: np.ndarray) -> np.ndarray:
     heading = np.bincount(row, inward.real, count) + 1j * np.bincount(row, inward.imag, count)
     # On the boundary, between the one edge and the chord: beyond the chord may be another part of the map.
     heading = heading + np.where(removal.on_boundary, _left(w[removal.corner[:, 0]] - w[removal.corner[:, 1]]), 0)
-    slope, room = _cross(b - a, heading[row]), _cross(a - base[row], b - base[row])
+    slope, room = complex_cross(b - a, heading[row]), complex_cross(a - base[row], b - base[row])
     reach = np.where(touching | (slope >= 0), np.inf, room / np.maximum(-slope, 1e-300))
     nearest = np.full(count, np.inf)
     np.minimum.at(nearest, row, reach)
     # Lines that hardly slope meet the heading far outside of the star.
     nearest = np.minimum(nearest, np.maximum.reduceat(np.abs(a - base[row]), np.searchsorted(row, np.arange(count))))
     safe = base + 0.5 * nearest * heading
-    at_safe, at_target = (_cross(a - x[row], b - x[row]) for x in (safe, target))
+    at_safe, at_target = (complex_cross(a - x[row], b - x[row]) for x in (safe, target))
     short = at_target < KEPT_AREA * at_safe
     way = np.ones(count)
     np.minimum.at(way, row[short], ((1 - KEPT_AREA) * at_safe / np.maximum(at_safe - at_target, 1e-300))[short])
@@ -274,10 +274,6 @@ def _returned(removal: RemovalRound, w: np.ndarray) -> np.ndarray:
 def _left(edge):
     """Unit vectors to the left of edges (k,) complex."""
     return 1j * edge / np.maximum(np.abs(edge), 1e-300)
-
-
-def _cross(a, b):
-    return a.real * b.imag - a.imag * b.real
 
 
 def _normals(V, F):

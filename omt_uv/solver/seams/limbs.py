@@ -62,13 +62,11 @@ BETWEEN = 1.15
 def pieces_of_chart(
     chart: Chart, uv: np.ndarray, cost: np.ndarray, up: Up, whole: float, images: MirrorImages | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The piece (m,) of every triangle of a chart with map uv (n,2) that leaves most of a texture empty, and the edges
-    (k,2) of the surface in between; one piece where it is neither a long band nor the sprawling most of a surface.
+    """The piece (m,) of every triangle of a chart with map uv (n,2) that `may_come_apart`, and the edges (k,2) of the
+    surface in between; one piece where others would fill a texture little better.
 
     whole : the area of the surface; cost, images : see `parting.parted`; up (3,) : see `sprawls`
     """
-    if not may_come_apart(chart, uv, up, whole):
-        return np.zeros(len(chart.triangles), np.int64), np.zeros((0, 2), np.int64)
     count = _count_of_band(chart, uv, whole)
     return in_pieces(chart, uv, cost, count) if count > 1 else without_limbs(chart, uv, cost, up, images)
 

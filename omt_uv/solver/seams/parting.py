@@ -104,6 +104,10 @@ class PolygonGraph:
         """What cutting each edge (e,) costs; cost (n,) : at the vertices of the chart, per length."""
         return cost[self.ends].mean(axis=1) * edge_lengths(chart.vertices, self.ends)
 
+    def steps(self, chart: Chart) -> csr_matrix:
+        """The lengths of the edges as a matrix (p,p), none of them 0."""
+        return self.matrix(edge_lengths(chart.vertices, self.ends) + 1e-300)
+
     def matrix(self, weight: np.ndarray) -> csr_matrix:
         """A weight (e,) > 0 for each edge as a matrix (p,p); the sum where two polygons share several."""
         rows, columns = np.concatenate([self.joined, self.joined[:, ::-1]]).T
@@ -119,7 +123,7 @@ def parted(chart: Chart, uv: np.ndarray, cost: np.ndarray, images: MirrorImages 
     graph = PolygonGraph.of(chart)
     pairs = _covering(chart, uv, graph)
     capacity = capacities(graph.prices(chart, cost))
-    steps = graph.matrix(edge_lengths(chart.vertices, graph.ends) + 1e-300)
+    steps = graph.steps(chart)
     cut, sides = np.zeros(len(graph.joined), dtype=bool), list[np.ndarray]()
     for one, other in pairs[:MOST_CUTS]:
         part = graph.pieces(~cut)
@@ -172,9 +176,8 @@ def _image_of(
     whole = float(graph.area.sum())
     if min(other, whole - other) < LEAST_PART * whole or not graph.around(there).any():
         return side
-    steps = graph.matrix(edge_lengths(chart.vertices, graph.ends) + 1e-300)
     beside = np.unique(graph.joined[graph.around(there)])
-    far = dijkstra(steps, indices=beside, min_only=True)
+    far = dijkstra(graph.steps(chart), indices=beside, min_only=True)
     smaller = min(float(graph.area[there].sum()), float(graph.area[~there].sum()))
     inner = far > NEAR_IMAGE * np.sqrt(smaller)
     if not (inner & there).any() or not (inner & ~there).any():

@@ -328,18 +328,6 @@ def made_round(search, edges, shear, found):
     return shear_search.Round.of(search, charts, maps, Cuts(edges, 0.0, (), edges[:0], ()), memory)
 
 
-def bumpy(n):
-    """A square with two bumps, its own mirror image across x = 1/2, also by its triangles; n is even."""
-    x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
-    z = sum(0.7 * np.exp(-40 * ((x - a) ** 2 + (y - 0.5) ** 2)) for a in (0.28, 0.72))
-    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
-    quads = np.stack([i, i + n + 1, i + n + 2, i + 1], axis=1)
-    left = (quads // (n + 1))[:, 0] < n // 2
-    one, other = quads[left], quads[~left]
-    F = np.concatenate([one[:, [0, 1, 2]], one[:, [0, 2, 3]], other[:, [0, 1, 3]], other[:, [1, 2, 3]]])
-    return np.stack([x, y, z], axis=2).reshape(-1, 3), F
-
-
 def edges_along(points):
     """Edges (k,2) between vertices (k+1,) one after another."""
     return np.stack([points[:-1], points[1:]], axis=1)
@@ -347,7 +335,7 @@ def edges_along(points):
 
 def halves(n, bound):
     """The bumpy square with a seam along its mirror plane, the search for a bound, and the seam (n,2)."""
-    V, F = bumpy(n)
+    V, F = meshes.two_bumps(n)
     surface = triangle_surface(V, F)
     search = shear_search.ShearSearch(
         surface, None, ShearBound(bound), None, {}, unwrap_module.rehearsal(UnwrapOptions())

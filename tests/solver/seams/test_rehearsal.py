@@ -18,18 +18,6 @@ from omt_uv.solver.seams import search as search_module
 from omt_uv.solver.seams.rehearsal import _along, opened
 
 
-def bumpy(n=40):
-    """A square with two bumps, its own mirror image across x = 1/2."""
-    x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
-    z = sum(0.7 * np.exp(-40 * ((x - a) ** 2 + (y - 0.5) ** 2)) for a in (0.28, 0.72))
-    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
-    quads = np.stack([i, i + n + 1, i + n + 2, i + 1], axis=1)
-    left = (quads // (n + 1))[:, 0] < n // 2
-    one, other = quads[left], quads[~left]
-    F = np.concatenate([one[:, [0, 1, 2]], one[:, [0, 2, 3]], other[:, [0, 1, 3]], other[:, [1, 2, 3]]])
-    return np.stack([x, y, z], axis=2).reshape(-1, 3), F
-
-
 def rehearsals(monkeypatch, surface, bound, **options):
     """What an unwrap rehearsed, and what it came to: coarse cuts with the square of log(shear), and its map."""
     seen = []
@@ -56,7 +44,7 @@ def mean_shear(found):
     return sum(a @ s for s, a in parts) / sum(a.sum() for _, a in parts)
 
 
-@pytest.mark.parametrize("mesh", [bumpy(), meshes.icosphere(4)])
+@pytest.mark.parametrize("mesh", [meshes.two_bumps(), meshes.icosphere(4)])
 def test_an_opened_surface_is_the_coarse_one_cut_along_its_steps(monkeypatch, mesh):
     seen, _ = rehearsals(monkeypatch, triangle_surface(*mesh), 1.3)
     assert len(seen)
@@ -76,7 +64,7 @@ def test_an_opened_surface_is_the_coarse_one_cut_along_its_steps(monkeypatch, me
 
 
 def test_a_symmetric_cut_is_rehearsed_on_a_surface_that_is_its_own_image(monkeypatch):
-    seen, _ = rehearsals(monkeypatch, triangle_surface(*bumpy()), 1.3)
+    seen, _ = rehearsals(monkeypatch, triangle_surface(*meshes.two_bumps()), 1.3)
     assert any(found.mirror is not None for _, found, _ in seen)
     for rehearsal, found, _ in seen:
         if found.mirror is None:
@@ -107,7 +95,7 @@ def test_a_rehearsal_foretells_the_map(monkeypatch):
     """The square of log(shear), of the cut that the search went by; what comes in pieces for its room shears less."""
     monkeypatch.setattr("omt_uv.solver.parameterization.unwrap.COMPACT", np.inf)
     for bound in (1.3, 1.4):
-        seen, found = rehearsals(monkeypatch, triangle_surface(*bumpy(60)), bound)
+        seen, found = rehearsals(monkeypatch, triangle_surface(*meshes.two_bumps(60)), bound)
         reached = np.log(mean_shear(found)) ** 2
         assert mean_shear(found) <= bound + 0.005
         told = [value for _, _, value in seen if value is not None]
@@ -122,14 +110,14 @@ def test_what_coarse_triangles_shear_by_themselves_is_not_cut_for(monkeypatch):
         yield
 
     monkeypatch.setattr(ShearSearch, "rehearsed", lambda *_: silent())
-    predicted = drain(unwrap(triangle_surface(*bumpy()), options=UnwrapOptions(max_shear=1.4))).seams
+    predicted = drain(unwrap(triangle_surface(*meshes.two_bumps()), options=UnwrapOptions(max_shear=1.4))).seams
     monkeypatch.setattr(ShearSearch, "rehearsed", stuck)
-    seen, found = rehearsals(monkeypatch, triangle_surface(*bumpy()), 1.4)
+    seen, found = rehearsals(monkeypatch, triangle_surface(*meshes.two_bumps()), 1.4)
     assert any(value for _, _, value in seen) and np.array_equal(found.seams, predicted)
 
 
 def test_what_is_small_is_mapped_and_not_rehearsed(monkeypatch):
-    seen, found = rehearsals(monkeypatch, triangle_surface(*bumpy(20)), 1.3)
+    seen, found = rehearsals(monkeypatch, triangle_surface(*meshes.two_bumps(20)), 1.3)
     assert all(value is None for _, _, value in seen) and mean_shear(found) <= 1.305
 
 
@@ -144,7 +132,7 @@ def test_what_maps_do_not_need_is_taken_back(monkeypatch, bound):
 
     monkeypatch.setattr(ShearSearch, "rehearsed", doubled)
     monkeypatch.setattr("omt_uv.solver.parameterization.unwrap.COMPACT", np.inf)
-    surface, length = triangle_surface(*bumpy(60)), []
+    surface, length = triangle_surface(*meshes.two_bumps(60)), []
     for slack in (0.0, shear_search.SLACK):
         monkeypatch.setattr(shear_search, "SLACK", slack)
         found = drain(unwrap(surface, options=UnwrapOptions(max_shear=bound)))
@@ -155,5 +143,8 @@ def test_what_maps_do_not_need_is_taken_back(monkeypatch, bound):
 
 def test_the_bar_rises_while_cuts_are_taken_back(monkeypatch):
     seen = []
-    drain(unwrap(triangle_surface(*bumpy(60)), options=UnwrapOptions(max_shear=1.4)), lambda p: seen.append(p.fraction))
+    drain(
+        unwrap(triangle_surface(*meshes.two_bumps(60)), options=UnwrapOptions(max_shear=1.4)),
+        lambda p: seen.append(p.fraction),
+    )
     assert (np.diff(seen) >= -1e-9).all() and seen[-1] <= 1
