@@ -61,8 +61,9 @@ class CoarseCut:
 
     @property
     def score(self) -> float:
-        """What it costs; less is better. One that misses the bound costs what reaching it would."""
-        return self.cut.cost * max(self.cut.spread / self.task.bound, 1.0) ** EXCHANGE
+        """What it costs, with what is cut beside it; less is better. One that misses the bound costs what reaching it
+        would."""
+        return self.setting.base_cost + self.cut.cost * max(self.cut.spread / self.task.bound, 1.0) ** EXCHANGE
 
     def carried(self, component: CutComponent) -> Found:
         """The same, led along the edges of the component."""
@@ -78,7 +79,8 @@ class CoarseCut:
 
 @dataclass(frozen=True)
 class Setting:
-    """A coarse surface to be cut, from the vertices `start` (n,) bool on: its boundary, or what is cut already."""
+    """A coarse surface to be cut, from the vertices `start` (n,) bool on: its boundary, or what is cut already, which
+    has its cost, too."""
 
     coarse: CoarseSurface
     model: ScaleModel
@@ -86,6 +88,7 @@ class Setting:
     tip_factor: np.ndarray
     start: np.ndarray
     mirrored: Mirrored | None
+    base_cost: float
 
     @staticmethod
     def of(component: CutComponent, coarse: CoarseSurface, base, mirror, model, tip_factor) -> Setting:
@@ -112,6 +115,7 @@ class Setting:
             tip_factor=tip_factor[coarse.kept],
             start=start,
             mirrored=mirrored,
+            base_cost=float(component.cost[base].sum() / coarse.size),
         )
 
     @property

@@ -160,8 +160,9 @@ class Rehearsal:
 
 
 def _price(found: CoarseCut, sheared: float, asked: float) -> float:
-    """What a cut would cost that kept a square of log(shear) where this one has another; less is better."""
-    return found.cut.cost * max(sheared, asked) ** DEARER_BY
+    """What a cut would cost that kept a square of log(shear) where this one has another, with what is cut beside it;
+    less is better."""
+    return (found.setting.base_cost + found.cut.cost) * max(sheared, asked) ** DEARER_BY
 
 
 def _longer(task: Task, cut: Cut) -> list[Cut]:

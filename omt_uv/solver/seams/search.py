@@ -131,14 +131,14 @@ class SeamSearch:
             if model.spread <= bound and not base.any():
                 return base
         component = self.priced(component)
-        mirror = self._mirror(component)
+        mirror, free = self._mirror(component), base
         if mirror is not None and base.any():
             symmetric = symmetric_base(component, mirror)
             base, mirror = (base, None) if symmetric is None else (symmetric, mirror)
         if bounded and model.spread <= bound:
             return base
         plain = (coarse, model) if bounded else None
-        best = yield from part_of(self._best(component, base, bound, mirror, plain), 0.0, 0.7)
+        best = yield from part_of(self._best(component, (base, free), bound, mirror, plain), 0.0, 0.7)
         coarser = min(self.options.vertices / component.vertex_count, 1.0)
         asked = self.asked * float(np.interp(coarser, (0, 1), REHEARSED[::-1]))
         best, kept = yield from part_of(self._rehearsal(component).kept(best, asked), 0.7, 0.2)
@@ -149,16 +149,17 @@ class SeamSearch:
     def _best(
         self,
         component: CutComponent,
-        base: np.ndarray,
+        bases: tuple[np.ndarray, np.ndarray],
         bound: float,
         mirror: FineMirror | None,
         plain: tuple[CoarseSurface, ScaleModel] | None,
     ) -> Steps[CoarseCut]:
         """The best cut, a symmetric one where that is not much dearer.
 
-        plain : the first of the coarse surfaces that know no mirror, where it is known
+        bases : edges (e,) bool that make a disk of it, for symmetric ones and for others; plain : the first of the
+            coarse surfaces that know no mirror, where it is known
         """
-        exact: CoarseCut | None = None
+        (base, free), exact = bases, None
         near: CoarseCut | None = None
         line, shorter = mirror, None
         if mirror is not None and mirror.exact:
@@ -172,9 +173,9 @@ class SeamSearch:
         if exact is not None and near is not None and exact.score <= EXACTLY * near.score:
             return exact
         coarse, model = self._modelled(component) if plain is None else plain
-        setting = self._setting(component, base, None, coarse, model)
+        setting = self._setting(component, free, None, coarse, model)
         task = setting.task(bound, setting.extremity())
-        first = yield from part_of(self._grown_on(setting, task, base, None), 0.6, 0.1)
+        first = yield from part_of(self._grown_on(setting, task, free, None), 0.6, 0.1)
         best = exact if near is None else near
         if best is not None:
             # One of the coarse surfaces says what other cuts cost, about.
@@ -186,7 +187,7 @@ class SeamSearch:
                 if best.score <= self._worth_of_symmetry() * shorter.score:
                     return best
         more = range(1, self._trials(component))
-        others = yield from part_of(self._several_grown(component, base, None, bound, more), 0.8, 0.05)
+        others = yield from part_of(self._several_grown(component, free, None, bound, more), 0.8, 0.05)
         choosing = self._rehearsal(component).best_of([first, *others], self.asked)
         found = yield from part_of(choosing, 0.85, 0.05)
         if found is first and shorter is not None:

@@ -1,22 +1,27 @@
-"""Join the boundaries of a component with a mirror plane so that it becomes a disk and stays its own mirror image.
+"""Cut a component with a mirror plane so that it becomes a disk and stays its own mirror image.
 
-Arcs come in mirrored pairs, or run in the plane. They form a tree with the boundaries: the first pair meets in the
-plane, and no other that leaves the plane comes back to it.
+Arcs come in mirrored pairs, or run in the plane. Without handles they form a tree with the boundaries: the first pair
+meets in the plane, and no other that leaves the plane comes back to it. With handles, one half is cut into a disk, and
+is joined to its image along one piece of the plane alone: the Euler characteristic of both is 2 less the number of
+such pieces.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..cutting.component import CutComponent, boundary_vertices
-from ..cutting.cut_graph import is_disk
-from ..mesh.topology import pair_keys
+from ..cutting.cut_graph import greedy_arcs, is_disk, shorten, stretches
+from ..mesh.topology import graph_components, halfedges, pair_keys
 from .fine_paths import FineGraph, FineMirror
 from .path_graph import path_to
+
+# How far from the images of its vertices the image of an arc may run, over the size, where these are not exact.
+AROUND_IMAGES = 0.01
 
 
 @dataclass(frozen=True)
@@ -30,11 +35,11 @@ class _ArcPlace:
 
 
 def symmetric_base(component: CutComponent, mirror: FineMirror) -> np.ndarray | None:
-    """Edges (e,) bool that cut a component without handles into a disk, symmetrically; None where there are none."""
+    """Edges (e,) bool that cut a component into a disk, symmetrically; None where there are none."""
     loops = boundary_vertices(component)
     edges = len(component.pair) + len(component.boundary)
     if component.vertex_count - edges + len(component.triangles) + len(loops) != 2:
-        return None
+        return _by_halves(component, mirror)
     loop = np.full(component.vertex_count, -1)
     for k, vertices in enumerate(loops):
         loop[vertices] = k
@@ -90,3 +95,92 @@ def _cheapest(graph: csr_matrix, ways: list[_ArcPlace]) -> np.ndarray | None:
             least = way.count * cost[last]
             best = inner[path_to(before, last)[::-1]]
     return best
+
+
+def _by_halves(component: CutComponent, mirror: FineMirror) -> np.ndarray | None:
+    """What `symmetric_base` finds for a component with handles: a cut of one half, its image, and all of the plane but
+    the dearest piece between these."""
+    within = mirror.side | mirror.plane
+    chosen = within[component.triangles].all(axis=1) & ~mirror.plane[component.triangles].all(axis=1)
+    sides = chosen[component.pair // 3]
+    rim = sides.any(axis=1) & ~sides.all(axis=1)
+    half, vertices = _part(component, chosen)
+    parts = graph_components(*(half.pair // 3).T, len(half.triangles))[0]
+    if parts != 1 or not rim.any() or not mirror.plane[component.ends[rim]].all():
+        return None
+    graph = FineGraph.of(component, mirror.image if mirror.exact else None)
+    ends = vertices[half.ends]
+    dear = np.asarray(graph.cost[ends[:, 0], ends[:, 1]]).ravel() == 0
+    half = replace(half, cost=np.where(dear, np.inf, half.cost))
+    none = np.zeros(0, np.int64)
+    found = shorten(half, greedy_arcs(half, none), none)
+    arcs = [vertices[path] for path in _paths(half, found)]
+    images = [_image(graph, mirror, path) for path in arcs]
+    if any(image is None for image in images):
+        return None
+    keys = [pair_keys(path[:-1], path[1:]) for path in (*arcs, *images)]
+    cut = np.isin(pair_keys(*component.ends.T), np.concatenate([np.zeros(0, np.int64), *keys]))
+    kept = stretches(component, rim, np.unique(vertices[half.ends[found]]))[0]
+    cut |= rim
+    cut[kept] = False
+    return cut if np.isfinite(component.cost[cut]).all() and is_disk(component, cut) else None
+
+
+def _part(component: CutComponent, chosen: np.ndarray) -> tuple[CutComponent, np.ndarray]:
+    """The triangles (m,) bool of a component as one of their own, and the vertices (k,) that these have there."""
+    vertices, triangles = np.unique(component.triangles[chosen], return_inverse=True)
+    place = np.cumsum(chosen) - 1
+    inner = chosen[component.pair // 3].all(axis=1)
+    pair = component.pair[inner]
+    pair = 3 * place[pair // 3] + pair % 3
+    outside = np.ones(3 * int(chosen.sum()), dtype=bool)
+    outside[pair] = False
+    part = CutComponent(
+        positions=component.positions[vertices],
+        triangles=triangles.reshape(-1, 3),
+        pair=pair,
+        gluing_pair=component.gluing_pair[inner],
+        ends=np.searchsorted(vertices, component.ends[inner]),
+        length=component.length[inner],
+        cost=component.cost[inner],
+        boundary=np.flatnonzero(outside),
+        members=component.members[chosen],
+        polygons=component.polygons[chosen],
+        vertex_ids=component.vertex_ids[vertices],
+        avoid=component.avoid[vertices],
+    )
+    return part, vertices
+
+
+def _paths(component: CutComponent, cut: np.ndarray) -> list[np.ndarray]:
+    """Vertices (k,) of every path of the cut (e,) bool between branchings and boundaries; two of one that closes."""
+    n, found = component.vertex_count, []
+    for stretch in stretches(component, cut, np.zeros(0, np.int64)):
+        ends = component.ends[stretch]
+        vertices, count = np.unique(ends, return_counts=True)
+        last = vertices[count == 1]
+        graph = csr_matrix((np.ones(len(ends)), ends.T), shape=(n, n))
+        if len(last):
+            before = dijkstra(graph, directed=False, indices=last[0], return_predecessors=True)[1]
+            found.append(path_to(before, int(last[1])))
+            continue
+        node = vertices[component.on_boundary()[vertices] | (np.bincount(component.ends[cut].ravel())[vertices] > 2)][0]
+        far, before = dijkstra(graph, directed=False, indices=node, return_predecessors=True)
+        middle = vertices[np.argmax(far[vertices])]
+        one = path_to(before, int(middle))
+        rest = ends[~np.isin(pair_keys(*ends.T), pair_keys(one[:-1], one[1:]))]
+        graph = csr_matrix((np.ones(len(rest)), rest.T), shape=(n, n))
+        before = dijkstra(graph, directed=False, indices=node, return_predecessors=True)[1]
+        found += [one, path_to(before, int(middle))]
+    return found
+
+
+def _image(graph: FineGraph, mirror: FineMirror, path: np.ndarray) -> np.ndarray | None:
+    """The mirror image (k,) of a path (k,) along edges of a graph, from end to end; None if there is none."""
+    image = mirror.image[path]
+    if graph.joined(image):
+        return image
+    end, allowed = np.zeros(len(mirror.image), dtype=bool), ~(mirror.side | mirror.plane)
+    end[image[-1]] = allowed[image[[0, -1]]] = True
+    found = graph.path(end, int(image[0]), image, AROUND_IMAGES, allowed)
+    return found if len(found) else None

@@ -1,4 +1,4 @@
-"""Boundaries of symmetric bodies are joined symmetrically, and scans that nearly are get seams that nearly are."""
+"""Symmetric bodies become disks symmetrically, handles or not, and scans that nearly are get seams that nearly are."""
 
 import meshes
 import numpy as np
@@ -53,6 +53,38 @@ def test_boundaries_are_joined_symmetrically(holes, spread, monkeypatch):
     far, image = cKDTree(V).query(V * [-1, 1, 1])
     assert far.max() < 1e-9 and len(edges) and joined[0].any()
     assert set(map(tuple, edges.tolist())) == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
+
+
+def ring(mirrored_in, noise=0.0):
+    """Quads of a torus, of which nothing is a mirror plane but one that is across its axis, or holds it."""
+    V, _ = meshes.torus(48, 16)
+    x, y, z = V.T
+    lopsided = {"across": [x + 0.1 * y, y + 0.3 * x**2, z], "along": [x, y + 0.2 * z, z + 0.3 * y**2]}
+    V = np.stack(lopsided[mirrored_in], axis=1)
+    V = V + noise * np.random.default_rng(0).standard_normal(V.shape)
+    ids = np.arange(48 * 16).reshape(48, 16)
+    right, up = np.roll(ids, -1, axis=0), np.roll(ids, -1, axis=1)
+    return meshes.polygon_surface(V, np.stack([ids, right, np.roll(right, -1, axis=1), up], axis=2).reshape(-1, 4))
+
+
+@pytest.mark.parametrize("spread", [0.5, 0.004])
+@pytest.mark.parametrize(("mirrored_in", "image"), [("across", [1, 1, -1]), ("along", [-1, 1, 1])])
+def test_handles_are_opened_symmetrically(mirrored_in, image, spread, monkeypatch):
+    joined = []
+    monkeypatch.setattr(search, "symmetric_base", lambda *given: joined.append(symmetric_base(*given)) or joined[-1])
+    surface = ring(mirrored_in)
+    V, edges = surface.positions, seams_of(surface, spread)
+    far, image = cKDTree(V).query(V * image)
+    assert far.max() < 1e-9 and joined[0].any()
+    assert set(map(tuple, edges.tolist())) == set(map(tuple, np.sort(image[edges], axis=1).tolist()))
+
+
+@pytest.mark.parametrize(("mirrored_in", "image"), [("across", [1, 1, -1]), ("along", [-1, 1, 1])])
+def test_handles_of_a_scan_are_opened_nearly_symmetrically(mirrored_in, image):
+    surface = ring(mirrored_in, noise=0.002)
+    seam = surface.positions[np.unique(seams_of(surface, 0.004))]
+    far, _ = cKDTree(seam).query(seam * image)
+    assert len(seam) > 20 and far.max() < 0.15
 
 
 def test_seams_of_a_scan_are_nearly_symmetric():
