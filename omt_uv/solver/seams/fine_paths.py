@@ -48,7 +48,9 @@ class FineMirror:
 def with_line(component: CutComponent, mirror: FineMirror) -> FineMirror | None:
     """The mirror with a line along the plane, of every edge that crosses it the nearer end; None if none does."""
     height = mirror.height
-    crossing = component.ends[height[component.ends].prod(axis=1) <= 0]
+    border = np.stack([ends[component.boundary] for ends in halfedges(component.triangles)], axis=1)
+    ends = np.concatenate([component.ends, border])
+    crossing = ends[height[ends].prod(axis=1) <= 0]
     plane, image = np.zeros(len(height), dtype=bool), mirror.image.copy()
     plane[crossing[np.arange(len(crossing)), np.abs(height[crossing]).argmin(axis=1)]] = True
     image[plane] = np.flatnonzero(plane)

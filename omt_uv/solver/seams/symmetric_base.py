@@ -38,8 +38,13 @@ def symmetric_base(component: CutComponent, mirror: FineMirror) -> np.ndarray | 
     """Edges (e,) bool that cut a component into a disk, symmetrically; None where there are none."""
     loops = boundary_vertices(component)
     edges = len(component.pair) + len(component.boundary)
-    if component.vertex_count - edges + len(component.triangles) + len(loops) != 2:
-        return _by_halves(component, mirror)
+    flat = component.vertex_count - edges + len(component.triangles) + len(loops) == 2
+    found = _by_arcs(component, mirror, loops) if flat else None
+    return _by_halves(component, mirror) if found is None else found
+
+
+def _by_arcs(component: CutComponent, mirror: FineMirror, loops: list[np.ndarray]) -> np.ndarray | None:
+    """What `symmetric_base` finds for a component without handles, whose boundaries have these vertices (k,)."""
     loop = np.full(component.vertex_count, -1)
     for k, vertices in enumerate(loops):
         loop[vertices] = k
@@ -98,7 +103,7 @@ def _cheapest(graph: csr_matrix, ways: list[_ArcPlace]) -> np.ndarray | None:
 
 
 def _by_halves(component: CutComponent, mirror: FineMirror) -> np.ndarray | None:
-    """What `symmetric_base` finds for a component with handles: a cut of one half, its image, and all of the plane but
+    """What `symmetric_base` finds, handles or not: a cut of one half, its image, and all of the plane but
     the dearest piece between these."""
     within = mirror.side | mirror.plane
     chosen = within[component.triangles].all(axis=1) & ~mirror.plane[component.triangles].all(axis=1)

@@ -3,16 +3,17 @@
 import meshes
 import numpy as np
 import pytest
+import short_cuts
 from scipy.spatial import cKDTree
 
 from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.geometry import unit
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.mesh.topology import boundary_loops, graph_components
+from omt_uv.solver.mesh.topology import boundary_edges, boundary_loops, graph_components
 from omt_uv.solver.seams import coarse_cut
 from omt_uv.solver.seams.coarse_surface import coarsening
-from omt_uv.solver.seams.fine_paths import FineGraph, FineMirror, carried
+from omt_uv.solver.seams.fine_paths import FineGraph, FineMirror, carried, with_line
 from omt_uv.solver.seams.path_graph import Mirrored, path_graph, path_to
 from omt_uv.solver.seams.search import SeamSearch
 
@@ -166,3 +167,20 @@ def _meridian(V, angle):
     axis = np.array([np.cos(angle), np.sin(angle)])
     there = np.flatnonzero(V[:, :2] @ axis >= np.linalg.norm(V[:, :2], axis=1) * (1 - 1e-9))
     return there[np.argsort(V[there, 2])]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_line_along_a_plane_ends_where_that_crosses_the_boundary(seed):
+    V, F = meshes.random_disk(300, seed)
+    component = short_cuts.component_of(V, F)
+    height = component.positions[:, 0] - 0.5
+    mirror = FineMirror(np.arange(len(V)), height, np.zeros(len(V), dtype=bool), exact=False)
+    line = with_line(component, mirror).plane
+    ends = boundary_edges(component.triangles)
+    crossing = ends[height[ends].prod(axis=1) <= 0]
+    assert len(crossing) >= 2 and line[crossing].any(axis=1).all()
+    # Between them it is one path: nothing crosses the plane but beside it.
+    inner = component.ends[line[component.ends].all(axis=1)]
+    ends = np.concatenate([inner, ends[line[ends].all(axis=1)]])
+    label = graph_components(*ends.T, len(V))[1]
+    assert len(np.unique(label[line])) == 1
