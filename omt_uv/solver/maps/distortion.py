@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import EmptyMeshError, NonFiniteError, ZeroAreaFaceError
-from ..mesh.geometry import cross2, face_areas
+from ..mesh.geometry import cross2, face_areas, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quads
 from ..mesh.topology import graph_components
 from .overlap import overlap_share
@@ -253,26 +253,37 @@ def _shear_of_polygons(mesh: _Triangles, polygons, mirrored) -> tuple[np.ndarray
     rows = square // 3
     alone[rows[:, :2]] = False
     corner = np.concatenate([np.arange(mesh.F.size).reshape(-1, 3)[alone], square[:, BOTH].reshape(-1, 3)])
-    F, uv = mesh.F.ravel()[corner], mesh.uv.reshape(-1, 2)[corner]
-    of, flip = polygons[corner[:, 0] // 3], mirrored[corner[:, 0] // 3]
-    area = face_areas(mesh.V, F)
+    area = part_by_part(lambda some: face_areas(mesh.V, mesh.F.ravel()[some]), corner)
     real = area > NEGLIGIBLE_AREA * area.sum()
-    F, uv, of, flip, area = F[real], uv[real], of[real], flip[real], area[real]
+    corner, area = corner[real], area[real]
+    of, flip = polygons[corner[:, 0] // 3], mirrored[corner[:, 0] // 3]
     least = np.where(np.flatnonzero(real) < alone.sum(), 0, VANISHED)
-    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    double, shear = part_by_part(lambda some: _double_areas_and_shear(mesh, some), corner).T
     # A triangle that is about to turn over says no more of its quad than one that has.
-    has = cross2(a, b) * np.where(flip, -1, 1)
+    has = double * np.where(flip, -1, 1)
     forward = has > least * area * max(np.abs(has).sum(), np.finfo(float).tiny) / area.sum()
     count = int(polygons.max()) + 1
     turned = np.bincount(of, forward, count) == 0
     weight = np.where(forward | turned[of], area, 0)
     total = np.bincount(of, weight, count)
-    mean = np.bincount(of, weight * shear_of(mesh.V, F, a, b), count)
+    mean = np.bincount(of, weight * shear, count)
     return np.divide(mean, total, out=np.ones(count), where=total > 0), turned
+
+
+def _double_areas_and_shear(mesh: _Triangles, corner: np.ndarray) -> np.ndarray:
+    """Twice the signed UV areas of triangles of these corners (k,3) of a mesh, and their shear s1/s2: (k,2)."""
+    F, uv = mesh.F.ravel()[corner], mesh.uv.reshape(-1, 2)[corner]
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return np.column_stack([cross2(a, b), shear_of(mesh.V, F, a, b)])
 
 
 def shear_of(V, F, a, b):
     """s1/s2 (m,) of the maps that send the edges 01 and 02 of the faces to `a` and `b` (m,2), capped."""
+    return part_by_part(lambda *some: _shear_of(V, *some), F, a, b)
+
+
+def _shear_of(V, F, a, b):
+    """`shear_of` of all faces at once."""
     e, f = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
     base = np.linalg.norm(e, axis=1)
     along = np.einsum("ij,ij->i", e, f) / base

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mesh.geometry import face_areas
+from ..mesh.geometry import face_areas, part_by_part
 from ..mesh.polygon_areas import BOTH, polygon_areas, quad_areas, quad_corners, triangle_pairs
 from .energy import Elements, Quads, elements, hat_gradients
 
@@ -138,7 +138,7 @@ def _bent(positions, triangles, faces, mesh: PolygonMesh) -> np.ndarray:
 
 def _dented(positions, quads: np.ndarray) -> np.ndarray:
     """Areas (q,) of quads (q,4) over the means of both triangulations: not 1 of flat darts."""
-    mean = face_areas(positions, quads[:, BOTH].reshape(-1, 3)).reshape(-1, 4).sum(axis=1) / 2
+    mean = part_by_part(lambda q: face_areas(positions, q[:, BOTH].reshape(-1, 3)).reshape(-1, 4).sum(axis=1) / 2, quads)
     return np.divide(quad_areas(positions, quads), mean, out=np.ones(len(quads)), where=mean > 0)
 
 
@@ -190,10 +190,14 @@ def restricted(faces: Elements, kept: np.ndarray, place: np.ndarray) -> Elements
 
 def _convex(positions: np.ndarray, quads: np.ndarray) -> np.ndarray:
     """Quads (q,4) whose four triangles look to the quad's own side, and have an area, (q,) bool."""
-    p = positions[quads[:, BOTH]]
-    normal = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
-    own = normal[:, :2].sum(axis=1)
-    return (np.einsum("qtd,qd->qt", normal, own) > CONVEX * (own**2).sum(axis=1)[:, None]).all(axis=1)
+
+    def convex(some):
+        p = positions[some[:, BOTH]]
+        normal = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
+        own = normal[:, :2].sum(axis=1)
+        return (np.einsum("qtd,qd->qt", normal, own) > CONVEX * (own**2).sum(axis=1)[:, None]).all(axis=1)
+
+    return part_by_part(convex, quads)
 
 
 def _areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:

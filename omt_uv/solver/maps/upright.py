@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.charts import Chart
-from ..mesh.geometry import signed_areas
+from ..mesh.geometry import part_by_part, signed_areas
 from ..mesh.topology import halfedges, pair_keys, pair_up
 
 # Directions of edges, up to quarter turns, are counted in so many bins of half a degree.
@@ -147,26 +147,37 @@ def _main_direction(islands: _Islands, tail, head, side: np.ndarray) -> tuple[np
 
 def _upward(islands: _Islands, up: np.ndarray, viewers: np.ndarray | None) -> np.ndarray:
     """Direction (k,) in the map in which the islands rise in space; nan for those that do not rise anywhere."""
-    corner = islands.uv[islands.triangles]
     area = signed_areas(islands.uv, islands.triangles)
-    # Gradient times area, from the heights at the corners and the sides across from them, turned.
-    side = 0.5 * (corner[:, [2, 0, 1]] - corner[:, [1, 2, 0]])
-    normal = np.stack([-side[..., 1], side[..., 0]], axis=-1)
     whole = np.maximum(np.bincount(islands.owner, np.abs(area), islands.count), np.finfo(float).tiny)
     upward = np.full(islands.count, np.nan)
     # A wall rises by 1 per length where the map is as large as the surface.
     for k, axis in enumerate((up, *_level(up, viewers))):
-        height = np.einsum("mkd,md->mk", islands.points[islands.triangles], axis[islands.owner])
-        rise = np.einsum("mk,mkd->md", height, normal) * np.sign(area)[:, None]
+        given = (islands.triangles, islands.owner, area)
+        rises = part_by_part(lambda *some, axis=axis: _rises(islands, axis, *some), *given)
+        rise, height = rises[:, :2], rises[:, 2]
         total = np.stack([np.bincount(islands.owner, rise[:, d], islands.count) for d in range(2)], axis=1)
         size = np.bincount(islands.owner, np.hypot(*rise.T), islands.count)
         steep = size >= STEEP * whole
         sure = (np.hypot(*total.T) >= PARALLEL * size) & steep
         upward = np.where(np.isnan(upward) & sure, np.arctan2(total[:, 1], total[:, 0]), upward)
         if k == 0:
-            ridge = _along_ridge(islands, area, height.mean(axis=1), rise)
+            ridge = _along_ridge(islands, area, height, rise)
             upward = np.where(np.isnan(upward) & steep, ridge, upward)
     return upward
+
+
+def _rises(
+    islands: _Islands, axis: np.ndarray, triangles: np.ndarray, owner: np.ndarray, area: np.ndarray
+) -> np.ndarray:
+    """Gradients in the map of the heights along `axis` (k,3) of the islands `owner` (m,), times the areas (m,) of
+    triangles (m,3), and the mean heights of these: (m,3)."""
+    corner = islands.uv[triangles]
+    # Gradient times area, from the heights at the corners and the sides across from them, turned.
+    side = 0.5 * (corner[:, [2, 0, 1]] - corner[:, [1, 2, 0]])
+    normal = np.stack([-side[..., 1], side[..., 0]], axis=-1)
+    height = np.einsum("mkd,md->mk", islands.points[triangles], axis[owner])
+    rise = np.einsum("mk,mkd->md", height, normal) * np.sign(area)[:, None]
+    return np.column_stack([rise, height.mean(axis=1)])
 
 
 def _along_ridge(islands: _Islands, area: np.ndarray, height: np.ndarray, rise: np.ndarray) -> np.ndarray:

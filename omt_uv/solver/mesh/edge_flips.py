@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .geometry import part_by_part
 from .polygon_areas import quads
 from .surface import Surface
 from .topology import next_halfedge, pair_keys, previous_halfedge
@@ -110,19 +111,26 @@ def longer_diagonals(vertices: np.ndarray, quads: np.ndarray, triangles: np.ndar
     A diagonal between vertices that an edge joins would double that edge, and so would one that two quads have, around
     a vertex that only they share: those take their other ones. vertices, triangles: see `shorter_diagonals`
     """
+    # Between equal ones the first corner in space decides.
+    first = np.lexsort(vertices.T[::-1])
+    rank = np.empty(len(vertices), np.int64)
+    rank[first] = np.arange(len(vertices))
+    convex, longer = part_by_part(lambda some: _convex_and_longer(vertices, some, rank), quads).T
+    return _undoubled(quads, convex & longer, convex, triangles)
+
+
+def _convex_and_longer(vertices: np.ndarray, quads: np.ndarray, rank: np.ndarray) -> np.ndarray:
+    """Which quads (q,4) are convex, and of which the diagonal from the first corner is the longer one, (q,2) bool; of
+    equal ones a corner of the least rank (n,) decides."""
     p = vertices[quads]
     length = np.linalg.norm(p[:, [0, 1]] - p[:, [2, 3]], axis=2)
     normal = np.cross(p[:, [1, 2, 3, 0]] - p, p[:, [3, 0, 1, 2]] - p)
     own = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     # A triangle next to a corner that is nearly straight is a sliver: if it was given, the map has to keep it open.
     convex = (np.einsum("qkd,qd->qk", normal, own) > LEAST_CORNER * (own**2).sum(axis=1)[:, None]).all(axis=1)
-    # Between equal ones the first corner in space decides.
-    first = np.lexsort(vertices.T[::-1])
-    rank = np.empty(len(vertices), np.int64)
-    rank[first] = np.arange(len(vertices))
     equal = np.abs(length[:, 1] - length[:, 0]) <= 1e-9 * length.max(axis=1)
     turned = np.where(equal, rank[quads].argmin(axis=1) % 2 == 1, length[:, 1] < length[:, 0])
-    return _undoubled(quads, convex & turned, convex, triangles)
+    return np.column_stack([convex, turned])
 
 
 def cut_along_shorter(surface: Surface) -> Surface:

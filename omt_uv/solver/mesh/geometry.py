@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -44,10 +44,32 @@ def in_parts(*arrays: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
     return zip(*(np.array_split(a, count) for a in arrays), strict=True)
 
 
+def part_by_part(function: Callable[..., np.ndarray], *arrays: np.ndarray) -> np.ndarray:
+    """What a function makes of the rows of arrays (k, ...), a row (k, ...) each, some after the others: what it needs
+    on the way stays in the cache, where that of all of them would take several times the memory of a large mesh.
+
+    >>> part_by_part(lambda a, b: a + b, np.arange(3), np.ones(3))
+    array([1., 2., 3.])
+    """
+    count = len(arrays[0])
+    if count <= CHUNK:
+        return function(*arrays)
+    found = None
+    for begin in range(0, count, CHUNK):
+        part = function(*(a[begin : begin + CHUNK] for a in arrays))
+        found = np.empty((count, *part.shape[1:]), part.dtype) if found is None else found
+        found[begin : begin + CHUNK] = part
+    return found
+
+
 def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Length of every halfedge, (3m,), of positions (n,2) or (n,3)."""
-    p = positions[triangles]
-    return np.linalg.norm(p[:, [1, 2, 0]] - p, axis=2).ravel()
+
+    def lengths(some):
+        p = positions[some]
+        return np.linalg.norm(p[:, [1, 2, 0]] - p, axis=2)
+
+    return part_by_part(lengths, triangles).ravel()
 
 
 def places(points: np.ndarray) -> np.ndarray:
@@ -74,8 +96,12 @@ def edge_lengths(positions: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 def face_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Unsigned area of every triangle, (m,), of positions (n,3)."""
-    x, y, z = _double_areas(positions, triangles)
-    return 0.5 * np.sqrt(x * x + y * y + z * z)
+
+    def areas(some):
+        x, y, z = _double_areas(positions, some)
+        return 0.5 * np.sqrt(x * x + y * y + z * z)
+
+    return part_by_part(areas, triangles)
 
 
 def unit(v: np.ndarray) -> np.ndarray:
@@ -149,8 +175,12 @@ def _double_areas(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndar
 
 def signed_areas(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Area of every triangle in the plane, (m,), positive when counter-clockwise, of uv (n,2)."""
-    p = uv[triangles]
-    return 0.5 * cross2(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+
+    def areas(some):
+        p = uv[some]
+        return 0.5 * cross2(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+
+    return part_by_part(areas, triangles)
 
 
 def vertex_areas(positions: np.ndarray, triangles: np.ndarray, density: np.ndarray | None = None) -> np.ndarray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import face_areas
+from .geometry import face_areas, part_by_part
 
 # Corners of a quad's four triangles: those of the diagonal given, then the others.
 BOTH = np.array([[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
@@ -47,6 +47,11 @@ def polygon_areas(positions: np.ndarray, triangles: np.ndarray, polygons: np.nda
 
 def quad_areas(positions: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Areas (q,) of quads (q,4) of a surface (n,3): the mean of both triangulations, flat darts as they are."""
+    return part_by_part(lambda some: _quad_areas(positions, some), corners)
+
+
+def _quad_areas(positions: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """`quad_areas` of all at once."""
     area = face_areas(positions, corners[:, BOTH].reshape(-1, 3)).reshape(-1, 4)
     total, largest = area.sum(axis=1), area.max(axis=1)
     # In a plane the largest triangle of a dart is as large as the others, of which one is turned, together.
@@ -94,6 +99,12 @@ def quad_corners(triangles: np.ndarray, first: np.ndarray, second: np.ndarray) -
 
     Corners are places in the m x 3 of `triangles` (m,3); the common side goes from the first to the third.
     """
+    found = part_by_part(lambda one, two: _corners_of_quads(triangles, one, two), first, second)
+    return found[:, :4], found[:, 4] > 0
+
+
+def _corners_of_quads(triangles: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Corners (k,4) and, in a fifth column, whether these have a side in common, of `quad_corners`."""
     one, two = triangles[first], triangles[second]
     shared = (one[:, :, None] == two[:, None, :]).any(axis=2)
     # From the corner that the other triangle lacks.
@@ -105,7 +116,7 @@ def quad_corners(triangles: np.ndarray, first: np.ndarray, second: np.ndarray) -
     joined = (shared.sum(axis=1) == 2) & (one[:, 1] == two[:, 2]) & (one[:, 2] == two[:, 1])
     # one = (a, b, d) and two = (c, d, b): the quad b, c, d, a.
     place = 3 * first[:, None] + turn
-    return np.column_stack([place[:, 1], 3 * second + other, place[:, 2], place[:, 0]]), joined
+    return np.column_stack([place[:, 1], 3 * second + other, place[:, 2], place[:, 0], joined])
 
 
 def polygon_fans(

@@ -31,7 +31,7 @@ from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops, row_labels
 from ..refinement.mirrored_motion import find_symmetry
 from .corner_solver import CornerMesh, CornerPatches
-from .polygon_corners import CONVEX, DENTED, PolygonCorners, convex_corners, straight_share
+from .polygon_corners import CONVEX, DENTED, PolygonCorners, areas_in_map, convex_corners, straight_share
 from .polygon_disk import with_fans
 
 # Rings of faces around a reflex corner that may move, at most.
@@ -219,9 +219,8 @@ def _mapped_corners(surface: Surface, charts: Sequence[Chart], triangles: np.nda
     corner, polygon, share = convex_corners(surface, straight=True)
     vertex = np.full(len(surface.corner_vertex), -1)
     vertex[np.concatenate([c.corners.ravel() for c in charts])] = triangles.ravel()
-    a, b, c = w[triangles].T
     owner = np.concatenate([c.faces for c in charts])
-    area = np.bincount(owner, 0.5 * ((b - a).conj() * (c - a)).imag, len(surface.face_start) - 1)
+    area = np.bincount(owner, areas_in_map(triangles, w), len(surface.face_start) - 1)
     ears = vertex[corner]
     kept = (ears >= 0).all(1) & (area[polygon] > 0)
     kept[kept] &= _possible(ears[kept], corner[kept], surface)

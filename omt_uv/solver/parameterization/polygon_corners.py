@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..maps.polygon_elements import OPEN
+from ..mesh.geometry import part_by_part
 from ..mesh.surface import Surface
 
 # A corner counts where it has this share of its polygon's area on the surface.
@@ -20,6 +21,16 @@ STRAIGHT = 0.02
 FLATTER = 0.3
 # Straight ones are reflex only where they have lost this share of the area: straight lines may stay so.
 DENTED = 0.01
+
+
+def areas_in_map(triangles: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Signed areas (k,) of triangles (k,3) in a map w (n,) complex."""
+
+    def areas(some):
+        a, b, c = w[some].T
+        return 0.5 * ((b - a).conj() * (c - a)).imag
+
+    return part_by_part(areas, triangles)
 
 
 @dataclass(frozen=True)
@@ -43,8 +54,7 @@ class PolygonCorners:
 
     def areas(self, w: np.ndarray) -> np.ndarray:
         """Signed areas (k,) in a map w (n,) complex."""
-        a, b, c = w[self.triangles].T
-        return 0.5 * ((b - a).conj() * (c - a)).imag
+        return areas_in_map(self.triangles, w)
 
     def reflex(self, w: np.ndarray) -> np.ndarray:
         """Which corners (k,) are reflex in a map w (n,) complex."""
@@ -119,17 +129,27 @@ def convex_corners(surface: Surface, straight: bool = False) -> tuple[np.ndarray
     polygon = polygon[here]
     first, last = surface.face_start[polygon], surface.face_start[polygon + 1] - 1
     corner = np.column_stack([here, np.where(here == last, first, here + 1), np.where(here == first, last, here - 1)])
-    p = surface.positions[surface.corner_vertex[corner]]
-    base = surface.positions[surface.corner_vertex[first]]
+    used = surface.positions[surface.corner_vertex[here]] / 2
     # Differences over an extent, so that neither place nor unit costs digits.
-    unit = np.maximum(np.ptp(p.reshape(-1, 3) / 2, axis=0).max(initial=0.0), np.finfo(float).tiny)
-    after, before, reach = (
-        (x / 2 - y / 2) / unit for x, y in ((p[:, 1], p[:, 0]), (p[:, 2], p[:, 0]), (p[:, 0], base))
-    )
-    twice = np.cross(reach, after)
-    normal = np.column_stack([np.bincount(polygon, twice[:, k], len(size)) for k in range(3)])[polygon]
-    ear = np.cross(after, before)
-    share = (ear * normal).sum(1) / np.maximum((normal**2).sum(1), np.finfo(float).tiny)
+    unit = np.maximum(np.ptp(used, axis=0).max(initial=0.0), np.finfo(float).tiny)
+
+    def between(some, others):
+        p, q = (surface.positions[surface.corner_vertex[x]] for x in (some, others))
+        return (p / 2 - q / 2) / unit
+
+    def doubled(corner, first):
+        return np.cross(between(corner[:, 0], first), between(corner[:, 1], corner[:, 0]))
+
+    twice = part_by_part(doubled, corner, first)
+    sums = np.column_stack([np.bincount(polygon, twice[:, k], len(size)) for k in range(3)])
+    del twice, used
+
+    def shares(corner, polygon):
+        normal = sums[polygon]
+        ear = np.cross(between(corner[:, 1], corner[:, 0]), between(corner[:, 2], corner[:, 0]))
+        return (ear * normal).sum(1) / np.maximum((normal**2).sum(1), np.finfo(float).tiny)
+
+    share = part_by_part(shares, corner, polygon)
     reflex = np.bincount(polygon, share < (-straight_share(size[polygon]) if straight else -SHARP), len(size)) > 0
     kept = ~reflex[polygon] & (straight | (share > SHARP))
     return corner[kept], polygon[kept], share[kept]
