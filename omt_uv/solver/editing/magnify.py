@@ -14,7 +14,7 @@ import numpy as np
 from ..analysis.density import area_error_warnings, normalised_density, region_share
 from ..analysis.region_density import RegionDensity, exact_density, target_density
 from ..errors import FoldedUVError, MeshError
-from ..linalg.additive_schwarz import schwarz_solver
+from ..linalg.symmetric_sweeps import sweeping_solver
 from ..maps.energy import Elements, area_error
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import BOTH, polygon_elements, polygon_mesh
@@ -245,7 +245,7 @@ def _magnified(
     half = halved(faces, symmetry)
     task = MapProblem(
         faces=half,
-        assembly=assembly_of(half, len(given), schwarz_solver(mesh.vertices, mesh.triangles), symmetry),
+        assembly=assembly_of(half, len(given), sweeping_solver(mesh.vertices, mesh.triangles), symmetry),
         motion=outline.motion if symmetry is None else MirroredMotion(outline.motion, symmetry, start),
         loop=edges if len(edges) and not meets_itself(start, edges) else None,
         with_barrier=False,

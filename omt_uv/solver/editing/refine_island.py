@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import FoldedUVError, MeshError, positive_density
-from ..linalg.additive_schwarz import schwarz_solver
+from ..linalg.symmetric_sweeps import sweeping_solver
 from ..maps.contacts import crossings
 from ..maps.energy import Elements, area_error
 from ..maps.mirror_symmetry import MirrorSymmetry
@@ -106,7 +106,7 @@ def _refined(
     half = halved(faces, symmetry)
     task = MapProblem(
         faces=half,
-        assembly=assembly_of(half, n, schwarz_solver(mesh.vertices, mesh.triangles), symmetry),
+        assembly=assembly_of(half, n, sweeping_solver(mesh.vertices, mesh.triangles), symmetry),
         motion=free if symmetry is None else MirroredMotion(free, symmetry, w),
         loop=guard,
         with_barrier=False,

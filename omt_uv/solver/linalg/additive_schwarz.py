@@ -111,7 +111,7 @@ class AdditiveSchwarz:
         """As `solve`, by new factors."""
         self.prepare(matrix)
         self._give_back()
-        spread = self._affine(w, axes())
+        spread = affine_motions(self._part, self._count, w, axes())
         self._give_back()
         factors = self._factors(matrix, np.diff(spread.indptr) > 0)
         self._give_back()
@@ -174,23 +174,26 @@ class AdditiveSchwarz:
             columns.append(gather @ (matrix @ motions))
         return sp.hstack(columns, format="csc")
 
-    def _affine(self, w, axes) -> sp.csr_matrix:
-        """The affine motions of every part, (2n, 6 parts), with no entries for unknowns that stay 0."""
-        part, count = self._part, self._count
-        size = np.bincount(part, minlength=count)
-        middle = (np.bincount(part, w.real, count) + 1j * np.bincount(part, w.imag, count)) / size
-        z = w - middle[part]
-        z /= np.sqrt(np.bincount(part, np.abs(z) ** 2, count) / size)[part]
-        moves = (axes != 0).ravel()
-        part, z, along = np.repeat(part, 2)[moves], np.repeat(z, 2)[moves], axes.ravel()[moves].conj()
-        # Column by column: all of them as complex numbers take more memory than the matrix.
-        entries = np.empty((len(z), 6))
-        for k, motion in enumerate((np.ones(len(z)), z, z.conj())):
-            for turn in range(2):
-                entries[:, k + 3 * turn] = (along * (1j**turn * motion)).real
-        columns = 6 * part[:, None] + np.arange(6, dtype=np.int32)
-        start = np.concatenate([[0], np.cumsum(6 * moves)])
-        return sp.csr_matrix((entries.ravel(), columns.ravel(), start), shape=(len(moves), 6 * count))
+
+def affine_motions(part: np.ndarray, count: int, w: np.ndarray, axes: np.ndarray) -> sp.csr_matrix:
+    """The affine motions of all parts, (2n, 6 count), with no entries for unknowns that stay 0.
+
+    part (n,) : of each vertex; w (n,), axes (n,2) complex : see `AdditiveSchwarz.solve`
+    """
+    size = np.bincount(part, minlength=count)
+    middle = (np.bincount(part, w.real, count) + 1j * np.bincount(part, w.imag, count)) / size
+    z = w - middle[part]
+    z /= np.sqrt(np.bincount(part, np.abs(z) ** 2, count) / size)[part]
+    moves = (axes != 0).ravel()
+    part, z, along = np.repeat(part, 2)[moves], np.repeat(z, 2)[moves], axes.ravel()[moves].conj()
+    # Column by column: all of them as complex numbers take more memory than the matrix.
+    entries = np.empty((len(z), 6))
+    for k, motion in enumerate((np.ones(len(z)), z, z.conj())):
+        for turn in range(2):
+            entries[:, k + 3 * turn] = (along * (1j**turn * motion)).real
+    columns = 6 * part[:, None] + np.arange(6, dtype=np.int32)
+    start = np.concatenate([[0], np.cumsum(6 * moves)])
+    return sp.csr_matrix((entries.ravel(), columns.ravel(), start), shape=(len(moves), 6 * count))
 
 
 def _part_factor(block: sp.csc_matrix) -> Factor:
@@ -206,15 +209,21 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False
 
     The order of the vertices is that of their elimination.
     """
-    n = len(points)
-    # Factors of smaller meshes have fewer entries for a vertex: these grow with the logarithm of their number.
-    little = LITTLE_FILL * min(1.0, np.log(n) / np.log(LARGE))
-    if n < (LARGE_KEPT if keep else LARGE) or (n < COUNTED and fill(vertex_graph(triangles, n)) < little * n):
+    if hangs_by_few(points, triangles, LARGE_KEPT if keep else LARGE):
         return None
     parts = AdditiveSchwarz(points, triangles, keep=keep)
     if not keep:
         give_back()
     return parts
+
+
+def hangs_by_few(points: np.ndarray, triangles: np.ndarray, large: int = LARGE) -> bool:
+    """Whether a mesh (n,d), (m,3) should be factored as a whole: it has less than `large` vertices, or is long and
+    narrow. The order of the vertices is that of their elimination."""
+    n = len(points)
+    # Factors of smaller meshes have fewer entries for a vertex: these grow with the logarithm of their number.
+    little = LITTLE_FILL * min(1.0, np.log(n) / np.log(LARGE))
+    return n < large or (n < COUNTED and fill(vertex_graph(triangles, n)) < little * n)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ four triangles of a quad and of its area share four vertices, and make one block
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,11 @@ from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.kept_factor import KeptFactor
 from ..linalg.nested_dissection import LARGE, vertex_graph
 from ..linalg.sparse import FillOrder, minimum_degree
+from ..linalg.symmetric_sweeps import SymmetricSweeps
+from ..linalg.vertex_rows import RowPattern, VertexRows
 from ..maps.energy import (
     Elements,
+    Quads,
     area_forms_of,
     by_squares,
     corner_slopes,
@@ -41,6 +45,8 @@ AT_ONCE = 100_000
 MOST_PAIRS = 2 * 9 * AT_ONCE
 # Axes of row and column within the block of two vertices.
 AXES = ((0, 0), (1, 0), (0, 1), (1, 1))
+Matrix = sp.spmatrix | VertexRows
+Solver = SymmetricSweeps | AdditiveSchwarz | KeptFactor
 
 
 class Assembly:
@@ -54,7 +60,7 @@ class Assembly:
         self,
         triangles: np.ndarray,
         n: int,
-        parts: AdditiveSchwarz | KeptFactor | None = None,
+        parts: Solver | None = None,
         quads: np.ndarray | None = None,
     ):
         self.parts, self.order = parts, FillOrder()
@@ -78,6 +84,18 @@ class Assembly:
         own = np.flatnonzero(row == column)
         self._diagonal = np.column_stack([self._slot[own], self._slot[own] + 1 + self._stride[own]]).ravel()
         self._size = 2 * n
+
+    def hessian(
+        self, faces: Elements, w: np.ndarray, weight, pressure, axes, symmetry: MirrorSymmetry | None = None
+    ) -> Hessian:
+        """The Hessian of the energy, see `hessian_blocks`."""
+        found = hessian_blocks(faces, w, weight, pressure, axes, symmetry)
+
+        def matrix(diagonal: np.ndarray, more: sp.spmatrix | None) -> Matrix:
+            plain = self.matrix(found.triangles, diagonal, found.quads)
+            return plain if more is None else plain + more
+
+        return Hessian(found.gradient, matrix, found.rest, found.scale)
 
     def matrix(self, blocks: np.ndarray, diagonal: np.ndarray, quads: np.ndarray | None = None) -> sp.csc_matrix:
         """Sum of the blocks (t,6,6) of triangles and (q,8,8) of quads, plus a diagonal (2n,)."""
@@ -110,6 +128,97 @@ class Assembly:
         return sp.csc_matrix((data, self._indices, self._indptr), shape=(self._size,) * 2)
 
 
+class RowAssembly:
+    """Sums dense blocks of triangles and quads of a large mesh into `VertexRows`, some polygons after the others.
+
+    parts: what solves for a step that is nearly right; order: in which unknowns are eliminated where that is no use
+    """
+
+    def __init__(self, triangles: np.ndarray, n: int, parts: SymmetricSweeps, quads: np.ndarray):
+        self.parts, self.order = parts, FillOrder()
+        self._pattern = RowPattern([triangles, quads], n)
+
+    def hessian(
+        self, faces: Elements, w: np.ndarray, weight, pressure, axes, symmetry: MirrorSymmetry | None = None
+    ) -> Hessian:
+        """The Hessian of the energy, see `hessian_blocks`."""
+        gradient, rest, scale = np.zeros(len(w), complex), None, 0.0
+
+        def blocks() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+            nonlocal gradient, rest, scale
+            for some, of, kept, (lone, four) in _some_after_others(faces, weight, pressure):
+                found = _blocks_at_once(some, w, of, kept, axes, symmetry)
+                gradient += found.gradient
+                scale += found.scale
+                rest = found.rest if rest is None else rest if found.rest is None else rest + found.rest
+                if len(found.triangles):
+                    yield self._pattern.blocks[0][lone], found.triangles
+                if found.quads is not None and len(found.quads):
+                    yield self._pattern.blocks[1][four], found.quads
+
+        data = VertexRows.summed(self._pattern, blocks())
+        return Hessian(gradient, lambda diagonal, more: self._matrix(data, diagonal, more), rest, scale)
+
+    def _matrix(self, data: np.ndarray, diagonal: np.ndarray, more: sp.spmatrix | None) -> VertexRows:
+        rows = VertexRows(self._pattern, data, more)
+        rows.add_diagonal(diagonal)
+        return rows
+
+
+def _some_after_others(faces: Elements, weight, pressure):
+    """The elements of some polygons after the others, their area weights and pressures, and where their blocks are:
+    rows of lone triangles, and of quads."""
+    count, first = len(faces.area), lone_triangles(faces)
+    four = (len(faces.triangles) - first) // 4
+    single = count - four
+    for begin in range(0, single, AT_ONCE):
+        end = min(begin + AT_ONCE, single)
+        here = slice(begin, end)
+        of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
+        if faces.polygon is None:
+            yield _slice_of(faces, here, here, None, None), of, kept, (here, slice(0, 0))
+        else:
+            some = np.zeros(count, bool)
+            some[here] = True
+            rows = np.flatnonzero(some[faces.polygon[:first]])
+            yield restricted(faces, some, np.arange(int(faces.triangles.max()) + 1)), of, kept, (rows, slice(0, 0))
+    for begin in range(0, four, AT_ONCE):
+        end = min(begin + AT_ONCE, four)
+        here, rows = slice(single + begin, single + end), slice(first + 4 * begin, first + 4 * end)
+        of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
+        crossed = None if faces.quads.crossed is None else faces.quads.crossed[begin:end]
+        quads = Quads(faces.quads.size[begin:end], faces.quads.convex[begin:end], crossed)
+        yield _slice_of(faces, here, rows, np.repeat(np.arange(end - begin), 4), quads), of, kept, (
+            slice(0, 0),
+            slice(begin, end),
+        )
+
+
+def _slice_of(faces: Elements, here: slice, rows: slice, polygon: np.ndarray | None, quads: Quads | None) -> Elements:
+    """The elements of polygons that follow each other, and of their triangles, which do, too."""
+    return Elements(
+        triangles=faces.triangles[rows],
+        area=faces.area[here],
+        gradient=faces.gradient[rows],
+        ratio=faces.ratio[here],
+        weight=faces.weight[here],
+        polygon=polygon,
+        part=None if polygon is None or faces.part is None else faces.part[rows],
+        quads=quads,
+    )
+
+
+@dataclass(frozen=True)
+class Hessian:
+    """Derivatives of the energy: gradient (n,) complex, what makes the matrix with a diagonal (2n,) and a sparse matrix
+    (2n,2n) or None that are added to it, a sparse matrix of longer polygons or None, the mean of the diagonal."""
+
+    gradient: np.ndarray
+    matrix: Callable[[np.ndarray, sp.spmatrix | None], Matrix]
+    rest: sp.spmatrix | None
+    scale: float
+
+
 def _pairs(cells: np.ndarray, n: int) -> np.ndarray:
     """Keys (c k k,) of the pairs of corners of cells (c,k), row by row: column times n plus row of their block."""
     k = cells.shape[1]
@@ -117,12 +226,13 @@ def _pairs(cells: np.ndarray, n: int) -> np.ndarray:
 
 
 def assembly_of(
-    faces: Elements, n: int, parts: AdditiveSchwarz | KeptFactor | None = None, symmetry: MirrorSymmetry | None = None
-) -> Assembly:
+    faces: Elements, n: int, parts: Solver | None = None, symmetry: MirrorSymmetry | None = None
+) -> Assembly | RowAssembly:
     """The assembly of the elements of a mesh of n vertices, of which some may follow others."""
     first = lone_triangles(faces)
     place = np.arange(n) if symmetry is None else symmetry.representative
-    assembly = Assembly(place[faces.triangles[:first]], n, parts, place[corners_of_quads(faces)])
+    make = RowAssembly if isinstance(parts, SymmetricSweeps) else Assembly
+    assembly = make(place[faces.triangles[:first]], n, parts, place[corners_of_quads(faces)])
     if symmetry is not None and n < LARGE:
         # The order of the mesh is no order of its half: folded, its separators are neighbours of both sides.
         vertices = minimum_degree(vertex_graph(place[faces.triangles], n))

@@ -12,12 +12,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import PrecisionError
-from ..linalg.additive_schwarz import AdditiveSchwarz
-from ..linalg.kept_factor import KeptFactor
 from ..linalg.sparse import FillOrder
+from ..linalg.vertex_rows import VertexRows
 from ..maps.energy import Elements, energies, squared, target_error
 from ..maps.mirror_symmetry import MirrorSymmetry
-from .hessian_blocks import Assembly, hessian_blocks
+from .hessian_blocks import Assembly, Matrix, RowAssembly, Solver
 from .vertex_sweeps import Smoother
 
 ARMIJO = 1e-4  # least share of the promised decrease that a step must gain
@@ -146,7 +145,7 @@ class NewtonProblem:
     """
 
     faces: Elements
-    assembly: Assembly
+    assembly: Assembly | RowAssembly
     motion: Motion
     area_weight: float | np.ndarray
     terms: tuple[EnergyTerm, ...] = ()
@@ -193,12 +192,13 @@ def newton_direction(
     return step.view(complex), float(step @ slopes)
 
 
-def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> tuple[sp.spmatrix, np.ndarray, float]:
+def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> tuple[Matrix, np.ndarray, float]:
     """Hessian (2n,2n) and slopes (2n,) along the axes of the frame, and the mean of the Hessian's diagonal."""
     n = len(w)
-    found = hessian_blocks(problem.faces, w, problem.area_weight, pressure, (frame, free), problem.symmetry)
-    gradient = found.gradient
-    squares = None
+    found = problem.assembly.hessian(
+        problem.faces, w, problem.area_weight, pressure, (frame, free), problem.symmetry
+    )
+    gradient, more, scale = found.gradient, found.rest, found.scale
     for part in problem.terms:
         slope, vertices, forms = part.derivatives(w)
         if problem.symmetry is not None:
@@ -207,23 +207,20 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
         gradient = gradient + slope
         linear = linear_forms(vertices, forms * frame[vertices], n, free)
         square = linear.T @ linear
-        squares = square if squares is None else squares + square
+        more = square if more is None else more + square
     axes = (gradient * frame.conj()).view(float).reshape(n, 2) * free
     diagonal = 1 - free
     diagonal[:, 0] += np.maximum(problem.motion.bend(w, gradient), 0) * free[:, 0]
-    matrix = problem.assembly.matrix(found.triangles, diagonal.ravel() + SHIFT * found.scale, found.quads)
-    rest, scale = found.rest, found.scale
-    # Blocks take more memory than their matrix.
-    del found
-    matrix = matrix if rest is None else matrix + rest
-    return matrix if squares is None else matrix + squares, axes.ravel(), scale
+    return found.matrix(diagonal.ravel() + SHIFT * scale, more), axes.ravel(), scale
 
 
 def _solution(
-    matrix: sp.spmatrix, b, scale: float, parts: AdditiveSchwarz | KeptFactor | None, w, axes, order: FillOrder
+    matrix: Matrix, b, scale: float, parts: Solver | None, w, axes, order: FillOrder
 ) -> np.ndarray:
     """Solution x (n,) of matrix x = b, shifted where rounding makes it singular: the step is shorter, and goes down."""
     shift = SHIFT
+    if parts is None and isinstance(matrix, VertexRows):
+        matrix = matrix.plain()
     while True:
         try:
             return order.factor(matrix).solve(b) if parts is None else parts.solve(matrix, b, w, axes)
@@ -231,7 +228,8 @@ def _solution(
             if shift > 1:
                 raise
             shift *= SHIFT_GROWTH
-            matrix = matrix + shift * scale * sp.identity(len(b))
+            more = shift * scale
+            matrix = matrix.shifted(more) if isinstance(matrix, VertexRows) else matrix + more * sp.identity(len(b))
 
 
 def newton_step(problem: NewtonProblem, w: np.ndarray, value: float, pressure: float = 1.0) -> NewtonStep:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import MeshError, positive_density
-from ..linalg.additive_schwarz import schwarz_solver
+from ..linalg.symmetric_sweeps import sweeping_solver
 from ..maps.contacts import crossings
 from ..maps.energy import Elements, area_error, elements, has_folds
 from ..maps.mirror_symmetry import MirrorSymmetry
@@ -232,7 +232,7 @@ def _refined(
     smoother = _smoother(mesh, faces, balance)
     warm = options.warm_start
     known = None if pins is not None else find_symmetry(mesh.vertices, mesh.triangles, polygons, faces)
-    parts = schwarz_solver(mesh.vertices, mesh.triangles)
+    parts = sweeping_solver(mesh.vertices, mesh.triangles)
     symmetry, w = _next_to_image(faces, initial.may_cross, known, w, by_triangle, boundary, loop)
     if known is not None and symmetry is None:
         free = _map_problem(faces, assembly_of(faces, n, parts), initial, loop, boundary, smoother)

@@ -1,0 +1,101 @@
+"""Solve Newton's equations of large meshes by symmetric sweeps and affine motions of parts.
+
+Conjugate gradients are preconditioned by a sweep over the vertices, colour after colour (symmetric Gauss-Seidel), and
+back, and in between by the affine motions of parts of about a hundred vertices: how these move, turn and stretch as a
+whole (Toselli, Widlund 2005, section 3, has such coarse spaces). Nothing is factored but the equations of these
+motions: a sweep needs nothing that the matrix does not have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..freed_memory import give_back
+from .additive_schwarz import SHIFT, AdditiveSchwarz, affine_motions, hangs_by_few
+from .kept_factor import by_gradients
+from .nested_dissection import kd_parts
+from .sparse import Factor, minimum_degree
+from .vertex_rows import VertexRows
+
+# Vertices of a part: of fewer, the equations of their motions take as long as the sweeps.
+PART_SIZE = 100
+# Iterations at most; where these are not enough, parts are factored from there on.
+MOST = 100
+
+
+class SymmetricSweeps:
+    """Parts of a mesh (n,d), (m,3), whose motions are solved for as a whole."""
+
+    def __init__(self, points: np.ndarray, triangles: np.ndarray):
+        self._mesh = points, triangles
+        self._part = kd_parts(points, max(0, round(np.log2(len(points) / PART_SIZE)))).astype(np.int32)
+        self._order: np.ndarray | None = None
+        self._parts: AdditiveSchwarz | None = None
+
+    def solve(self, rows: VertexRows, b: np.ndarray, w: np.ndarray, axes: Callable[[], np.ndarray]) -> np.ndarray:
+        """About the solution x (2n,) of rows x = b, symmetric positive definite; b.x > 0.
+
+        The decrease b.x / 2 that x promises as a Newton step is within some percent of the most there is; where that
+        takes too long, x is the solution. w, axes: see `AdditiveSchwarz.solve`. Raises PrecisionError.
+        """
+        give_back()
+        if self._parts is None:
+            x = self._swept(rows, b, w, axes)
+            if x is not None:
+                return x
+            self._parts = AdditiveSchwarz(*self._mesh)
+        return self._parts.solve(rows.plain(), b, w, axes)
+
+    def _swept(self, rows: VertexRows, b: np.ndarray, w: np.ndarray, axes) -> np.ndarray | None:
+        """The solution; None where it takes too many iterations."""
+        order, colours = rows.pattern.order, range(len(rows.pattern.first) - 1)
+        spread = affine_motions(self._part[order], int(self._part.max()) + 1, w[order], axes()[order])
+        coarse, gather = self._coarse(rows, spread), spread.T
+        xx, xy, yy = rows.inverse
+        give_back()
+
+        def sweep(x, r, order):
+            for k in order:
+                own = rows.pattern.rows(k)
+                left = (r[own] - rows.times(x, k)).T
+                x.reshape(-1, 2)[own, 0] += xx[own] * left[0] + xy[own] * left[1]
+                x.reshape(-1, 2)[own, 1] += xy[own] * left[0] + yy[own] * left[1]
+
+        def precondition(r):
+            x, by_vertex = np.zeros(len(r)), r.reshape(-1, 2)
+            sweep(x, by_vertex, colours)
+            x += spread @ coarse.solve(gather @ (r - rows @ x))
+            sweep(x, by_vertex, reversed(colours))
+            return x
+
+        found = by_gradients(rows, b.reshape(-1, 2)[order].ravel(), precondition, MOST)
+        if found is None:
+            return None
+        x = np.empty((len(order), 2))
+        x[order] = found.reshape(-1, 2)
+        return x.ravel()
+
+    def _coarse(self, rows: VertexRows, spread: sp.csr_matrix) -> Factor:
+        """Factors of the equations (6 parts, 6 parts) of the motions spread (2n, 6 parts), colour after colour."""
+        total = None
+        for k, both in enumerate(rows.of_colours):
+            own = rows.pattern.rows(k)
+            for p, some in enumerate(both):
+                found = spread[2 * own.start + p : 2 * own.stop : 2].T @ (some @ spread)
+                total = found if total is None else total + found
+        if rows.more_of_colours is not None:
+            total = total + spread.T @ (sp.vstack(rows.more_of_colours) @ spread)
+        total = total.tocsc()
+        if self._order is None:
+            parts = minimum_degree(total[::6, ::6])
+            self._order = (6 * parts[:, None] + np.arange(6)).ravel()
+        return Factor(total + SHIFT * total.diagonal().max() * sp.identity(total.shape[0]), self._order)
+
+
+def sweeping_solver(points: np.ndarray, triangles: np.ndarray) -> SymmetricSweeps | None:
+    """What solves Newton's equations of a mesh (n,d), (m,3) that is so large that they should not be factored; None for
+    others. The order of the vertices is that of their elimination."""
+    return None if hangs_by_few(points, triangles) else SymmetricSweeps(points, triangles)
