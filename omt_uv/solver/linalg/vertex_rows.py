@@ -124,9 +124,11 @@ class VertexRows:
             own = pattern.rows(k)
             start = pattern.start[own.start : own.stop + 1]
             here, pointers = slice(2 * start[0], 2 * start[-1]), 2 * (start - start[0])
-            given = ((x.reshape(-1)[here], pattern.columns[here], pointers) for x in self._data)
-            first, second = (sp.csr_matrix(x, shape=(len(start) - 1, size)) for x in given)
-            found.append((first, second))
+            both = sp.csr_matrix((len(start) - 1, size)), sp.csr_matrix((len(start) - 1, size))
+            for rows, data in zip(both, self._data, strict=True):
+                # A matrix that is made of parts of larger arrays copies them.
+                rows.data, rows.indices, rows.indptr = data.reshape(-1)[here], pattern.columns[here], pointers
+            found.append(both)
         return found
 
     @cached_property

@@ -100,7 +100,8 @@ def polygon_elements(
     if faces is None or len(np.unique(faces)) == len(faces):
         return elements(positions, triangles, target, region)
     mesh = polygon_mesh(triangles, faces)
-    every, polygon = mesh.every_triangle(), mesh.of_polygons()
+    # What is kept takes half of the memory that it is computed in.
+    every, polygon = mesh.every_triangle().astype(np.int32), mesh.of_polygons().astype(np.int32)
     area, gradient = hat_gradients(positions, every)
     q = len(mesh.quads)
     share = np.ones(len(every))

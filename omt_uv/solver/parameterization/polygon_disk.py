@@ -51,7 +51,7 @@ def polygon_disk(vertices: np.ndarray, chart: Chart) -> PolygonDisk:
     kept = ~np.isin(own, of_fans)
     halves = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
     return PolygonDisk(
-        vertices=np.concatenate([vertices, centres]),
+        vertices=np.concatenate([vertices, centres]) if len(centres) else vertices,
         triangles=np.concatenate([cut.triangles[kept], halves, fans, chart.patches]),
         polygons=np.concatenate([own[kept], np.repeat(of_quads, 2), of_fans, -1 - np.arange(len(chart.patches))]),
     )
