@@ -56,6 +56,8 @@ DIRECT_WITH_ROOM = 9000
 # Charts of at most so many vertices start from a mean value map where others start from an evened one: steps take
 # little time there, and searches for seams foretell the shear of a map by that of coarse surfaces with such a start.
 EVENED_ABOVE = 1500
+# Of charts with more than this a coarser one is embedded, since factors of all of them take as much memory as all else.
+EMBEDDED = 200_000
 # That has the vertices divided by this, and at most this share of them: otherwise it does not pay.
 COARSER = 8
 COARSE_ENOUGH = 0.25
@@ -195,10 +197,22 @@ def coarse_initial_map(
 
     flat (n,2) : an embedding, a mean value map by default; draft : the map had better have its areas at once
     """
-    vertices, triangles = disk.vertices, disk.triangles
-    far = is_far(disk.target, face_areas(vertices, triangles))
+    far = is_far(disk.target, face_areas(disk.vertices, disk.triangles))
+    if flat is None and len(disk.vertices) > EMBEDDED and not (far or draft):
+        found = yield from _coarse_initial_map(disk, balance, log, None, (False, False, False))
+        if found is not None and map_energy(found.uv, disk.vertices, disk.triangles) < HOPELESS:
+            return found
+    return (yield from _coarse_initial_map(disk, balance, log, flat, (far, draft, True)))
+
+
+def _coarse_initial_map(
+    disk: DiskMesh, balance: float, log: RunLog, flat: np.ndarray | None, options: tuple[bool, bool, bool]
+) -> Steps[InitialChartMap | None]:
+    """The same; options: whether the targets are far from the areas, it is a draft, and the mesh itself is embedded, in
+    place of the coarser one alone."""
+    (far, draft, embedded), vertices, triangles = options, disk.vertices, disk.triangles
     with log.timed("coarsening"):
-        if flat is None:
+        if flat is None and embedded:
             flat = disk.embedded
             even = _even_start(disk, flat) if disk.boundary == "free" and not far else None
             # A draft has no steps to spare for a start that is squeezed, too.
@@ -221,7 +235,7 @@ def coarse_initial_map(
     )
     found = None
     if len(points) > (DIRECT_FAR if far else DRAFT_COARSE_ABOVE if draft else COARSE_ABOVE):
-        coarser = coarse_initial_map(coarse_disk, balance, log, flat[coarse.kept], draft)
+        coarser = coarse_initial_map(coarse_disk, balance, log, None if flat is None else flat[coarse.kept], draft)
         found = yield from part_of(coarser, *COARSE_MAP)
     if found is None and draft and corners is None:
         found = _draft_start(coarse_disk, flat[coarse.kept], log)
@@ -238,7 +252,7 @@ def coarse_initial_map(
         weight = SMOOTH_WEIGHT_DRAFT if draft else SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT
         uv = yield from part_of(_smoothed(disk, uv, weight, draft), *SMOOTHING)
         # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
-        if not (far or draft) and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
+        if flat is not None and not (far or draft) and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
             return InitialChartMap(flat)
     return InitialChartMap(uv, found.conformal, found.cells, far, True, refined.multiplier)
 

@@ -1,7 +1,8 @@
 """Coarsen the mesh of a disk, and prolong maps without folds, by half-edge collapses (Hoppe 1996).
 
 An independent set of vertices is removed in every round (Kirkpatrick 1983). The mesh is carried along as an embedding
-in the plane: a collapse that keeps all its triangles positive there keeps the mesh a disk. On the way back every vertex
+in the plane: a collapse that keeps all its triangles positive there keeps the mesh a disk. Without an embedding it is
+one that makes no edge twice (the link condition of Dey, Edelsbrunner, Guha, Nekhayev 1999). On the way back every vertex
 returns into the star that it left: the vertex it was collapsed to sees all of that star, so near it there is always a
 place where no face folds (Shen, Jiang, Zorin, Panozzo 2019).
 """
@@ -14,7 +15,7 @@ import numpy as np
 
 from ..maps.energy import Elements, elements
 from ..mesh.geometry import complex_cross, cross2, dot2, face_areas
-from ..mesh.topology import boundary_loops, expand, halfedges, runs, twins
+from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs, twins
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
 
@@ -110,7 +111,7 @@ def coarsen_disk(
 ) -> Steps[CoarseMesh]:
     """Coarsen a disk (n,3), (m,3) to about `goal` vertices.
 
-    flat (n,2): an embedding in the plane with a convex boundary; mass (m,): what the triangles' areas in the final map
+    flat (n,2): an embedding in the plane with a convex boundary, or None; mass (m,): what the triangles' areas in the final map
     are to be, handed on; region (m,) in [0, 1]: weights of a region, which keeps its share of the mass; density (n,):
     how many vertices are to be left there for an area, relative to elsewhere; by default that is left to chance;
     whole_boundary: its vertices stay, however many they are of those that are left.
@@ -157,11 +158,14 @@ def _round(V, F, flat, mass, rank):
     star, turned = stars(F, independent_set(F, np.where((count > MOST_FACES) | (count < 2), -1, rank)))
     v, after, before = np.take_along_axis(F[star], turned, 1).T
     into, good = _collapses(V, flat, v, after, before, ahead)
+    if flat is None:
+        good &= _simple(F, v, after, before, into, good)
     star, v, after, before, into = (x[good] for x in (star, v, after, before, into))
     vertex, row = runs(v)
     stays = (after != into) & (before != into)
     new = np.column_stack([into, after, before])[stays]
-    corner, share = _places(V, flat, vertex, row[stays], new, ahead)
+    normal = None if flat is not None else _sums(row, _normals(V, np.column_stack([v, after, before]))[0])
+    corner, share = _places(V, flat, vertex, row[stays], new, ahead, normal)
     removal = RemovalRound(
         vertex=vertex,
         into=new[np.searchsorted(row[stays], np.arange(len(vertex))), 0],
@@ -179,6 +183,30 @@ def _round(V, F, flat, mass, rank):
     total = np.column_stack([np.bincount(row, column[star], len(vertex)) for column in mass.T])
     handed = part[:, None] * total[row[stays]]
     return np.concatenate([F[others], new]), np.concatenate([mass[others], handed]), removal
+
+
+def _simple(F, v, after, before, into, good):
+    """Which faces (s,) of the stars of vertices v (s,) are of collapses, of the good ones (s,) bool, that make no edge
+    that is there already, or that another one makes, too."""
+    row = runs(v)[1]
+    vertex = np.flatnonzero(np.diff(row, prepend=-1))
+    ends, of = np.concatenate([after[good], before[good]]), np.concatenate([row[good], row[good]])
+    others, goal = np.concatenate([before[good], after[good]]), into[vertex[of]]
+    # Those in the faces of the edge that goes are joined to both of its ends.
+    known = np.isin((of << 32) + ends, ((of << 32) + others)[ends == goal]) | (ends == goal)
+    ends, of = ends[~known], of[~known]
+    made = pair_keys(ends, into[vertex[of]])
+    # Every one of them is in two faces of its star, or at the boundary in one.
+    order = np.lexsort((of, made))
+    made, of = made[order], of[order]
+    first = np.diff(made, prepend=-1) != 0
+    owner = of[np.flatnonzero(first)][np.cumsum(first) - 1]
+    bad = of != owner
+    edges = np.sort(pair_keys(*halfedges(F)))
+    bad |= edges[np.minimum(np.searchsorted(edges, made), len(edges) - 1)] == made
+    fails = np.zeros(len(vertex), bool)
+    fails[of[bad]] = True
+    return ~fails[row]
 
 
 def _collapses(V, flat, v, after, before, ahead):
@@ -209,11 +237,12 @@ def _best_collapses(V, flat, v, after, before, ahead):
     new = np.column_stack([into, after[other], before[other]])
     normal, old = _normals(V, np.column_stack([v, after, before]))
     new_normal, shape = _normals(V, new)
-    whole = np.column_stack([np.bincount(row, normal[:, k]) for k in range(3)])
+    whole = _sums(row, normal)
     turned = (new_normal * whole[row[candidate]]).sum(1) <= 0
     begin = np.searchsorted(candidate, np.arange(len(v)))
     score = np.minimum.reduceat(np.where(gone, np.inf, shape), begin)
-    bad = np.logical_or.reduceat(~gone & (turned | (_flat_shape(flat, new) < LEAST_FLAT_SHAPE)), begin)
+    turned = turned if flat is None else turned | (_flat_shape(flat, new) < LEAST_FLAT_SHAPE)
+    bad = np.logical_or.reduceat(~gone & turned, begin)
     # Nor does an inner vertex go to the boundary: edges across would cut off parts that have no room in a domain.
     bad |= ((ahead[v] >= 0) & (after != ahead[v])) | ((ahead[v] < 0) & (ahead[after] >= 0)) | ~np.isfinite(score)
     bad |= score < np.minimum(LEAST_SHAPE, np.minimum.reduceat(old, first)[row] / 2)
@@ -224,11 +253,18 @@ def _best_collapses(V, flat, v, after, before, ahead):
     return after[winner], ~bad[winner]
 
 
-def _places(V, flat, vertex, row, new, ahead):
-    """Corners and weights (k,3) to return to: of the new triangle around the vertex; on the boundary, of its chord."""
-    a, b, c = flat[new].transpose(1, 0, 2)
-    p = flat[vertex[row]]
-    weights = np.column_stack([cross2(b - p, c - p), cross2(c - p, a - p), cross2(a - p, b - p)])
+def _places(V, flat, vertex, row, new, ahead, normal):
+    """Corners and weights (k,3) to return to: of the new triangle around the vertex; on the boundary, of its chord.
+
+    normal (k,3): of the stars, along which they are looked at where there is no flat embedding
+    """
+    a, b, c = (V if flat is None else flat)[new].transpose(1, 0, 2)
+    p = (V if flat is None else flat)[vertex[row]]
+    sides = ((b - p, c - p), (c - p, a - p), (a - p, b - p))
+    if flat is None:
+        weights = np.column_stack([np.einsum("sd,sd->s", np.cross(*pair), normal[row]) for pair in sides])
+    else:
+        weights = np.column_stack([cross2(*pair) for pair in sides])
     total = weights.sum(1)[:, None]
     # Of a triangle without area: outside of it.
     weights = np.divide(weights, total, out=np.tile([-1.0, 1.0, 1.0], (len(total), 1)), where=total != 0)
@@ -269,6 +305,11 @@ def _returned(removal: RemovalRound, w: np.ndarray) -> np.ndarray:
     way = np.ones(count)
     np.minimum.at(way, row[short], ((1 - KEPT_AREA) * at_safe / np.maximum(at_safe - at_target, 1e-300))[short])
     return safe + way * (target - safe)
+
+
+def _sums(row, vectors):
+    """Sums (k,3) of vectors (s,3) by their rows (s,)."""
+    return np.column_stack([np.bincount(row, vectors[:, k]) for k in range(3)])
 
 
 def _left(edge):
