@@ -168,8 +168,8 @@ class AdditiveSchwarz:
         turns = min(1 if self._keep else IN_TURN, self._count)
         for some in np.array_split(np.arange(self._count), turns):
             here = np.repeat(np.isin(self._part, some), 2)
-            rows, count = here[moved > 0], np.concatenate([[0], np.cumsum(moved * here)])
-            entries, place = (x.reshape(-1, 6)[rows].ravel() for x in (spread.data, spread.indices - 6 * some[0]))
+            entry, count = np.repeat(here, moved), np.concatenate([[0], np.cumsum(moved * here)])
+            entries, place = spread.data[entry], spread.indices[entry] - 6 * some[0]
             motions = sp.csr_matrix((entries, place, count), shape=(spread.shape[0], 6 * len(some)))
             columns.append(gather @ (matrix @ motions))
         return sp.hstack(columns, format="csc")
@@ -185,15 +185,20 @@ def affine_motions(part: np.ndarray, count: int, w: np.ndarray, axes: np.ndarray
     z = w - middle[part]
     z /= np.sqrt(np.bincount(part, np.abs(z) ** 2, count) / size)[part]
     moves = (axes != 0).ravel()
-    part, z, along = np.repeat(part, 2)[moves], np.repeat(z, 2)[moves], axes.ravel()[moves].conj()
-    # Column by column: all of them as complex numbers take more memory than the matrix.
-    entries = np.empty((len(z), 6))
-    for k, motion in enumerate((np.ones(len(z)), z, z.conj())):
-        for turn in range(2):
-            entries[:, k + 3 * turn] = (along * (1j**turn * motion)).real
-    columns = 6 * part[:, None] + np.arange(6, dtype=np.int32)
-    start = np.concatenate([[0], np.cumsum(6 * moves)])
-    return sp.csr_matrix((entries.ravel(), columns.ravel(), start), shape=(len(moves), 6 * count))
+    part, z, along = np.repeat(part, 2)[moves], np.repeat(z, 2)[moves], axes.ravel()[moves]
+    sides = along.real, along.imag
+    # Most unknowns are along an axis of the plane: motions across it do not move them.
+    size, start = np.zeros(len(moves), np.int64), np.zeros(len(moves) + 1, np.int64)
+    size[moves] = sum(3 * (x != 0) for x in sides)
+    np.cumsum(size, out=start[1:])
+    entries, columns = np.empty(start[-1]), np.empty(start[-1], np.int32)
+    place = start[:-1][moves]
+    for k, side in enumerate(sides):
+        here = side != 0
+        for m, motion in enumerate((1.0, z.real[here], z.imag[here])):
+            entries[place[here] + m], columns[place[here] + m] = side[here] * motion, 6 * part[here] + 3 * k + m
+        place = place + 3 * here
+    return sp.csr_matrix((entries, columns, start), shape=(len(moves), 6 * count))
 
 
 def _part_factor(block: sp.csc_matrix) -> Factor:

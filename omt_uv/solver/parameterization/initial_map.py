@@ -289,7 +289,10 @@ def _smoothed(disk: DiskMesh, uv: np.ndarray, area_weight: float, draft: bool) -
     sweeps, goal = (DRAFT_SWEEPS, QUALITIES["draft"].area_error) if draft else (SWEEPS, 0.0)
     faces, w = elements(disk.vertices, disk.triangles, disk.target), uv @ [1, 1j]
     w = w * np.sqrt((faces.area @ faces.ratio) / faces.areas(w).sum())
-    w = yield from smoothed(faces, w, area_weight, sweeps, goal=goal)
+    steps = smoothed(faces, w, area_weight, sweeps, goal=goal)
+    # They take the memory of six maps, and sweeps have their own.
+    del faces
+    w = yield from steps
     return np.column_stack([w.real, w.imag])
 
 

@@ -7,7 +7,7 @@ four triangles of a quad and of its area share four vertices, and make one block
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -41,6 +41,8 @@ EAGERNESS = 0.75
 # Polygons whose blocks are found at once, in meshes of more than twice as many triangles: what is found on the way
 # takes four times their memory.
 AT_ONCE = 100_000
+# The same in meshes whose rows follow each other, where what is found of some stays in the cache.
+FEW_AT_ONCE = 1 << 14
 # Pairs of corners of all cells up to which it is kept where each entry of a block belongs.
 MOST_PAIRS = 2 * 9 * AT_ONCE
 # Axes of row and column within the block of two vertices.
@@ -145,10 +147,9 @@ class RowAssembly:
         gradient, rest, scale = np.zeros(len(w), complex), None, 0.0
 
         def blocks() -> Iterator[tuple[np.ndarray, np.ndarray]]:
-            nonlocal gradient, rest, scale
+            nonlocal rest, scale
             for some, of, kept, (lone, four) in _some_after_others(faces, weight, pressure):
-                found = _blocks_at_once(some, w, of, kept, axes, symmetry)
-                gradient += found.gradient
+                found = _blocks_at_once(some, w, of, kept, axes, symmetry, gradient)
                 scale += found.scale
                 rest = found.rest if rest is None else rest if found.rest is None else rest + found.rest
                 if len(found.triangles):
@@ -157,6 +158,7 @@ class RowAssembly:
                     yield self._pattern.blocks[1][four], found.quads
 
         data = VertexRows.summed(self._pattern, blocks())
+        gradient = gradient if symmetry is None else symmetry.folded(gradient)
         return Hessian(gradient, lambda diagonal, more: self._matrix(data, diagonal, more), rest, scale)
 
     def _matrix(self, data: np.ndarray, diagonal: np.ndarray, more: sp.spmatrix | None) -> VertexRows:
@@ -171,8 +173,8 @@ def _some_after_others(faces: Elements, weight, pressure):
     count, first = len(faces.area), lone_triangles(faces)
     four = (len(faces.triangles) - first) // 4
     single = count - four
-    for begin in range(0, single, AT_ONCE):
-        end = min(begin + AT_ONCE, single)
+    for begin in range(0, single, FEW_AT_ONCE):
+        end = min(begin + FEW_AT_ONCE, single)
         here = slice(begin, end)
         of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
         if faces.polygon is None:
@@ -182,8 +184,8 @@ def _some_after_others(faces: Elements, weight, pressure):
             some[here] = True
             rows = np.flatnonzero(some[faces.polygon[:first]])
             yield restricted(faces, some, np.arange(int(faces.triangles.max()) + 1)), of, kept, (rows, slice(0, 0))
-    for begin in range(0, four, AT_ONCE):
-        end = min(begin + AT_ONCE, four)
+    for begin in range(0, four, FEW_AT_ONCE):
+        end = min(begin + FEW_AT_ONCE, four)
         here, rows = slice(single + begin, single + end), slice(first + 4 * begin, first + 4 * end)
         of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
         crossed = None if faces.quads.crossed is None else faces.quads.crossed[begin:end]
@@ -276,36 +278,38 @@ def hessian_blocks(
     weight : of the area term, one or (p,) of the polygons; pressure : see `energy.face_derivatives`
     """
     count = len(faces.area)
+    gradient, scale, rest = np.zeros(len(w), complex), 0.0, None
     if len(faces.triangles) <= 2 * AT_ONCE:
-        return _blocks_at_once(faces, w, weight, pressure, axes, symmetry)
+        found = _blocks_at_once(faces, w, weight, pressure, axes, symmetry, gradient)
+        return found if symmetry is None else replace(found, gradient=symmetry.folded(gradient))
     first = lone_triangles(faces)
     four = (len(faces.triangles) - first) // 4
     triangles, quads = np.empty((first, 6, 6)), np.empty((four, 8, 8))
-    gradient, scale, rest = np.zeros(len(w), complex), 0.0, None
     place = np.arange(len(w))
     for begin in range(0, count, AT_ONCE):
         some = np.zeros(count, bool)
         some[begin : begin + AT_ONCE] = True
         of, kept = (x if np.ndim(x) == 0 else x[some] for x in (weight, pressure))
-        found = _blocks_at_once(restricted(faces, some, place), w, of, kept, axes, symmetry)
+        found = _blocks_at_once(restricted(faces, some, place), w, of, kept, axes, symmetry, gradient)
         here = some if faces.polygon is None else some[faces.polygon]
         triangles[here[:first]] = found.triangles
         if found.quads is not None:
             quads[some[count - four :]] = found.quads
-        gradient, scale = gradient + found.gradient, scale + found.scale
+        scale += found.scale
         rest = found.rest if rest is None else rest if found.rest is None else rest + found.rest
+    gradient = gradient if symmetry is None else symmetry.folded(gradient)
     return Blocks(gradient, triangles, None if faces.polygon is None else quads, rest, scale)
 
 
-def _blocks_at_once(faces: Elements, w: np.ndarray, weight, pressure, axes, symmetry: MirrorSymmetry | None) -> Blocks:
-    """As `hessian_blocks`, of all faces at once."""
+def _blocks_at_once(
+    faces: Elements, w: np.ndarray, weight, pressure, axes, symmetry: MirrorSymmetry | None, gradient: np.ndarray
+) -> Blocks:
+    """As `hessian_blocks`, of all faces at once, which add their gradient to that of all vertices (n,) complex."""
     n, first, (frame, free) = len(w), lone_triangles(faces), axes
     eagerness = EAGERNESS * (1 - pressure)
     a, b = faces.derivatives(w)
     slopes, kept, radial = by_squares(faces, a, b, weight, pressure, eagerness)
-    gradient = sum_at_vertices(faces, corner_slopes(faces, a, b, slopes), n)
-    if symmetry is not None:
-        gradient = symmetry.folded(gradient)
+    _add_at_vertices(gradient, faces, corner_slopes(faces, a, b, slopes))
     blocks = triangle_blocks(faces.gradient, a, b, kept, radial)
     vertex = _in_axes(blocks, faces.triangles, frame, free, symmetry)
     scale = float(np.einsum("iim->", blocks)) / (2 * n)
@@ -325,6 +329,21 @@ def _blocks_at_once(faces: Elements, w: np.ndarray, weight, pressure, axes, symm
         rest=long_forms(faces, vertex, area[:first], n),
         scale=scale,
     )
+
+
+def _add_at_vertices(total: np.ndarray, faces: Elements, corner: np.ndarray) -> None:
+    """Add corner values (m,3) complex to those of their vertices (n,)."""
+    n, flat = len(total), faces.triangles.ravel()
+    if n <= 2 * len(flat):
+        total += sum_at_vertices(faces, corner, n)
+        return
+    # Of few of many vertices: sums of the others would take longer than all else.
+    seen, place = np.zeros(n, bool), np.empty(n, np.int32)
+    seen[flat] = True
+    used = np.flatnonzero(seen)
+    place[used] = np.arange(len(used))
+    local = place[flat]
+    total[used] += np.bincount(local, corner.real.ravel()) + 1j * np.bincount(local, corner.imag.ravel())
 
 
 def triangle_blocks(gradient: np.ndarray, a: np.ndarray, b: np.ndarray, kept, radial) -> np.ndarray:

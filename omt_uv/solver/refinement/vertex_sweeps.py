@@ -26,6 +26,8 @@ PASSES = 3
 SETS = 6
 # A boundary vertex moves only where it might go so many times as far before edges cross.
 ROOM = 6.0
+# Faces of stars that are relaxed at a time, roughly.
+PART = 1 << 15
 # Stars with so many times the mean energy are smoothed after a step of Newton's method.
 WORST = 2.0
 # With so many sweeps.
@@ -41,7 +43,9 @@ def smoothed(
     the boundary stays. goal: area error at which the sweeps end
     """
     w = w.copy()
-    sets = list(_sets(faces, len(w), loop is not None))
+    sets, aim = list(_sets(faces, len(w), loop is not None)), faces if goal else None
+    # What the sets have taken of it is all that is needed from here on.
+    del faces
     for k in range(sweeps):
         start = w.copy()
         _sweep(sets, w, area_weight)
@@ -50,7 +54,7 @@ def smoothed(
             w = start
             _sweep(sets, w, area_weight, loop)
         yield Progress("Smoothing", (k + 1) / sweeps)
-        if goal and area_error(faces, w) <= goal:
+        if aim is not None and area_error(aim, w) <= goal:
             break
     return w
 
@@ -105,7 +109,7 @@ class Smoother:
 def _sets(faces: Elements, n: int, whole=False):
     """Independent sets of vertices, inner or all: vertices (k,), and the rows (s,) and faces of their stars."""
     for vertex, row, star, corner in _stars(faces.triangles, n, whole):
-        yield vertex, row, take_faces(faces, star, corner)
+        yield vertex, row.astype(np.int32), take_faces(faces, star, corner)
 
 
 def _stars(F: np.ndarray, n: int, whole=False):
@@ -151,13 +155,9 @@ def stars(F: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def take_faces(faces: Elements, star: np.ndarray, corner: np.ndarray) -> Elements:
     """Some faces (s,), with their corners in the order (s,3)."""
     triangles, gradient = (np.take_along_axis(x[star], corner, 1) for x in (faces.triangles, faces.gradient))
-    return Elements(
-        triangles=triangles,
-        area=faces.area[star],
-        gradient=gradient,
-        ratio=faces.ratio[star],
-        weight=faces.weight[star],
-    )
+    weight = faces.weight[star]
+    # Nobody asks single vertices for the area of the surface.
+    return Elements(triangles.astype(np.int32), weight, gradient, faces.ratio[star], weight)
 
 
 def relax(
@@ -165,14 +165,36 @@ def relax(
 ) -> None:
     """Newton steps of every vertex (k,) within its star, in place, each only as far as its own energy falls.
 
-    row (s,): which of the vertices is the first corner of a face of the stars; fixed: vertices (k,) bool that stay.
+    row (s,): which of the vertices is the first corner of a face of the stars, ascending; fixed: vertices (k,) bool
+    that stay.
     """
+    # No vertex of one part is a neighbour of those of another: what is computed of a part stays in the cache.
+    parts = np.arange(0, len(row), PART)
+    first = np.unique(np.concatenate([row[parts], [len(vertex)]]))
+    begin = np.searchsorted(row, first)
+    for a, b, c, d in zip(first[:-1], first[1:], begin[:-1], begin[1:], strict=True):
+        some = faces if d - c == len(row) else _rows(faces, slice(c, d))
+        stay = np.broadcast_to(fixed, len(vertex))[a:b]
+        _relax(vertex[a:b], row[c:d] - a, some, w, area_weight, steps, stay)
+
+
+def _rows(faces: Elements, some: slice) -> Elements:
+    """Some of the faces, each a polygon of its own."""
+    return Elements(
+        faces.triangles[some], faces.area[some], faces.gradient[some], faces.ratio[some], faces.weight[some]
+    )
+
+
+def _relax(
+    vertex: np.ndarray, row: np.ndarray, faces: Elements, w: np.ndarray, area_weight: float, steps: int, fixed
+) -> None:
+    """`relax` of all at once."""
     k, before = len(vertex), w[vertex]
     around = _around(faces, w)
     first = value = np.bincount(row, around.energies(area_weight), k)
     for _ in range(steps):
         step = _directions(row, around, area_weight, k)
-        step[np.asarray(fixed) & np.ones(k, bool)] = 0
+        step[fixed] = 0
         moved, value = _searched(row, around, step, area_weight, value)
         w[vertex] += moved
         around = around.moved(moved[row]) if steps > 1 else around
