@@ -19,8 +19,8 @@ from ..mesh.topology import boundary_loops, expand, halfedges, pair_keys, runs, 
 from ..progress import Progress, Steps
 from .vertex_sweeps import independent_set, relax, stars
 
-# Faces of stars whose collapses are compared at once, roughly, for memory.
-PART = 200_000
+# Faces of stars whose collapses are compared at once, roughly: what their pairs take stays in the cache.
+PART = 1 << 15
 # A vertex with more faces stays: comparing all its collapses costs the square of their number.
 MOST_FACES = 9
 # Shape (1: equilateral) that new faces need in space, unless the old ones were worse.
