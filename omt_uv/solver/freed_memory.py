@@ -11,11 +11,20 @@ import sys
 from collections.abc import Callable
 from functools import cache
 
+# Vertices of a mesh of which hundreds of megabytes may be free and not given back.
+MANY = 100_000
+
 
 @cache
 def _trim() -> Callable[[int], int] | None:
     """The function of the C library of this process; None where it has none."""
     return getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
+
+
+def give_back_of(vertices: int) -> None:
+    """Give back what is free, if it may be much: between the stages of a mesh of so many vertices."""
+    if vertices > MANY:
+        give_back()
 
 
 def give_back() -> None:

@@ -222,13 +222,13 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False
     return parts
 
 
-def hangs_by_few(points: np.ndarray, triangles: np.ndarray, large: int = LARGE) -> bool:
-    """Whether a mesh (n,d), (m,3) should be factored as a whole: it has less than `large` vertices, or is long and
-    narrow. The order of the vertices is that of their elimination."""
+def hangs_by_few(points: np.ndarray, triangles: np.ndarray, large: int | None = None) -> bool:
+    """Whether a mesh (n,d), (m,3) should be factored as a whole: it has less than `large` vertices, LARGE by default, or is
+    long and narrow. The order of the vertices is that of their elimination."""
     n = len(points)
     # Factors of smaller meshes have fewer entries for a vertex: these grow with the logarithm of their number.
     little = LITTLE_FILL * min(1.0, np.log(n) / np.log(LARGE))
-    return n < large or (n < COUNTED and fill(vertex_graph(triangles, n)) < little * n)
+    return n < (LARGE if large is None else large) or (n < COUNTED and fill(vertex_graph(triangles, n)) < little * n)
 
 
 @dataclass(frozen=True)

@@ -67,10 +67,12 @@ class Elements:
 
     def derivatives(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """dw/dz and dw/dconj(z) per triangle, (m,) complex each, of a map w (n,) complex."""
-        corner = 0.5 * w[self.triangles]
-        g = self.gradient
-        a = np.einsum("mi,mi->m", corner, g.conj())
-        b = np.einsum("mi,mi->m", corner, g)
+        a, b = (np.empty(len(self.triangles), complex) for _ in range(2))
+        for begin in range(0, len(a), AT_ONCE):
+            here = slice(begin, begin + AT_ONCE)
+            corner, g = 0.5 * w[self.triangles[here]], self.gradient[here]
+            a[here] = np.einsum("mi,mi->m", corner, g.conj())
+            b[here] = np.einsum("mi,mi->m", corner, g)
         return a, b
 
     def areas(self, w: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 from ..analysis.density import Target, area_error_warnings
 from ..canonical.markers import ChartMarkers
 from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, plural, positive_density
+from ..freed_memory import give_back_of
 from ..maps.distortion import RATIO_FLOOR, Distortion, distortion, face_distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import bounding_box, face_areas, signed_areas
@@ -151,6 +152,7 @@ def map_chart(
             disk = replace(disk)  # without the maps that were made of it on the way
             refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
         refined = replace(refined, uv=refined.uv[: len(vertices)])  # centres of polygons were there for the map alone
+    give_back_of(len(vertices))
     with log.timed("measure"):
         figures = measured_chart(vertices, chart, refined.uv, density)
     if target is not None and options.balance == 0:

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from ..analysis.density import graded_density
 from ..conformal.boundary_first import FlatDisk, boundary_first
 from ..errors import PrecisionError, TransportError
+from ..freed_memory import give_back_of
 from ..maps.contacts import covers_itself
 from ..maps.energy import Elements, area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
@@ -211,6 +212,7 @@ def _coarse_initial_map(
     """The same; options: whether the targets are far from the areas, it is a draft, and the mesh itself is embedded, in
     place of the coarser one alone."""
     (far, draft, embedded), vertices, triangles = options, disk.vertices, disk.triangles
+    give_back_of(len(vertices))
     with log.timed("coarsening"):
         if flat is None and embedded:
             flat = disk.embedded
@@ -249,6 +251,7 @@ def _coarse_initial_map(
     log.warnings += refined.warnings
     with log.timed("coarsening"):
         uv = yield from part_of(coarse.prolonged(refined.uv, len(vertices)), *RETURN)
+        give_back_of(len(vertices))
         weight = SMOOTH_WEIGHT_DRAFT if draft else SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT
         uv = yield from part_of(_smoothed(disk, uv, weight, draft), *SMOOTHING)
         # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..freed_memory import give_back_of
 from ..linalg.additive_schwarz import AdditiveSchwarz
 from ..linalg.kept_factor import KeptFactor
 from ..linalg.nested_dissection import LARGE, vertex_graph
@@ -144,6 +145,7 @@ class RowAssembly:
         self, faces: Elements, w: np.ndarray, weight, pressure, axes, symmetry: MirrorSymmetry | None = None
     ) -> Hessian:
         """The Hessian of the energy, see `hessian_blocks`."""
+        give_back_of(len(w))
         gradient, rest, scale = np.zeros(len(w), complex), None, 0.0
 
         def blocks() -> Iterator[tuple[np.ndarray, np.ndarray]]:

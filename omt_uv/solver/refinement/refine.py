@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import MeshError, positive_density
+from ..freed_memory import give_back_of
 from ..linalg.symmetric_sweeps import sweeping_solver
 from ..maps.contacts import crossings
 from ..maps.energy import Elements, area_error, elements, has_folds
@@ -168,6 +169,7 @@ def refine(
     if pins is not None and options.boundary != "free":
         raise ValueError("pins need a free boundary")
     yield Progress("Refinement", 0.0)
+    give_back_of(len(vertices))
     target = _targets(face_areas(vertices, triangles), target)
     mesh = renumbered(vertices, triangles, uv, pins, polygons)
 
