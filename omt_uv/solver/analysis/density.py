@@ -21,6 +21,11 @@ from . import curvature
 CONTRAST = 1e6
 # An area error above so many times its goal is worth a warning.
 INEXACT = 2.0
+# Edges of a coarse mesh grow by at most the root of this over the number of vertices for a length: as they do around a
+# disk that gets most of the map, and meets its ring with as many edges as the ring has around it.
+AROUND = 4.0
+# Its vertices are at most so much denser in one place than in another.
+LEAST_DENSITY = 1e-4
 
 
 @dataclass(frozen=True)
@@ -211,3 +216,14 @@ def check_factor(factor: float) -> None:
     """Raise ShareError unless a factor is positive and finite."""
     if not (np.isfinite(factor) and factor > 0):
         raise ShareError(f"A region cannot have {factor:g} times its share", "Choose a factor above 0")
+
+
+def density_of_vertices(vertices: np.ndarray, triangles: np.ndarray, target: np.ndarray, goal: int) -> np.ndarray:
+    """Density (n,) of the `goal` vertices of a coarse mesh of a surface (n,3), (m,3): as the map stretches what is to
+    get the areas target (m,)."""
+    area = face_areas(vertices, triangles)
+    stretch = target / area
+    stretch = np.maximum(stretch, LEAST_DENSITY * stretch.max())
+    density = area * graded_density(stretch, vertices, triangles, np.sqrt(AROUND / goal), goal)
+    has, all_of_it = (np.bincount(triangles.ravel(), np.repeat(x, 3), len(vertices)) for x in (density, area))
+    return has / all_of_it

@@ -223,8 +223,8 @@ def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False
 
 
 def hangs_by_few(points: np.ndarray, triangles: np.ndarray, large: int | None = None) -> bool:
-    """Whether a mesh (n,d), (m,3) should be factored as a whole: it has less than `large` vertices, LARGE by default, or is
-    long and narrow. The order of the vertices is that of their elimination."""
+    """Whether a mesh (n,d), (m,3) should be factored as a whole: it has less than `large` vertices, LARGE by default,
+    or is long and narrow. The order of the vertices is that of their elimination."""
     n = len(points)
     # Factors of smaller meshes have fewer entries for a vertex: these grow with the logarithm of their number.
     little = LITTLE_FILL * min(1.0, np.log(n) / np.log(LARGE))

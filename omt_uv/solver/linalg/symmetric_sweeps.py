@@ -80,12 +80,12 @@ class SymmetricSweeps:
 
     def _coarse(self, rows: VertexRows, spread: sp.csr_matrix) -> Factor:
         """Factors of the equations (6 parts, 6 parts) of the motions spread (2n, 6 parts), colour after colour."""
-        total = None
+        total = sp.csr_matrix((spread.shape[1],) * 2)
         for k, both in enumerate(rows.of_colours):
             own = rows.pattern.rows(k)
             for p, some in enumerate(both):
                 found = spread[2 * own.start + p : 2 * own.stop : 2].T @ (some @ spread)
-                total = found if total is None else total + found
+                total = total + found
         if rows.more_of_colours is not None:
             total = total + spread.T @ (sp.vstack(rows.more_of_colours) @ spread)
         total = total.tocsc()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -137,7 +138,7 @@ class VertexRows:
         if self._more is None:
             return None
         cuts = 2 * self.pattern.first
-        return [self._more[a:b] for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+        return [self._more[a:b] for a, b in pairwise(cuts)]
 
     def times(self, x: np.ndarray, colour: int) -> np.ndarray:
         """What the rows of a colour make of x (2n,): (v,2)."""

@@ -7,6 +7,7 @@ and corners on corners. What tells them from neighbours is the angle that the ma
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..mesh.geometry import complex_cross
 from .boxes import box_pairs
@@ -16,11 +17,20 @@ OVERLAPPING = 1e-3
 # Edges that reach past each other by less than this share of the map only touch: the two sides of a cut through a flat
 # surface lie on one another, and rounding shall not decide whether they cross.
 TOUCH = 1e-9
+# Vertices of a boundary touch one another that are nearer than this share of the mean of its edges.
+TOUCHING = 1e-6
 
 
 def loop_edges(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tails and heads (b,) of the edges of a boundary: a loop (b,) of vertices, or edges (b,2) of several loops."""
     return (loop[:, 0], loop[:, 1]) if loop.ndim == 2 else (loop, np.roll(loop, -1))
+
+
+def touches_itself(uv: np.ndarray, loop: np.ndarray) -> bool:
+    """Whether vertices of a boundary (b,) lie on one another in a map uv (n,2), as those along a slit do."""
+    points = uv[loop]
+    step = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).mean()
+    return bool((cKDTree(points).query(points, k=2)[0][:, 1] < TOUCHING * step).any())
 
 
 def crossings(w: np.ndarray, loop: np.ndarray) -> np.ndarray:

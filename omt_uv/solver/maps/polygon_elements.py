@@ -8,6 +8,7 @@ have it; others are measured on the triangulation given until they have become c
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -139,7 +140,11 @@ def _bent(positions, triangles, faces, mesh: PolygonMesh) -> np.ndarray:
 
 def _dented(positions, quads: np.ndarray) -> np.ndarray:
     """Areas (q,) of quads (q,4) over the means of both triangulations: not 1 of flat darts."""
-    mean = part_by_part(lambda q: face_areas(positions, q[:, BOTH].reshape(-1, 3)).reshape(-1, 4).sum(axis=1) / 2, quads)
+
+    def means(some):
+        return face_areas(positions, some[:, BOTH].reshape(-1, 3)).reshape(-1, 4).sum(axis=1) / 2
+
+    mean = part_by_part(means, quads)
     return np.divide(quad_areas(positions, quads), mean, out=np.ones(len(quads)), where=mean > 0)
 
 
@@ -186,6 +191,46 @@ def restricted(faces: Elements, kept: np.ndarray, place: np.ndarray) -> Elements
         polygon=None if faces.polygon is None else (np.cumsum(kept) - 1)[faces.polygon[here]],
         part=None if faces.part is None else faces.part[here],
         quads=quads,
+    )
+
+
+def in_turn(faces: Elements, count: int) -> Iterator[tuple[Elements, slice, np.ndarray | slice, slice]]:
+    """The elements of `count` polygons after the others, and where they come from: these polygons, and the rows of
+    their lone triangles and quads among all lone triangles and all quads."""
+    four = 0 if faces.quads is None else len(faces.quads.convex)
+    first, single, none = len(faces.triangles) - 4 * four, len(faces.area) - four, slice(0, 0)
+    for begin in range(0, single, count):
+        here = slice(begin, min(begin + count, single))
+        if faces.polygon is None:
+            yield _slice_of(faces, here, here), here, here, none
+            continue
+        some = np.zeros(len(faces.area), bool)
+        some[here] = True
+        rows = np.flatnonzero(some[faces.polygon[:first]])
+        yield restricted(faces, some, np.arange(int(faces.triangles.max()) + 1)), here, rows, none
+    for begin in range(0, four, count):
+        end = min(begin + count, four)
+        here = slice(single + begin, single + end)
+        yield _slice_of(faces, here, slice(first + 4 * begin, first + 4 * end)), here, none, slice(begin, end)
+
+
+def _slice_of(faces: Elements, here: slice, rows: slice) -> Elements:
+    """The elements of some triangles that are polygons of their own, or of some quads, that follow each other."""
+    lone, quads = here == rows, faces.quads
+    if not lone and quads is not None:
+        last = here.start - len(faces.area), (here.stop - len(faces.area)) or None
+        kept = slice(*last)
+        crossed = None if quads.crossed is None else quads.crossed[kept]
+        quads = Quads(quads.size[kept], quads.convex[kept], crossed)
+    return Elements(
+        triangles=faces.triangles[rows],
+        area=faces.area[here],
+        gradient=faces.gradient[rows],
+        ratio=faces.ratio[here],
+        weight=faces.weight[here],
+        polygon=None if lone else np.repeat(np.arange(here.stop - here.start), 4),
+        part=None if lone or faces.part is None else faces.part[rows],
+        quads=None if lone else quads,
     )
 
 

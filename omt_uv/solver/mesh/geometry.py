@@ -54,11 +54,11 @@ def part_by_part(function: Callable[..., np.ndarray], *arrays: np.ndarray) -> np
     count = len(arrays[0])
     if count <= CHUNK:
         return function(*arrays)
-    found = None
-    for begin in range(0, count, CHUNK):
-        part = function(*(a[begin : begin + CHUNK] for a in arrays))
-        found = np.empty((count, *part.shape[1:]), part.dtype) if found is None else found
-        found[begin : begin + CHUNK] = part
+    first = function(*(a[:CHUNK] for a in arrays))
+    found = np.empty((count, *first.shape[1:]), first.dtype)
+    found[:CHUNK] = first
+    for begin in range(CHUNK, count, CHUNK):
+        found[begin : begin + CHUNK] = function(*(a[begin : begin + CHUNK] for a in arrays))
     return found
 
 

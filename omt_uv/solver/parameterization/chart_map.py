@@ -13,6 +13,7 @@ from ..analysis.density import Target, area_error_warnings
 from ..canonical.markers import ChartMarkers
 from ..errors import FoldedUVError, MeshError, PinError, PrecisionError, TransportError, plural, positive_density
 from ..freed_memory import give_back_of
+from ..maps.contacts import touches_itself
 from ..maps.distortion import RATIO_FLOOR, Distortion, distortion, face_distortion
 from ..mesh.charts import Chart
 from ..mesh.geometry import bounding_box, face_areas, signed_areas
@@ -36,7 +37,6 @@ from .initial_map import (
     good_enough,
     mean_value_sites,
     roomy_initial_map,
-    touches_itself,
 )
 from .options import MapOptions
 from .polygon_disk import of_polygon_disk, polygon_disk, with_centres
@@ -152,7 +152,6 @@ def map_chart(
             disk = replace(disk)  # without the maps that were made of it on the way
             refined = yield from part_of(_refined(disk, start, refinement_options, given, log), *REFINEMENT)
         refined = replace(refined, uv=refined.uv[: len(vertices)])  # centres of polygons were there for the map alone
-    give_back_of(len(vertices))
     with log.timed("measure"):
         figures = measured_chart(vertices, chart, refined.uv, density)
     if target is not None and options.balance == 0:
@@ -377,6 +376,7 @@ def _refined(disk: DiskMesh, uv: np.ndarray, options: RefinementOptions, given: 
 
 def measured_chart(vertices: np.ndarray, chart: Chart, uv: np.ndarray, density: np.ndarray | None) -> Distortion:
     """Figures of a map (n,2) of the polygons of a chart, at the positions (n,3), against a density (m,)."""
+    give_back_of(len(vertices))
     mapped = uv[chart.triangles]
     return distortion(vertices, chart.triangles, mapped, overlap=False, density=density, polygons=chart.faces)
 

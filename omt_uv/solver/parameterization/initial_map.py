@@ -11,13 +11,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..analysis.density import graded_density
+from ..analysis.density import density_of_vertices
 from ..conformal.boundary_first import FlatDisk, boundary_first
 from ..errors import PrecisionError, TransportError
 from ..freed_memory import give_back_of
-from ..maps.contacts import covers_itself
+from ..maps.contacts import covers_itself, touches_itself
 from ..maps.energy import Elements, area_error, elements, energy
 from ..maps.polygon_elements import polygon_elements
 from ..maps.tutte import arc_length_parameters, evened_tutte, tutte
@@ -76,8 +75,6 @@ HOPELESS = 50.0
 ISOMETRY = 1e-8
 # What is unrolled so that its outline lies on itself may be that far from one: shear of 1.02 to 1.1.
 UNROLLED = 1e-2
-# Vertices of a boundary touch one another that are nearer than this share of the mean of its edges.
-TOUCHING = 1e-6
 # Drafts of charts with more vertices than this come by way of a coarser mesh, unless their log scale spreads less, and
 # need no step of all vertices where sweeps bring the areas of a draft.
 DRAFT_ABOVE = 600
@@ -85,11 +82,6 @@ DRAFT_COARSE_ABOVE = 2000
 DRAFT_COARSER = 6
 DRAFT_SPREAD = 0.03
 DRAFT_SWEEPS = 16
-# Their edges grow by at most the root of this over the number of vertices for a length: as they do around a disk that
-# gets most of the map, and meets its ring with as many edges as the ring has around it.
-AROUND = 4.0
-# Vertices are at most so much denser in one place than in another.
-LEAST_DENSITY = 1e-4
 # What comes back is smoothed so many times, with these area weights.
 SWEEPS = 8
 SMOOTH_WEIGHT = 30.0
@@ -221,7 +213,7 @@ def _coarse_initial_map(
             if even is not None and not (draft and map_energy(even, vertices, triangles) > HOPELESS):
                 return InitialChartMap(even)
         goal = len(vertices) // (COARSER_FAR if far else DRAFT_COARSER if draft else COARSER)
-        density = _density(vertices, triangles, disk.target, goal) if far else None
+        density = density_of_vertices(vertices, triangles, disk.target, goal) if far else None
         whole = draft and disk.boundary != "free"
         steps = coarsen_disk(vertices, triangles, flat, disk.target, goal, disk.region, density, whole)
         coarse = yield from part_of(steps, *COARSENING)
@@ -239,7 +231,7 @@ def _coarse_initial_map(
     if len(points) > (DIRECT_FAR if far else DRAFT_COARSE_ABOVE if draft else COARSE_ABOVE):
         coarser = coarse_initial_map(coarse_disk, balance, log, None if flat is None else flat[coarse.kept], draft)
         found = yield from part_of(coarser, *COARSE_MAP)
-    if found is None and draft and corners is None:
+    if found is None and draft and corners is None and flat is not None:
         found = _draft_start(coarse_disk, flat[coarse.kept], log)
     elif found is None:
         found = yield from part_of(direct_initial_map(coarse_disk, log), *COARSE_MAP)
@@ -255,8 +247,9 @@ def _coarse_initial_map(
         weight = SMOOTH_WEIGHT_DRAFT if draft else SMOOTH_WEIGHT_FAR if far else SMOOTH_WEIGHT
         uv = yield from part_of(_smoothed(disk, uv, weight, draft), *SMOOTHING)
         # Of slivers a coarser mesh says nothing: no vertex of theirs can go without others turning inside out.
-        if flat is not None and not (far or draft) and map_energy(flat, vertices, triangles) < map_energy(uv, vertices, triangles):
-            return InitialChartMap(flat)
+        start = None if far or draft else flat
+        if start is not None and map_energy(start, vertices, triangles) < map_energy(uv, vertices, triangles):
+            return InitialChartMap(start)
     return InitialChartMap(uv, found.conformal, found.cells, far, True, refined.multiplier)
 
 
@@ -297,16 +290,6 @@ def _smoothed(disk: DiskMesh, uv: np.ndarray, area_weight: float, draft: bool) -
     del faces
     w = yield from steps
     return np.column_stack([w.real, w.imag])
-
-
-def _density(vertices, triangles, target, goal: int) -> np.ndarray:
-    """Density (n,) of the vertices of a coarse mesh: as the map stretches what is to get the areas target (m,)."""
-    area = face_areas(vertices, triangles)
-    stretch = target / area
-    stretch = np.maximum(stretch, LEAST_DENSITY * stretch.max())
-    density = area * graded_density(stretch, vertices, triangles, np.sqrt(AROUND / goal), goal)
-    has, all_of_it = (np.bincount(triangles.ravel(), np.repeat(x, 3), len(vertices)) for x in (density, area))
-    return has / all_of_it
 
 
 def roomy_initial_map(disk: DiskMesh, log: RunLog) -> InitialChartMap | None:
@@ -374,13 +357,6 @@ def good_enough(disk: DiskMesh, uv: np.ndarray, draft: bool, apart: bool, goal: 
         overlap=False,
         warnings=(),
     )
-
-
-def touches_itself(uv: np.ndarray, loop: np.ndarray) -> bool:
-    """Whether vertices of a boundary (b,) lie on one another in a map uv (n,2), as those along a slit do."""
-    points = uv[loop]
-    step = np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1).mean()
-    return bool((cKDTree(points).query(points, k=2)[0][:, 1] < TOUCHING * step).any())
 
 
 def initial_map(disk: DiskMesh, log: RunLog) -> Steps[InitialChartMap]:

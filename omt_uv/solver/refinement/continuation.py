@@ -45,7 +45,7 @@ from .continuation_rules import (
     spare_weight,
     stage_tolerances,
 )
-from .hessian_blocks import Assembly
+from .hessian_blocks import Assembly, RowAssembly
 from .projected_newton import Motion, NewtonProblem, NewtonStep
 from .vertex_sweeps import Smoother
 
@@ -69,7 +69,7 @@ class MapProblem:
     """
 
     faces: Elements
-    assembly: Assembly
+    assembly: Assembly | RowAssembly
     motion: Motion
     loop: np.ndarray | None
     with_barrier: bool

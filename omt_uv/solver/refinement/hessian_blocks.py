@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import overload
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,7 +22,6 @@ from ..linalg.symmetric_sweeps import SymmetricSweeps
 from ..linalg.vertex_rows import RowPattern, VertexRows
 from ..maps.energy import (
     Elements,
-    Quads,
     area_forms_of,
     by_squares,
     corner_slopes,
@@ -30,7 +30,7 @@ from ..maps.energy import (
     without_negative,
 )
 from ..maps.mirror_symmetry import MirrorSymmetry
-from ..maps.polygon_elements import restricted
+from ..maps.polygon_elements import in_turn, restricted
 from ..mesh.polygon_areas import BOTH
 
 # Triangles whose blocks are found at a time: what is found on the way stays in the processor's cache.
@@ -150,7 +150,8 @@ class RowAssembly:
 
         def blocks() -> Iterator[tuple[np.ndarray, np.ndarray]]:
             nonlocal rest, scale
-            for some, of, kept, (lone, four) in _some_after_others(faces, weight, pressure):
+            for some, here, lone, four in in_turn(faces, FEW_AT_ONCE):
+                of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
                 found = _blocks_at_once(some, w, of, kept, axes, symmetry, gradient)
                 scale += found.scale
                 rest = found.rest if rest is None else rest if found.rest is None else rest + found.rest
@@ -167,49 +168,6 @@ class RowAssembly:
         rows = VertexRows(self._pattern, data, more)
         rows.add_diagonal(diagonal)
         return rows
-
-
-def _some_after_others(faces: Elements, weight, pressure):
-    """The elements of some polygons after the others, their area weights and pressures, and where their blocks are:
-    rows of lone triangles, and of quads."""
-    count, first = len(faces.area), lone_triangles(faces)
-    four = (len(faces.triangles) - first) // 4
-    single = count - four
-    for begin in range(0, single, FEW_AT_ONCE):
-        end = min(begin + FEW_AT_ONCE, single)
-        here = slice(begin, end)
-        of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
-        if faces.polygon is None:
-            yield _slice_of(faces, here, here, None, None), of, kept, (here, slice(0, 0))
-        else:
-            some = np.zeros(count, bool)
-            some[here] = True
-            rows = np.flatnonzero(some[faces.polygon[:first]])
-            yield restricted(faces, some, np.arange(int(faces.triangles.max()) + 1)), of, kept, (rows, slice(0, 0))
-    for begin in range(0, four, FEW_AT_ONCE):
-        end = min(begin + FEW_AT_ONCE, four)
-        here, rows = slice(single + begin, single + end), slice(first + 4 * begin, first + 4 * end)
-        of, kept = (x if np.ndim(x) == 0 else x[here] for x in (weight, pressure))
-        crossed = None if faces.quads.crossed is None else faces.quads.crossed[begin:end]
-        quads = Quads(faces.quads.size[begin:end], faces.quads.convex[begin:end], crossed)
-        yield _slice_of(faces, here, rows, np.repeat(np.arange(end - begin), 4), quads), of, kept, (
-            slice(0, 0),
-            slice(begin, end),
-        )
-
-
-def _slice_of(faces: Elements, here: slice, rows: slice, polygon: np.ndarray | None, quads: Quads | None) -> Elements:
-    """The elements of polygons that follow each other, and of their triangles, which do, too."""
-    return Elements(
-        triangles=faces.triangles[rows],
-        area=faces.area[here],
-        gradient=faces.gradient[rows],
-        ratio=faces.ratio[here],
-        weight=faces.weight[here],
-        polygon=polygon,
-        part=None if polygon is None or faces.part is None else faces.part[rows],
-        quads=quads,
-    )
 
 
 @dataclass(frozen=True)
@@ -229,14 +187,29 @@ def _pairs(cells: np.ndarray, n: int) -> np.ndarray:
     return (np.tile(cells, (1, k)).astype(np.int64) * n + np.repeat(cells, k, axis=1)).ravel()
 
 
+@overload
+def assembly_of(
+    faces: Elements, n: int, parts: SymmetricSweeps, symmetry: MirrorSymmetry | None = None
+) -> RowAssembly: ...
+@overload
+def assembly_of(
+    faces: Elements,
+    n: int,
+    parts: AdditiveSchwarz | KeptFactor | None = None,
+    symmetry: MirrorSymmetry | None = None,
+) -> Assembly: ...
 def assembly_of(
     faces: Elements, n: int, parts: Solver | None = None, symmetry: MirrorSymmetry | None = None
 ) -> Assembly | RowAssembly:
     """The assembly of the elements of a mesh of n vertices, of which some may follow others."""
     first = lone_triangles(faces)
     place = np.arange(n) if symmetry is None else symmetry.representative
-    make = RowAssembly if isinstance(parts, SymmetricSweeps) else Assembly
-    assembly = make(place[faces.triangles[:first]], n, parts, place[corners_of_quads(faces)])
+    lone, four = place[faces.triangles[:first]], place[corners_of_quads(faces)]
+    assembly: Assembly | RowAssembly
+    if isinstance(parts, SymmetricSweeps):
+        assembly = RowAssembly(lone, n, parts, four)
+    else:
+        assembly = Assembly(lone, n, parts, four)
     if symmetry is not None and n < LARGE:
         # The order of the mesh is no order of its half: folded, its separators are neighbours of both sides.
         vertices = minimum_degree(vertex_graph(place[faces.triangles], n))

@@ -2,9 +2,9 @@
 
 An independent set of vertices is removed in every round (Kirkpatrick 1983). The mesh is carried along as an embedding
 in the plane: a collapse that keeps all its triangles positive there keeps the mesh a disk. Without an embedding it is
-one that makes no edge twice (the link condition of Dey, Edelsbrunner, Guha, Nekhayev 1999). On the way back every vertex
-returns into the star that it left: the vertex it was collapsed to sees all of that star, so near it there is always a
-place where no face folds (Shen, Jiang, Zorin, Panozzo 2019).
+one that makes no edge twice (the link condition of Dey, Edelsbrunner, Guha, Nekhayev 1999). On the way back every
+vertex returns into the star that it left: the vertex it was collapsed to sees all of that star, so near it there is
+always a place where no face folds (Shen, Jiang, Zorin, Panozzo 2019).
 """
 
 from __future__ import annotations
@@ -111,10 +111,10 @@ def coarsen_disk(
 ) -> Steps[CoarseMesh]:
     """Coarsen a disk (n,3), (m,3) to about `goal` vertices.
 
-    flat (n,2): an embedding in the plane with a convex boundary, or None; mass (m,): what the triangles' areas in the final map
-    are to be, handed on; region (m,) in [0, 1]: weights of a region, which keeps its share of the mass; density (n,):
-    how many vertices are to be left there for an area, relative to elsewhere; by default that is left to chance;
-    whole_boundary: its vertices stay, however many they are of those that are left.
+    flat (n,2): an embedding in the plane with a convex boundary, or None; mass (m,): what the triangles' areas in the
+    final map are to be, handed on; region (m,) in [0, 1]: weights of a region, which keeps its share of the mass;
+    density (n,): how many vertices are to be left there for an area, relative to elsewhere; by default that is left to
+    chance; whole_boundary: its vertices stay, however many they are of those that are left.
     """
     mass = np.column_stack([mass] if region is None else [mass, mass * region])
     rounds: list[RemovalRound] = []

@@ -195,9 +195,7 @@ def newton_direction(
 def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> tuple[Matrix, np.ndarray, float]:
     """Hessian (2n,2n) and slopes (2n,) along the axes of the frame, and the mean of the Hessian's diagonal."""
     n = len(w)
-    found = problem.assembly.hessian(
-        problem.faces, w, problem.area_weight, pressure, (frame, free), problem.symmetry
-    )
+    found = problem.assembly.hessian(problem.faces, w, problem.area_weight, pressure, (frame, free), problem.symmetry)
     gradient, more, scale = found.gradient, found.rest, found.scale
     for part in problem.terms:
         slope, vertices, forms = part.derivatives(w)
@@ -214,9 +212,7 @@ def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> 
     return found.matrix(diagonal.ravel() + SHIFT * scale, more), axes.ravel(), scale
 
 
-def _solution(
-    matrix: Matrix, b, scale: float, parts: Solver | None, w, axes, order: FillOrder
-) -> np.ndarray:
+def _solution(matrix: Matrix, b, scale: float, parts: Solver | None, w, axes, order: FillOrder) -> np.ndarray:
     """Solution x (n,) of matrix x = b, shifted where rounding makes it singular: the step is shorter, and goes down."""
     shift = SHIFT
     if parts is None and isinstance(matrix, VertexRows):

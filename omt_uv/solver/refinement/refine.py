@@ -26,7 +26,7 @@ from ..progress import Progress, Steps, part_of
 from .continuation import ContinuationResult, MapProblem, minimise_in_stages
 from .continuation_rules import QUALITIES, planned_weights
 from .elimination_order import Renumbered, renumbered
-from .hessian_blocks import Assembly, assembly_of, corners_of_quads
+from .hessian_blocks import Assembly, RowAssembly, assembly_of, corners_of_quads
 from .initial_maps import (
     InitialMap,
     disk_initial_map,
@@ -381,7 +381,12 @@ def _mirrored(problem: MapProblem, symmetry: MirrorSymmetry | None, w: np.ndarra
 
 
 def _map_problem(
-    faces: Elements, assembly: Assembly, initial: InitialMap, loop, boundary: str, smoother: Smoother | None
+    faces: Elements,
+    assembly: Assembly | RowAssembly,
+    initial: InitialMap,
+    loop,
+    boundary: str,
+    smoother: Smoother | None,
 ) -> MapProblem:
     return MapProblem(
         faces=faces,

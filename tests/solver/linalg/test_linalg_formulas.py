@@ -215,7 +215,7 @@ def test_a_solve_by_parts_is_preconditioned_by_their_sum():
         parts.solve(sp.csr_matrix(A), b, w, lambda: axes)
     finally:
         additive_schwarz.by_gradients = before
-    spread = parts._affine(w, axes).toarray()
+    spread = additive_schwarz.affine_motions(parts._part, parts._count, w, axes).toarray()
     # Every part has motions of its own: to shift, turn, scale and shear it.
     assert np.linalg.matrix_rank(spread) == spread.shape[1] == 6 * (parts._part.max() + 1)
     coarse = spread.T @ A @ spread

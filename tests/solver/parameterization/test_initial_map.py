@@ -7,6 +7,7 @@ import pytest
 
 from omt_uv.solver.conformal.disk_map import sharpest_corners
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
+from omt_uv.solver.maps.contacts import touches_itself
 from omt_uv.solver.maps.distortion import distortion
 from omt_uv.solver.maps.energy import elements, energy
 from omt_uv.solver.maps.untangle import count_folds, map_energy
@@ -20,7 +21,6 @@ from omt_uv.solver.parameterization.initial_map import (
     initial_map,
     mean_value_sites,
     roomy_initial_map,
-    touches_itself,
 )
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
