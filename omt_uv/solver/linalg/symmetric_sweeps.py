@@ -53,9 +53,10 @@ class SymmetricSweeps:
         """The solution; None where it takes too many iterations."""
         order, colours = rows.pattern.order, range(len(rows.pattern.first) - 1)
         spread = affine_motions(self._part[order], int(self._part.max()) + 1, w[order], axes()[order])
-        coarse, gather = self._coarse(rows, spread), spread.T
-        xx, xy, yy = rows.inverse
         give_back()
+        coarse, gather = self._coarse(rows, spread), spread.T
+        give_back()
+        xx, xy, yy = rows.inverse
 
         def sweep(x, r, order):
             for k in order:

@@ -155,8 +155,13 @@ def with_convex_quads(faces: Elements, w: np.ndarray) -> Elements:
     """
     if faces.quads is None:
         return faces
-    a, b, c = w[faces.triangles[len(faces.triangles) - 4 * len(faces.quads.convex) :]].T
-    return with_convex_quads_of(faces, ((b - a).conj() * (c - a)).imag.reshape(-1, 4))
+
+    def areas(some):
+        a, b, c = w[some].T
+        return ((b - a).conj() * (c - a)).imag
+
+    four = faces.triangles[len(faces.triangles) - 4 * len(faces.quads.convex) :]
+    return with_convex_quads_of(faces, part_by_part(areas, four).reshape(-1, 4))
 
 
 def with_convex_quads_of(faces: Elements, area: np.ndarray) -> Elements:

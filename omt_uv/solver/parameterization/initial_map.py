@@ -14,7 +14,7 @@ import numpy as np
 
 from ..analysis.density import density_of_vertices
 from ..conformal.boundary_first import FlatDisk, boundary_first
-from ..errors import PrecisionError, TransportError
+from ..errors import MeshError, PrecisionError, TransportError
 from ..freed_memory import give_back_of
 from ..maps.contacts import covers_itself, touches_itself
 from ..maps.energy import Elements, area_error, elements, energy
@@ -192,7 +192,11 @@ def coarse_initial_map(
     """
     far = is_far(disk.target, face_areas(disk.vertices, disk.triangles))
     if flat is None and len(disk.vertices) > EMBEDDED and not (far or draft):
-        found = yield from _coarse_initial_map(disk, balance, log, None, (False, False, False))
+        try:
+            found = yield from _coarse_initial_map(disk, balance, log, None, (False, False, False))
+        except MeshError:
+            # An embedding of all of it says what it is.
+            found = None
         if found is not None and map_energy(found.uv, disk.vertices, disk.triangles) < HOPELESS:
             return found
     return (yield from _coarse_initial_map(disk, balance, log, flat, (far, draft, True)))

@@ -109,6 +109,39 @@ def test_a_coarse_mesh_leads_to_a_map_without_folds():
     assert {"coarsening", "coarse refinement"} <= log.seconds.keys()
 
 
+@pytest.mark.parametrize("boundary", ["free", "disk", "square"])
+def test_large_meshes_are_embedded_once_they_are_coarse(boundary, monkeypatch):
+    """What comes of that is as good a map."""
+    V, F = meshes.head(96)
+    surface, options = triangle_surface(V, F), UnwrapOptions(boundary)
+    sizes, embedded = [], initial_maps.mean_value_sites
+
+    def seen(vertices, *rest):
+        sizes.append(len(vertices))
+        return embedded(vertices, *rest)
+
+    monkeypatch.setattr(initial_maps, "mean_value_sites", seen)
+    (whole,) = drain(unwrap(surface, options=options)).maps
+    assert max(sizes) == len(V)
+    sizes.clear()
+    monkeypatch.setattr(initial_maps, "EMBEDDED", 5_000)
+    (found,) = drain(unwrap(surface, options=options)).maps
+    assert max(sizes, default=0) < len(V) / 4
+    assert found.folds == 0 and found.area_l1 <= 0.008 and not found.warnings
+    assert found.angle_mean == pytest.approx(whole.angle_mean, rel=0.01)
+
+
+def test_large_meshes_of_slivers_are_embedded_all_the_same(monkeypatch):
+    V, F = hard_meshes.sliver_sphere(6_000)
+    chart = cut_to_disks(triangle_surface(V, F)).charts[0]
+    disk = disk_of(chart.vertices, chart.triangles)
+    before = drain(coarse_initial_map(disk, 0.0, RunLog()))
+    monkeypatch.setattr(initial_maps, "EMBEDDED", 1_000)
+    found = drain(coarse_initial_map(disk_of(chart.vertices, chart.triangles), 0.0, RunLog()))
+    energies = [map_energy(x.uv, disk.vertices, disk.triangles) for x in (found, before)]
+    assert energies[0] <= max(1.01 * energies[1], initial_maps.HOPELESS)
+
+
 def test_a_mesh_of_boundary_vertices_is_not_coarsened():
     assert drain(coarse_initial_map(disk_of(*meshes.spiral_strip(1.0, 20), "disk"), 0.0, RunLog())) is None
 

@@ -41,6 +41,50 @@ def test_a_coarser_mesh_is_the_same_disk(name):
     assert coarse.mass.sum() == pytest.approx(mass.sum()) and (coarse.mass > 0).all()
 
 
+def bare(name, share=8, **options):
+    """The coarser mesh of one that is not embedded."""
+    V, F = getattr(meshes, name)()
+    mass = face_areas(V, F)
+    return V, F, mass, drain(coarsen_disk(V, F, None, mass, len(V) // share, **options))
+
+
+@pytest.mark.parametrize("name", [*SHAPES, "comb", "two_bumps", "hemisphere"])
+def test_a_coarser_mesh_of_one_that_is_not_embedded_is_the_same_disk(name):
+    """Any map of it without folds is carried back without folds."""
+    V, F, mass, coarse = bare(name)
+    T = coarse.triangles
+    loops = boundary_loops(T)
+    assert len(coarse.kept) < 0.7 * len(V) and len(loops) == 1
+    edges = np.sort(np.concatenate([T, np.roll(T, -1, axis=1)]).reshape(2, -1).T, axis=1)
+    assert np.unique(edges, axis=0, return_counts=True)[1].max() <= 2
+    assert len(coarse.kept) - (3 * len(T) + (twins(T) < 0).sum()) // 2 + len(T) == 1  # Euler
+    assert coarse.mass.sum() == pytest.approx(mass.sum()) and (coarse.mass > 0).all()
+    flat = mean_value_sites(V[coarse.kept], T, loops[0], None, Disk())
+    assert (signed_areas(flat, T) > 0).all()
+    uv = drain(coarse.prolonged(flat, len(V)))
+    assert (signed_areas(uv, F) > 0).all()
+    np.testing.assert_array_equal(uv[coarse.kept], flat)
+
+
+def test_no_edge_is_made_twice_by_collapses_of_one_round():
+    """Vertices of a coarse ring around another hang together by what would be doubled."""
+    V, F = meshes.random_disk(400)
+    for seed in range(6):
+        flat = V[np.random.default_rng(seed).permutation(len(V))]
+        coarse = drain(coarsen_disk(flat, F, None, np.ones(len(F)), 12))
+        T = coarse.triangles
+        assert len(boundary_loops(T)) == 1
+        assert len(coarse.kept) - (3 * len(T) + (twins(T) < 0).sum()) // 2 + len(T) == 1  # Euler
+        edges = np.sort(np.stack([T.ravel(), np.roll(T, -1, axis=1).ravel()], axis=1), axis=1)
+        assert np.unique(edges, axis=0, return_counts=True)[1].max() <= 2
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_whole_boundary_of_a_mesh_that_is_not_embedded_stays_where_it_is_asked_to(name):
+    _, F, _, coarse = bare(name, 40, whole_boundary=True)
+    assert np.isin(boundary_loops(F)[0], coarse.kept).all()
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_no_face_folds_on_the_way_back(name):
     V, F, flat, _, coarse = coarse_of(name)
