@@ -1,7 +1,8 @@
 """Sparse linear systems of meshes: direct and iterative solvers, elimination orders, and L-BFGS.
 
 Imports solver.errors and solver.mesh.
-Main names: Factor, solve_spd, solve_general, LaplacianSolver, AdditiveSchwarz, KeptFactor, Dissection, LBFGS.
+Main names: Factor, solve_spd, solve_general, LaplacianSolver, SymmetricSweeps, AdditiveSchwarz, KeptFactor, Dissection,
+LBFGS.
 """
 
 from ..lazy import lazy
@@ -13,5 +14,7 @@ __getattr__, __all__ = lazy(
     lbfgs="LBFGS",
     multigrid="LaplacianSolver Multigrid",
     nested_dissection="Dissection kd_parts mesh_order vertex_graph",
+    symmetric_sweeps="SymmetricSweeps sweeping_solver",
+    vertex_rows="RowPattern VertexRows",
     sparse="Factor conjugate_gradients minimum_degree solve_conjugate_gradients solve_general solve_spd",
 )
