@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.geometry import face_areas, face_normals, halfedge_lengths
+from ..mesh.geometry import dot3, face_areas, face_normals, halfedge_lengths, lengths
 from ..mesh.topology import graph_components, halfedges, pair_keys, pair_up, twins
 
 NO_EDGES = np.zeros((0, 2), np.int64)
@@ -28,15 +28,16 @@ def fold_angles(positions: np.ndarray, triangles: np.ndarray, pair: np.ndarray) 
 
     Negative where the surface is hollow, 0 beside faces without area.
     """
-    p = positions[triangles]
+    p = np.take(positions, triangles, axis=0)
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    size = np.linalg.norm(normal, axis=1)
+    size = lengths(normal)
     normal /= np.where(size > 0, size, 1)[:, None]
     t, s = pair.T // 3
-    cosine = np.clip((normal[t] * normal[s]).sum(axis=1), -1, 1)
+    one, other = np.take(normal, t, axis=0), np.take(normal, s, axis=0)
+    cosine = np.clip(dot3(one, other), -1, 1)
     # The far corner of the one face lies above the other where the surface is hollow.
     far = positions[triangles[s, (pair[:, 1] + 2) % 3]] - positions[triangles[t, pair[:, 0] % 3]]
-    rise = (normal[t] * far).sum(axis=1)
+    rise = dot3(one, far)
     depth = np.where((size[t] > 0) & (size[s] > 0), np.arccos(cosine), 0.0)
     return np.where(rise > 0, -depth, depth)
 

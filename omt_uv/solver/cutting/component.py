@@ -10,6 +10,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..analysis.feature_edges import fold_angles
+from ..mesh.geometry import edge_lengths
 from ..mesh.gluing import Gluing, groups
 from ..mesh.topology import halfedges
 from .component_order import in_order
@@ -165,7 +166,7 @@ def make_component(
     tail, head = halfedges(triangles)
     ends = np.stack([tail[pair[:, 0]], head[pair[:, 0]]], axis=1)
     p = positions[vertex_ids]
-    length = np.linalg.norm(p[ends[:, 0]] - p[ends[:, 1]], axis=1)
+    length = edge_lengths(p, ends)
     # An edge without length still costs something: sparse graphs take a zero for no edge.
     floor = 1e-9 * max(float(length.mean()) if len(length) else 1.0, 1e-30)
     noise = 1 + NOISE * np.random.default_rng(0).random(len(pair))

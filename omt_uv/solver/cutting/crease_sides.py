@@ -11,13 +11,13 @@ from collections.abc import Callable
 import numpy as np
 
 from ..analysis.feature_edges import fold_angles
-from ..maps.contacts import covers_itself
+from ..maps.contacts import lies_apart
 from ..maps.development import developed
 from ..maps.overlap import cover_pairs, overlap_share
-from ..mesh.geometry import face_areas, signed_areas
+from ..mesh.geometry import as_points, face_areas, signed_areas
 from ..mesh.gluing import Gluing, components, corner_classes, groups
 from ..mesh.surface import Surface
-from ..mesh.topology import boundary_loops, graph_components, pair_keys, paired
+from ..mesh.topology import graph_components, pair_keys, paired
 from .component import SMOOTH, CutComponent, make_component
 from .cut_graph import cut_classes
 from .developable_nets import BENT, HARD, MUCH, defects, net
@@ -369,13 +369,5 @@ def _part_covered(flat: np.ndarray, corners: np.ndarray, part: np.ndarray) -> fl
 
 
 def _covered(flat: np.ndarray, corners: np.ndarray) -> float:
-    """Which share of themselves triangles (t,3) with places (k,) complex cover.
-
-    None for certain where they are all the same way up and their one outline does not cross itself: of long polygons,
-    whose slivers all lie side by side, every sample would be compared with thousands.
-    """
-    uv = np.stack([flat.real, flat.imag], axis=1)
-    loops = boundary_loops(corners) if (signed_areas(uv, corners) > 0).all() else []
-    if len(loops) == 1 and not covers_itself(flat, loops[0]):
-        return 0.0
-    return overlap_share(uv[corners], samples=SAMPLES)
+    """Which share of themselves triangles (t,3) with places (k,) complex cover."""
+    return 0.0 if lies_apart(flat, corners) else overlap_share(as_points(flat)[corners], samples=SAMPLES)

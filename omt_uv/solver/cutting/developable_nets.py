@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..analysis.feature_edges import fold_angles
+from ..maps.contacts import lies_apart
 from ..maps.development import developed
 from ..maps.overlap import overlap_share
-from ..mesh.geometry import angle_defects, angles_from_lengths, face_areas, halfedge_lengths
+from ..mesh.geometry import angle_defects, angles_from_lengths, as_points, face_areas, halfedge_lengths
 from .component import CutComponent
 from .cut_graph import cut_classes, greedy_arcs
 from .hard_surface import net_factors, rounded_corners
@@ -123,10 +124,10 @@ def _covers_itself(component: CutComponent, cut: np.ndarray) -> bool:
     positions = np.zeros((int(corners.max()) + 1, 3))
     positions[corners.ravel()] = component.positions[component.triangles.ravel()]
     flat, gap = developed(positions, corners)
-    uv = np.stack([flat.real, flat.imag], axis=1)
     # What is not quite flat is laid somewhere else by its map.
-    if gap.max() > FLAT * np.abs(flat).max():
+    if gap.max() > FLAT * np.abs(flat).max() or lies_apart(flat, corners):
         return False
+    uv = as_points(flat)
     # Few samples see what covers much: most nets of large bodies do.
     return overlap_share(uv[corners], samples=FEW) > MUCH or overlap_share(uv[corners], samples=SAMPLES) > COVERED
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.geometry import complex_cross
+from ..mesh.geometry import as_points, complex_cross, signed_areas
+from ..mesh.topology import boundary_loops
 from .boxes import box_pairs
 
 # Angles in radians by which two sectors have to overlap: the two sides of a slit meet in less, for rounding.
@@ -86,6 +87,18 @@ def _cross_at(w, tail, head, i, j, depth: float) -> np.ndarray:
 def covers_itself(w: np.ndarray, loop: np.ndarray) -> bool:
     """Whether a map w (n,) without folds of a disk with the boundary loop (b,) covers any place twice."""
     return int(turns(w, *loop_edges(loop))[0]) > 1 or len(crossings(w, loop)) > 0
+
+
+def lies_apart(w: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether triangles (m,3) with places w (n,) complex cover no place twice for certain: all are the same way up, and
+    their one outline does not cross itself.
+
+    Of long polygons, whose slivers all lie side by side, every sample of `overlap` would be compared with thousands.
+    """
+    if not (signed_areas(as_points(w), triangles) > 0).all():
+        return False
+    loops = boundary_loops(triangles)
+    return len(loops) == 1 and not covers_itself(w, loops[0])
 
 
 def _passes(a, b, p, q, depth: float) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
-from ..mesh.geometry import halfedge_lengths
+from ..mesh.geometry import dot3, halfedge_lengths, lengths
 from ..mesh.topology import graph_components, twins
 
 
@@ -35,9 +35,10 @@ def _local_frames(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Corners (m,3) complex of every triangle in a plane of its own, the first edge along the real axis."""
     length = halfedge_lengths(positions, triangles).reshape(-1, 3)
     base, right, left = length.T
-    p = positions[triangles]
-    height = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / np.maximum(base, 1e-300)
-    along = ((p[:, 1] - p[:, 0]) * (p[:, 2] - p[:, 0])).sum(axis=1) / np.maximum(base, 1e-300)
+    p = np.take(positions, triangles, axis=0)
+    one, other = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    height = lengths(np.cross(one, other)) / np.maximum(base, 1e-300)
+    along = dot3(one, other) / np.maximum(base, 1e-300)
     return np.stack([np.zeros(len(base), complex), base.astype(complex), along + 1j * height], axis=1)
 
 

@@ -28,6 +28,16 @@ def dot2(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
 
 
+def dot3(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar product of vectors in space (..., 3): the sum along the last axis to the bit, several times faster."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+
+
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """Euclidean lengths (...) of vectors (..., 2) or (..., 3): `np.linalg.norm` to the bit, several times faster."""
+    return np.sqrt((dot2 if vectors.shape[-1] == 2 else dot3)(vectors, vectors))
+
+
 def as_complex(points: np.ndarray) -> np.ndarray:
     """Points of the plane (n,2) as complex numbers (n,), gathered four times as fast: conj(a) b = a . b + i a x b."""
     return np.ascontiguousarray(points, dtype=float).view(complex)[:, 0]
@@ -65,11 +75,11 @@ def part_by_part(function: Callable[..., np.ndarray], *arrays: np.ndarray) -> np
 def halfedge_lengths(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Length of every halfedge, (3m,), of positions (n,2) or (n,3)."""
 
-    def lengths(some):
-        p = positions[some]
-        return np.linalg.norm(p[:, [1, 2, 0]] - p, axis=2)
+    def sides(some):
+        p = np.take(positions, some, axis=0)
+        return lengths(np.roll(p, -1, axis=1) - p)
 
-    return part_by_part(lengths, triangles).ravel()
+    return part_by_part(sides, triangles).ravel()
 
 
 def places(points: np.ndarray) -> np.ndarray:
@@ -84,14 +94,14 @@ def bounding_box(points: np.ndarray) -> tuple[np.ndarray, float]:
     >>> bounding_box(np.array([[0.0, 0.0, 0.0], [2.0, 4.0, 1.0]]))
     (array([1. , 2. , 0.5]), 4.0)
     """
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = (np.array([of(column) for column in points.T]) for of in (np.min, np.max))
     # Halves first: the difference of two huge numbers may be infinite.
     return low / 2 + high / 2, 2 * float((high / 2 - low / 2).max())
 
 
 def edge_lengths(positions: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Length (k,) of every edge (k,2) between positions (n,2) or (n,3)."""
-    return np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1)
+    return lengths(np.take(positions, edges[:, 0], axis=0) - np.take(positions, edges[:, 1], axis=0))
 
 
 def face_areas(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -177,8 +187,8 @@ def signed_areas(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Area of every triangle in the plane, (m,), positive when counter-clockwise, of uv (n,2)."""
 
     def areas(some):
-        p = uv[some]
-        return 0.5 * cross2(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        x, y = np.take(uv.T, some.T, axis=1)
+        return 0.5 * ((x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0]))
 
     return part_by_part(areas, triangles)
 

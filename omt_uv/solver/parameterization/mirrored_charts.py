@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -317,7 +318,14 @@ def map_completed(
 ) -> Steps[ChartMap]:
     """`map_chart`, with a free boundary of the chart `with_missing_images`: the map is symmetric but for them."""
     plain = options.boundary == "free" and options.kind == "authalic" and target is None and pins is None
-    whole = with_missing_images(chart) if plain and not _unrolls(chart) else None
+    given: dict[str, Any] = {"options": options, "target": target, "pins": pins, "markers": markers}
+    alone = None
+    if plain and _may_unroll(chart):
+        alone = yield from map_chart(chart, **given)
+        # What has no distortion has a map that is as symmetric as it is, whatever hangs on it.
+        if max(alone.angle_mean - 1, alone.area_l1) <= UNROLLED:
+            return alone
+    whole = with_missing_images(chart) if plain else None
     if whole is not None:
         try:
             found = yield from map_chart(whole, options=options, markers=markers)
@@ -325,17 +333,13 @@ def map_completed(
                 return _without_images(chart, found)
         except MeshError:
             pass  # it is that of the images, or the chart alone has it, too, and says where
-    return (yield from map_chart(chart, options=options, target=target, pins=pins, markers=markers))
+    return (yield from map_chart(chart, **given)) if alone is None else alone
 
 
-def _unrolls(chart: Chart) -> bool:
-    """Whether a chart unrolls without distortion: then its map is as symmetric as it is, whatever hangs on it."""
+def _may_unroll(chart: Chart) -> bool:
+    """Whether a chart unrolls, with little distortion or none."""
     vertices, _ = in_unit_box(chart.vertices)
-    flat = unroll(vertices, chart.triangles, boundary_loops(chart.triangles)[0])
-    if flat is None:
-        return False
-    figures = measured_chart(vertices, chart, flat, None)
-    return max(figures.angle_mean - 1, figures.area_l1) <= UNROLLED
+    return unroll(vertices, chart.triangles, boundary_loops(chart.triangles)[0]) is not None
 
 
 def _without_images(chart: Chart, found: ChartMap) -> ChartMap:
