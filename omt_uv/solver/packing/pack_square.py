@@ -275,10 +275,14 @@ def _fit(task: _PackTask, scale: float, order: list[int]) -> tuple[_Found | None
         return None, order
     # The same draws at every scale: what has fitted at one is tried at the next.
     rng, tried, many = np.random.default_rng(0), order, len(cells) >= MANY_ITEMS
+    empty, failed = _grid(task, widest), dict[tuple[int, ...], int]()
     for k in range(min(task.tries[0], STUCK_FIRST + 1) if many else task.tries[0]):
-        places, stuck = place(raster.items, tried, _grid(task, widest))
-        if places:
-            return _Found(task, scale, raster, places, tried), tried
+        # Of few items chance has the same orders again.
+        if tuple(tried) not in failed:
+            places, failed[tuple(tried)] = place(raster.items, tried, empty.copy())
+            if places:
+                return _Found(task, scale, raster, places, tried), tried
+        stuck = failed[tuple(tried)]
         hopeless = many and cells[tried[: tried.index(stuck)]].sum() < HOPEFUL * cells.sum()
         if k < STUCK_FIRST:
             tried = [stuck, *(item for item in tried if item != stuck)]

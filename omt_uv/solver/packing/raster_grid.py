@@ -7,7 +7,13 @@ disjunctions of whole bytes for all places of the mask.
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
+
+# Cells beyond the last ones of rows and columns that are there, and taken. No run of a mask that lies on the raster
+# reaches them: they are for what looks beside it, and for whole bytes.
+BEYOND = 8
 
 
 def runs_of(mask: np.ndarray) -> list[list[int]]:
@@ -29,17 +35,25 @@ class RasterGrid:
 
     def __init__(self, side: int, widest: int):
         self.side = side
-        # What lies outside is taken.
-        self._width = 8 * -(-(side + widest) // 8)
-        taken = np.ones((side + widest, self._width + 8), dtype=bool)
-        taken[:side, :side] = False
-        self._widened = [taken]
-        while 2 ** len(self._widened) <= widest:
-            wider, step = self._widened[-1].copy(), 2 ** (len(self._widened) - 1)
-            wider[:, :-step] |= self._widened[-1][:, step:]
-            self._widened.append(wider)
-        self._bits = [_shifted(wider) for wider in self._widened]
-        self._flat = [bits.reshape(8, -1) for bits in self._bits]
+        self._width = 8 * -(-(side + BEYOND) // 8)
+        # All rows are as one: what lies outside is taken.
+        row = np.ones(self._width + 8, dtype=bool)
+        row[:side] = False
+        widened = [row]
+        while 2 ** len(widened) <= widest:
+            wider, step = widened[-1].copy(), 2 ** (len(widened) - 1)
+            wider[:-step] |= widened[-1][step:]
+            widened.append(wider)
+        self._widened = np.ones((len(widened), side + BEYOND, len(row)), dtype=bool)
+        self._widened[:, :side] = np.stack(widened)[:, None]
+        self._bits = np.full((len(widened), 8, side + BEYOND, self._width // 8), 255, np.uint8)
+        self._bits[:, :, :side] = np.stack([_shifted(wider[None]) for wider in widened])
+
+    def copy(self) -> RasterGrid:
+        """A raster of which as much is taken."""
+        other = copy(self)
+        other._widened, other._bits = self._widened.copy(), self._bits.copy()
+        return other
 
     @property
     def taken(self) -> np.ndarray:
@@ -61,12 +75,12 @@ class RasterGrid:
             if k:
                 narrow, half = self._widened[k - 1], step // 2
                 wider[rows, begin:end] = narrow[rows, begin:end]
-                # The copies are wider than the raster by as much as is looked at beyond its end.
+                # No run reaches so far that what lies beyond matters.
                 reach = min(end, wider.shape[1] - half)
                 wider[rows, begin:reach] |= narrow[rows, begin + half : reach + half]
             # Bits that are shifted by s come from s cells farther on.
             begin, stop = max(0, begin - 8), min(self._width, 8 * -(-end // 8))
-            self._bits[k][:, rows, begin // 8 : stop // 8] = _shifted(wider[rows, begin : stop + 8])
+            self._bits[k, :, rows, begin // 8 : stop // 8] = _shifted(wider[rows, begin : stop + 8])
 
     def places(self, runs: list[list[int]], height: int, width: int) -> np.ndarray | None:
         """Lower left cells (rows,columns) bool at which a mask of these runs, height and width is free, or None."""
@@ -77,10 +91,10 @@ class RasterGrid:
         stride, count = self._width // 8, -(-columns // 8)
         blocked = np.zeros(rows * stride, np.uint8)
         length = (rows - 1) * stride + count
-        ahead = blocked[:length]
+        ahead, flat = blocked[:length], self._bits.reshape(len(self._bits), 8, -1)
         for k, row, column in runs:
             start = row * stride + (column >> 3)
-            ahead |= self._flat[k][column & 7][start : start + length]
+            ahead |= flat[k, column & 7, start : start + length]
         free = np.unpackbits(~blocked.reshape(rows, stride)[:, :count], axis=1, count=columns).view(bool)
         return free if free.any() else None
 
