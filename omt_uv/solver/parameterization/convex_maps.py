@@ -20,6 +20,7 @@ from ..refinement.continuation_rules import QUALITIES
 from .chart_indices import ChartPins, chart_target
 from .chart_map import FOLDED, ChartMap, in_unit_box, measured_map, refined_again
 from .options import MapOptions
+from .polygon_corners import Forced
 from .polygon_disk import cut_as_mapped
 
 # The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
@@ -57,14 +58,17 @@ def with_convex_polygons(
 
     targets = [chart_target(target, surface, c) for c in charts]
     folded = reflex_triangles(drawn, charts, [m.uv for m in maps])
-    maps = yield from _opened(drawn, charts, maps, pins, options, targets, folded)
+    forced: Forced = {}
+    maps = yield from _opened(drawn, charts, maps, pins, options, targets, folded, forced)
     given, charts = charts, [cut_as_mapped(c, m.uv) for c, m in zip(charts, maps, strict=True)]
     fixed = [_fixed(c, p, options.boundary) for c, p in zip(charts, pins, strict=True)]
     density = [None if t is None else t.density for t in targets]
     goal = QUALITIES[options.quality].area_error
     spare = [AREA_KEPT * max(m.area_l1, goal) - m.area_l1 for m in maps]
     new = list(maps)
-    found = keep_convex(drawn, charts, [m.uv for m in maps], fixed, density, [m.area_weight for m in maps], spare)
+    uvs, weights = [m.uv for m in maps], [m.area_weight for m in maps]
+    # Where no map was better for being opened, its corners are forced from where they were.
+    found = keep_convex(drawn, charts, uvs, fixed, density, weights, spare, forced)
     for k, uv in found.items():
         chart, old = given[k], maps[k]
         figures = measured_map(chart, uv, density[k])
@@ -95,10 +99,11 @@ def _opened(
     options: MapOptions,
     targets: Sequence[Target | None],
     folded: np.ndarray,
+    forced: Forced,
 ) -> Steps[list[ChartMap]]:
     """The maps, those in which corners are folded refined again from where they are open, if that keeps them so.
 
-    folded (c,) : how many corners of each chart are
+    folded (c,) : how many corners of each chart are; forced : see `keep_convex`
     """
     from .convexity import keep_convex, reflex_triangles
 
@@ -110,7 +115,7 @@ def _opened(
     density = [None if t is None else t.density for t in (targets[k] for k in some)]
     cut = [cut_as_mapped(charts[k], maps[k].uv) for k in some]
     uvs, weights = [maps[k].uv for k in some], [maps[k].area_weight for k in some]
-    opened = keep_convex(surface, cut, uvs, fixed, density, weights, None)
+    opened = keep_convex(surface, cut, uvs, fixed, density, weights, None, forced)
     new, goal = list(maps), QUALITIES[options.quality].area_error
     for place, start in opened.items():
         k = some[place]

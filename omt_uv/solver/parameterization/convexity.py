@@ -31,7 +31,15 @@ from ..mesh.surface import Surface
 from ..mesh.topology import boundary_loops, row_labels
 from ..refinement.mirrored_motion import find_symmetry
 from .corner_solver import CornerMesh, CornerPatches
-from .polygon_corners import CONVEX, DENTED, PolygonCorners, areas_in_map, convex_corners, straight_share
+from .polygon_corners import (
+    CONVEX,
+    DENTED,
+    Forced,
+    PolygonCorners,
+    areas_in_map,
+    convex_corners,
+    straight_share,
+)
 from .polygon_disk import with_fans
 
 # Rings of faces around a reflex corner that may move, at most.
@@ -56,6 +64,7 @@ def keep_convex(
     density: Sequence[np.ndarray | None],
     area_weights: Sequence[float],
     spare: Sequence[float] | None,
+    forced: Forced | None = None,
 ) -> dict[int, np.ndarray]:
     """Make the corners of convex polygons convex in the maps: new maps, by the number of the chart, where any changed.
 
@@ -68,6 +77,7 @@ def keep_convex(
     density : (m_i,) of the triangles, None where they get their own areas
     area_weights : of the area term, one for each chart
     spare : by how much the area error of each chart may grow; None for a start of a refinement, whatever it costs
+    forced : what corners were forced open before, which is added to
     """
     fans = [with_fans(chart, uv) for chart, uv in zip(charts, maps, strict=True)]
     first = np.cumsum([0, *(len(uv) for _, uv, _ in fans)])
@@ -87,7 +97,7 @@ def keep_convex(
     symmetry, middle = _symmetry(mesh, first, w, bent)
     mesh, w = _without(mesh, squeezed), w - middle
     for attempt in range(ATTEMPTS):
-        moved = _relaxed(mesh, w, corners, immobile, spare is None, symmetry)
+        moved = _relaxed(mesh, w, corners, immobile, spare is None, symmetry, forced)
         changed = np.unique(np.searchsorted(first, np.flatnonzero(moved != w), side="right") - 1)
         loops = [boundary_loops(charts[k].disk)[0] + first[k] for k in changed]
         crossed = [_crossed(w, moved, loop, attempt == ATTEMPTS - 2) for loop in loops]
@@ -274,6 +284,7 @@ def _relaxed(
     fixed: np.ndarray,
     opening: bool,
     symmetry: MirrorSymmetry | None,
+    forced: Forced | None,
 ) -> np.ndarray:
     """The map w (n,) complex with the vertices around reflex corners placed anew, those `fixed` (n,) excepted.
 
@@ -302,7 +313,8 @@ def _relaxed(
     vertices = vertices[minimum_degree(vertex_graph(joined, len(vertices)))]
     place[vertices] = np.arange(len(vertices))
     mirrored = None if symmetry is None else symmetry.restricted(vertices, place)
-    patches = CornerPatches(mesh.of(vertices, faces, place), corners.of(here, place), free[vertices], mirrored)
+    given = mesh.of(vertices, faces, place), corners.of(here, place), free[vertices], mirrored
+    patches = CornerPatches(*given, forced)
     moved = w.copy()
     moved[vertices] = patches.opened(w[vertices]) if opening else patches.convexified(w[vertices])
     return moved

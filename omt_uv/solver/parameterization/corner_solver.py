@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..maps.energy import Elements, energies, gradient
+from ..maps.energy import Elements, energies
 from ..maps.mirror_symmetry import MirrorSymmetry
 from ..maps.polygon_elements import polygon_elements, with_convex_quads
 from ..mesh.polygon_areas import polygon_areas
@@ -20,9 +20,9 @@ from ..refinement.projected_newton import (
     FreeMotion,
     NewtonProblem,
     fold_shares,
-    newton_direction,
+    newton_steps,
 )
-from .polygon_corners import CONVEX, CornerBarrier, PolygonCorners
+from .polygon_corners import CONVEX, CornerBarrier, Forced, PolygonCorners
 
 # Strength of the barrier of a corner, per share that its polygon has of the target's area.
 STRENGTH = 30.0
@@ -41,7 +41,7 @@ LEAST = 0.1
 # A patch whose area error grew by more than this factor gets an area weight so many times as large.
 GROWTH = 1.25
 HEAVIER = 1.5
-# See `projected_newton.newton_direction`.
+# See `projected_newton.newton_steps`.
 PRESSURE = 0.3
 # Halvings of a step until a patch stays where it is.
 HALVINGS = 12
@@ -83,7 +83,10 @@ class CornerMesh:
 
 
 class CornerPatches:
-    """Patches of a mesh, each of which goes its own way; unknowns in the order of their elimination."""
+    """Patches of a mesh, each of which goes its own way; unknowns in the order of their elimination.
+
+    forced : known to other patches, and added to by these
+    """
 
     def __init__(
         self,
@@ -91,7 +94,9 @@ class CornerPatches:
         corners: PolygonCorners,
         free: np.ndarray,
         symmetry: MirrorSymmetry | None = None,
+        forced: Forced | None = None,
     ):
+        self._known: Forced = {} if forced is None else forced
         n, self.motion, self.corners, self.symmetry = len(free), FreeMotion(~free), corners, symmetry
         # Areas are those that the refinement gave, and that decide whether the map is kept: of whole polygons.
         self.faces = polygon_elements(mesh.positions, mesh.triangles, mesh.target, mesh.polygon)
@@ -126,6 +131,8 @@ class CornerPatches:
     def opened(self, w: np.ndarray) -> np.ndarray:
         """The map w (n,) with corners made convex in those patches where fewer are reflex then, at whatever cost."""
         given, w = w, self._forced(self._symmetric(w))
+        if not (self._reflex_count(w) < self._reflex_count(given)).any():
+            return given
         w = self._stepped(w, self.area_weight, self._barrier(w, self.strength))
         return np.where((self._reflex_count(w) < self._reflex_count(given))[self.of_vertex], w, given)
 
@@ -134,6 +141,8 @@ class CornerPatches:
         given, weight = w, self.area_weight
         before, reflex = self._area_errors(given), self._reflex_count(given)
         w = self._forced(self._symmetric(w))
+        if not (self._reflex_count(w) < reflex).any():
+            return given
         for k in range(MOST_SETTLING):
             worse = (self._area_errors(w) > GROWTH * before) & (k > 1)
             weight = np.where(worse[self.of_face], HEAVIER * weight, weight)
@@ -150,6 +159,13 @@ class CornerPatches:
 
     def _forced(self, w: np.ndarray) -> np.ndarray:
         """The map w (n,) after rounds with a barrier that grows stronger at corners while these are reflex."""
+        parts = (w, self.motion.free, self.faces.triangles, self.faces.area, self.corners.triangles, self.area_weight)
+        key = tuple(part.tobytes() for part in parts)
+        if key not in self._known:
+            self._known[key] = self._forced_anew(w)
+        return self._known[key]
+
+    def _forced_anew(self, w: np.ndarray) -> np.ndarray:
         strength, lacking = self.strength, np.inf
         for k in range(MOST_CONVEXIFYING):
             reflex = self.corners.reflex(w)
@@ -192,11 +208,11 @@ class CornerPatches:
         value = self._values(faces, w, weight, barrier)
         of_triangle, counts = self.of_face[faces.owner], faces.triangle_areas > 0
         for _ in range(STEPS):
-            step = motion.frame(w) * newton_direction(problem, w, PRESSURE)[0]
+            step, slopes = newton_steps(problem, w, PRESSURE)
+            slope = np.bincount(self.of_vertex, (step.conj() * slopes).real, self.count)
+            step = motion.frame(w) * step
             if self.symmetry is not None:
                 step = self.symmetry.spread(step)
-            down = gradient(faces, w, weight) + barrier.derivatives(w)[0]
-            slope = np.bincount(self.of_vertex, (step.conj() * down).real, self.count)
             far = np.full(self.count, 1 / FOLD_SHARE)
             folding = fold_shares(*faces.derivatives(w), *faces.derivatives(step))
             np.minimum.at(far, of_triangle[counts], folding[counts])

@@ -21,6 +21,8 @@ STRAIGHT = 0.02
 FLATTER = 0.3
 # Straight ones are reflex only where they have lost this share of the area: straight lines may stay so.
 DENTED = 0.01
+# Maps (n,) whose corners were forced open, by what they were found from.
+Forced = dict[tuple[bytes, ...], np.ndarray]
 
 
 def areas_in_map(triangles: np.ndarray, w: np.ndarray) -> np.ndarray:

@@ -185,11 +185,19 @@ def newton_direction(
     problem: NewtonProblem, w: np.ndarray, pressure: float | np.ndarray = 1.0
 ) -> tuple[np.ndarray, float]:
     """Step (n,) complex in the axes of the motion's frame, and the slope of the energy along it (negative)."""
+    step, slopes = newton_steps(problem, w, pressure)
+    return step, float(step.view(float) @ slopes.view(float))
+
+
+def newton_steps(
+    problem: NewtonProblem, w: np.ndarray, pressure: float | np.ndarray = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Step (n,) complex in the axes of the motion's frame, and the slopes (n,) complex of the energy along these."""
     frame, free = problem.motion.frame(w), problem.motion.free
     matrix, slopes, scale = _equations(problem, w, pressure, frame, free.astype(float))
     parts = problem.assembly.parts if np.max(problem.area_weight) <= STIFF else None
     step = -_solution(matrix, slopes, scale, parts, w, lambda: frame[:, None] * [1, 1j] * free, problem.assembly.order)
-    return step.view(complex), float(step @ slopes)
+    return step.view(complex), slopes.view(complex)
 
 
 def _equations(problem: NewtonProblem, w: np.ndarray, pressure, frame, free) -> tuple[Matrix, np.ndarray, float]:
