@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from .polygon_disk import cut_as_mapped
 
 # The area error of a map may grow by this factor, or to so much more than its goal, for polygons that are convex.
 AREA_KEPT = 1.1
+# Mean shear may grow by this factor for that: a map refined from where they are open has hardly less. Where it grows by
+# more, that is tried.
+SHEAR_KEPT = 1.06
 # Mean shear above 1, and area error, of what is no more than rounded.
 ISOMETRIC = 1e-7
 # How warnings of polygons that fold if they are cut otherwise than they are drawn end.
@@ -46,39 +49,97 @@ def with_convex_polygons(
 ) -> Steps[list[ChartMap]]:
     """The maps with polygons that are convex on the surface convex in them, too, as far as may be: `keep_convex`.
 
-    Charts without pins are opened there whatever it costs, and refined from then on: quads that are convex stay so.
-    Where that fails, corners are opened as far as areas can be spared. A map that would lose its areas stays as it is.
+    Corners are opened as far as areas can be spared. Charts without pins in which some stay folded, or that are sheared
+    by it, are opened there whatever it costs, and refined from then on: quads that are convex stay so. A map that would
+    lose its areas stays as it is.
     pins : of every chart; options and target : those of the maps; drawn : the surface with the triangles of who draws
     it
     """
     drawn = surface if drawn is None else drawn
     if not (np.diff(surface.face_start) > 3).any() or all(map(_is_isometry, maps)):
         return maps
-    from .convexity import keep_convex, reflex_triangles
+    from .convexity import reflex_triangles
 
     targets = [chart_target(target, surface, c) for c in charts]
+    task = _Opening(drawn, charts, pins, options, targets, {})
     folded = reflex_triangles(drawn, charts, [m.uv for m in maps])
-    forced: Forced = {}
-    maps = yield from _opened(drawn, charts, maps, pins, options, targets, folded, forced)
-    given, charts = charts, [cut_as_mapped(c, m.uv) for c, m in zip(charts, maps, strict=True)]
-    fixed = [_fixed(c, p, options.boundary) for c, p in zip(charts, pins, strict=True)]
-    density = [None if t is None else t.density for t in targets]
-    goal = QUALITIES[options.quality].area_error
-    spare = [AREA_KEPT * max(m.area_l1, goal) - m.area_l1 for m in maps]
-    new = list(maps)
-    uvs, weights = [m.uv for m in maps], [m.area_weight for m in maps]
-    # Where no map was better for being opened, its corners are forced from where they were.
-    found = keep_convex(drawn, charts, uvs, fixed, density, weights, spare, forced)
-    for k, uv in found.items():
-        chart, old = given[k], maps[k]
-        figures = measured_map(chart, uv, density[k])
-        if _keeps(figures, old, goal):
-            if not fixed[k].any():
-                uv = _as_before(uv, old.uv, chart.triangles)
-            new[k] = with_figures(old, uv, figures)
+    new = task.kept(maps, np.arange(len(maps)))
     for k in np.flatnonzero(folded):
-        new[k] = with_dents_told(drawn, given[k], new[k])
+        if new[k].angle_mean > SHEAR_KEPT * maps[k].angle_mean or task.folded(k, new[k]):
+            opened = yield from task.opened(k, maps[k], folded[k])
+            if opened is not None:
+                either = [new[k], *task.kept([opened], np.array([k]))]
+                figures = [(task.folded(k, one), one.angle_mean) for one in either]
+                new[k] = either[figures.index(min(figures))]
+        new[k] = with_dents_told(drawn, charts[k], new[k])
     return new
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """Charts whose corners are opened: the surface with the triangles of who draws it; pins and targets of every
+    chart, the options of its map, and what was forced open, see `keep_convex`."""
+
+    drawn: Surface
+    charts: list[Chart]
+    pins: Sequence[ChartPins | None]
+    options: MapOptions
+    targets: Sequence[Target | None]
+    forced: Forced
+
+    def density(self, k: int) -> np.ndarray | None:
+        """The density (m,) that chart k asks for."""
+        target = self.targets[k]
+        return None if target is None else target.density
+
+    def folded(self, k: int, chart_map: ChartMap) -> int:
+        """How many corners of chart k are folded in a map."""
+        from .convexity import reflex_triangles
+
+        return int(reflex_triangles(self.drawn, [self.charts[k]], [chart_map.uv])[0])
+
+    def kept(self, maps: Sequence[ChartMap], which: np.ndarray) -> list[ChartMap]:
+        """Maps of some charts (c,) with corners opened as far as areas can be spared."""
+        from .convexity import keep_convex
+
+        charts = [cut_as_mapped(self.charts[k], m.uv) for k, m in zip(which, maps, strict=True)]
+        fixed = [_fixed(c, self.pins[k], self.options.boundary) for k, c in zip(which, charts, strict=True)]
+        density, goal = [self.density(k) for k in which], QUALITIES[self.options.quality].area_error
+        uvs, weights = [m.uv for m in maps], [m.area_weight for m in maps]
+        spare = [AREA_KEPT * max(m.area_l1, goal) - m.area_l1 for m in maps]
+        new = list(maps)
+        found = keep_convex(self.drawn, charts, uvs, fixed, density, weights, spare, self.forced)
+        for place, uv in found.items():
+            chart, old = self.charts[which[place]], maps[place]
+            figures = measured_map(chart, uv, density[place])
+            if _keeps(figures, old, goal):
+                uv = uv if fixed[place].any() else _as_before(uv, old.uv, chart.triangles)
+                new[place] = with_figures(old, uv, figures)
+        return new
+
+    def opened(self, k: int, old: ChartMap, folded: int) -> Steps[ChartMap | None]:
+        """The map of a chart in which so many corners are folded, refined again from where they are open whatever it
+        costs; None where that has no more of them open."""
+        from .convexity import keep_convex
+
+        # Corners of squares and rectangles, and drafts, stay as they were chosen.
+        boundary = self.options.boundary
+        if self.pins[k] is not None or self.options.quality == "draft" or boundary not in ("free", "disk"):
+            return None
+        chart, density = self.charts[k], self.density(k)
+        given = [cut_as_mapped(chart, old.uv)], [old.uv], [_fixed(chart, None, boundary)], [density], [old.area_weight]
+        start = keep_convex(self.drawn, *given, None, self.forced).get(0)
+        if start is None:
+            return None
+        try:
+            uv = yield from refined_again(chart, start, self.options, self.targets[k])
+        except MeshError:
+            # The map that there is has no error.
+            return None
+        uv = _as_before(uv, old.uv, chart.triangles) if boundary == "free" else uv
+        found = with_figures(old, uv, measured_map(chart, uv, density))
+        kept = _keeps(found, old, QUALITIES[self.options.quality].area_error)
+        return found if kept and self.folded(k, found) < folded else None
 
 
 def with_dents_told(drawn: Surface, chart: Chart, chart_map: ChartMap) -> ChartMap:
@@ -89,48 +150,6 @@ def with_dents_told(drawn: Surface, chart: Chart, chart_map: ChartMap) -> ChartM
     others = tuple(text for text in chart_map.warnings if not text.endswith(OTHERWISE))
     told = (f"{plural(count, '1 face folds', '{} faces fold')} {OTHERWISE}",) if count else ()
     return replace(chart_map, warnings=(*others, *told))
-
-
-def _opened(
-    surface: Surface,
-    charts: list[Chart],
-    maps: list[ChartMap],
-    pins: Sequence[ChartPins | None],
-    options: MapOptions,
-    targets: Sequence[Target | None],
-    folded: np.ndarray,
-    forced: Forced,
-) -> Steps[list[ChartMap]]:
-    """The maps, those in which corners are folded refined again from where they are open, if that keeps them so.
-
-    folded (c,) : how many corners of each chart are; forced : see `keep_convex`
-    """
-    from .convexity import keep_convex, reflex_triangles
-
-    some = [k for k in np.flatnonzero(folded) if pins[k] is None]
-    # Corners of squares and rectangles, and drafts, stay as they were chosen.
-    if not some or options.quality == "draft" or options.boundary not in ("free", "disk"):
-        return maps
-    fixed = [_fixed(charts[k], None, options.boundary) for k in some]
-    density = [None if t is None else t.density for t in (targets[k] for k in some)]
-    cut = [cut_as_mapped(charts[k], maps[k].uv) for k in some]
-    uvs, weights = [maps[k].uv for k in some], [maps[k].area_weight for k in some]
-    opened = keep_convex(surface, cut, uvs, fixed, density, weights, None, forced)
-    new, goal = list(maps), QUALITIES[options.quality].area_error
-    for place, start in opened.items():
-        k = some[place]
-        chart, old = charts[k], maps[k]
-        try:
-            uv = yield from refined_again(chart, start, options, targets[k])
-        except MeshError:
-            # The map that there is has no error.
-            continue
-        if options.boundary == "free":
-            uv = _as_before(uv, old.uv, chart.triangles)
-        figures = measured_map(chart, uv, density[place])
-        if _keeps(figures, old, goal) and reflex_triangles(surface, [chart], [uv])[0] < folded[k]:
-            new[k] = with_figures(old, uv, figures)
-    return new
 
 
 def with_drawn_triangles(
@@ -193,7 +212,7 @@ def _by_triangles(
     return _as_before(uv, old.uv, chart.triangles) if options.boundary == "free" else uv
 
 
-def _keeps(figures: Distortion, old: ChartMap, goal: float) -> bool:
+def _keeps(figures: Distortion | ChartMap, old: ChartMap, goal: float) -> bool:
     """Whether a map with these figures folds no more than another, and has its areas, or those that are the goal."""
     return figures.folds <= old.folds and figures.area_l1 <= AREA_KEPT * max(old.area_l1, goal)
 
