@@ -280,7 +280,7 @@ def is_settled(share: Number, now: tuple[Number, Number], before: tuple[Number, 
     """Whether a step taken to this share left shear and area error about as they were, and the latter at its goal:
     what further ones change, nobody sees."""
     (shear, error), (last_shear, last_error) = now, before
-    same = (np.abs(shear - last_shear) <= SETTLED * last_shear) & (np.abs(error - last_error) <= SETTLED * last_error)
+    same = (np.abs(shear - last_shear) <= SETTLED * shear) & (np.abs(error - last_error) <= SETTLED * error)
     return (share == 1) & (error <= goal) & same
 
 
