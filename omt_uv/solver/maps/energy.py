@@ -20,6 +20,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..mesh.geometry import lengths
+
 # A relative error of a region's share counts as so much area error: where areas may be off by 0.8 % it may be by 0.3 %;
 SHARE_ERROR = 2.7
 # and so much that of single faces of the region, or of the rest: they may be off by 1.8 %.
@@ -130,9 +132,9 @@ def hat_gradients(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndar
 def _hat_gradients(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same of triangles with corners (m,3,3)."""
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    side = np.linalg.norm(e1, axis=1)
+    side = lengths(e1)
     x = np.einsum("md,md->m", e2, e1) / side
-    y = np.linalg.norm(np.cross(e1, e2), axis=1) / side
+    y = lengths(np.cross(e1, e2)) / side
     y = np.maximum(y, 1e-9 * np.maximum(side, np.abs(x)))
     local = np.stack([np.zeros(len(x)), side, x + 1j * y], axis=1)
     area = 0.5 * side * y

@@ -106,17 +106,22 @@ def quad_corners(triangles: np.ndarray, first: np.ndarray, second: np.ndarray) -
 def _corners_of_quads(triangles: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Corners (k,4) and, in a fifth column, whether these have a side in common, of `quad_corners`."""
     one, two = triangles[first], triangles[second]
-    shared = (one[:, :, None] == two[:, None, :]).any(axis=2)
+    shared = _among(one, two)
     # From the corner that the other triangle lacks.
     turn = ((~shared).argmax(axis=1)[:, None] + np.arange(3)) % 3
     one = np.take_along_axis(one, turn, axis=1)
-    apart = ~(one[:, :, None] == two[:, None, :]).any(axis=1)
-    other = apart.argmax(axis=1)
+    other = (~_among(two, one)).argmax(axis=1)
     two = np.take_along_axis(two, (other[:, None] + np.arange(3)) % 3, axis=1)
     joined = (shared.sum(axis=1) == 2) & (one[:, 1] == two[:, 2]) & (one[:, 2] == two[:, 1])
     # one = (a, b, d) and two = (c, d, b): the quad b, c, d, a.
     place = 3 * first[:, None] + turn
     return np.column_stack([place[:, 1], 3 * second + other, place[:, 2], place[:, 0], joined])
+
+
+def _among(triangles: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Which corners (k,3) bool of triangles (k,3) are corners of the others (k,3), each of its own."""
+    a, b, c = others.T
+    return np.stack([(corner == a) | (corner == b) | (corner == c) for corner in triangles.T], axis=1)
 
 
 def polygon_fans(
