@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from short_cuts import component_of
 
+from omt_uv.solver.cutting import developable_nets
 from omt_uv.solver.cutting.cut_graph import cut_classes
 from omt_uv.solver.cutting.developable_nets import net
 from omt_uv.solver.maps.development import developed
@@ -65,3 +66,17 @@ def test_the_net_of_a_bracket_does_not_cover_itself():
     flat, gap = developed(positions, classes)
     assert len(tips) == 12 and gap.max() < 1e-9
     assert overlap_share(np.stack([flat.real, flat.imag], axis=1)[classes]) == 0
+
+
+def test_a_net_whose_outline_does_not_cross_itself_is_not_sampled(monkeypatch):
+    """Of a fan of slivers every sample would be compared with all."""
+    monkeypatch.setattr(developable_nets, "overlap_share", pytest.fail)
+    n = 500
+    turn = 2 * np.pi * np.arange(n) / n
+    V = np.concatenate([np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), [[0, 0, 2], [0, 0, 0]]])
+    i, j = np.arange(n), (np.arange(n) + 1) % n
+    cone = component_of(
+        V, np.concatenate([np.column_stack(side) for side in ((i, j, n + 0 * i), (j, i, n + 1 + 0 * i))])
+    )
+    found = net(cone)
+    assert found.spread_out() is found

@@ -5,7 +5,7 @@ import meshes
 import numpy as np
 import pytest
 
-from omt_uv.solver.maps.contacts import covering_contacts, covers_itself, crossings, loop_edges, turns
+from omt_uv.solver.maps.contacts import covering_contacts, covers_itself, crossings, lies_apart, loop_edges, turns
 from omt_uv.solver.maps.overlap import overlap_share
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.parameterization.options import UnwrapOptions
@@ -43,6 +43,16 @@ def test_a_path_of_squares_covers_itself_where_it_comes_by_twice(turn):
         assert covers_itself(turn * w, loop) == twice
         seen.append(twice)
     assert 50 < sum(seen) < 250
+
+
+def test_only_what_certainly_lies_apart_does():
+    V, F = meshes.grid(3, 3)
+    w = V[:, :2] @ [1, 1j]
+    assert lies_apart(w, F) and not lies_apart(w.conj(), F)
+    _, around, triangles = path_of_squares([0, 0, 1, 1, 2, 2, 3, 3, 3])
+    assert not lies_apart(around, triangles)
+    # Two parts have two outlines, and may lie on each other.
+    assert not lies_apart(np.concatenate([w, w + 10]), np.concatenate([F, F + len(w)]))
 
 
 def test_more_than_a_full_turn_around_a_vertex_is_two_turns_of_the_outline():

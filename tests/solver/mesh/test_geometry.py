@@ -14,17 +14,28 @@ from omt_uv.solver.mesh.geometry import (
     cotangents_from_lengths,
     cross2,
     dot2,
+    dot3,
     face_areas,
     face_normals,
     halfedge_lengths,
     in_parts,
     least_angles,
+    lengths,
     signed_areas,
     unit,
     vertex_areas,
     vertex_normals,
 )
 from omt_uv.solver.mesh.topology import boundary_loops
+
+
+def test_lengths_and_products_in_columns_are_those_along_the_axis_to_the_bit():
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(size=(2, 500, 3, 3)) * 10.0 ** rng.integers(-9, 9, size=(500, 1, 1))
+    np.testing.assert_array_equal(dot3(a, b), (a * b).sum(axis=-1))
+    for vectors in (a, a[..., :2], a[:, 0]):
+        np.testing.assert_array_equal(lengths(vectors), np.linalg.norm(vectors, axis=-1))
+
 
 SHAPES = {"bumpy": meshes.bumpy(), "torus": meshes.torus(), "cube": meshes.cube(), "spiral": meshes.spiral_strip()}
 

@@ -253,3 +253,21 @@ def test_islands_of_any_size_are_packed_alike(exponent):
     after = drain(pack_square.pack([np.ldexp(p, exponent) for p in points], faces))
     assert all(np.array_equal(a, b) for a, b in zip(before.islands, after.islands, strict=True))
     assert after.scale == np.ldexp(before.scale, -exponent)
+
+
+def test_no_order_is_tried_twice_at_a_scale(monkeypatch):
+    tried, scales, real = [], [], (pack_square.place, pack_square._rasterised)
+
+    def place(items, order, grid):
+        tried.append((scales[-1], tuple(order)))
+        return real[0](items, order, grid)
+
+    def rasterised(task, scale):
+        scales.append((task.raster, scale))
+        return real[1](task, scale)
+
+    monkeypatch.setattr(pack_square, "place", place)
+    monkeypatch.setattr(pack_square, "_rasterised", rasterised)
+    square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    pack([square, 2 * square, square * [3, 0.5]], [np.array([[0, 1, 2], [0, 2, 3]])] * 3)
+    assert len(tried) > 6 and len(set(tried)) == len(tried)

@@ -87,6 +87,27 @@ def test_places_are_all_free_ones_also_after_more_is_taken(seed):
         assert np.array_equal(grid.taken, taken)
 
 
+def test_masks_as_wide_as_the_raster_have_the_places_that_they_have():
+    grid, taken = RasterGrid(37, 45), np.zeros((37, 37), bool)
+    for y, length in ((0, 37), (1, 36), (2, 33), (3, 5), (3, 31)):
+        mask = np.ones((1, length), bool)
+        found = grid.places(runs_of(mask), 1, length)
+        expected = [[not row[x : x + length].any() for x in range(38 - length)] for row in taken]
+        assert np.array_equal(found, expected)
+        x = int(np.flatnonzero(found[y])[-1])
+        grid.take(mask, x, y)
+        taken[y, x : x + length] = True
+    assert grid.taken_around.shape[0] > 37 and grid.taken_around[37:].all() and grid.taken_around[:, 37:].all()
+
+
+def test_a_copy_of_a_raster_is_taken_by_itself():
+    grid, mask = RasterGrid(20, 8), np.ones((3, 3), bool)
+    other = grid.copy()
+    other.take(mask, 4, 5)
+    assert other.taken.sum() == 9 and not grid.taken.any()
+    assert grid.places(runs_of(mask), 3, 3).all() and not other.places(runs_of(mask), 3, 3)[5, 4]
+
+
 def test_placed_masks_share_no_cell():
     rng = np.random.default_rng(3)
     masks = [blob(rng, *rng.integers(2, 12, 2)) for _ in range(9)]

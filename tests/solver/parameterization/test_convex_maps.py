@@ -8,8 +8,10 @@ import numpy as np
 import polygons
 import pytest
 
+from omt_uv.solver.errors import FoldedUVError
 from omt_uv.solver.mesh.charts import strict_charts
 from omt_uv.solver.mesh.geometry import signed_areas
+from omt_uv.solver.parameterization import convex_maps, corner_solver
 from omt_uv.solver.parameterization.chart_indices import ChartPins
 from omt_uv.solver.parameterization.chart_map import FOLDED, map_chart, measured_map
 from omt_uv.solver.parameterization.convex_maps import (
@@ -200,3 +202,30 @@ def test_warnings_of_other_diagonals_are_those_of_the_map_that_is_kept():
     assert with_dents_told(surface, chart, told).warnings == told.warnings
     flat = replace(told, uv=chart.vertices[:, :2])
     assert not any(text.endswith(OTHERWISE) for text in with_dents_told(surface, chart, flat).warnings)
+
+
+def test_what_is_open_at_little_cost_is_not_refined_again(monkeypatch):
+    surface, chart, chart_map = darts()
+    monkeypatch.setattr(convex_maps, "refined_again", pytest.fail)
+    (found,) = drain(with_convex_polygons(surface, [chart], [chart_map], [None], MapOptions()))
+    assert reflex(surface, chart, chart_map.uv) and not reflex(surface, chart, found.uv)
+
+
+def test_corners_are_forced_open_once_and_what_no_refinement_keeps_stays(monkeypatch):
+    surface, chart, chart_map = darts()
+    forced, real, refined = [], corner_solver.CornerPatches._forced_anew, []
+
+    def force(patches, w):
+        forced.append(w)
+        return real(patches, w)
+
+    def refuse(*arguments):
+        refined.append(arguments)
+        raise FoldedUVError("refused")
+        yield
+
+    monkeypatch.setattr(corner_solver.CornerPatches, "_forced_anew", force)
+    monkeypatch.setattr(convex_maps, "refined_again", refuse)
+    monkeypatch.setattr(convex_maps, "SHEAR_KEPT", 0.0)
+    (found,) = drain(with_convex_polygons(surface, [chart], [chart_map], [None], MapOptions()))
+    assert len(forced) == len(refined) == 1 and not reflex(surface, chart, found.uv)
