@@ -64,13 +64,15 @@ def with_convex_polygons(
     task = _Opening(drawn, charts, pins, options, targets, {})
     folded = reflex_triangles(drawn, charts, [m.uv for m in maps])
     new = task.kept(maps, np.arange(len(maps)))
+    # Areas that a balance leaves off, and vertices on a circle, make less of what is spared than a refinement does.
+    enough = SHEAR_KEPT if options.boundary == "free" and options.balance == 0 else 0.0
     for k in np.flatnonzero(folded):
-        if new[k].angle_mean > SHEAR_KEPT * maps[k].angle_mean or task.folded(k, new[k]):
+        if new[k].angle_mean > enough * maps[k].angle_mean or task.folded(k, new[k]):
             opened = yield from task.opened(k, maps[k], folded[k])
             if opened is not None:
                 either = [new[k], *task.kept([opened], np.array([k]))]
                 figures = [(task.folded(k, one), one.angle_mean) for one in either]
-                new[k] = either[figures.index(min(figures))]
+                new[k] = either[figures.index(min(figures))] if enough else either[1]
         new[k] = with_dents_told(drawn, charts[k], new[k])
     return new
 
