@@ -64,8 +64,10 @@ def with_convex_polygons(
     task = _Opening(drawn, charts, pins, options, targets, {})
     folded = reflex_triangles(drawn, charts, [m.uv for m in maps])
     new = task.kept(maps, np.arange(len(maps)))
-    # Areas that a balance leaves off, and vertices on a circle, make less of what is spared than a refinement does.
-    enough = SHEAR_KEPT if options.boundary == "free" and options.balance == 0 else 0.0
+    # Exact areas spare little, those that a balance leaves off much, and on a circle vertices stay: a refinement makes
+    # more of these.
+    plain = options.boundary == "free" and options.balance == 0 and options.quality != "exact"
+    enough = SHEAR_KEPT if plain else 0.0
     for k in np.flatnonzero(folded):
         if new[k].angle_mean > enough * maps[k].angle_mean or task.folded(k, new[k]):
             opened = yield from task.opened(k, maps[k], folded[k])
