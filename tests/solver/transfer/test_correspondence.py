@@ -9,6 +9,7 @@ import pytest
 from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.mesh.geometry import vertex_normals
 from omt_uv.solver.mesh.topology import pair_keys, twins
+from omt_uv.solver.transfer import correspondence
 from omt_uv.solver.transfer.correspondence import correspond
 
 NO_SEAMS = np.zeros((0, 2), np.int64)
@@ -67,3 +68,13 @@ def test_the_unit_of_length_does_not_count(scale):
     found, scaled = (correspond(s * V, F, NO_SEAMS, s * W, G, on.faces, on.barycentric) for s in (1.0, scale))
     for name in ("face_triangle", "corner_triangle", "corner_weights", "vertex_triangle", "vertex_weights"):
         np.testing.assert_array_equal(getattr(found, name), getattr(scaled, name))
+
+
+@pytest.mark.parametrize("offset", [0.0, 40.0])
+def test_the_largest_triangle_of_each_polygon_leads_wherever_it_lies(offset):
+    rng = np.random.default_rng(5)
+    owner, corners = rng.integers(12, size=60), rng.random((60, 3, 3))
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    lead = correspondence._leading(owner, corners + [offset, -2 * offset, 0])
+    np.testing.assert_array_equal(owner[lead], owner)
+    np.testing.assert_array_equal(area[lead], [area[owner == k].max() for k in owner])
