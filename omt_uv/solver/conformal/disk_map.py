@@ -82,12 +82,18 @@ def conformal_rectangle(
     """Conformal map of a disk mesh (n,3), (m,3) to the rectangle [0,1] x [0,aspect].
 
     corners (4,) boundary vertices, counter-clockwise from the lower left; the sharpest by default.
-    Triangles whose three vertices lie on one side have no area in the image. Raises PrecisionError where the
-    map leaves double precision.
+    Triangles whose three vertices lie on one side have no area in the image.
+
+    Raises
+    ------
+    PrecisionError : the map leaves double precision
+    ValueError : corners that are not four different vertices of the boundary, in turn, where it has as many
     """
     loop = boundary_loops(triangles)[0]
     if corners is None:
         corners = sharpest_corners(vertices, triangles, loop)
+    elif len(loop) > 3:
+        _check_corners(loop, corners, len(vertices))
     result = yield from _rectangle(vertices, triangles, loop, corners)
     _check_resolution(result.uv / [1, result.aspect], triangles)
     return result
@@ -159,6 +165,15 @@ def _rectangle(vertices, triangles, loop, corners, tolerance=TOLERANCE) -> Steps
     )
 
 
+def _check_corners(loop: np.ndarray, corners: np.ndarray, n: int) -> None:
+    """Raise ValueError unless corners (4,) follow one another along a boundary loop (b,) of n vertices."""
+    place = np.full(n, -1, dtype=np.int64)
+    place[loop] = np.arange(len(loop))
+    at = place[corners]
+    if (at < 0).any() or (np.diff((at - at[0]) % len(loop)) <= 0).any():
+        raise ValueError("the corners must be four different boundary vertices in counter-clockwise order")
+
+
 def _layout(flow: YamabeFlow, owner, loop, corners, n) -> tuple[np.ndarray, float]:
     """Coordinates (n,2) of the flat pillow's front, and the aspect ratio of the rectangle.
 
@@ -168,8 +183,6 @@ def _layout(flow: YamabeFlow, owner, loop, corners, n) -> tuple[np.ndarray, floa
     place = np.full(n, -1, dtype=np.int64)
     place[loop] = np.arange(len(loop))
     start = place[corners]
-    if (np.diff(start) <= 0).any():
-        raise ValueError("the corners must be four different boundary vertices in counter-clockwise order")
     # Side of the rectangle of each boundary segment: 0 bottom, 1 right, 2 top, 3 left.
     side = (np.searchsorted(start, np.arange(len(loop)), side="right") - 1) % 4
     segment = crossed_segment(flow.triangulation, loop, n)
