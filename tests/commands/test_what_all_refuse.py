@@ -184,3 +184,36 @@ def test_a_full_disk_leaves_whole_what_was_there_and_a_good_one_changes_only_wha
     found = contents(tmp_path)
     assert found.keys() == targets
     assert all(data != b"old" for data in found.values()), command
+
+
+# What some commands refuse beside what all do, @ for files of the folder, # for new ones, and what they name.
+SOME = {
+    "distances @index.npz -o #out.txt": ".csv",
+    "distances @index.npz -o #out.csv --picture #out.jpg": "out.jpg: this picture is a .png",
+    "distances @index.npz -o #out.csv --mds #out.jpg": "out.jpg: this picture is a .png",
+    "distances @index.npz -o #out.csv --knn 1": "Give --labels",
+    "distances @index.npz -o #out.csv --labels @image.png": "no table",
+    "distances @index.npz -o #out.csv --labels #one.csv": "has no class for 1 shapes",
+    "page @shapes -o #out.txt": ".html",
+    "magnify @in.blend -o #out.blend --weights region --factor 1.5 --source uv --image @image.png": "--image-output",
+    "magnify @in.blend -o #out.blend --weights region --factor 1.5 --source uv --image-size 64": "Give all of them",
+    "magnify @in.blend -o #out.blend --weights region --factor 1.5 --source mesh --image @image.png "
+    "--image-output #out.png": "--source uv",
+    "match @in.blend @other.blend --wrap -o #out.stl": "no vertices in common",
+    "match @in.blend @in.blend -o #out.blend": "both files are one",
+    "match @two.blend @in.blend -o #out.blend": "several meshes",
+    "average @shapes -o @shapes/a.blend": "Give the mean a name of its own",
+    "average @shapes -o #out.blend --report @shapes/b.blend": "Give each a name of its own",
+    "compare @two.blend @in.blend --beltrami": "one by --object",
+    "distance @two.blend @in.blend --markers 0,1": "Choose it by --object",
+    "distance @in.blend @other.blend --markers 0,900": "no vertex 900",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("call", SOME)
+def test_what_some_commands_refuse_is_named_in_one_line_and_nothing_is_written(run, folder, tmp_path, call):
+    (tmp_path / "one.csv").write_text("a.blend,first\n")
+    at = {"@": folder, "#": tmp_path}
+    arguments = [at[word[0]] / word[1:] if word[0] in at else word for word in call.split()]
+    err = refused(run, tmp_path, arguments, [SOME[call] + "."])
+    assert SOME[call] in err

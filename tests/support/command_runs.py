@@ -45,11 +45,14 @@ def body(name: str, at: float = 0.0, seed: int = 1) -> bpy.types.Object:
 
 
 def prepare(run, folder: Path) -> None:
-    """Files for all commands: in.blend, other.blend, an image, handles, a folder of shapes and its index."""
+    """Files for all commands: in.blend, other.blend, two.blend with two meshes, an image, handles, a folder of
+    shapes and its index."""
     for name in ("in", "other"):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         body(name)
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{name}.blend"))
+    body("in", at=5.0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "two.blend"))
     (folder / "handles.json").write_text(json.dumps([{"vertices": [0], "move": [0, 0, 0.1]}]))
     image = bpy.data.images.new("image", 32, 16)
     image.filepath_raw, image.file_format = str(folder / "image.png"), "PNG"

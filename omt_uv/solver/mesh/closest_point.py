@@ -18,6 +18,10 @@ from .topology import twins
 
 # Samples whose faces are tried for a query.
 CANDIDATES = 4
+# So many pitches of samples from the nearest, half of the samples in each direction tell about where it is as well.
+FAR = 12.0
+# Samples so few are searched for any point.
+FEW_SAMPLES = 1000
 # Samples that are tried whichever way the surface looks there,
 MORE_CANDIDATES = 8
 # but for those that look the opposite way: cosine between the normals.
@@ -142,6 +146,19 @@ class ClosestPoint:
         """The samples without their normals."""
         return cKDTree(self._spread[1])
 
+    @cached_property
+    def _levels(self) -> list[tuple[np.ndarray, cKDTree, float]]:
+        """Triangles (s,) of samples, these, and how far apart they are: all, then one of each cube twice as large."""
+        (owner, samples), pitch = self._spread, max(PITCH * self.spacing, 1e-300)
+        levels = [(owner, self._plain, pitch)]
+        while len(owner) > FEW_SAMPLES:
+            pitch *= 2
+            cubes = np.floor((samples - samples.min(axis=0)) / pitch).astype(np.int64)
+            first = np.unique(cubes, axis=0, return_index=True)[1]
+            owner, samples = owner[first], samples[first]
+            levels.append((owner, cKDTree(samples), pitch))
+        return levels
+
     def closer(self, points: np.ndarray, normals: np.ndarray, found: SurfacePoints) -> SurfacePoints:
         """What was found for points (k,3) with normals (k,3), or the nearest by position where that is nearer, and does
         not look the opposite way."""
@@ -158,11 +175,39 @@ class ClosestPoint:
         return SurfacePoints(*(np.where(nearer.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in parts))
 
     def near_by_position(self, points: np.ndarray) -> np.ndarray:
-        """The nearest triangle (k,) of those of the samples nearest to points (k,3), whichever way it looks."""
-        owner = self._spread[0]
-        k = min(MORE_CANDIDATES, len(owner))
-        faces = owner[self._plain.query(points, k=k)[1].reshape(len(points), k)]
+        """The nearest triangle (k,) of those of the samples nearest to points (k,3), whichever way it looks.
+
+        A tree tells the nearest of many that are about as far only by visiting them all, as from the middle of a ball:
+        the farther a point, the fewer samples tell where to look, and from there more and more tell where it is.
+        """
+        left, level, found = np.arange(len(points)), np.zeros(len(points), np.int64), np.zeros(len(points), np.int64)
+        for k, (owner, tree, pitch) in enumerate(self._levels):
+            reach = FAR * pitch if k + 1 < len(self._levels) else np.inf
+            near, faces = self._candidates(owner, tree, points[left], reach)
+            rows = left[near]
+            found[rows], level[rows] = self._best(points[rows], faces), k
+            left = left[~near]
+        for k in range(int(level.max(initial=0)) - 1, -1, -1):
+            rows = np.flatnonzero(level > k)
+            here = self.at(found[rows], self.distance(points[rows], found[rows])[0])
+            around = self._candidates(*self._levels[k][:2], here, np.inf)[1]
+            found[rows] = self._best(points[rows], np.column_stack([found[rows], around]))
+        return found
+
+    def _best(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+        """The triangle (k,) of candidates (k,c) that is nearest to each of points (k,3)."""
         return faces[np.arange(len(faces)), self.distance(points, faces)[1].argmin(axis=1)]
+
+    @staticmethod
+    def _candidates(
+        owner: np.ndarray, tree: cKDTree, points: np.ndarray, reach: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Which points (k,3) have samples within reach, (k,) bool, and triangles of theirs, (j,c)."""
+        count = min(MORE_CANDIDATES, len(owner))
+        off, at = (x.reshape(-1, count) for x in tree.query(points, k=count, distance_upper_bound=reach))
+        near = np.isfinite(off[:, 0])
+        # Where fewer are as near, the nearest stands for the others.
+        return near, owner[np.where(np.isfinite(off), at, at[:, :1])[near]]
 
     def nearest_face(self, points: np.ndarray) -> np.ndarray:
         """The triangle (k,) of the sample nearest to each of points (k,3): where it is about, for smooth quantities."""

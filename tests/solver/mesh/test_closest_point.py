@@ -1,5 +1,7 @@
 """Closest points against brute force, and samples that cover the faces."""
 
+from itertools import pairwise
+
 import meshes
 import numpy as np
 import pytest
@@ -20,6 +22,23 @@ def distances(V, F, points):
     coordinates = closest_on_triangles(points[:, None], a, b, c)
     near = np.einsum("kmc,mcd->kmd", coordinates, V[F])
     return np.linalg.norm(near - points[:, None], axis=2).min(axis=1)
+
+
+@pytest.mark.parametrize("subdivisions", [1, 3])
+@pytest.mark.parametrize("size", [1.0, 1e-3])
+def test_what_is_near_by_position_is_about_the_nearest_of_all_at_any_distance(subdivisions, size):
+    """Inside, in the middle, which all is as far from, on the surface, and far away, by fewer and fewer samples."""
+    V, F = meshes.icosphere(subdivisions)
+    V, rng = size * V * [1, 1.3, 0.8], np.random.default_rng(0)
+    index = ClosestPoint(V, F, 0.02 * size)
+    for at, spread in ((0, 0.5), (0, 1e-3), (V[5] / size, 0.05), ([3, 0, 0], 1.0), ([0, 300, 0], 1.0)):
+        points = size * (at + spread * rng.normal(size=(60, 3)))
+        exact, near = distances(V, F, points), index.near_by_position(points)
+        off = np.linalg.norm(index.walk(points, near).points - points, axis=1)
+        assert (off >= exact * (1 - 1e-9)).all() and (off <= exact * 1.01 + 1e-12).all()
+        assert (off <= exact * (1 + 1e-9) + 1e-12).mean() > 0.95
+    counts = [len(owner) for owner, *_ in index._levels]
+    assert all(few < many / 3 for many, few in pairwise(counts)) and counts[-1] <= 1000 < counts[0]
 
 
 def test_coordinates_are_barycentric_and_nothing_is_nearer():
