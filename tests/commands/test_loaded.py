@@ -144,6 +144,9 @@ def test_coordinates_of_a_survey_keep_their_digits(package, run, tmp_path, name,
     (obj,) = bpy.data.objects
     there = package("files.loaded").positions_of(obj.data).astype(float) + np.array(obj.location)
     assert np.abs(there - POINTS - PLACE).max() < 1e-6
+    # The origin is in the middle, where single precision is finest.
+    here = package("files.loaded").positions_of(obj.data)
+    assert np.abs(here.min(axis=0) + here.max(axis=0)).max() < 1.0 < np.ptp(here, axis=0).max()
     uv = scenes.uv_of(obj)
     assert run("unwrap", tmp_path / "near.obj", "-o", tmp_path / "near.blend")[0] == 0
     assert np.abs(uv - scenes.uv_of(bpy.data.objects[0])).max() < 1e-4

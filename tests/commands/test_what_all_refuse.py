@@ -161,9 +161,24 @@ def test_no_two_files_of_a_command_may_be_one(package, run, folder):
     assert tried > 60
 
 
+@pytest.fixture
+def progress(package, monkeypatch):
+    """How far solvers say that they are, a list for each that is run to its end."""
+    module, told = package("solver.progress"), []
+    drain = module.drain
+
+    def recorded(steps, callback=None):
+        told.append([])
+        mine = told[-1]
+        return drain(steps, lambda p: mine.append(p.fraction) if callback is None else callback(p))
+
+    monkeypatch.setattr(module, "drain", recorded)
+    return told
+
+
 @pytest.mark.parametrize("command", [c for c in command_runs.CALLS if c not in NOTHING_WRITTEN])
 def test_a_full_disk_leaves_whole_what_was_there_and_a_good_one_changes_only_what_was_named(
-    package, run, folder, tmp_path, command
+    package, run, folder, tmp_path, command, progress
 ):
     files = written_to(tmp_path)
     (parser,) = (p for name, p in command_runs.commands(package).items() if name == command)
@@ -184,6 +199,9 @@ def test_a_full_disk_leaves_whole_what_was_there_and_a_good_one_changes_only_wha
     found = contents(tmp_path)
     assert found.keys() == targets
     assert all(data != b"old" for data in found.values()), command
+    # It went on all the time, and not beyond the end.
+    for each in filter(None, progress):
+        assert each[0] >= 0 and each[-1] <= 1 and (np.diff(each) >= -1e-9).all(), (command, each)
 
 
 # What some commands refuse beside what all do, @ for files of the folder, # for new ones, and what they name.

@@ -98,3 +98,17 @@ def test_bars_are_as_high_as_their_shares_of_the_top(monkeypatch, unit):
         assert abs((column < 0.5).sum() - part / max(lines) * (low - high)) <= 1
     for value, y in lines.items():
         assert abs((low - y) - value / max(lines) * (low - high)) <= 1
+
+
+def test_a_picture_that_is_not_there_after_it_was_saved_is_an_error_and_nothing_is_left(monkeypatch, tmp_path):
+    images = SimpleNamespace(removed=[])
+    image = SimpleNamespace(save=lambda: None)
+    monkeypatch.setattr(canvas, "show", lambda *_: image)
+    data = SimpleNamespace(images=SimpleNamespace(remove=images.removed.append))
+    monkeypatch.setattr(canvas, "bpy", SimpleNamespace(data=data))
+    with pytest.raises(OSError, match="could not be written"):
+        canvas.save(tmp_path / "a.png", np.zeros((2, 2, 3)))
+    assert images.removed == [image] and image.filepath_raw == str(tmp_path / "a.png")
+    image.save = lambda: (tmp_path / "a.png").write_bytes(b"")
+    canvas.save(tmp_path / "a.png", np.zeros((2, 2, 3)))
+    assert images.removed == [image, image]

@@ -103,3 +103,16 @@ def two_islands(name):
     obj = scenes.add(np.concatenate([points, points + [5, 0, 0]]), np.concatenate([faces, faces + 16]).tolist(), name)
     scenes.set_uv(obj, scenes.seen_from_above(obj, 0.1))
     return obj
+
+
+def test_every_island_has_its_turn_however_short_the_slices(session):
+    obj = two_islands("Pair")
+    uv = scenes.uv_of(obj)
+    scenes.set_uv(obj, np.where(uv[:, :1] > 0.3, [0.3, 0], [0, 0]) + uv * [0.5, 1.0])
+    before, live, half = scenes.uv_of(obj), session(obj), len(scenes.uv_of(obj)) // 2
+    for _ in range(60):
+        live.follow(0.0, 0.0)
+        moved = (scenes.uv_of(obj) != before).any(axis=1)
+        if moved[:half].any() and moved[half:].any():
+            return
+    raise AssertionError("one island took all the time")

@@ -176,6 +176,22 @@ def test_a_mesh_that_changes_meanwhile_ends_the_run(kind):
         assert uv_bytes(mesh) == uv
 
 
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("kind", ["vertex", "uv", "renamed", "deleted"])
+def test_one_of_several_that_changes_meanwhile_ends_the_run(kind, which):
+    objects = [scene("uv.omt_unwrap", "OBJECT"), scenes.bump(6, 6)]
+    objects[1].name = "Second"
+    scenes.set_uv(objects[1], scenes.seen_from_above(objects[1]))
+    scenes.select(objects)
+    operator = scenes.stand_in("uv.omt_unwrap")
+    assert step(operator, 2) == {"RUNNING_MODAL"}
+    DISTURBANCES[kind](objects[which])
+    state = {"RUNNING_MODAL"}
+    while "RUNNING_MODAL" in state:
+        state = operator.modal(bpy.context, event("TIMER"))
+    assert state == {"CANCELLED"} and "meanwhile" in operator.reports[0][1]
+
+
 def uv_bytes(mesh):
     values = np.zeros(2 * len(mesh.loops), np.float32)
     mesh.uv_layers.active.uv.foreach_get("vector", values)

@@ -114,3 +114,87 @@ def test_lists_strips_and_fans_are_the_triangles_that_the_format_says(count):
         found = glb_data.triangles(glb, {"attributes": {"POSITION": 0}, "mode": mode})
         assert found.tolist() == [list(face) for face in faces], mode
     assert glb_data.triangles(glb, {"attributes": {}}).shape == (0, 3)
+
+
+@pytest.mark.parametrize("form", ["embedded", "beside"])
+def test_a_buffer_has_as_many_bytes_as_it_declares_and_no_others(tmp_path, form):
+    (tmp_path / "a b.bin").write_bytes(b"0123456789")
+    head = "data:application/octet-stream;base64,"
+    uri = {"embedded": head + base64.b64encode(b"0123456789").decode(), "beside": "a%20b.bin"}[form]
+    for length in (0, 1, 9, 10):
+        assert gltf._bytes_of(0, {"uri": uri, "byteLength": length}, tmp_path) == b"0123456789"[:length]
+    for length in (-1, 11, 1.5, "10", None):
+        with pytest.raises(InPlaceError, match="buffer 3 declares"):
+            gltf._bytes_of(3, {"uri": uri, "byteLength": length}, tmp_path)
+    strange = {"data:text/plain,0123": "of a kind", head + "0": "no base64", "https://a/b.bin": "not in the folder",
+               "": "not in the folder", "c.bin": "c.bin: No such file"}  # fmt: skip
+    for uri, text in strange.items():
+        with pytest.raises(InPlaceError, match=text):
+            gltf._bytes_of(3, {"uri": uri, "byteLength": 1}, tmp_path)
+
+
+# The specification's table of types of numbers (5.1.3).
+NUMBERS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+
+
+@pytest.mark.parametrize("code", NUMBERS)
+@pytest.mark.parametrize("gap", [0, 4])
+def test_numbers_of_every_type_are_read_as_they_were_written(code, gap):
+    """Beside one another, and with gaps; all of them, and some in the place of others."""
+    kind = np.dtype(NUMBERS[code]).newbyteorder("<")
+    top = np.finfo(np.float32).max if code == 5126 else np.iinfo(kind).max
+    values = np.array([[0, 1, 2], [top, 3, 4], [5, 6, top]], kind)
+    rows = b"".join(row.tobytes() + bytes(gap) for row in values)
+    new = np.array([[7, 8, 9]], kind)
+    where = np.array([1], "<u2").tobytes() + bytes(2)
+    doc = {
+        "buffers": [{"byteLength": 4 + len(rows) + len(where) + 12}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 4, "byteLength": len(rows)}
+            | ({"byteStride": 3 * kind.itemsize + 4} if gap else {}),
+            {"buffer": 0, "byteOffset": 4 + len(rows), "byteLength": 2},
+            {"buffer": 0, "byteOffset": 4 + len(rows) + len(where), "byteLength": 3 * kind.itemsize},
+        ],
+        "accessors": [{"bufferView": 0, "componentType": code, "count": 3, "type": "VEC3"}],
+    }
+    doc["accessors"].append(
+        doc["accessors"][0]
+        | {"sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5123}, "values": {"bufferView": 2}}}
+    )
+    doc["accessors"].append({"componentType": code, "count": 2, "type": "VEC3"})
+    glb = glb_data.Glb(doc, bytes(4) + rows + where + new.tobytes() + bytes(12), [])
+    found = [glb_data.accessor(glb, k) for k in range(3)]
+    assert all(one.dtype == kind for one in found)
+    np.testing.assert_array_equal(found[0], values)
+    np.testing.assert_array_equal(found[1], [values[0], new[0], values[2]])
+    np.testing.assert_array_equal(found[2], np.zeros((2, 3)))
+
+
+DAMAGED = {
+    "counts": lambda doc: doc["accessors"][0].update(count=10**9),
+    "leads out of": lambda doc: doc["accessors"][0].update(byteOffset=60),
+    "matrices of small": lambda doc: doc["accessors"][0].update(componentType=5121, type="MAT3"),
+    "does not have": lambda doc: doc["accessors"][0]["sparse"].update(count=3),
+    "replaces -1 values": lambda doc: doc["accessors"][0]["sparse"].update(count=-1),
+    "in other files": lambda doc: doc["buffers"][0].update(uri="a.bin"),
+    "compressed": lambda doc: doc["bufferViews"][0].update(extensions={"EXT_meshopt_compression": {}}),
+}
+
+
+@pytest.mark.parametrize("text", DAMAGED)
+def test_accessors_that_lie_are_refused_by_what_is_wrong(text):
+    doc = {
+        "buffers": [{"byteLength": 64}],
+        "bufferViews": [{"buffer": 0, "byteLength": 64}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR"}],
+    }
+    doc["accessors"][0]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": 0, "componentType": 5125},
+        "values": {"bufferView": 0},
+    }
+    glb = glb_data.Glb(doc, bytes(64), [])
+    np.testing.assert_array_equal(glb_data.accessor(glb, 0), np.zeros((2, 1)))
+    DAMAGED[text](doc)
+    with pytest.raises(InPlaceError, match=text):
+        glb_data.accessor(glb, 0)

@@ -90,7 +90,7 @@ def test_the_notices_are_paged(package):
     for shown in (1, 0):
         assert bpy.ops.uv.omt_notices(whole=False) == {"FINISHED"}
         assert last_run.state.shown == shown
-    assert bpy.ops.uv.omt_notices() == {"FINISHED"}
+    assert bpy.ops.uv.omt_notices() == {"FINISHED"} and last_run.state.shown == 0
     last_run.forget()
 
 

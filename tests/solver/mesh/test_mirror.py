@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from polygons import slit_across
 
+from omt_uv.solver.mesh import mirror
 from omt_uv.solver.mesh.mirror import find_mirror, mirrored_quads, partial_mirror
 
 
@@ -117,3 +118,12 @@ def test_corners_of_polygons_of_any_number_of_sides_find_their_images(sides):
     mirror = find_mirror(V, F, start)
     half = sides * 5
     np.testing.assert_array_equal(mirror.image, np.concatenate([np.arange(half) + half, np.arange(half)]))
+
+
+@pytest.mark.parametrize("doubled", [0, 1, 7])
+def test_polygons_that_lie_on_one_another_are_twins_and_all_others_have_none(doubled):
+    V, F = meshes.bumpy(4, 4)
+    both = np.concatenate([F, F[:doubled, [1, 2, 0]]])
+    expected = np.full(len(both), -1)
+    expected[:doubled], expected[len(F) :] = len(F) + np.arange(doubled), np.arange(doubled)
+    np.testing.assert_array_equal(mirror._Polygons(V, both, None).twins, expected)

@@ -18,6 +18,7 @@ from omt_uv.solver.parameterization import initial_map as initial_maps
 from omt_uv.solver.parameterization.initial_map import (
     DiskMesh,
     coarse_initial_map,
+    good_enough,
     initial_map,
     mean_value_sites,
     roomy_initial_map,
@@ -202,6 +203,26 @@ def test_a_boundary_touches_itself_where_vertices_lie_on_one_another():
     V, F = meshes.grid(4, 4)
     loop, uv = boundary_loops(F)[0], V[:, :2].copy()
     assert not touches_itself(uv, loop)
-    assert not touches_itself(1e-9 * uv, loop)
+    assert not touches_itself(1e-9 * uv, loop) and not touches_itself(uv + 1e6, loop)
     uv[loop[5]] = uv[loop[0]] + 1e-9
     assert touches_itself(uv, loop) and touches_itself(1e6 * uv, loop)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 50.0])
+@pytest.mark.parametrize("draft", [False, True])
+def test_an_isometry_is_good_enough_in_any_unit_and_what_folds_or_shears_is_not(scale, draft):
+    V, F = meshes.grid(6, 6, 1.0, 2.0)
+    V = V * [1, 1, 0]
+    disk, uv = disk_of(V, F), V[:, :2]
+    found = good_enough(disk, scale * uv + 3 * scale, draft, False, 0.0)
+    assert found.area_error < 1e-9 and found.iterations == 0
+    # What comes out has the area of the surface.
+    assert np.abs(signed_areas(found.uv, F)).sum() == pytest.approx(2.0)
+    np.testing.assert_allclose(found.uv - found.uv[0], uv - uv[0], atol=1e-9)
+    folded = uv.copy()
+    folded[24] += [0.5, 0]
+    assert good_enough(disk, scale * folded, draft, False, 0.0) is None
+    sheared = scale * uv * [3.0, 1.0]
+    assert (good_enough(disk, sheared, draft, False, 0.0) is None) != draft
+    # The areas of a draft have bounds, too.
+    assert good_enough(disk, scale * np.sign(uv - 0.01) * np.abs(uv) ** 3, draft, False, 0.0) is None

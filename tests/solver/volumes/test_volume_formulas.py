@@ -206,6 +206,8 @@ def test_what_the_domains_do():
     frames = sphere.frames(back)
     np.testing.assert_allclose(frames[edge][:, :, 2], back[edge], atol=1e-12)
     assert np.linalg.det(frames) == pytest.approx(1)
+    # Where a point of the boundary is off the sphere, its axes are those of where it belongs.
+    np.testing.assert_allclose(sphere.frames(points)[edge], frames[edge], atol=1e-12)
     assert sphere.bending(slope, back) == pytest.approx(np.maximum(-(slope * back)[edge].sum(axis=1), 0))
     assert sphere.start(back) is back
     side = np.array([0, 1, 2])

@@ -47,6 +47,21 @@ def test_few_samples_stand_for_the_measure():
     np.testing.assert_allclose(measure, measure[0])
 
 
+@pytest.mark.parametrize("contrast", [1.0, 9.0, 100.0])
+@pytest.mark.parametrize("scale", [1.0, 1e3])
+def test_where_more_is_asked_for_there_are_more_samples(contrast, scale):
+    """As dense as asked for where the density is greatest, in any unit."""
+    V, F = meshes.icosphere(3)
+    V = scale * V
+    area, upper = face_areas(V, F), V[F].mean(axis=1)[:, 2] > 0
+    density = np.where(upper, contrast, 1.0)
+    density /= area @ density / area.sum()
+    samples = area_samples(index_of(V, F, 0.1 * scale), 4000, density)
+    share = np.bincount(samples.faces, minlength=len(F))[upper].sum() / 4000
+    asked = (area @ np.where(upper, density, 0)) / area.sum()
+    assert 0.8 * asked < share < 2 * asked and 3200 < len(samples.points) <= 8000
+
+
 def test_crests_are_the_edges_of_a_cube():
     V, F = meshes.cube()
     for _ in range(4):
