@@ -40,26 +40,28 @@ def folder(tmp_path):
 
 def test_a_folder_is_unwrapped_with_table_summary_and_page(run, folder):
     pytest.importorskip("scipy", reason="runs outside Blender, where the wheels of the extension are not")
-    words = ["batch", "unwrap", folder / "in", "-o", folder / "out", "--", "--quality", "draft"]
+    # In a folder that is not there yet.
+    target = folder / "new" / "out"
+    words = ["batch", "unwrap", folder / "in", "-o", target, "--", "--quality", "draft"]
     status, out, err = run(*words)
     assert status == 7 and out.startswith("2 of 3 files done, 3 of all runs now")
     assert err.count("\n") == 1 and "1 of 3 files could not be done" in err
     for name in ("a.obj", "sub/-b $(touch x); .obj"):
-        assert (folder / "out" / name).read_text().count("vt ") == 4
-        assert (folder / "out.previews" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (target / name).read_text().count("vt ") == 4
+        assert (target.with_name("out.previews") / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert not list(folder.glob("**/x"))
     status, out, _ = run(*words)
     assert status == 7 and "0 of all runs now" in out
-    status, out, _ = run("table", folder / "out")
+    status, out, _ = run("table", target)
     rows = {row["name"]: row for row in csv.DictReader(io.StringIO(out))}
     assert rows["a.obj"]["faces"] == "2" and float(rows["a.obj"]["area_l1"]) < 0.01
     assert rows["bad.obj"]["status"] == "1" and "no faces" in rows["bad.obj"]["message"]
-    status, out, _ = run("summary", folder / "out", "--json")
+    status, out, _ = run("summary", target, "--json")
     assert json.loads(out)["counts"] == {"done": 2, "failed": 1}
-    assert run("page", folder / "out")[0] == 0
-    assert "out.previews/sub/-b%20%24%28touch%20x%29%3B%20.obj.png" in (folder / "out.html").read_text()
+    assert run("page", target)[0] == 0
+    assert "out.previews/sub/-b%20%24%28touch%20x%29%3B%20.obj.png" in (target.with_name("out.html")).read_text()
     assert run(*words[:5], "--allow-failures", *words[5:])[0] == 0
-    assert run("table", folder / "out", "-o", folder / "t.txt")[0] == 1
+    assert run("table", target, "-o", folder / "t.txt")[0] == 1
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from omt_uv.pipelines.magnify import Region
 from omt_uv.pipelines.regions import detail
 from omt_uv.pipelines.shapes import distance, match, partition, strain
 from omt_uv.pipelines.shapes.cell_attributes import carry_to_cells
+from omt_uv.pipelines.shapes.landmark_pairs import pairs_of
 from omt_uv.settings import PartitionSettings
 from omt_uv.solver.mesh.geometry import face_areas, face_normals
 from omt_uv.solver.mesh.surface import chosen_triangles, triangle_surface
@@ -21,6 +22,7 @@ from omt_uv.solver.parameterization.chart_indices import CornerPins
 from omt_uv.solver.partition.cut_mesh import cut_along_cells
 from omt_uv.solver.partition.division import DivisionOptions, divide
 from omt_uv.solver.progress import drain
+from omt_uv.solver.registration.results import RegistrationOptions
 from omt_uv.solver.strain.beltrami import Beltrami
 
 
@@ -209,6 +211,19 @@ def test_small_parts_go_along_with_a_similarity(mirrored):
         for rows in (np.isin(F, part.rest).all(axis=1),):
             before, after = (np.linalg.det(x[F[rows]] - x[F[rows]].mean(axis=(0, 1))) for x in (V, wrapped))
             assert np.isfinite(after).all() and before.any()
+
+
+SIDES = ("source", "target")
+NOT_POLISHED = RegistrationOptions(polish=False)
+
+
+@pytest.mark.parametrize("parted", SIDES)
+def test_parts_that_go_along_are_counted_and_told_with_whose_they_are(parted):
+    surfaces = [triangle_surface(*(two_parts() if parted == name else meshes.icosphere(2))) for name in SIDES]
+    pairs = pairs_of([], [], SIDES)
+    found = drain(match.match_surfaces(match.MatchJob(*surfaces, pairs, NOT_POLISHED, surfaces[0].seams[:0])))
+    told = [text for text in found.warnings if "smaller part" in text]
+    assert told == [f"2 smaller parts of the {parted} went along with the largest"]
 
 
 def test_the_largest_part_by_area_and_what_is_left():

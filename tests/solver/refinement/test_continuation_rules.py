@@ -144,3 +144,14 @@ def test_only_free_boundaries_with_areas_about_right_begin_with_soft_areas():
         assert first == (rules.FREE_PRESSURE if soft else rules.FIRST_PRESSURE)
     assert rules.first_pressure(QUALITIES["standard"], 0.5, True) == rules.FIRST_PRESSURE
     assert rules.first_pressure(QUALITIES["standard"], 0.0, False) == rules.FIRST_PRESSURE
+
+
+@pytest.mark.parametrize("quality", QUALITIES)
+def test_a_stage_is_the_last_from_its_bounds_on(quality):
+    of = QUALITIES[quality]
+    error, weight = of.area_error, of.greatest_weight
+    # Both bounds are within, and with shear in the balance every stage is enough.
+    for given, asked in (((error, 0.0), True), ((np.nextafter(error, 1), 0.0), False), ((2 * error, weight), True),
+                         ((2 * error, np.nextafter(weight, 0)), False), ((0.0, 0.0), True)):  # fmt: skip
+        assert bool(rules.is_enough(of, 0.0, *given)) == asked
+        assert rules.is_enough(of, 0.5, *given)

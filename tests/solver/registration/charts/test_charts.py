@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from meshes import bumpy, torus
+from sphere_shapes import random_rotation
 
 from omt_uv.solver.errors import LandmarkError, TopologyMismatchError
 from omt_uv.solver.mesh.charts import strict_charts
@@ -115,3 +116,13 @@ def test_points_at_vertices_are_those_all_of_whose_weight_is_at_one():
     np.testing.assert_array_equal(_at_vertices(triangles, faces, barycentric), [4, 4, 2, -1, -1, -1])
     none = _at_vertices(triangles, np.zeros(0, np.int64), np.zeros((0, 3)))
     assert none.shape == (0,)
+
+
+def test_where_the_source_stands_does_not_count_with_landmarks_that_turn_it(tori):
+    (V, F, seams, at), (W, G, others, _) = tori
+    here = np.array([4 * 12 + 6, 18 * 12 + 3, 9 * 12 + 9])
+    landmarks = vertex_landmarks((here, F), (np.array([6 * 16 + 8, 27 * 16 + 4, 13 * 16 + 12]), G))
+    turned = 0.2 * V @ random_rotation(3).T + [7, -30, 2]
+    found = drain(register_charts((turned, F, seams), (W, G, others), landmarks))
+    off = np.linalg.norm(found.forward.positions(W, G) - placed(at), axis=1)
+    assert found.met.all() and found.flipped == 0 and off.max() < 0.2 and off.mean() < 0.05
