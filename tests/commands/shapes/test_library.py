@@ -22,9 +22,15 @@ def test_a_folder_is_indexed_once_and_searched(run, tmp_path):
     (tmp_path / "all").mkdir()
     body(tmp_path / "all" / "round.blend", 1)
     body(tmp_path / "all" / "long.blend", 3)
+    # What is no mesh is nobody's business, and each picture comes without the other.
+    (tmp_path / "all" / "notes.txt").write_text("v 0 0 0")
     words = ["library", tmp_path / "all", "-o", tmp_path / "index.npz"]
-    status, out, _ = run(*words)
-    assert status == 0 and out.startswith("2 new, 2 in ")
+    status, out, err = run(*words)
+    assert status == 0 and out.startswith("2 new, 2 in ") and err == ""
+    for kind in ("--mds", "--picture"):
+        made = tmp_path / f"{kind}.png"
+        assert run("distances", tmp_path / "index.npz", "-o", tmp_path / "d.csv", kind, made)[0] == 0
+        assert made.stat().st_size > 1000
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_torus_add()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "all" / "ring.blend"))
