@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from ...errors import UserError
 from ...solver.mesh.closest_point import ClosestPoint
 from ...solver.mesh.geometry import halfedge_lengths, vertex_normals
 from ...solver.registration.landmarks import Landmarks, no_landmarks
+
+# No mesh has more.
+MOST_VERTICES = 2**31 - 1
 
 
 class PairsError(UserError):
@@ -68,19 +72,34 @@ def read_pairs(path: Path) -> Pairs:
         raise PairsError(f"{path}: {error}") from error
     sides: tuple[list[LandmarkPoint], list[LandmarkPoint]] = ([], [])
     try:
-        for k, row in enumerate(rows):
-            for side, value in zip(sides, row, strict=True):
-                if isinstance(value, int):
-                    side.append(LandmarkPoint(f"{k}", vertex=value))
-                else:
-                    x, y, z = (float(v) for v in value)
-                    side.append(LandmarkPoint(f"{k}", position=(x, y, z)))
-    except (TypeError, ValueError) as error:
+        for k, row in enumerate(_list(rows)):
+            for side, value in zip(sides, _list(row), strict=True):
+                side.append(_point(f"{k}", value))
+    except (TypeError, ValueError, OverflowError) as error:
         raise PairsError(
             f"{path}: pair {len(sides[1])} is none. Give a list of [source, target], "
             "each the number of a vertex or a position [x, y, z]."
         ) from error
     return Pairs(tuple(sides[0]), tuple(sides[1]))
+
+
+def _list(value) -> list:
+    """What is a list. Raises TypeError for what only goes through a loop as one does."""
+    if not isinstance(value, list):
+        raise TypeError("no list")
+    return value
+
+
+def _point(name: str, value) -> LandmarkPoint:
+    """A point at the number of a vertex, or at a position [x, y, z]. Raises TypeError, ValueError, OverflowError."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 0 <= value <= MOST_VERTICES:
+            raise ValueError("no number of a vertex")
+        return LandmarkPoint(name, vertex=value)
+    x, y, z = (float(v) for v in _list(value))
+    if not math.isfinite(x + y + z):
+        raise ValueError("no place")
+    return LandmarkPoint(name, position=(x, y, z))
 
 
 def landmarks_on(
