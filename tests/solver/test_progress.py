@@ -2,9 +2,18 @@
 
 import threading
 
+import meshes
+import numpy as np
 import pytest
 
+from omt_uv.solver.api import steps
+from omt_uv.solver.comparison.comparison_figures import compare
+from omt_uv.solver.editing.magnify import magnify_map
 from omt_uv.solver.progress import EarlyEnd, Progress, RunLog, ThreadProgress, drain, on_thread, part_of, unless_ended
+from omt_uv.solver.registration.register import register
+from omt_uv.solver.sphere.dominitz_tannenbaum import flow_map
+from omt_uv.solver.sphere.sphere_map import sphere_map
+from omt_uv.solver.volumes.body_map import volume_map
 
 
 def count_to(n):
@@ -95,3 +104,43 @@ def test_a_log_adds_seconds_also_of_what_fails():
     with pytest.raises(ValueError, match="b"), log.timed("a"):
         raise ValueError("b")
     assert log.seconds["a"] >= first and log.warnings == []
+
+
+BALL, PATCH = meshes.icosphere(2), meshes.bumpy(8, 8)
+
+
+def many_patches(count=12):
+    """Patches side by side, so many that small charts are mapped together."""
+    V, F = meshes.bumpy(4, 4)
+    at = np.arange(count)
+    return (V + 3 * at[:, None, None] * [1, 0, 0]).reshape(-1, 3), (F + len(V) * at[:, None, None]).reshape(-1, 3)
+
+
+AREA = np.full(len(BALL[1]), 1.0)
+FLAT = PATCH[0][:, :2]
+# Solvers that have several stages, each a part of the way.
+SOLVERS = {
+    "unwrap": lambda: steps.unwrap(*PATCH),
+    "unwrap many": lambda: steps.unwrap(*many_patches()),
+    "refine": lambda: steps.refine(*PATCH, FLAT[PATCH[1]], balance=0.5),
+    "remesh": lambda: steps.remesh(*PATCH, 90),
+    "remesh closed": lambda: steps.remesh(*BALL, 300),
+    "sphere": lambda: sphere_map(*BALL),
+    "sphere by flow": lambda: sphere_map(*BALL, method="flow"),
+    "flow": lambda: flow_map(*BALL, AREA + np.arange(len(AREA)) % 3),
+    "match": lambda: register(PATCH, PATCH),
+    "magnify": lambda: magnify_map(FLAT, PATCH[1], np.where(np.arange(len(PATCH[1])) < 30, 2.0, 1.0)),
+    "volume": lambda: volume_map(*BALL, count=300),
+    "volume by flow": lambda: volume_map(*BALL, method="flow", count=300),
+    "compare": lambda: compare(PATCH, PATCH, 500),
+}
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_solver_goes_on_all_the_way_and_is_at_its_end_when_it_says_so(name):
+    seen = []
+    drain(SOLVERS[name](), lambda p: seen.append(p.fraction))
+    at = np.array(seen)
+    assert at[0] < 0.1 and at.min() >= 0 and at.max() <= 1 and (np.diff(at) >= -1e-9).all()
+    # At most one report comes at the end, and no stage is passed over in one step.
+    assert (at >= 1).sum() <= 1 and np.diff(at, append=1.0).max() < 0.8

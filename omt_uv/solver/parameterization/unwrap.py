@@ -425,7 +425,9 @@ class _Task:
         done = sum(len(charts[k].triangles) for k in cut.alike) / total if together else 0.0
         if not cut.maps and self.markers is None:
             (cut,) = yield from part_of(map_small_charts([cut], self.options), 0.0, done)
-        # Of charts that go alone, those that are equal but for a motion have one map.
+        # Small ones, too, go alone where they are few; of those that do, equal but for a motion, all have one map.
+        done = begun = done if cut.maps else 0.0
+        left = total - sum(len(charts[k].triangles) for k in cut.maps)
         maps, alone = list[ChartMap](), list[tuple[Chart, Target | None, ChartMap]]()
         for k, chart in enumerate(charts):
             if k in pairs:
@@ -436,7 +438,7 @@ class _Task:
             if chart_map is None and moves:
                 chart_map = equal_chart_map(chart, cut.targets[k], alone)
             if chart_map is None:
-                share = min(len(chart.triangles) / total, 1 - done)
+                share = (1 - begun) * len(chart.triangles) / left
                 chart_map = yield from part_of(self.map_one(chart), done, share)
                 done += share
                 alone += [(chart, cut.targets[k], chart_map)] if moves else []
