@@ -135,3 +135,23 @@ def test_a_picture_read_as_premultiplied_is_written_as_bright_as_it_looks(packag
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     for again in (bpy.data.images["made"], images.load(tmp_path / "saved.png")):
         assert np.abs(images.pixels_of(again) - before).max() < 0.013
+
+
+def test_a_blend_holds_every_mesh_bit_by_bit_or_is_refused_by_the_name_of_the_one_that_it_has_not(package, tmp_path):
+    """One that is missing altogether, too."""
+    check, one, two = package("files.read_back").check_blend, patch("One"), patch("Two")
+    path = tmp_path / "a.blend"
+    bpy.data.libraries.write(str(path), {one, two}, fake_user=True)
+    libraries = len(bpy.data.libraries)
+    check(path, [one, two])
+    two.data.uv_layers[0].uv[0].vector.x += 1e-3
+    with pytest.raises(package("errors").UserError, match=f"does not hold {two.data.name} as it is"):
+        check(path, [one, two])
+    three = patch("Three")
+    with pytest.raises(package("errors").UserError, match=f"does not hold {three.data.name} as it is"):
+        check(path, [one, three])
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(package("errors").UserError, match="cannot be read again"):
+        check(path, [one])
+    # What was linked for a look is gone.
+    assert len(bpy.data.libraries) == libraries and not any(mesh.library for mesh in bpy.data.meshes)

@@ -108,3 +108,32 @@ def test_a_step_that_presses_a_globe_flat_is_none():
     with np.errstate(all="raise"):
         assert problem.energy(0 * unfolded.uv) == np.inf
         assert problem.energy(unfolded.uv) < np.inf
+
+
+class Overshooting:
+    """The squared distance from 0, with steps that go much too far unless they are damped."""
+
+    order = None
+
+    def __init__(self, factor):
+        self.factor, self.tried = factor, []
+
+    def energy(self, uv):
+        self.tried.append(float((uv**2).sum()))
+        return self.tried[-1]
+
+    def step(self, uv, damping, order):
+        return -self.factor * uv / (1 + damping)
+
+    def within(self, uv):
+        return uv
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0, 30.0, 1000.0])
+def test_steps_that_lower_nothing_are_damped_until_they_do(factor):
+    problem = Overshooting(factor)
+    start = np.array([[3.0, -4.0]])
+    found, rounds = drain(exact_areas._levenberg_marquardt(problem, start, 0.0))
+    assert (found**2).sum() < 1e-3 * (start**2).sum() and 0 < rounds <= exact_areas.ROUNDS
+    # What comes out is the least that was seen.
+    assert (found**2).sum() == min(problem.tried)
