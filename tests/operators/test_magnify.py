@@ -115,8 +115,13 @@ def test_the_material_shows_the_warped_image_if_it_shall(shown):
     material.use_nodes = True
     node = material.node_tree.nodes.new("ShaderNodeTexImage")
     node.image = image
-    obj.data.materials.append(material)
+    # Slots without a material, materials without nodes, and other pictures are left alone.
+    plain, other = bpy.data.materials.new("Plain"), material.node_tree.nodes.new("ShaderNodeTexImage")
+    other.image = bpy.data.images.new("other", 4, 4)
+    for slot in (material, None, plain):
+        obj.data.materials.append(slot)
     magnify(factor=2.0, source="UV", image="map", use_image=shown)
+    assert other.image.name == "other"
     assert node.image.name.startswith("map warped") == shown
 
 

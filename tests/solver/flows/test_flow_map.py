@@ -218,3 +218,17 @@ def _way(handles, points, kind):
     """The way of handles in the units of a flow."""
     size = np.linalg.norm(np.ptp(points, axis=0))
     return flow_map._way(points / size, handles, FlowOptions(path=kind, samples=8), None, size).path
+
+
+def test_what_a_flow_has_missed_and_changed_is_told_from_a_thousandth_on():
+    """Whichever way a volume has changed, and each by itself."""
+    none = np.zeros(2)
+    assert flow_map._warnings(0.0, none, 0) == () == flow_map._warnings(1e-3, np.array([1e-3, -1e-3]), 0)
+    (missed,) = flow_map._warnings(1.1e-3, none, 0)
+    assert "by up to 0.11 % of the diagonal" in missed
+    for volumes in ([1.1e-3, 0], [0, -1.1e-3]):
+        (changed,) = flow_map._warnings(0.0, np.array(volumes), 0)
+        assert "changes by 0.11 %" in changed
+    (one,), (two,) = (flow_map._warnings(0.0, none, k) for k in (1, 2))
+    assert one.startswith("A pair of faces passes") and two.startswith("2 pairs of faces pass")
+    assert len(flow_map._warnings(1.0, np.ones(1), 1)) == 3

@@ -28,6 +28,9 @@ def test_classes_of_corners_are_vertices(mesh, vertices):
     gluing = glued(*mesh)
     assert len(np.unique(corner_classes(gluing))) == vertices
     np.testing.assert_array_equal(components(gluing), 0)
+    # They are kept for all that ask.
+    with pytest.raises(ValueError, match="read-only"):
+        corner_classes(gluing)[0] = 1
 
 
 def test_seams_are_not_glued():
