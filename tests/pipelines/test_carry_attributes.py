@@ -6,6 +6,7 @@ import pytest
 
 from omt_uv.pipelines.attributes import TYPES, Attributes, Layer, Marks, ShapeKey
 from omt_uv.pipelines.carry_attributes import carry
+from omt_uv.solver.mesh.closest_point import ClosestPoint
 from omt_uv.solver.mesh.surface import triangle_surface
 from omt_uv.solver.transfer.correspondence import correspond
 
@@ -88,6 +89,27 @@ def test_a_linear_uv_map_is_carried_as_it_is():
     old = Attributes(np.zeros(len(F), np.int32), np.zeros(len(F), bool), no_marks(), (layer,))
     new = carry(old, triangle_surface(V, F), at)
     assert new.layers[0].values == pytest.approx(W[G.ravel(), :2] @ linear, abs=1e-7) and new.folded == 0
+
+
+@pytest.mark.parametrize("columns", [3, 5, 7])
+def test_faces_that_reach_across_a_seam_have_the_map_of_one_side_as_far_as_they_go(columns):
+    V, F = meshes.grid(8, 8)
+    W, G = meshes.grid(columns, 4)
+    V, W = V * [1, 1, 0], W * [1, 1, 0]
+    right = V[F].mean(axis=1)[:, 0] > 0.5
+    middle = np.flatnonzero(np.isclose(V[:, 0], 0.5))
+    seams = np.column_stack([middle[:-1], middle[1:]])
+    uv = (V[F, :2] + 5.0 * right[:, None, None]).reshape(-1, 2)
+    index = ClosestPoint(V, F, 0.1)
+    near = index(W, np.tile([0.0, 0, 1], (len(W), 1)))
+    at = correspond(V, F, seams, W, G, near.faces, near.barycentric)
+    layer = Layer("UVMap", "CORNER", "FLOAT2", uv)
+    old = Attributes(np.zeros(len(F), np.int32), np.zeros(len(F), bool), no_marks(), (layer,))
+    found = carry(old, triangle_surface(V, F, seams), at)
+    off = found.layers[0].values.reshape(-1, 3, 2) - W[G][:, :, :2]
+    assert at.extended > 0 and found.folded == 0
+    np.testing.assert_allclose(off, np.repeat(off[:, :1], 3, axis=1), atol=1e-6)
+    np.testing.assert_allclose(off, np.where(off > 2, 5.0, 0.0), atol=1e-6)
 
 
 def test_a_mesh_carried_to_itself_has_what_it_had():
