@@ -392,3 +392,9 @@ def test_what_misses_the_bound_by_little_keeps_it_with_areas_as_exact_as_is_prom
     monkeypatch.setattr(shear_bound, "SPARED", 0.0)
     (same,) = unwrapped(surface, bound).maps
     assert same.area_l1 == plain.area_l1
+
+
+def test_a_search_that_can_map_nothing_rehearses_nothing():
+    surface = triangle_surface(*meshes.grid(4, 4))
+    search = shear_search.ShearSearch(surface, None, ShearBound(1.2), None, {})
+    assert drain(search.rehearsed(surface, None)) is None
