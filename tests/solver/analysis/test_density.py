@@ -15,6 +15,7 @@ from omt_uv.solver.analysis.density import (
     normalised_density,
     painted_density,
     region_share,
+    relative_entropy,
 )
 from omt_uv.solver.analysis.region_density import exact_density
 from omt_uv.solver.errors import DensityError, ShareError, WeightError
@@ -121,3 +122,14 @@ def test_a_part_of_a_target_keeps_what_it_has(rows):
     np.testing.assert_array_equal(part.density, density[rows])
     np.testing.assert_array_equal(part.region, region[rows])
     assert Target(density).of(rows).region is None
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-6, 40.0])
+def test_entropies_are_of_shares_and_count_what_has_any(scale):
+    target, area = np.array([1.0, 3.0, 0.0]), np.array([2.0, 1.0, 1.0])
+    expected = 0.25 * np.log(0.25 / 0.5) + 0.75 * np.log(0.75 / 0.25)
+    assert relative_entropy(scale * target, area) == pytest.approx(expected)
+    assert relative_entropy(target, scale * area) == pytest.approx(expected)
+    assert relative_entropy(area, scale * area) == pytest.approx(0, abs=1e-12)
+    # A triangle without area, or without a target, is passed over.
+    assert relative_entropy(area, target) == pytest.approx(0.5 * np.log(0.5 / 0.25) + 0.25 * np.log(0.25 / 0.75))
