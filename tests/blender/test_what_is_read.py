@@ -63,3 +63,26 @@ def test_faces_belong_to_a_region_with_half_of_the_weight_of_their_corners(packa
     faint.add([2, 3, 6, 7], 0.51, "REPLACE")
     found = {name: masks[0].tolist() for name, masks in labels.regions_of(pairs, labels.GROUPS)}
     assert found["faint"] == [False, False, True]
+
+
+def test_faces_of_empty_slots_are_a_region_of_their_own_and_those_of_every_material_too(package):
+    labels = package("blender.measuring.region_labels")
+    pairs = []
+    for names in (["Red", None, "Blue"], [None, "Red"], []):
+        obj = scenes.bump(3, 1)
+        for name in names:
+            found = bpy.data.materials.get(name) or bpy.data.materials.new(name) if name else None
+            obj.data.materials.append(found)
+        for polygon in obj.data.polygons:
+            polygon.material_index = min(polygon.index, max(len(names) - 1, 0))
+        pairs.append((obj, package("blender.mesh").read(obj)))
+    found = {name: [mask.tolist() for mask in masks] for name, masks in labels.regions_of(pairs, labels.MATERIALS)}
+    yes, no = True, False
+    assert found == {
+        "Red": [[yes, no, no], [no, yes, yes], [no, no, no]],
+        "Blue": [[no, no, yes], [no, no, no], [no, no, no]],
+        "no material": [[no, yes, no], [yes, no, no], [yes, yes, yes]],
+    }
+    # Where nothing has a material, there are no regions.
+    with pytest.raises(package("errors").UserError, match="no material to tell regions by"):
+        labels.regions_of(pairs[2:], labels.MATERIALS)

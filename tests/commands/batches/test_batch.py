@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import io
 import json
@@ -10,6 +11,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -150,3 +152,23 @@ def test_what_is_in_the_way_of_a_batch_is_one_line_that_names_it_and_no_defect(r
     status, _, err = run("batch", "unwrap", source, "-o", out)
     assert status == 1 and err.count("\n") == 1, err
     assert named in err and "defect" not in err and "another batch" not in err
+
+
+@pytest.mark.parametrize(
+    "rest, kept",
+    [
+        ("--quality draft", "--quality draft"),
+        ("--report r.json --quality draft", "--quality draft"),
+        ("--quality draft -o x.obj --size=3", "--quality draft --size=3"),
+        ("--preview=p.png --size 3 --timeout 5 --memory=2 --quality draft", "--size 3 --quality draft"),
+        ("--report --quality --size 3", "--size 3"),
+        ("", ""),
+    ],
+)
+def test_what_a_batch_gives_itself_is_left_out_with_its_value_and_nothing_else(package, rest, kept):
+    parser = argparse.ArgumentParser()
+    for name in ("--report", "--preview", "-o --output", "--timeout", "--memory", "--quality", "--size"):
+        parser.add_argument(*name.split())
+    given, rest = SimpleNamespace(parser=parser), tuple(rest.split())
+    words = ["in.obj", "--", *rest]
+    assert package("commands.batches.batch")._complete(given, words, rest) == ["in.obj", "--", *kept.split()]
