@@ -110,3 +110,29 @@ def test_what_is_drawn_for_which_choice_is_that_of_the_table(package):
                 lines.append("\t".join([name, prop.identifier, plain(value), *other]))
             properties.property_unset(prop.identifier)
     check(DRAWN, lines)
+
+
+class Flags(Recorder):
+    """A layout that keeps how it was told to draw, too."""
+
+    def __setattr__(self, name, value):
+        self.kept[name] = value
+        super().__setattr__(name, value)
+
+
+def test_settings_have_their_names_beside_them_and_no_dots_for_keys(package):
+    """As in every panel of Blender: the redo panel and the sidebar draw the same."""
+    tried = 0
+    for name, cls in operators(package):
+        draw = getattr(importlib.import_module(cls.__module__), "draw_settings", None)
+        if draw is None:
+            continue
+        layout = Flags([])
+        try:
+            draw(layout, bpy.context.window_manager.operator_properties_last(name))
+        except (AttributeError, TypeError):
+            # The module draws the settings of another one of its operators.
+            continue
+        assert layout.kept["use_property_split"] is True and layout.kept["use_property_decorate"] is False, name
+        tried += 1
+    assert tried > 8

@@ -213,6 +213,7 @@ def test_folds_are_straightened_and_what_is_held_stays():
     found = drain(straightened(P, F, folded, held))
     assert (signed_volumes(found, F) > 0).all() and np.allclose(found[held], P[held], atol=1e-12)
     fresh = laid_out(P, F, folded, P[:, 2] > 0.8)
+    assert np.allclose(np.linalg.norm(fresh, axis=1), 1, atol=1e-12)
     assert (signed_volumes(fresh, F) > 0).all() and np.allclose(fresh[held], P[held])
 
 
