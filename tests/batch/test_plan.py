@@ -112,3 +112,19 @@ def test_the_key_changes_with_whatever_changes_results(package, tmp_path):
     keys = {p.key() for p in [plan, *more, package("batch.plan").BatchPlan("refine", plan.options, plan.output)]}
     assert len(keys) == 5
     assert plan_of(package, tmp_path / "elsewhere", timeout=9.0, memory=1.0).key() == plan.key()
+
+
+def test_what_a_run_has_written_is_its_file_or_all_its_levels_of_detail(package, tmp_path):
+    outputs = package("batch.child").outputs_of
+    task = package("batch.plan").FileTask("a.obj", tmp_path / "a.obj", 1, 1, tmp_path / "out" / "a.obj")
+    assert outputs(task) == {}
+    (tmp_path / "out").mkdir()
+    levels = [tmp_path / "out" / f"a_LOD{k}.obj" for k in (0, 1, 2, 4)]
+    for k, path in enumerate(levels):
+        path.write_bytes(b"x" * (k + 1))
+    # What comes after a gap is of another run.
+    found = outputs(task)
+    assert {path: size for path, (_, size) in found.items()} == {str(path): k + 1 for k, path in enumerate(levels[:3])}
+    assert len({digest for digest, _ in found.values()}) == 3
+    task.output.write_bytes(b"whole")
+    assert [(path, size) for path, (_, size) in outputs(task).items()] == [(str(task.output), 5)]

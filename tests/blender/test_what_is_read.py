@@ -86,3 +86,9 @@ def test_faces_of_empty_slots_are_a_region_of_their_own_and_those_of_every_mater
     # Where nothing has a material, there are no regions.
     with pytest.raises(package("errors").UserError, match="no material to tell regions by"):
         labels.regions_of(pairs[2:], labels.MATERIALS)
+
+
+def test_options_that_an_operator_does_not_have_are_left_out(package):
+    known = package("blender.versions").known_options
+    assert known(bpy.ops.mesh.primitive_cube_add, size=2.0, facets=9) == {"size": 2.0}
+    assert known(bpy.ops.mesh.primitive_cube_add) == {}

@@ -10,7 +10,7 @@ from omt_uv.pipelines.arranging.actions import rectify_islands
 from omt_uv.pipelines.layout import Refusal
 from omt_uv.pipelines.magnify import Region, islands_of
 from omt_uv.pipelines.reading import Reading
-from omt_uv.pipelines.regions.several import NamedRegion, magnify_several, region_factors
+from omt_uv.pipelines.regions.several import MISSED, JointShares, NamedRegion, magnify_several, region_factors
 from omt_uv.pipelines.shapes.landmark_pairs import PairsError, pairs_of, read_pairs
 from omt_uv.pipelines.shapes.match import largest_part
 from omt_uv.pipelines.shapes.partition import MOST_MATERIALS, partition_surface
@@ -112,3 +112,11 @@ def test_islands_that_are_no_grids_are_refused_by_their_faces():
     with pytest.raises(Refusal, match="no quads") as caught:
         rectify_islands([Reading(SURFACE, np.ones(len(F), bool), UV, None)])
     np.testing.assert_array_equal(caught.value.error.elements, np.arange(len(F)))
+
+
+@pytest.mark.parametrize("off", [1.0, -1.0])
+def test_regions_that_missed_their_share_are_told_and_no_others(off):
+    target, missed = np.array([0.2, 0.3, 0.5]), np.array([0.9, 1.1, 0.0])
+    shares = JointShares(("a", "b", "c"), target / 2, target, target * (1 + off * MISSED * missed))
+    (told,) = shares.warnings()
+    assert told.startswith("b has ") and told.endswith(" of the texture instead of 30 %")
