@@ -45,3 +45,13 @@ def test_means_do_not_depend_on_scale():
     small = HeatMeans(V, F, 0.2).means(values * vertex_areas(V, F), SIGMAS)
     large = HeatMeans(1e4 * V, F, 2e3).means(values * vertex_areas(1e4 * V, F), 1e4 * SIGMAS)
     np.testing.assert_allclose(large, small, rtol=1e-8)
+
+
+@pytest.mark.parametrize("mesh", [meshes.single_triangle, meshes.quad_patch, meshes.cube, meshes.icosphere])
+def test_what_is_even_stays_even_and_the_whole_amount_is_kept_on_the_smallest_meshes_too(mesh):
+    """There the space of all functions is complete before it has its most dimensions."""
+    V, F = mesh()
+    area = vertex_areas(V, F)
+    np.testing.assert_allclose(HeatMeans(V, F, 0.3).means(3 * area, SIGMAS), 3.0, rtol=1e-8)
+    amount = np.where(np.arange(len(V)) == 1, 2.0, 0.0)
+    np.testing.assert_allclose(HeatMeans(V, F, 0.3).means(amount, SIGMAS) @ area, 2.0, rtol=1e-4)
