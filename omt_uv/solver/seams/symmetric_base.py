@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..cutting.component import CutComponent, boundary_vertices
 from ..cutting.cut_graph import greedy_arcs, is_disk, shorten, stretches
-from ..mesh.topology import graph_components, halfedges, pair_keys
+from ..mesh.topology import graph_components, pair_keys
 from .fine_paths import FineGraph, FineMirror
 from .path_graph import path_to
 
@@ -108,10 +108,11 @@ def _by_halves(component: CutComponent, mirror: FineMirror) -> np.ndarray | None
     within = mirror.side | mirror.plane
     chosen = within[component.triangles].all(axis=1) & ~mirror.plane[component.triangles].all(axis=1)
     sides = chosen[component.pair // 3]
-    rim = sides.any(axis=1) & ~sides.all(axis=1)
+    border = sides.any(axis=1) & ~sides.all(axis=1)
     half, vertices = _part(component, chosen)
-    parts = graph_components(*(half.pair // 3).T, len(half.triangles))[0]
-    if parts != 1 or not rim.any() or not mirror.plane[component.ends[rim]].all():
+    one, other = half.pair.T // 3
+    parts = graph_components(one, other, len(half.triangles))[0]
+    if parts != 1 or not border.any() or not mirror.plane[component.ends[border]].all():
         return None
     graph = FineGraph.of(component, mirror.image if mirror.exact else None)
     ends = vertices[half.ends]
@@ -125,8 +126,8 @@ def _by_halves(component: CutComponent, mirror: FineMirror) -> np.ndarray | None
         return None
     keys = [pair_keys(path[:-1], path[1:]) for path in (*arcs, *images)]
     cut = np.isin(pair_keys(*component.ends.T), np.concatenate([np.zeros(0, np.int64), *keys]))
-    kept = stretches(component, rim, np.unique(vertices[half.ends[found]]))[0]
-    cut |= rim
+    kept = stretches(component, border, np.unique(vertices[half.ends[found]]))[0]
+    cut |= border
     cut[kept] = False
     return cut if np.isfinite(component.cost[cut]).all() and is_disk(component, cut) else None
 
