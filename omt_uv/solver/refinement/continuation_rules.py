@@ -34,8 +34,10 @@ LOOSE = 3e-2
 ON_THE_WAY = 0.1
 # One that will miss its goal is told by its areas where a step promises less than this: see `is_out_of_reach`.
 FORESEEN = 0.05
-# One that has reached it ends, too, where a whole step changes shear and area error by less than this share of them.
+# One that has reached it ends, too, where a whole step changes the shear by less than this share, and the area error by
+# less than this share of the goal.
 SETTLED = 0.02
+SETTLED_AREAS = 0.1
 # The same where sweeps follow every step: what Newton promises then is in few faces, and sweeps do it for less. Share
 # of the energy where the goal is not reached, where it is, and on the way.
 SWEPT_TOLERANCE = 0.1
@@ -280,7 +282,7 @@ def is_settled(share: Number, now: tuple[Number, Number], before: tuple[Number, 
     """Whether a step taken to this share left shear and area error about as they were, and the latter at its goal:
     what further ones change, nobody sees."""
     (shear, error), (last_shear, last_error) = now, before
-    same = (np.abs(shear - last_shear) <= SETTLED * shear) & (np.abs(error - last_error) <= SETTLED * error)
+    same = (np.abs(shear - last_shear) <= SETTLED * last_shear) & (np.abs(error - last_error) <= SETTLED_AREAS * goal)
     return (share == 1) & (error <= goal) & same
 
 
