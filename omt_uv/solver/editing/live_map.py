@@ -67,7 +67,7 @@ class LiveMap:
         motion = FreeMotion(np.zeros(len(given), bool))
         # Large islands by parts, and all by factors of steps before: a step that is nearly right, and there sooner, is
         # what a slider wants.
-        parts = schwarz_solver(mesh.vertices, mesh.triangles, keep=True)
+        parts = schwarz_solver(mesh.vertices, mesh.triangles)
         assembly = assembly_of(faces, len(given), parts or KeptFactor())
         if parts is not None:
             # Not while the slider is being moved.

@@ -209,17 +209,12 @@ def _part_factor(block: sp.csc_matrix) -> Factor:
         return Factor(block, "natural")
 
 
-def schwarz_solver(points: np.ndarray, triangles: np.ndarray, keep: bool = False) -> AdditiveSchwarz | None:
-    """Parts of a mesh (n,d), (m,3) that is so large that it should be solved in parts; keep: see there.
+def schwarz_solver(points: np.ndarray, triangles: np.ndarray) -> AdditiveSchwarz | None:
+    """Parts, whose factors are kept, of a mesh (n,d), (m,3) that is so large that it should be solved in parts.
 
     The order of the vertices is that of their elimination.
     """
-    if hangs_by_few(points, triangles, LARGE_KEPT if keep else LARGE):
-        return None
-    parts = AdditiveSchwarz(points, triangles, keep=keep)
-    if not keep:
-        give_back()
-    return parts
+    return None if hangs_by_few(points, triangles, LARGE_KEPT) else AdditiveSchwarz(points, triangles, keep=True)
 
 
 def hangs_by_few(points: np.ndarray, triangles: np.ndarray, large: int | None = None) -> bool:

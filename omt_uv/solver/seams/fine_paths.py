@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -108,11 +109,13 @@ def carried(
                 image = fine.straightened(image, used | ~allowed, unsure)
             used[image] = True
             paths.append(image)
-    chosen = np.zeros(len(component.pair), dtype=bool)
-    if paths:
-        keys = pair_keys(np.concatenate([p[:-1] for p in paths]), np.concatenate([p[1:] for p in paths]))
-        chosen = np.isin(pair_keys(*component.ends.T), keys)
-    return _forest(component, chosen, start)
+    return _forest(component, edges_along(component, paths), start)
+
+
+def edges_along(component: CutComponent, paths: Sequence[np.ndarray]) -> np.ndarray:
+    """Edges (e,) bool of a component between the vertices (k,) of paths that follow each other."""
+    keys = [np.zeros(0, np.int64), *(pair_keys(path[:-1], path[1:]) for path in paths)]
+    return np.isin(pair_keys(*component.ends.T), np.concatenate(keys))
 
 
 def _led(

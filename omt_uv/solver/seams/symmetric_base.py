@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..cutting.component import CutComponent, boundary_vertices
 from ..cutting.cut_graph import greedy_arcs, is_disk, shorten, stretches
 from ..mesh.topology import graph_components, pair_keys
-from .fine_paths import FineGraph, FineMirror
+from .fine_paths import FineGraph, FineMirror, edges_along
 from .path_graph import path_to
 
 # How far from the images of its vertices the image of an arc may run, over the size, where these are not exact.
@@ -71,8 +71,7 @@ def _by_arcs(component: CutComponent, mirror: FineMirror, loops: list[np.ndarray
         left[ends] = False
         joined[path] = joined[mirror.image[path]] = True
         paths += [path, mirror.image[path]]
-    keys = [pair_keys(path[:-1], path[1:]) for path in paths]
-    cut = np.isin(pair_keys(*component.ends.T), np.concatenate([np.zeros(0, np.int64), *keys]))
+    cut = edges_along(component, paths)
     # Where the mesh is not quite its own image, an arc may meet another one's image.
     return cut if is_disk(component, cut) else None
 
@@ -121,11 +120,10 @@ def _by_halves(component: CutComponent, mirror: FineMirror) -> np.ndarray | None
     none = np.zeros(0, np.int64)
     found = shorten(half, greedy_arcs(half, none), none)
     arcs = [vertices[path] for path in _paths(half, found)]
-    images = [_image(graph, mirror, path) for path in arcs]
-    if any(image is None for image in images):
+    images = [image for image in (_image(graph, mirror, path) for path in arcs) if image is not None]
+    if len(images) < len(arcs):
         return None
-    keys = [pair_keys(path[:-1], path[1:]) for path in (*arcs, *images)]
-    cut = np.isin(pair_keys(*component.ends.T), np.concatenate([np.zeros(0, np.int64), *keys]))
+    cut = edges_along(component, [*arcs, *images])
     kept = stretches(component, border, np.unique(vertices[half.ends[found]]))[0]
     cut |= border
     cut[kept] = False
@@ -161,24 +159,24 @@ def _part(component: CutComponent, chosen: np.ndarray) -> tuple[CutComponent, np
 def _paths(component: CutComponent, cut: np.ndarray) -> list[np.ndarray]:
     """Vertices (k,) of every path of the cut (e,) bool between branchings and boundaries; two of one that closes."""
     n, found = component.vertex_count, []
+    node = component.on_boundary() | (np.bincount(component.ends[cut].ravel(), minlength=n) > 2)
     for stretch in stretches(component, cut, np.zeros(0, np.int64)):
         ends = component.ends[stretch]
         vertices, count = np.unique(ends, return_counts=True)
         last = vertices[count == 1]
-        graph = csr_matrix((np.ones(len(ends)), ends.T), shape=(n, n))
-        if len(last):
-            before = dijkstra(graph, directed=False, indices=last[0], return_predecessors=True)[1]
-            found.append(path_to(before, int(last[1])))
-            continue
-        node = vertices[component.on_boundary()[vertices] | (np.bincount(component.ends[cut].ravel())[vertices] > 2)][0]
-        far, before = dijkstra(graph, directed=False, indices=node, return_predecessors=True)
-        middle = vertices[np.argmax(far[vertices])]
-        one = path_to(before, int(middle))
-        rest = ends[~np.isin(pair_keys(*ends.T), pair_keys(one[:-1], one[1:]))]
-        graph = csr_matrix((np.ones(len(rest)), rest.T), shape=(n, n))
-        before = dijkstra(graph, directed=False, indices=node, return_predecessors=True)[1]
-        found += [one, path_to(before, int(middle))]
+        begin = int(last[0] if len(last) else vertices[node[vertices]][0])
+        found.append(_longest(ends, begin, n))
+        if not len(last):
+            half = pair_keys(found[-1][:-1], found[-1][1:])
+            found.append(_longest(ends[~np.isin(pair_keys(*ends.T), half)], begin, n))
     return found
+
+
+def _longest(ends: np.ndarray, begin: int, n: int) -> np.ndarray:
+    """Vertices (k,) of the way along edges (e,2), of n vertices, from the farthest of them to `begin`."""
+    graph = csr_matrix((np.ones(len(ends)), ends.T), shape=(n, n))
+    far, before = dijkstra(graph, directed=False, indices=begin, return_predecessors=True)
+    return path_to(before, int(np.argmax(np.where(np.isfinite(far), far, -1.0))))
 
 
 def _image(graph: FineGraph, mirror: FineMirror, path: np.ndarray) -> np.ndarray | None:
