@@ -29,7 +29,7 @@ from .component import (
 from .crease_sides import hard_borders
 from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import net
-from .gluing_facts import TurningLines, cost_factors, marked_triangles, total_curvature, turning_lines
+from .gluing_facts import TurningLines, cost_factors, in_unit_box, marked_triangles, total_curvature, turning_lines
 from .handle_partition import partition_pairs
 from .hole_filling import MANY, fill_holes, level_parts, sieved
 from .protrusions import BEARABLE, edge_distance, farthest, first_tips, log_scale, outline_spread, peak, spread
@@ -54,6 +54,10 @@ LONGER = 1.5
 
 class SeamFinder(Protocol):
     """What finds the seams of components, beyond what makes them disks; see `seams.search.SeamSearch`."""
+
+    @property
+    def is_again(self) -> bool:
+        """Whether what is wanted has missed its bound as it was cut before: a net, too."""
 
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether to search a component of these polygons (m,), some of whose boundary is marked as a seam or not."""
@@ -157,7 +161,7 @@ def cut_gluing(
 ) -> Steps[CutSurface]:
     """A repaired gluing cut into disks; see `cut`. outline : they are to fill an outline"""
     vertex_count = len(surface.positions)
-    positions, unit = _in_unit_box(surface, repaired.gluing)
+    positions, unit = in_unit_box(surface, repaired.gluing)
     gluing, one_sided = _oriented(repaired.gluing, positions)
     twisted = one_sided
     component_of, classes = components(gluing), corner_classes(gluing)
@@ -181,7 +185,7 @@ def cut_gluing(
         filled = fill_holes(surface, gluing, one_sided, None if fill else sieve, level)
         surface, gluing, holes = filled.surface, filled.gluing, filled.holes
         one_sided = np.append(one_sided, np.zeros(len(gluing.triangles) - len(one_sided), dtype=bool))
-        positions, unit = _in_unit_box(surface, gluing)
+        positions, unit = in_unit_box(surface, gluing)
     keep_free = np.ones(len(positions))
     keep_free[:vertex_count] = 0
     if avoid is not None:
@@ -203,7 +207,7 @@ def cut_gluing(
 
 def uncut(surface: Surface, repaired: Repaired) -> CutSurface | None:
     """A repaired gluing, its faces turned to one side, with no cuts but where it was torn; None if it has one side."""
-    positions, unit = _in_unit_box(surface, repaired.gluing)
+    positions, unit = in_unit_box(surface, repaired.gluing)
     gluing, one_sided = _oriented(repaired.gluing, positions)
     return None if one_sided.any() else _uncut(surface, gluing, repaired, components(gluing), unit)
 
@@ -314,7 +318,8 @@ class _Cutter:
         self, component: CutComponent, topology: Topology, k: int, filled: bool, searched: bool
     ) -> Steps[tuple[np.ndarray, np.ndarray]]:
         """The net of component k, if it has one that is not much longer than other cuts; else those."""
-        unrolled = net(component) if (self.extremities or searched) and not filled else None
+        again = searched and self.search is not None and self.search.is_again
+        unrolled = net(component) if (self.extremities or searched) and not (filled or again) else None
         found = None if unrolled is None else unrolled.up_to(unrolled.most)
         if found is not None:
             return found.cut, found.tips
@@ -367,18 +372,6 @@ def _oriented(gluing: Gluing, positions: np.ndarray) -> tuple[Gluing, np.ndarray
     area = face_areas(positions, gluing.vertex[gluing.triangles])
     turned, one_sided = orientations(gluing, area)
     return turn_over(gluing, turned), one_sided
-
-
-def _in_unit_box(surface: Surface, gluing: Gluing) -> tuple[np.ndarray, float]:
-    """Positions (n,3) of the surface such that the triangles lie in a unit box, and its size; 0 where unused."""
-    used = np.unique(gluing.vertex[gluing.triangles])
-    p = surface.positions[used]
-    low, high = p.min(axis=0), p.max(axis=0)
-    # Halves first: the difference of two huge numbers may be infinite.
-    unit = 2 * float((high / 2 - low / 2).max()) or 1.0
-    positions = np.zeros(surface.positions.shape)
-    positions[used] = p / unit - low / unit
-    return positions, unit
 
 
 def cut_component(

@@ -80,3 +80,15 @@ def turning_lines(gluing: Gluing, component_of: np.ndarray, one_sided: np.ndarra
     _, first = np.unique(apart, return_index=True)
     parts = np.bincount(component_of[first], minlength=int(component_of.max()) + 1)
     return lines & (parts == 1)[pair_component]
+
+
+def in_unit_box(surface: Surface, gluing: Gluing) -> tuple[np.ndarray, float]:
+    """Positions (n,3) of the surface such that the triangles lie in a unit box, and its size; 0 where unused."""
+    used = np.unique(gluing.vertex[gluing.triangles])
+    p = surface.positions[used]
+    low, high = p.min(axis=0), p.max(axis=0)
+    # Halves first: the difference of two huge numbers may be infinite.
+    unit = 2 * float((high / 2 - low / 2).max()) or 1.0
+    positions = np.zeros(surface.positions.shape)
+    positions[used] = p / unit - low / unit
+    return positions, unit

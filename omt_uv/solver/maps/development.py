@@ -11,8 +11,11 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
-from ..mesh.geometry import dot3, halfedge_lengths, lengths
+from ..mesh.geometry import as_points, dot3, halfedge_lengths, lengths
 from ..mesh.topology import graph_components, twins
+
+# Triangles that disagree by no more than this, over the extent, lie flat together.
+FLAT = 1e-4
 
 
 def developed(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -29,6 +32,13 @@ def developed(positions: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray,
     gap = np.zeros(n)
     np.maximum.at(gap, flat, np.abs(corners - w[flat]))
     return w, gap
+
+
+def unrolled(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray | None:
+    """Places (n,2) of a disk (n,3), (m,3) that lies flat once it is developed; None where it has curvature."""
+    w, gap = developed(positions, triangles)
+    extent = float(np.ptp(positions[np.unique(triangles)], axis=0).max())
+    return as_points(w) if gap.max() <= FLAT * extent else None
 
 
 def _local_frames(positions: np.ndarray, triangles: np.ndarray) -> np.ndarray:

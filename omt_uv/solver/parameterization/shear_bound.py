@@ -10,13 +10,14 @@ import numpy as np
 
 from ..cutting.disk_charts import DiskCharts
 from ..errors import ENDED_EARLY, MORE_SEAMS
-from ..mesh.charts import Chart
-from ..mesh.geometry import edge_lengths
-from ..mesh.topology import boundary_edges
+from ..mesh.charts import Chart, part_of_chart, sound_disks
+from ..mesh.geometry import edge_lengths, face_areas
+from ..mesh.topology import boundary_edges, pair_keys
 from ..progress import EarlyEnd, Steps, part_of, unless_ended
-from ..seams.options import SPREAD_BY_SHEAR
-from .chart_indices import but_within, edge_set, identity, is_marked
-from .chart_map import ChartMap, local_shear
+from ..seams.options import COMPACT, SPREAD_BY_SHEAR
+from .chart_indices import but_within, edge_set, identity, is_marked, outline
+from .chart_map import ChartMap, local_shear, measured_map
+from .convex_maps import with_figures
 from .mirrored_charts import mapped_anew
 from .options import ShearBound
 from .shear_search import MOST_STEEP, NEARLY, NO_EXCESS, STEEP, Round, ShearSearch, joined, pressing_shear
@@ -44,8 +45,10 @@ WORTHWHILE = 0.03
 HOPES = (1.0, 0.5)
 # What misses the bound by less may keep it with areas that are no more exact than is promised.
 SPARED = 0.05
-# Of what came apart parts with this share of the area are searched anew.
+# Of what came apart parts with this share of the area are searched anew, unless they shear no more than this: a shorter
+# cut would go across what lies flat along its edges.
 LARGE_PART = 0.03
+UNSHEARED = 1.001
 # What has no map is asked for this share of what cuts have left.
 UNKNOWN = 0.5
 # Where the time goes, roughly: seams take this share of every round.
@@ -63,11 +66,13 @@ class BoundedShear:
     prepared : the charts, and all cuts
     maps : of the charts
     warnings : which of them miss it, and what helps
+    ended_early : somebody has asked for the end
     """
 
     prepared: DiskCharts
     maps: list[ChartMap]
     warnings: tuple[str, ...]
+    ended_early: bool = False
 
 
 def bound_shear(
@@ -110,13 +115,18 @@ def bound_shear(
         if parts is None or (is_stuck and not parts[0]):
             break
         apart, flat, crossed = parts
-        missed = [k for k in last.searched if k not in apart]
+        # Searches that hardly got on are long, and the next one would get no farther.
+        stuck = [k for k in last.searched if any(one.is_stuck for one in last.found_for(k))]
+        missed = [k for k in last.searched if k not in apart and k not in stuck]
+        if not missed and not apart:
+            break
         share, promised = _shares(last, missed, promised, MARGIN ** (1 / rounds))
         spread = spread * share**SPREAD_BY_SHEAR
         kept = [but_within(last.cuts.edges, [last.charts[k] for k in (*missed, *flat)]), *apart.values()]
         # One other draw may be shorter than a longer cut, or worse; what is added to shears less, but for luck.
         changes = {"share": share, "adding": rounds > 1} | rehearsed
-        asked = _Asked(missed, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
+        chosen = [*missed, *flat]  # What is left beside flat sides may need cuts of its own.
+        asked = _Asked(chosen, np.concatenate(kept), spread, changes, lambda edges: edge_set(edges) not in tried)
         anew = _cut_anew(search, last, asked, map_charts, early)
         new = yield from part_of(anew, begin + width * PARTING, width * (1 - PARTING))
         if new is None:
@@ -129,7 +139,8 @@ def bound_shear(
     best = last if last.excess <= best.excess else best
     if not early.is_asked:
         best = yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)
-    return _result(best, search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
+    found = _result(best, search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
+    return replace(found, ended_early=early.is_asked)
 
 
 @dataclass(frozen=True)
@@ -213,7 +224,7 @@ def _taken_back(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -
 def _parts_cut_anew(search: ShearSearch, last: Round, map_charts, early: EarlyEnd) -> Steps[Round]:
     """A round within the bound whose parts have cuts of their own, where these are shorter than what was cut of the
     whole before it came apart, and keep the bound, too."""
-    large = last.area >= LARGE_PART * last.area.sum()
+    large = (last.area >= LARGE_PART * last.area.sum()) & (last.mean > UNSHEARED)
     parts = [
         k
         for k in np.flatnonzero(large & last.has_room).tolist()
@@ -287,6 +298,7 @@ def _apart(
     chosen = [k for k in last.searched if last.maps[k].failure is None]
     if not chosen:
         return found, flat, crossed
+    from ..maps.development import unrolled
     from ..seams.parting import flat_sides  # Hardly any chart misses its bound.
 
     for k in chosen:
@@ -295,7 +307,9 @@ def _apart(
         if len(edges):
             flat.append(k)
         elif crossing is not None and not whole and _may_cross(last, k, late, rounds):
-            uv = yield from crossing(last.charts[k], last.maps[k])
+            # From a sheared map on it is a long way to where what is flat lies on itself.
+            uv = unrolled(last.charts[k].vertices, last.charts[k].triangles)
+            uv = (yield from crossing(last.charts[k], last.maps[k])) if uv is None else uv
             edges = _uncrossed(search, last, k, uv, late)
             crossed |= len(edges) > 0
         if not len(edges) and mean <= (1 + NEARLY * late) * last.bound:
@@ -348,3 +362,64 @@ def _result(last: Round, shear: ShearBound, warnings: tuple[str, ...], why: str)
     by_hand = ~np.isin(np.arange(len(last.charts)), last.searched)
     missed = tuple(shear.missed(last.mean, last.area, by_hand, why))
     return BoundedShear(DiskCharts(last.charts, last.cuts, warnings), last.maps, missed)
+
+
+def in_pieces(
+    search: ShearSearch,
+    prepared: DiskCharts,
+    maps: list[ChartMap],
+    map_charts: Callable[[list[Chart]], Steps[list[ChartMap]]],
+) -> Steps[tuple[DiskCharts, list[ChartMap]]]:
+    """Charts and maps, those cut in pieces that leave most of a texture empty: long bands, as those of a gear or a
+    cable, and bodies with limbs. Charts that were not cut at all, and those with marked seams, stay whole."""
+    surface = search.surface
+    chosen = surface.triangles if search.faces is None else surface.triangles[search.faces[surface.triangle_face]]
+    whole = float(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
+    cuts = prepared.found_cuts
+    new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts.edges]
+    for chart, chart_map in zip(prepared.charts, maps, strict=True):
+        found, between = ([chart], [chart_map]), cuts.edges[:0]
+        # Most are compact, and of thousands nothing else is asked.
+        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > COMPACT * np.sqrt(whole) > 0 and not len(chart.patches):
+            was_cut = np.isin(outline(chart), pair_keys(*cuts.edges.T)).any()
+            if was_cut and not is_marked(surface, chart):
+                found, between = yield from _pieces(search, chart, chart_map, whole, map_charts)
+        new_charts += found[0]
+        new_maps += found[1]
+        edges.append(between)
+    return replace(prepared, charts=new_charts, cuts=joined(search, cuts, np.concatenate(edges))), new_maps
+
+
+def _pieces(
+    search: ShearSearch, chart: Chart, chart_map: ChartMap, whole: float, map_charts
+) -> Steps[tuple[tuple[list[Chart], list[ChartMap]], np.ndarray]]:
+    """A chart of a surface of area `whole` and its map cut in pieces, and the edges (k,2) in between; whole where it is
+    neither long nor sprawls, or the pieces are no disks."""
+    from ..seams.limbs import may_come_apart, pieces_of_chart
+
+    axes = search.shear.preferences.axes
+    up = None if axes is None else axes.up
+    if not may_come_apart(chart, chart_map.uv, up, whole):
+        return ([chart], [chart_map]), np.zeros((0, 2), np.int64)
+    cost = search.costs().vertex_cost[chart.vertex_ids]
+    piece, between = pieces_of_chart(chart, chart_map.uv, cost, up, whole, search.images)
+    parts, maps = list[Chart](), list[ChartMap]()
+    for k in range(int(piece.max()) + 1 if len(between) else 0):
+        part, used = part_of_chart(chart, piece == k)
+        parts.append(part)
+        maps.append(with_figures(chart_map, chart_map.uv[used], measured_map(part, chart_map.uv[used], None)))
+    if not parts or not sound_disks(parts).all():
+        return ([chart], [chart_map]), between[:0]
+    # What hangs on nothing any more can do with less shear.
+    again = yield from map_charts(parts)
+    return (parts, again if _shears_less(parts, again, maps) else maps), between
+
+
+def _shears_less(charts: list[Chart], maps: list[ChartMap], before: list[ChartMap]) -> bool:
+    """Whether all charts have maps that shear less in the mean than those before, and fold no more faces."""
+    if any(one.failure is not None or one.folds > other.folds for one, other in zip(maps, before, strict=True)):
+        return False
+    area = np.array([face_areas(chart.vertices, chart.triangles).sum() for chart in charts])
+    return bool(
+        area @ np.array([one.angle_mean - other.angle_mean for one, other in zip(maps, before, strict=True)]) < 0
+    )

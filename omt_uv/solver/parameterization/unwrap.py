@@ -17,14 +17,11 @@ from ..cutting.cuts import cut as cut_surface
 from ..cutting.disk_charts import OUTLINED, DiskCharts, disk_charts
 from ..cutting.hole_filling import MANY
 from ..errors import MeshError, plural
-from ..mesh.charts import Chart, part_of_chart, sound_disks
+from ..mesh.charts import Chart
 from ..mesh.edge_flips import cut_along_shorter
-from ..mesh.geometry import face_areas
 from ..mesh.surface import Surface
-from ..mesh.topology import pair_keys
 from ..progress import Progress, Steps, part_of
 from ..refinement.continuation_rules import PROMISED, QUALITIES
-from ..seams.options import COMPACT
 from .chart_indices import (
     ChartPins,
     CornerPins,
@@ -32,13 +29,11 @@ from .chart_indices import (
     clear_of_pins,
     cut_as_given,
     in_order_of_places,
-    is_marked,
     located,
-    outline,
     pins_of_chart,
 )
-from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, measured_map, no_map, refined_again
-from .convex_maps import with_convex_polygons, with_drawn_triangles, with_figures, with_folds_counted
+from .chart_map import WITHOUT_MAP, ChartMap, cut_for_a_map, no_map, refined_again
+from .convex_maps import with_convex_polygons, with_drawn_triangles, with_folds_counted
 from .mirrored_charts import (
     as_given,
     cut_alike,
@@ -50,7 +45,7 @@ from .mirrored_charts import (
     with_mirrored_quads,
 )
 from .options import ShearBound, UnwrapOptions
-from .shear_bound import bound_shear
+from .shear_bound import bound_shear, in_pieces
 from .shear_search import ShearSearch
 from .small_charts import is_small, map_together
 
@@ -149,77 +144,28 @@ def unwrap(
     task = _Task(cut.surface, options, pins, target, markers, cut_anew=search is not None)
     prepared, width = cut.prepared, (1 - begin) * (1 if cut.search is None else MAPPING)
     maps = yield from part_of(task.map_symmetric(cut), begin, width)
+    crossing = task.crossing if pins is None and task.options.boundary == "free" else None
+    said, settled = prepared.warnings, search is None
+    missed: tuple[str, ...] = ()
     if search is not None:
-        crossing = task.crossing if pins is None and task.options.boundary == "free" else None
         further = bound_shear(search, prepared, maps, task.map_charts, crossing, task.sparing)
         found = yield from part_of(further, begin + width, 1 - begin - width - PIECES)
-        warnings = (*prepared.warnings, *cut_for_a_map(maps, found.maps), *found.warnings)
-        prepared, maps = replace(found.prepared, warnings=warnings), found.maps
+        said, missed, settled = (*said, *cut_for_a_map(maps, found.maps)), found.warnings, found.ended_early
+        prepared, maps = found.prepared, found.maps
+    if cut.search is not None and crossing is not None and target is None:
+        pieces = in_pieces(cut.search, prepared, maps, task.map_charts)
+        apart, parts = yield from part_of(pieces, 1 - PIECES, PIECES / 2)
+        if len(parts) > len(maps) and not settled:
+            # Limbs shear more than the mean of them and all else.
+            further = bound_shear(cut.search, apart, parts, task.map_charts, crossing, task.sparing)
+            found = yield from part_of(further, 1 - PIECES / 2, PIECES / 2)
+            apart, parts, missed = found.prepared, found.maps, found.warnings
+        prepared, maps = apart, parts
     charts, cuts = prepared.charts, np.zeros((0, 2), np.int64) if prepared.cuts is None else prepared.cuts.edges
-    if cut.search is not None and pins is None and target is None and task.options.boundary == "free":
-        pieces = _in_pieces(task, cut.search, charts, maps, cuts)
-        charts, maps, cuts = yield from part_of(pieces, 1 - PIECES, PIECES)
     given, (charts, maps) = charts, (yield from task.finished(charts, maps, surface))
     if task.options.boundary != "free" and task.options.kind == "authalic":
         maps = yield from _with_room(task, given, maps, surface)
-    return SurfaceMap(charts, maps, cuts, prepared.warnings)
-
-
-def _in_pieces(
-    task: _Task, search: ShearSearch, charts: list[Chart], maps: list[ChartMap], cuts: np.ndarray
-) -> Steps[tuple[list[Chart], list[ChartMap], np.ndarray]]:
-    """Charts, maps and cuts (k,2), those cut in pieces that leave most of a texture empty: long bands, as those of a
-    gear or a cable, and bodies with limbs. Charts that were not cut at all, and those with marked seams, stay whole."""
-    surface = search.surface
-    chosen = surface.triangles if search.faces is None else surface.triangles[search.faces[surface.triangle_face]]
-    whole = float(face_areas(surface.positions, surface.corner_vertex[chosen]).sum())
-    new_charts, new_maps, edges = list[Chart](), list[ChartMap](), [cuts]
-    for chart, chart_map in zip(charts, maps, strict=True):
-        found, between = ([chart], [chart_map]), cuts[:0]
-        # Most are compact, and of thousands nothing else is asked.
-        if np.hypot(*np.ptp(chart_map.uv, axis=0)) > COMPACT * np.sqrt(whole) > 0 and not len(chart.patches):
-            was_cut = np.isin(outline(chart), pair_keys(*cuts.T)).any()
-            if was_cut and not is_marked(surface, chart):
-                found, between = yield from _pieces(task, search, chart, chart_map, whole)
-        new_charts += found[0]
-        new_maps += found[1]
-        edges.append(between)
-    return new_charts, new_maps, np.concatenate(edges)
-
-
-def _pieces(
-    task: _Task, search: ShearSearch, chart: Chart, chart_map: ChartMap, whole: float
-) -> Steps[tuple[_Drawn, np.ndarray]]:
-    """A chart of a surface of area `whole` and its map cut in pieces, and the edges (k,2) in between; whole where it is
-    neither long nor sprawls, or the pieces are no disks."""
-    from ..seams.limbs import may_come_apart, pieces_of_chart
-
-    axes = search.shear.preferences.axes
-    up = None if axes is None else axes.up
-    if not may_come_apart(chart, chart_map.uv, up, whole):
-        return ([chart], [chart_map]), np.zeros((0, 2), np.int64)
-    cost = search.costs().vertex_cost[chart.vertex_ids]
-    piece, between = pieces_of_chart(chart, chart_map.uv, cost, up, whole, search.images)
-    parts, maps = list[Chart](), list[ChartMap]()
-    for k in range(int(piece.max()) + 1 if len(between) else 0):
-        part, used = part_of_chart(chart, piece == k)
-        parts.append(part)
-        maps.append(with_figures(chart_map, chart_map.uv[used], measured_map(part, chart_map.uv[used], None)))
-    if not parts or not sound_disks(parts).all():
-        return ([chart], [chart_map]), between[:0]
-    # What hangs on nothing any more can do with less shear.
-    again = yield from task.map_charts(parts)
-    return (parts, again if _shears_less(parts, again, maps) else maps), between
-
-
-def _shears_less(charts: list[Chart], maps: list[ChartMap], before: list[ChartMap]) -> bool:
-    """Whether all charts have maps that shear less in the mean than those before, and fold no more faces."""
-    if any(one.failure is not None or one.folds > other.folds for one, other in zip(maps, before, strict=True)):
-        return False
-    area = np.array([face_areas(chart.vertices, chart.triangles).sum() for chart in charts])
-    return bool(
-        area @ np.array([one.angle_mean - other.angle_mean for one, other in zip(maps, before, strict=True)]) < 0
-    )
+    return SurfaceMap(charts, maps, cuts, (*said, *missed))
 
 
 def _with_room(task: _Task, charts: list[Chart], maps: list[ChartMap], given: Surface) -> Steps[list[ChartMap]]:

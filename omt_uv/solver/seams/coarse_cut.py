@@ -22,6 +22,8 @@ from .predicted_scale import ScaleModel
 
 # A closed surface is grounded through this share of its area, so that its Laplacian has an inverse.
 GROUND = 1e-6
+# A cut that has so many times the spread asked for, or more, has no arcs left to grow: symmetric ones, mostly.
+STUCK = 2.0
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class Found:
     rehearsed : the square of log(shear) of a map of the coarse surface that is cut so; None where there is none
     polygons (k,) : of the part
     gave_up : no longer cut seemed to be worth what it costs, though that is more than was asked for
+    is_stuck : it was asked for more, and hardly anything was left to grow
     """
 
     edges: np.ndarray
@@ -47,6 +50,7 @@ class Found:
     polygons: np.ndarray
     rehearsed: float | None = None
     gave_up: bool = False
+    is_stuck: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,11 @@ class CoarseCut:
         """What it costs, with what is cut beside it; less is better. One that misses the bound costs what reaching it
         would."""
         return self.setting.base_cost + self.cut.cost * max(self.cut.spread / self.task.bound, 1.0) ** EXCHANGE
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether it is far from its bound, and nothing more can be cut."""
+        return self.cut.spread > STUCK * self.task.bound
 
     def carried(self, component: CutComponent) -> Found:
         """The same, led along the edges of the component."""

@@ -15,16 +15,22 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from scipy.spatial import cKDTree
 
 from ..analysis.symmetry_plane import MirrorImages
-from ..maps.overlap import cover_pairs
+from ..maps.contacts import lies_apart
+from ..maps.development import developed
+from ..maps.overlap import cover_pairs, overlap_share
 from ..mesh.charts import Chart
-from ..mesh.geometry import edge_lengths, face_areas, unit
+from ..mesh.geometry import as_points, edge_lengths, face_areas, unit
 from ..mesh.topology import boundary_edges, graph_components, halfedges, pair_keys, pair_up, paired
 from .options import COMPACT
 from .path_graph import path_to
 
 # Points of a triangle that are looked at, as shares of its corners: its middle, and between that and each corner.
 POINTS = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
-# Parts that cover less than this share of the chart between them are left to lie beside each other.
+# Of charts of few triangles so many in each are, at least, in rows: slivers can cover little, and be in the way.
+FEW = 1000
+ROWS = 12
+# Parts that cover less than this share of the chart between them are left to lie beside each other, but for those that
+# cover most.
 LEAST_COVER = 3e-3
 # What is taken off has this share of the chart at least.
 LEAST_PART = 0.03
@@ -59,6 +65,10 @@ PIECE = 1.2
 MOST_PIECES = 12
 # A cut across a long chart is looked for within this share of a piece of where pieces of the same length would end.
 NEAR_CUT = 0.2
+# Flat sides stay together across a line that is this share of the outline of the smaller one, if they cover no more
+# than a share of themselves when they are unfolded.
+SHARED = 0.15
+COVERED = 2e-3
 # Capacities are whole numbers: that of an edge of mean cost, the greatest, and that of what may not be cut.
 MEAN_CAPACITY = 10_000
 MOST_CAPACITY = 10_000_000
@@ -232,7 +242,47 @@ def flat_sides(chart: Chart) -> np.ndarray:
     flat = (size >= FLAT * area) & (area >= LEAST_SIDE * graph.area.sum()) & (outline >= LEAST_OUTLINE)
     if area[flat].sum() < MOSTLY * graph.area.sum():
         return np.zeros((0, 2), np.int64)
-    return graph.ends[(one != other) & (flat[one] | flat[other])]
+    return graph.ends[(one != other) & (flat[one] | flat[other]) & ~_unfolded(chart, graph, side, flat)]
+
+
+def _unfolded(chart: Chart, graph: PolygonGraph, side: np.ndarray, flat: np.ndarray) -> np.ndarray:
+    """Edges (e,) bool in the lines across which sides (p,) of polygons that are flat (s,) bool unfold beside one
+    another, as those of a blade do; the longest lines first."""
+    inner, positions = chart.vertex_ids >= 0, np.zeros((int(chart.vertex_ids.max()) + 1, 3))
+    positions[chart.vertex_ids[inner]] = chart.vertices[inner]
+    pair = np.sort(side[graph.joined], axis=1)
+    length = np.where(pair[:, 0] != pair[:, 1], edge_lengths(positions, graph.ends), 0.0)
+    outline = np.bincount(pair.ravel(), np.repeat(length, 2), len(flat))
+    line = np.flatnonzero((length > 0) & flat[pair].all(axis=1))
+    keys, of_line = np.unique(pair_keys(*pair[line].T), return_inverse=True)
+    shared, group = np.bincount(of_line.ravel(), length[line], len(keys)), np.arange(len(flat))
+    corners, of_corner = chart.vertex_ids[chart.triangles], side[graph.polygon]
+    kept, unfolded = np.zeros((0, 2), np.int64), np.zeros(len(pair), dtype=bool)
+    for k in np.argsort(-shared, kind="stable"):
+        sides = paired(keys[k : k + 1])[0]
+        one, other = group[sides]
+        if one == other or shared[k] < SHARED * outline[sides].min():
+            continue
+        # Every side has vertices of its own, but for those on the lines across which it stays with another.
+        edges = line[of_line.ravel() == k]
+        trial = np.concatenate([kept, sides * len(positions) + np.unique(graph.ends[edges])[:, None]])
+        rows = np.isin(group[of_corner], (one, other))
+        if _lies_flat(positions, corners[rows], of_corner[rows], trial):
+            kept, group, unfolded[edges] = trial, np.where(group == other, one, group), True
+    return unfolded
+
+
+def _lies_flat(positions: np.ndarray, triangles: np.ndarray, side: np.ndarray, same: np.ndarray) -> bool:
+    """Whether flat sides (m,) of triangles (m,3) unfold beside one another, whose vertices side * n + vertex are the
+    same in pairs (k,2) and others are not."""
+    nodes, index = np.unique(side[:, None] * len(positions) + triangles, return_inverse=True)
+    here = np.isin(same, nodes).all(axis=1)
+    one, other = np.searchsorted(nodes, same[here]).T
+    label = graph_components(one, other, len(nodes))[1]
+    first = np.unique(label, return_index=True)[1]
+    faces = label[index.reshape(-1, 3)]
+    flat, _ = developed(positions[nodes[first] % len(positions)], faces)
+    return lies_apart(flat, faces) or overlap_share(as_points(flat)[faces]) <= COVERED
 
 
 def slits(
@@ -328,10 +378,11 @@ def _images_in(chart: Chart, image: np.ndarray | None) -> np.ndarray:
 def _covering(chart: Chart, uv: np.ndarray, graph: PolygonGraph) -> list[tuple[np.ndarray, np.ndarray]]:
     """Polygons (a,) and (b,) of pieces that cover each other, those first that do so most."""
     corners = uv[chart.triangles]
-    point, over = cover_pairs(corners, np.einsum("kc,mcd->mkd", POINTS, corners).reshape(-1, 2))
-    below = graph.polygon[point // len(POINTS)]
+    points = POINTS if len(corners) > FEW else _in_rows(ROWS)
+    point, over = cover_pairs(corners, np.einsum("kc,mcd->mkd", points, corners).reshape(-1, 2))
+    below = graph.polygon[point // len(points)]
     above = graph.polygon[over]
-    share = face_areas(chart.vertices, chart.triangles)[point // len(POINTS)] / (len(POINTS) * graph.area.sum())
+    share = face_areas(chart.vertices, chart.triangles)[point // len(points)] / (len(points) * graph.area.sum())
     share, below, above = (x[below != above] for x in (share, below, above))
     covered = np.zeros(len(graph.area), dtype=bool)
     covered[below] = covered[above] = True
@@ -341,10 +392,18 @@ def _covering(chart: Chart, uv: np.ndarray, graph: PolygonGraph) -> list[tuple[n
     # Every pair is seen from both sides.
     total = np.bincount(index.ravel(), share, len(key)) / 2
     found = paired(key)
-    large = (total > LEAST_COVER) & (found[:, 0] != found[:, 1])
+    apart = found[:, 0] != found[:, 1]
+    large = apart & (total >= min(LEAST_COVER, total.max(where=apart, initial=0.0)))
     order = np.argsort(-total[large], kind="stable")
     members = [np.flatnonzero(covered & (piece == k)) for k in found[large][order].ravel()]
     return list(zip(members[::2], members[1::2], strict=True))
+
+
+def _in_rows(rows: int) -> np.ndarray:
+    """Points (k,3) of a triangle, as shares of its corners, in so many rows."""
+    a, b = np.divmod(np.arange(rows**2), rows)
+    inside = a + b < rows
+    return np.stack([a + 1 / 3, b + 1 / 3, rows - a - b - 2 / 3], axis=1)[inside] / rows
 
 
 def _enlarged(

@@ -98,6 +98,11 @@ class SeamSearch:
     rehearse: Callable[[Surface, np.ndarray | None], Steps[float | None]] | None = None
     rehearsed: dict[tuple[bytes, ...], float | None] = field(default_factory=dict)
 
+    @property
+    def is_again(self) -> bool:
+        """Whether this is no first search."""
+        return self.share is not None
+
     def wants(self, polygons: np.ndarray, marked: bool) -> bool:
         """Whether a component of these polygons (m,) is searched, some of whose boundary is marked as a seam or not."""
         polygons = polygons[polygons >= 0]
@@ -164,20 +169,20 @@ class SeamSearch:
         line, shorter = mirror, None
         if mirror is not None and mirror.exact:
             exact = yield from part_of(self._symmetric(component, base, bound, mirror), 0.0, 0.4)
-            if exact is not None and exact.task.graph.is_whole():
+            if exact is not None and exact.task.graph.is_whole() and not exact.is_stuck:
                 return exact
             # Where the plane runs between the vertices, or through polygons, most go without those, along a line by it.
             line = with_line(component, mirror)
         if line is not None:
             near = yield from part_of(self._symmetric(component, base, bound, line), 0.4, 0.2)
-        if exact is not None and near is not None and exact.score <= EXACTLY * near.score:
+        if exact is not None and near is not None and not exact.is_stuck and exact.score <= EXACTLY * near.score:
             return exact
         coarse, model = self._modelled(component) if plain is None else plain
         setting = self._setting(component, free, None, coarse, model)
         task = setting.task(bound, setting.extremity())
         first = yield from part_of(self._grown_on(setting, task, free, None), 0.6, 0.1)
         best = exact if near is None else near
-        if best is not None:
+        if best is not None and (first.is_stuck or not best.is_stuck):
             # One of the coarse surfaces says what other cuts cost, about.
             most = self._worth_of_symmetry() * first.score
             if best.score <= (1 - SHORTENED) * most:
@@ -253,8 +258,11 @@ class SeamSearch:
             best = yield from part_of(self._grown_further(component, found, spread), 0.0, GROWN / 2)
         if best is None or best.cut.spread > best.task.bound:
             best = yield from part_of(self._grown_finer(component, found, spread), GROWN / 2, GROWN / 2)
+            if best.is_stuck and found.mirror is not None:
+                free = yield from self._grown_finer(component, replace(found, mirror=None), spread)
+                best = best if free.is_stuck else free
         best = yield from part_of(self._shortened(best), GROWN, 1 - GROWN)
-        return best.carried(component)
+        return replace(best.carried(component), is_stuck=best.is_stuck)
 
     def _rehearsal(self, component: CutComponent) -> Rehearsal:
         plane = self.costs().plane

@@ -3,8 +3,9 @@
 import hard_meshes
 import meshes
 import numpy as np
+import pytest
 
-from omt_uv.solver.maps.development import developed
+from omt_uv.solver.maps.development import developed, unrolled
 from omt_uv.solver.mesh.geometry import halfedge_lengths
 from omt_uv.solver.mesh.topology import boundary_loops
 from omt_uv.solver.refinement.initial_maps import unroll
@@ -43,3 +44,14 @@ def test_a_long_strip_is_unrolled():
     uv = unroll(V / 4000, F, boundary_loops(F)[0])
     length = halfedge_lengths(V, F) / 4000
     np.testing.assert_allclose(halfedge_lengths(np.column_stack([uv, 0 * uv[:, 0]]), F), length, rtol=1e-8)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_a_disk_without_curvature_is_unrolled_whatever_its_size(scale):
+    V, F = meshes.bumpy(20, 6)
+    V[:, 2] = 0.3 * np.sin(7 * V[:, 0])
+    uv = unrolled(scale * V, F)
+    assert uv is not None and uv.shape == (len(V), 2)
+    flat = np.column_stack([uv, np.zeros(len(V))])
+    np.testing.assert_allclose(halfedge_lengths(flat, F), scale * halfedge_lengths(V, F), rtol=1e-9)
+    assert unrolled(scale * meshes.bumpy(12, 12)[0], meshes.bumpy(12, 12)[1]) is None

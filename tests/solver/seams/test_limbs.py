@@ -12,6 +12,7 @@ from omt_uv.solver.analysis.symmetry_plane import MirrorImages
 from omt_uv.solver.mesh.charts import part_of_chart, strict_charts
 from omt_uv.solver.mesh.geometry import face_areas
 from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.parameterization import unwrap as unwrap_module
 from omt_uv.solver.parameterization.options import UnwrapOptions
 from omt_uv.solver.parameterization.unwrap import unwrap
 from omt_uv.solver.progress import drain
@@ -117,7 +118,7 @@ def test_pieces_are_mapped_as_if_their_seams_were_given(monkeypatch, seed):
     """A limb that comes off for its room in the texture keeps none of the shear that it had on the body."""
     for name in ("SPRAWLING", "FULL", "FULLER", "HOPEFUL"):
         monkeypatch.setattr(limbs, name, 1.0)
-    monkeypatch.setattr("omt_uv.solver.parameterization.unwrap.COMPACT", 0.1)
+    monkeypatch.setattr("omt_uv.solver.parameterization.shear_bound.COMPACT", 0.1)
     surface = meshes.polygon_surface(*with_limbs(seed))
     found = drain(unwrap(surface, options=UnwrapOptions(max_shear=1.35)))
     given = replace(surface, seams=np.concatenate([surface.seams, found.seams]))
@@ -125,6 +126,25 @@ def test_pieces_are_mapped_as_if_their_seams_were_given(monkeypatch, seed):
     assert len(found.charts) == len(again.charts) > 1
     shears = [sorted(one.angle_mean for one in maps) for maps in (found.maps, again.maps)]
     np.testing.assert_allclose(*shears, rtol=1e-3)
+
+
+def test_limbs_that_come_off_keep_the_bound_by_themselves(monkeypatch):
+    """Not only in the mean with what they hung on; what is said is about the pieces."""
+    for name in ("SPRAWLING", "FULL", "FULLER", "HOPEFUL"):
+        monkeypatch.setattr(limbs, name, 1.0)
+    monkeypatch.setattr("omt_uv.solver.parameterization.shear_bound.COMPACT", 0.1)
+    seen, bound_shear = [], unwrap_module.bound_shear
+
+    def recorded(search, first, maps, *rest):
+        seen.append((len(first.charts), len(first.found_cuts.edges)))
+        found = yield from bound_shear(search, first, maps, *rest)
+        return replace(found, warnings=(f"of {len(first.charts)}",))
+
+    monkeypatch.setattr(unwrap_module, "bound_shear", recorded)
+    found = drain(unwrap(meshes.polygon_surface(*with_limbs(1)), options=UnwrapOptions(max_shear=1.35)))
+    (whole, cuts), (pieces, more) = seen
+    assert pieces > whole and more > cuts and found.warnings == (f"of {pieces}",)
+    assert all(one.angle_mean <= 1.36 for one in found.maps) and len(found.charts) >= pieces
 
 
 def bars():

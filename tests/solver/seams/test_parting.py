@@ -149,6 +149,62 @@ def test_flat_sides_are_cut_around_and_nothing_else(turn):
     assert {*map(tuple, np.sort(edges, axis=1).tolist())} == {*map(tuple, np.sort(both, axis=1).tolist())}
 
 
+def two_sides(cells, turned):
+    """A side of square cells below a line, in the plane, and one that rises above it: with their common line along 0 0
+    to 2 0, and the cells (x, y) that the second one has, as it lies unfolded."""
+    first = [(x, y) for x in range(12) for y in range(-4, 0)] + [(x, y) for x in range(8, 12) for y in range(4)]
+    index, polygons = {}, []
+    c, s = np.cos(turned), np.sin(turned)
+    for flat, side in ((True, first), (False, cells)):
+        for x, y in side:
+            corners = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)]
+            named = [(a, b, flat or (b == 0 and a <= 8)) for a, b in corners]
+            polygons.append([index.setdefault(name, len(index)) for name in named])
+    points = [(a, b, 0.0) if flat else (a, c * b, s * b) for a, b, flat in index]
+    return np.array(points, float), polygons
+
+
+@pytest.mark.parametrize("turned", [0.4, 2.0])
+def test_flat_sides_stay_beside_one_another_across_a_line_unless_they_would_cover_each_other(turned):
+    beside = [(x, y) for x in range(8) for y in range(4)]
+    points, polygons = two_sides(beside, turned)
+    (chart,) = strict_charts(meshes.polygon_surface(points, polygons))
+    assert len(flat_sides(chart)) == 0
+    covering = [*beside, *((x, y) for x in range(8, 12) for y in (2, 3))]
+    points, polygons = two_sides(covering, turned)
+    (chart,) = strict_charts(meshes.polygon_surface(points, polygons))
+    edges = flat_sides(chart)
+    line = np.flatnonzero((points[:, 1] == 0) & (points[:, 2] == 0) & (points[:, 0] <= 8))
+    assert len(edges) == 8 and {*np.unique(edges).tolist()} == {*line.tolist()}
+
+
+def test_sides_around_a_blade_unfold_in_a_row():
+    """All but one line stay: the last one closes a ring, which cannot lie flat."""
+    rows, n = 8, 4
+    outline = np.array([[1.0, 0.0], [0.0, 0.2], [-1.0, 0.0], [0.0, -0.2]])
+    points = np.concatenate([np.column_stack([outline, np.full(n, 0.5 * z)]) for z in range(rows + 1)])
+    polygons = [
+        (z * n + k, z * n + (k + 1) % n, (z + 1) * n + (k + 1) % n, (z + 1) * n + k)
+        for z in range(rows)
+        for k in range(n)
+    ]
+    seam = np.column_stack([np.arange(rows) * n, np.arange(1, rows + 1) * n])
+    (chart,) = strict_charts(meshes.polygon_surface(points, polygons, seam))
+    edges = np.sort(flat_sides(chart), axis=1)
+    assert len(edges) == rows and len(np.unique(edges[:, 0] % n)) == 1
+    assert np.array_equal(edges[:, 1] - edges[:, 0], np.full(rows, n))
+
+
+@pytest.mark.parametrize("share", [0.5, 0.1])
+def test_slivers_of_small_charts_that_cover_little_come_apart(share):
+    """Of two strips around a corner, the end of one lies on the other by a sliver."""
+    V, F, flat = ramp(1.0 + 0.02 * share, steps=24, rings=2)
+    (chart,) = strict_charts(triangle_surface(V, F))
+    assert 0 < overlap_share(flat[chart.vertex_ids][chart.triangles], samples=20_000) < 0.02
+    edges = parted(chart, flat[chart.vertex_ids], np.ones(len(chart.vertices)))
+    assert len(edges) == 1
+
+
 def test_a_round_body_has_no_flat_sides():
     (chart,) = strict_charts(triangle_surface(*meshes.cap(12, 24, 0.9)))
     assert len(flat_sides(chart)) == 0

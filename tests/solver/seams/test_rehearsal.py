@@ -93,7 +93,7 @@ def test_a_step_across_an_edge_flips_it_and_one_in_a_triangle_that_is_flipped_go
 
 def test_a_rehearsal_foretells_the_map(monkeypatch):
     """The square of log(shear), of the cut that the search went by; what comes in pieces for its room shears less."""
-    monkeypatch.setattr("omt_uv.solver.parameterization.unwrap.COMPACT", np.inf)
+    monkeypatch.setattr("omt_uv.solver.parameterization.shear_bound.COMPACT", np.inf)
     for bound in (1.3, 1.4):
         seen, found = rehearsals(monkeypatch, triangle_surface(*meshes.two_bumps(60)), bound)
         reached = np.log(mean_shear(found)) ** 2
@@ -131,7 +131,7 @@ def test_what_maps_do_not_need_is_taken_back(monkeypatch, bound):
         return None if told is None else 2 * told
 
     monkeypatch.setattr(ShearSearch, "rehearsed", doubled)
-    monkeypatch.setattr("omt_uv.solver.parameterization.unwrap.COMPACT", np.inf)
+    monkeypatch.setattr("omt_uv.solver.parameterization.shear_bound.COMPACT", np.inf)
     surface, length = triangle_surface(*meshes.two_bumps(60)), []
     for slack in (0.0, shear_search.SLACK):
         monkeypatch.setattr(shear_search, "SLACK", slack)

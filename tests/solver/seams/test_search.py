@@ -12,7 +12,7 @@ from omt_uv.solver.analysis.seam_costs import seam_costs
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.cutting.disk_charts import cut_to_disks
 from omt_uv.solver.mesh.surface import triangle_surface
-from omt_uv.solver.seams import search
+from omt_uv.solver.seams import coarse_cut, search
 from omt_uv.solver.seams.coarse_surface import coarsening
 from omt_uv.solver.seams.cut_tree import Removal, Task, cut_along, leaves, stretches
 from omt_uv.solver.seams.growth import grow
@@ -132,6 +132,7 @@ def bent_cap():
 def test_seams_are_symmetric_where_the_plane_runs_through_some_faces(monkeypatch):
     """Edges in the plane that are turned run across it, and no cut follows it there; whatever it costs then."""
     monkeypatch.setattr(search, "EXACTLY", np.inf)
+    monkeypatch.setattr(coarse_cut, "STUCK", np.inf)
     V, F, image, plane = bent_cap()
     for k in (9, 22):
         ends = plane[[k, k + 1]]
@@ -199,6 +200,55 @@ def test_what_shears_more_than_was_predicted_is_cut_though_nothing_was_before():
     search = SeamSearch(np.full(len(F), 10.0), surface, lambda: seam_costs(surface))
     assert not len(cut_to_disks(surface, search=search).cuts.edges)
     assert len(cut_to_disks(surface, search=replace(search, share=np.full(len(F), 0.5))).cuts.edges)
+
+
+def test_a_net_is_taken_first_and_searched_for_once_its_map_has_missed_the_bound(monkeypatch):
+    surface = triangle_surface(*meshes.subdivide(*meshes.cube()))
+    count, searched = len(surface.face_start) - 1, []
+
+    def recorded(self, component, base):
+        searched.append(component.vertex_count)
+        return np.arange(len(component.pair)) < 3
+        yield
+
+    monkeypatch.setattr(SeamSearch, "__call__", recorded)
+    search = SeamSearch(np.full(count, 1e-3), surface, lambda: seam_costs(surface))
+    net = cut(surface, search=search)
+    assert not searched and net.length == pytest.approx(7 * np.ptp(surface.positions, axis=0).max())
+    cut(surface, search=replace(search, share=np.full(count, 0.5)))
+    assert searched == [len(surface.positions)]
+
+
+def symmetric_arcs_end(monkeypatch):
+    """Symmetric cuts have nothing to grow, as where the plane of a mirror passes between the vertices."""
+    grown = SeamSearch._grown
+
+    def ended(self, task, cut=None):
+        if task.graph.image is not None and (task.graph.image != np.arange(len(task.graph.image))).any():
+            return cut_along(task, np.zeros(0, np.int64))
+        return (yield from grown(self, task, cut))
+
+    monkeypatch.setattr(SeamSearch, "_grown", ended)
+
+
+def test_where_symmetric_cuts_have_nothing_left_to_grow_others_are_found(monkeypatch):
+    V, F = meshes.two_bumps(20)
+    surface, bound = triangle_surface(V, F), 0.02
+    search = SeamSearch(np.full(len(F), bound), surface, lambda: seam_costs(surface))
+    assert seam_costs(surface).plane is not None
+    first = cut_to_disks(surface, search=search)
+    (found,) = search.memory.values()
+    assert len(first.cuts.edges) and found.mirror is not None
+    symmetric_arcs_end(monkeypatch)
+    free = replace(search, memory={})
+    assert len(cut_to_disks(surface, search=free).cuts.edges)
+    (other,) = free.memory.values()
+    assert other.mirror is None and len(other.steps)
+    # What was found with a mirror goes on without where that is stuck.
+    again = replace(search, memory=dict(search.memory), share=np.full(len(F), 0.1))
+    cut_to_disks(surface, search=again)
+    (further,) = again.memory.values()
+    assert further.mirror is None and len(further.steps)
 
 
 def test_a_path_may_leave_the_mirror_plane_and_not_come_back():
