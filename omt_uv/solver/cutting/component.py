@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
@@ -33,6 +34,10 @@ HOLE = 1000.0
 NOISE = 1e-6
 # A cut ends at a vertex to be avoided as if what it reached were so much smaller.
 AVOIDED_TIP = 0.999
+# Vertices of copies are off by no more than this, over the size, and those whose extents differ by more than the second
+# share are not compared.
+SAME = 1e-5
+COARSE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -218,8 +223,41 @@ def boundary_vertices(component: CutComponent) -> list[np.ndarray]:
 
 
 def fingerprint(component: CutComponent) -> tuple[bytes, ...]:
-    """Equal for copies of a component, moved but not turned, and almost surely for no others."""
+    """Equal for the same component, and for some of its copies, and almost surely for no others."""
+    rounded = [np.round(x * 1e6) for x in _relative(component)]
+    return tuple(a.tobytes() for a in (component.triangles, component.pair, *rounded))
+
+
+@dataclass(frozen=True)
+class Copies:
+    """What was found for components, told again for copies that are moved but not turned.
+
+    Far from the origin single precision moves vertices of copies by more than any digits that a name could have.
+    """
+
+    found: dict[tuple[bytes, ...], list[tuple[list[np.ndarray], Any]]] = field(default_factory=dict)
+
+    def of(self, component: CutComponent) -> Any:
+        """What was found for a copy of a component; None where none was told."""
+        mine = _relative(component)
+        for theirs, found in self.found.get(self._name(component, mine), []):
+            if all(np.abs(a - b).max(initial=0.0) <= SAME for a, b in zip(mine, theirs, strict=True)):
+                return found
+        return None
+
+    def tell(self, component: CutComponent, found: Any) -> None:
+        """Keep what was found for a component."""
+        mine = _relative(component)
+        self.found.setdefault(self._name(component, mine), []).append((mine, found))
+
+    def _name(self, component: CutComponent, mine: list[np.ndarray]) -> tuple[bytes, ...]:
+        # Thousands of parts with the same edges, and shapes of their own, are not compared with one another.
+        shape = np.concatenate([np.ptp(mine[0], axis=0), [mine[0].mean(), np.linalg.norm(mine[0])]])
+        return component.triangles.tobytes(), component.pair.tobytes(), np.round(shape / COARSE).tobytes()
+
+
+def _relative(component: CutComponent) -> list[np.ndarray]:
+    """Positions and costs of a component of size 1 at the origin, -1 where these are infinite."""
     p = component.positions - component.positions.min(axis=0)
     size = float(p.max()) or 1.0
-    rounded = [np.round(x / size * 1e6) for x in (p, np.where(np.isfinite(component.cost), component.cost, -1))]
-    return tuple(a.tobytes() for a in (component.triangles, component.pair, *rounded))
+    return [p / size, np.where(np.isfinite(component.cost), component.cost / size, -1)]

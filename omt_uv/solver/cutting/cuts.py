@@ -19,13 +19,7 @@ from ..mesh.gluing import Gluing, components, corner_classes, groups, orientatio
 from ..mesh.repair import Repaired, coincident_boundary_vertices, repaired_gluing
 from ..mesh.surface import Surface, chosen_triangles
 from ..progress import Steps, drain, part_of
-from .component import (
-    CutComponent,
-    Topology,
-    classify,
-    fingerprint,
-    make_component,
-)
+from .component import Copies, CutComponent, Topology, classify, make_component
 from .crease_sides import hard_borders
 from .cut_graph import greedy_arcs, path_to, shorten
 from .developable_nets import net
@@ -274,7 +268,7 @@ class _Cutter:
         number = np.flatnonzero(~gone)
         report = []
         # A mesh may hold the same component many times: rivets, teeth, leaves.
-        known: dict[tuple[bytes, ...], tuple[np.ndarray, np.ndarray]] = {}
+        known = Copies(), Copies()  # Of parts that are not searched, and of others.
         patched = np.zeros(len(members), dtype=bool)
         patched[component_of[self.gluing.owner < 0]] = True
         patched[component_of[np.flatnonzero(level)]] = False
@@ -283,11 +277,12 @@ class _Cutter:
         for count, k in enumerate(chosen_ones):
             pairs = order[start[k] : start[k + 1]]
             component = make_component(left, self.positions, corner_class, members[k], pairs, self.avoid, factor)
-            name = (*fingerprint(component), searched[k].tobytes())
-            if name not in known:
+            found = known[int(searched[k])].of(component)
+            if found is None:
                 finding = self._best_cut(component, topology, k, bool(patched[k]) and not sieves, bool(searched[k]))
-                known[name] = yield from part_of(finding, count / len(chosen_ones), 1 / len(chosen_ones))
-            chosen, tips = known[name]
+                found = yield from part_of(finding, count / len(chosen_ones), 1 / len(chosen_ones))
+                known[int(searched[k])].tell(component, found)
+            chosen, tips = found
             gone[number[component.gluing_pair[chosen]]] = True
             if chosen.any() or not whole.is_disk[k]:
                 report.append(

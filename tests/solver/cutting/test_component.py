@@ -1,13 +1,18 @@
 """Components that are to be cut: what they are, and what their edges cost."""
 
+from dataclasses import replace
+
 import meshes
 import numpy as np
 import pytest
 from short_cuts import component_of, gluing_of
 
-from omt_uv.solver.cutting.component import boundary_vertices, classify, fingerprint, fold_angles
+from omt_uv.solver.analysis.seam_costs import seam_costs
+from omt_uv.solver.cutting.component import Copies, boundary_vertices, classify, fingerprint, fold_angles
 from omt_uv.solver.cutting.cuts import cut
 from omt_uv.solver.mesh.gluing import components, corner_classes
+from omt_uv.solver.mesh.surface import triangle_surface
+from omt_uv.solver.seams.search import SeamSearch
 
 
 def union(*shapes):
@@ -58,6 +63,42 @@ def test_fingerprints_are_equal_for_moved_copies_alone():
     own = fingerprint(component_of(V, F))
     assert own == fingerprint(component_of(V + [0.25, 0.5, -1], F))
     assert own != fingerprint(component_of(V * [1, 1, 1.1], F)) and own == fingerprint(component_of(V, F[::-1]))
+
+
+def test_copies_are_known_where_single_precision_has_moved_their_vertices():
+    """Not those that are turned, or of another shape, however little, or whose edges cost something else."""
+    V, F = meshes.bumpy(5, 4)
+    copies = Copies()
+    assert copies.of(component_of(V, F)) is None
+    copies.tell(component_of(V, F), "this")
+    far = (V + 12.3).astype(np.float32).astype(float)
+    assert fingerprint(component_of(V, F)) != fingerprint(component_of(far, F))
+    assert copies.of(component_of(far, F)) == copies.of(component_of(3 * V, F)) == "this"
+    turned, bent = V[:, [1, 0, 2]] * [-1, 1, 1], V + 1e-4 * np.eye(len(V), 3)
+    assert copies.of(component_of(turned, F)) is None and copies.of(component_of(bent, F)) is None
+    dearer = component_of(V, F)
+    assert copies.of(replace(dearer, cost=2 * dearer.cost)) is None
+    copies.tell(component_of(turned, F), "other")
+    assert copies.of(component_of(turned, F)) == "other" and copies.of(component_of(V, F)) == "this"
+
+
+def test_many_copies_are_cut_alike_and_searched_once(monkeypatch):
+    V, F = meshes.icosphere(2)
+    rng, searched, search_one = np.random.default_rng(0), [], SeamSearch.__call__
+    places = rng.uniform(-20, 20, size=(8, 3))
+    points, faces = union(*(((V + place).astype(np.float32).astype(float), F) for place in places))
+    surface = triangle_surface(points, faces)
+
+    def counted(self, component, base):
+        searched.append(component)
+        return (yield from search_one(self, component, base))
+
+    monkeypatch.setattr(SeamSearch, "__call__", counted)
+    search = SeamSearch(np.full(len(faces), 0.02), surface, lambda: seam_costs(surface))
+    edges = cut(surface, search=search).edges
+    assert len(searched) == 1
+    each = [np.unique(np.sort(edges[edges[:, 0] // len(V) == k] % len(V), axis=1), axis=0) for k in range(len(places))]
+    assert all(np.array_equal(each[0], other) for other in each) and len(each[0])
 
 
 def test_neither_order_nor_diagonals_move_a_seam():
