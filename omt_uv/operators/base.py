@@ -5,6 +5,7 @@ numpy and scipy load when an operator runs, so that Blender does not wait for th
 
 from __future__ import annotations
 
+import re
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -20,6 +21,9 @@ from ..settings import DEFAULT_MAX_SHEAR, DEFAULT_TEXTURE_SIZE
 
 # What Blender makes of infinity is above, and nothing that is meant.
 LARGEST = 3e38
+# Up to so many objects each have a line of their own where the same is said of them, but for numbers.
+MOST_NAMED = 3
+NUMBER = re.compile(r"\d[\d.,e+-]*")
 # Where operators on meshes work, unless they say otherwise.
 MODES = ("OBJECT", "EDIT_MESH")
 
@@ -169,15 +173,25 @@ def tell(operator: bpy.types.Operator, context: bpy.types.Context, complaint: Co
 
 
 def warn(operator: bpy.types.Operator, objects: list, warnings: list[tuple[int, str]]) -> None:
-    """Report warnings, pairs of an index into objects (-1: of none) and a text, each once."""
+    """Report warnings, pairs of an index into objects (-1: of none) and a text, each once, and one for many objects of
+    which the same is said, but for numbers."""
     from ..remedies import action_advised, advise
 
+    alike: dict[str, list[tuple[int, str, int]]] = {}
     for (index, raw), count in Counter(warnings).items():
-        name = f"{objects[index].name}: " if index >= 0 else ""
-        several = f" ({counted(count, '{} island', '{} islands')})" if count > 1 else ""
-        text = advise(raw) + several
-        last_run.state.notices.append(last_run.Notice(text, action_advised(raw)))
-        operator.report({"WARNING"}, one_line(name + text))
+        kind = NUMBER.sub("#", raw) if index >= 0 else raw
+        alike.setdefault(kind, []).append((index, raw, count))
+    for told in alike.values():
+        others = len({index for index, *_ in told}) - 1
+        for index, raw, count in told if others < MOST_NAMED else told[:1]:
+            name = f"{objects[index].name}: " if index >= 0 else ""
+            several = f" ({counted(count, '{} island', '{} islands')})" if count > 1 else ""
+            text = advise(raw) + several
+            if others >= MOST_NAMED:
+                # The numbers are those of the first.
+                name, text = "", f"{objects[index].name} and {others} other objects: {text}"
+            last_run.state.notices.append(last_run.Notice(text, action_advised(raw)))
+            operator.report({"WARNING"}, one_line(name + text))
 
 
 def _is_finite(value) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 
@@ -282,3 +283,33 @@ def test_a_report_is_about_what_is_selected(package):
     mesh = obj.data
     expected = [1, len(mesh.vertices), len(mesh.edges), len(mesh.polygons), len(mesh.uv_layers)]
     assert numbers(line) == pytest.approx([*expected, 3.0, 2.0, 2.0])
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 14])
+def test_what_is_said_of_many_objects_is_said_once(package, count):
+    """But for numbers; other words of the same objects, and what is about none of them, stand beside it."""
+    base, state = package("operators.base"), package("session.last_run").state
+    objects, told = [SimpleNamespace(name=f"Part {k}") for k in range(count)], []
+    operator = SimpleNamespace(report=lambda kind, text: told.append((kind, text)))
+    before = list(state.notices)
+    state.notices.clear()
+    every = [(k, f"{195 + k} boundary vertices lie on others") for k in range(count)]
+    try:
+        base.warn(
+            operator, objects, [*every, (0, "1.5 is much"), (0, "1.5 is much"), (-1, "2 of none"), (-1, "3 of none")]
+        )
+        notices = [notice.text for notice in state.notices]
+    finally:
+        state.notices[:] = before
+    assert all(kind == {"WARNING"} for kind, _ in told) and len(notices) == len(told)
+    named = [text for _, text in told if "boundary" in text]
+    if count > 3:
+        assert named == [f"Part 0 and {count - 1} other objects: 195 boundary vertices lie on others"]
+        assert named[0] in notices
+    else:
+        assert named == [f"Part {k}: {195 + k} boundary vertices lie on others" for k in range(count)]
+    assert [text for _, text in told if "boundary" not in text] == [
+        "Part 0: 1.5 is much (2 islands)",
+        "2 of none",
+        "3 of none",
+    ]

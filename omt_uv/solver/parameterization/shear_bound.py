@@ -139,6 +139,8 @@ def bound_shear(
     best = last if last.excess <= best.excess else best
     if not early.is_asked:
         best = yield from part_of(_made_shorter(search, best, map_charts, map_sparing, early), begin, 1 - begin)
+    # Another call need not search in vain what this one did.
+    search.memory.update(best.memory)
     found = _result(best, search.shear, first.warnings, ENDED_EARLY if early.is_asked else MORE_SEAMS)
     return replace(found, ended_early=early.is_asked)
 
